@@ -1,0 +1,162 @@
+//! What each effect costs in the production renderer: rules, bindings, bytes, instructions, GPU time.
+//! `cargo run --release --example effects_cost -- SCENE -o table.csv`; see README.md beside this file.
+
+use std::path::PathBuf;
+
+use clap::Parser;
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use skinfit::gpu::upload::Content;
+use skinfit::gpu::{Choice, Gpu, RenderOptions, Renderer};
+use skinfit::model::effects::{Effect, Effects};
+use skinfit::prepare::{PrepareOptions, Prepared, Views};
+use skinfit::render::antialias::Antialias;
+use skinfit::scene::view::Camera;
+use skinfit::shader::{Budget, Plan};
+
+#[derive(Parser)]
+struct Arguments {
+    /// The scene file.
+    scene: PathBuf,
+    /// The table, as CSV.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Image size.
+    #[arg(long, default_value_t = 1920)]
+    width: u32,
+    /// Image size.
+    #[arg(long, default_value_t = 1080)]
+    height: u32,
+    /// Frames of which the median time is taken.
+    #[arg(long, default_value_t = 200)]
+    frames: usize,
+    /// Only the full model and its floor.
+    #[arg(long)]
+    full: bool,
+    /// Filter in the shader, in f32, instead of by the hardware.
+    #[arg(long)]
+    exact: bool,
+}
+
+/// One line of the table.
+struct Row {
+    name: String,
+    rules: usize,
+    attributes: usize,
+    bindings: usize,
+    constants: usize,
+    uploaded: u64,
+    instructions: usize,
+    operations: f64,
+    milliseconds: Option<(f64, f64)>,
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments = Arguments::parse();
+    let gpu = Gpu::open(&Choice::default())?;
+    let full = Prepared::baked(&arguments.scene, &options(None))?.scene.effects;
+    let mut rows = Vec::new();
+    if !arguments.full {
+        for effect in Effect::ALL.into_iter().filter(|effect| *effect != Effect::Bloom) {
+            rows.push(measure(&arguments, &gpu, effect.name(), Effects::of(&[effect]), Plan::clone)?);
+        }
+        for effect in full.iter() {
+            let name = format!("all but {}", effect.name());
+            rows.push(measure(&arguments, &gpu, &name, full.without(effect), Plan::clone)?);
+        }
+    }
+    rows.push(measure(&arguments, &gpu, "the scene's effects", full, Plan::clone)?);
+    rows.push(measure(&arguments, &gpu, "the same fetches alone", full, Plan::fetches_alone)?);
+    let mut text = String::from(
+        "effects,rules,attributes,bindings,constants,uploaded bytes,SPIR-V instructions,planned operations,median ms,spread ms\n",
+    );
+    for row in &rows {
+        let time =
+            row.milliseconds.map_or(",".to_owned(), |(median, spread)| format!("{median:.4},{spread:.4}"));
+        text += &format!(
+            "{},{},{},{},{},{},{},{:.0},{time}\n",
+            row.name,
+            row.rules,
+            row.attributes,
+            row.bindings,
+            row.constants,
+            row.uploaded,
+            row.instructions,
+            row.operations
+        );
+    }
+    skinfit::output::write(&arguments.output, text.as_bytes())?;
+    print!("{text}");
+    println!("{} at {} x {}", gpu.name(), arguments.width, arguments.height);
+    Ok(())
+}
+
+fn options(effects: Option<Effects>) -> PrepareOptions {
+    PrepareOptions {
+        effects,
+        fit: false,
+        views: Views::First,
+        params: None,
+        cache: Some(skinfit::bake::cache::default_folder()),
+        ..PrepareOptions::default()
+    }
+}
+
+fn measure(
+    arguments: &Arguments,
+    gpu: &Gpu,
+    name: &str,
+    effects: Effects,
+    change: fn(&Plan) -> Plan,
+) -> Result<Row, Box<dyn std::error::Error>> {
+    let prepared = Prepared::baked(&arguments.scene, &options(Some(effects)))?;
+    let content = Content {
+        scene: &prepared.scene,
+        illumination: &prepared.illumination,
+        occlusion: prepared.occlusion.as_ref(),
+        params: &prepared.scene.params,
+    };
+    let budget = if arguments.exact { Budget::Exact } else { Budget::Paper };
+    let render = RenderOptions { antialias: Antialias::Grid(1), budget, timed: true, animated: false };
+    let mut renderer = Renderer::with_shader(gpu, content, render, change)?;
+    let camera =
+        Camera { width: arguments.width, height: arguments.height, ..prepared.scene.views[0].camera };
+    // The first frames wake the adapter up.
+    renderer.frame_times(&camera, arguments.frames)?;
+    let mut times = renderer.frame_times(&camera, arguments.frames)?;
+    times.sort_by(f64::total_cmp);
+    let plan = renderer.plan();
+    Ok(Row {
+        name: name.to_owned(),
+        rules: plan.steps.len(),
+        attributes: plan.attributes.len(),
+        bindings: plan.resources.len() + usize::from(!plan.constants.is_empty()),
+        constants: plan.constants.len(),
+        uploaded: renderer.uploaded_bytes(),
+        instructions: instructions(plan)?,
+        operations: plan.cost,
+        milliseconds: times
+            .get(times.len() / 2)
+            .map(|median| (*median, times[times.len() * 3 / 4] - times[times.len() / 4])),
+    })
+}
+
+/// SPIR-V instructions in the functions of both stages, as naga writes them (nothing is optimised yet).
+fn instructions(plan: &Plan) -> Result<usize, Box<dyn std::error::Error>> {
+    let module = naga::front::wgsl::parse_str(&plan.wgsl)?;
+    let info = Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module)?;
+    let options = naga::back::spv::Options::default();
+    let words = naga::back::spv::write_vec(&module, &info, &options, None)?;
+    // A module: five words of header, then instructions whose first word holds length and opcode.
+    let (mut at, mut inside, mut count) = (5, false, 0);
+    while at < words.len() {
+        let (length, opcode) = (words[at] >> 16, words[at] & 0xffff);
+        // OpFunction and OpFunctionEnd.
+        match opcode {
+            54 => inside = true,
+            56 => inside = false,
+            _ => count += usize::from(inside),
+        }
+        at += length.max(1) as usize;
+    }
+    Ok(count)
+}

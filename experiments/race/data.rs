@@ -1,0 +1,154 @@
+//! The race's data folder: manifest.json and raw little-endian float32 planes.
+
+use std::path::Path;
+
+use serde::Deserialize;
+use skinfit::bake::LobeStack;
+use skinfit::engine::cpu::Illumination;
+use skinfit::engine::view::ObservedView;
+use skinfit::model::cube::Cube;
+use skinfit::model::effects::Form;
+use skinfit::model::params::{Channels, Column, Param, Params};
+use skinfit::samples::{LANES, SurfaceArrays, ViewSamples};
+
+/// What the data folder says of itself.
+#[derive(Debug, Deserialize)]
+pub(crate) struct Manifest {
+    pub format: String,
+    pub pixels: usize,
+    pub param_names: Vec<String>,
+    pub params_true: Vec<f64>,
+    pub params_init: Vec<f64>,
+    pub params_opt_noisy: Vec<f64>,
+    pub loss_opt_noisy: f64,
+    pub hessian_half_noisy: Vec<Vec<f64>>,
+    pub cube_size: usize,
+}
+
+/// The race's unknowns, under its names.
+const UNKNOWNS: [(&str, Param, Channels); 10] = [
+    ("rim_weight_r", Param::RimWeight, Channels::One(0)),
+    ("rim_weight_g", Param::RimWeight, Channels::One(1)),
+    ("rim_weight_b", Param::RimWeight, Channels::One(2)),
+    ("rim_exponent", Param::RimExponent, Channels::Tied),
+    ("hilite", Param::Hilite, Channels::Tied),
+    ("reflection", Param::Reflection, Channels::Tied),
+    ("occlusion", Param::Occlusion, Channels::Tied),
+    ("side_spec", Param::SideSpecular, Channels::Tied),
+    ("bump", Param::NormalStrength, Channels::Tied),
+    ("haze", Param::HazeWeight, Channels::Tied),
+];
+
+/// Any failure, told with what was being read.
+pub(crate) type Result<T> = std::result::Result<T, String>;
+
+impl Manifest {
+    pub(crate) fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join("manifest.json");
+        let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let manifest: Self = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+        let known = UNKNOWNS.iter().map(|(name, ..)| *name);
+        if manifest.format != "dawn-race-1" || !manifest.param_names.iter().map(String::as_str).eq(known) {
+            return Err(format!("{}: not the race's format dawn-race-1", path.display()));
+        }
+        Ok(manifest)
+    }
+
+    /// The race's unknowns in its order; `bump` is left out of mode `pre`.
+    pub(crate) fn columns(bump_free: bool) -> Vec<Column> {
+        UNKNOWNS
+            .iter()
+            .filter(|(_, param, _)| bump_free || *param != Param::NormalStrength)
+            .map(|&(_, param, channels)| Column { param, channels })
+            .collect()
+    }
+
+    /// The race's parameter vector as the model's.
+    pub(crate) fn params(values: &[f64]) -> Params {
+        let mut params = Params::defaults(Form::Corrected);
+        params.set(Param::BaseWeight, 1.0);
+        for ((_, param, channels), &value) in UNKNOWNS.iter().zip(values) {
+            Column { param: *param, channels: *channels }.set(&mut params, value);
+        }
+        params
+    }
+
+    /// The model's parameters as the race's vector.
+    pub(crate) fn vector(params: &Params) -> Vec<f64> {
+        Self::columns(true).iter().map(|column| column.get(params)).collect()
+    }
+}
+
+fn plane(folder: &Path, name: &str) -> Result<Vec<f32>> {
+    let path = folder.join(format!("{name}.f32"));
+    let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+}
+
+/// `C` planes of `pixels` numbers, each padded to whole groups by repeating its last number.
+fn planes<const C: usize>(folder: &Path, name: &str, pixels: usize) -> Result<[Vec<f32>; C]> {
+    let all = plane(folder, name)?;
+    if all.len() != C * pixels {
+        return Err(format!(
+            "{name}.f32 in {} has {} numbers, not {C} x {pixels}",
+            folder.display(),
+            all.len()
+        ));
+    }
+    Ok(std::array::from_fn(|c| {
+        let mut plane = all[c * pixels..(c + 1) * pixels].to_vec();
+        plane.resize(pixels.next_multiple_of(LANES), plane[pixels - 1]);
+        plane
+    }))
+}
+
+/// The samples, one a pixel, beside the target `target_<which>`.
+pub(crate) fn view(folder: &Path, manifest: &Manifest, which: &str) -> Result<ObservedView> {
+    let n = manifest.pixels;
+    let [occlusion] = planes(folder, "occ", n)?;
+    let [specular] = planes(folder, "spec", n)?;
+    let [attenuator] = planes(folder, "atten", n)?;
+    let surface = SurfaceArrays {
+        base: planes(folder, "base", n)?,
+        bump: planes(folder, "bump", n)?,
+        view: planes(folder, "view", n)?,
+        occlusion,
+        albedo: planes(folder, "albedo", n)?,
+        specular,
+        attenuator,
+        ..SurfaceArrays::default()
+    };
+    let groups = n.div_ceil(LANES) as u32;
+    let weight = if n.is_multiple_of(LANES) {
+        Vec::new()
+    } else {
+        (0..n.next_multiple_of(LANES)).map(|i| if i < n { 1.0 } else { 0.0 }).collect()
+    };
+    Ok(ObservedView {
+        samples: ViewSamples { group_start: (0..=groups).collect(), surface, ..ViewSamples::default() },
+        target: planes(folder, &format!("target_{which}"), n)?,
+        weight,
+        clip: None,
+    })
+}
+
+fn cube(folder: &Path, name: &str, size: usize) -> Result<Cube<f32>> {
+    let texels = plane(folder, name)?;
+    if texels.len() != 6 * size * size * 4 {
+        return Err(format!("{name}.f32 in {} is not a cube of {size} texels a side", folder.display()));
+    }
+    Ok(Cube::from_fn(size, |face, column, row| {
+        let at = ((face * size + row) * size + column) * 4;
+        [texels[at], texels[at + 1], texels[at + 2], texels[at + 3]]
+    }))
+}
+
+/// The three cube maps.
+pub(crate) fn illumination(folder: &Path, manifest: &Manifest) -> Result<Illumination> {
+    let size = manifest.cube_size;
+    Ok(Illumination {
+        irradiance: Some(cube(folder, "cube_diffuse", size)?),
+        lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![cube(folder, "cube_spec", size)?] }),
+        hilite: Some(cube(folder, "cube_hilite", size)?),
+    })
+}

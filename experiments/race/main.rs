@@ -1,0 +1,223 @@
+//! The race: the same forward pass, gradient, normal equations and fits, on the same inputs, as
+//! other frameworks do them. Reads a data folder, writes one row of the table as JSON.
+//!
+//! `cargo run --release --example race -- DATA_DIR [--mode sampled|pre] -o row.json`
+
+mod data;
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Parser;
+use data::{Manifest, Result};
+use serde_json::{Value, json};
+use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::{Objective, Point, Unknown};
+use skinfit::fit::coordinates::Coordinates;
+use skinfit::fit::{FitOptions, bounded, fit};
+use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::evaluate::Setup;
+use skinfit::model::params::Param;
+use skinfit::scene::Loss;
+
+#[derive(Parser)]
+#[command(about = "Time skinfit's CPU engine on the race's data")]
+struct Arguments {
+    /// Folder with manifest.json and the raw planes.
+    data: PathBuf,
+    /// `sampled`: all four lookups in each pass; `pre`: the bump strength is held at its true value.
+    #[arg(long, default_value = "sampled", value_parser = ["sampled", "pre"])]
+    mode: String,
+    /// Where the row is written; standard output when left out.
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Repetitions of each timing, at the least.
+    #[arg(long, default_value_t = 7)]
+    reps: usize,
+}
+
+const SETUP: Setup = Setup {
+    form: Form::Corrected,
+    silhouette: Silhouette::Bumped,
+    effects: Effects::SURFACE.with(Effect::Haze),
+};
+
+fn timed(reps: usize, mut run: impl FnMut()) -> Value {
+    run();
+    let (mut seconds, start) = (Vec::new(), Instant::now());
+    while seconds.len() < reps || (start.elapsed().as_secs_f64() < 1.0 && seconds.len() < 200) {
+        let t = Instant::now();
+        run();
+        seconds.push(t.elapsed().as_secs_f64());
+    }
+    seconds.sort_by(f64::total_cmp);
+    json!({"median": seconds[seconds.len() / 2], "min": seconds[0], "reps": seconds.len()})
+}
+
+fn peak_rss_mb() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
+}
+
+fn engine(arguments: &Arguments, manifest: &Manifest, which: &str, keep: bool) -> Result<CpuEngine> {
+    let columns = Manifest::columns(arguments.mode == "sampled");
+    Ok(CpuEngine::with_kept_terms(
+        SETUP,
+        data::illumination(&arguments.data, manifest)?,
+        vec![data::view(&arguments.data, manifest, which)?],
+        Loss::L2,
+        columns.into_iter().map(Unknown::Param).collect(),
+        keep,
+    ))
+}
+
+/// Pixels that the coarse stage of a fit reads, about.
+const COARSE_PIXELS: usize = 1024;
+
+/// How far `point` is from the race's criterion: the worst parameter error (clean), or the relative
+/// excess loss to second order (noisy), over the criterion's tolerance.
+fn criterion(manifest: &Manifest, which: &str, point: &Point) -> (f64, f64) {
+    let p = Manifest::vector(&point.params);
+    if which == "clean" {
+        let errors = p.iter().zip(&manifest.params_true).map(|(p, t)| (p - t).abs());
+        return (errors.fold(0.0, f64::max), 1e-4);
+    }
+    let d: Vec<f64> = p.iter().zip(&manifest.params_opt_noisy).map(|(p, o)| p - o).collect();
+    let rows = manifest.hessian_half_noisy.iter().zip(&d);
+    let excess: f64 = rows.map(|(row, di)| di * row.iter().zip(&d).map(|(h, dj)| h * dj).sum::<f64>()).sum();
+    (excess / manifest.loss_opt_noisy, 1e-6)
+}
+
+/// Variable projection to convergence on a share of the pixels, then Gauss-Newton steps over all of
+/// them until the criterion holds: one is enough, as the coarse answer is within its standard errors.
+/// Every pass counts as one evaluation, the coarse ones for their share.
+///
+/// In mode `pre` the noisy criterion, whose optimum has the bump strength free, can be out of reach on
+/// few pixels; the fit then ends where it no longer comes closer.
+fn fit_to_criterion(engine: &mut CpuEngine, manifest: &Manifest, which: &str, start: &Point) -> Result<Run> {
+    let clock = Instant::now();
+    let stride = (manifest.pixels / COARSE_PIXELS).max(1);
+    engine.set_stride(stride);
+    let coarse = fit(engine, start, &FitOptions::default(), &mut |_| {}).map_err(|e| e.to_string())?;
+    let mut evaluations = coarse.evaluations as f64 / stride as f64;
+    let mut point = coarse.end;
+    engine.set_stride(1);
+    let mut best = f64::INFINITY;
+    for _ in 0..20 {
+        let (error, tolerance) = criterion(manifest, which, &point);
+        best = best.min(error);
+        if error < tolerance {
+            return Ok(Run { seconds: Some(clock.elapsed().as_secs_f64()), evaluations, best });
+        }
+        point = gauss_newton_step(engine, &point);
+        evaluations += 1.0;
+    }
+    Ok(Run { seconds: None, evaluations, best })
+}
+
+/// How a fit went.
+struct Run {
+    /// Until the criterion held, if it did.
+    seconds: Option<f64>,
+    evaluations: f64,
+    /// The least error on the way.
+    best: f64,
+}
+
+/// One bounded Gauss-Newton step over all pixels.
+fn gauss_newton_step(engine: &CpuEngine, point: &Point) -> Point {
+    let sums = engine.normal_equations(point);
+    let coordinates = Coordinates::new(engine.unknowns(), point);
+    let at = coordinates.origin();
+    let slope: Vec<f64> = (0..at.len()).map(|i| coordinates.slope(i, at[i])).collect();
+    let k = at.len();
+    let hessian: Vec<f64> = (0..k * k).map(|ij| sums.jtj[ij] * slope[ij / k] * slope[ij % k]).collect();
+    let gradient: Vec<f64> = (0..k).map(|i| sums.jtr[i] * slope[i]).collect();
+    let (lower, upper) = coordinates.room(at);
+    let step = bounded::minimise(&hessian, &gradient, &lower, &upper);
+    coordinates.point(&coordinates.moved(at, &step))
+}
+
+fn fits(arguments: &Arguments, manifest: &Manifest, start: &Point) -> Result<Value> {
+    let mut fits = serde_json::Map::new();
+    for which in ["clean", "noisy"] {
+        let mut engine = engine(arguments, manifest, which, true)?;
+        // The first pass makes the kept terms (mode `pre`: what peers are given in files).
+        engine.normal_equations(start);
+        let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
+        let runs = arguments.reps.max(5);
+        for _ in 0..runs {
+            let run = fit_to_criterion(&mut engine, manifest, which, start)?;
+            seconds.extend(run.seconds);
+            (evaluations, best) = (run.evaluations, run.best);
+        }
+        seconds.sort_by(f64::total_cmp);
+        let row = json!({"median": seconds.get(seconds.len() / 2), "min": seconds.first(),
+                         "evals": (evaluations * 100.0).round() / 100.0,
+                         "best": best, "ok": seconds.len(), "runs": runs});
+        fits.insert(format!("{which}/lm"), row);
+    }
+    Ok(Value::Object(fits))
+}
+
+fn run(arguments: &Arguments) -> Result<Value> {
+    let manifest = Manifest::read(&arguments.data)?;
+    let pre = arguments.mode == "pre";
+    let truth = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };
+    let mut start = Point { params: Manifest::params(&manifest.params_init), gains: vec![1.0] };
+    if pre {
+        start.params.set(Param::NormalStrength, truth.params.scalar(Param::NormalStrength));
+    }
+    let before = peak_rss_mb();
+    // In mode `sampled` every lookup is done anew; in mode `pre` what the bump strength decides is
+    // kept from the first (untimed) pass, as the peers are given it in files.
+    let timed_engine = engine(arguments, &manifest, "clean", pre)?;
+    let inputs = peak_rss_mb();
+    let first = Instant::now();
+    let image = timed_engine.image(0, &truth);
+    let first_forward = first.elapsed().as_secs_f64();
+    let target = &timed_engine.views()[0].target;
+    let error =
+        |c: usize, i: usize| f64::from((image[c][i] - target[c][i]).abs() / (1.0 + target[c][i].abs()));
+    let max_error = (0..4)
+        .flat_map(|c| (0..manifest.pixels).map(move |i| (c, i)))
+        .map(|(c, i)| error(c, i))
+        .fold(0.0, f64::max);
+    drop(image);
+    let forward = timed(arguments.reps, || drop(std::hint::black_box(timed_engine.image(0, &start))));
+    let grad = timed(arguments.reps, || drop(std::hint::black_box(timed_engine.gradient(&start))));
+    let normal = timed(arguments.reps, || drop(std::hint::black_box(timed_engine.normal_equations(&start))));
+    drop(timed_engine);
+    let fits = fits(arguments, &manifest, &start)?;
+    let peak = peak_rss_mb();
+    Ok(json!({
+        "peer": "skinfit", "version": format!("skinfit {} (rustc, f32 lanes)", env!("CARGO_PKG_VERSION")),
+        "pixels": manifest.pixels, "mode": arguments.mode, "device": "cpu",
+        "forward": forward, "grad": grad, "normal": normal, "fits": fits,
+        "first_forward_s": first_forward, "forward_max_err": max_error,
+        "peak_rss_mb": peak, "rss_import_mb": before, "rss_before_fits_mb": inputs, "other_cpu": 0,
+    }))
+}
+
+fn main() -> std::process::ExitCode {
+    let arguments = Arguments::parse();
+    // From within the pool, so that a pass does not begin by waking another thread.
+    let written = rayon::scope(|_| run(&arguments)).and_then(|row| {
+        let text = format!("{row:#}\n");
+        match &arguments.output {
+            None => {
+                print!("{text}");
+                Ok(())
+            }
+            Some(path) => skinfit::output::write(path, text.as_bytes()).map_err(|e| e.to_string()),
+        }
+    });
+    match written {
+        Ok(()) => std::process::ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("race: {message}");
+            std::process::ExitCode::from(2)
+        }
+    }
+}

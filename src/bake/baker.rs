@@ -1,0 +1,151 @@
+//! Single bakes, each through the cache.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::cache::{self, Found, Key};
+use super::panorama::Radiance;
+use super::prefilter::{Prefilter, luminance};
+use super::{BakeStats, VertexOcclusion, occlusion};
+use crate::model::cube::Cube;
+use crate::progress;
+use crate::scene::maps::Environment;
+use crate::scene::mesh::PosedMesh;
+
+/// Bakes through the cache, and keeps count.
+pub(super) struct Baker<'a> {
+    pub(super) cache: Option<&'a Path>,
+    pub(super) stats: BakeStats,
+}
+
+impl Baker<'_> {
+    /// `count` numbers from the cache, or from `make`, which then go to the cache.
+    fn through_cache(
+        &mut self,
+        name: String,
+        kind: &str,
+        key: &Key,
+        count: usize,
+        make: impl FnOnce(&mut BakeStats) -> Vec<f32>,
+    ) -> Vec<f32> {
+        let since = Instant::now();
+        match self.cache.map(|folder| cache::read(folder, kind, key, count)) {
+            Some(Found::Floats(floats)) => {
+                self.stats.row(name, true, since.elapsed().as_secs_f64());
+                return floats;
+            }
+            Some(Found::Unusable(warning)) => self.stats.warnings.push(warning),
+            Some(Found::Nothing) | None => {}
+        }
+        let before = self.stats.seconds();
+        let floats = make(&mut self.stats);
+        // What was shared has a row of its own.
+        let shared = self.stats.seconds() - before;
+        if let Some(folder) = self.cache
+            && let Err(warning) = cache::write(folder, kind, key, &floats)
+            // Once is enough for a folder that cannot be written.
+            && !self.stats.warnings.iter().any(|w| w.contains("not kept"))
+        {
+            self.stats.warnings.push(warning);
+        }
+        self.stats.row(name, false, since.elapsed().as_secs_f64() - shared);
+        floats
+    }
+
+    /// Ambient occlusion, with a set for each of `morphs` targets.
+    pub(super) fn occlusion(
+        &mut self,
+        pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+        morphs: usize,
+        rays: u32,
+    ) -> VertexOcclusion {
+        let mut key = Key::new("occlusion").with(&[rays]);
+        let mut vertices = 0;
+        for target in 0..=morphs {
+            let weights: Vec<f32> = (1..=morphs).map(|i| f32::from(u8::from(i == target))).collect();
+            let posed = pose(&weights);
+            key = key.with(&posed.positions).with(&posed.normals).with(posed.triangles.as_flattened());
+            vertices = posed.positions.len();
+        }
+        let count = (1 + morphs) * vertices;
+        let floats = self.through_cache("occlusion".to_owned(), "occlusion", &key, count, |_| {
+            let baked = occlusion::bake_occlusion(pose, morphs, rays);
+            std::iter::once(baked.base).chain(baked.morphs).flatten().collect()
+        });
+        let mut sets = floats.chunks_exact(vertices.max(1)).map(<[f32]>::to_vec);
+        VertexOcclusion { base: sets.next().unwrap_or_default(), morphs: sets.collect() }
+    }
+}
+
+/// Bakes of one environment; what they share is made when the first asks for it.
+pub(super) struct EnvironmentBaker<'a> {
+    environment: &'a Environment,
+    key: Key,
+    prefilter: Option<Prefilter>,
+}
+
+impl<'a> EnvironmentBaker<'a> {
+    pub(super) fn new(environment: &'a Environment) -> Self {
+        let map = &environment.panorama;
+        let key = Key::new("environment")
+            .with(&[map.width as u64, map.height as u64])
+            .with(map.texels.as_flattened())
+            .with(&[environment.rotation_degrees, environment.intensity]);
+        Self { environment, key, prefilter: None }
+    }
+
+    /// The environment through a Phong lobe; exponent 1 is the irradiance.
+    pub(super) fn lobe(
+        &mut self,
+        baker: &mut Baker<'_>,
+        name: String,
+        size: usize,
+        exponent: f64,
+    ) -> Cube<f32> {
+        let key = self.key.clone().with(&[size as u64]).with(&[exponent]);
+        let floats = baker.through_cache(name, "lobe", &key, 24 * size * size, |stats| {
+            let prefilter = self.prefilter(stats);
+            let bar = progress::bar("prefilter", (6 * size * size) as u64);
+            bar.set_message(format!("exponent {exponent:.4}"));
+            let cube = prefilter.lobe(size, exponent, |n| bar.inc(n));
+            bar.finish_and_clear();
+            cube_to_floats(&cube)
+        });
+        cube_from_floats(size, &floats)
+    }
+
+    /// The environment's mean over each texel.
+    pub(super) fn hilite(&mut self, baker: &mut Baker<'_>, size: usize) -> Cube<f32> {
+        let key = self.key.clone().with(&[size as u64]);
+        let floats = baker.through_cache("hilite".to_owned(), "hilite", &key, 24 * size * size, |stats| {
+            let shared = self.prefilter(stats).means(size);
+            let cube = shared.unwrap_or_else(|| Radiance::new(self.environment).to_cube(size));
+            cube_to_floats(&cube.map(|texel| {
+                let [r, g, b, _] = texel.map(|x| x as f32);
+                [r, g, b, luminance([r, g, b])]
+            }))
+        });
+        cube_from_floats(size, &floats)
+    }
+
+    /// The environment, ready to be filtered.
+    fn prefilter(&mut self, stats: &mut BakeStats) -> &Prefilter {
+        self.prefilter.get_or_insert_with(|| {
+            let since = Instant::now();
+            let prefilter = Prefilter::of(&Radiance::new(self.environment));
+            stats.row("environment", false, since.elapsed().as_secs_f64());
+            prefilter
+        })
+    }
+}
+
+fn cube_to_floats(cube: &Cube<f32>) -> Vec<f32> {
+    let size = cube.size();
+    let texel = |i: usize| cube.texel(i / (size * size), i % size, i / size % size);
+    (0..6 * size * size).flat_map(texel).collect()
+}
+
+fn cube_from_floats(size: usize, floats: &[f32]) -> Cube<f32> {
+    let (texels, _) = floats.as_chunks::<4>();
+    Cube::from_fn(size, |face, column, row| texels[(face * size + row) * size + column])
+}

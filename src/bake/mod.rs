@@ -1,0 +1,220 @@
+//! What is computed once for a scene: environment to cube maps, ambient occlusion, and the cache
+//! of both. Nothing is baked that no enabled effect asks for.
+//!
+//! - [`panorama`]: the lat-long lookup, and panorama to cube
+//! - [`prefilter`]: the Phong-lobe filter (`pyramid`: the cells that it sums over, `lobe_kernel`:
+//!   the sum)
+//! - [`lobes`]: the stack of specular cubes over the exponent
+//! - [`occlusion`]: per-vertex ambient occlusion (`low_discrepancy`: its rays)
+//! - [`rays`]: the mesh as rays see it
+//! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
+
+mod baker;
+pub mod cache;
+mod lobe_kernel;
+pub mod lobes;
+mod low_discrepancy;
+pub mod occlusion;
+pub mod panorama;
+pub mod prefilter;
+mod pyramid;
+pub mod rays;
+
+use std::ops::RangeInclusive;
+use std::path::Path;
+
+use crate::model::cube::Cube;
+use crate::scene::Scene;
+use crate::scene::maps::Environment;
+use crate::scene::mesh::PosedMesh;
+use baker::{Baker, EnvironmentBaker};
+pub use lobes::LobeStack;
+
+/// Everything that was baked for a scene.
+#[derive(Clone, Debug, Default)]
+pub struct Bake {
+    /// E_d: the cosine-weighted mean of the incoming light (alpha: its luminance, unused).
+    pub irradiance: Option<Cube<f32>>,
+    /// E_s for a stack of exponents.
+    pub lobes: Option<LobeStack>,
+    /// E_h: the environment, lightly filtered for its resolution (alpha: its luminance, unused).
+    pub hilite: Option<Cube<f32>>,
+    /// Ambient occlusion of each vertex.
+    pub occlusion: Option<VertexOcclusion>,
+}
+
+/// The open share of the hemisphere, 1 = unoccluded.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VertexOcclusion {
+    /// At rest, one a vertex.
+    pub base: Vec<f32>,
+    /// What each morph target at weight 1 adds, as many as the mesh has targets; empty for one that
+    /// the scene gives no weight.
+    pub morphs: Vec<Vec<f32>>,
+}
+
+impl VertexOcclusion {
+    /// The occlusion with the morph targets at `weights` (listing 3-3: not clamped, the model takes
+    /// it as it is); targets beyond the list count nothing.
+    #[must_use]
+    pub fn posed(&self, weights: &[f32]) -> Vec<f32> {
+        let mut open = self.base.clone();
+        for (delta, &weight) in self.morphs.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
+            open.iter_mut().zip(delta).for_each(|(open, delta)| *open += weight * delta);
+        }
+        open
+    }
+}
+
+/// What was baked, and what came from the cache.
+#[derive(Clone, Debug, Default)]
+pub struct BakeStats {
+    /// A row for each bake, in the order in which they were made.
+    pub rows: Vec<BakeRow>,
+    /// Cache files that were damaged or could not be written.
+    pub warnings: Vec<String>,
+}
+
+/// One bake.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BakeRow {
+    /// `irradiance`, `lobe 32`, `hilite`, `occlusion`; `environment` for what these share.
+    pub name: String,
+    /// Whether it came from the cache.
+    pub cached: bool,
+    /// Seconds that it took.
+    pub seconds: f64,
+}
+
+impl BakeStats {
+    /// Seconds altogether.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.rows.iter().map(|row| row.seconds).sum()
+    }
+
+    fn row(&mut self, name: impl Into<String>, cached: bool, seconds: f64) {
+        self.rows.push(BakeRow { name: name.into(), cached, seconds });
+    }
+}
+
+/// A scene that cannot be baked.
+#[derive(Debug, thiserror::Error)]
+pub enum BakeError {
+    /// An effect looks up cubes, but there is nothing to make them of.
+    #[error(
+        "{scene}: the enabled effects look up the environment, but the scene has none. Add \
+         [environment] file = \"...\", or leave out diffuse, side_specular, hilite and reflection."
+    )]
+    NoEnvironment {
+        /// The scene file.
+        scene: String,
+    },
+    /// The panorama has no texels, or not as many as its size says.
+    #[error(
+        "{scene}: the environment's panorama has {texels} texels, not {width} x {height}. Give a \
+         lat-long image of at least 1 x 1 texels."
+    )]
+    BadPanorama {
+        /// The scene file.
+        scene: String,
+        /// Texels that are there.
+        texels: usize,
+        /// Columns.
+        width: usize,
+        /// Rows.
+        height: usize,
+    },
+    /// A cube of no texels.
+    #[error("{scene}: [quality] {key} is 0. Give the number of texels along a cube's face, 1 or more.")]
+    NoTexels {
+        /// The scene file.
+        scene: String,
+        /// The key.
+        key: &'static str,
+    },
+}
+
+/// Ambient occlusion, with a set for each morph target that the scene gives a weight.
+fn occlusion_of_used(
+    scene: &Scene,
+    pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+    baker: &mut Baker<'_>,
+) -> VertexOcclusion {
+    let morphs = &scene.mesh.morphs;
+    let used: Vec<usize> = (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0).collect();
+    let pose_used = |weights: &[f32]| {
+        let mut all = vec![0.0; morphs.len()];
+        used.iter().zip(weights).for_each(|(&target, &weight)| all[target] = weight);
+        pose(&all)
+    };
+    let baked = baker.occlusion(&pose_used, used.len(), scene.quality.occlusion_rays);
+    let mut sets = vec![Vec::new(); morphs.len()];
+    used.iter().zip(baked.morphs).for_each(|(&target, set)| sets[target] = set);
+    VertexOcclusion { base: baked.base, morphs: sets }
+}
+
+/// Bake what the scene's effects ask for, and no more.
+///
+/// `pose` gives the scene's mesh with its morph targets at the listed weights. Of the specular
+/// cubes, those are made that [`LobeStack::at`] needs for exponents in `exponents` (the start
+/// value's alone, unless it is free). Bakes are looked for and kept in the folder `cache`.
+///
+/// # Errors
+/// When the scene lacks what its effects ask for. A cache that cannot be used is a warning in the
+/// stats, not an error.
+pub fn bake(
+    scene: &Scene,
+    pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+    exponents: RangeInclusive<f64>,
+    cache: Option<&Path>,
+) -> Result<(Bake, BakeStats), BakeError> {
+    let needs = scene.effects.needs(scene.silhouette);
+    let mut baker = Baker { cache, stats: BakeStats::default() };
+    let mut bake = Bake::default();
+    if needs.environment() {
+        let environment = checked_environment(scene)?;
+        let mut cubes = EnvironmentBaker::new(environment);
+        let quality = &scene.quality;
+        if needs.irradiance {
+            let size = quality.irradiance_size as usize;
+            bake.irradiance = Some(cubes.lobe(&mut baker, "irradiance".to_owned(), size, 1.0));
+        }
+        if needs.lobes {
+            let exponents = lobes::knots(&exponents, quality.lobes_per_octave);
+            let size = quality.lobe_size as usize;
+            let cube = |&e: &f64| cubes.lobe(&mut baker, format!("lobe {e:.4}"), size, e);
+            let stack = exponents.iter().map(cube).collect();
+            bake.lobes = Some(LobeStack { exponents, cubes: stack });
+        }
+        if needs.hilite {
+            bake.hilite = Some(cubes.hilite(&mut baker, quality.hilite_size as usize));
+        }
+    }
+    if needs.occlusion {
+        bake.occlusion = Some(occlusion_of_used(scene, pose, &mut baker));
+    }
+    Ok((bake, baker.stats))
+}
+
+fn checked_environment(scene: &Scene) -> Result<&Environment, BakeError> {
+    let name = || scene.path.display().to_string();
+    let environment = scene.environment.as_ref().ok_or_else(|| BakeError::NoEnvironment { scene: name() })?;
+    let map = &environment.panorama;
+    let texels = map.texels.len();
+    if texels == 0 || texels != map.width * map.height {
+        let (width, height) = (map.width, map.height);
+        return Err(BakeError::BadPanorama { scene: name(), texels, width, height });
+    }
+    let quality = &scene.quality;
+    for (key, size) in [
+        ("irradiance_size", quality.irradiance_size),
+        ("lobe_size", quality.lobe_size),
+        ("hilite_size", quality.hilite_size),
+    ] {
+        if size == 0 {
+            return Err(BakeError::NoTexels { scene: name(), key });
+        }
+    }
+    Ok(environment)
+}

@@ -1,0 +1,192 @@
+//! The Phong-lobe filter F(r) = int L(w) max(r.w, 0)^e dw / int max(r.w, 0)^e dw (MODEL 4).
+//!
+//! Exponent 1 is irradiance / pi. Both integrals are sums over the same cells, and the mean radiance
+//! is taken out before and added after, so that a constant environment stays exactly that constant.
+//! Each cell counts with the mean of the lobe over it to second order (see `lobe_kernel`).
+
+use fearless_simd::{Level, dispatch};
+use rayon::prelude::*;
+
+use super::lobe_kernel::{BLOCK, Cells, Lobe, WIDE, gather};
+use super::panorama::Radiance;
+use super::pyramid::{Cell, Pyramid};
+use crate::model::cube::{Cube, texel_direction, texel_solid_angle};
+
+/// Cells are wide by this share of a lobe's standard deviation, at most (see `pyramid`).
+const CELL_WIDTH: f64 = 0.5;
+/// Nor are they wider than this (radians): wide lobes end at the horizon, which cuts through cells.
+const WIDEST_CELL: f64 = 0.05;
+/// An unevenly lit cell is split when it may move the result by this share of the mean radiance.
+const CELL_TOLERANCE: f64 = 3e-5;
+/// The lobe is cut where a share of this of its solid angle is left.
+const CUT: f64 = 1e-9;
+/// Texels along the face of the finest source: 0.35 degrees, a quarter of the standard deviation of
+/// the sharpest lobe (exponent 2048).
+const FINEST: usize = 256;
+/// Texels along the side of a tile of the output, whose texels share a list of blocks.
+const TILE: usize = 8;
+
+/// An environment that is ready to be filtered with any exponent.
+pub struct Prefilter {
+    pyramid: Pyramid,
+}
+
+/// Cells, and a cone around them.
+struct Block {
+    cells: [Cells; BLOCK],
+    axis: [f64; 3],
+    /// Half angle of the cone of directions whose lobes reach into the block, radians.
+    reach: f64,
+}
+
+impl Prefilter {
+    /// Prepare the rgb of `environment`, a piecewise constant cube.
+    #[must_use]
+    pub fn new(environment: &Cube<f64>) -> Self {
+        Self { pyramid: Pyramid::new(environment) }
+    }
+
+    /// Prepare `radiance`, on a cube that is fine enough for its panorama and for every exponent
+    /// of the parameter table.
+    #[must_use]
+    pub fn of(radiance: &Radiance) -> Self {
+        let size = (radiance.width() / 2).next_power_of_two().clamp(16, FINEST);
+        Self::new(&radiance.to_cube(size))
+    }
+
+    /// The mean radiance over each texel of a cube of `size` texels a side, where that is a power
+    /// of 2 times coarser than the cube that is filtered; alpha is 0.
+    #[must_use]
+    pub fn means(&self, size: usize) -> Option<Cube<f64>> {
+        self.pyramid.means(size)
+    }
+
+    /// The environment filtered for the centre of each texel of a cube of `size` texels a side;
+    /// alpha is the Rec.709 luminance. All cores; `progress` is called with the number of texels
+    /// done since the last call.
+    #[must_use]
+    pub fn lobe(&self, size: usize, exponent: f64, progress: impl Fn(u64) + Sync) -> Cube<f32> {
+        let tiles = size.div_ceil(TILE);
+        let blocks = self.blocks(exponent);
+        let lobe = Lobe::new(exponent);
+        let level = Level::new();
+        let filtered: Vec<Vec<[f32; 4]>> = (0..6 * tiles * tiles)
+            .into_par_iter()
+            .map(|tile| {
+                let directions = tile_directions(tile, tiles, size);
+                let near = blocks_near(&blocks, &directions);
+                let texel = |&r: &[f64; 3]| {
+                    let sums = dispatch!(level, simd => gather(simd, near.iter().map(|block| &block.cells), r, lobe));
+                    self.finish(sums)
+                };
+                let texels: Vec<[f32; 4]> = directions.iter().map(texel).collect();
+                progress(texels.len() as u64);
+                texels
+            })
+            .collect();
+        Cube::from_fn(size, |face, column, row| {
+            let tile = &filtered[(face * tiles + row / TILE) * tiles + column / TILE];
+            let across = TILE.min(size - column / TILE * TILE);
+            tile[row % TILE * across + column % TILE]
+        })
+    }
+
+    /// Radiance from the sums of weight and weighted flux.
+    fn finish(&self, [weight, red, green, blue]: [f64; 4]) -> [f32; 4] {
+        let sums = [red, green, blue];
+        let rgb: [f32; 3] = std::array::from_fn(|c| {
+            let mean = self.pyramid.mean[c];
+            let [least, greatest] = self.pyramid.range[c];
+            // A mean lies within the range; rounding beside a sun could leave it.
+            ((f64::from(mean) + sums[c] / weight) as f32).clamp(least, greatest)
+        });
+        [rgb[0], rgb[1], rgb[2], luminance(rgb)]
+    }
+
+    fn blocks(&self, exponent: f64) -> Vec<Block> {
+        let width = (CELL_WIDTH / exponent.sqrt()).min(WIDEST_CELL);
+        let cells = self.pyramid.cells_for(exponent, width, CELL_TOLERANCE);
+        // The share of max(cos, 0)^e beyond an angle is its cosine to the power e + 1.
+        let cut = CUT.powf(1.0 / (exponent + 1.0)).acos();
+        let block = |cells: &[Cell]| Block::new(cells, self.pyramid.mean, cut);
+        cells.par_chunks(WIDE * BLOCK).map(block).collect()
+    }
+}
+
+/// Rec.709 luminance.
+#[must_use]
+pub fn luminance(rgb: [f32; 3]) -> f32 {
+    let [r, g, b] = rgb.map(f64::from);
+    // In f64 and with weights that sum to exactly 1, so that grey 1 has luminance 1.
+    (0.2126 * r + 0.7152 * g + 0.0722 * b) as f32
+}
+
+impl Block {
+    fn new(cells: &[Cell], mean: [f32; 3], cut: f64) -> Self {
+        let mut sum = [0.0; 3];
+        for cell in cells {
+            (0..3).for_each(|i| sum[i] += cell.moment[i]);
+        }
+        let axis = unit(sum);
+        let radius = |cell: &Cell| {
+            // A cell reaches to half its diagonal, and a little more where it is distorted.
+            angle(axis, unit(cell.moment)) + cell.solid_angle.sqrt()
+        };
+        let radius = cells.iter().map(radius).fold(0.0, f64::max);
+        let packed = std::array::from_fn(|i| Cells::pack(cells.get(i * WIDE..).unwrap_or(&[]), mean));
+        Self { cells: packed, axis, reach: radius + cut }
+    }
+}
+
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 { v.map(|x| x / length) } else { [0.0, 0.0, 1.0] }
+}
+
+fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|i| a[i] * b[i]).sum::<f64>().clamp(-1.0, 1.0).acos()
+}
+
+/// The directions of a tile's texels, row by row.
+fn tile_directions(tile: usize, tiles: usize, size: usize) -> Vec<[f64; 3]> {
+    let (face, row, column) = (tile / (tiles * tiles), tile / tiles % tiles * TILE, tile % tiles * TILE);
+    let rows = row..(row + TILE).min(size);
+    let columns = column..(column + TILE).min(size);
+    rows.flat_map(|y| columns.clone().map(move |x| texel_direction(face, x, y, size))).collect()
+}
+
+/// The blocks that a lobe about any of `directions` reaches.
+fn blocks_near<'a>(blocks: &'a [Block], directions: &[[f64; 3]]) -> Vec<&'a Block> {
+    let mut sum = [0.0; 3];
+    for d in directions {
+        (0..3).for_each(|i| sum[i] += d[i]);
+    }
+    let axis = unit(sum);
+    let radius = directions.iter().map(|&d| angle(axis, d)).fold(0.0, f64::max);
+    blocks.iter().filter(|block| angle(axis, block.axis) <= block.reach + radius).collect()
+}
+
+/// The filter by brute force in f64: the piecewise constant `cube` along the unit direction `r`,
+/// each texel split into `splits x splits` cells of exact solid angle. What the fast filter is
+/// tested against; any four channels.
+#[must_use]
+pub fn by_brute_force(cube: &Cube<f64>, r: [f64; 3], exponent: f64, splits: usize) -> [f64; 4] {
+    let fine = cube.size() * splits;
+    let (mut sum, mut weights) = ([0.0; 4], 0.0);
+    for face in 0..6 {
+        for row in 0..fine {
+            for column in 0..fine {
+                let d = texel_direction(face, column, row, fine);
+                let cosine: f64 = (0..3).map(|i| r[i] * d[i]).sum();
+                if cosine <= 0.0 {
+                    continue;
+                }
+                let weight = cosine.powf(exponent) * texel_solid_angle(column, row, fine);
+                let texel = cube.texel(face, column / splits, row / splits);
+                (0..4).for_each(|c| sum[c] += weight * texel[c]);
+                weights += weight;
+            }
+        }
+    }
+    sum.map(|s| s / weights)
+}

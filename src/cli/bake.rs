@@ -1,0 +1,113 @@
+//! `skinfit bake`: what a scene's effects ask to be baked, as files to look at.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::scene::{SceneArguments, parse_effects};
+use super::{Exit, Refusal, say, tell, tell_warnings};
+use crate::bake::VertexOcclusion;
+use crate::model::cube::Cube;
+use crate::model::effects::Effects;
+use crate::model::params::Param;
+use crate::output;
+use crate::prepare::{PrepareOptions, Prepared};
+use crate::render::files::{ImageOptions, write_image};
+use crate::render::image::Image;
+
+/// Bake a scene's cube maps and ambient occlusion into files
+#[derive(clap::Args)]
+#[command(
+    after_help = "Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at) and occlusion.csv (a row a vertex: the open share of its hemisphere).\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked"
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The folder to write into; it is made if need be.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Effects to switch on, comma-separated, instead of the scene's.
+    #[arg(long, value_name = "LIST", value_parser = parse_effects)]
+    effects: Option<Effects>,
+    /// Parameters of an earlier fit: the specular cube is that of its lobe.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let (path, _scratch) = arguments.scene.path()?;
+    let options = PrepareOptions {
+        effects: arguments.effects,
+        params: arguments.params.clone(),
+        cache: arguments.scene.cache(),
+        ..PrepareOptions::default()
+    };
+    let prepared = Prepared::baked(&path, &options)?;
+    tell_warnings(&prepared.warnings);
+    let folder = &arguments.output;
+    let light = &prepared.illumination;
+    let mut written = 0;
+    let mut cube = |name: &str, cube: &Cube<f32>| -> Result<(), Refusal> {
+        written += 1;
+        write_cube(folder, name, cube)
+    };
+    if let Some(irradiance) = &light.irradiance {
+        cube("irradiance", irradiance)?;
+    }
+    if let Some(lobes) = &light.lobes {
+        for (exponent, lobe) in lobes.exponents.iter().zip(&lobes.cubes) {
+            cube(&format!("lobe_{exponent}"), lobe)?;
+        }
+        // Between the stack's exponents, what shaders look up is none of its cubes.
+        if lobes.cubes.len() > 1 {
+            cube("specular", &lobes.at(prepared.scene.params.scalar(Param::SpecularLobe)).0)?;
+        }
+    }
+    if let Some(hilite) = &light.hilite {
+        cube("hilite", hilite)?;
+    }
+    if let Some(occlusion) = &prepared.occlusion {
+        written += 1;
+        output::write(&folder.join("occlusion.csv"), occlusion_csv(occlusion).as_bytes())?;
+    }
+    for row in &prepared.baked.rows {
+        let from = if row.cached { "kept from an earlier run" } else { "baked" };
+        say(&format!("{:>14}  {from}, {:.3} s", row.name, row.seconds))?;
+    }
+    match written {
+        0 => tell("the enabled effects ask for no bake; nothing was written."),
+        1 => say(&format!("wrote 1 bake to {}", folder.display()))?,
+        _ => say(&format!("wrote {written} bakes to {}", folder.display()))?,
+    }
+    Ok(Exit::Done)
+}
+
+/// The faces below each other, as EXR and as PNG.
+fn write_cube(folder: &Path, name: &str, cube: &Cube<f32>) -> Result<(), Refusal> {
+    let size = cube.size();
+    let mut image = Image::new(size, 6 * size);
+    for (at, (rgb, alpha)) in image.rgb.iter_mut().zip(&mut image.alpha).enumerate() {
+        let [r, g, b, _] = cube.texel(at / (size * size), at % size, at / size % size);
+        *rgb = [r, g, b];
+        *alpha = 1.0;
+    }
+    for ending in ["exr", "png"] {
+        write_image(&folder.join(format!("{name}.{ending}")), &image, &ImageOptions::default())?;
+    }
+    Ok(())
+}
+
+fn occlusion_csv(occlusion: &VertexOcclusion) -> String {
+    let mut text = "vertex,open".to_owned();
+    for morph in 0..occlusion.morphs.len() {
+        let _ = write!(text, ",morph_{morph}");
+    }
+    text.push('\n');
+    for (vertex, open) in occlusion.base.iter().enumerate() {
+        let _ = write!(text, "{vertex},{open}");
+        for morph in &occlusion.morphs {
+            let _ = write!(text, ",{}", morph[vertex]);
+        }
+        text.push('\n');
+    }
+    text
+}

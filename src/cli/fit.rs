@@ -1,0 +1,294 @@
+//! `skinfit fit`: a scene goes in, fitted constants come out, with the evidence of how good they are.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+use super::fitted_scene::{Changes, Start};
+use super::run_folder::RunFolder;
+use super::scene::SceneArguments;
+use super::{Exit, Refusal, say, tell, tell_warnings};
+use crate::engine::Unknown;
+use crate::engine::cpu::CpuEngine;
+use crate::engine::view::ObservedView;
+use crate::fit::outcome::{Ending, Outcome};
+use crate::fit::params_file::ParamsFile;
+use crate::fit::{self, FitError, FitOptions, SolverKind};
+use crate::prepare::{PrepareOptions, Prepared};
+use crate::progress;
+use crate::render::image::Image;
+use crate::render::shade::Shader;
+use crate::report::{self, RunInfo, ViewEvidence};
+use crate::scene::view::View;
+use crate::scene::{Loss, Scene};
+
+/// Fit a scene's free parameters to its target images
+#[derive(clap::Args)]
+#[command(
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1")
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The run folder [default: runs/<the scene's folder>].
+    #[arg(short, long, value_name = "RUN")]
+    output: Option<PathBuf>,
+    /// Start from these parameters, instead of the scene's start values.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+    /// Which solver: varpro and lm take few passes; lbfgs and nelder-mead are there to compare.
+    #[arg(long, default_value = "varpro", value_parser = ["varpro", "lm", "lbfgs", "nelder-mead"], help_heading = "Solver")]
+    solver: String,
+    /// What is minimised, instead of the scene's loss.
+    #[arg(long, value_parser = ["l2", "relative_l2", "huber", "smape"], help_heading = "Solver")]
+    loss: Option<String>,
+    /// Fit from this many starts and keep the best: the given one, and others drawn about it.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Solver")]
+    starts: u32,
+    /// What the other starts are drawn from.
+    #[arg(long, default_value_t = 0, help_heading = "Solver")]
+    seed: u64,
+    /// Most iterations of each start.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Solver")]
+    max_iterations: Option<u64>,
+    /// Go on from where an interrupted fit in this run folder stopped.
+    #[arg(long, help_heading = "Solver")]
+    resume: bool,
+    /// Print report.json on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let mut folder = RunFolder::open(arguments.output.as_deref(), arguments.scene.scene.as_deref())?;
+    let path = arguments.scene.kept_path(folder.path())?;
+    let options = PrepareOptions {
+        fit: true,
+        params: arguments.params.clone(),
+        cache: arguments.scene.cache(),
+        ..PrepareOptions::default()
+    };
+    let mut prepared = Prepared::new(&path, &options)?;
+    if let Some(loss) = &arguments.loss {
+        prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
+    }
+    let engine = prepared.engine()?;
+    tell_warnings(&prepared.warnings);
+
+    let outcome = solve(arguments, &folder, &prepared, &engine)?;
+    folder.keep();
+    // Of every process that had a part in it, where the fit was resumed.
+    prepared.seconds.fit = outcome.seconds;
+
+    let clock = Instant::now();
+    let views = evidence(&prepared, &engine, &outcome);
+    prepared.seconds.render = clock.elapsed().as_secs_f64();
+    folder.write_scene(&path, changes(arguments, &prepared))?;
+    params_file(&prepared, &outcome).write(&folder.path().join("params.toml"), &path, Some(&outcome))?;
+    let run = run_info(arguments, &path, &prepared, &engine, views);
+    let report = report::write_run(folder.path(), &run, &outcome)?;
+    if arguments.json {
+        say(report.json.trim_end())?;
+    } else {
+        tell_outcome(&outcome, &prepared.scene.views)?;
+        say(&format!("{}: final loss {:.6e}", folder.path().display(), outcome.loss_end))?;
+    }
+    if let Some(advice) = advice(&outcome) {
+        tell(&format!("{}: {advice}", folder.path().display()));
+        return Ok(Exit::Failed);
+    }
+    Ok(Exit::Done)
+}
+
+/// Where the fit differed from its scene file.
+fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> {
+    let Scene { form, params, fit, .. } = &prepared.scene;
+    let start = Start { form: *form, params, free: &fit.free };
+    Changes { loss: arguments.loss.as_deref(), start: arguments.params.as_ref().map(|_| start) }
+}
+
+/// What to do about a fit that did not converge.
+fn advice(outcome: &Outcome) -> Option<String> {
+    let iterations = outcome.iterations;
+    match outcome.ending {
+        Ending::Converged => None,
+        Ending::RanOut => Some(format!(
+            "the fit ran out after {iterations} iterations and has not converged. Go on with --resume and a greater \
+             --max-iterations."
+        )),
+        Ending::Stalled => Some(
+            "the fit stalled: no step lowers the loss, yet it has not converged. Try --solver lm, or --starts 8."
+                .to_owned(),
+        ),
+        Ending::Interrupted => {
+            Some(format!("the fit was interrupted after {iterations} iterations. Go on with --resume."))
+        }
+    }
+}
+
+/// The fitted parameters, to be used again.
+fn params_file(prepared: &Prepared, outcome: &Outcome) -> ParamsFile {
+    let names = prepared.scene.views.iter().map(|view| view.name.clone());
+    ParamsFile {
+        form: prepared.scene.form,
+        loss: Some(prepared.scene.fit.loss),
+        params: outcome.end.params,
+        gains: names.zip(outcome.end.gains.iter().copied()).collect(),
+    }
+}
+
+/// Fit, with a progress line and Ctrl-C that keeps the state.
+fn solve(
+    arguments: &Arguments,
+    folder: &RunFolder,
+    prepared: &Prepared,
+    engine: &CpuEngine,
+) -> Result<Outcome, Refusal> {
+    let interrupt = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&interrupt);
+    // Refused only if a handler is there already; then Ctrl-C ends the program as it always did.
+    let _ = ctrlc::set_handler(move || {
+        // Pressed twice, it is meant at once; the state is at most a second old.
+        if flag.swap(true, Ordering::SeqCst) {
+            std::process::exit(1);
+        }
+    });
+    let state = folder.path().join("state.json");
+    let options = FitOptions {
+        solver: SolverKind::from_name(&arguments.solver).unwrap_or_default(),
+        max_iterations: arguments.max_iterations,
+        starts: arguments.starts,
+        seed: arguments.seed,
+        fingerprint: fingerprint(prepared, engine),
+        resume: arguments.resume.then(|| state.clone()),
+        state: Some(state),
+        interrupt: Some(interrupt),
+        ..FitOptions::default()
+    };
+    let bar = progress::spinner("fit");
+    let outcome = fit::fit(engine, &prepared.start(), &options, &mut |iteration| {
+        bar.set_position(iteration.iteration);
+        bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
+    });
+    bar.finish_and_clear();
+    outcome.map_err(|error| match error {
+        // It names its file itself.
+        FitError::State(error) => Refusal::from(error),
+        error => Refusal::new(format!("{}: {error}", prepared.scene.path.display())),
+    })
+}
+
+/// A hash of what a state belongs to: switches, loss, lights' sizes, and what was observed.
+fn fingerprint(prepared: &Prepared, engine: &CpuEngine) -> String {
+    let mut hash = blake3::Hasher::new();
+    hash.update(format!("{:?} {:?}", prepared.setup(), prepared.scene.fit.loss).as_bytes());
+    for view in engine.views() {
+        for plane in view.target.iter().chain([&view.weight, &view.samples.coverage]) {
+            hash.update(bytemuck::cast_slice(plane));
+        }
+    }
+    hash.finalize().to_hex()[..16].to_owned()
+}
+
+/// For each view the target, the fit and its terms.
+fn evidence(prepared: &Prepared, engine: &CpuEngine, outcome: &Outcome) -> Vec<ViewEvidence> {
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
+    let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
+    let views = prepared.scene.views.iter().zip(engine.views()).enumerate();
+    let evidence = views
+        .map(|(index, (view, observed))| {
+            let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
+            let (target, coverage) = compared(view, observed, &shaded.image);
+            bar.inc(1);
+            ViewEvidence {
+                name: view.name.clone(),
+                target,
+                fit: shaded.image,
+                coverage,
+                terms: shaded
+                    .terms
+                    .into_iter()
+                    .map(|(name, image)| (name.name().to_owned(), image))
+                    .collect(),
+            }
+        })
+        .collect();
+    bar.finish_and_clear();
+    evidence
+}
+
+/// The target as an image, and how much of each pixel is compared.
+fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
+    let mut target = Image::new(fit.width, fit.height);
+    let Some(source) = &view.target else { return (target, fit.alpha.clone()) };
+    target.rgb.clone_from(&source.rgb);
+    // Without an alpha of its own, the target is opaque.
+    target.alpha = source.alpha.clone().unwrap_or_else(|| vec![1.0; source.rgb.len()]);
+    let mut coverage = vec![0.0; fit.alpha.len()];
+    for (slot, &pixel) in observed.samples.pixel.iter().enumerate() {
+        if pixel != u32::MAX && observed.weight[slot] > 0.0 {
+            let at = pixel as usize;
+            coverage[at] = observed.samples.coverage[slot].min(target.alpha[at]);
+        }
+    }
+    (target, coverage)
+}
+
+fn run_info(
+    arguments: &Arguments,
+    path: &std::path::Path,
+    prepared: &Prepared,
+    engine: &CpuEngine,
+    views: Vec<ViewEvidence>,
+) -> RunInfo {
+    let scene = match &arguments.scene.scene {
+        Some(_) => path.display().to_string(),
+        None => "the built-in scene".to_owned(),
+    };
+    let effects: Vec<&str> = prepared.scene.effects.iter().map(crate::model::effects::Effect::name).collect();
+    RunInfo {
+        scene,
+        loss: prepared.scene.fit.loss,
+        engine: "cpu".to_owned(),
+        samples: engine.samples(),
+        seconds: prepared.seconds,
+        views,
+        warnings: prepared.warnings.clone(),
+        provenance: vec![
+            ("form".to_owned(), prepared.scene.form.name().to_owned()),
+            ("silhouette".to_owned(), prepared.scene.silhouette.name().to_owned()),
+            ("effects".to_owned(), effects.join(", ")),
+            ("starts".to_owned(), format!("{}, seed {}", arguments.starts, arguments.seed)),
+            ("threads".to_owned(), rayon::current_num_threads().to_string()),
+            ("instructions".to_owned(), engine.instructions()),
+        ],
+    }
+}
+
+/// The fitted values as a small table.
+fn tell_outcome(outcome: &Outcome, views: &[View]) -> Result<(), Refusal> {
+    for unknown in &outcome.unknowns {
+        let (name, unit) = match unknown.unknown {
+            Unknown::Gain(view) => (format!("gain.{}", views[view].name), ""),
+            Unknown::Param(column) => (column.name(), column.param.info().unit),
+        };
+        let error = match unknown.std_error {
+            Some(error) => format!("+- {error:.2e}"),
+            None if !unknown.identifiable => "not determined by the images".to_owned(),
+            None if unknown.at_bound => "at its bound".to_owned(),
+            None => String::new(),
+        };
+        say(format!("{name:>22} {:>12.6}  {error:<11}  {unit}", unknown.value).trim_end())?;
+    }
+    let ending = outcome.ending.words();
+    let count = |n: u64, one: &str, more: &str| format!("{n} {}", if n == 1 { one } else { more });
+    say(&format!(
+        "{ending} after {} and {} over the samples, {:.2} s; loss {:.6e} -> {:.6e}",
+        count(outcome.iterations, "iteration", "iterations"),
+        count(outcome.evaluations, "pass", "passes"),
+        outcome.seconds,
+        outcome.loss_start,
+        outcome.loss_end
+    ))
+}

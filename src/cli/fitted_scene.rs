@@ -1,0 +1,169 @@
+//! The text of a scene file as it was fitted: comments and order stay, paths become absolute, and what
+//! the command line said stands in the place of the file's own.
+
+use std::path::Path;
+
+use toml_edit::{Array, DocumentMut, Item, Table, TableLike, TomlError, Value};
+
+use crate::model::effects::Form;
+use crate::model::params::{Channels, Column, Param, Params};
+
+/// What the command line changed.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Changes<'a> {
+    /// The loss, instead of the file's.
+    pub(super) loss: Option<&'a str>,
+    /// The start values, instead of the file's.
+    pub(super) start: Option<Start<'a>>,
+}
+
+/// Start values that a fit used.
+#[derive(Clone, Copy)]
+pub(super) struct Start<'a> {
+    pub(super) form: Form,
+    pub(super) params: &'a Params,
+    /// What was free: a parameter that was so in each channel is given three values.
+    pub(super) free: &'a [Column],
+}
+
+/// The text of a scene file in `folder`, as it was fitted.
+///
+/// # Errors
+/// When it is not TOML.
+pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Result<String, TomlError> {
+    let mut scene: DocumentMut = text.parse()?;
+    let files = [
+        ("mesh", &["file"][..]),
+        ("environment", &["file"]),
+        ("maps", &["color", "normal", "specular", "attenuator"]),
+    ];
+    for (name, keys) in files {
+        if let Some(table) = scene.get_mut(name).and_then(Item::as_table_like_mut) {
+            make_absolute(table, keys, folder);
+        }
+    }
+    let keys = ["target", "mask"];
+    match scene.get_mut("view") {
+        Some(Item::ArrayOfTables(views)) => {
+            views.iter_mut().for_each(|view| make_absolute(view, &keys, folder));
+        }
+        Some(Item::Value(Value::Array(views))) => {
+            let views = views.iter_mut().filter_map(Value::as_inline_table_mut);
+            views.for_each(|view| make_absolute(view, &keys, folder));
+        }
+        _ => {}
+    }
+    if let Some(loss) = changes.loss
+        && let Some(fit) = section(scene.as_table_mut(), "fit")
+    {
+        set(fit, "loss", loss.into());
+    }
+    if let Some(start) = changes.start {
+        let model = section(scene.as_table_mut(), "model");
+        if let Some(params) = model.and_then(|model| section(model, "params")) {
+            set_params(params, start);
+        }
+    }
+    Ok(scene.to_string())
+}
+
+fn make_absolute(table: &mut dyn TableLike, keys: &[&str], folder: &Path) {
+    for key in keys {
+        if let Some(path) = table.get(key).and_then(Item::as_str) {
+            let path = folder.join(path).display().to_string();
+            set(table, key, path.into());
+        }
+    }
+}
+
+/// The table `name`, which is made if need be.
+fn section<'a>(table: &'a mut dyn TableLike, name: &str) -> Option<&'a mut dyn TableLike> {
+    table.entry(name).or_insert_with(|| Item::Table(Table::new())).as_table_like_mut()
+}
+
+/// Set a value; what stands around it (spaces, a comment) stays.
+fn set(table: &mut dyn TableLike, key: &str, mut value: Value) {
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => {
+            *value.decor_mut() = old.decor().clone();
+            *old = value;
+        }
+        None => {
+            table.insert(key, Item::Value(value));
+        }
+    }
+}
+
+/// Every start value that is not the form's default, or that the file names.
+fn set_params(table: &mut dyn TableLike, start: Start<'_>) {
+    for param in Param::all() {
+        let rgb = start.params.rgb(param);
+        let of = |column: &&Column| column.param == param;
+        let coloured = start.free.iter().filter(of).any(|column| column.channels != Channels::Tied);
+        if coloured || rgb != [rgb[0]; 3] {
+            set(table, param.name(), Value::Array(Array::from_iter(rgb)));
+        } else if rgb[0] != param.default(start.form) || table.contains_key(param.name()) {
+            set(table, param.name(), rgb[0].into());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENE: &str = "# kept\n[mesh]\nfile = \"a b.glb\" # here too\n[maps]\ncolor = '/c.png'\n\
+        [[view]]\ntarget = \"t\\u0041.exr\"\n";
+
+    #[test]
+    fn paths_become_absolute_and_comments_stay() {
+        let text = as_fitted(SCENE, Path::new("/sc\"ene"), Changes::default()).unwrap();
+        assert_eq!(
+            text,
+            "# kept\n[mesh]\nfile = '/sc\"ene/a b.glb' # here too\n[maps]\ncolor = \"/c.png\"\n\
+             [[view]]\ntarget = '/sc\"ene/tA.exr'\n"
+        );
+        let inline = "view = [{ target = \"a.exr\", mask = \"b.png\" }] # views\n";
+        let text = as_fitted(inline, Path::new("/s"), Changes::default()).unwrap();
+        assert_eq!(text, "view = [{ target = \"/s/a.exr\", mask = \"/s/b.png\" }] # views\n");
+    }
+
+    #[test]
+    fn the_loss_is_the_one_that_was_minimised() {
+        let fits = ["", "[fit] # why\n", "[fit]\nfree = [] # none\n", "[fit]\nloss = \"huber\" # ?\n"];
+        for fit in fits.into_iter().chain(["fit.free = []\n"]) {
+            let changes = Changes { loss: Some("l2"), ..Changes::default() };
+            let text = as_fitted(&format!("{fit}{SCENE}"), Path::new("/s"), changes).unwrap();
+            let table: toml::Table = text.parse().unwrap();
+            assert_eq!(table["fit"]["loss"].as_str(), Some("l2"), "{text}");
+            assert_eq!(table["mesh"]["file"].as_str(), Some("/s/a b.glb"));
+            let comments = |text: &str| text.matches('#').count();
+            assert_eq!(comments(&text), comments(fit) + comments(SCENE), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_start_values_are_those_that_were_used() {
+        let mut params = Params::defaults(Form::Corrected);
+        params.set(Param::RimExponent, 3.5);
+        params.set_rgb(Param::RimWeight, [0.1, 0.2, 0.3]);
+        let free = Column::per_channel(Param::Hilite);
+        let start = Start { form: Form::Corrected, params: &params, free: &free };
+        for model in ["", "[model]\n", "[model.params]\nocclusion = 0.3 # old\nrim_exponent = 9 # old\n"] {
+            let changes = Changes { start: Some(start), ..Changes::default() };
+            let text = as_fitted(&format!("{model}{SCENE}"), Path::new("/s"), changes).unwrap();
+            let table: toml::Table = text.parse().unwrap();
+            let found = table["model"]["params"].as_table().unwrap();
+            assert_eq!(found["rim_exponent"].as_float(), Some(3.5), "{text}");
+            let three = |name: &str| -> Vec<f64> {
+                found[name].as_array().unwrap().iter().map(|x| x.as_float().unwrap()).collect()
+            };
+            assert_eq!(three("rim_weight"), [0.1, 0.2, 0.3]);
+            assert_eq!(three("hilite"), [0.7; 3]);
+            // One that the file names is set back to the default; one that it does not stays unsaid.
+            assert_eq!(found.get("occlusion").is_some(), model.contains("occlusion"));
+            assert!(!found.contains_key("base_weight"));
+            assert_eq!(text.matches("# old").count(), model.matches("# old").count());
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The command line: one file a command. Every command ends with an [`Exit`].
+//!
+//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
+//! - `scene`: how a command finds its scene and its cache
+//! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
+
+mod bake;
+mod demo;
+mod export;
+mod fit;
+mod fitted_scene;
+mod info;
+mod params;
+mod render;
+mod run_folder;
+mod scene;
+mod shader;
+
+use std::io::Write as _;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+/// How a command ended, as an exit code; `EXIT_CODES` says what each means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "EXIT_CODES documents them")]
+pub enum Exit {
+    Done,
+    Failed,
+}
+
+/// What the exit codes 0, 1 and 2 mean: for every help page, and docs/scene-files.md.
+const EXIT_CODES: [&str; 3] =
+    ["done", "the fit failed: it stalled, ran out of iterations or was interrupted", "the input was refused"];
+
+/// A help page's end.
+fn with_exit_codes(text: &str) -> String {
+    let [done, failed, refused] = EXIT_CODES;
+    format!("{text}\n\nExit codes:\n  0  {done}\n  1  {failed}\n  2  {refused}")
+}
+
+/// Why a command was refused: one paragraph that says file, place, what is wrong, and what to do.
+#[derive(Debug)]
+pub struct Refusal(String);
+
+impl<E: std::error::Error> From<E> for Refusal {
+    fn from(error: E) -> Self {
+        Self(error.to_string())
+    }
+}
+
+impl Refusal {
+    /// A refusal in these words.
+    pub fn new(words: impl Into<String>) -> Self {
+        Self(words.into())
+    }
+}
+
+#[derive(Parser)]
+#[command(
+    name = "skinfit",
+    version,
+    about = "Fit the constants of a real-time skin shader to images",
+    long_about = "skinfit fits the constants of a real-time skin shader to images.\n\nThe model is the \
+        one of NVIDIA's Dawn demo (GPU Gems, chapter 3): diffuse, specular and hilite cube maps, ambient \
+        occlusion and a rim weight. A scene file names mesh, maps, environment and target images; a fit \
+        leaves the constants, their error bars and pictures in a run folder.",
+    after_help = with_exit_codes("Start with:\n  skinfit fit                        fit the built-in scene\n  skinfit demo my-scene              write the built-in scene as files to copy from\n  skinfit fit my-scene/scene.toml    fit those files"),
+    arg_required_else_help = true
+)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Fit(fit::Arguments),
+    Render(render::Arguments),
+    Bake(bake::Arguments),
+    Demo(demo::Arguments),
+    Params(params::Arguments),
+    Shader(shader::Arguments),
+    Export(export::Arguments),
+    Info(info::Arguments),
+}
+
+/// Run the program on the process' arguments.
+#[must_use]
+pub fn main() -> ExitCode {
+    // A word that is not understood ends here, with exit code 2.
+    let arguments = Arguments::parse();
+    let done = match arguments.command {
+        Command::Fit(arguments) => fit::run(&arguments),
+        Command::Render(arguments) => render::run(&arguments),
+        Command::Bake(arguments) => bake::run(&arguments),
+        Command::Demo(arguments) => demo::run(&arguments),
+        Command::Params(arguments) => params::run(&arguments),
+        Command::Shader(arguments) => shader::run(&arguments),
+        Command::Export(arguments) => export::run(&arguments),
+        Command::Info(arguments) => info::run(&arguments),
+    };
+    match done {
+        Ok(Exit::Done) => ExitCode::SUCCESS,
+        Ok(Exit::Failed) => ExitCode::from(1),
+        Err(Refusal(words)) => {
+            tell(&words);
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// Print a line on standard output. A reader that has gone away (`| head -1`) is no failure; a full
+/// disk is.
+fn say(line: &str) -> Result<(), Refusal> {
+    match writeln!(std::io::stdout(), "{line}") {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Refusal::new(format!(
+            "standard output cannot be written: {error}. Send it to a file or a terminal that takes it."
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Print a line on standard error, after the program's name; there is nobody to tell that it failed.
+fn tell(line: &str) {
+    let _ = writeln!(std::io::stderr(), "skinfit: {line}");
+}
+
+/// Print what was mended or left out.
+fn tell_warnings(warnings: &[String]) {
+    for warning in warnings {
+        tell(&format!("warning: {warning}"));
+    }
+}
+
+/// See to it that opening a graphics adapter says nothing on standard error where no desktop session runs:
+/// there, a Vulkan layer of Mesa's asks a Wayland compositor in vain and complains. It heeds an environment
+/// variable, which a process can only have from its start; so the program starts anew with it, in the same
+/// process.
+fn quieten_graphics() {
+    #[cfg(all(unix, feature = "gpu"))]
+    {
+        use std::os::unix::process::CommandExt as _;
+        const VARIABLE: &str = "NODEVICE_SELECT";
+        let session = std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| !folder.is_empty());
+        if session || std::env::var_os(VARIABLE).is_some() {
+            return;
+        }
+        if let Ok(program) = std::env::current_exe() {
+            let mut arguments = std::env::args_os();
+            let name = arguments.next().unwrap_or_else(|| "skinfit".into());
+            // It only returns when it fails; then the complaint is heard, and nothing else is lost.
+            let _ = std::process::Command::new(program).arg0(name).args(arguments).env(VARIABLE, "1").exec();
+        }
+    }
+}

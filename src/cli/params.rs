@@ -1,0 +1,96 @@
+//! `skinfit params`: the parameter table.
+
+use std::fmt::Write as _;
+
+use super::{Exit, Refusal, say};
+use crate::model::params::{ParamInfo, Scale, TABLE};
+use crate::scene::interval;
+
+/// Print the parameter table: name, defaults, bounds, unit, kind, source
+#[derive(clap::Args)]
+#[command(
+    after_help = "`corrected` and `listing` are the defaults of the two forms.\n\nExamples:\n  skinfit params\n  skinfit params --format markdown > parameters.md"
+)]
+pub(super) struct Arguments {
+    /// How it is printed.
+    #[arg(long, default_value = "text", value_parser = ["text", "markdown", "json"])]
+    format: String,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let text = match arguments.format.as_str() {
+        "json" => json(),
+        "markdown" => markdown(),
+        _ => plain(),
+    };
+    say(text.trim_end())?;
+    Ok(Exit::Done)
+}
+
+fn kind(row: &ParamInfo) -> String {
+    let channels = if row.rgb { "scalar or rgb" } else { "scalar" };
+    let shape = match (row.linear, row.scale) {
+        (true, _) => "linear",
+        (false, Scale::Linear) => "non-linear",
+        (false, Scale::Log) => "non-linear, by its logarithm",
+    };
+    format!("{channels}, {shape}")
+}
+
+const HEAD: [&str; 8] = ["name", "corrected", "listing", "bounds", "unit", "kind", "source", "meaning"];
+
+fn cells(row: &ParamInfo) -> [String; 8] {
+    [
+        row.name.to_owned(),
+        row.corrected.to_string(),
+        row.listing.to_string(),
+        interval(row.lower, row.upper),
+        row.unit.to_owned(),
+        kind(row),
+        row.source.to_owned(),
+        row.meaning.to_owned(),
+    ]
+}
+
+fn plain() -> String {
+    let rows: Vec<[String; 8]> =
+        std::iter::once(HEAD.map(str::to_owned)).chain(TABLE.iter().map(cells)).collect();
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..8).map(width).collect();
+    let mut text = String::new();
+    for row in &rows {
+        let line: Vec<String> =
+            row.iter().zip(&widths).map(|(cell, &width)| format!("{cell:width$}")).collect();
+        let _ = writeln!(text, "{}", line.join("  ").trim_end());
+    }
+    text
+}
+
+/// The table as Markdown; docs/parameters.md holds exactly this.
+#[must_use]
+fn markdown() -> String {
+    let mut text = format!("| {} |\n|{}\n", HEAD.join(" | "), " --- |".repeat(8));
+    for row in &TABLE {
+        let cells = cells(row).map(|cell| cell.replace('|', "\\|"));
+        let _ = writeln!(text, "| {} |", cells.join(" | "));
+    }
+    text
+}
+
+fn json() -> String {
+    // JSON knows no infinity: null is "no bound".
+    let finite = |x: f64| if x.is_finite() { serde_json::json!(x) } else { serde_json::Value::Null };
+    let rows: Vec<serde_json::Value> = TABLE
+        .iter()
+        .map(|row| {
+            let effects: Vec<&str> = row.effects.iter().map(|effect| effect.name()).collect();
+            serde_json::json!({
+                "name": row.name, "default": {"corrected": row.corrected, "listing": row.listing},
+                "bounds": [finite(row.lower), finite(row.upper)], "unit": row.unit,
+                "rgb": row.rgb, "linear": row.linear, "effects": effects,
+                "source": row.source, "meaning": row.meaning,
+            })
+        })
+        .collect();
+    format!("{:#}", serde_json::Value::Array(rows))
+}

@@ -1,0 +1,146 @@
+//! Which engine draws, and its options.
+
+use super::Refusal;
+use super::painter::{CpuPainter, Painter};
+use crate::cli::shader::parse_budget;
+use crate::prepare::Prepared;
+use crate::render::antialias::Antialias;
+use crate::shader::Budget;
+
+/// How frames are drawn.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Engine")]
+pub(super) struct EngineArguments {
+    /// What draws: the GPU's renderer, the CPU engine, or `auto`: the GPU where there is an adapter.
+    #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = ["auto", "gpu", "cpu"])]
+    engine: String,
+    /// Part of the name of the graphics adapter to use [default: $WGPU_ADAPTER_NAME, or the fastest kind].
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Samples a pixel: `none`, `1x1` to `8x8` shaded ones, or `msaa4` (on the GPU) [default: the scene's
+    /// samples_per_axis].
+    #[arg(long, value_name = "SAMPLES", value_parser = parse_antialias)]
+    antialias: Option<Antialias>,
+    /// How far the GPU's shader may be off: `exact`, `paper` (what the paper's programs did), or a number
+    /// relative to white.
+    #[arg(long, value_name = "BUDGET", default_value = "exact", value_parser = parse_budget)]
+    accuracy: Budget,
+}
+
+fn parse_antialias(name: &str) -> Result<Antialias, String> {
+    Antialias::from_name(name).ok_or_else(|| "give none, msaa4, or 1x1 to 8x8".to_owned())
+}
+
+/// What an engine is to do with a scene; the CPU's does not ask.
+#[derive(Clone, Copy)]
+#[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "the GPU's alone prepares for it"))]
+pub(super) struct Task {
+    /// Whether the mesh will move.
+    pub(super) animated: bool,
+    /// Whether GPU time is measured.
+    pub(super) timed: bool,
+}
+
+impl EngineArguments {
+    /// Whether an adapter may be opened.
+    pub(super) fn may_be_gpu(&self) -> bool {
+        self.engine != "cpu"
+    }
+
+    /// Call `draw` with the engine that was asked for, the scene in it.
+    pub(super) fn with_painter(
+        &self,
+        prepared: &mut Prepared,
+        task: Task,
+        draw: impl FnOnce(&Prepared, &mut dyn Painter) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        let antialias = self.antialias.unwrap_or(Antialias::Grid(prepared.scene.quality.samples_per_axis));
+        if self.may_be_gpu()
+            && let Some(gpu) = self.open()?
+        {
+            let mut painter = self.painter(&gpu, prepared, antialias, task)?;
+            return draw(prepared, &mut painter);
+        }
+        let Antialias::Grid(n) = antialias else {
+            return Err(Refusal::new(
+                "--antialias msaa4 is a graphics adapter's; the CPU engine shades every sample. Give 2x2, or \
+                 render on an adapter.",
+            ));
+        };
+        prepared.scene.quality.samples_per_axis = n;
+        let mut painter = CpuPainter::new(prepared)?;
+        draw(prepared, &mut painter)
+    }
+}
+
+#[cfg(feature = "gpu")]
+mod gpu {
+    use super::super::painter::GpuPainter;
+    use super::{Antialias, EngineArguments, Prepared, Refusal, Task};
+    use crate::cli::tell;
+    use crate::gpu::error::SOFTWARE_DRIVER;
+    use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
+
+    impl EngineArguments {
+        /// The adapter's device; none where `auto` finds no adapter that works, which it says.
+        pub(super) fn open(&self) -> Result<Option<Gpu>, Refusal> {
+            let choice = Choice { name: self.adapter.clone(), max_side: None };
+            match Gpu::open(&choice) {
+                Ok(gpu) => Ok(Some(gpu)),
+                Err(error) if self.engine == "gpu" || self.adapter.is_some() => Err(error.into()),
+                Err(GpuError::NoAdapter) => {
+                    tell(&format!(
+                        "no graphics adapter was found: the CPU engine renders. {SOFTWARE_DRIVER}."
+                    ));
+                    Ok(None)
+                }
+                Err(error) => {
+                    tell(&format!("{error} The CPU engine renders."));
+                    Ok(None)
+                }
+            }
+        }
+
+        pub(super) fn painter<'a>(
+            &self,
+            gpu: &'a Gpu,
+            prepared: &'a Prepared,
+            antialias: Antialias,
+            task: Task,
+        ) -> Result<GpuPainter<'a>, Refusal> {
+            let Task { animated, timed } = task;
+            let options = RenderOptions { antialias, budget: self.accuracy, timed, animated };
+            Ok(GpuPainter::new(gpu, prepared, options)?)
+        }
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+mod gpu {
+    use super::{Antialias, CpuPainter, EngineArguments, Prepared, Refusal, Task};
+
+    /// There is none.
+    pub(super) enum Gpu {}
+
+    impl EngineArguments {
+        pub(super) fn open(&self) -> Result<Option<Gpu>, Refusal> {
+            if self.engine == "gpu" || self.adapter.is_some() {
+                return Err(Refusal::new(
+                    "this skinfit was built without its GPU renderer. Build it with the feature `gpu` (a \
+                     default one), or render with --engine cpu.",
+                ));
+            }
+            Ok(None)
+        }
+
+        pub(super) fn painter<'a>(
+            &self,
+            gpu: &'a Gpu,
+            _prepared: &'a Prepared,
+            _antialias: Antialias,
+            _task: Task,
+        ) -> Result<CpuPainter<'a>, Refusal> {
+            match *gpu {}
+        }
+    }
+}

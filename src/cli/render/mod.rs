@@ -1,0 +1,230 @@
+//! `skinfit render`: a view as an image, or as a sequence of images.
+//!
+//! - `engine`: which engine draws, and its options
+//! - `painter`: both engines behind one interface
+//! - `frames`: which frames a sequence has, and their files
+
+mod engine;
+mod frames;
+mod painter;
+
+use std::path::{Path, PathBuf};
+
+use super::scene::{SceneArguments, parse_effects};
+use super::{Exit, Refusal, quieten_graphics, say, tell_warnings};
+use crate::model::effects::Effects;
+use crate::model::params::{Param, Params};
+use crate::prepare::{PrepareOptions, Prepared, Views};
+use crate::progress;
+use crate::render::files::{ImageOptions, write_exr_layers, write_image};
+use crate::render::image::{MAX_PIXELS, MAX_SIDE};
+use crate::render::tonemap::{Operator, ToneMap};
+use crate::samples;
+use crate::scene::load::Animation;
+use frames::Frame;
+use painter::Painter;
+
+/// Render a view of a scene with the model
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  skinfit render scene.toml --params runs/a/params.toml --view front -o front.exr\n  skinfit render --effects diffuse,occlusion --tone aces -o clay.png\n  skinfit render scene.toml --frames 120 --size 1920x1080 --accuracy paper --antialias msaa4 -o turn.png"
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Parameters of an earlier fit, instead of the scene's start values.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+    /// Which view [default: the scene's first].
+    #[arg(long, value_name = "NAME")]
+    view: Option<String>,
+    /// Effects to switch on, comma-separated, instead of the scene's.
+    #[arg(long, value_name = "LIST", value_parser = parse_effects)]
+    effects: Option<Effects>,
+    /// The image: .exr (linear, 32-bit float) or .png (sRGB). With --frames, each frame's number goes before
+    /// the ending.
+    #[arg(short, long, value_name = "FILE")]
+    output: PathBuf,
+    /// Pixels across and down, instead of the view's; its vertical field of view stays.
+    #[arg(long, value_name = "WxH", value_parser = parse_size)]
+    size: Option<(u32, u32)>,
+    /// Write a layer for each term into the EXR; they add up to the whole.
+    #[arg(long)]
+    layers: bool,
+    /// How radiance becomes a PNG's colours.
+    #[arg(long, default_value = "clip", value_parser = ["clip", "reinhard", "aces"])]
+    tone: String,
+    /// Exposure of a PNG, in stops.
+    #[arg(long, value_name = "STOPS", default_value_t = 0.0, allow_negative_numbers = true, value_parser = parse_stops)]
+    exposure: f32,
+    #[command(flatten)]
+    engine: engine::EngineArguments,
+    /// Render so many frames: a whole turn of the camera about the mesh's vertical axis.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Sequences")]
+    frames: Option<u32>,
+    /// Let the frames go through the mesh file's animation 0 instead, the camera standing still. Ambient
+    /// occlusion stays that of its beginning.
+    #[arg(long, requires = "frames", help_heading = "Sequences")]
+    animate: bool,
+    /// Print what a frame took: GPU time by pass, uploaded bytes, bindings.
+    #[arg(long)]
+    stats: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let is_exr = check_output(&arguments.output, arguments.layers)?;
+    if arguments.engine.may_be_gpu() {
+        quieten_graphics();
+    }
+    let (path, _scratch) = arguments.scene.path()?;
+    let options = PrepareOptions {
+        effects: arguments.effects,
+        fit: false,
+        views: arguments.view.clone().map_or(Views::First, Views::Named),
+        params: arguments.params.clone(),
+        cache: arguments.scene.cache(),
+        time: arguments.animate.then_some(0.0),
+    };
+    let mut prepared = Prepared::baked(&path, &options)?;
+    samples::check_uvs(&prepared.scene, &prepared.scene.mesh.uvs)?;
+    if let Some((width, height)) = arguments.size {
+        let camera = &mut prepared.scene.views[0].camera;
+        (camera.width, camera.height) = (width, height);
+    }
+    let animation = if arguments.animate { Some(animation(&prepared)?) } else { None };
+    tell_warnings(&prepared.warnings);
+    let frames = frames(arguments, &prepared, animation.as_ref());
+    let sequence = arguments.frames.is_some();
+    let task = engine::Task { animated: animation.is_some(), timed: arguments.stats };
+    arguments.engine.with_painter(&mut prepared, task, |prepared, painter| {
+        let bar = progress::bar("frames", frames.len() as u64);
+        for frame in &frames {
+            if let (Some(animation), Some(time)) = (&animation, frame.time) {
+                painter.set_mesh(&animation.mesh(time)?)?;
+            }
+            let layers = is_exr && arguments.layers;
+            let picture = painter.paint(&frame.camera, prepared.gains[0], layers)?;
+            if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
+                return Err(samples::nothing_visible(&prepared.scene, &prepared.scene.views[0]).into());
+            }
+            bar.suspend(|| tell_warnings(&picture.warnings));
+            write(arguments, &path, frame, &picture, &prepared.scene.params)?;
+            bar.inc(1);
+        }
+        bar.finish_and_clear();
+        tell_done(arguments, prepared, &frames, painter)
+    })?;
+    Ok(Exit::Done)
+}
+
+/// The frames that were asked for.
+fn frames(arguments: &Arguments, prepared: &Prepared, animation: Option<&Animation>) -> Vec<Frame> {
+    let (camera, output) = (&prepared.scene.views[0].camera, &arguments.output);
+    match (arguments.frames, animation) {
+        (None, _) => frames::still(*camera, output),
+        (Some(count), None) => frames::turntable(camera, &prepared.scene.mesh, count, output),
+        (Some(count), Some(animation)) => frames::animation(camera, animation.seconds, count, output),
+    }
+}
+
+fn animation(prepared: &Prepared) -> Result<Animation, Refusal> {
+    Animation::open(&prepared.scene)?.ok_or_else(|| {
+        Refusal::new(format!(
+            "{}: its mesh file has no animation with keys. Leave out --animate, or name a mesh that moves.",
+            prepared.scene.path.display()
+        ))
+    })
+}
+
+fn write(
+    arguments: &Arguments,
+    scene: &Path,
+    frame: &Frame,
+    picture: &painter::Picture,
+    params: &Params,
+) -> Result<(), Refusal> {
+    let options = ImageOptions {
+        tone: ToneMap {
+            operator: Operator::from_name(&arguments.tone).unwrap_or_default(),
+            exposure: arguments.exposure,
+        },
+        attributes: vec![
+            ("software".to_owned(), format!("skinfit {}", env!("CARGO_PKG_VERSION"))),
+            ("scene".to_owned(), scene.display().to_string()),
+            ("parameters".to_owned(), parameters(params)),
+        ],
+        ..ImageOptions::default()
+    };
+    if picture.layers.is_empty() {
+        write_image(&frame.path, &picture.image, &options)?;
+    } else {
+        let layers: Vec<_> =
+            picture.layers.iter().map(|(name, image)| (name.name().to_owned(), image.clone())).collect();
+        write_exr_layers(&frame.path, &picture.image, &layers, &options)?;
+    }
+    Ok(())
+}
+
+fn tell_done(
+    arguments: &Arguments,
+    prepared: &Prepared,
+    frames: &[Frame],
+    painter: &dyn Painter,
+) -> Result<(), Refusal> {
+    let (view, engine) = (&prepared.scene.views[0].name, painter.name());
+    if let [first, .., last] = frames {
+        let (first, last) = (first.path.display(), last.path.display());
+        say(&format!("wrote {} frames, {first} to {last} (view {view}; {engine})", frames.len()))?;
+    } else if let [only] = frames {
+        say(&format!("wrote {} (view {view}; {engine})", only.path.display()))?;
+    }
+    if arguments.stats {
+        painter.stats().iter().try_for_each(|line| say(line))?;
+    }
+    Ok(())
+}
+
+fn parse_stops(text: &str) -> Result<f32, String> {
+    let stops = text.parse().map_err(|_| "give a number of stops, such as -1.5")?;
+    // Beyond that, every image is black or white.
+    if (-64.0..=64.0).contains(&stops) { Ok(stops) } else { Err("give stops in [-64, 64]".to_owned()) }
+}
+
+/// `1920x1080`
+fn parse_size(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']).map(|(width, height)| (width.parse(), height.parse()));
+    let Some((Ok(width), Ok(height))) = sides else {
+        return Err("give pixels across and down, such as 1920x1080".to_owned());
+    };
+    let within = |side: u32| (1..=MAX_SIDE).contains(&(side as usize));
+    if !within(width) || !within(height) || width as usize * height as usize > MAX_PIXELS {
+        return Err(format!("give 1 to {MAX_SIDE} pixels a side, with at most {MAX_PIXELS} in all"));
+    }
+    Ok((width, height))
+}
+
+/// Refuse an ending before any work is done; whether it is EXR.
+fn check_output(path: &Path, layers: bool) -> Result<bool, Refusal> {
+    let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+    match ending.as_deref() {
+        Some("exr") => Ok(true),
+        Some("png") if layers => Err(Refusal::new(format!(
+            "{}: a PNG holds no layers. Write an .exr, or leave out --layers.",
+            path.display()
+        ))),
+        Some("png") => Ok(false),
+        _ => Err(Refusal::new(format!(
+            "{}: unknown kind of image. Give a path that ends in .exr or .png.",
+            path.display()
+        ))),
+    }
+}
+
+/// The parameters on one line, as provenance.
+fn parameters(params: &Params) -> String {
+    let value = |param: Param| match params.rgb(param) {
+        [r, g, b] if r == g && g == b => format!("{} = {r}", param.name()),
+        rgb => format!("{} = {rgb:?}", param.name()),
+    };
+    Param::all().map(value).collect::<Vec<_>>().join("; ")
+}

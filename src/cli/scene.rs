@@ -1,0 +1,85 @@
+//! How a command finds its scene, its cache and its effects.
+
+use std::path::{Path, PathBuf};
+
+use tempfile::TempDir;
+
+use super::Refusal;
+use crate::bake::cache;
+use crate::demo;
+use crate::model::effects::{Effect, Effects};
+use crate::scene::suggestion;
+
+/// Which scene, and where bakes are kept.
+#[derive(clap::Args)]
+pub(super) struct SceneArguments {
+    /// The scene file; the built-in scene when left out.
+    pub scene: Option<PathBuf>,
+    /// Folder that keeps bakes between runs [default: $SKINFIT_CACHE, or the user's cache folder].
+    #[arg(long, value_name = "DIR", help_heading = "Baking")]
+    cache: Option<PathBuf>,
+    /// Bake anew, and keep nothing.
+    #[arg(long, conflicts_with = "cache", help_heading = "Baking")]
+    no_cache: bool,
+    /// Threads to use [default: all cores].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+impl SceneArguments {
+    /// The scene's file, and what must stay alive for as long as it is read: without a cache the
+    /// built-in scene lives in a folder of its own that goes with it.
+    pub(super) fn path(&self) -> Result<(PathBuf, Option<TempDir>), Refusal> {
+        if self.scene.is_some() || !self.no_cache {
+            return Ok((self.kept_path(Path::new(""))?, None));
+        }
+        let scratch = tempfile::tempdir().map_err(|error| {
+            let folder = std::env::temp_dir();
+            Refusal::new(format!(
+                "{}: the built-in scene cannot be written there: {error}. Make room, or set TMPDIR.",
+                folder.display()
+            ))
+        })?;
+        Ok((self.kept_path(scratch.path())?, Some(scratch)))
+    }
+
+    /// The scene's file; the built-in scene is written first if it is not there yet, into the cache
+    /// or, when there is none, into `folder`.
+    pub(super) fn kept_path(&self, folder: &Path) -> Result<PathBuf, Refusal> {
+        self.set_threads();
+        match &self.scene {
+            Some(scene) => Ok(scene.clone()),
+            None => {
+                let cache = self.cache();
+                Ok(demo::kept_scene(cache.as_deref().unwrap_or(folder), cache.as_deref())?)
+            }
+        }
+    }
+
+    /// Where bakes are kept; `None` with `--no-cache`.
+    pub(super) fn cache(&self) -> Option<PathBuf> {
+        if self.no_cache { None } else { Some(self.cache.clone().unwrap_or_else(cache::default_folder)) }
+    }
+
+    fn set_threads(&self) {
+        if let Some(threads) = self.threads {
+            // It fails only when the pool is there already, from an earlier call in this process.
+            let _ = rayon::ThreadPoolBuilder::new().num_threads(usize::from(threads)).build_global();
+        }
+    }
+}
+
+/// `diffuse,rim,...` as a set of effects.
+pub(super) fn parse_effects(list: &str) -> Result<Effects, String> {
+    let known: Vec<&str> = Effect::ALL.iter().map(|effect| effect.name()).collect();
+    let parse = |name: &str| {
+        Effect::from_name(name)
+            .ok_or_else(|| format!("unknown effect `{name}`. {}.", suggestion(name, &known)))
+    };
+    let names = list.split(',').map(str::trim).filter(|name| !name.is_empty());
+    let effects: Effects = names.map(parse).collect::<Result<_, _>>()?;
+    if effects == Effects::default() {
+        return Err(format!("it names no effect. {}.", suggestion("", &known)));
+    }
+    Ok(effects)
+}

@@ -1,0 +1,117 @@
+//! `skinfit shader`: the shader that a scene gets, and the plan behind it.
+
+use std::fmt::Write as _;
+use std::path::PathBuf;
+
+use super::scene::{SceneArguments, parse_effects};
+use super::{Exit, Refusal, say, tell_warnings};
+use crate::fit::params_file::ParamsFile;
+use crate::model::effects::Effects;
+use crate::output;
+use crate::scene::Scene;
+use crate::scene::load::LoadOptions;
+use crate::shader::rule::Stage;
+use crate::shader::{Budget, Facts, Plan, plan};
+
+/// Print the shader that a scene gets, and the plan behind it
+#[derive(clap::Args)]
+#[command(
+    after_help = "Examples:\n  skinfit shader scene.toml\n  skinfit shader --effects diffuse,rim --accuracy paper --show plan\n  skinfit shader scene.toml --show wgsl -o skin.wgsl"
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// Parameters of an earlier fit, instead of the scene's start values.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+    /// Effects to switch on, comma-separated, instead of the scene's.
+    #[arg(long, value_name = "LIST", value_parser = parse_effects)]
+    effects: Option<Effects>,
+    /// How far the output may be off: `exact`, `paper` (what the paper's programs did), or a number
+    /// relative to white.
+    #[arg(long, value_name = "BUDGET", default_value = "exact", value_parser = parse_budget)]
+    accuracy: Budget,
+    /// Let the shader compute in 16 bits where that is accurate enough.
+    #[arg(long)]
+    f16: bool,
+    /// What to print.
+    #[arg(long, default_value = "all", value_parser = ["all", "plan", "wgsl"])]
+    show: String,
+    /// A file to write instead of standard output.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let (path, _scratch) = arguments.scene.path()?;
+    let load = LoadOptions { effects: arguments.effects, targets: false, ..LoadOptions::default() };
+    let (scene, warnings) = Scene::load(&path, &load)?;
+    tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
+    let params = match &arguments.params {
+        Some(file) => ParamsFile::read(file, scene.form, &scene.params)?.params,
+        None => scene.params,
+    };
+    let plan = plan(&Facts::of_scene(&scene, &params, arguments.accuracy, arguments.f16))?;
+    let text = match arguments.show.as_str() {
+        "plan" => table(&plan, ""),
+        "wgsl" => plan.wgsl.clone(),
+        _ => format!("{}\n{}", table(&plan, "// "), plan.wgsl),
+    };
+    match &arguments.output {
+        Some(path) => {
+            output::write(path, text.as_bytes())?;
+            say(&format!("wrote {}", path.display()))?;
+        }
+        None => say(text.trim_end())?,
+    }
+    Ok(Exit::Done)
+}
+
+/// `exact`, `paper` or a number.
+pub(super) fn parse_budget(text: &str) -> Result<Budget, String> {
+    match text {
+        "exact" => Ok(Budget::Exact),
+        "paper" => Ok(Budget::Paper),
+        number => match number.parse() {
+            Ok(most) if (0.0..=1.0).contains(&most) => Ok(Budget::Within(most)),
+            _ => Err("give `exact`, `paper` or a number from 0 to 1, such as 0.005".to_owned()),
+        },
+    }
+}
+
+/// The plan as a table, each line after `margin`.
+fn table(plan: &Plan, margin: &str) -> String {
+    let mut text = String::new();
+    let mut line = |words: String| {
+        let _ = writeln!(text, "{}", format!("{margin}{words}").trim_end());
+    };
+    line(format!(
+        "{} rules, about {:.0} operations a fragment, error at most {:.1e}",
+        plan.steps.len(),
+        plan.cost,
+        plan.error
+    ));
+    line(format!("vertex attributes: {}", list(plan.attributes.iter().map(|a| a.name()))));
+    line(format!("interpolated: {}", list(plan.varyings.iter().map(|(name, _)| *name))));
+    line(format!("bound: {}", list(plan.resources.iter().map(|r| r.name()))));
+    line(format!("constants: {}", list(plan.constants.iter().map(|c| c.name()))));
+    line(String::new());
+    line(format!("{:<10} {:<26} {:<28} {:>5} {:>8}", "where", "quantity", "rule", "cost", "error"));
+    for step in &plan.steps {
+        let stage = if step.rule.stage == Stage::Vertex { "vertex" } else { "fragment" };
+        let gives = list(step.rule.gives.iter().map(|(quantity, _)| *quantity));
+        let (name, cost, error) = (step.rule.name, step.cost, step.error);
+        line(format!("{stage:<10} {gives:<26} {name:<28} {cost:>5.0} {error:>8.1e}"));
+    }
+    line(String::new());
+    line("left out:".to_owned());
+    for (rule, reason) in plan.left_out() {
+        line(format!("  {:<28} {reason}", rule.name));
+    }
+    text
+}
+
+fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {
+    let names: Vec<&str> = names.collect();
+    if names.is_empty() { "nothing".to_owned() } else { names.join(", ") }
+}

@@ -1,0 +1,320 @@
+//! Sixteen f32 lanes as one [`Real`]: the model's formulas, on whatever SIMD the processor has.
+//!
+//! The width is fixed, so that results are the same whichever instructions run (up to the fused
+//! multiply-add, which SSE2 lacks).
+
+use fearless_simd::prelude::*;
+use fearless_simd::{Simd, f32x4, f32x16, i32x16, mask32x16};
+
+use crate::model::real::Real;
+use crate::samples::LANES;
+
+/// [`LANES`] numbers in one register (or two, or four).
+#[derive(Clone, Copy)]
+pub struct Lanes<S: Simd>(pub f32x16<S>);
+
+macro_rules! operator {
+    ($trait:ident, $method:ident) => {
+        impl<S: Simd> std::ops::$trait for Lanes<S> {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(self.0.$method(other.0))
+            }
+        }
+    };
+}
+
+operator!(Add, add);
+operator!(Sub, sub);
+operator!(Mul, mul);
+operator!(Div, div);
+
+impl<S: Simd> std::ops::Neg for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl<S: Simd> Lanes<S> {
+    /// `value` in every lane.
+    #[inline(always)]
+    pub fn splat(simd: S, value: f32) -> Self {
+        Self(f32x16::splat(simd, value))
+    }
+
+    /// The lanes' values.
+    #[inline(always)]
+    #[must_use]
+    pub fn to_array(self) -> [f32; LANES] {
+        self.0.to_array()
+    }
+
+    /// The values of a row.
+    #[inline(always)]
+    pub fn of_row(simd: S, row: &[f32; LANES]) -> Self {
+        Self(f32x16::load_array_ref(simd, row))
+    }
+
+    /// Store into a row.
+    #[inline(always)]
+    pub fn store(self, row: &mut [f32; LANES]) {
+        self.0.store_array(row);
+    }
+
+    #[inline(always)]
+    fn int(self, value: i32) -> i32x16<S> {
+        i32x16::splat(self.0.simd, value)
+    }
+}
+
+impl<S: Simd> Real for Lanes<S> {
+    type Mask = mask32x16<S>;
+    type Texel = f32;
+
+    #[inline(always)]
+    #[allow(clippy::cast_possible_truncation, reason = "rounds to the scalar")]
+    fn lit(self, value: f64) -> Self {
+        Self::splat(self.0.simd, value as f32)
+    }
+    /// The processor's estimate, refined once: a division occupies the divider for 16 cycles.
+    #[inline(always)]
+    fn recip(self) -> Self {
+        let estimate = Self(self.0.approximate_recip());
+        let error = (-self).mul_add(estimate, self.lit(1.0));
+        error.mul_add(estimate, estimate)
+    }
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self(self.0.sqrt())
+    }
+    #[inline(always)]
+    fn abs(self) -> Self {
+        Self(self.0.abs())
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        Self(self.0.min(other.0))
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
+    }
+    #[inline(always)]
+    fn floor(self) -> Self {
+        Self(self.0.floor())
+    }
+
+    /// By the exponent's bits and the series of artanh; within 2e-7 absolute.
+    #[inline(always)]
+    fn log2(self) -> Self {
+        let bits: i32x16<S> = self.0.to_bits().bitcast();
+        // 0x3f3504f3 is sqrt(1/2): the mantissa is taken from [sqrt(1/2), sqrt(2)).
+        let shifted = bits - self.int(0x3f35_04f3);
+        let exponent = shifted >> 23;
+        let mantissa: f32x16<S> = (bits - (exponent << 23)).bitcast();
+        let m = Self(mantissa);
+        let one = self.lit(1.0);
+        let t = (m - one) * (m + one).recip();
+        let t2 = t * t;
+        // log2 m = 2 / ln 2 (t + t^3/3 + t^5/5 + ...), |t| < 0.172
+        let k = 2.0 / std::f64::consts::LN_2;
+        let series = t2
+            .mul_add(self.lit(k / 9.0), self.lit(k / 7.0))
+            .mul_add(t2, self.lit(k / 5.0))
+            .mul_add(t2, self.lit(k / 3.0))
+            .mul_add(t2, self.lit(k));
+        series.mul_add(t, Self(exponent.to_float()))
+    }
+
+    /// By the nearest integer and Taylor's polynomial of degree 7; within 2e-7 relative.
+    #[inline(always)]
+    fn exp2(self) -> Self {
+        let underflow = self.lit(-126.0);
+        let clamped = self.max(underflow).min(self.lit(127.0));
+        let whole = (clamped + self.lit(0.5)).floor();
+        let f = clamped - whole;
+        let mut coefficients = [1.0_f64; 8];
+        for k in 1..8 {
+            coefficients[k] = coefficients[k - 1] * std::f64::consts::LN_2 / k as f64;
+        }
+        let mut value = self.lit(coefficients[7]);
+        for k in (0..7).rev() {
+            value = value.mul_add(f, self.lit(coefficients[k]));
+        }
+        let whole: i32x16<S> = whole.0.to_int();
+        let power: f32x16<S> = ((whole + self.int(127)) << 23).bitcast();
+        Self::select(self.ge(underflow), value * Self(power), self.lit(0.0))
+    }
+
+    #[inline(always)]
+    fn mul_add(self, a: Self, b: Self) -> Self {
+        Self(self.0.mul_add(a.0, b.0))
+    }
+    #[inline(always)]
+    fn lt(self, other: Self) -> Self::Mask {
+        self.0.simd_lt(other.0)
+    }
+    #[inline(always)]
+    fn ge(self, other: Self) -> Self::Mask {
+        self.0.simd_ge(other.0)
+    }
+    #[inline(always)]
+    fn is_finite(self) -> Self::Mask {
+        // NaN fails the comparison too.
+        self.abs().0.simd_le(self.lit(f64::from(f32::MAX)).0)
+    }
+    #[inline(always)]
+    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        a & b
+    }
+    #[inline(always)]
+    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
+        Self(mask.select(yes.0, no.0))
+    }
+
+    #[inline(always)]
+    fn all(mask: Self::Mask) -> bool {
+        mask.all_true()
+    }
+
+    #[inline(always)]
+    fn bilinear(texels: &[[f32; 4]], row: usize, index: Self, fx: Self, fy: Self) -> [Self; 4] {
+        let mut values = [fx; 4];
+        let corners = Corners::load(texels, row, index);
+        for channel in 0..4 {
+            let [a, b, c, d] = corners.of(channel);
+            let (upper, lower) = (fx.mul_add(b - a, a), fx.mul_add(d - c, c));
+            values[channel] = fy.mul_add(lower - upper, upper);
+        }
+        values
+    }
+
+    #[inline(always)]
+    fn bilinear_with_slope(
+        texels: &[[f32; 4]],
+        row: usize,
+        index: Self,
+        [fx, fy]: [Self; 2],
+        [dx, dy]: [Self; 2],
+    ) -> ([Self; 4], [Self; 4]) {
+        let (mut values, mut slopes) = ([fx; 4], [fx; 4]);
+        let corners = Corners::load(texels, row, index);
+        for channel in 0..4 {
+            let [a, b, c, d] = corners.of(channel);
+            let (upper_step, lower_step) = (b - a, d - c);
+            let (upper, lower) = (fx.mul_add(upper_step, a), fx.mul_add(lower_step, c));
+            let down = lower - upper;
+            values[channel] = fy.mul_add(down, upper);
+            let across = fy.mul_add(lower_step - upper_step, upper_step);
+            slopes[channel] = dx.mul_add(across, dy * down);
+        }
+        (values, slopes)
+    }
+}
+
+/// The 2 x 2 texels of each lane's lookup: for each corner, four channels of sixteen lanes.
+///
+/// A texel is one 16-byte load; four lanes' texels are joined in a register and transposed. Gathers
+/// of single floats are several times slower.
+struct Corners<S: Simd>([[Lanes<S>; 4]; 4]);
+
+impl<S: Simd> Corners<S> {
+    #[inline(always)]
+    fn load(texels: &[[f32; 4]], row: usize, first: Lanes<S>) -> Self {
+        let simd = first.0.simd;
+        let first: i32x16<S> = first.0.to_int();
+        // Through memory: taking sixteen numbers out of a register costs more.
+        let first = std::hint::black_box(first.to_array());
+        // Slices of equal length, so that one check of an index covers all four corners.
+        let count = texels.len() - row - 1;
+        let (a, b) = (&texels[..count], &texels[1..][..count]);
+        let (c, d) = (&texels[row..][..count], &texels[row + 1..][..count]);
+        let mut joined = [[f32x16::splat(simd, 0.0); 4]; 4];
+        // Lane by lane, so that few indices are held at a time.
+        for quarter in 0..4 {
+            let lane = 4 * quarter;
+            let index = [first[lane], first[lane + 1], first[lane + 2], first[lane + 3]];
+            joined[0][quarter] = four_texels(simd, a, index);
+            joined[1][quarter] = four_texels(simd, b, index);
+            joined[2][quarter] = four_texels(simd, c, index);
+            joined[3][quarter] = four_texels(simd, d, index);
+        }
+        let [a, b, c, d] = joined;
+        Self([transpose(simd, a), transpose(simd, b), transpose(simd, c), transpose(simd, d)])
+    }
+
+    /// A channel's four corners.
+    #[inline(always)]
+    fn of(&self, channel: usize) -> [Lanes<S>; 4] {
+        let [a, b, c, d] = &self.0;
+        [a[channel], b[channel], c[channel], d[channel]]
+    }
+}
+
+/// Four RGBA quadruples in one register.
+#[inline(always)]
+fn four_texels<S: Simd>(simd: S, texels: &[[f32; 4]], index: [i32; 4]) -> f32x16<S> {
+    join(
+        simd,
+        f32x4::load_array_ref(simd, &texels[index[0] as usize]),
+        f32x4::load_array_ref(simd, &texels[index[1] as usize]),
+        f32x4::load_array_ref(simd, &texels[index[2] as usize]),
+        f32x4::load_array_ref(simd, &texels[index[3] as usize]),
+    )
+}
+
+/// Four RGBA quadruples in one register, without a detour through memory: wide loads of what was
+/// just stored in parts would stall.
+#[inline(always)]
+fn join<S: Simd>(simd: S, a: f32x4<S>, b: f32x4<S>, c: f32x4<S>, d: f32x4<S>) -> f32x16<S> {
+    simd.combine_f32x8(simd.combine_f32x4(a, b), simd.combine_f32x4(c, d))
+}
+
+/// Sixteen RGBA quadruples to four channels of sixteen.
+#[inline(always)]
+fn transpose<S: Simd>(simd: S, lanes: [f32x16<S>; 4]) -> [Lanes<S>; 4] {
+    let (rb0, ga0) = simd.deinterleave_f32x16(lanes[0], lanes[1]);
+    let (rb1, ga1) = simd.deinterleave_f32x16(lanes[2], lanes[3]);
+    let (r, b) = simd.deinterleave_f32x16(rb0, rb1);
+    let (g, a) = simd.deinterleave_f32x16(ga0, ga1);
+    [Lanes(r), Lanes(g), Lanes(b), Lanes(a)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use fearless_simd::{Level, dispatch};
+
+    #[inline(always)]
+    fn worst_errors<S: Simd>(simd: S) -> [f64; 2] {
+        let mut worst = [0.0_f64; 2];
+        for i in 0..4000 {
+            let x: [f32; LANES] =
+                std::array::from_fn(|lane| (0.004 * (i * LANES + lane) as f32 - 120.0).exp2());
+            let y: [f32; LANES] = std::array::from_fn(|lane| -0.002 * (i * LANES + lane) as f32);
+            let log = Lanes(f32x16::load_array(simd, x)).log2().0.to_array();
+            let exp = Lanes(f32x16::load_array(simd, y)).exp2().0.to_array();
+            for lane in 0..LANES {
+                let want = f64::from(x[lane]).log2();
+                worst[0] = worst[0].max((f64::from(log[lane]) - want).abs() / want.abs().max(1.0));
+                let want = f64::from(y[lane]).exp2();
+                if y[lane] >= -126.0 {
+                    worst[1] = worst[1].max((f64::from(exp[lane]) - want).abs() / want);
+                }
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn logarithm_and_power_are_within_two_units_in_the_last_place() {
+        let level = Level::new();
+        let [log, exp] = dispatch!(level, simd => worst_errors(simd));
+        // An f32 has 6e-8 of relative rounding; each function rounds a few times.
+        assert!(log < 2.4e-7, "log2: {log}");
+        assert!(exp < 2.4e-7, "exp2: {exp}");
+    }
+}

@@ -1,0 +1,210 @@
+//! How each shading language spells what the shader rules say in WGSL.
+
+use crate::shader::quantity::{Kind, Resource};
+
+/// Families that share most of their grammar.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Family {
+    /// The rules' own language.
+    Wgsl,
+    /// `vec3`, `mix`, combined samplers.
+    Glsl,
+    /// `float3`, `lerp`.
+    Hlsl,
+    /// `float3`, `mix`, textures as arguments.
+    Msl,
+}
+
+/// A shading language.
+#[derive(Clone, Copy, Debug)]
+pub struct Dialect {
+    /// Its grammar.
+    pub family: Family,
+    /// What stands before a constant's type.
+    pub constant: &'static str,
+    /// A bilinear lookup of a 2D map: `{t}` texture, `{s}` sampler, `{c}` coordinates.
+    pub map_lookup: &'static str,
+    /// A lookup of a cube.
+    pub cube_lookup: &'static str,
+    /// Declarations of a 2D map, a cube and a sampler: `{n}` name, `{b}` binding. Empty: none.
+    pub declarations: [&'static str; 3],
+    /// The names of the samplers of maps and cubes.
+    pub samplers: [&'static str; 2],
+    /// The bits of a vector's floats; empty where the language has none, but `isfinite`.
+    pub bits: &'static str,
+    /// Lines that come first.
+    pub prologue: &'static str,
+    /// Lines that come last.
+    pub epilogue: &'static str,
+}
+
+/// WebGPU's language.
+pub const WGSL: Dialect = Dialect {
+    family: Family::Wgsl,
+    constant: "const",
+    map_lookup: "textureSampleLevel({t}, {s}, {c}, 0.0)",
+    cube_lookup: "textureSampleLevel({t}, {s}, {c}, 0.0)",
+    declarations: [
+        "@group(0) @binding({b}) var {n}: texture_2d<f32>;",
+        "@group(0) @binding({b}) var {n}: texture_cube<f32>;",
+        "@group(0) @binding({b}) var {n}: sampler;",
+    ],
+    samplers: ["map_sampler", "cube_sampler"],
+    bits: "bitcast<vec3u>",
+    prologue: "",
+    epilogue: "",
+};
+
+/// OpenGL 4.3, OpenGL ES 3.1 and up.
+pub const GLSL: Dialect = Dialect {
+    family: Family::Glsl,
+    constant: "const",
+    map_lookup: "textureLod({t}, {c}, 0.0)",
+    cube_lookup: "textureLod({t}, {c}, 0.0)",
+    declarations: [
+        "layout(binding = {b}) uniform sampler2D {n};",
+        "layout(binding = {b}) uniform samplerCube {n};",
+        "",
+    ],
+    samplers: ["map_sampler", "cube_sampler"],
+    bits: "floatBitsToUint",
+    prologue: "",
+    epilogue: "",
+};
+
+/// Direct3D 11 and up.
+pub const HLSL: Dialect = Dialect {
+    family: Family::Hlsl,
+    constant: "static const",
+    map_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
+    cube_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
+    declarations: [
+        "Texture2D<float4> {n} : register(t{b});",
+        "TextureCube<float4> {n} : register(t{b});",
+        "SamplerState {n} : register(s{b});",
+    ],
+    samplers: ["map_sampler", "cube_sampler"],
+    bits: "asuint",
+    prologue: "",
+    epilogue: "",
+};
+
+/// The paper's language (profiles with `texCUBElod`: fp40, gp4 and up).
+pub const CG: Dialect = Dialect {
+    family: Family::Hlsl,
+    constant: "static const",
+    map_lookup: "tex2Dlod({t}, float4({c}, 0.0, 0.0))",
+    cube_lookup: "texCUBElod({t}, float4({c}, 0.0))",
+    declarations: ["uniform sampler2D {n};", "uniform samplerCUBE {n};", ""],
+    samplers: ["map_sampler", "cube_sampler"],
+    bits: "",
+    prologue: "",
+    epilogue: "",
+};
+
+/// Metal 2 and up. Textures are arguments of a shader there: a struct holds them and has the functions.
+pub const MSL: Dialect = Dialect {
+    family: Family::Msl,
+    constant: "constant",
+    map_lookup: "{t}.sample({s}, {c}, level(0.0))",
+    cube_lookup: "{t}.sample({s}, {c}, level(0.0))",
+    declarations: ["texture2d<float> {n};", "texturecube<float> {n};", "sampler {n};"],
+    samplers: ["map_sampler", "cube_sampler"],
+    bits: "as_type<uint3>",
+    prologue: "#include <metal_stdlib>\nusing namespace metal;\n",
+    epilogue: "",
+};
+
+/// Godot 4, as an include of a spatial shader.
+pub const GODOT: Dialect = Dialect {
+    family: Family::Glsl,
+    constant: "const",
+    map_lookup: "textureLod({t}, {c}, 0.0)",
+    cube_lookup: "textureLod({t}, {c}, 0.0)",
+    declarations: [
+        "uniform sampler2D {n} : filter_linear, repeat_enable;",
+        "uniform samplerCube {n} : filter_linear;",
+        "",
+    ],
+    samplers: ["map_sampler", "cube_sampler"],
+    bits: "floatBitsToUint",
+    prologue: "",
+    epilogue: "",
+};
+
+/// Unity, as an include of an HLSLPROGRAM.
+pub const UNITY: Dialect = Dialect {
+    family: Family::Hlsl,
+    constant: "static const",
+    map_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
+    cube_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
+    declarations: ["Texture2D<float4> {n};", "TextureCube<float4> {n};", "SamplerState {n};"],
+    samplers: ["sampler_linear_repeat", "sampler_linear_clamp"],
+    bits: "asuint",
+    prologue: "#ifndef SKINFIT_INCLUDED\n#define SKINFIT_INCLUDED\n",
+    epilogue: "\n#endif\n",
+};
+
+impl Dialect {
+    /// A type of the rules.
+    #[must_use]
+    pub fn kind(&self, wgsl: &str) -> String {
+        let words = match self.family {
+            Family::Wgsl => return wgsl.to_owned(),
+            Family::Glsl => ["vec2", "vec3", "vec4", "uvec3"],
+            Family::Hlsl | Family::Msl => ["float2", "float3", "float4", "uint3"],
+        };
+        match wgsl {
+            "f32" => "float".to_owned(),
+            "vec2f" => words[0].to_owned(),
+            "vec3f" => words[1].to_owned(),
+            "vec4f" => words[2].to_owned(),
+            "vec3u" => words[3].to_owned(),
+            other => other.to_owned(),
+        }
+    }
+
+    /// A built-in function of the rules.
+    #[must_use]
+    pub fn builtin<'a>(&self, wgsl: &'a str) -> &'a str {
+        match (self.family, wgsl) {
+            (Family::Hlsl, "mix") => "lerp",
+            (Family::Hlsl, "fract") => "frac",
+            _ => wgsl,
+        }
+    }
+
+    /// A constant's definition.
+    #[must_use]
+    pub fn definition(&self, name: &str, wgsl: &str, value: &[f64]) -> String {
+        let kind = self.kind(wgsl);
+        let numbers: Vec<String> = value.iter().map(|x| format!("{x:?}")).collect();
+        let value =
+            if value.len() == 1 { numbers[0].clone() } else { format!("{kind}({})", numbers.join(", ")) };
+        match self.family {
+            Family::Wgsl => format!("{} {name}: {kind} = {value};", self.constant),
+            _ => format!("{} {kind} {name} = {value};", self.constant),
+        }
+    }
+
+    /// A resource's name. Unity finds a sampler's filter and wrapping in its name.
+    #[must_use]
+    pub fn resource<'a>(&self, name: &'a str) -> &'a str {
+        match name {
+            "map_sampler" => self.samplers[0],
+            "cube_sampler" => self.samplers[1],
+            _ => name,
+        }
+    }
+
+    /// A resource's declaration; empty where it needs none.
+    #[must_use]
+    pub fn declaration(&self, resource: Resource, binding: usize) -> String {
+        let text = match resource.kind() {
+            Kind::Cube => self.declarations[1],
+            Kind::Sampler => self.declarations[2],
+            _ => self.declarations[0],
+        };
+        text.replace("{n}", self.resource(resource.name())).replace("{b}", &binding.to_string())
+    }
+}

@@ -1,0 +1,114 @@
+//! The shader of a scene as one function, with what it reads.
+
+use std::fmt::Write as _;
+
+use super::dialect::{Dialect, Family};
+use super::translate::translate;
+use super::{ExportError, Provenance, Target};
+use crate::model::params::{Param, Params};
+use crate::shader::Resource;
+use crate::shader::quantity::Kind;
+use crate::shader::{Plan, facts::Facts, plan};
+
+/// The function `skinfit_shade`, its constants and declarations.
+pub(super) fn text(
+    target: Target,
+    facts: &Facts,
+    params: &Params,
+    from: &Provenance,
+) -> Result<String, ExportError> {
+    let Some(dialect) = target.dialect() else {
+        let languages: Vec<&str> =
+            Target::ALL.into_iter().filter(|t| t.dialect().is_some()).map(Target::name).collect();
+        return Err(ExportError::NoFunction { target: target.name(), languages: languages.join(", ") });
+    };
+    // Not every language has 16-bit numbers, nor every engine's adapter.
+    let plan = plan(&Facts { f16: false, ..*facts })?;
+    let mut text = String::new();
+    for line in from.lines() {
+        let _ = writeln!(text, "// {line}");
+    }
+    let _ =
+        writeln!(text, "//\n// Call skinfit_shade with what the vertex stage hands over, in world space:");
+    for (name, _) in plan.surface() {
+        let _ = writeln!(text, "// - {name}: {}", meaning(name));
+    }
+    let _ = writeln!(
+        text,
+        "//\n// It reads what `skinfit bake --params` writes of the scene, seamless and without mip levels:"
+    );
+    for resource in &plan.resources {
+        if let Some(words) = what_to_bind(*resource, params) {
+            let _ = writeln!(text, "// - {}: {words}", resource.name());
+        }
+    }
+    let _ = write!(text, "\n{}", dialect.prologue);
+    for (name, kind, value) in plan.literals(params) {
+        let _ = writeln!(text, "{}", dialect.definition(&name, kind, &value));
+    }
+    let declared = declarations(dialect, &plan);
+    let functions = translate(dialect, &plan.function());
+    if dialect.family == Family::Msl {
+        let body = indented(&format!("{declared}\n{functions}"));
+        let _ = write!(
+            text,
+            "\n// Textures and samplers, and the functions that read them.\nstruct Skinfit {{\n{body}}};\n"
+        );
+    } else {
+        let _ = write!(text, "\n{declared}\n{functions}");
+    }
+    text.push_str(dialect.epilogue);
+    Ok(text)
+}
+
+fn declarations(dialect: &Dialect, plan: &Plan) -> String {
+    let mut text = String::new();
+    // Storage is the vertex stage's: an engine brings its own.
+    let read = plan.resources.iter().filter(|resource| resource.kind() != Kind::Storage);
+    for (i, &resource) in read.enumerate() {
+        let declaration = dialect.declaration(resource, i + 1);
+        if !declaration.is_empty() {
+            let _ = writeln!(text, "{declaration}");
+        }
+    }
+    text
+}
+
+fn indented(text: &str) -> String {
+    let line = |line: &str| if line.is_empty() { "\n".to_owned() } else { format!("    {line}\n") };
+    text.lines().map(line).collect()
+}
+
+/// What belongs in a cube or map.
+fn what_to_bind(resource: Resource, params: &Params) -> Option<String> {
+    let words = match resource {
+        Resource::IrradianceCube => "irradiance / pi of the environment (irradiance.exr)".to_owned(),
+        Resource::SpecularCube => format!(
+            "Phong lobe of exponent {:?}, luminance in alpha (specular.exr, or lobe_<exponent>.exr)",
+            params.scalar(Param::SpecularLobe)
+        ),
+        Resource::HiliteCube => "the environment (hilite.exr)".to_owned(),
+        Resource::ColorMap => "the scene's colour map, decoded from sRGB".to_owned(),
+        Resource::NormalMap => "the scene's normal map as stored, +Y up".to_owned(),
+        Resource::SpecularMap => "the scene's specular map, linear".to_owned(),
+        Resource::AttenuatorMap => "the scene's attenuator map, linear".to_owned(),
+        _ => return None,
+    };
+    Some(words)
+}
+
+/// What a field of the function's input is.
+fn meaning(field: &str) -> &'static str {
+    match field {
+        "vertex_position" => "position",
+        "vertex_normal" => "normal, as interpolated",
+        "vertex_tangent" => "tangent, as interpolated",
+        "vertex_bitangent" => "bitangent w cross(N, T), as interpolated",
+        "vertex_uv" => "texture coordinates, origin at the image's top left",
+        "vertex_occlusion" => "open share of the hemisphere, 1 = unoccluded",
+        "vertex_view" => "unit vector from the eye to the vertex, as interpolated",
+        "vertex_silhouette" => "1 - |N.V| of the vertex, as interpolated",
+        "eye" => "position of the eye",
+        _ => "as the rule of that name gives it",
+    }
+}

@@ -1,0 +1,60 @@
+//! Tuned constants, alone or with the shader that they belong to, as text for other engines.
+//!
+//! - [`target`]: the languages and formats
+//! - [`dialect`]: how each language spells what the shader rules say in WGSL
+//! - `translate`: the rules' WGSL, in another language
+//! - [`provenance`]: where the constants come from
+//! - `constants`, `function`: the texts
+//!
+//! The shader is written once, as the planner's rules; every exported function is a translation of them.
+
+mod constants;
+pub mod dialect;
+mod function;
+pub mod provenance;
+pub mod target;
+mod translate;
+
+pub use provenance::Provenance;
+pub use target::Target;
+
+use crate::model::effects::Effects;
+use crate::model::params::Params;
+use crate::shader::{Facts, PlanError};
+
+/// What cannot be exported.
+#[derive(Debug, thiserror::Error)]
+pub enum ExportError {
+    /// The target holds constants alone.
+    #[error(
+        "{target} holds data, no shader: export the constants alone with --constants, or the shader to one of {languages}."
+    )]
+    NoFunction {
+        /// The target's name.
+        target: &'static str,
+        /// Those that hold one.
+        languages: String,
+    },
+    /// No shader within the accuracy.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+}
+
+/// The constants that `effects` read, as text.
+#[must_use]
+pub fn constants(target: Target, effects: Effects, params: &Params, from: &Provenance) -> String {
+    constants::text(target, effects, params, from)
+}
+
+/// The shader of a scene with its constants, as text: one function, and what it reads.
+///
+/// # Errors
+/// When the target holds no functions, or no shader is accurate enough.
+pub fn function(
+    target: Target,
+    facts: &Facts,
+    params: &Params,
+    from: &Provenance,
+) -> Result<String, ExportError> {
+    function::text(target, facts, params, from)
+}

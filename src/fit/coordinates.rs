@@ -1,0 +1,124 @@
+//! The coordinates that solvers step in: an unknown's value, or its logarithm where the parameter
+//! table says that its ratio is what matters.
+
+use crate::engine::{Point, Unknown};
+use crate::model::params::Scale;
+
+/// The map between points and vectors of solver coordinates.
+#[derive(Clone, Debug)]
+pub struct Coordinates {
+    unknowns: Vec<Unknown>,
+    origin: Point,
+    at_origin: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+}
+
+impl Coordinates {
+    /// The coordinates of `unknowns`; everything else stays as it is at `origin`.
+    #[must_use]
+    pub fn new(unknowns: &[Unknown], origin: &Point) -> Self {
+        let each = |value: fn(&Unknown) -> f64| unknowns.iter().map(|u| inward(u, value(u))).collect();
+        Self {
+            unknowns: unknowns.to_vec(),
+            origin: origin.clone(),
+            at_origin: unknowns.iter().map(|u| inward(u, u.get(origin))).collect(),
+            lower: each(|u| u.bounds().0),
+            upper: each(|u| u.bounds().1),
+        }
+    }
+
+    /// The unknowns, in order.
+    #[must_use]
+    pub fn unknowns(&self) -> &[Unknown] {
+        &self.unknowns
+    }
+
+    /// The coordinates of the origin.
+    #[must_use]
+    pub fn origin(&self) -> &[f64] {
+        &self.at_origin
+    }
+
+    /// Least allowed coordinates.
+    #[must_use]
+    pub fn lower(&self) -> &[f64] {
+        &self.lower
+    }
+
+    /// Greatest allowed coordinates.
+    #[must_use]
+    pub fn upper(&self) -> &[f64] {
+        &self.upper
+    }
+
+    /// The point at these coordinates. Bounds and the origin come back to the bit.
+    #[must_use]
+    pub fn point(&self, at: &[f64]) -> Point {
+        let mut point = self.origin.clone();
+        for (i, unknown) in self.unknowns.iter().enumerate() {
+            let (low, high) = unknown.bounds();
+            if at[i] <= self.lower[i] {
+                unknown.set(&mut point, low);
+            } else if at[i] >= self.upper[i] {
+                unknown.set(&mut point, high);
+            } else if at[i] != self.at_origin[i] {
+                unknown.set(&mut point, outward(unknown, at[i]).clamp(low, high));
+            }
+        }
+        point
+    }
+
+    /// `at + step`, within the bounds, and on a bound to the bit where the step reaches it.
+    #[must_use]
+    pub fn moved(&self, at: &[f64], step: &[f64]) -> Vec<f64> {
+        (0..at.len())
+            .map(|i| match step[i] {
+                d if d <= self.lower[i] - at[i] => self.lower[i],
+                d if d >= self.upper[i] - at[i] => self.upper[i],
+                d => at[i] + d,
+            })
+            .collect()
+    }
+
+    /// How far a step from `at` may go down and up.
+    #[must_use]
+    pub fn room(&self, at: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let to = |bounds: &[f64]| bounds.iter().zip(at).map(|(b, u)| b - u).collect();
+        (to(&self.lower), to(&self.upper))
+    }
+
+    /// The derivative of unknown `i`'s value with respect to its coordinate.
+    #[must_use]
+    pub fn slope(&self, i: usize, at: f64) -> f64 {
+        if is_log(&self.unknowns[i]) { outward(&self.unknowns[i], at) } else { 1.0 }
+    }
+
+    /// The size that a change of coordinate `i` is compared with: the coordinate's own, but no less
+    /// than what is natural (a hundredth of a weight, one unit of a logarithm, one degree).
+    #[must_use]
+    pub fn size(&self, i: usize, at: f64) -> f64 {
+        match self.unknowns[i] {
+            u if is_log(&u) => 1.0,
+            Unknown::Param(column) if column.param.info().unit == "degrees" => at.abs().max(1.0),
+            _ => at.abs().max(0.01),
+        }
+    }
+}
+
+/// Whether a solver steps through this unknown by its logarithm.
+#[must_use]
+pub fn is_log(unknown: &Unknown) -> bool {
+    match unknown {
+        Unknown::Param(column) => column.param.info().scale == Scale::Log,
+        Unknown::Gain(_) => false,
+    }
+}
+
+fn inward(unknown: &Unknown, value: f64) -> f64 {
+    if is_log(unknown) { value.ln() } else { value }
+}
+
+fn outward(unknown: &Unknown, at: f64) -> f64 {
+    if is_log(unknown) { at.exp() } else { at }
+}

@@ -1,0 +1,200 @@
+//! The solvers, and what is known of the answer afterwards.
+//!
+//! - [`options`]: how a fit is to be done, and how it may fail
+//! - [`coordinates`], [`linearisation`]: what solvers step in, and what one pass tells them
+//! - [`bounded`]: the bounded least-squares step
+//! - [`lm`], [`memory`]: Levenberg-Marquardt; [`varpro`]: what makes it variable projection
+//! - [`transform`], [`unbounded`]: bounds and costs for `argmin`'s own solvers
+//! - `drive`: the executor, watched
+//! - [`state`]: interrupted fits, resumed
+//! - [`starts`]: where the other starts of a multi-start fit begin
+//! - [`statistics`]: standard errors, correlations, and what is undetermined
+//! - [`outcome`]: what a fit yields
+//! - [`params_file`]: what was fitted, as `params.toml`
+
+use std::time::Instant;
+
+pub mod bounded;
+pub mod coordinates;
+mod drive;
+pub mod linearisation;
+pub mod lm;
+pub mod memory;
+pub mod options;
+pub mod outcome;
+pub mod params_file;
+pub mod starts;
+pub mod state;
+pub mod statistics;
+pub mod transform;
+pub mod unbounded;
+pub mod varpro;
+
+pub use options::{FitError, FitOptions, SolverKind, Tolerances};
+
+use coordinates::Coordinates;
+use drive::Log;
+use linearisation::{Linearisation, Passes};
+use outcome::{Ending, Iteration, Outcome, StartOutcome, UnknownOutcome};
+use state::{Run, Saved};
+use statistics::Statistics;
+
+use crate::engine::{Objective, Point};
+
+/// Solvers that step through transforms never quite reach a bound.
+const AT_BOUND: f64 = 1e-6;
+
+/// Fit `objective` from `start`; `progress` is told each iteration of each start.
+///
+/// Without unknowns the outcome is the start and its loss. More unknowns than residuals, or unknowns
+/// that nothing depends on, are no error: the outcome names what is undetermined.
+///
+/// # Errors
+/// When nothing has weight, the start is outside its bounds or its loss is not finite, the state cannot
+/// be read, written or is another fit's, or a solver fails.
+pub fn fit(
+    objective: &dyn Objective,
+    start: &Point,
+    options: &FitOptions,
+    progress: &mut dyn FnMut(&Iteration),
+) -> Result<Outcome, FitError> {
+    let clock = Instant::now();
+    check_bounds(objective, start)?;
+    let coordinates = Coordinates::new(objective.unknowns(), start);
+    let saved = match &options.resume {
+        Some(path) => Saved::read(path, objective.unknowns(), start, options)?,
+        None => begin(objective, start, options, &coordinates)?,
+    };
+    let passes = Passes::new(objective, &coordinates, saved.evaluations);
+    let mut log = Log::new(saved, &passes, options, progress, clock);
+    for index in 0..options.starts.max(1) {
+        if index > 0 && log.interrupted() {
+            break;
+        }
+        if log.saved.runs.len() <= index as usize {
+            let run = begin_run(&passes, &log.saved.origin, options.seed, index);
+            log.saved.runs.push(run);
+        }
+        let most = options.max_iterations.unwrap_or(options.solver.default_iterations());
+        if coordinates.unknowns().is_empty() {
+            log.saved.runs[index as usize].ending = Some(Ending::Converged);
+        } else if !log.saved.runs[index as usize].is_over(most) {
+            drive::run(options.solver, &mut log)?;
+        }
+    }
+    log.write()?;
+    Ok(conclude(&coordinates, start, options, &log.saved, objective.rounding()))
+}
+
+fn check_bounds(objective: &dyn Objective, start: &Point) -> Result<(), FitError> {
+    for unknown in objective.unknowns() {
+        let (lower, upper) = unknown.bounds();
+        let value = unknown.get(start);
+        if !(lower..=upper).contains(&value) || !value.is_finite() {
+            return Err(FitError::OutOfBounds { name: unknown.name(), value, lower, upper });
+        }
+    }
+    Ok(())
+}
+
+/// The pass at the start, which every solver and the sensitivities begin from.
+fn begin(
+    objective: &dyn Objective,
+    start: &Point,
+    options: &FitOptions,
+    coordinates: &Coordinates,
+) -> Result<Saved, FitError> {
+    let passes = Passes::new(objective, coordinates, 0);
+    let origin = passes.linearise(coordinates.origin());
+    if origin.count == 0 || origin.weight.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+        return Err(FitError::Empty);
+    }
+    let derivative = |i: usize| format!("derivative of the loss by {}", coordinates.unknowns()[i].name());
+    let values = std::iter::once(("loss".to_owned(), origin.loss))
+        .chain(origin.gradient.iter().enumerate().map(|(i, &g)| (derivative(i), g)))
+        .chain(origin.hessian.iter().enumerate().map(|(ij, &h)| (derivative(ij / origin.len()), h)));
+    for (what, value) in values {
+        if !value.is_finite() {
+            return Err(FitError::NotFinite { what, value });
+        }
+    }
+    let mut saved = Saved::new(coordinates.unknowns(), start, options, origin);
+    saved.evaluations = passes.count();
+    Ok(saved)
+}
+
+/// The run from start `index`. A drawn start whose loss is not finite is pulled towards the given
+/// one, whose loss is.
+fn begin_run(passes: &Passes<'_>, origin: &Linearisation, seed: u64, index: u32) -> Run {
+    let mut at = starts::draw(passes.coordinates(), seed, index);
+    let attempts = if index == 0 { 0 } else { 8 };
+    for _ in 0..attempts {
+        let first = passes.linearise(&at);
+        if first.is_finite() {
+            return Run::beginning(first);
+        }
+        at = at.iter().zip(&origin.at).map(|(u, o)| 0.5 * (u + o)).collect();
+    }
+    Run::beginning(origin.clone())
+}
+
+/// The best run, and what is known of it.
+fn conclude(
+    coordinates: &Coordinates,
+    start: &Point,
+    options: &FitOptions,
+    saved: &Saved,
+    rounding: f64,
+) -> Outcome {
+    let best = saved.runs.iter().min_by(|a, b| a.loss.total_cmp(&b.loss));
+    let untouched = Run::beginning(saved.origin.clone());
+    let best = best.unwrap_or(&untouched);
+    let model = best.model().unwrap_or(&saved.origin);
+    let at_bound: Vec<bool> = (0..model.len()).map(|i| is_at_bound(coordinates, i, best.at[i])).collect();
+    let known = Statistics::new(coordinates, model, &at_bound, rounding);
+    let end = coordinates.point(&best.at);
+    let unknowns = coordinates.unknowns().iter().enumerate().map(|(i, unknown)| UnknownOutcome {
+        unknown: *unknown,
+        start: unknown.get(start),
+        value: unknown.get(&end),
+        std_error: known.std_errors[i],
+        identifiable: known.identifiable[i],
+        at_bound: at_bound[i],
+        sensitivity: sensitivity(coordinates, &saved.origin, i),
+    });
+    Outcome {
+        solver: options.solver.name(),
+        start: start.clone(),
+        loss_start: saved.origin.loss,
+        loss_end: best.loss,
+        unknowns: unknowns.collect(),
+        correlations: known.correlations,
+        undetermined: known.undetermined,
+        history: best.history.clone(),
+        iterations: best.iterations,
+        evaluations: saved.evaluations,
+        seconds: saved.seconds,
+        starts: saved.runs.iter().map(start_outcome).collect(),
+        ending: ending(saved, best),
+        end,
+    }
+}
+
+fn is_at_bound(coordinates: &Coordinates, i: usize, at: f64) -> bool {
+    let near = AT_BOUND * coordinates.size(i, at);
+    at - coordinates.lower()[i] <= near || coordinates.upper()[i] - at <= near
+}
+
+fn sensitivity(coordinates: &Coordinates, origin: &Linearisation, i: usize) -> f64 {
+    (origin.curvature(i) / origin.weight).sqrt() / coordinates.slope(i, origin.at[i])
+}
+
+fn start_outcome(run: &Run) -> StartOutcome {
+    let ending = run.ending.unwrap_or(Ending::Interrupted);
+    StartOutcome { loss_start: run.loss_start, loss_end: run.loss, ending }
+}
+
+/// A fit is interrupted if any of its starts is, or was not reached; else it ended as its best did.
+fn ending(saved: &Saved, best: &Run) -> Ending {
+    if saved.is_complete() { best.ending.unwrap_or(Ending::Interrupted) } else { Ending::Interrupted }
+}

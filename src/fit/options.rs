@@ -1,0 +1,174 @@
+//! How a fit is to be done, and how it may fail.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
+
+use super::state::StateError;
+
+/// The solvers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverKind {
+    /// Variable projection: linear unknowns in closed form, the others by Levenberg-Marquardt.
+    #[default]
+    Varpro,
+    /// Levenberg-Marquardt over all unknowns.
+    Lm,
+    /// L-BFGS with a line search by Moré and Thuente, bounds by transforms; for comparison.
+    Lbfgs,
+    /// The simplex of Nelder and Mead, bounds by transforms; for comparison.
+    NelderMead,
+}
+
+impl SolverKind {
+    /// Every solver, in the order of documentation.
+    pub const ALL: [Self; 4] = [Self::Varpro, Self::Lm, Self::Lbfgs, Self::NelderMead];
+
+    /// The name on the command line.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Varpro => "varpro",
+            Self::Lm => "lm",
+            Self::Lbfgs => "lbfgs",
+            Self::NelderMead => "nelder-mead",
+        }
+    }
+
+    /// The solver of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+
+    /// Iterations after which a fit that has not converged probably never will.
+    #[must_use]
+    pub const fn default_iterations(self) -> u64 {
+        match self {
+            // They converge in 5 to 30.
+            Self::Varpro | Self::Lm => 200,
+            Self::Lbfgs => 1000,
+            // A simplex needs some hundreds for each unknown.
+            Self::NelderMead => 20_000,
+        }
+    }
+}
+
+/// When `varpro` and `lm` stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// Stop when the undamped step changes no unknown by more than this share of its size. That
+    /// step is still taken: near the answer it squares the error, so that 1e-5 leaves about 1e-10.
+    pub step: f64,
+    /// Stop when the model promises less than this share of the loss: less is rounding.
+    pub gain: f64,
+    /// The same for robust losses, whose reweighting closes in by a steady factor an iteration.
+    pub robust_gain: f64,
+    /// Stop when what the model promises moves the answer by less than this share of a standard
+    /// error, that is when it is less than `error^2 / residuals` of the loss. The step is still taken.
+    pub error: f64,
+}
+
+impl Default for Tolerances {
+    fn default() -> Self {
+        Self { step: 1e-5, gain: 1e-10, robust_gain: 1e-8, error: 0.03 }
+    }
+}
+
+impl Tolerances {
+    /// The share of the loss that is not worth another pass, of a fit of `count` residuals.
+    #[must_use]
+    pub fn gain(&self, quadratic: bool, count: u64) -> f64 {
+        let rounding = if quadratic { self.gain } else { self.robust_gain };
+        rounding.max(self.error * self.error / count.max(1) as f64)
+    }
+}
+
+/// How a fit is to be done.
+#[derive(Clone, Debug)]
+pub struct FitOptions {
+    /// Which solver.
+    pub solver: SolverKind,
+    /// Most iterations for each start; `None`: [`SolverKind::default_iterations`].
+    pub max_iterations: Option<u64>,
+    /// When `varpro` and `lm` stop.
+    pub tolerances: Tolerances,
+    /// How many starts: the given point, and others drawn about it. At least 1.
+    pub starts: u32,
+    /// What the other starts are drawn from.
+    pub seed: u64,
+    /// What identifies the objective (a hash of the scene): states of others are refused.
+    pub fingerprint: String,
+    /// Where the state is kept, written about once a second and at the end.
+    pub state: Option<PathBuf>,
+    /// A state to go on from.
+    pub resume: Option<PathBuf>,
+    /// Set from outside (by Ctrl-C) to end the fit after the present iteration.
+    pub interrupt: Option<Arc<AtomicBool>>,
+}
+
+impl Default for FitOptions {
+    fn default() -> Self {
+        Self {
+            solver: SolverKind::default(),
+            max_iterations: None,
+            tolerances: Tolerances::default(),
+            starts: 1,
+            seed: 0,
+            fingerprint: String::new(),
+            state: None,
+            resume: None,
+            interrupt: None,
+        }
+    }
+}
+
+/// A fit cannot be done.
+#[derive(Debug, thiserror::Error)]
+pub enum FitError {
+    /// Nothing to compare with.
+    #[error(
+        "the fit has nothing to compare: no pixel has a weight above 0. Check that the views' targets and masks \
+         overlap the mesh."
+    )]
+    Empty,
+    /// The start is no place to begin at.
+    #[error(
+        "the {what} at the start is {value}, which is not a finite number. Check the start values and the \
+         targets for extreme numbers."
+    )]
+    NotFinite {
+        /// The loss or its derivative, named.
+        what: String,
+        /// Its value.
+        value: f64,
+    },
+    /// A start value is outside its bounds.
+    #[error(
+        "the start value of {name} is {value}, outside its bounds {lower} to {upper}. Choose one inside."
+    )]
+    OutOfBounds {
+        /// The unknown.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// Its least value.
+        lower: f64,
+        /// Its greatest value.
+        upper: f64,
+    },
+    /// The state file cannot be used.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// The solver failed.
+    #[error("the solver {solver} failed: {reason}. Try another one (--solver varpro).")]
+    Solver {
+        /// Its name.
+        solver: &'static str,
+        /// What it says.
+        reason: String,
+    },
+}

@@ -1,0 +1,116 @@
+//! What a fit yields, for reports, files and the next fit.
+
+use serde::{Deserialize, Serialize};
+
+use crate::engine::{Point, Unknown};
+
+/// A finished (or interrupted) fit.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Which solver ran: `varpro`, `lm`, `lbfgs` or `nelder-mead`.
+    pub solver: &'static str,
+    /// Where the fit began.
+    pub start: Point,
+    /// Where it ended.
+    pub end: Point,
+    /// The loss at the start.
+    pub loss_start: f64,
+    /// The loss at the end.
+    pub loss_end: f64,
+    /// What is known of each unknown.
+    pub unknowns: Vec<UnknownOutcome>,
+    /// Correlation matrix of the unknowns, row-major, K x K; 0 beside unknowns without a variance.
+    pub correlations: Vec<f64>,
+    /// Directions in which the loss does not change: the images cannot determine these.
+    pub undetermined: Vec<Direction>,
+    /// The loss after each iteration.
+    pub history: Vec<Iteration>,
+    /// Iterations of the start that won.
+    pub iterations: u64,
+    /// Passes over the samples, of all starts together.
+    pub evaluations: u64,
+    /// Seconds spent, before an interruption and after it.
+    pub seconds: f64,
+    /// How each start of a multi-start fit fared, in order; the first is the given one.
+    pub starts: Vec<StartOutcome>,
+    /// How it ended.
+    pub ending: Ending,
+}
+
+/// How one of several starts fared.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StartOutcome {
+    /// The loss where it began.
+    pub loss_start: f64,
+    /// The loss where it ended.
+    pub loss_end: f64,
+    /// How it ended.
+    pub ending: Ending,
+}
+
+/// How a fit ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ending {
+    /// The step, the gradient or the predicted gain fell below its tolerance.
+    Converged,
+    /// The iterations ran out.
+    RanOut,
+    /// No step lowers the loss, yet no tolerance was met.
+    Stalled,
+    /// Somebody pressed Ctrl-C; the state was kept.
+    Interrupted,
+}
+
+impl Ending {
+    /// How the fit ended, in a word or a few.
+    #[must_use]
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Converged => "converged",
+            Self::RanOut => "ran out of iterations",
+            Self::Stalled => "stalled",
+            Self::Interrupted => "interrupted",
+        }
+    }
+}
+
+/// What is known of one unknown.
+#[derive(Clone, Debug)]
+pub struct UnknownOutcome {
+    /// Which.
+    pub unknown: Unknown,
+    /// Its value at the start.
+    pub start: f64,
+    /// Its value at the end.
+    pub value: f64,
+    /// One standard error, from the normal equations; `None` at a bound or when unidentifiable.
+    pub std_error: Option<f64>,
+    /// Whether the images determine it.
+    pub identifiable: bool,
+    /// Whether it ended on a bound.
+    pub at_bound: bool,
+    /// At the start: the root of the loss' second derivative with respect to it, that is by how
+    /// much the (weighted) image changes, root mean square, when it changes by 1.
+    pub sensitivity: f64,
+}
+
+/// A combination of unknowns, with a unit vector of (name, component).
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Direction {
+    /// The components, largest first; those below 1% are left out.
+    pub components: Vec<(String, f64)>,
+}
+
+/// One iteration of a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Iteration {
+    /// Its number, from 0 for the start.
+    pub iteration: u64,
+    /// Passes over the samples so far.
+    pub evaluations: u64,
+    /// The loss after it.
+    pub loss: f64,
+    /// Seconds since the start.
+    pub seconds: f64,
+}

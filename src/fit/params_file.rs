@@ -1,0 +1,235 @@
+//! `params.toml`: what was fitted, for `render` and the next fit.
+//!
+//! ```toml
+//! # Fitted by skinfit 0.1.0 with varpro to scenes/forest.toml.
+//! # Loss 3.1e-2 at the start, 4.2e-3 at the end.
+//! form = "corrected"
+//! loss = "relative_l2"
+//!
+//! [params]
+//! base_weight = 0.95              # +- 0.002
+//! hilite = [0.7, 0.6, 0.5]        # +- 0.01, 0.01, 0.02
+//!
+//! [gains]
+//! front = 1.0
+//! ```
+//!
+//! Reading is strict: an unknown name, a value outside its parameter's bounds or another form than the
+//! scene's is refused with its line. A parameter that the file does not name keeps the scene's value.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+mod parse;
+
+use parse::{Problem, parse};
+
+use crate::engine::Unknown;
+use crate::fit::outcome::{Outcome, UnknownOutcome};
+use crate::model::effects::Form;
+use crate::model::params::{Channels, Param, Params};
+use crate::output::{self, OutputError};
+use crate::scene::Loss;
+
+/// What a `params.toml` holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParamsFile {
+    /// The form that the parameters are of.
+    pub form: Form,
+    /// The loss that they minimise, where the file says.
+    pub loss: Option<Loss>,
+    /// The parameters.
+    pub params: Params,
+    /// A gain for each view, by its name, in the file's order.
+    pub gains: Vec<(String, f64)>,
+}
+
+/// A `params.toml` cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[error("{}{}: {problem}", path.display(), line.map(|n| format!(", line {n}")).unwrap_or_default())]
+pub struct ParamsFileError {
+    path: PathBuf,
+    line: Option<usize>,
+    problem: String,
+}
+
+impl ParamsFile {
+    /// The file's text; with an `outcome`, comments tell what it came from, of the scene `scene`.
+    #[must_use]
+    pub fn to_toml(&self, scene: &Path, outcome: Option<&Outcome>) -> String {
+        let mut text = String::new();
+        // Writing to a string cannot fail.
+        let _ = self.write_text(&mut text, scene, outcome);
+        text
+    }
+
+    fn write_text(&self, text: &mut String, scene: &Path, outcome: Option<&Outcome>) -> std::fmt::Result {
+        // A line break in a path must not end the comment.
+        let scene: String =
+            scene.display().to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        let version = env!("CARGO_PKG_VERSION");
+        match outcome {
+            None => writeln!(text, "# Written by skinfit {version}; scene {scene}.")?,
+            Some(outcome) => {
+                writeln!(text, "# Fitted by skinfit {version} with {} to {scene}.", outcome.solver)?;
+                let (start, end) = (outcome.loss_start, outcome.loss_end);
+                writeln!(text, "# Loss {start:.6e} at the start, {end:.6e} at the end.")?;
+            }
+        }
+        writeln!(text, "form = \"{}\"", self.form.name())?;
+        if let Some(loss) = self.loss {
+            writeln!(text, "loss = \"{}\"", loss.name())?;
+        }
+        writeln!(text, "\n[params]")?;
+        let known = outcome.map_or(&[][..], |outcome| &outcome.unknowns);
+        for param in Param::all() {
+            let line = format!("{} = {}", param.name(), value(self.params.rgb(param)));
+            line_with_comment(text, &line, &comment(known, |unknown| param_channel(unknown, param)))?;
+        }
+        if !self.gains.is_empty() {
+            writeln!(text, "\n[gains]")?;
+        }
+        for (view, (name, gain)) in self.gains.iter().enumerate() {
+            let line = format!("{} = {gain:?}", quoted(name));
+            let of_view = |unknown: &Unknown| (*unknown == Unknown::Gain(view)).then_some(0);
+            line_with_comment(text, &line, &comment(known, of_view))?;
+        }
+        Ok(())
+    }
+
+    /// Write the file, whole or not at all.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, path: &Path, scene: &Path, outcome: Option<&Outcome>) -> Result<(), OutputError> {
+        output::write(path, self.to_toml(scene, outcome).as_bytes())
+    }
+
+    /// Read a file for a scene of `form`; what it does not name is as in `base`.
+    ///
+    /// # Errors
+    /// When it cannot be read, is no TOML, names what there is not, has values of the wrong kind or
+    /// outside their bounds, or is of another form.
+    pub fn read(path: &Path, form: Form, base: &Params) -> Result<Self, ParamsFileError> {
+        let error = |line, problem| ParamsFileError { path: path.to_owned(), line, problem };
+        let text = std::fs::read_to_string(path).map_err(|e| {
+            error(
+                None,
+                format!("the parameters cannot be read: {e}. Name a params.toml that a fit has left."),
+            )
+        })?;
+        parse(&text, form, base).map_err(|Problem { place, problem }| {
+            let breaks = |at: usize| text.bytes().take(at).filter(|&byte| byte == b'\n').count();
+            let line = place.map(|at| breaks(at.start) + 1);
+            error(line, problem)
+        })
+    }
+}
+
+fn value(rgb: [f64; 3]) -> String {
+    // `{:?}` writes the shortest decimal that reads back to the bit, and always as a float.
+    if rgb[0] == rgb[1] && rgb[1] == rgb[2] { format!("{:?}", rgb[0]) } else { format!("{rgb:?}") }
+}
+
+/// A basic string: JSON's escapes are TOML's too, but for DEL, which JSON leaves bare.
+fn quoted(name: &str) -> String {
+    serde_json::Value::from(name).to_string().replace('\u{7f}', "\\u007f")
+}
+
+fn line_with_comment(text: &mut String, line: &str, comment: &str) -> std::fmt::Result {
+    if comment.is_empty() { writeln!(text, "{line}") } else { writeln!(text, "{line:<40} # {comment}") }
+}
+
+/// The channel of `param` that an unknown moves; 0 for all of them.
+fn param_channel(unknown: &Unknown, param: Param) -> Option<usize> {
+    match unknown {
+        Unknown::Param(column) if column.param == param => Some(match column.channels {
+            Channels::Tied => 0,
+            Channels::One(c) => c,
+        }),
+        _ => None,
+    }
+}
+
+/// What is known of the unknowns that `channel` picks, in the order of channels.
+fn comment(known: &[UnknownOutcome], channel: impl Fn(&Unknown) -> Option<usize>) -> String {
+    let mut picked: Vec<_> = known.iter().filter_map(|u| Some((channel(&u.unknown)?, u))).collect();
+    picked.sort_by_key(|&(channel, _)| channel);
+    let words = picked.iter().map(|(_, u)| match u.std_error {
+        _ if u.at_bound => "at its bound".to_owned(),
+        _ if !u.identifiable => "not determined by the images".to_owned(),
+        Some(error) => format!("+- {error:.2e}"),
+        None => "of unknown error".to_owned(),
+    });
+    words.collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str, form: Form) -> Result<ParamsFile, String> {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("params.toml");
+        std::fs::write(&path, text).unwrap();
+        ParamsFile::read(&path, form, &Params::defaults(form)).map_err(|e| e.to_string())
+    }
+
+    #[test]
+    fn what_is_written_reads_back_to_the_bit() {
+        for form in Form::ALL {
+            let mut params = Params::defaults(form);
+            for (i, param) in Param::all().enumerate() {
+                // Values with long decimals, within all bounds.
+                params.set(
+                    param,
+                    1.0 - 1.0 / (3.0 + i as f64) * if param == Param::SpecularLobe { 0.0 } else { 1.0 },
+                );
+            }
+            params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e20]);
+            let gains = vec![("front \"left\"".to_owned(), 0.7), ("b\nc\u{7f}\u{1}".to_owned(), 1.0 / 3.0)];
+            let file = ParamsFile { form, loss: Some(Loss::Huber), params, gains };
+            let text = file.to_toml(Path::new("a\nform = 1"), None);
+            assert_eq!(read(&text, form).unwrap(), file, "{text}");
+        }
+    }
+
+    #[test]
+    fn what_a_file_does_not_name_keeps_its_value() {
+        let file = read("[params]\nrim_exponent = 3", Form::Corrected).unwrap();
+        let mut expected = Params::defaults(Form::Corrected);
+        expected.set(Param::RimExponent, 3.0);
+        assert_eq!((file.params, file.loss, file.gains), (expected, None, vec![]));
+    }
+
+    #[test]
+    fn what_is_wrong_is_refused_with_its_line() {
+        #[rustfmt::skip]
+        let cases = [
+            ("[params]\nhilight = 1.0", "line 2", "unknown parameter `hilight`"),
+            ("[params]\n\nocclusion = 1.5", "line 3", "outside its bounds 0 to 1"),
+            ("[params]\nhilite = [0.1, -0.1, 0.1]", "line 2", "outside its bounds"),
+            ("[params]\nhilite = [0.1, 0.1]", "line 2", "[r, g, b]"),
+            ("[params]\nrim_exponent = [1.0, 1.0, 1.0]", "line 2", "one number"),
+            ("[params]\nhilite = nan", "line 2", "finite"),
+            ("[params]\nrim_weight = inf", "line 2", "finite"),
+            ("[params]\nrim_weight = \"1\"", "line 2", "number"),
+            ("form = \"listing\"", "line 1", "form `listing`, but the scene's form is `corrected`"),
+            ("form = \"printed\"", "line 1", "unknown form"),
+            ("form = 1", "line 1", "wrong kind"),
+            ("\nloss = \"l3\"", "line 2", "unknown loss"),
+            ("colour = 1", "line 1", "unknown key `colour`"),
+            ("[params]\nhilite = 1\nhilite = 2", "line 3", "not TOML"),
+            ("[gains]\nfront = 0.0", "line 2", "outside its bounds"),
+            ("params = 3", "line 1", "wrong kind"),
+        ];
+        for (text, line, what) in cases {
+            let error = read(text, Form::Corrected).unwrap_err();
+            assert!(error.contains(line) && error.contains(what), "{text}: {error}");
+        }
+        let missing = Path::new("no/such/params.toml");
+        let error =
+            ParamsFile::read(missing, Form::Corrected, &Params::defaults(Form::Corrected)).unwrap_err();
+        assert!(error.to_string().contains("no/such/params.toml: the parameters cannot be read"));
+    }
+}

@@ -1,0 +1,147 @@
+//! Reading `params.toml`, strictly.
+
+use std::ops::Range;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::ParamsFile;
+use crate::engine::Unknown;
+use crate::model::effects::Form;
+use crate::model::params::{Param, Params};
+use crate::scene::Loss;
+
+/// What is wrong, and where in the text.
+pub(super) struct Problem {
+    pub(super) place: Option<Range<usize>>,
+    pub(super) problem: String,
+}
+
+fn problem<T>(place: Range<usize>, problem: String) -> Result<T, Problem> {
+    Err(Problem { place: Some(place), problem })
+}
+
+/// What `text` holds, for a scene of `form`, over the values of `base`.
+pub(super) fn parse(text: &str, form: Form, base: &Params) -> Result<ParamsFile, Problem> {
+    let table = DeTable::parse(text).map_err(|e| Problem {
+        place: e.span(),
+        problem: format!("not TOML: {}. Correct the line or fit anew.", e.message().trim_end_matches('.')),
+    })?;
+    let mut file = ParamsFile { form, loss: None, params: *base, gains: Vec::new() };
+    for (key, value) in table.get_ref() {
+        match (key.get_ref().as_ref(), value.get_ref()) {
+            ("form", DeValue::String(name)) => check_form(name, form, value.span())?,
+            ("loss", DeValue::String(name)) => file.loss = Some(read_loss(name, value.span())?),
+            ("params", DeValue::Table(params)) => read_params(params, &mut file.params)?,
+            ("gains", DeValue::Table(gains)) => file.gains = read_gains(gains)?,
+            ("form" | "loss" | "params" | "gains", _) => {
+                let what = "form and loss are strings, params and gains tables";
+                return problem(value.span(), format!("`{}` is of the wrong kind: {what}.", key.get_ref()));
+            }
+            (name, _) => {
+                let known = "form, loss, [params] and [gains]";
+                return problem(key.span(), format!("unknown key `{name}`. This file knows {known}."));
+            }
+        }
+    }
+    Ok(file)
+}
+
+fn check_form(name: &str, form: Form, place: Range<usize>) -> Result<(), Problem> {
+    match Form::ALL.into_iter().find(|f| f.name() == name) {
+        Some(found) if found == form => Ok(()),
+        Some(found) => problem(
+            place,
+            format!(
+                "these parameters are of the form `{}`, but the scene's form is `{}`. Use them with a scene of \
+                 their form, or fit this one anew.",
+                found.name(),
+                form.name()
+            ),
+        ),
+        None => problem(place, format!("unknown form `{name}`. It is `listing` or `corrected`.")),
+    }
+}
+
+fn read_loss(name: &str, place: Range<usize>) -> Result<Loss, Problem> {
+    let known = || Loss::ALL.map(Loss::name).join(", ");
+    match Loss::ALL.into_iter().find(|loss| loss.name() == name) {
+        Some(loss) => Ok(loss),
+        None => problem(place, format!("unknown loss `{name}`. There are {}.", known())),
+    }
+}
+
+fn read_params(table: &DeTable<'_>, params: &mut Params) -> Result<(), Problem> {
+    for (key, value) in table {
+        let name = key.get_ref().as_ref();
+        let Some(param) = Param::from_name(name) else {
+            let known: Vec<_> = Param::all().map(Param::name).collect();
+            return problem(
+                key.span(),
+                format!("unknown parameter `{name}`. There are {}.", known.join(", ")),
+            );
+        };
+        params.set_rgb(param, read_rgb(param, value)?);
+    }
+    Ok(())
+}
+
+fn read_rgb(param: Param, value: &Spanned<DeValue<'_>>) -> Result<[f64; 3], Problem> {
+    let info = param.info();
+    let bounded = |value: &Spanned<DeValue<'_>>| {
+        let number = number(param.name(), value)?;
+        if (info.lower..=info.upper).contains(&number) {
+            return Ok(number);
+        }
+        let (name, low, high) = (info.name, info.lower, info.upper);
+        problem(value.span(), format!("{name} = {number} is outside its bounds {low} to {high}."))
+    };
+    match value.get_ref() {
+        DeValue::Array(channels) if info.rgb && channels.len() == 3 => {
+            let mut rgb = [0.0; 3];
+            for (c, channel) in rgb.iter_mut().zip(channels.iter()) {
+                *c = bounded(channel)?;
+            }
+            Ok(rgb)
+        }
+        DeValue::Array(_) if info.rgb => {
+            problem(value.span(), format!("{} takes a number or three: [r, g, b].", info.name))
+        }
+        DeValue::Array(_) => {
+            problem(value.span(), format!("{} takes one number for all channels.", info.name))
+        }
+        _ => Ok([bounded(value)?; 3]),
+    }
+}
+
+fn read_gains(table: &DeTable<'_>) -> Result<Vec<(String, f64)>, Problem> {
+    let (lower, upper) = Unknown::Gain(0).bounds();
+    let mut gains: Vec<(usize, String, f64)> = Vec::new();
+    for (key, value) in table {
+        let name = key.get_ref().as_ref();
+        let gain = number(name, value)?;
+        if !(lower..=upper).contains(&gain) {
+            let bounds = format!("{lower} to {upper}");
+            return problem(
+                value.span(),
+                format!("the gain of {name} is {gain}, outside its bounds {bounds}."),
+            );
+        }
+        gains.push((key.span().start, name.to_owned(), gain));
+    }
+    gains.sort_by_key(|&(place, ..)| place);
+    Ok(gains.into_iter().map(|(_, name, gain)| (name, gain)).collect())
+}
+
+/// A finite number.
+fn number(name: &str, value: &Spanned<DeValue<'_>>) -> Result<f64, Problem> {
+    let number = match value.get_ref() {
+        DeValue::Integer(digits) if digits.radix() == 10 => digits.as_str().parse::<f64>().ok(),
+        DeValue::Float(digits) => digits.as_str().parse::<f64>().ok(),
+        _ => None,
+    };
+    match number.filter(|x| x.is_finite()) {
+        Some(number) => Ok(number),
+        None => problem(value.span(), format!("{name} must be a finite decimal number.")),
+    }
+}

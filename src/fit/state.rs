@@ -1,0 +1,253 @@
+//! The state of a fit as a file, so that an interrupted one goes on to the same end.
+//!
+//! JSON, floats written so that they read back to the bit. `varpro` and `lm` keep all that their
+//! next step depends on and go on as if nothing had happened; `lbfgs` and `nelder-mead` live inside
+//! `argmin`, which keeps their curvature pairs and simplex to itself: they begin anew from the best
+//! point found.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::linearisation::Linearisation;
+use super::memory::Memory;
+use super::options::{FitOptions, SolverKind};
+use super::outcome::{Ending, Iteration};
+use crate::engine::{Point, Unknown};
+use crate::model::params::Param;
+use crate::output::{self, OutputError};
+
+/// The format's version.
+const FORMAT: u32 = 1;
+
+/// A state file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StateError {
+    /// It cannot be read.
+    #[error(
+        "{}: the state of the interrupted fit cannot be read: {reason}. Name a run folder that a fit was \
+         interrupted in, or start afresh without --resume.", path.display()
+    )]
+    Unreadable {
+        /// The file.
+        path: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
+    /// It is not a state, or a damaged one.
+    #[error("{}: this is not a state that a fit has left: {reason}. Start afresh without --resume.", path.display())]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// It is another fit's.
+    #[error(
+        "{}: this state belongs to another fit: its {what} differs ({found}; now {expected}). Resume with the \
+         scene and options that the fit was started with, or start afresh without --resume.", path.display()
+    )]
+    Different {
+        /// The file.
+        path: PathBuf,
+        /// What differs.
+        what: &'static str,
+        /// The state's.
+        found: String,
+        /// The present fit's.
+        expected: String,
+    },
+    /// It cannot be written.
+    #[error(transparent)]
+    Unwritable(#[from] OutputError),
+}
+
+/// One start's run of the solver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Run {
+    /// The loss where it began.
+    pub loss_start: f64,
+    /// Coordinates of the best point so far.
+    pub at: Vec<f64>,
+    /// The loss there.
+    pub loss: f64,
+    /// Iterations done.
+    pub iterations: u64,
+    /// The loss after each.
+    pub history: Vec<Iteration>,
+    /// What `varpro` and `lm` remember.
+    pub memory: Option<Memory>,
+    /// The normal equations at the start, and at the end of the other solvers.
+    pub model: Option<Linearisation>,
+    /// How it ended, when it did.
+    pub ending: Option<Ending>,
+}
+
+impl Run {
+    /// A run that is about to begin where the pass `first` was made.
+    #[must_use]
+    pub fn beginning(first: Linearisation) -> Self {
+        Self {
+            loss_start: first.loss,
+            at: first.at.clone(),
+            loss: first.loss,
+            iterations: 0,
+            history: Vec::new(),
+            memory: None,
+            model: Some(first),
+            ending: None,
+        }
+    }
+
+    /// Whether there is nothing left to do within `max_iterations`.
+    #[must_use]
+    pub fn is_over(&self, max_iterations: u64) -> bool {
+        match self.ending {
+            Some(Ending::Converged | Ending::Stalled) => true,
+            Some(Ending::RanOut) => self.iterations >= max_iterations,
+            Some(Ending::Interrupted) | None => false,
+        }
+    }
+
+    /// The normal equations at its end.
+    #[must_use]
+    pub fn model(&self) -> Option<&Linearisation> {
+        self.model.as_ref().or(self.memory.as_ref().map(|memory| &memory.base))
+    }
+
+    fn check(&self, k: usize) -> Result<(), String> {
+        let complete = |m: &Linearisation| {
+            m.at.len() == k && m.gradient.len() == k && m.hessian.len() == k * k && m.weight > 0.0
+        };
+        if self.at.len() != k || !self.model().is_none_or(complete) {
+            return Err(format!("its vectors are not of length {k}"));
+        }
+        if self.memory.as_ref().is_some_and(|memory| !memory.is_sound()) {
+            return Err("the solver's memory is not sound".to_owned());
+        }
+        Ok(())
+    }
+}
+
+/// All that a fit writes down between iterations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Saved {
+    format: u32,
+    fingerprint: String,
+    solver: SolverKind,
+    unknowns: Vec<String>,
+    start: Vec<f64>,
+    starts: u32,
+    seed: u64,
+    /// The pass at the given start.
+    pub origin: Linearisation,
+    /// The runs from each start so far; the last may still be going on.
+    pub runs: Vec<Run>,
+    /// Passes made.
+    pub evaluations: u64,
+    /// Seconds spent.
+    pub seconds: f64,
+}
+
+impl Saved {
+    /// The state before the first run.
+    #[must_use]
+    pub fn new(unknowns: &[Unknown], start: &Point, options: &FitOptions, origin: Linearisation) -> Self {
+        Self {
+            format: FORMAT,
+            fingerprint: options.fingerprint.clone(),
+            solver: options.solver,
+            unknowns: unknowns.iter().map(Unknown::name).collect(),
+            start: values(start),
+            starts: options.starts.max(1),
+            seed: options.seed,
+            origin,
+            runs: Vec::new(),
+            evaluations: 0,
+            seconds: 0.0,
+        }
+    }
+
+    /// Whether every start ran to an end of its own.
+    #[must_use]
+    pub fn is_complete(&self) -> bool {
+        let ended = |run: &Run| !matches!(run.ending, None | Some(Ending::Interrupted));
+        self.runs.len() >= self.starts as usize && self.runs.iter().all(ended)
+    }
+
+    /// Write it, whole or not at all.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), StateError> {
+        Ok(output::write_with(path, |file| serde_json::to_writer(file, self))?)
+    }
+
+    /// Read the state of a fit of `unknowns` from `start` with `options`.
+    ///
+    /// # Errors
+    /// When it cannot be read, is damaged, or is the state of another fit.
+    pub fn read(
+        path: &Path,
+        unknowns: &[Unknown],
+        start: &Point,
+        options: &FitOptions,
+    ) -> Result<Self, StateError> {
+        let unreadable =
+            |e: std::io::Error| StateError::Unreadable { path: path.to_owned(), reason: e.to_string() };
+        let corrupt = |reason: String| StateError::Corrupt { path: path.to_owned(), reason };
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let saved: Self = serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
+        let now = Self::new(unknowns, start, options, saved.origin.clone());
+        saved.belongs_to(&now, path)?;
+        saved.check().map_err(corrupt)?;
+        Ok(saved)
+    }
+
+    fn belongs_to(&self, now: &Self, path: &Path) -> Result<(), StateError> {
+        let same = |what, found: String, expected: String| {
+            if found == expected {
+                return Ok(());
+            }
+            Err(StateError::Different { path: path.to_owned(), what, found, expected })
+        };
+        same("format", self.format.to_string(), now.format.to_string())?;
+        same("solver", self.solver.name().to_owned(), now.solver.name().to_owned())?;
+        same("list of unknowns", self.unknowns.join(" "), now.unknowns.join(" "))?;
+        same("scene", self.fingerprint.clone(), now.fingerprint.clone())?;
+        if self.start != now.start {
+            let (was, is) = first_difference(&self.start, &now.start);
+            same("start", was, is)?;
+        }
+        same("number of starts", self.starts.to_string(), now.starts.to_string())?;
+        same("seed", self.seed.to_string(), now.seed.to_string())
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let k = self.unknowns.len();
+        if self.runs.len() > self.starts as usize {
+            return Err("it holds more runs than starts".to_owned());
+        }
+        let origin = Run::beginning(self.origin.clone());
+        std::iter::once(&origin).chain(&self.runs).try_for_each(|run| run.check(k))
+    }
+}
+
+/// The first of two points' values that differs, named.
+fn first_difference(was: &[f64], is: &[f64]) -> (String, String) {
+    let at = was.iter().zip(is).position(|(a, b)| a != b).unwrap_or(was.len().min(is.len()));
+    let name = Param::all().nth(at / 3).map_or("gain", Param::name);
+    let say = |values: &[f64]| match values.get(at) {
+        Some(value) => format!("{name} {value}"),
+        None => format!("{} views", values.len().saturating_sub(3 * Param::COUNT)),
+    };
+    (say(was), say(is))
+}
+
+/// Every number of a point, in order.
+fn values(point: &Point) -> Vec<f64> {
+    let params = Param::all().flat_map(|param| point.params.rgb(param));
+    params.chain(point.gains.iter().copied()).collect()
+}

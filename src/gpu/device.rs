@@ -1,0 +1,166 @@
+//! The device, and what went wrong there.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use wgpu::{
+    AdapterInfo, Buffer, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType, Features,
+    Limits, MemoryHints, PollType, Queue,
+};
+
+use super::adapter::{Choice, WELCOME, choose};
+use super::error::GpuError;
+
+/// An adapter's device, open for work.
+#[derive(Debug)]
+pub struct Gpu {
+    pub(super) device: Device,
+    pub(super) queue: Queue,
+    info: AdapterInfo,
+    /// The first thing that went wrong; errors after it are its consequences.
+    fault: Arc<Mutex<Option<GpuError>>>,
+}
+
+impl Gpu {
+    /// A device of the chosen adapter, with the features and limits that rendering uses.
+    ///
+    /// # Errors
+    /// When there is no such adapter, or it gives no device.
+    pub fn open(choice: &Choice) -> Result<Self, GpuError> {
+        let adapter = choose(choice)?;
+        let info = adapter.get_info();
+        let welcome = WELCOME.iter().fold(Features::empty(), |all, (feature, ..)| all | *feature);
+        let features = adapter.features() & welcome;
+        let descriptor = DeviceDescriptor {
+            label: Some("skinfit"),
+            required_features: features,
+            required_limits: limits(&adapter.limits(), choice.max_side),
+            // One scene and its targets: blocks for many small resources would stay empty.
+            memory_hints: MemoryHints::MemoryUsage,
+            ..DeviceDescriptor::default()
+        };
+        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
+            GpuError::NoDevice { adapter: info.name.clone(), reason: sentence(&error.to_string()) }
+        })?;
+        let gpu = Self { device, queue, info, fault: Arc::default() };
+        gpu.listen();
+        Ok(gpu)
+    }
+
+    /// Keep the first error, instead of wgpu's panic.
+    fn listen(&self) {
+        let (fault, adapter) = (self.fault.clone(), self.info.name.clone());
+        self.device.on_uncaptured_error(Arc::new(move |error| {
+            let adapter = adapter.clone();
+            keep(
+                &fault,
+                match error {
+                    wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory { adapter },
+                    other => GpuError::Refused { adapter, reason: sentence(&other.to_string()) },
+                },
+            );
+        }));
+        let (fault, adapter) = (self.fault.clone(), self.info.name.clone());
+        self.device.set_device_lost_callback(move |_, reason| {
+            let lost = GpuError::Lost { adapter: adapter.clone(), reason: sentence(&reason) };
+            // What a lost device refuses says less than that it is lost.
+            *fault.lock().unwrap_or_else(PoisonError::into_inner) = Some(lost);
+        });
+    }
+
+    /// Whether all went well so far.
+    ///
+    /// # Errors
+    /// The first thing that did not.
+    pub fn check(&self) -> Result<(), GpuError> {
+        let fault = || self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if fault().is_some() {
+            // The refusals of a lost device come before the word that it is lost, which a poll brings.
+            let _ = self.device.poll(PollType::Poll);
+        }
+        fault().map_or(Ok(()), Err)
+    }
+
+    /// A buffer that holds `contents`. (wgpu's own helper panics where the device is lost.)
+    pub(super) fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
+        let buffer = self.device.create_buffer(&BufferDescriptor {
+            label: Some(label),
+            size: contents.len() as u64,
+            usage: usage | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.queue.write_buffer(&buffer, 0, contents);
+        buffer
+    }
+
+    /// Wait until all submitted work is done.
+    pub(super) fn wait(&self) -> Result<(), GpuError> {
+        let waited = self.device.poll(PollType::wait_indefinitely());
+        self.check()?;
+        waited.map(|_| ()).map_err(|error| self.lost(&error.to_string()))
+    }
+
+    /// That the device does not answer, in the driver's words.
+    pub(super) fn lost(&self, reason: &str) -> GpuError {
+        match self.check() {
+            Err(error) => error,
+            Ok(()) => GpuError::Lost { adapter: self.info.name.clone(), reason: sentence(reason) },
+        }
+    }
+
+    /// Give the device back; whatever is asked of it afterwards is answered by [`GpuError::Lost`].
+    pub fn close(&self) {
+        self.device.destroy();
+    }
+
+    /// The adapter's name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.info.name
+    }
+
+    /// Whether the adapter is a program on the CPU.
+    #[must_use]
+    pub fn is_software(&self) -> bool {
+        self.info.device_type == DeviceType::Cpu
+    }
+
+    /// Whether shaders may compute in 16 bits.
+    #[must_use]
+    pub fn f16(&self) -> bool {
+        self.device.features().contains(Features::SHADER_F16)
+    }
+
+    /// Whether passes can be timed.
+    #[must_use]
+    pub fn timestamps(&self) -> bool {
+        self.device.features().contains(Features::TIMESTAMP_QUERY)
+    }
+
+    /// The longest side of a texture.
+    #[must_use]
+    pub fn max_side(&self) -> u32 {
+        self.device.limits().max_texture_dimension_2d
+    }
+}
+
+/// WebGPU's defaults, but sizes as large as the adapter has them.
+fn limits(adapter: &Limits, max_side: Option<u32>) -> Limits {
+    let side = adapter.max_texture_dimension_2d;
+    Limits {
+        max_texture_dimension_2d: max_side.unwrap_or(side).min(side),
+        max_buffer_size: adapter.max_buffer_size,
+        max_storage_buffer_binding_size: adapter.max_storage_buffer_binding_size,
+        ..Limits::default().or_worse_values_from(adapter)
+    }
+}
+
+fn keep(fault: &Mutex<Option<GpuError>>, error: GpuError) {
+    fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+}
+
+/// A driver's words on one line, without the full stop.
+fn sentence(words: &str) -> String {
+    let line = words.split_whitespace().collect::<Vec<_>>().join(" ");
+    let line = line.trim_end_matches('.');
+    if line.is_empty() { "the driver gives no reason".to_owned() } else { line.to_owned() }
+}

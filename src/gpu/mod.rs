@@ -1,0 +1,39 @@
+//! The production renderer: the planned WGSL on a graphics adapter, in one vertex and fragment pass.
+//!
+//! - [`adapter`]: which adapters there are, and which one is taken
+//! - [`device`]: the device on it, and what went wrong there
+//! - [`upload`]: what a plan reads, on the device (`texels`: in the formats that it is read in;
+//!   `vertices`: the mesh at rest, its morph targets and bones)
+//! - `constants`: the uniform block
+//! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
+//! - `program`: a plan as a pipeline
+//! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
+//! - `readback`: images from the device
+//! - [`probe`]: rules evaluated for given numbers
+//! - [`timing`]: GPU time by pass
+//! - [`renderer`]: all of it: from a scene and a camera to an image
+//! - [`error`]: what is refused
+//!
+//! Semantics are those of `samples` and `model`; images are compared with `render::shade` in the tests.
+
+pub mod adapter;
+mod bloom;
+mod constants;
+pub mod device;
+pub mod error;
+mod filter;
+pub mod probe;
+mod program;
+mod readback;
+pub mod renderer;
+mod resolve;
+mod targets;
+mod texels;
+pub mod timing;
+pub mod upload;
+mod vertices;
+
+pub use adapter::Choice;
+pub use device::Gpu;
+pub use error::GpuError;
+pub use renderer::{Frame, RenderOptions, Renderer};

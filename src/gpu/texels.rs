@@ -1,0 +1,120 @@
+//! Maps and cubes in the formats that shaders read them in.
+
+use exr::prelude::f16;
+use rayon::prelude::*;
+use wgpu::{TextureFormat, TextureViewDimension};
+
+use crate::model::cube::Cube;
+use crate::render::tonemap::srgb_encode;
+use crate::scene::maps::{Map, Maps};
+use crate::shader::Resource;
+
+/// A texture's content, layer by layer, row by row.
+pub(super) struct Texels {
+    pub(super) width: u32,
+    pub(super) height: u32,
+    pub(super) layers: u32,
+    pub(super) format: TextureFormat,
+    pub(super) dimension: TextureViewDimension,
+    pub(super) bytes: Vec<u8>,
+}
+
+/// Six padded faces in 32 bits: the texels that the CPU filters.
+pub(super) fn faces(cube: &Cube<f32>) -> Texels {
+    let side = cube.size() as u32 + 2;
+    Texels {
+        width: side,
+        height: side,
+        layers: 6,
+        format: TextureFormat::Rgba32Float,
+        dimension: TextureViewDimension::D2Array,
+        bytes: bytemuck::cast_slice(cube.padded()).to_vec(),
+    }
+}
+
+/// Six faces in 16 bits, whose borders the hardware bridges. Radiance beyond their range is cut at it.
+pub(super) fn cube(cube: &Cube<f32>) -> Texels {
+    let size = cube.size();
+    let places = (0..6)
+        .flat_map(|face| (0..size).flat_map(move |row| (0..size).map(move |column| (face, column, row))));
+    let half = |x: f32| f16::from_f32(x.clamp(-65504.0, 65504.0)).to_bits();
+    let halves: Vec<u16> =
+        places.flat_map(|(face, column, row)| cube.texel(face, column, row).map(half)).collect();
+    Texels {
+        width: size as u32,
+        height: size as u32,
+        layers: 6,
+        format: TextureFormat::Rgba16Float,
+        dimension: TextureViewDimension::Cube,
+        bytes: bytemuck::cast_slice(&halves).to_vec(),
+    }
+}
+
+/// The map that `resource` names; `None` where the scene has none, or it is no map.
+pub(super) fn map(resource: Resource, maps: &Maps) -> Option<Texels> {
+    use TextureFormat as F;
+    let Maps { color, normal, specular, attenuator } = maps;
+    let linear = |x: f32| x;
+    match resource {
+        Resource::ColorTexels => color.as_ref().map(|map| rgba(map, None, F::Rgba32Float, float)),
+        Resource::NormalTexels => normal.as_ref().map(|map| rgba(map, None, F::Rgba32Float, float)),
+        Resource::ColorSpecularTexels => {
+            color.as_ref().map(|map| rgba(map, specular.as_ref(), F::Rgba32Float, float))
+        }
+        Resource::NormalAttenuatorTexels => {
+            normal.as_ref().map(|map| rgba(map, attenuator.as_ref(), F::Rgba32Float, float))
+        }
+        Resource::SpecularTexels => specular.as_ref().map(|map| single(map, F::R32Float, float)),
+        Resource::AttenuatorTexels => attenuator.as_ref().map(|map| single(map, F::R32Float, float)),
+        Resource::ColorMap => color.as_ref().map(|map| rgba8(map, None, F::Rgba8UnormSrgb, srgb_encode)),
+        Resource::NormalMap => normal.as_ref().map(|map| rgba8(map, None, F::Rgba8Unorm, linear)),
+        Resource::ColorSpecularMap => {
+            color.as_ref().map(|map| rgba8(map, specular.as_ref(), F::Rgba8UnormSrgb, srgb_encode))
+        }
+        Resource::NormalAttenuatorMap => {
+            normal.as_ref().map(|map| rgba8(map, attenuator.as_ref(), F::Rgba8Unorm, linear))
+        }
+        Resource::SpecularMap => specular.as_ref().map(|map| single(map, F::R8Unorm, |x| [byte(x)])),
+        Resource::AttenuatorMap => attenuator.as_ref().map(|map| single(map, F::R8Unorm, |x| [byte(x)])),
+        _ => None,
+    }
+}
+
+fn float(x: f32) -> [u8; 4] {
+    x.to_ne_bytes()
+}
+
+fn byte(x: f32) -> u8 {
+    (x * 255.0 + 0.5) as u8
+}
+
+/// Three channels and, in alpha, a map of the same size (or 1), each through `encode`.
+fn rgba(map: &Map<3>, alpha: Option<&Map<1>>, format: TextureFormat, encode: fn(f32) -> [u8; 4]) -> Texels {
+    let texel = |i: usize| {
+        let [r, g, b] = map.texels[i];
+        let a = alpha.and_then(|map| map.texels.get(i)).map_or(1.0, |&[a]| a);
+        [r, g, b, a].map(encode)
+    };
+    let bytes: Vec<[[u8; 4]; 4]> = (0..map.texels.len()).into_par_iter().map(texel).collect();
+    plane(map, format, bytemuck::cast_slice(&bytes).to_vec())
+}
+
+/// The same in 8 bits; `encode` takes colour to what is stored, alpha is stored as it is.
+fn rgba8(map: &Map<3>, alpha: Option<&Map<1>>, format: TextureFormat, encode: fn(f32) -> f32) -> Texels {
+    let texel = |i: usize| {
+        let [r, g, b] = map.texels[i].map(|x| byte(encode(x)));
+        let a = alpha.and_then(|map| map.texels.get(i)).map_or(255, |&[a]| byte(a));
+        [r, g, b, a]
+    };
+    let bytes: Vec<[u8; 4]> = (0..map.texels.len()).into_par_iter().map(texel).collect();
+    plane(map, format, bytemuck::cast_slice(&bytes).to_vec())
+}
+
+fn single<const N: usize>(map: &Map<1>, format: TextureFormat, encode: fn(f32) -> [u8; N]) -> Texels {
+    plane(map, format, map.texels.iter().flat_map(|&[x]| encode(x)).collect())
+}
+
+fn plane<const C: usize>(map: &Map<C>, format: TextureFormat, bytes: Vec<u8>) -> Texels {
+    let (width, height) = (map.width as u32, map.height as u32);
+    Texels { width, height, layers: 1, format, dimension: TextureViewDimension::D2, bytes }
+}

@@ -1,0 +1,100 @@
+//! GPU time by pass, from the adapter's timestamps.
+
+use wgpu::{
+    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, MapMode, QUERY_SIZE, QuerySet,
+    QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
+};
+
+use super::device::Gpu;
+use super::error::GpuError;
+
+/// The passes of one tile.
+const MOST_PASSES: u32 = 8;
+
+/// GPU time of a pass, over all tiles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PassTime {
+    /// The pass.
+    pub pass: &'static str,
+    /// Milliseconds.
+    pub milliseconds: f64,
+}
+
+/// Timestamps around the passes that are submitted at once.
+pub(super) struct Timer {
+    /// Absent where the adapter has no timestamps.
+    queries: Option<(QuerySet, Buffer, Buffer)>,
+    passes: Vec<&'static str>,
+    /// Sums over submissions.
+    pub(super) times: Vec<PassTime>,
+}
+
+impl Timer {
+    pub(super) fn new(gpu: &Gpu) -> Self {
+        let queries = gpu.timestamps().then(|| {
+            let set = gpu.device.create_query_set(&QuerySetDescriptor {
+                label: Some("times"),
+                ty: QueryType::Timestamp,
+                count: 2 * MOST_PASSES,
+            });
+            let buffer = |label, usage| {
+                let size = u64::from(2 * MOST_PASSES) * u64::from(QUERY_SIZE);
+                let label = Some(label);
+                gpu.device.create_buffer(&BufferDescriptor { label, size, usage, mapped_at_creation: false })
+            };
+            let resolved = buffer("times", BufferUsages::QUERY_RESOLVE | BufferUsages::COPY_SRC);
+            let read = buffer("times, readable", BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+            (set, resolved, read)
+        });
+        Self { queries, passes: Vec::new(), times: Vec::new() }
+    }
+
+    /// What a pass is to write; none where passes cannot be timed.
+    pub(super) fn around(&mut self, pass: &'static str) -> Option<RenderPassTimestampWrites<'_>> {
+        let (set, ..) = self.queries.as_ref()?;
+        let first = 2 * self.passes.len() as u32;
+        if first >= 2 * MOST_PASSES {
+            return None;
+        }
+        self.passes.push(pass);
+        Some(RenderPassTimestampWrites {
+            query_set: set,
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        })
+    }
+
+    /// After the last pass: have the times copied.
+    pub(super) fn finish(&self, encoder: &mut CommandEncoder) {
+        if let Some((set, resolved, read)) = &self.queries {
+            let count = 2 * self.passes.len() as u32;
+            encoder.resolve_query_set(set, 0..count, resolved, 0);
+            encoder.copy_buffer_to_buffer(resolved, 0, read, 0, u64::from(count * QUERY_SIZE));
+        }
+    }
+
+    /// After the submission: wait for the times, and add them up.
+    pub(super) fn collect(&mut self, gpu: &Gpu) -> Result<(), GpuError> {
+        let passes = std::mem::take(&mut self.passes);
+        let Some((_, _, read)) = &self.queries else { return Ok(()) };
+        let slice = read.slice(..u64::from(2 * passes.len() as u32 * QUERY_SIZE));
+        slice.map_async(MapMode::Read, |_| {});
+        gpu.wait()?;
+        {
+            let view = slice.get_mapped_range().map_err(|error| gpu.lost(&error.to_string()))?;
+            let period = f64::from(gpu.queue.get_timestamp_period());
+            for (pass, ticks) in passes.into_iter().zip(view.chunks_exact(16)) {
+                let tick =
+                    |bytes: &[u8]| bytes.iter().rev().fold(0_u64, |sum, &byte| sum << 8 | u64::from(byte));
+                let length = tick(&ticks[8..]).saturating_sub(tick(&ticks[..8]));
+                let milliseconds = length as f64 * period * 1e-6;
+                match self.times.iter_mut().find(|time| time.pass == pass) {
+                    Some(time) => time.milliseconds += milliseconds,
+                    None => self.times.push(PassTime { pass, milliseconds }),
+                }
+            }
+        }
+        read.unmap();
+        Ok(())
+    }
+}

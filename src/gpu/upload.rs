@@ -1,0 +1,227 @@
+//! A scene on the device: what plans read of it, each thing uploaded once and only when a plan names it.
+
+use std::collections::HashMap;
+
+use wgpu::util::{DeviceExt as _, TextureDataOrder};
+use wgpu::{
+    AddressMode, BindingResource, Buffer, BufferUsages, Extent3d, FilterMode, MipmapFilterMode, Sampler,
+    SamplerDescriptor, TextureDescriptor, TextureDimension, TextureUsages, TextureView,
+    TextureViewDescriptor,
+};
+
+use super::device::Gpu;
+use super::error::GpuError;
+use super::texels::{self, Texels};
+use super::vertices;
+use crate::bake::VertexOcclusion;
+use crate::engine::cpu::Illumination;
+use crate::model::cube::Cube;
+use crate::model::params::{Param, Params};
+use crate::scene::Scene;
+use crate::scene::mesh::Mesh;
+use crate::shader::{Attribute, Resource};
+
+/// What is rendered: a scene, its bakes, and the parameters.
+#[derive(Clone, Copy)]
+pub struct Content<'a> {
+    /// The scene, its mesh at rest.
+    pub scene: &'a Scene,
+    /// The cubes that its effects ask for.
+    pub illumination: &'a Illumination,
+    /// Ambient occlusion, when asked for.
+    pub occlusion: Option<&'a VertexOcclusion>,
+    /// The constants of the model.
+    pub params: &'a Params,
+}
+
+/// The scene's part on the device.
+pub(super) struct Uploads<'a> {
+    content: Content<'a>,
+    /// The morph targets that are summed, by their index in the mesh.
+    targets: Vec<usize>,
+    specular: Option<Cube<f32>>,
+    attributes: HashMap<Attribute, Buffer>,
+    resources: HashMap<Resource, Bound>,
+    indices: Buffer,
+    /// Bytes that were uploaded.
+    bytes: u64,
+}
+
+/// A resource as it is bound.
+#[derive(Clone)]
+pub(super) enum Bound {
+    Texture(TextureView),
+    Sampler(Sampler),
+    Buffer(Buffer),
+}
+
+impl Bound {
+    pub(super) fn binding(&self) -> BindingResource<'_> {
+        match self {
+            Self::Texture(view) => BindingResource::TextureView(view),
+            Self::Sampler(sampler) => BindingResource::Sampler(sampler),
+            Self::Buffer(buffer) => buffer.as_entire_binding(),
+        }
+    }
+}
+
+impl<'a> Uploads<'a> {
+    /// The scene's triangles; everything else follows as it is asked for. `targets` are summed.
+    pub(super) fn new(gpu: &Gpu, content: Content<'a>, targets: Vec<usize>) -> Result<Self, GpuError> {
+        let triangles = bytemuck::cast_slice(&content.scene.mesh.triangles);
+        let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX)?;
+        let lobe = content.params.scalar(Param::SpecularLobe);
+        let specular = content.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
+        let bytes = triangles.len() as u64;
+        let (attributes, resources) = (HashMap::new(), HashMap::new());
+        Ok(Self { content, targets, specular, attributes, resources, indices, bytes })
+    }
+
+    pub(super) const fn content(&self) -> &Content<'a> {
+        &self.content
+    }
+
+    pub(super) const fn indices(&self) -> &Buffer {
+        &self.indices
+    }
+
+    pub(super) const fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// An attribute's vertex buffer.
+    pub(super) fn attribute(&mut self, gpu: &Gpu, attribute: Attribute) -> Result<Buffer, GpuError> {
+        if let Some(buffer) = self.attributes.get(&attribute) {
+            return Ok(buffer.clone());
+        }
+        let bytes = vertices::attribute(attribute, &self.content.scene.mesh, self.content.occlusion);
+        let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
+        self.bytes += bytes.len() as u64;
+        self.attributes.insert(attribute, made.clone());
+        Ok(made)
+    }
+
+    /// A resource, ready to be bound.
+    pub(super) fn resource(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
+        if let Some(bound) = self.resources.get(&resource) {
+            return Ok(bound.clone());
+        }
+        let bound = self.make(gpu, resource)?;
+        self.resources.insert(resource, bound.clone());
+        Ok(bound)
+    }
+
+    fn make(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
+        let Content { scene, illumination, occlusion, .. } = self.content;
+        let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
+        let texels = match resource {
+            Resource::MapSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::Repeat))),
+            Resource::CubeSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::ClampToEdge))),
+            Resource::MorphDeltas => {
+                let deltas = vertices::morph_deltas(&scene.mesh, &self.targets, occlusion);
+                return self.storage(gpu, "morph targets", &deltas);
+            }
+            Resource::Bones => return self.storage(gpu, "bones", &vertices::bones(&scene.mesh.bones)),
+            Resource::IrradianceFaces => cube(&illumination.irradiance, texels::faces),
+            Resource::SpecularFaces => cube(&self.specular, texels::faces),
+            Resource::HiliteFaces => cube(&illumination.hilite, texels::faces),
+            Resource::IrradianceCube => cube(&illumination.irradiance, texels::cube),
+            Resource::SpecularCube => cube(&self.specular, texels::cube),
+            Resource::HiliteCube => cube(&illumination.hilite, texels::cube),
+            map => texels::map(map, &scene.maps),
+        };
+        let texels = texels.ok_or_else(|| GpuError::Refused {
+            adapter: gpu.name().to_owned(),
+            reason: format!("the shader reads {}, which the scene does not have", resource.name()),
+        })?;
+        self.bytes += texels.bytes.len() as u64;
+        Ok(Bound::Texture(texture(gpu, resource.name(), &texels)?))
+    }
+
+    fn storage(&mut self, gpu: &Gpu, what: &str, rows: &[[f32; 4]]) -> Result<Bound, GpuError> {
+        let bytes: &[u8] = bytemuck::cast_slice(rows);
+        let (found, limit) = (bytes.len() as u64, gpu.device.limits().max_storage_buffer_binding_size);
+        check_size(gpu, what, found, limit)?;
+        self.bytes += found;
+        Ok(Bound::Buffer(buffer(gpu, what, bytes, BufferUsages::STORAGE)?))
+    }
+
+    /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the
+    /// device.
+    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh) {
+        for (&attribute, buffer) in &self.attributes {
+            if matches!(attribute, Attribute::Position | Attribute::Normal | Attribute::Tangent) {
+                let bytes = vertices::attribute(attribute, mesh, self.content.occlusion);
+                gpu.queue.write_buffer(buffer, 0, &bytes);
+            }
+        }
+        for (&resource, bound) in &self.resources {
+            let rows = match resource {
+                Resource::Bones => vertices::bones(&mesh.bones),
+                Resource::MorphDeltas => vertices::morph_deltas(mesh, &self.targets, self.content.occlusion),
+                _ => continue,
+            };
+            if let Bound::Buffer(buffer) = bound {
+                gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rows));
+            }
+        }
+    }
+}
+
+fn check_size(gpu: &Gpu, what: &str, bytes: u64, limit: u64) -> Result<(), GpuError> {
+    if bytes <= limit {
+        return Ok(());
+    }
+    Err(GpuError::BufferSize { adapter: gpu.name().to_owned(), what: what.to_owned(), bytes, limit })
+}
+
+fn buffer(gpu: &Gpu, label: &str, contents: &[u8], usage: BufferUsages) -> Result<Buffer, GpuError> {
+    check_size(gpu, label, contents.len() as u64, gpu.device.limits().max_buffer_size)?;
+    let made = gpu.buffer(label, contents, usage);
+    gpu.check()?;
+    Ok(made)
+}
+
+fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureView, GpuError> {
+    let limit = gpu.device.limits().max_texture_dimension_2d;
+    if texels.width.max(texels.height) > limit {
+        return Err(GpuError::TextureSize {
+            adapter: gpu.name().to_owned(),
+            what: name.replace('_', " "),
+            width: texels.width as usize,
+            height: texels.height as usize,
+            limit,
+            remedy: "Scale the map down",
+        });
+    }
+    let descriptor = TextureDescriptor {
+        label: Some(name),
+        size: Extent3d { width: texels.width, height: texels.height, depth_or_array_layers: texels.layers },
+        mip_level_count: 1,
+        sample_count: 1,
+        dimension: TextureDimension::D2,
+        format: texels.format,
+        usage: TextureUsages::TEXTURE_BINDING,
+        view_formats: &[],
+    };
+    let order = TextureDataOrder::LayerMajor;
+    let made = gpu.device.create_texture_with_data(&gpu.queue, &descriptor, order, &texels.bytes);
+    gpu.check()?;
+    Ok(made.create_view(&TextureViewDescriptor {
+        dimension: Some(texels.dimension),
+        ..TextureViewDescriptor::default()
+    }))
+}
+
+/// Bilinear in the one level that there is: what the CPU does.
+fn sampler(gpu: &Gpu, mode: AddressMode) -> Sampler {
+    gpu.device.create_sampler(&SamplerDescriptor {
+        address_mode_u: mode,
+        address_mode_v: mode,
+        address_mode_w: mode,
+        mag_filter: FilterMode::Linear,
+        min_filter: FilterMode::Linear,
+        mipmap_filter: MipmapFilterMode::Nearest,
+        ..SamplerDescriptor::default()
+    })
+}

@@ -1,0 +1,72 @@
+//! The mesh as the vertex stage reads it: attributes at rest, morph deltas, bones.
+
+use glam::{Mat4, Vec2, Vec3, Vec4};
+
+use crate::bake::VertexOcclusion;
+use crate::model::vertex::Bone;
+use crate::scene::mesh::Mesh;
+use crate::shader::Attribute;
+
+/// One attribute of every vertex, as bytes; what the mesh lacks is zero, which the vertex stage takes for
+/// "no direction", and occlusion 1.
+pub(super) fn attribute(attribute: Attribute, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Vec<u8> {
+    let count = mesh.positions.len();
+    let floats = |floats: Vec<f32>| bytemuck::cast_slice(&floats).to_vec();
+    let mut bytes = match attribute {
+        Attribute::Position => floats(mesh.positions.iter().flat_map(Vec3::to_array).collect()),
+        Attribute::Normal => floats(mesh.normals.iter().flat_map(Vec3::to_array).collect()),
+        Attribute::Tangent => floats(mesh.tangents.iter().flat_map(Vec4::to_array).collect()),
+        Attribute::Uv => floats(mesh.uvs.iter().flat_map(Vec2::to_array).collect()),
+        Attribute::Occlusion => floats(occlusion.map_or_else(|| vec![1.0; count], |o| o.base.clone())),
+        Attribute::Joints => {
+            let joints: Vec<u32> = (0..count).flat_map(|i| influences(mesh, i).0).collect();
+            bytemuck::cast_slice(&joints).to_vec()
+        }
+        Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
+    };
+    bytes.resize(count * attribute.bytes() as usize, 0);
+    bytes
+}
+
+/// The bones of a vertex and their weights. One that no bone moves is in the world already: it hangs on
+/// the bone behind the last, which moves nothing.
+fn influences(mesh: &Mesh, vertex: usize) -> ([u32; 4], [f32; 4]) {
+    let weights = mesh.weights.get(vertex).copied().unwrap_or_default();
+    match mesh.joints.get(vertex) {
+        Some(joints) if weights.iter().any(|&weight| weight != 0.0) => (joints.map(u32::from), weights),
+        _ => ([mesh.bones.len() as u32; 4], [1.0, 0.0, 0.0, 0.0]),
+    }
+}
+
+/// For each bone three rows of its affine map and three of what it does to normals; then those of the bone
+/// that moves nothing.
+pub(super) fn bones(bones: &[Mat4]) -> Vec<[f32; 4]> {
+    let rows = |bone: &Mat4| {
+        let rows = bone.as_dmat4().transpose().to_cols_array_2d();
+        let (affine, normal) = Bone::new([rows[0], rows[1], rows[2]]).rows();
+        let normal = normal.map(|[x, y, z]| [x, y, z, 0.0]);
+        affine.into_iter().chain(normal).map(|row| row.map(|x| x as f32)).collect::<Vec<_>>()
+    };
+    bones.iter().chain([&Mat4::IDENTITY]).flat_map(rows).collect()
+}
+
+/// For each of the targets (indices into the mesh's) and each vertex: the position delta with the
+/// occlusion delta in w, then the normal delta.
+pub(super) fn morph_deltas(
+    mesh: &Mesh,
+    targets: &[usize],
+    occlusion: Option<&VertexOcclusion>,
+) -> Vec<[f32; 4]> {
+    let mut deltas = Vec::with_capacity(2 * targets.len() * mesh.positions.len());
+    for &target in targets {
+        let morph = &mesh.morphs[target];
+        let open = occlusion.and_then(|occlusion| occlusion.morphs.get(target));
+        for i in 0..mesh.positions.len() {
+            let open = open.and_then(|open| open.get(i)).copied().unwrap_or_default();
+            let position = morph.positions.get(i).copied().unwrap_or_default();
+            let normal = morph.normals.get(i).copied().unwrap_or_default();
+            deltas.extend([position.extend(open).to_array(), normal.extend(0.0).to_array()]);
+        }
+    }
+    deltas
+}

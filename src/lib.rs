@@ -1,0 +1,40 @@
+//! **skinfit**: a differentiable shading-fit tool for real-time skin.
+//!
+//! Data flows one way through the modules, as `docs/architecture.md` draws it:
+//!
+//! - [`model`]: the skin model of *Skin in the "Dawn" Demo* (GPU Gems, chapter 3), generic over
+//!   the scalar; its parameter table and its effects. Knows nothing of files or meshes.
+//! - [`scene`]: scene files, meshes, maps, cameras: everything that is read.
+//! - [`builtin`]: the scene that the program makes by itself.
+//! - [`bake`]: environment to cube maps, ambient occlusion, and their cache.
+//! - [`samples`]: the visible surface of each view, as a structure of arrays.
+//! - [`engine`]: loss, gradient and normal equations over samples.
+//! - [`fit`]: the solvers, and what is known of the answer afterwards.
+//! - [`render`]: images from samples, and image files.
+//! - `gpu`: the production renderer, planned shaders on a graphics adapter (feature `gpu`).
+//! - [`prepare`]: the stages up to the samples, run once and timed.
+//! - [`demo`]: the built-in scene as files, its targets rendered.
+//! - [`report`]: metrics, pictures and pages that show how good a fit is.
+//! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
+//! - [`export`]: constants and shaders as text for other engines.
+//! - [`cli`]: the command line.
+//! - [`output`], [`progress`]: files written whole or not at all; progress bars.
+
+pub mod bake;
+pub mod builtin;
+pub mod cli;
+pub mod demo;
+pub mod engine;
+pub mod export;
+pub mod fit;
+#[cfg(feature = "gpu")]
+pub mod gpu;
+pub mod model;
+pub mod output;
+pub mod prepare;
+pub mod progress;
+pub mod render;
+pub mod report;
+pub mod samples;
+pub mod scene;
+pub mod shader;

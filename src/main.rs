@@ -1,0 +1,5 @@
+//! The `skinfit` command.
+
+fn main() -> std::process::ExitCode {
+    skinfit::cli::main()
+}

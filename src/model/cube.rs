@@ -1,0 +1,324 @@
+//! Cube maps with a seamless border, and their bilinear lookup.
+//!
+//! Faces stand in the order +X -X +Y -Y +Z -Z with the face orientation of WebGPU, Vulkan and D3D.
+//! Each face carries a border of one texel from its neighbours, so that four texels always suffice
+//! and a lookup on an edge or a corner is the same from both sides.
+
+use super::real::Real;
+use super::vector::{V3, select};
+
+/// A cube map, RGBA, with a border of one texel around each face.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cube<T> {
+    /// Texels along a face's side, without the border.
+    size: usize,
+    /// `[face][row][column]`, each `(size + 2) x (size + 2)`.
+    padded: Vec<[T; 4]>,
+}
+
+/// The direction (not normalised) of the point (s, t) in [-1, 1] on a face; t runs downwards.
+#[must_use]
+pub fn face_direction(face: usize, s: f64, t: f64) -> [f64; 3] {
+    match face {
+        0 => [1.0, -t, -s],
+        1 => [-1.0, -t, s],
+        2 => [s, 1.0, t],
+        3 => [s, -1.0, -t],
+        4 => [s, -t, 1.0],
+        _ => [-s, -t, -1.0],
+    }
+}
+
+/// The unit direction through the centre of texel (column, row) of a face of `size` texels.
+#[must_use]
+pub fn texel_direction(face: usize, column: usize, row: usize, size: usize) -> [f64; 3] {
+    let centre = |i: usize| (2 * i + 1) as f64 / size as f64 - 1.0;
+    let d = face_direction(face, centre(column), centre(row));
+    let length = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+    d.map(|x| x / length)
+}
+
+/// The solid angle of texel (column, row) of a face of `size` texels, in steradians.
+#[must_use]
+pub fn texel_solid_angle(column: usize, row: usize, size: usize) -> f64 {
+    let edge = |i: usize| 2.0 * i as f64 / size as f64 - 1.0;
+    let corner = |x: f64, y: f64| (x * y).atan2((x * x + y * y + 1.0).sqrt());
+    let (x0, x1, y0, y1) = (edge(column), edge(column + 1), edge(row), edge(row + 1));
+    corner(x1, y1) - corner(x0, y1) - corner(x1, y0) + corner(x0, y0)
+}
+
+/// Where a direction meets the cube: cubes of any size can be looked up there.
+#[derive(Clone, Copy)]
+pub struct CubePoint<R: Real> {
+    /// 0 to 5.
+    face: R,
+    s: R,
+    t: R,
+    /// 1 / the major axis' length.
+    inverse_major: R,
+    x_major: R::Mask,
+    y_major: R::Mask,
+    positive: R::Mask,
+}
+
+impl<R: Real> CubePoint<R> {
+    /// Of a direction of any length from 1e-36 on. A shorter or non-finite direction has no face; +Z stands in.
+    #[inline(always)]
+    pub fn new(d: V3<R>) -> Self {
+        let (zero, one) = (d[0].lit(0.0), d[0].lit(1.0));
+        let sum = d[0].abs() + d[1].abs() + d[2].abs();
+        let ok = R::and(sum.is_finite(), sum.ge(one.lit(1e-36)));
+        let d = if R::all(ok) { d } else { select::<R>(ok, d, [zero, zero, one]) };
+        Self::of_finite(d)
+    }
+
+    /// Ties of the major axis go to x before y before z; seamlessness makes the choice immaterial.
+    #[inline(always)]
+    fn of_finite([x, y, z]: V3<R>) -> Self {
+        let (zero, one, half) = (x.lit(0.0), x.lit(1.0), x.lit(0.5));
+        let (ax, ay, az) = (x.abs(), y.abs(), z.abs());
+        let x_major = R::and(ax.ge(ay), ax.ge(az));
+        let y_major = ay.ge(az);
+        let positive = Self::pick(x_major, y_major, x, y, z).ge(zero);
+        let point = Self { face: zero, s: zero, t: zero, inverse_major: one, x_major, y_major, positive };
+        let (s, t) = point.across(x, y, z);
+        let face = Self::pick(x_major, y_major, zero, x.lit(2.0), x.lit(4.0));
+        let inverse_major = Self::pick(x_major, y_major, ax, ay, az).recip();
+        Self {
+            face: face + R::select(positive, zero, one),
+            s: (s * inverse_major).mul_add(half, half),
+            t: (t * inverse_major).mul_add(half, half),
+            inverse_major,
+            ..point
+        }
+    }
+
+    #[inline(always)]
+    fn pick(x_major: R::Mask, y_major: R::Mask, on_x: R, on_y: R, on_z: R) -> R {
+        R::select(x_major, on_x, R::select(y_major, on_y, on_z))
+    }
+
+    /// The components of a vector that run along the face's s and t.
+    #[inline(always)]
+    fn across(&self, x: R, y: R, z: R) -> (R, R) {
+        let signed = |v: R| R::select(self.positive, v, -v);
+        let s = Self::pick(self.x_major, self.y_major, signed(-z), x, signed(x));
+        let t = Self::pick(self.x_major, self.y_major, -y, signed(z), -y);
+        (s, t)
+    }
+
+    /// How (s, t) move when the direction moves by `d` (the face held).
+    #[inline(always)]
+    pub fn tangent(&self, [x, y, z]: V3<R>) -> [R; 2] {
+        let major = Self::pick(self.x_major, self.y_major, x, y, z);
+        let d_major = R::select(self.positive, major, -major);
+        let (ds, dt) = self.across(x, y, z);
+        let half = x.lit(0.5);
+        // s = (sc / |major| + 1) / 2, so that sc / |major| = 2 s - 1.
+        let centred = d_major * half;
+        let derivative = |du: R, u: R| self.inverse_major * (du * half - d_major * u + centred);
+        [derivative(ds, self.s), derivative(dt, self.t)]
+    }
+}
+
+impl<T: Copy> Cube<T> {
+    /// Texels along a face's side.
+    #[must_use]
+    pub const fn size(&self) -> usize {
+        self.size
+    }
+
+    /// Texels with their border, `[face][row][column]`, each side `size + 2`.
+    #[must_use]
+    pub fn padded(&self) -> &[[T; 4]] {
+        &self.padded
+    }
+
+    /// The texel of a face, without the border.
+    #[must_use]
+    pub fn texel(&self, face: usize, column: usize, row: usize) -> [T; 4] {
+        self.padded[self.index(face, column + 1, row + 1)]
+    }
+
+    /// Each texel (border included) converted.
+    #[must_use]
+    pub fn map<U>(&self, convert: impl Fn([T; 4]) -> [U; 4]) -> Cube<U> {
+        Cube { size: self.size, padded: self.padded.iter().map(|&texel| convert(texel)).collect() }
+    }
+
+    const fn index(&self, face: usize, column: usize, row: usize) -> usize {
+        let side = self.size + 2;
+        (face * side + row) * side + column
+    }
+
+    /// The seamless bilinear lookup along `d`.
+    #[inline(always)]
+    pub fn sample<R: Real<Texel = T>>(&self, d: V3<R>) -> [R; 4] {
+        self.sample_at(&CubePoint::new(d))
+    }
+
+    /// The lookup at a point.
+    #[inline(always)]
+    pub fn sample_at<R: Real<Texel = T>>(&self, point: &CubePoint<R>) -> [R; 4] {
+        let (index, [fx, fy]) = self.footprint(point);
+        R::bilinear(&self.padded, self.size + 2, index, fx, fy)
+    }
+
+    /// The lookup at a point, and its derivative as (s, t) moves along `tangent`.
+    #[inline(always)]
+    pub fn sample_with_slope<R: Real<Texel = T>>(
+        &self,
+        point: &CubePoint<R>,
+        tangent: [R; 2],
+    ) -> ([R; 4], [R; 4]) {
+        let (index, f) = self.footprint(point);
+        let size = point.s.lit(self.size as f64);
+        let d = [tangent[0] * size, tangent[1] * size];
+        R::bilinear_with_slope(&self.padded, self.size + 2, index, f, d)
+    }
+
+    /// The first of the four texels around a point, and the point's place among them.
+    #[inline(always)]
+    fn footprint<R: Real>(&self, point: &CubePoint<R>) -> (R, [R; 2]) {
+        let (zero, half) = (point.s.lit(0.0), point.s.lit(0.5));
+        let (size, side) = (half.lit(self.size as f64), half.lit((self.size + 2) as f64));
+        let (x, y) = (point.s.mul_add(size, half), point.t.mul_add(size, half));
+        let (column, row) = (x.floor().max(zero).min(size), y.floor().max(zero).min(size));
+        let index = point.face.mul_add(side, row).mul_add(side, column);
+        (index, [x - column, y - row])
+    }
+}
+
+/// What can stand in a texel while a cube is built: f32 or f64.
+pub trait Channel: Copy {
+    /// The mean of three.
+    fn mean3(a: Self, b: Self, c: Self) -> Self;
+}
+
+impl Channel for f32 {
+    fn mean3(a: Self, b: Self, c: Self) -> Self {
+        (a + b + c) / 3.0
+    }
+}
+
+impl Channel for f64 {
+    fn mean3(a: Self, b: Self, c: Self) -> Self {
+        (a + b + c) / 3.0
+    }
+}
+
+impl<T: Channel> Cube<T> {
+    /// A cube of `size` texels a side from `texel(face, column, row)`; the border is taken from the
+    /// neighbouring faces, its corners are the mean of the three texels that meet there.
+    ///
+    /// # Panics
+    /// When `size` is 0.
+    #[must_use]
+    pub fn from_fn(size: usize, mut texel: impl FnMut(usize, usize, usize) -> [T; 4]) -> Self {
+        assert!(size > 0, "a cube needs at least one texel a face");
+        let mut faces = Vec::with_capacity(6 * size * size);
+        for face in 0..6 {
+            for row in 0..size {
+                for column in 0..size {
+                    faces.push(texel(face, column, row));
+                }
+            }
+        }
+        let side = size + 2;
+        let mut padded = Vec::with_capacity(6 * side * side);
+        for face in 0..6 {
+            for row in 0..side {
+                for column in 0..side {
+                    padded.push(faces[neighbour(face, column, row, size)]);
+                }
+            }
+        }
+        let mut cube = Self { size, padded };
+        for face in 0..6 {
+            for (row, inner_row) in [(0, 1), (size + 1, size)] {
+                for (column, inner_column) in [(0, 1), (size + 1, size)] {
+                    let at = |c, r| cube.padded[cube.index(face, c, r)];
+                    let (a, b, c) =
+                        (at(inner_column, inner_row), at(column, inner_row), at(inner_column, row));
+                    let corner = std::array::from_fn(|i| T::mean3(a[i], b[i], c[i]));
+                    let index = cube.index(face, column, row);
+                    cube.padded[index] = corner;
+                }
+            }
+        }
+        cube
+    }
+}
+
+/// The texel that the padded texel (column, row) of `face` shows: its own, or a neighbour's where
+/// the border's centre falls on another face.
+fn neighbour(face: usize, column: usize, row: usize, size: usize) -> usize {
+    let centre = |i: usize| (2.0 * i as f64 - 1.0) / size as f64 - 1.0;
+    let point = CubePoint::new(face_direction(face, centre(column), centre(row)));
+    let clamp = |u: f64| ((u * size as f64) as usize).min(size - 1);
+    (point.face as usize * size + clamp(point.t)) * size + clamp(point.s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wavy(size: usize) -> Cube<f64> {
+        Cube::from_fn(size, |face, column, row| {
+            let d = texel_direction(face, column, row, size);
+            [d[0], d[1] * d[2], 1.0 + d[2] * d[0], d[1]]
+        })
+    }
+
+    #[test]
+    fn solid_angles_of_all_texels_sum_to_the_sphere() {
+        let sum: f64 = (0..8).flat_map(|r| (0..8).map(move |c| texel_solid_angle(c, r, 8))).sum();
+        // Summing 64 numbers in f64.
+        assert!((6.0 * sum - 4.0 * std::f64::consts::PI).abs() < 1e-12);
+    }
+
+    #[test]
+    fn edges_and_corners_read_the_same_from_every_side() {
+        let cube = wavy(8);
+        for (a, b) in [
+            ([1.0, 1.0 - 1e-12, 0.3], [1.0 - 1e-12, 1.0, 0.3]),
+            ([-1.0, 0.2, 1.0 - 1e-12], [-1.0 + 1e-12, 0.2, 1.0]),
+            ([1.0, 1.0 - 1e-12, 1.0 - 1e-12], [1.0 - 1e-12, 1.0 - 1e-12, 1.0]),
+        ] {
+            let (left, right): ([f64; 4], [f64; 4]) = (cube.sample(a), cube.sample(b));
+            for c in 0..4 {
+                // The two directions differ by 1e-12, times a slope of about 1 a radian.
+                assert!((left[c] - right[c]).abs() < 1e-10, "{a:?}: {left:?} {right:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn tangents_agree_with_central_differences() {
+        let cube = wavy(8);
+        for d in [[0.9, 0.2, -0.3], [0.13, -0.8, 0.33], [-0.2, 0.4, 0.7], [-0.9, 0.3, 0.2]] {
+            for dd in [[0.3, 0.1, -0.2], [-0.1, 0.5, 0.4]] {
+                let point = CubePoint::new(d);
+                let (_, got) = cube.sample_with_slope(&point, point.tangent(dd));
+                let h = 1e-7;
+                let at = |h: f64| -> [f64; 4] { cube.sample(std::array::from_fn(|i| d[i] + h * dd[i])) };
+                let (plus, minus) = (at(h), at(-h));
+                for c in 0..4 {
+                    let want: f64 = (plus[c] - minus[c]) / (2.0 * h);
+                    // Rounding of 1e-16 over a step of 1e-7.
+                    assert!((got[c] - want).abs() < 1e-7, "{d:?} {dd:?}: {} {want}", got[c]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn zero_and_non_finite_directions_stay_in_range() {
+        let cube = wavy(4);
+        for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
+            let point = CubePoint::new(bad);
+            let (value, slope) = cube.sample_with_slope(&point, point.tangent([1.0, 0.0, 0.0]));
+            assert!(value.iter().chain(&slope).all(|x| x.is_finite()), "{bad:?}");
+        }
+    }
+}

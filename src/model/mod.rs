@@ -1,0 +1,25 @@
+//! The skin model: formulas, parameters and effects, generic over the scalar.
+//!
+//! - [`real`]: what the model asks of a number (f32, f64, SIMD lanes; number formats can follow)
+//! - [`vector`]: the few 3-vector operations that the formulas use
+//! - [`params`]: the one table of parameters
+//! - [`effects`]: what can be switched on, and what each effect asks for
+//! - [`rim`]: the silhouette and its power
+//! - [`fragment`]: the fragment stage: shading normal, and the light's terms along it
+//! - [`lights`]: what shines on a fragment
+//! - [`compose`]: the weighted sum of the terms, and its derivatives
+//! - [`evaluate`]: the whole model for one fragment
+//! - [`cube`]: cube maps and their seamless bilinear lookup
+//! - [`vertex`]: morphing, skinning and the frame of a vertex, and what the eye sees of it
+
+pub mod compose;
+pub mod cube;
+pub mod effects;
+pub mod evaluate;
+pub mod fragment;
+pub mod lights;
+pub mod params;
+pub mod real;
+pub mod rim;
+pub mod vector;
+pub mod vertex;

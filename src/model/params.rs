@@ -1,0 +1,289 @@
+//! The one table of the model's parameters. Command line, documents, solvers and exporters
+//! derive from it; nothing about a parameter is written anywhere else.
+
+use super::effects::{Effect, Effects, Form};
+
+/// A parameter of the model; its row in [`TABLE`] is `TABLE[param as usize]`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[repr(u8)]
+#[allow(missing_docs, reason = "each variant is documented by its row in TABLE")]
+pub enum Param {
+    BaseWeight,
+    RimWeight,
+    RimExponent,
+    Hilite,
+    Reflection,
+    SideSpecular,
+    Occlusion,
+    NormalStrength,
+    SpecularLobe,
+    EnvironmentRotation,
+    HazeWeight,
+    KeyAzimuth,
+    KeyElevation,
+    KeyColor,
+}
+
+/// How a solver steps through a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// By its value.
+    Linear,
+    /// By its logarithm: what matters is the ratio (exponents of lobes).
+    Log,
+}
+
+/// One row of the table.
+#[derive(Clone, Copy, Debug)]
+pub struct ParamInfo {
+    /// Which parameter.
+    pub param: Param,
+    /// The name in scene files, on the command line, in reports and exports.
+    pub name: &'static str,
+    /// The value that reproduces the printed listing.
+    pub listing: f64,
+    /// The default of the corrected form.
+    pub corrected: f64,
+    /// Least allowed value (may be infinite).
+    pub lower: f64,
+    /// Greatest allowed value (may be infinite).
+    pub upper: f64,
+    /// The unit, empty for a pure number.
+    pub unit: &'static str,
+    /// Whether it may take one value a colour channel.
+    pub rgb: bool,
+    /// Whether the result is linear in it, once the non-linear ones are fixed.
+    pub linear: bool,
+    /// How a solver steps through it.
+    pub scale: Scale,
+    /// It is asked for when one of these effects is enabled.
+    pub effects: &'static [Effect],
+    /// Where it comes from.
+    pub source: &'static str,
+    /// What it does, in one line.
+    pub meaning: &'static str,
+}
+
+const INF: f64 = f64::INFINITY;
+
+macro_rules! row {
+    ($param:ident $name:literal, $listing:expr, $corrected:expr, [$lower:expr, $upper:expr], $unit:literal,
+     $rgb:literal, $linear:literal, $scale:ident, [$($effect:ident),*], $source:literal, $meaning:literal) => {
+        ParamInfo {
+            param: Param::$param, name: $name, listing: $listing, corrected: $corrected, lower: $lower, upper: $upper,
+            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, effects: &[$(Effect::$effect),*],
+            source: $source, meaning: $meaning,
+        }
+    };
+}
+
+/// Every parameter, in the order of [`Param`].
+#[rustfmt::skip]
+pub const TABLE: [ParamInfo; 14] = [
+    //  param               name                   listing corrected  bounds        unit  rgb   linear scale  asked for by
+    row!(BaseWeight          "base_weight",          0.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [Diffuse],
+         "MODEL 3 (corrected form)", "share of the diffuse light seen from any angle"),
+    row!(RimWeight           "rim_weight",           1.0,  0.5,  [-INF, INF],      "",        true,  true,  Linear, [Diffuse],
+         "listing 3-4, SkinSilhouetteVec.y", "diffuse light added towards the silhouette"),
+    row!(RimExponent         "rim_exponent",         2.0,  2.0,  [0.25, 16.0],     "",        false, false, Linear, [Diffuse, Hilite],
+         "listing 3-3, (1-|N.V|)^2", "power of the silhouette term 1-|N.V|"),
+    row!(Hilite              "hilite",               0.7,  0.7,  [0.0, INF],       "",        true,  true,  Linear, [Hilite],
+         "listing 3-4, 0.7", "weight of the back light that shines past the rim"),
+    row!(Reflection          "reflection",           0.02, 0.02, [0.0, INF],       "",        true,  true,  Linear, [Reflection],
+         "listing 3-4, 0.02", "weight of the mirrored environment"),
+    row!(SideSpecular        "side_specular",        1.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [SideSpecular],
+         "listing 3-4, sideSpec", "weight of the specular map times the specular cube"),
+    row!(Occlusion           "occlusion",            1.0,  1.0,  [0.0, 1.0],       "",        false, false, Linear, [Occlusion],
+         "listing 3-4, SkinSilhouetteVec.x", "how much ambient occlusion darkens (0 none, 1 as baked)"),
+    row!(NormalStrength      "normal_strength",      1.0,  1.0,  [0.0, 4.0],       "",        false, false, Linear, [NormalMap],
+         "MODEL 3 (corrected form)", "scale of the normal map's slopes"),
+    row!(SpecularLobe        "specular_lobe",        32.0, 32.0, [1.0, 2048.0],    "Phong exponent", false, false, Log, [SideSpecular, Reflection, Haze, Bloom],
+         "MODEL 4", "sharpness of the specular cube"),
+    row!(EnvironmentRotation "environment_rotation", 0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [Diffuse, SideSpecular, Hilite, Reflection, Haze, Bloom],
+         "MODEL 1", "turn of the environment about +Y, on top of the scene's own"),
+    row!(HazeWeight          "haze_weight",          1.0,  1.0,  [0.0, INF],       "",        false, true,  Linear, [Haze, Bloom],
+         "listing 3-4, alpha", "weight of the haze written to alpha"),
+    row!(KeyAzimuth          "key_azimuth",          0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [KeyLight],
+         "GPU Gems ch. 3, last page", "key light's direction, from +Z towards +X"),
+    row!(KeyElevation        "key_elevation",        45.0, 45.0, [-90.0, 90.0],    "degrees", false, false, Linear, [KeyLight],
+         "GPU Gems ch. 3, last page", "key light's direction above the horizon"),
+    row!(KeyColor            "key_color",            1.0,  1.0,  [0.0, INF],       "radiance", true, true,  Linear, [KeyLight],
+         "GPU Gems ch. 3, last page", "key light's colour"),
+];
+
+impl Param {
+    /// How many parameters there are.
+    pub const COUNT: usize = TABLE.len();
+
+    /// Every parameter, in the order of the table.
+    pub fn all() -> impl Iterator<Item = Self> {
+        TABLE.iter().map(|row| row.param)
+    }
+
+    /// This parameter's row.
+    #[must_use]
+    pub const fn info(self) -> &'static ParamInfo {
+        &TABLE[self as usize]
+    }
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        self.info().name
+    }
+
+    /// The parameter of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::all().find(|p| p.name() == name)
+    }
+
+    /// The default in `form`.
+    #[must_use]
+    pub const fn default(self, form: Form) -> f64 {
+        match form {
+            Form::Listing => self.info().listing,
+            Form::Corrected => self.info().corrected,
+        }
+    }
+
+    /// Whether any enabled effect reads this parameter.
+    #[must_use]
+    pub fn asked_for(self, effects: Effects) -> bool {
+        effects.has_any(self.info().effects)
+            && (self != Self::RimWeight || effects.has(Effect::Rim))
+            && (self != Self::RimExponent || effects.has(Effect::Hilite) || effects.has(Effect::Rim))
+    }
+}
+
+/// One value a parameter and channel. A parameter that is not `rgb` holds three equal values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Params([[f64; 3]; Param::COUNT]);
+
+impl Params {
+    /// The defaults of `form`.
+    #[must_use]
+    pub fn defaults(form: Form) -> Self {
+        let mut values = [[0.0; 3]; Param::COUNT];
+        for param in Param::all() {
+            values[param as usize] = [param.default(form); 3];
+        }
+        Self(values)
+    }
+
+    /// The value of a scalar parameter (the red value of a coloured one).
+    #[must_use]
+    pub const fn scalar(&self, param: Param) -> f64 {
+        self.0[param as usize][0]
+    }
+
+    /// The three channels' values.
+    #[must_use]
+    pub const fn rgb(&self, param: Param) -> [f64; 3] {
+        self.0[param as usize]
+    }
+
+    /// Set all channels to `value`.
+    pub const fn set(&mut self, param: Param, value: f64) {
+        self.0[param as usize] = [value; 3];
+    }
+
+    /// Set each channel.
+    pub const fn set_rgb(&mut self, param: Param, value: [f64; 3]) {
+        self.0[param as usize] = value;
+    }
+}
+
+/// Which channels of a parameter one free column moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Channels {
+    /// All three together: the parameter is tied to a scalar.
+    Tied,
+    /// One channel, 0 to 2.
+    One(usize),
+}
+
+impl Channels {
+    /// Whether channel `c` is moved.
+    #[must_use]
+    pub const fn includes(self, c: usize) -> bool {
+        match self {
+            Self::Tied => true,
+            Self::One(channel) => channel == c,
+        }
+    }
+}
+
+/// One free unknown of a fit: one column of the Jacobian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Column {
+    /// The parameter.
+    pub param: Param,
+    /// The channels of it that move together.
+    pub channels: Channels,
+}
+
+impl Column {
+    /// A parameter tied to a scalar.
+    #[must_use]
+    pub const fn tied(param: Param) -> Self {
+        Self { param, channels: Channels::Tied }
+    }
+
+    /// A parameter free in each channel: three columns.
+    #[must_use]
+    pub fn per_channel(param: Param) -> [Self; 3] {
+        [0, 1, 2].map(|c| Self { param, channels: Channels::One(c) })
+    }
+
+    /// The name in reports: the parameter's, with `.r`, `.g` or `.b` when the channel is its own.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self.channels {
+            Channels::Tied => self.param.name().to_owned(),
+            Channels::One(c) => format!("{}.{}", self.param.name(), ["r", "g", "b"][c]),
+        }
+    }
+
+    /// This column's value in `params`.
+    #[must_use]
+    pub const fn get(&self, params: &Params) -> f64 {
+        match self.channels {
+            Channels::Tied => params.scalar(self.param),
+            Channels::One(c) => params.rgb(self.param)[c],
+        }
+    }
+
+    /// Set this column's value in `params`.
+    pub const fn set(&self, params: &mut Params, value: f64) {
+        match self.channels {
+            Channels::Tied => params.set(self.param, value),
+            Channels::One(c) => params.0[self.param as usize][c] = value,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn table_rows_stand_in_the_order_of_the_enum_with_defaults_within_bounds() {
+        for (i, row) in TABLE.iter().enumerate() {
+            assert_eq!(row.param as usize, i, "{}", row.name);
+            for value in [row.listing, row.corrected] {
+                assert!((row.lower..=row.upper).contains(&value), "{}", row.name);
+            }
+            assert_eq!(Param::from_name(row.name), Some(row.param));
+        }
+    }
+
+    #[test]
+    fn columns_read_back_what_they_set() {
+        let mut params = Params::defaults(Form::Corrected);
+        for column in Param::all().map(Column::tied).chain(Column::per_channel(Param::Hilite)) {
+            column.set(&mut params, 0.375);
+            assert_eq!(column.get(&params), 0.375, "{}", column.name());
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! The stages before a fit or a render, run once and timed: scene -> bake -> samples.
+
+use std::ops::RangeInclusive;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::bake::{self, BakeError, BakeStats, VertexOcclusion};
+use crate::engine::cpu::{CpuEngine, Illumination};
+use crate::engine::view::ObservedView;
+use crate::engine::{Point, Unknown};
+use crate::fit::params_file::{ParamsFile, ParamsFileError};
+use crate::model::effects::Effects;
+use crate::model::evaluate::Setup;
+use crate::model::params::{Channels, Column, Param, Params};
+use crate::report::StageSeconds;
+use crate::samples::{self, SampleError, TargetArrays, ViewSamples};
+use crate::scene::Scene;
+use crate::scene::error::SceneError;
+use crate::scene::load::LoadOptions;
+use crate::scene::suggestion;
+
+/// What a command asks of the stages.
+#[derive(Clone, Debug, Default)]
+pub struct PrepareOptions {
+    /// Instead of the scene's effects.
+    pub effects: Option<Effects>,
+    /// Whether targets are read, as a fit needs them; then all lobes are baked of which the fit can
+    /// make use, and otherwise the start value's alone.
+    pub fit: bool,
+    /// Which views.
+    pub views: Views,
+    /// A parameter file to take parameters and gains from, instead of the scene's start values.
+    pub params: Option<PathBuf>,
+    /// Where bakes are kept between runs.
+    pub cache: Option<PathBuf>,
+    /// Seconds into animation 0, instead of the scene's.
+    pub time: Option<f64>,
+}
+
+/// Which of a scene's views are wanted.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum Views {
+    /// Every one.
+    #[default]
+    All,
+    /// The first.
+    First,
+    /// The one of this name.
+    Named(String),
+}
+
+/// A scene that is ready to be evaluated.
+#[derive(Debug)]
+pub struct Prepared {
+    /// The scene; its params are those to start from.
+    pub scene: Scene,
+    /// A factor on each view's image.
+    pub gains: Vec<f64>,
+    /// The cubes that its effects ask for.
+    pub illumination: Illumination,
+    /// Ambient occlusion, when asked for.
+    pub occlusion: Option<VertexOcclusion>,
+    /// The visible surface, a view each.
+    pub samples: Vec<ViewSamples>,
+    /// What was baked, and what came from the cache.
+    pub baked: BakeStats,
+    /// Seconds by stage so far.
+    pub seconds: StageSeconds,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// A stage refused its input.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant is the stage's own error")]
+pub enum PrepareError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    #[error(transparent)]
+    Samples(#[from] SampleError),
+    #[error(transparent)]
+    Params(#[from] ParamsFileError),
+    /// A view that cannot be compared with its target.
+    #[error("{scene}: {error}")]
+    Target { scene: String, error: SampleError },
+    /// No view of that name.
+    #[error("{scene}: there is no view `{view}`. {suggestion}.")]
+    NoView { scene: String, view: String, suggestion: String },
+    /// A fit without anything to match.
+    #[error(
+        "{scene}: no view names a target, so there is nothing to fit. Add target = \"image.exr\" to a [[view]]."
+    )]
+    NoTarget { scene: String },
+}
+
+impl Prepared {
+    /// Read, bake and sample the scene at `path`.
+    ///
+    /// # Errors
+    /// The first stage's that refuses its input.
+    pub fn new(path: &Path, options: &PrepareOptions) -> Result<Self, PrepareError> {
+        let mut prepared = Self::baked(path, options)?;
+        let start = Instant::now();
+        let posed = prepared.scene.mesh.pose();
+        prepared.samples = samples::sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref())?;
+        prepared.seconds.samples = start.elapsed().as_secs_f64();
+        Ok(prepared)
+    }
+
+    /// Read and bake the scene at `path`; no surface is sampled.
+    ///
+    /// # Errors
+    /// The first stage's that refuses its input.
+    pub fn baked(path: &Path, options: &PrepareOptions) -> Result<Self, PrepareError> {
+        let start = Instant::now();
+        let load = LoadOptions { effects: options.effects, targets: options.fit, time: options.time };
+        let (mut scene, warnings) = Scene::load(path, &load)?;
+        choose_views(&mut scene, &options.views)?;
+        let mut gains = vec![1.0; scene.views.len()];
+        if let Some(path) = &options.params {
+            let file = ParamsFile::read(path, scene.form, &scene.params)?;
+            scene.params = file.params;
+            scene.fit.free = untied(&scene.fit.free, &scene.params);
+            for (gain, view) in gains.iter_mut().zip(&scene.views) {
+                let given = file.gains.iter().find(|(name, _)| *name == view.name);
+                *gain = given.map_or(1.0, |&(_, gain)| gain);
+            }
+        }
+        let mut prepared = Self {
+            scene,
+            gains,
+            illumination: Illumination::default(),
+            occlusion: None,
+            samples: Vec::new(),
+            baked: BakeStats::default(),
+            seconds: StageSeconds { load: start.elapsed().as_secs_f64(), ..StageSeconds::default() },
+            warnings: warnings.iter().map(ToString::to_string).collect(),
+        };
+        let lobe = Param::SpecularLobe.info();
+        let free = prepared.scene.fit.free.iter().any(|column| column.param == lobe.param);
+        let start = prepared.scene.params.scalar(lobe.param);
+        let exponents = if options.fit && free { lobe.lower..=lobe.upper } else { start..=start };
+        prepared.bake(exponents, options.cache.as_deref())?;
+        Ok(prepared)
+    }
+
+    /// Bake what the effects ask for, with the lobes around `exponents`.
+    ///
+    /// # Errors
+    /// When the scene lacks what its effects ask for.
+    pub fn bake(&mut self, exponents: RangeInclusive<f64>, cache: Option<&Path>) -> Result<(), PrepareError> {
+        let start = Instant::now();
+        let mesh = &self.scene.mesh;
+        let pose = |weights: &[f32]| mesh.pose_with_weights(weights);
+        let (bake, baked) = bake::bake(&self.scene, &pose, exponents, cache)?;
+        self.warnings.extend(baked.warnings.iter().cloned());
+        self.baked = baked;
+        self.illumination =
+            Illumination { irradiance: bake.irradiance, lobes: bake.lobes, hilite: bake.hilite };
+        self.occlusion = bake.occlusion;
+        self.seconds.bake += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+
+    /// Where a fit starts.
+    #[must_use]
+    pub fn start(&self) -> Point {
+        Point { params: self.scene.params, gains: self.gains.clone() }
+    }
+
+    /// The switches of the model.
+    #[must_use]
+    pub fn setup(&self) -> Setup {
+        let Scene { form, silhouette, effects, .. } = self.scene;
+        Setup { form, silhouette, effects }
+    }
+
+    /// The unknowns of the scene's fit: free columns, then free gains.
+    #[must_use]
+    pub fn unknowns(&self) -> Vec<Unknown> {
+        let gains = if self.scene.fit.free_gains { self.scene.views.len() } else { 0 };
+        let columns = self.scene.fit.free.iter().copied().map(Unknown::Param);
+        columns.chain((1..gains).map(Unknown::Gain)).collect()
+    }
+
+    /// An engine over the views that have a target; views without one are dropped from the scene.
+    ///
+    /// # Errors
+    /// When no view has a target, or a target asks nothing.
+    pub fn engine(&mut self) -> Result<CpuEngine, PrepareError> {
+        let views = std::mem::take(&mut self.scene.views);
+        let samples = std::mem::take(&mut self.samples);
+        let gains = std::mem::take(&mut self.gains);
+        let mut observed = Vec::new();
+        for ((view, samples), gain) in views.into_iter().zip(samples).zip(gains) {
+            let target = TargetArrays::new(&view, &samples).map_err(|error| PrepareError::Target {
+                scene: self.scene.path.display().to_string(),
+                error,
+            })?;
+            match target {
+                Some(target) => {
+                    observed.push(observe(samples, target));
+                    self.scene.views.push(view);
+                    self.gains.push(gain);
+                }
+                None => self.warnings.push(format!(
+                    "{}: view \"{}\" has no target and takes no part in the fit.",
+                    self.scene.path.display(),
+                    view.name
+                )),
+            }
+        }
+        if observed.is_empty() {
+            return Err(PrepareError::NoTarget { scene: self.scene.path.display().to_string() });
+        }
+        let illumination = self.illumination.clone();
+        Ok(CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns()))
+    }
+}
+
+fn observe(samples: ViewSamples, target: TargetArrays) -> ObservedView {
+    let [r, g, b] = target.rgb;
+    ObservedView { samples, target: [r, g, b, Vec::new()], weight: target.weight, clip: target.clip }
+}
+
+/// The free columns, with one a channel for each parameter whose start has three different values: a
+/// tied column would begin by throwing two of them away.
+fn untied(free: &[Column], start: &Params) -> Vec<Column> {
+    let split = |column: &Column| match (column.channels, start.rgb(column.param)) {
+        (Channels::Tied, [r, g, b]) if r != g || g != b => Column::per_channel(column.param).to_vec(),
+        _ => vec![*column],
+    };
+    free.iter().flat_map(split).collect()
+}
+
+fn choose_views(scene: &mut Scene, wanted: &Views) -> Result<(), PrepareError> {
+    match wanted {
+        Views::All => {}
+        Views::First => scene.views.truncate(1),
+        Views::Named(name) => {
+            if !scene.views.iter().any(|view| view.name == *name) {
+                let known: Vec<&str> = scene.views.iter().map(|view| view.name.as_str()).collect();
+                return Err(PrepareError::NoView {
+                    scene: scene.path.display().to_string(),
+                    view: name.clone(),
+                    suggestion: suggestion(name, &known),
+                });
+            }
+            scene.views.retain(|view| view.name == *name);
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,147 @@
+//! Samples to images: the model in f64, with an image for each term.
+
+use rayon::prelude::*;
+
+use super::image::Image;
+use crate::engine::cpu::Illumination;
+use crate::model::compose::TermName;
+use crate::model::cube::Cube;
+use crate::model::effects::Effect;
+use crate::model::evaluate::{Setup, compose};
+use crate::model::fragment::Fragment;
+use crate::model::lights::{Cubes, Lights};
+use crate::model::params::{Param, Params};
+use crate::samples::{LANES, SurfaceArrays, ViewSamples};
+use crate::scene::view::Camera;
+
+/// A view's image and what it is made of.
+#[derive(Clone, Debug)]
+pub struct Shaded {
+    /// The whole, alpha being the coverage.
+    pub image: Image,
+    /// An image for each enabled term; they add up to the whole.
+    pub terms: Vec<(TermName, Image)>,
+    /// The haze of each pixel, premultiplied by its coverage; empty unless an effect asks for it.
+    pub haze: Vec<f32>,
+}
+
+/// The light of a scene in f64, at the lobe of one set of parameters.
+pub struct Shader {
+    setup: Setup,
+    params: Params,
+    irradiance: Option<Cube<f64>>,
+    specular: Option<Cube<f64>>,
+    hilite: Option<Cube<f64>>,
+}
+
+impl Shader {
+    /// Of a scene's cubes, at `params`.
+    #[must_use]
+    pub fn new(setup: Setup, illumination: &Illumination, params: &Params) -> Self {
+        let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(f64::from));
+        let lobe = |stack: &crate::bake::LobeStack| stack.at(params.scalar(Param::SpecularLobe)).0;
+        Self {
+            setup,
+            params: *params,
+            irradiance: illumination.irradiance.as_ref().map(wide),
+            specular: illumination.lobes.as_ref().map(lobe).as_ref().map(wide),
+            hilite: illumination.hilite.as_ref().map(wide),
+        }
+    }
+
+    /// The image of a view, times `gain`. All cores; the same for any number of threads.
+    #[must_use]
+    pub fn shade(&self, samples: &ViewSamples, camera: &Camera, gain: f64) -> Shaded {
+        let names = TermName::of(self.setup.effects);
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let mut shaded = Shaded {
+            image: Image::new(width, height),
+            terms: names.iter().map(|&name| (name, Image::new(width, height))).collect(),
+            haze: vec![0.0; if self.hazy() { width * height } else { 0 }],
+        };
+        let groups: Vec<Vec<Pixel>> =
+            (0..samples.groups()).into_par_iter().map(|group| self.group(samples, group, gain)).collect();
+        for pixel in groups.into_iter().flatten() {
+            let at = pixel.index;
+            for (name, (_, image)) in names.iter().zip(&mut shaded.terms) {
+                let term = pixel.terms[*name as usize];
+                image.rgb[at] = term.map(|x| x as f32);
+                image.alpha[at] = pixel.coverage;
+            }
+            shaded.image.rgb[at] =
+                [0, 1, 2].map(|c| names.iter().map(|n| pixel.terms[*n as usize][c]).sum::<f64>() as f32);
+            shaded.image.alpha[at] = pixel.coverage;
+            if let Some(haze) = shaded.haze.get_mut(at) {
+                *haze = pixel.haze as f32;
+            }
+        }
+        shaded
+    }
+
+    fn hazy(&self) -> bool {
+        self.setup.effects.has_any(&[Effect::Haze, Effect::Bloom])
+    }
+
+    /// The pixels of a group: means over their samples, premultiplied by their coverage.
+    fn group(&self, samples: &ViewSamples, group: usize, gain: f64) -> Vec<Pixel> {
+        let cubes = Cubes {
+            irradiance: self.irradiance.as_ref(),
+            specular: self.specular.as_ref(),
+            lobe_slope: None,
+            hilite: self.hilite.as_ref(),
+        };
+        let lights = Lights::new(self.setup, &self.params, cubes, false, 0.0_f64);
+        let records = samples.group_start[group] as usize..samples.group_start[group + 1] as usize;
+        let lane = |lane: usize| {
+            let slot = group * LANES + lane;
+            let index = samples.pixel[slot];
+            if index == u32::MAX {
+                return None;
+            }
+            let coverage = samples.coverage[slot];
+            let mut pixel = Pixel { index: index as usize, coverage, terms: [[0.0; 3]; 6], haze: 0.0 };
+            for record in records.clone() {
+                let at = record * LANES + lane;
+                let share = f64::from(samples.weight[at]) * f64::from(coverage) * gain;
+                if share == 0.0 {
+                    continue;
+                }
+                let composition = compose(self.setup, &lights, &fragment(&samples.surface, at), &self.params);
+                for c in 0..3 {
+                    for (name, value) in composition.each_term(c) {
+                        pixel.terms[name as usize][c] += share * value;
+                    }
+                }
+                pixel.haze += share * composition.alpha();
+            }
+            Some(pixel)
+        };
+        (0..LANES).filter_map(lane).collect()
+    }
+}
+
+struct Pixel {
+    index: usize,
+    coverage: f32,
+    terms: [[f64; 3]; 6],
+    haze: f64,
+}
+
+/// The sample's fragment; planes that no effect asked for have their neutral value.
+fn fragment(s: &SurfaceArrays, at: usize) -> Fragment<f64> {
+    let x = |plane: &[f32], neutral: f64| plane.get(at).map_or(neutral, |&x| f64::from(x));
+    let v = |planes: &[Vec<f32>; 3], neutral: f64| [0, 1, 2].map(|c| x(&planes[c], neutral));
+    let base = v(&s.base, 0.0);
+    Fragment {
+        base,
+        bump: v(&s.bump, 0.0),
+        normal: if s.normal[0].is_empty() { base } else { v(&s.normal, 0.0) },
+        view: v(&s.view, 0.0),
+        occlusion: x(&s.occlusion, 1.0),
+        silhouette: x(&s.silhouette, 0.0),
+        dapple: x(&s.dapple, 1.0),
+        albedo: v(&s.albedo, 1.0),
+        specular: x(&s.specular, 1.0),
+        attenuator: x(&s.attenuator, 1.0),
+    }
+}

@@ -1,0 +1,273 @@
+//! `report.json`: what a run found, for programs.
+//!
+//! Keys stand in the order of the format's description; `null` stands for a number that does not
+//! exist (a standard error at a bound, a score of a view without covered pixels, an infinite bound).
+
+use serde::ser::{Serialize, Serializer};
+
+use super::metrics::Scores;
+use super::{RunInfo, StageSeconds};
+use crate::engine::{Point, Unknown};
+use crate::fit::outcome::{Ending, Iteration, Outcome, UnknownOutcome};
+use crate::model::params::{Channels, Param};
+
+/// The whole of `report.json`.
+///
+/// Numbers that are not finite are written as `null`, as `serde_json` does with every `f64`.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Summary {
+    /// The loss before and after.
+    pub loss: StartEnd,
+    /// Each parameter that was free, by its name.
+    pub params: Ordered<ParamSummary>,
+    /// Each view's scores, by its name.
+    pub views: Ordered<ViewSummary>,
+    /// Which solver ran.
+    pub solver: &'static str,
+    /// Which engine evaluated the model: `cpu` or `gpu`.
+    pub engine: String,
+    /// Iterations done.
+    pub iterations: u64,
+    /// Passes over the samples.
+    pub evaluations: u64,
+    /// Seconds spent in each stage.
+    pub seconds: StageSeconds,
+    /// Surface samples over all views.
+    pub samples: u64,
+    /// How the fit ended.
+    pub ending: Ending,
+    /// What was minimised.
+    pub loss_name: &'static str,
+    /// Each unknown: a tied parameter, one channel of a parameter, or a view's gain.
+    pub unknowns: Vec<UnknownSummary>,
+    /// How the unknowns' errors hang together.
+    pub correlations: Correlations,
+    /// Combinations that the images do not determine, each a unit vector (unknown: component).
+    pub undetermined: Vec<Ordered<f64>>,
+    /// The loss after each iteration.
+    pub history: Vec<Iteration>,
+    /// The names of the views' pictures and terms, beside this file.
+    pub files: Vec<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Where the numbers come from.
+    pub provenance: Ordered<String>,
+}
+
+/// A number before and after the fit.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct StartEnd {
+    /// Before.
+    pub start: f64,
+    /// After.
+    pub end: f64,
+}
+
+/// What is known of one parameter.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct ParamSummary {
+    /// Where the fit began.
+    pub start: Value<f64>,
+    /// Where it ended.
+    pub value: Value<f64>,
+    /// One standard error; `null` where there is none.
+    pub std_error: Option<Value<Option<f64>>>,
+    /// Whether the images determine it (each of its channels).
+    pub identifiable: bool,
+    /// Whether it (or a channel of it) ended on a bound.
+    pub at_bound: bool,
+}
+
+/// A number, or one a channel.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(untagged)]
+pub enum Value<T> {
+    /// One for all channels.
+    Tied(T),
+    /// Red, green, blue.
+    Rgb([T; 3]),
+}
+
+/// How well one view is matched; `null` when no pixel of it is covered.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ViewSummary {
+    /// dB; 200 stands for equal images.
+    pub psnr: Option<f64>,
+    /// 1 for equal images.
+    pub ssim: Option<f64>,
+    /// 0 for equal images.
+    pub flip: Option<f64>,
+    /// How many pixels were compared.
+    pub pixels: usize,
+}
+
+impl ViewSummary {
+    /// The scores over `pixels` compared pixels.
+    #[must_use]
+    pub fn new(scores: Option<Scores>, pixels: usize) -> Self {
+        let of = |score: fn(&Scores) -> f64| scores.as_ref().map(score);
+        Self { psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), flip: of(|s| s.flip), pixels }
+    }
+}
+
+/// What is known of one unknown.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct UnknownSummary {
+    /// `hilite`, `hilite.g`, `gain.<view>`.
+    pub name: String,
+    /// Where the fit began.
+    pub start: f64,
+    /// Where it ended.
+    pub value: f64,
+    /// One standard error.
+    pub std_error: Option<f64>,
+    /// Whether the images determine it.
+    pub identifiable: bool,
+    /// Whether it ended on a bound.
+    pub at_bound: bool,
+    /// Least and greatest allowed value; `null` for an infinite one.
+    pub bounds: [f64; 2],
+    /// Root mean square change of the weighted image for a change by 1, at the start.
+    pub sensitivity: f64,
+}
+
+/// The correlation matrix.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Correlations {
+    /// The unknowns, in the order of rows and columns.
+    pub names: Vec<String>,
+    /// Rows.
+    pub matrix: Vec<Vec<f64>>,
+}
+
+/// A JSON object whose keys keep their order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ordered<T>(pub Vec<(String, T)>);
+
+impl<T: Serialize> Serialize for Ordered<T> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
+    }
+}
+
+impl Summary {
+    /// The summary of a run whose views have the scores `views`, in their order.
+    #[must_use]
+    pub fn new(
+        run: &RunInfo,
+        outcome: &Outcome,
+        views: &[ViewSummary],
+        files: Vec<String>,
+        warnings: Vec<String>,
+    ) -> Self {
+        let names: Vec<String> = outcome.unknowns.iter().map(|u| label(&u.unknown.name(), run)).collect();
+        let order = names.len().max(1);
+        Self {
+            loss: StartEnd { start: outcome.loss_start, end: outcome.loss_end },
+            params: Ordered(params(outcome)),
+            views: Ordered(run.views.iter().map(|v| v.name.clone()).zip(views.iter().copied()).collect()),
+            solver: outcome.solver,
+            engine: run.engine.clone(),
+            iterations: outcome.iterations,
+            evaluations: outcome.evaluations,
+            seconds: run.seconds,
+            samples: run.samples,
+            ending: outcome.ending,
+            loss_name: run.loss.name(),
+            unknowns: outcome.unknowns.iter().zip(&names).map(|(u, name)| unknown(u, name)).collect(),
+            correlations: Correlations {
+                names,
+                matrix: outcome
+                    .correlations
+                    .chunks(order)
+                    .take(outcome.unknowns.len())
+                    .map(<[f64]>::to_vec)
+                    .collect(),
+            },
+            undetermined: outcome
+                .undetermined
+                .iter()
+                .map(|d| Ordered(d.components.iter().map(|(name, x)| (label(name, run), *x)).collect()))
+                .collect(),
+            history: outcome.history.clone(),
+            files,
+            warnings,
+            provenance: Ordered(run.provenance()),
+        }
+    }
+
+    /// The text of `report.json`.
+    ///
+    /// # Errors
+    /// None that these types can cause.
+    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+        serde_json::to_string_pretty(self).map(|text| text + "\n")
+    }
+}
+
+/// An unknown's name for people: a gain is named by its view, not by the view's number.
+fn label(name: &str, run: &RunInfo) -> String {
+    let number = name.strip_prefix("gain.").and_then(|n| n.parse::<usize>().ok());
+    match number.and_then(|n| run.views.get(n)) {
+        Some(view) => format!("gain.{}", view.name),
+        None => name.to_owned(),
+    }
+}
+
+fn unknown(outcome: &UnknownOutcome, name: &str) -> UnknownSummary {
+    let (lower, upper) = outcome.unknown.bounds();
+    UnknownSummary {
+        name: name.to_owned(),
+        start: outcome.start,
+        value: outcome.value,
+        std_error: outcome.std_error,
+        identifiable: outcome.identifiable,
+        at_bound: outcome.at_bound,
+        bounds: [lower, upper],
+        sensitivity: outcome.sensitivity,
+    }
+}
+
+/// The unknowns gathered by parameter, in the order of the unknowns.
+fn params(outcome: &Outcome) -> Vec<(String, ParamSummary)> {
+    let mut free: Vec<Param> = Vec::new();
+    for unknown in &outcome.unknowns {
+        if let Unknown::Param(column) = unknown.unknown
+            && !free.contains(&column.param)
+        {
+            free.push(column.param);
+        }
+    }
+    free.into_iter().map(|param| (param.name().to_owned(), summarise(param, outcome))).collect()
+}
+
+fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
+    let mut errors = [None; 3];
+    let (mut tied, mut identifiable, mut at_bound) = (true, true, false);
+    for known in &outcome.unknowns {
+        let Unknown::Param(column) = known.unknown else { continue };
+        if column.param == param {
+            tied &= column.channels == Channels::Tied;
+            identifiable &= known.identifiable;
+            at_bound |= known.at_bound;
+            for c in (0..3).filter(|&c| column.channels.includes(c)) {
+                errors[c] = known.std_error.filter(|e| e.is_finite());
+            }
+        }
+    }
+    let value = |point: &Point| match tied {
+        true => Value::Tied(point.params.scalar(param)),
+        false => Value::Rgb(point.params.rgb(param)),
+    };
+    let std_error = errors.iter().any(Option::is_some).then_some(match tied {
+        true => Value::Tied(errors[0]),
+        false => Value::Rgb(errors),
+    });
+    ParamSummary {
+        start: value(&outcome.start),
+        value: value(&outcome.end),
+        std_error,
+        identifiable,
+        at_bound,
+    }
+}

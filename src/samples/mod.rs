@@ -1,0 +1,227 @@
+//! The visible surface of each view, as a structure of arrays that the engine streams through.
+//!
+//! Pixels are taken [`LANES`] at a time: a *group*. A group has as many *records* as the most
+//! densely covered of its pixels has samples; record r of lane l is the r-th sample of that lane's
+//! pixel, or padding of weight 0. Every per-sample array is indexed `record * LANES + lane`, every
+//! per-pixel array `group * LANES + lane`. Groups with equally many records stand together, so that
+//! silhouettes (few samples) cost no padding inside.
+//!
+//! - `trace`: primary rays, and what they hit
+//! - `surface`: frames, silhouette and maps at a hit
+//! - `group`: samples packed into groups
+//! - [`targets`]: what each pixel of a target asks
+
+mod group;
+mod surface;
+pub mod targets;
+mod trace;
+
+use glam::Vec2;
+
+use crate::bake::VertexOcclusion;
+use crate::bake::rays::RayMesh;
+use crate::progress;
+use crate::scene::Scene;
+use crate::scene::mesh::{Morph, PosedMesh};
+use crate::scene::view::{Camera, View};
+pub use targets::TargetArrays;
+
+/// Pixels in a group: the widest vector of 32-bit floats on today's processors.
+pub const LANES: usize = 16;
+
+/// The visible surface of one view.
+#[derive(Clone, Debug, Default)]
+pub struct ViewSamples {
+    /// Where each group's records start, and the end of the last: `groups + 1` entries.
+    pub group_start: Vec<u32>,
+    /// For each pixel slot: the pixel's index in the image (row by row), or `u32::MAX` for padding.
+    pub pixel: Vec<u32>,
+    /// For each pixel slot: the covered share of the pixel's area.
+    pub coverage: Vec<f32>,
+    /// For each sample: its share of the pixel's covered area; the samples of a pixel sum to 1,
+    /// padding has 0.
+    pub weight: Vec<f32>,
+    /// What the model reads of each sample.
+    pub surface: SurfaceArrays,
+}
+
+/// What the model reads of each sample, a plane a component; planes that no enabled effect asks for
+/// are empty.
+///
+/// The shading normal is the direction of `base + normal_strength * bump`.
+#[derive(Clone, Debug, Default)]
+pub struct SurfaceArrays {
+    /// Decoded normal map's z times the smooth normal N (N itself without a normal map).
+    pub base: [Vec<f32>; 3],
+    /// Decoded normal map's x T + y B; empty without a normal map.
+    pub bump: [Vec<f32>; 3],
+    /// Unit vector from the eye to the surface.
+    pub view: [Vec<f32>; 3],
+    /// The unit smooth normal N; only for the key light.
+    pub normal: [Vec<f32>; 3],
+    /// Open share of the hemisphere, S.x.
+    pub occlusion: Vec<f32>,
+    /// S.z = 1 - |N.V|; empty when it follows the bumped normal.
+    pub silhouette: Vec<f32>,
+    /// S.w.
+    pub dapple: Vec<f32>,
+    /// Albedo, linear.
+    pub albedo: [Vec<f32>; 3],
+    /// Specular map s.
+    pub specular: Vec<f32>,
+    /// Attenuator map a.
+    pub attenuator: Vec<f32>,
+}
+
+impl ViewSamples {
+    /// How many groups of [`LANES`] pixels there are.
+    #[must_use]
+    pub fn groups(&self) -> usize {
+        self.group_start.len().saturating_sub(1)
+    }
+
+    /// How many records of [`LANES`] samples there are.
+    #[must_use]
+    pub fn records(&self) -> usize {
+        self.group_start.last().map_or(0, |&end| end as usize)
+    }
+}
+
+/// A view that cannot be sampled.
+#[derive(Debug, thiserror::Error)]
+pub enum SampleError {
+    /// The camera looks past the mesh.
+    #[error(
+        "{scene}: view \"{view}\": no pixel shows the mesh. The camera looks down its own -Z; check \
+         world_to_camera (row by row, translation last) and fov_y_degrees."
+    )]
+    NothingVisible {
+        /// The scene file.
+        scene: String,
+        /// The view.
+        view: String,
+    },
+    /// A map is asked for, but the mesh cannot be textured.
+    #[error(
+        "{scene}: the mesh has no texture coordinates, but the enabled effects sample a map. Give a \
+         mesh with TEXCOORD_0, or leave the effects out that read maps."
+    )]
+    NoUvs {
+        /// The scene file.
+        scene: String,
+    },
+    /// Occlusion of another mesh.
+    #[error(
+        "{scene}: occlusion was baked for {found} vertices, but the mesh has {vertices}. Bake the \
+         scene anew."
+    )]
+    OcclusionLength {
+        /// The scene file.
+        scene: String,
+        /// Vertices that were baked.
+        found: usize,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// A target of another size than its view.
+    #[error(
+        "view \"{view}\": the target has {found} pixels, but the view {pixels}. Give width and \
+         height as they are in the target's file."
+    )]
+    TargetSize {
+        /// The view.
+        view: String,
+        /// Pixels of the target.
+        found: usize,
+        /// Pixels of the view.
+        pixels: usize,
+    },
+    /// No pixel counts.
+    #[error(
+        "view \"{view}\": the mask is empty: no pixel that shows the mesh has both a mask and a \
+         target's alpha above 0. Check that target, mask and camera belong together."
+    )]
+    EmptyMask {
+        /// The view.
+        view: String,
+    },
+}
+
+/// The visible surface of each view of `scene`, with its mesh posed as `posed`.
+///
+/// `occlusion` is what was baked, if anything; morph targets add theirs by the scene's weights.
+///
+/// # Errors
+/// When a view sees nothing of the mesh, or the mesh lacks what the effects ask for.
+pub fn sample_views(
+    scene: &Scene,
+    posed: &PosedMesh,
+    occlusion: Option<&VertexOcclusion>,
+) -> Result<Vec<ViewSamples>, SampleError> {
+    check_uvs(scene, &posed.uvs)?;
+    let open = posed_occlusion(scene, &scene.mesh.morphs, posed.positions.len(), occlusion)?;
+    let rays = RayMesh::new(&posed.positions, &posed.triangles);
+    let bar = progress::bar("samples", scene.views.len() as u64);
+    let views = scene.views.iter().map(|view| {
+        let samples = sample_view(scene, posed, &rays, open.as_deref(), &view.camera);
+        bar.inc(1);
+        if samples.pixel.is_empty() { Err(nothing_visible(scene, view)) } else { Ok(samples) }
+    });
+    let views = views.collect();
+    bar.finish_and_clear();
+    views
+}
+
+/// That a view of `scene` shows nothing of the mesh.
+#[must_use]
+pub fn nothing_visible(scene: &Scene, view: &View) -> SampleError {
+    SampleError::NothingVisible { scene: scene.path.display().to_string(), view: view.name.clone() }
+}
+
+/// Refuse a mesh of those texture coordinates where the effects sample a map and it has none.
+///
+/// # Errors
+/// [`SampleError::NoUvs`]
+pub fn check_uvs(scene: &Scene, uvs: &[Vec2]) -> Result<(), SampleError> {
+    if scene.effects.needs(scene.silhouette).maps() && uvs.is_empty() {
+        return Err(SampleError::NoUvs { scene: scene.path.display().to_string() });
+    }
+    Ok(())
+}
+
+/// The occlusion of each of so many vertices of a scene's mesh, with `morphs` at their weights.
+///
+/// # Errors
+/// When it was baked for another mesh.
+pub fn posed_occlusion(
+    scene: &Scene,
+    morphs: &[Morph],
+    vertices: usize,
+    occlusion: Option<&VertexOcclusion>,
+) -> Result<Option<Vec<f32>>, SampleError> {
+    let weights: Vec<f32> = morphs.iter().map(|morph| morph.weight).collect();
+    let open = occlusion.map(|occlusion| occlusion.posed(&weights));
+    match &open {
+        Some(open) if open.len() != vertices => {
+            let found = open.len();
+            Err(SampleError::OcclusionLength { scene: scene.path.display().to_string(), found, vertices })
+        }
+        _ => Ok(open),
+    }
+}
+
+/// The visible surface from one camera; empty when it sees nothing. `rays` holds the triangles of
+/// `posed`, and `occlusion` one value a vertex. Deterministic for any number of threads.
+#[must_use]
+pub fn sample_view(
+    scene: &Scene,
+    posed: &PosedMesh,
+    rays: &RayMesh,
+    occlusion: Option<&[f32]>,
+    camera: &Camera,
+) -> ViewSamples {
+    let n = scene.quality.samples_per_axis.max(1);
+    let hits = trace::trace(rays, posed, camera, n);
+    let surface = surface::Surface::new(scene, posed, occlusion, camera.eye());
+    group::pack(&hits, &surface, camera.width, n * n)
+}

@@ -1,0 +1,174 @@
+//! What the model reads of a point of the surface: interpolated frames, silhouette, maps.
+
+use glam::{DVec3, Vec2, Vec3};
+use rayon::prelude::*;
+
+use super::SurfaceArrays;
+use super::trace::Hit;
+use crate::model::effects::{Form, Needs, Silhouette};
+use crate::model::vector::normalize_or;
+use crate::scene::Scene;
+use crate::scene::maps::Maps;
+use crate::scene::mesh::PosedMesh;
+
+/// A decoded z that is positive is at least this, so that the normal never vanishes.
+const LEAST_Z: f32 = 1e-6;
+
+/// The vertex stage of one view, ready to be read at any point.
+pub(super) struct Surface<'a> {
+    mesh: &'a PosedMesh,
+    maps: &'a Maps,
+    occlusion: Option<&'a [f32]>,
+    form: Form,
+    silhouette: Silhouette,
+    needs: Needs,
+    eye: DVec3,
+    /// w cross(N, T) of each vertex; empty without a normal map.
+    bitangents: Vec<Vec3>,
+    /// Unit vectors from the eye to each vertex; empty where no one asks.
+    views: Vec<Vec3>,
+}
+
+/// One sample; fields that no effect asks for are never read.
+struct Point {
+    base: Vec3,
+    bump: Vec3,
+    view: Vec3,
+    normal: Vec3,
+    occlusion: f32,
+    silhouette: f32,
+    dapple: f32,
+    albedo: [f32; 3],
+    specular: f32,
+    attenuator: f32,
+}
+
+impl<'a> Surface<'a> {
+    pub(super) fn new(
+        scene: &'a Scene,
+        mesh: &'a PosedMesh,
+        occlusion: Option<&'a [f32]>,
+        eye: DVec3,
+    ) -> Self {
+        let needs = scene.effects.needs(scene.silhouette);
+        // Of a missing map, the listing still reads its neutral value, which it does not decode.
+        let bumped = needs.normal_map
+            && !mesh.tangents.is_empty()
+            && (scene.maps.normal.is_some() || scene.form == Form::Listing);
+        let bitangent = |(n, t): (&Vec3, &glam::Vec4)| t.w * n.cross(t.truncate()).normalize_or_zero();
+        let bitangents = if bumped {
+            mesh.normals.par_iter().zip(&mesh.tangents).map(bitangent).collect()
+        } else {
+            Vec::new()
+        };
+        let per_vertex = scene.form == Form::Listing || scene.silhouette == Silhouette::Vertex;
+        let view = |p: &Vec3| (p.as_dvec3() - eye).normalize_or_zero().as_vec3();
+        let views = if per_vertex { mesh.positions.par_iter().map(view).collect() } else { Vec::new() };
+        let (form, silhouette, maps) = (scene.form, scene.silhouette, &scene.maps);
+        Self { mesh, maps, occlusion, form, silhouette, needs, eye, bitangents, views }
+    }
+
+    /// Append the surface at `hit` to each plane that is asked for.
+    pub(super) fn push(&self, hit: Hit, into: &mut SurfaceArrays) {
+        let point = self.at(hit);
+        let needs = &self.needs;
+        let vectors = [
+            (true, point.base.to_array(), &mut into.base),
+            (!self.bitangents.is_empty(), point.bump.to_array(), &mut into.bump),
+            (true, point.view.to_array(), &mut into.view),
+            (needs.key_light, point.normal.to_array(), &mut into.normal),
+            (needs.color_map, point.albedo, &mut into.albedo),
+        ];
+        for (wanted, value, planes) in vectors {
+            if wanted {
+                planes.iter_mut().zip(value).for_each(|(plane, x)| plane.push(x));
+            }
+        }
+        let scalars = [
+            (needs.occlusion, point.occlusion, &mut into.occlusion),
+            (needs.rim && self.silhouette != Silhouette::Bumped, point.silhouette, &mut into.silhouette),
+            (needs.dapple, point.dapple, &mut into.dapple),
+            (needs.specular_map, point.specular, &mut into.specular),
+            (needs.attenuator_map, point.attenuator, &mut into.attenuator),
+        ];
+        for (wanted, value, plane) in scalars {
+            if wanted {
+                plane.push(value);
+            }
+        }
+    }
+
+    fn at(&self, hit: Hit) -> Point {
+        let corners = self.mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let [u, v] = hit.barycentric;
+        let weights = [1.0 - u - v, u, v];
+        let vector = |of: &[Vec3]| -> Vec3 { (0..3).map(|i| weights[i] * of[corners[i]]).sum() };
+        let scalar = |of: &[f32]| -> f32 { (0..3).map(|i| weights[i] * of[corners[i]]).sum() };
+
+        let exact_view = self.exact_view(corners, hit.barycentric);
+        let view = match self.form {
+            Form::Corrected => exact_view,
+            Form::Listing => vector(&self.views),
+        };
+        let interpolated = vector(&self.mesh.normals);
+        let (normal, _) = normalize_or(interpolated.to_array(), (-exact_view).to_array());
+        let normal = Vec3::from(normal);
+        let uv = if self.mesh.uvs.is_empty() {
+            Vec2::ZERO
+        } else {
+            (0..3).map(|i| weights[i] * self.mesh.uvs[corners[i]]).sum()
+        };
+        let (base, bump) = if self.bitangents.is_empty() {
+            (if self.form == Form::Listing { interpolated } else { normal }, Vec3::ZERO)
+        } else {
+            let tangent = (0..3).map(|i| weights[i] * self.mesh.tangents[corners[i]].truncate()).sum();
+            self.bumped(uv, interpolated, tangent, vector(&self.bitangents))
+        };
+        let silhouette = match self.silhouette {
+            Silhouette::Vertex => {
+                let at = |i: usize| self.mesh.normals[corners[i]].dot(self.views[corners[i]]);
+                (0..3).map(|i| weights[i] * (1.0 - at(i).abs().min(1.0))).sum()
+            }
+            Silhouette::Fragment | Silhouette::Bumped => 1.0 - normal.dot(view).abs().min(1.0),
+        };
+        Point {
+            // Only a vanished N leaves no base: then the side that faces the eye counts.
+            base: if base == Vec3::ZERO || !base.is_finite() { -exact_view } else { base },
+            bump: if bump.is_finite() { bump } else { Vec3::ZERO },
+            view,
+            normal,
+            occlusion: self.occlusion.map_or(1.0, scalar),
+            silhouette,
+            dapple: match self.form {
+                Form::Corrected => interpolated.z.max(0.0),
+                Form::Listing => interpolated.z,
+            },
+            albedo: self.maps.color.as_ref().map_or([1.0; 3], |map| map.sample(uv.x, uv.y)),
+            specular: self.maps.specular.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]),
+            attenuator: self.maps.attenuator.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]),
+        }
+    }
+
+    /// The normal map's part along N, and its part along T and B.
+    fn bumped(&self, uv: Vec2, n: Vec3, t: Vec3, b: Vec3) -> (Vec3, Vec3) {
+        let texel = self.maps.normal.as_ref().map_or([0.5, 0.5, 1.0], |map| map.sample(uv.x, uv.y));
+        let texel = Vec3::from(texel);
+        if self.form == Form::Listing {
+            return (texel.z * n, texel.x * t + texel.y * b);
+        }
+        let d = 2.0 * texel - 1.0;
+        if d == Vec3::ZERO || !d.is_finite() {
+            return (n, Vec3::ZERO);
+        }
+        let z = if (0.0..LEAST_Z).contains(&d.z) { LEAST_Z } else { d.z };
+        (z * n, d.x * t + d.y * b)
+    }
+
+    /// The unit vector from the eye to the point.
+    fn exact_view(&self, corners: [usize; 3], [u, v]: [f32; 2]) -> Vec3 {
+        let [a, b, c] = corners.map(|i| self.mesh.positions[i].as_dvec3());
+        let point = a + f64::from(u) * (b - a) + f64::from(v) * (c - a);
+        // An eye on the surface itself has no direction; the one straight ahead stands in.
+        (point - self.eye).try_normalize().unwrap_or(DVec3::NEG_Z).as_vec3()
+    }
+}

@@ -1,0 +1,65 @@
+//! What each pixel of a target asks of the model: its colour, and how much it counts.
+
+use super::{SampleError, ViewSamples};
+use crate::scene::view::{Clip, View};
+
+/// A pixel of which less than this is covered, in the target or by the samples, is left out: what
+/// remains after division by its coverage is noise.
+const LEAST_COVERAGE: f32 = 0.05;
+
+/// A target in the order of a [`ViewSamples`]' pixel slots.
+#[derive(Clone, Debug, Default)]
+pub struct TargetArrays {
+    /// Linear radiance of the surface, no longer premultiplied; 0 where the weight is 0.
+    pub rgb: [Vec<f32>; 3],
+    /// What the pixel counts: mask times coverage; 0 for padding.
+    pub weight: Vec<f32>,
+    /// The values at and beyond which residuals are one-sided.
+    pub clip: Option<Clip>,
+}
+
+impl TargetArrays {
+    /// The target of `view` for `samples`; `None` when the view has no target.
+    ///
+    /// The colour is the target's over its alpha, so that a silhouette pixel is compared with the
+    /// samples that cover it; it counts by the smaller of the two coverages. A target without
+    /// alpha is compared where the samples cover the whole pixel.
+    ///
+    /// # Errors
+    /// When the target has not as many pixels as the view, or none of them counts.
+    pub fn new(view: &View, samples: &ViewSamples) -> Result<Option<Self>, SampleError> {
+        let Some(target) = &view.target else { return Ok(None) };
+        let pixels = view.camera.width as usize * view.camera.height as usize;
+        let lengths =
+            [Some(target.rgb.len()), target.alpha.as_ref().map(Vec::len), target.mask.as_ref().map(Vec::len)];
+        if let Some(found) = lengths.into_iter().flatten().find(|&length| length != pixels) {
+            return Err(SampleError::TargetSize { view: view.name.clone(), found, pixels });
+        }
+        let mut arrays = Self { clip: target.clipped_at, ..Self::default() };
+        for (&pixel, &coverage) in samples.pixel.iter().zip(&samples.coverage) {
+            let (rgb, weight) = if pixel == u32::MAX {
+                ([0.0; 3], 0.0)
+            } else {
+                let i = pixel as usize;
+                let mask = target.mask.as_ref().map_or(1.0, |mask| mask[i]);
+                let (alpha, shared) = match &target.alpha {
+                    Some(alpha) => (alpha[i], coverage.min(alpha[i])),
+                    None => (1.0, if coverage >= 1.0 { 1.0 } else { 0.0 }),
+                };
+                // The readers refuse what is not finite; should it get here, it does not count.
+                let sound = target.rgb[i].iter().all(|x| x.is_finite());
+                if alpha >= LEAST_COVERAGE && shared >= LEAST_COVERAGE && mask > 0.0 && sound {
+                    (target.rgb[i].map(|x| x / alpha), mask * shared.min(1.0))
+                } else {
+                    ([0.0; 3], 0.0)
+                }
+            };
+            arrays.rgb.iter_mut().zip(rgb).for_each(|(plane, x)| plane.push(x));
+            arrays.weight.push(weight);
+        }
+        if arrays.weight.iter().all(|&weight| weight == 0.0) {
+            return Err(SampleError::EmptyMask { view: view.name.clone() });
+        }
+        Ok(Some(arrays))
+    }
+}

@@ -1,0 +1,60 @@
+//! glTF 2.0 files (.glb and .gltf) as one mesh.
+//!
+//! - [`document`]: the JSON, its buffers, and checked lookups of everything by index
+//! - [`accessor`]: typed arrays out of the buffers
+//! - [`nodes`]: the node tree, posed by an [`animation`] at a time
+//! - [`primitive`]: one primitive's attributes and triangles
+//! - [`skins`]: bones and their influences
+//! - [`assemble`]: every primitive of the scene in one [`Mesh`](super::mesh::Mesh)
+//!
+//! Only the JSON types of the `gltf` crate are used: its wrappers trust indices that files of the
+//! wild get wrong.
+
+mod accessor;
+mod animation;
+mod assemble;
+mod document;
+mod nodes;
+mod primitive;
+mod skins;
+
+pub(super) use document::Document;
+
+/// What is to be read of a mesh file; the rest is left alone.
+#[derive(Clone, Debug)]
+pub(super) struct Ask {
+    /// Texture coordinates: a map will be looked up.
+    pub uvs: Uvs,
+    /// Tangents, and how good they must be.
+    pub tangents: Tangents,
+    /// Morph targets.
+    pub morphs: bool,
+    /// Their weights, in order; without: the file's own.
+    pub morph_weights: Option<Vec<f32>>,
+    /// Bones.
+    pub bones: bool,
+    /// Seconds into animation 0; without: the nodes as they stand.
+    pub time: Option<f64>,
+}
+
+/// How much texture coordinates matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Uvs {
+    /// Nothing looks at them.
+    None,
+    /// Every map has its neutral value: where they are missing, anything will do.
+    Optional,
+    /// A map is looked up: a mesh without them is refused.
+    Required,
+}
+
+/// How much tangents matter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Tangents {
+    /// Nothing looks at them.
+    None,
+    /// The normal map is flat: any unit frame will do.
+    AnyFrame,
+    /// From the file, or MikkTSpace.
+    Exact,
+}

@@ -1,0 +1,200 @@
+//! One primitive: its attributes, as long as each other, and its triangles.
+
+use std::path::Path;
+
+use glam::{Vec2, Vec3, Vec4};
+use gltf::json;
+use json::Index;
+use json::accessor::Accessor;
+use json::mesh::{Mode, Primitive, Semantic};
+use json::validation::Checked;
+
+use super::document::Document;
+use super::{Ask, Tangents, Uvs};
+use crate::scene::error::{SceneError, Warnings, warn};
+
+/// A primitive in its node's space.
+pub(super) struct Part {
+    pub positions: Vec<Vec3>,
+    pub normals: Option<Vec<Vec3>>,
+    pub tangents: Option<Vec<Vec4>>,
+    pub uvs: Option<Vec<Vec2>>,
+    /// Bone indices (into the skin) and weights.
+    pub influences: Option<Vec<Influence>>,
+    pub triangles: Vec<[u32; 3]>,
+    pub targets: Vec<Target>,
+}
+
+/// Up to 4 bones of a vertex (padded with weight 0), and their weights.
+pub(super) type Influence = ([u16; 4], [f32; 4]);
+
+/// A morph target's deltas.
+pub(super) struct Target {
+    pub positions: Option<Vec<Vec3>>,
+    pub normals: Option<Vec<Vec3>>,
+}
+
+/// How often something was mended over all primitives; each is said once, at the end.
+#[derive(Default)]
+pub(super) struct Mended {
+    pub not_triangles: usize,
+    pub renormalised: usize,
+    pub folded: usize,
+    pub unbound: usize,
+    pub degenerate: usize,
+    pub bad_normals: usize,
+    pub bad_tangents: usize,
+}
+
+impl Mended {
+    /// Say what was mended.
+    pub(super) fn report(&self, path: &Path, warnings: &mut Warnings) {
+        let mut say = |count: usize, message: &str| {
+            if count > 0 {
+                warn(warnings, path, format!("{count} {message}"));
+            }
+        };
+        say(self.not_triangles, "primitives are points or lines: left out");
+        say(self.renormalised, "vertices have bone weights that do not sum to 1: renormalised");
+        say(self.folded, "vertices have more than 4 bones: the 4 largest weights were kept");
+        say(self.unbound, "vertices of a skin have no bone weights: bound to their first bone");
+        say(self.degenerate, "degenerate triangles: left out");
+        say(self.bad_normals, "vertices have normals without a direction: computed from the triangles");
+        say(
+            self.bad_tangents,
+            "vertices have tangents without a direction: computed from the texture coordinates",
+        );
+    }
+}
+
+impl Document {
+    /// Read a primitive; none when it is of points or lines. `bones` is the number of bones of its
+    /// node's skin, where there is one and it is asked for.
+    pub(super) fn part(
+        &self,
+        primitive: &Primitive,
+        place: &str,
+        ask: &Ask,
+        bones: Option<usize>,
+        mended: &mut Mended,
+    ) -> Result<Option<Part>, SceneError> {
+        let mode = match primitive.mode {
+            Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) => mode,
+            _ => {
+                mended.not_triangles += 1;
+                return Ok(None);
+            }
+        };
+        let at = |error: SceneError| error.at(place);
+        let attribute = |semantic: Semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+        let Some(positions) = attribute(Semantic::Positions) else {
+            return Err(at(self.error("has no positions", "Export it anew (uncompressed)")));
+        };
+        let positions = self.vectors(positions)?;
+        let count = positions.len();
+        if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
+            let [x, y, z] = positions[i].to_array();
+            return Err(self
+                .error(format!("stands at ({x}, {y}, {z})"), "Repair the mesh: positions must be finite")
+                .at(format!("{place}, vertex {i}")));
+        }
+        let same = |length: usize, what: &str| {
+            if length == count {
+                return Ok(());
+            }
+            Err(at(self.error(format!("has {count} positions but {length} {what}"), "Export it anew")))
+        };
+        let normals = attribute(Semantic::Normals).map(|index| self.vectors(index)).transpose()?;
+        same(normals.as_ref().map_or(count, Vec::len), "normals")?;
+        let tangents = match attribute(Semantic::Tangents).filter(|_| ask.tangents == Tangents::Exact) {
+            Some(index) => Some(self.floats::<4>(index)?.into_iter().map(Vec4::from).collect::<Vec<_>>()),
+            None => None,
+        };
+        same(tangents.as_ref().map_or(count, Vec::len), "tangents")?;
+        let uvs = self.uvs(attribute(Semantic::TexCoords(0)), place, ask)?;
+        same(uvs.as_ref().map_or(count, Vec::len), "texture coordinates")?;
+        let influences = match bones {
+            Some(bones) => self.influences(primitive, bones, count, place, mended)?,
+            None => None,
+        };
+        let mut targets = Vec::new();
+        for target in primitive.targets.iter().flatten().filter(|_| ask.morphs) {
+            let read = |index: Option<Index<Accessor>>| index.map(|index| self.vectors(index)).transpose();
+            let target = Target { positions: read(target.positions)?, normals: read(target.normals)? };
+            for deltas in [&target.positions, &target.normals].into_iter().flatten() {
+                same(deltas.len(), "morph deltas")?;
+                if let Some(i) = deltas.iter().position(|d| !d.is_finite()) {
+                    let place = format!("{place}, morph target {}, vertex {i}", targets.len());
+                    return Err(self.error("has a delta that is not finite", "Repair the mesh").at(place));
+                }
+            }
+            targets.push(target);
+        }
+        let triangles = self.triangles(primitive, mode, count, place)?;
+        Ok(Some(Part { positions, normals, tangents, uvs, influences, triangles, targets }))
+    }
+
+    fn vectors(&self, index: Index<Accessor>) -> Result<Vec<Vec3>, SceneError> {
+        Ok(self.floats::<3>(index)?.into_iter().map(Vec3::from).collect())
+    }
+
+    fn uvs(
+        &self,
+        index: Option<Index<Accessor>>,
+        place: &str,
+        ask: &Ask,
+    ) -> Result<Option<Vec<Vec2>>, SceneError> {
+        let Some(index) = index.filter(|_| ask.uvs != Uvs::None) else {
+            if ask.uvs == Uvs::Required {
+                return Err(self
+                    .error(
+                        "has no texture coordinates, but a map is to be looked up",
+                        "Unwrap the mesh, or take the maps out of the scene (or their effects)",
+                    )
+                    .at(place));
+            }
+            return Ok(None);
+        };
+        let uvs: Vec<Vec2> = self.floats::<2>(index)?.into_iter().map(Vec2::from).collect();
+        match uvs.iter().position(|uv| !uv.is_finite()) {
+            None => Ok(Some(uvs)),
+            Some(i) => Err(self
+                .error("has a texture coordinate that is not finite", "Repair the mesh")
+                .at(format!("{place}, vertex {i}"))),
+        }
+    }
+
+    /// The triangles of a list, strip or fan, indexed or not.
+    fn triangles(
+        &self,
+        primitive: &Primitive,
+        mode: Mode,
+        count: usize,
+        place: &str,
+    ) -> Result<Vec<[u32; 3]>, SceneError> {
+        let indices: Vec<u32> = match primitive.indices {
+            Some(index) => self.integers::<1>(index)?.into_iter().flatten().collect(),
+            // Accessors are bounded far below the range of u32.
+            None => (0..count as u32).collect(),
+        };
+        if let Some(i) = indices.iter().position(|&index| index as usize >= count) {
+            return Err(self
+                .error(
+                    format!("names vertex {}, but there are {count}", indices[i]),
+                    "The file is damaged: export it anew",
+                )
+                .at(format!("{place}, index {i}")));
+        }
+        Ok(match mode {
+            Mode::TriangleStrip => indices
+                .windows(3)
+                .enumerate()
+                .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] })
+                .collect(),
+            Mode::TriangleFan => {
+                indices.get(1..).unwrap_or_default().windows(2).map(|w| [w[0], w[1], indices[0]]).collect()
+            }
+            _ => indices.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        })
+    }
+}

@@ -1,0 +1,204 @@
+//! Image files as linear numbers: OpenEXR, Radiance HDR, PNG and JPEG.
+//!
+//! - `open_exr`, `raster`: the decoders
+//! - `target`: images to be matched, and their masks
+//!
+//! Files are told apart by their content. Colour maps in 8 or 16 bits are sRGB; data maps are taken
+//! as they are; EXR and HDR are linear. Sizes are checked before anything is allocated.
+
+mod open_exr;
+mod raster;
+mod target;
+
+use std::path::Path;
+
+pub(super) use target::target;
+
+use super::error::{SceneError, Warnings, guarded, read_bytes, warn};
+use super::maps::Map;
+
+/// No image above this many texels is read.
+const MOST_TEXELS: u64 = 1 << 28;
+/// No image file above this many bytes is read.
+const MOST_BYTES: u64 = 1 << 32;
+
+/// An image as decoded.
+struct Image {
+    width: usize,
+    height: usize,
+    /// Linear, or codes in [0, 1] when `code` says so.
+    rgb: Vec<[f32; 3]>,
+    alpha: Option<Vec<f32>>,
+    /// The greatest code of an 8- or 16-bit file; `None` for floating point.
+    code: Option<u16>,
+}
+
+/// What a reader needs to know of the file that it decodes.
+#[derive(Clone, Copy)]
+struct Opened<'a> {
+    path: &'a Path,
+    bytes: &'a [u8],
+    /// The only size that will do.
+    size: Option<(u32, u32)>,
+}
+
+impl Opened<'_> {
+    fn error(&self, what: impl Into<String>, remedy: &str) -> SceneError {
+        SceneError::new(self.path, what, remedy)
+    }
+
+    /// A decoder's own complaint.
+    fn damaged(&self, kind: &str, reason: impl std::fmt::Display) -> SceneError {
+        let reason = reason.to_string().replace('\n', " ");
+        let reason = reason.trim_end_matches('.');
+        self.error(
+            format!("cannot be read as {kind}: {reason}"),
+            "The file is cut short, damaged or of a rare kind: write it anew from its source",
+        )
+    }
+
+    /// Refuse a size before anything is allocated: not the expected one, empty, beyond
+    /// [`MOST_TEXELS`], or more texels than `per_byte` times the file's bytes could ever hold.
+    fn check_size(&self, width: u64, height: u64, per_byte: u64) -> Result<(), SceneError> {
+        let texels = width.saturating_mul(height);
+        if texels == 0 {
+            return Err(self.error("has no pixels", "Name another image"));
+        }
+        if let Some((w, h)) = self.size.filter(|&(w, h)| (u64::from(w), u64::from(h)) != (width, height)) {
+            return Err(self.error(
+                format!("is {width} x {height} pixels, but its view is {w} x {h}"),
+                "Give the view the image's size, or the image the view's",
+            ));
+        }
+        if texels > MOST_TEXELS {
+            return Err(self.error(
+                format!("is {width} x {height} pixels, more than the {MOST_TEXELS} that are read"),
+                "Scale it down",
+            ));
+        }
+        if texels > (self.bytes.len() as u64).saturating_mul(per_byte) {
+            return Err(
+                self.damaged("an image", format!("{width} x {height} pixels cannot be in so short a file"))
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Decode any image; of size `size` when that is given. No pixel is NaN or infinite.
+fn read(path: &Path, size: Option<(u32, u32)>) -> Result<Image, SceneError> {
+    let bytes = read_bytes(path, MOST_BYTES)?;
+    let opened = Opened { path, bytes: &bytes, size };
+    let image = guarded(path, || match bytes.as_slice() {
+        [0x76, 0x2f, 0x31, 0x01, ..] => open_exr::decode(opened),
+        [b'#', b'?', ..] => raster::decode_hdr(opened),
+        [0x89, b'P', b'N', b'G', ..] => raster::decode(opened, image::ImageFormat::Png),
+        [0xff, 0xd8, 0xff, ..] => raster::decode(opened, image::ImageFormat::Jpeg),
+        _ => {
+            let claims = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+            let what = match claims.as_str() {
+                "exr" => "is not an EXR file, whatever its name says",
+                "hdr" => "is not a Radiance HDR file, whatever its name says",
+                "png" => "is not a PNG file, whatever its name says",
+                "jpg" | "jpeg" => "is not a JPEG file, whatever its name says",
+                _ => "is not an image that can be read",
+            };
+            Err(opened.error(what, "Use OpenEXR, Radiance HDR, PNG or JPEG"))
+        }
+    })?;
+    image.check_finite(path)?;
+    Ok(image)
+}
+
+impl Image {
+    fn check_finite(&self, path: &Path) -> Result<(), SceneError> {
+        let refuse = |i: usize, channel: &str, value: f32| {
+            let (x, y) = (i % self.width, i / self.width);
+            SceneError::new(path, format!("holds {value}"), "Repair the pixel, or render the image anew")
+                .at(format!("pixel x = {x}, y = {y}, channel {channel}"))
+        };
+        for (i, rgb) in self.rgb.iter().enumerate() {
+            if let Some(c) = rgb.iter().position(|value| !value.is_finite()) {
+                return Err(refuse(i, ["R", "G", "B"][c], rgb[c]));
+            }
+        }
+        match self.alpha.iter().flatten().enumerate().find(|(_, a)| !a.is_finite()) {
+            Some((i, &a)) => Err(refuse(i, "A", a)),
+            None => Ok(()),
+        }
+    }
+
+    /// Codes to linear radiance; linear images stay.
+    fn decode_srgb(&mut self) {
+        let Some(code) = self.code else { return };
+        let most = f64::from(code);
+        let table: Vec<f32> =
+            (0..=u32::from(code)).map(|i| srgb_decode(f64::from(i) / most) as f32).collect();
+        let index = |value: f32| (f64::from(value) * most).round() as usize;
+        for rgb in &mut self.rgb {
+            *rgb = rgb.map(|value| table[index(value)]);
+        }
+    }
+
+    fn into_map(self) -> Map<3> {
+        Map { width: self.width, height: self.height, texels: self.rgb }
+    }
+}
+
+/// The sRGB transfer function, code in [0, 1] to linear (IEC 61966-2-1).
+#[must_use]
+pub fn srgb_decode(code: f64) -> f64 {
+    if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
+}
+
+/// A colour map: linear Rec.709.
+pub(super) fn color_map(path: &Path) -> Result<Map<3>, SceneError> {
+    let mut image = read(path, None)?;
+    image.decode_srgb();
+    Ok(image.into_map())
+}
+
+/// A tangent-space normal map as stored, turned to +Y up when `flip` says that it is +Y down.
+pub(super) fn normal_map(path: &Path, flip: bool) -> Result<Map<3>, SceneError> {
+    let mut map = read(path, None)?.into_map();
+    if flip {
+        map.texels.iter_mut().for_each(|t| t[1] = 1.0 - t[1]);
+    }
+    Ok(map)
+}
+
+/// The first channel of a data map.
+pub(super) fn scalar_map(path: &Path) -> Result<Map<1>, SceneError> {
+    let image = read(path, None)?;
+    let texels = image.rgb.iter().map(|rgb| [rgb[0]]).collect();
+    Ok(Map { width: image.width, height: image.height, texels })
+}
+
+/// A lat-long panorama: linear radiance, never negative.
+pub(super) fn panorama(path: &Path, warnings: &mut Warnings) -> Result<Map<3>, SceneError> {
+    let mut image = read(path, None)?;
+    if let Some(code) = image.code {
+        let bits = if code == 255 { 8 } else { 16 };
+        let message = format!("holds {bits}-bit colours, read as sRGB: lights brighter than white are lost");
+        warn(warnings, path, message);
+        image.decode_srgb();
+    }
+    if image.width != 2 * image.height {
+        let message = format!(
+            "is {} x {} texels; a lat-long panorama is twice as wide as high: stretched over the sphere as it is",
+            image.width, image.height
+        );
+        warn(warnings, path, message);
+    }
+    let mut negative = 0_usize;
+    for rgb in &mut image.rgb {
+        if rgb.iter().any(|&value| value < 0.0) {
+            negative += 1;
+            *rgb = rgb.map(|value| value.max(0.0));
+        }
+    }
+    if negative > 0 {
+        warn(warnings, path, format!("{negative} texels have negative radiance: set to 0"));
+    }
+    Ok(image.into_map())
+}

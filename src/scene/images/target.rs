@@ -1,0 +1,59 @@
+//! Images to be matched, and their masks.
+
+use std::path::Path;
+
+use super::{Image, read, srgb_decode};
+use crate::scene::error::{SceneError, Warnings, warn};
+use crate::scene::view::{Clip, Target};
+
+/// A target of `size`: linear radiance, premultiplied by coverage.
+///
+/// EXR and HDR are taken as they are (EXR is premultiplied by convention). Codes of 8 or 16 bits are
+/// decoded from sRGB, multiplied by their straight alpha, and may be clipped at both ends.
+pub(in crate::scene) fn target(
+    path: &Path,
+    mask: Option<&Path>,
+    size: (u32, u32),
+    warnings: &mut Warnings,
+) -> Result<Target, SceneError> {
+    let mut image = read(path, Some(size))?;
+    let clipped_at = image.code.map(|code| {
+        // Half a code from either end: what rounds to the end may lie beyond it.
+        let at = |half: f64| srgb_decode(half / f64::from(code)) as f32;
+        Clip { low: at(0.5), high: at(f64::from(code) - 0.5) }
+    });
+    image.decode_srgb();
+    let alpha = image.alpha.take().map(|alpha| clamp(alpha, "coverage", path, warnings));
+    if let (Some(_), Some(alpha)) = (image.code, &alpha) {
+        for (rgb, a) in image.rgb.iter_mut().zip(alpha) {
+            *rgb = rgb.map(|value| value * a);
+        }
+    }
+    let mask = mask.map(|mask| read_mask(mask, size, warnings)).transpose()?;
+    Ok(Target { rgb: image.rgb, alpha, mask, clipped_at })
+}
+
+/// The first channel of a mask: what each pixel counts. A mask that counts nothing is refused.
+fn read_mask(path: &Path, size: (u32, u32), warnings: &mut Warnings) -> Result<Vec<f32>, SceneError> {
+    let Image { rgb, .. } = read(path, Some(size))?;
+    let mask = clamp(rgb.iter().map(|rgb| rgb[0]).collect(), "weight", path, warnings);
+    if mask.iter().all(|&weight| weight == 0.0) {
+        return Err(SceneError::new(
+            path,
+            "is an empty mask: every pixel is 0, so nothing would be compared",
+            "Paint white what counts, or leave the mask out",
+        ));
+    }
+    Ok(mask)
+}
+
+/// Values in [0, 1]; others are clamped, and counted where they are off by more than rounding.
+fn clamp(mut values: Vec<f32>, what: &str, path: &Path, warnings: &mut Warnings) -> Vec<f32> {
+    // Filters and half floats leave coverages a little above 1.
+    let off = values.iter().filter(|value| !(-1e-3..=1.001).contains(*value)).count();
+    if off > 0 {
+        warn(warnings, path, format!("{off} pixels have a {what} outside [0, 1]: clamped"));
+    }
+    values.iter_mut().for_each(|value| *value = value.clamp(0.0, 1.0));
+    values
+}

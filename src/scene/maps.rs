@@ -1,0 +1,59 @@
+//! Texture maps and the panorama, as linear numbers.
+
+/// An image of `C` linear channels, row by row from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map<const C: usize> {
+    /// Width in texels.
+    pub width: usize,
+    /// Height in texels.
+    pub height: usize,
+    /// `height x width` texels.
+    pub texels: Vec<[f32; C]>,
+}
+
+impl<const C: usize> Map<C> {
+    /// The bilinear value at texture coordinates (u, v); the image repeats in both directions.
+    #[must_use]
+    pub fn sample(&self, u: f32, v: f32) -> [f32; C] {
+        // In f64, as 24 bits leave too few for the fraction in a map of thousands of texels.
+        let at = |u: f32, size: usize| {
+            let x = f64::from(u - u.floor()) * size as f64 - 0.5;
+            let low = x.floor();
+            let wrap = |i: f64| (i as i64).rem_euclid(size as i64) as usize;
+            (wrap(low), wrap(low + 1.0), (x - low) as f32)
+        };
+        let (x0, x1, fx) = at(u, self.width);
+        let (y0, y1, fy) = at(v, self.height);
+        let texel = |x: usize, y: usize| self.texels[y * self.width + x];
+        let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+        std::array::from_fn(|i| {
+            let top = a[i] * (1.0 - fx) + b[i] * fx;
+            let bottom = c[i] * (1.0 - fx) + d[i] * fx;
+            top * (1.0 - fy) + bottom * fy
+        })
+    }
+}
+
+/// The maps that the enabled effects ask for; a map that the scene leaves out has its neutral value.
+#[derive(Clone, Debug, Default)]
+pub struct Maps {
+    /// Albedo, linear Rec.709 (neutral: 1).
+    pub color: Option<Map<3>>,
+    /// Tangent-space normals as stored, in [0, 1], +Y up (neutral: (1/2, 1/2, 1)).
+    pub normal: Option<Map<3>>,
+    /// Side-specular intensity s (neutral: 1).
+    pub specular: Option<Map<1>>,
+    /// Hilite attenuator a (neutral: 1).
+    pub attenuator: Option<Map<1>>,
+}
+
+/// The environment of a scene.
+#[derive(Clone, Debug)]
+pub struct Environment {
+    /// Lat-long radiance: the centre is -Z, the right quarter +X, the top row +Y.
+    pub panorama: Map<3>,
+    /// Turn about +Y by the right-hand rule, degrees.
+    pub rotation_degrees: f64,
+    /// Factor on the radiance.
+    pub intensity: f64,
+}

@@ -1,0 +1,56 @@
+//! The mesh as loaded, and posed: the structures between reader, vertex stage and samples.
+
+use glam::{Mat4, Vec2, Vec3, Vec4};
+
+/// A mesh in world units, node transforms applied; not yet morphed or skinned.
+///
+/// All vertex arrays are as long as `positions`, or empty when no enabled effect asks for them.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Mesh {
+    /// Positions. Of skinned parts: in bind space, which the bones take to the world.
+    pub positions: Vec<Vec3>,
+    /// Unit normals.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents; w is the handedness: bitangent = w cross(N, T).
+    pub tangents: Vec<Vec4>,
+    /// glTF texture coordinates: origin at the image's top left.
+    pub uvs: Vec<Vec2>,
+    /// Vertex indices, counter-clockwise from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Morph targets.
+    pub morphs: Vec<Morph>,
+    /// Bone indices of each vertex, into `bones`.
+    pub joints: Vec<[u16; 4]>,
+    /// Bone weights of each vertex, summing to 1.
+    pub weights: Vec<[f32; 4]>,
+    /// Bone matrices (joint to world times inverse bind) at the scene's time.
+    pub bones: Vec<Mat4>,
+}
+
+/// One morph target: what is added at weight 1.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Morph {
+    /// The target's name in the file, or its number.
+    pub name: String,
+    /// Its weight in this scene.
+    pub weight: f32,
+    /// Position deltas, one a vertex.
+    pub positions: Vec<Vec3>,
+    /// Normal deltas, one a vertex; empty when the file has none.
+    pub normals: Vec<Vec3>,
+}
+
+/// A mesh after the vertex stage's geometry: morphed, skinned, in the world.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PosedMesh {
+    /// World positions.
+    pub positions: Vec<Vec3>,
+    /// Unit world normals.
+    pub normals: Vec<Vec3>,
+    /// Unit world tangents, handedness in w; empty when not asked for.
+    pub tangents: Vec<Vec4>,
+    /// Texture coordinates; empty when not asked for.
+    pub uvs: Vec<Vec2>,
+    /// Vertex indices.
+    pub triangles: Vec<[u32; 3]>,
+}

@@ -1,0 +1,83 @@
+//! Cameras and targets.
+
+use glam::{DMat4, DVec3, DVec4};
+
+/// One view of the scene.
+#[derive(Clone, Debug)]
+pub struct View {
+    /// Its name, unique in the scene; names files and report rows.
+    pub name: String,
+    /// Its camera.
+    pub camera: Camera,
+    /// The image to be matched.
+    pub target: Option<Target>,
+}
+
+/// A perspective camera that looks down its own -Z.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// World to camera, acting on column vectors; a rigid motion.
+    pub world_to_camera: DMat4,
+    /// Vertical field of view, radians.
+    pub fov_y: f64,
+    /// Image width in pixels.
+    pub width: u32,
+    /// Image height in pixels.
+    pub height: u32,
+}
+
+impl Camera {
+    /// The eye in the world.
+    #[must_use]
+    pub fn eye(&self) -> DVec3 {
+        self.world_to_camera.inverse().w_axis.truncate()
+    }
+
+    /// The unit direction in the world through the image point (x, y), in pixels from the top left
+    /// corner; a pixel's centre is at half numbers.
+    #[must_use]
+    pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+        let tangent = (0.5 * self.fov_y).tan();
+        let aspect = f64::from(self.width) / f64::from(self.height);
+        let ndc_x = 2.0 * x / f64::from(self.width) - 1.0;
+        let ndc_y = 1.0 - 2.0 * y / f64::from(self.height);
+        let local = DVec4::new(ndc_x * tangent * aspect, ndc_y * tangent, -1.0, 0.0);
+        (self.world_to_camera.inverse() * local).truncate().normalize()
+    }
+
+    /// The image point, in pixels, and the distance along the camera's axis of a world point.
+    #[must_use]
+    pub fn project(&self, point: DVec3) -> (f64, f64, f64) {
+        let p = self.world_to_camera.transform_point3(point);
+        let depth = -p.z;
+        let tangent = (0.5 * self.fov_y).tan();
+        let aspect = f64::from(self.width) / f64::from(self.height);
+        let ndc_x = p.x / (depth * tangent * aspect);
+        let ndc_y = p.y / (depth * tangent);
+        (0.5 * (ndc_x + 1.0) * f64::from(self.width), 0.5 * (1.0 - ndc_y) * f64::from(self.height), depth)
+    }
+}
+
+/// An image to be matched, at the camera's size.
+#[derive(Clone, Debug)]
+pub struct Target {
+    /// Linear radiance, premultiplied by coverage, row by row from the top.
+    pub rgb: Vec<[f32; 3]>,
+    /// Coverage in [0, 1]; `None` when the file has no alpha: then only pixels that the mesh covers
+    /// fully are compared.
+    pub alpha: Option<Vec<f32>>,
+    /// What each pixel counts, in [0, 1]; `None`: 1 everywhere.
+    pub mask: Option<Vec<f32>>,
+    /// Whether the file holds 8-bit values, of which 0 and 255 may be clipped: there the residual
+    /// is one-sided.
+    pub clipped_at: Option<Clip>,
+}
+
+/// The linear values at and beyond which a target is clipped.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Clip {
+    /// At or below this, only too bright a model counts.
+    pub low: f32,
+    /// At or above this, only too dark a model counts.
+    pub high: f32,
+}

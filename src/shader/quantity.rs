@@ -1,0 +1,276 @@
+//! What shaders read: vertex attributes, bound resources and uniform constants. Everything else is a
+//! quantity that rules give.
+
+use crate::model::params::Param;
+
+/// A vertex attribute; in WGSL `rest_position` and so on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Attribute {
+    /// Position at rest: `vec3f`.
+    Position,
+    /// Normal at rest: `vec3f`.
+    Normal,
+    /// Tangent at rest, handedness in w: `vec4f`.
+    Tangent,
+    /// Texture coordinates: `vec2f`.
+    Uv,
+    /// Open share of the hemisphere at rest: `f32`.
+    Occlusion,
+    /// Indices of four bones: `vec4u`.
+    Joints,
+    /// Weights of four bones: `vec4f`.
+    Weights,
+}
+
+impl Attribute {
+    /// Every attribute.
+    pub const ALL: [Self; 7] =
+        [Self::Position, Self::Normal, Self::Tangent, Self::Uv, Self::Occlusion, Self::Joints, Self::Weights];
+
+    /// The quantity's name in rules.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Position => "rest_position",
+            Self::Normal => "rest_normal",
+            Self::Tangent => "rest_tangent",
+            Self::Uv => "rest_uv",
+            Self::Occlusion => "rest_occlusion",
+            Self::Joints => "joints",
+            Self::Weights => "joint_weights",
+        }
+    }
+
+    /// Its WGSL type.
+    #[must_use]
+    pub const fn wgsl(self) -> &'static str {
+        match self {
+            Self::Position | Self::Normal => "vec3f",
+            Self::Tangent | Self::Weights => "vec4f",
+            Self::Uv => "vec2f",
+            Self::Occlusion => "f32",
+            Self::Joints => "vec4u",
+        }
+    }
+
+    /// Bytes a vertex, as they are uploaded (32-bit components).
+    #[must_use]
+    pub const fn bytes(self) -> u64 {
+        match self {
+            Self::Position | Self::Normal => 12,
+            Self::Tangent | Self::Weights | Self::Joints => 16,
+            Self::Uv => 8,
+            Self::Occlusion => 4,
+        }
+    }
+}
+
+/// Something that is bound in group 0; the constants are binding 0, then each resource of the plan in
+/// its order.
+///
+/// *Texels* are read one by one and filtered in the shader, in f32, as the CPU does; *maps* and *cubes*
+/// are filtered by the hardware's samplers (8 bits of fraction).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Resource {
+    /// E_d: six padded faces, `texture_2d_array<f32>`, 32-bit float RGBA.
+    IrradianceFaces,
+    /// E_s at the current `specular_lobe`, likewise.
+    SpecularFaces,
+    /// E_h, likewise.
+    HiliteFaces,
+    /// E_d as `texture_cube<f32>`, 16-bit float RGBA.
+    IrradianceCube,
+    /// E_s at the current `specular_lobe`, likewise.
+    SpecularCube,
+    /// E_h, likewise.
+    HiliteCube,
+    /// Colour map, linear, 32-bit float RGBA; `texture_2d<f32>`.
+    ColorTexels,
+    /// Normal map as stored in [0, 1], 32-bit float RGBA.
+    NormalTexels,
+    /// Specular map s, 32-bit float R.
+    SpecularTexels,
+    /// Attenuator map a, 32-bit float R.
+    AttenuatorTexels,
+    /// Colour map with the specular map in alpha, 32-bit float RGBA; maps of one size only.
+    ColorSpecularTexels,
+    /// Normal map with the attenuator map in alpha, likewise.
+    NormalAttenuatorTexels,
+    /// Colour map, 8-bit sRGB RGBA, filterable.
+    ColorMap,
+    /// Normal map, 8-bit RGBA.
+    NormalMap,
+    /// Specular map s, 8-bit R.
+    SpecularMap,
+    /// Attenuator map a, 8-bit R.
+    AttenuatorMap,
+    /// Colour map (8-bit sRGB) with the specular map in alpha; maps of one size only.
+    ColorSpecularMap,
+    /// Normal map with the attenuator map in alpha (8-bit RGBA).
+    NormalAttenuatorMap,
+    /// Bilinear and repeating, for maps.
+    MapSampler,
+    /// Bilinear, for cubes.
+    CubeSampler,
+    /// `array<vec4f>`: for each active target and vertex (target-major), position delta and, in w,
+    /// occlusion delta; then normal delta.
+    MorphDeltas,
+    /// `array<vec4f>`: for each bone three rows of its affine map, then three of what it does to normals.
+    Bones,
+}
+
+/// How a resource is declared in WGSL.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// `texture_2d_array<f32>` of six padded faces; not filterable.
+    Faces,
+    /// `texture_cube<f32>`, filterable.
+    Cube,
+    /// `texture_2d<f32>`; not filterable.
+    Texels,
+    /// `texture_2d<f32>`, filterable.
+    Map,
+    /// `sampler`, filtering.
+    Sampler,
+    /// Read-only storage, `array<vec4f>`.
+    Storage,
+}
+
+impl Kind {
+    /// The WGSL address space and type.
+    #[must_use]
+    pub const fn wgsl(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Faces => ("var", "texture_2d_array<f32>"),
+            Self::Cube => ("var", "texture_cube<f32>"),
+            Self::Texels | Self::Map => ("var", "texture_2d<f32>"),
+            Self::Sampler => ("var", "sampler"),
+            Self::Storage => ("var<storage, read>", "array<vec4f>"),
+        }
+    }
+}
+
+impl Resource {
+    /// Every resource.
+    pub const ALL: [Self; 22] = [
+        Self::IrradianceFaces,
+        Self::SpecularFaces,
+        Self::HiliteFaces,
+        Self::IrradianceCube,
+        Self::SpecularCube,
+        Self::HiliteCube,
+        Self::ColorTexels,
+        Self::NormalTexels,
+        Self::SpecularTexels,
+        Self::AttenuatorTexels,
+        Self::ColorSpecularTexels,
+        Self::NormalAttenuatorTexels,
+        Self::ColorMap,
+        Self::NormalMap,
+        Self::SpecularMap,
+        Self::AttenuatorMap,
+        Self::ColorSpecularMap,
+        Self::NormalAttenuatorMap,
+        Self::MapSampler,
+        Self::CubeSampler,
+        Self::MorphDeltas,
+        Self::Bones,
+    ];
+
+    /// Its name in WGSL.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::IrradianceFaces => "irradiance_faces",
+            Self::SpecularFaces => "specular_faces",
+            Self::HiliteFaces => "hilite_faces",
+            Self::IrradianceCube => "irradiance_cube",
+            Self::SpecularCube => "specular_cube",
+            Self::HiliteCube => "hilite_cube",
+            Self::ColorTexels => "color_texels",
+            Self::NormalTexels => "normal_texels",
+            Self::SpecularTexels => "specular_texels",
+            Self::AttenuatorTexels => "attenuator_texels",
+            Self::ColorSpecularTexels => "color_specular_texels",
+            Self::NormalAttenuatorTexels => "normal_attenuator_texels",
+            Self::ColorMap => "color_map",
+            Self::NormalMap => "normal_map",
+            Self::SpecularMap => "specular_map",
+            Self::AttenuatorMap => "attenuator_map",
+            Self::ColorSpecularMap => "color_specular_map",
+            Self::NormalAttenuatorMap => "normal_attenuator_map",
+            Self::MapSampler => "map_sampler",
+            Self::CubeSampler => "cube_sampler",
+            Self::MorphDeltas => "morph_deltas",
+            Self::Bones => "bones",
+        }
+    }
+
+    /// How it is declared.
+    #[must_use]
+    pub const fn kind(self) -> Kind {
+        match self {
+            Self::IrradianceFaces | Self::SpecularFaces | Self::HiliteFaces => Kind::Faces,
+            Self::IrradianceCube | Self::SpecularCube | Self::HiliteCube => Kind::Cube,
+            Self::ColorTexels
+            | Self::NormalTexels
+            | Self::SpecularTexels
+            | Self::AttenuatorTexels
+            | Self::ColorSpecularTexels
+            | Self::NormalAttenuatorTexels => Kind::Texels,
+            Self::ColorMap
+            | Self::NormalMap
+            | Self::SpecularMap
+            | Self::AttenuatorMap
+            | Self::ColorSpecularMap
+            | Self::NormalAttenuatorMap => Kind::Map,
+            Self::MapSampler | Self::CubeSampler => Kind::Sampler,
+            Self::MorphDeltas | Self::Bones => Kind::Storage,
+        }
+    }
+}
+
+/// A member of the uniform block, binding 0 of group 0; in WGSL `constants.NAME`.
+///
+/// Every constant but a matrix or an array takes one `vec4f` (16 bytes), so that the block's layout is a
+/// plain sum of sizes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Constant {
+    /// A parameter of the model: rgb in xyz, or the scalar in x.
+    Param(Param),
+    /// World position of the eye, in xyz.
+    Eye,
+    /// World to clip space: `mat4x4f`, column by column.
+    ViewProjection,
+    /// Cosine and sine of `environment_rotation`, in xy.
+    Turn,
+    /// Unit vector towards the key light, in xyz.
+    KeyDirection,
+    /// A weight for each active morph target, in x of `array<vec4f, N>`.
+    MorphWeights,
+}
+
+impl Constant {
+    /// Those that are not parameters of the model.
+    pub const OWN: [Self; 5] =
+        [Self::Eye, Self::ViewProjection, Self::Turn, Self::KeyDirection, Self::MorphWeights];
+
+    /// The constant of that name in rules.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::OWN.into_iter().find(|c| c.name() == name).or_else(|| Param::from_name(name).map(Self::Param))
+    }
+
+    /// Its name in rules and in WGSL.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Param(param) => param.name(),
+            Self::Eye => "eye",
+            Self::ViewProjection => "view_projection",
+            Self::Turn => "turn",
+            Self::KeyDirection => "key_direction",
+            Self::MorphWeights => "morph_weights",
+        }
+    }
+}

@@ -1,0 +1,10 @@
+// Albedo, linear Rec.709, filtered in the shader.
+//
+// gives: albedo
+// when: has_color_map
+// cost: 34
+// uses: texels
+// reads: color_texels
+fn albedo_from_texels(vertex_uv: vec2f) -> vec3f {
+    return sample_texels(color_texels, vertex_uv).rgb;
+}

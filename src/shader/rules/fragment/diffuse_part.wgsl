@@ -1,0 +1,15 @@
+// diffuse (base_weight + rim_weight rim) (MODEL 3).
+//
+// gives: diffuse_part
+// when: rim
+// cost: 12
+fn diffuse_light(
+    albedo: vec3f,
+    irradiance: vec3f,
+    occ: f32,
+    rim: f32,
+    base_weight: vec3f,
+    rim_weight: vec3f,
+) -> vec3f {
+    return albedo * irradiance * (occ * (base_weight + rim * rim_weight));
+}

@@ -1,0 +1,8 @@
+// Without a normal map n is the smooth normal.
+//
+// gives: n
+// when: !bumped, corrected, raster
+// cost: 0
+fn n_smooth(normal: vec3f) -> vec3f {
+    return normal;
+}

@@ -1,0 +1,11 @@
+// Normal map and attenuator from one 8-bit map, packed when it is loaded; filtered by the hardware.
+//
+// gives: normal_texel.xyz, attenuator.w
+// when: normal_attenuator_one_size
+// cost: 9
+// error: 0.004
+// paper: yes
+// reads: normal_attenuator_map, map_sampler
+fn normal_and_attenuator_from_map(vertex_uv: vec2f) -> vec4f {
+    return textureSampleLevel(normal_attenuator_map, map_sampler, vertex_uv, 0.0);
+}

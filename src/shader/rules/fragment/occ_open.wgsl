@@ -1,0 +1,8 @@
+// Without ambient occlusion everything is open.
+//
+// gives: occ
+// when: !occlusion
+// cost: 0
+fn unoccluded() -> f32 {
+    return 1.0;
+}

@@ -1,0 +1,8 @@
+// rim = S.z^2, where the exponent is the listing's.
+//
+// gives: rim
+// when: square_rim
+// cost: 1
+fn rim_squared(silhouette: f32) -> f32 {
+    return silhouette * silhouette;
+}

@@ -1,0 +1,9 @@
+// E_s(n), what shines from the side; filtered in the shader.
+//
+// gives: side_light
+// cost: 22
+// uses: cube, vector
+// reads: specular_faces
+fn side_light_from_faces(n_place: vec3f) -> vec3f {
+    return sample_faces(specular_faces, n_place).rgb;
+}

@@ -1,0 +1,118 @@
+//! The scene that the program makes by itself.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use serde_json::Value;
+use skinfit::builtin;
+use skinfit::demo;
+use skinfit::render::files::{Image, ImageOptions, write_exr};
+
+use super::desk::{Ran, program};
+use crate::fixtures::read_exr;
+
+/// A folder with the built-in scene and its bakes, made once for all tests of this run.
+pub(crate) fn kept() -> &'static Path {
+    static KEPT: OnceLock<PathBuf> = OnceLock::new();
+    KEPT.get_or_init(|| {
+        let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("built-in");
+        // An earlier run may have left another version's.
+        let _ = std::fs::remove_dir_all(&folder);
+        demo::kept_scene(&folder, Some(&folder)).unwrap();
+        folder
+    })
+}
+
+/// Each free parameter's fitted values and standard errors, beside its true values.
+fn against_truth(report: &Value) -> Vec<(String, [f64; 3])> {
+    let mut rows = Vec::new();
+    for (param, truth) in builtin::truth() {
+        let found = &report["params"][param.name()];
+        let channel = |value: &Value, c: usize| {
+            value.get(c).unwrap_or(value).as_f64().unwrap_or_else(|| panic!("{}: {found}", param.name()))
+        };
+        for (c, &truth) in truth.iter().enumerate() {
+            let row = [channel(&found["value"], c), channel(&found["std_error"], c), truth];
+            rows.push((format!("{}, channel {c}", param.name()), row));
+        }
+    }
+    rows
+}
+
+#[test]
+fn a_fit_without_a_scene_finds_the_truth() {
+    let folder = tempfile::tempdir().unwrap();
+    let ran = Ran::of(program(kept()).args(["fit", "--json"]).current_dir(folder.path())).done();
+    let report: Value = serde_json::from_str(&ran.out).unwrap();
+    for (name, [value, error, truth]) in against_truth(&report) {
+        assert!((value - truth).abs() <= 1e-4 * truth.abs(), "{name}: {value} is not {truth}");
+        // Without noise, the error bars are those of rounding, and true all the same.
+        assert!((value - truth).abs() <= 3.0 * error, "{name}: {value} +- {error} is not {truth}");
+        assert!(error < 1e-4 * truth.abs(), "{name}: +- {error}");
+    }
+    let params = std::fs::read_to_string(folder.path().join("runs/builtin/params.toml")).unwrap();
+    let params: toml::Table = params.parse().unwrap();
+    for (param, truth) in builtin::truth() {
+        let value = &params["params"][param.name()];
+        let value = value.get(0).unwrap_or(value).as_float().unwrap();
+        assert!((value - truth[0]).abs() <= 1e-4 * truth[0], "{}: {value}", param.name());
+    }
+}
+
+/// Two independent normal deviates (Box and Muller 1958).
+fn normal(random: &mut StdRng) -> [f64; 2] {
+    let (u, v): (f64, f64) = (random.random(), random.random());
+    let radius = (-2.0 * (1.0 - u).ln()).sqrt();
+    let (sin, cos) = (std::f64::consts::TAU * v).sin_cos();
+    [radius * cos, radius * sin]
+}
+
+/// `from` with normal noise of `share` of its mean over what is covered, as `to`.
+fn add_noise(from: &Path, to: &Path, share: f64, random: &mut StdRng) {
+    let planes = read_exr(from);
+    let mut image = Image::new(planes.width, planes.height);
+    image.alpha.clone_from(&planes.planes["A"]);
+    let rgb = planes.rgb(["R", "G", "B"]);
+    let sum: f64 = rgb.iter().flatten().map(|&x| f64::from(x)).sum();
+    let mean = sum / (3.0 * image.alpha.iter().map(|&a| f64::from(a)).sum::<f64>());
+    for ((out, rgb), alpha) in image.rgb.iter_mut().zip(rgb).zip(&image.alpha) {
+        let [r, g] = normal(random);
+        let [b, _] = normal(random);
+        let noise = [r, g, b].map(|n| (share * mean * n) as f32 * alpha);
+        *out = [0, 1, 2].map(|c| rgb[c] + noise[c]);
+    }
+    write_exr(to, &image, &ImageOptions::default()).unwrap();
+}
+
+#[test]
+fn with_noise_the_truth_lies_within_three_standard_errors() {
+    let scene = kept().join(builtin::version());
+    let folder = tempfile::tempdir().unwrap();
+    let mut text = std::fs::read_to_string(scene.join("scene.toml")).unwrap();
+    let mut random = StdRng::seed_from_u64(20);
+    for view in ["front", "three_quarter", "profile"] {
+        let name = format!("targets/{view}.exr");
+        add_noise(&scene.join(&name), &folder.path().join(&name), 0.01, &mut random);
+    }
+    for file in ["head.glb", "color.png", "normal.png", "specular.png", "attenuator.png", "environment.exr"] {
+        text = text.replace(&format!("\"{file}\""), &format!("{:?}", scene.join(file).to_str().unwrap()));
+    }
+    std::fs::write(folder.path().join("scene.toml"), text).unwrap();
+    let fit = |loss: &str| {
+        let mut command = program(kept());
+        command.args(["fit", "scene.toml", "--json", "--loss", loss]).current_dir(folder.path());
+        let report: Value = serde_json::from_str(&Ran::of(&mut command).done().out).unwrap();
+        against_truth(&report)
+    };
+    for (name, [value, error, truth]) in fit("l2") {
+        assert!((value - truth).abs() <= 3.0 * error, "{name}: {value} +- {error} is not {truth}");
+        assert!(error > 0.0 && error < 0.01 * truth, "{name}: +- {error} says nothing");
+    }
+    // A loss that divides by the noisy target prefers the pixels that came out dark: a bias of the
+    // order of the noise's square, which so many pixels resolve. It stays below the noise itself.
+    for (name, [value, _, truth]) in fit("relative_l2") {
+        assert!((value - truth).abs() <= 0.01 * truth, "{name}: {value} is not {truth}");
+    }
+}

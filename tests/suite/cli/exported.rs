@@ -1,0 +1,82 @@
+//! `shader` and `export`: what they print and write, and what they refuse.
+
+use skinfit::export::Target;
+
+use super::desk::Desk;
+use super::refusals::{Case, check};
+
+#[test]
+fn a_scenes_shader_and_its_plan_are_printed_and_written() {
+    let desk = Desk::new();
+    let all = desk.run(&["shader", "scene.toml"]).done().out;
+    assert!(all.contains("left out:") && all.contains("fn fs_main(") && all.contains("fn vs_main("));
+    let plan = desk.run(&["shader", "scene.toml", "--show", "plan"]).done().out;
+    assert!(plan.starts_with(|c: char| c.is_ascii_digit()) && !plan.contains("fs_main"), "{plan}");
+    desk.run(&["shader", "scene.toml", "--show", "wgsl", "-o", "skin.wgsl"]).done();
+    naga::front::wgsl::parse_str(&desk.text("skin.wgsl")).unwrap();
+    // The hilite's cube is read by no other effect.
+    let less = desk.run(&["shader", "scene.toml", "--effects", "diffuse,rim"]).done().out;
+    assert!(all.contains("var hilite_faces") && !less.contains("var hilite_faces"));
+}
+
+#[test]
+fn a_fits_constants_are_exported_with_their_provenance() {
+    let desk = Desk::new();
+    desk.fit("run", &[]).done();
+    let value = desk.json("run/report.json")["params"]["rim_weight"]["value"].clone();
+    for target in Target::ALL {
+        let name = target.name();
+        let whole = desk.run(&["export", "run/params.toml", "--to", name, "--constants"]).done().out;
+        assert!(whole.contains("run/params.toml") && whole.contains("scene.toml"), "{whole}");
+        assert!(whole.to_lowercase().contains("rim_weight"), "{whole}");
+        if target.dialect().is_some() {
+            let file = format!("skin.{name}");
+            desk.run(&["export", "run/params.toml", "--to", name, "-o", &file]).done();
+            let text = desk.text(&file);
+            assert!(text.contains("skinfit_shade") && text.contains("Standard error of"), "{text}");
+        }
+    }
+    // Data holds nothing but constants.
+    let json = desk.run(&["export", "run/params.toml", "--to", "json"]).done().out;
+    let json: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let exported = &json["constants"]["rim_weight"];
+    let red = |value: &serde_json::Value| value.as_f64().or_else(|| value[0].as_f64());
+    assert_eq!(red(exported), red(&value), "{exported} {value}");
+}
+
+#[test]
+fn exports_that_cannot_be() {
+    let nothing = |_: &Desk| {};
+    let alone = |desk: &Desk| desk.write("p/params.toml", b"form = \"corrected\"\n[params]\nhilite = 0.5\n");
+    let listing = |desk: &Desk| desk.write("p.toml", b"form = \"listing\"\n[params]\nhilite = 0.5\n");
+    let case = |what, arguments, spoil, words| Case { what, arguments, spoil, words };
+    check(&[
+        case(
+            "missing parameters",
+            &["export", "p.toml", "--to", "glsl"],
+            &nothing,
+            &["p.toml", "cannot be read"],
+        ),
+        case(
+            "no scene beside",
+            &["export", "p/params.toml", "--to", "glsl"],
+            &alone,
+            &["p/params.toml", "--scene"],
+        ),
+        case(
+            "another form",
+            &["export", "p.toml", "--scene", "scene.toml", "--to", "glsl"],
+            &listing,
+            &["p.toml, line 1", "form `listing`"],
+        ),
+    ]);
+}
+
+#[test]
+fn words_that_are_no_target_and_no_accuracy_are_refused_with_those_that_are() {
+    let desk = Desk::new();
+    let ran = desk.run(&["export", "p.toml", "--to", "glls"]);
+    assert!(ran.code == Some(2) && ran.err.contains("Did you mean `glsl`?"), "{ran:?}");
+    let ran = desk.run(&["shader", "scene.toml", "--accuracy", "high"]);
+    assert!(ran.code == Some(2) && ran.err.contains("exact") && ran.err.contains("paper"), "{ran:?}");
+}

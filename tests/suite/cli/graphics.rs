@@ -1,0 +1,149 @@
+//! Rendering on a graphics adapter, and without one.
+
+use serde_json::Value;
+
+use super::desk::{Desk, Ran};
+use crate::fixtures::read_exr;
+
+/// Whether there is an adapter; where there is none, `SKINFIT_NO_GPU_TESTS` must say that it is no mistake.
+fn adapter(desk: &Desk) -> bool {
+    let info: Value = serde_json::from_str(&desk.run(&["info", "--json"]).done().out).unwrap();
+    if info["engine"] == "gpu" {
+        return true;
+    }
+    let excused = std::env::var_os("SKINFIT_NO_GPU_TESTS").is_some();
+    assert!(excused, "{}\nThese tests need an adapter: tests/run installs a software one.", info["why"]);
+    eprintln!("NOT CHECKED, as SKINFIT_NO_GPU_TESTS is set: {}", info["why"]);
+    false
+}
+
+/// The program where no driver answers.
+fn without_adapter(desk: &Desk, arguments: &[&str]) -> Ran {
+    let mut command = desk.command(arguments);
+    for variable in ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
+        command.env(variable, desk.path("no_such_driver.json"));
+    }
+    Ran::of(&mut command)
+}
+
+#[test]
+fn an_image_is_the_same_from_both_engines_and_says_where_it_was_drawn() {
+    let desk = Desk::new();
+    if !adapter(&desk) {
+        return;
+    }
+    let render = |engine: &str, output: &str| {
+        let more = ["--engine", engine, "--params", "truth.toml", "--layers", "--size", "40x24"];
+        desk.run(&[&["render", "scene.toml", "-o", output], &more[..]].concat()).done().out
+    };
+    assert_eq!(render("cpu", "cpu.exr"), "wrote cpu.exr (view front; cpu)\n");
+    assert!(render("gpu", "gpu.exr").starts_with("wrote gpu.exr (view front; gpu: "));
+    assert!(render("auto", "auto.exr").starts_with("wrote auto.exr (view front; gpu: "));
+    let [cpu, gpu, auto] = ["cpu.exr", "gpu.exr", "auto.exr"].map(|name| read_exr(&desk.path(name)));
+    assert!(gpu.planes == auto.planes);
+    assert_eq!((gpu.width, gpu.height), (40, 24));
+    assert_eq!(cpu.planes.keys().collect::<Vec<_>>(), gpu.planes.keys().collect::<Vec<_>>());
+    for (name, plane) in &cpu.planes {
+        let mut errors: Vec<f32> = plane.iter().zip(&gpu.planes[name]).map(|(a, b)| (a - b).abs()).collect();
+        errors.sort_by(f32::total_cmp);
+        // f32 against f64; the sun's edge in a cube of 8 texels is steep. Pixels at the outline may differ by a
+        // sample.
+        let nine_tenths = errors[errors.len() * 9 / 10];
+        assert!(nine_tenths < 1e-3, "{name}: {nine_tenths}");
+    }
+}
+
+#[test]
+fn a_sequence_is_numbered_and_its_first_frame_is_the_still() {
+    let desk = Desk::new();
+    for engine in ["cpu", "auto"] {
+        if engine == "auto" && !adapter(&desk) {
+            continue;
+        }
+        let render = |more: &[&str]| {
+            desk.run(&[&["render", "scene.toml", "--engine", engine, "--antialias", "1x1"], more].concat())
+                .done()
+                .out
+        };
+        render(&["-o", "still.png"]);
+        let out = render(&["-o", "turn/a.png", "--frames", "3"]);
+        assert!(out.starts_with("wrote 3 frames, turn/a.0000.png to turn/a.0002.png (view front; "), "{out}");
+        assert_eq!(desk.read("turn/a.0000.png"), desk.read("still.png"), "{engine}");
+        assert_ne!(desk.read("turn/a.0001.png"), desk.read("turn/a.0002.png"), "{engine}");
+        assert!(!desk.path("turn/a.png").exists() && !desk.path("turn/a.0003.png").exists());
+    }
+}
+
+#[test]
+fn statistics_tell_what_a_frame_took() {
+    let desk = Desk::new();
+    let render = |engine: &str| {
+        let more = ["--engine", engine, "--stats", "--accuracy", "paper", "-o", "a.png"];
+        desk.run(&[&["render", "scene.toml"], &more[..]].concat()).done().out
+    };
+    assert!(render("cpu").contains("shading"));
+    if adapter(&desk) {
+        let out = render("gpu");
+        for word in ["uploaded", "MiB", "bindings", "vertex buffers", "rest_position"] {
+            assert!(out.contains(word), "{word}: {out}");
+        }
+    }
+}
+
+#[test]
+fn adapters_are_told_with_what_will_be_used_and_why() {
+    let desk = Desk::new();
+    let text = desk.run(&["info"]).done().out;
+    assert!(text.contains("render uses: the ") && text.contains("CPU: "), "{text}");
+    if adapter(&desk) {
+        let info: Value = serde_json::from_str(&desk.run(&["info", "--json"]).done().out).unwrap();
+        let first = &info["adapters"][0];
+        assert_eq!(info["adapter"], first["name"]);
+        assert!(first["max_texture_side"].as_u64().unwrap() >= 2048, "{info:#}");
+        assert_eq!(first["features"].as_array().unwrap().len(), 2, "{info:#}");
+    }
+}
+
+#[test]
+fn without_an_adapter_the_cpu_engine_renders_and_says_which_package_brings_one() {
+    let desk = Desk::new();
+    let ran = without_adapter(&desk, &["render", "scene.toml", "-o", "a.png"]);
+    assert_eq!((ran.code, ran.out.as_str()), (Some(0), "wrote a.png (view front; cpu)\n"), "{ran:?}");
+    let package = if cfg!(target_os = "linux") { "mesa-vulkan-drivers" } else { "driver" };
+    assert!(ran.err.contains("no graphics adapter") && ran.err.contains(package), "{ran:?}");
+    assert_eq!(ran.err.lines().count(), 1, "{ran:?}");
+    let arguments = ["render", "scene.toml", "--engine", "gpu", "-o", "b.png"];
+    without_adapter(&desk, &arguments).refused(&["no graphics adapter", package, "--engine cpu"]);
+    assert!(!desk.path("b.png").exists());
+    let info = without_adapter(&desk, &["info"]).done().out;
+    assert!(info.contains("the CPU engine") && info.contains(package), "{info}");
+}
+
+#[test]
+fn what_the_engines_cannot_do_is_refused_before_a_file_is_written() {
+    let desk = Desk::new();
+    let gpu = adapter(&desk);
+    for (more, words) in [
+        (&["--size", "40"][..], &["1920x1080"][..]),
+        (&["--size", "0x40"], &["1 to 32768 pixels"]),
+        (&["--size", "32768x32768"], &["268435456 in all"]),
+        (&["--antialias", "3x2"], &["1x1 to 8x8"]),
+        (&["--accuracy", "good"], &["`exact`, `paper`"]),
+        (&["--frames", "0"], &["0 is not in 1..=100000"]),
+        (&["--animate"], &["--frames"]),
+    ] {
+        let ran = desk.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat());
+        assert_eq!(ran.code, Some(2), "{ran:?}");
+        assert!(words.iter().all(|word| ran.err.contains(word)), "{ran:?}");
+    }
+    let refused = |more: &[&str], words: &[&str]| {
+        desk.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat()).refused(words);
+    };
+    refused(&["--engine", "cpu", "--antialias", "msaa4"], &["msaa4", "2x2"]);
+    refused(&["--engine", "cpu", "--frames", "2", "--animate"], &["no animation", "--animate"]);
+    if gpu {
+        refused(&["--engine", "gpu", "--adapter", "Voodoo"], &["Voodoo", "There is: "]);
+        refused(&["--engine", "gpu", "--size", "32768x16"], &["a side may have", "--size"]);
+    }
+    assert!(!desk.path("a.png").exists());
+}

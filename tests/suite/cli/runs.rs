@@ -1,0 +1,283 @@
+//! What a fit leaves, and what can be done with it.
+
+use serde_json::Value;
+
+use super::desk::{Desk, TRUTH};
+use crate::fixtures::read_exr;
+
+/// The fitted values are the truth within this share of it: targets are f32, and varpro stops when
+/// a step would gain less than 1e-12 of the loss.
+const SHARE: f64 = 1e-4;
+
+#[test]
+fn a_fit_finds_the_truth_and_leaves_every_file_of_a_run() {
+    let desk = Desk::new();
+    let ran = desk.fit("runs/a", &[]).done();
+    let report = desk.json("runs/a/report.json");
+    let loss = report["loss"]["end"].as_f64().unwrap();
+    let last = ran.out.lines().last().unwrap();
+    assert_eq!(last, format!("runs/a: final loss {loss:.6e}"));
+    assert_eq!(ran.out.lines().count(), 8 + 2, "a line a parameter, how it ended, and where: {}", ran.out);
+
+    let mut names: Vec<String> = std::fs::read_dir(desk.path("runs/a"))
+        .unwrap()
+        .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .collect();
+    names.sort();
+    let pictures = ["front.png", "front_terms.exr", "side.png", "side_terms.exr"];
+    let others = [".lock", "params.toml", "report.html", "report.json", "scene.toml", "state.json"];
+    let mut expected = [&pictures[..], &others[..]].concat();
+    expected.sort_unstable();
+    assert_eq!(names, expected);
+    check_report(&report);
+    // Three images of 32 pixels, at least.
+    let picture = image::open(desk.path("runs/a/front.png")).unwrap();
+    assert!(picture.width() > 96 && picture.height() > 32, "{} x {}", picture.width(), picture.height());
+    assert!(desk.text("runs/a/report.html").starts_with("<!DOCTYPE html>"));
+
+    let fitted: toml::Table = desk.text("runs/a/params.toml").parse().unwrap();
+    let truth: toml::Table = TRUTH.parse().unwrap();
+    for (name, truth) in truth["params"].as_table().unwrap() {
+        let (value, truth) = (fitted["params"][name].as_float().unwrap(), truth.as_float().unwrap());
+        assert!((value - truth).abs() <= SHARE * truth, "{name}: {value} is not {truth}");
+        assert_eq!(report["params"][name]["value"].as_f64(), Some(value), "{name}");
+    }
+}
+
+/// The keys of SCENE.md's `report.json`.
+fn check_report(report: &Value) {
+    let number = |place: &str| {
+        let value = report.pointer(place).unwrap_or_else(|| panic!("{place} is missing: {report:#}"));
+        value.as_f64().unwrap_or_else(|| panic!("{place} is {value}"))
+    };
+    assert!(number("/loss/end") < 1e-6 * number("/loss/start"), "{report:#}");
+    for name in
+        ["base_weight", "rim_weight", "rim_exponent", "side_specular", "hilite", "reflection", "occlusion"]
+    {
+        number(&format!("/params/{name}/start"));
+        number(&format!("/params/{name}/value"));
+        assert!(number(&format!("/params/{name}/std_error")) > 0.0, "{name}");
+        assert_eq!(report["params"][name]["identifiable"], Value::Bool(true), "{name}");
+    }
+    for view in ["front", "side"] {
+        // Beyond 80 dB the images differ by less than 1 code in 10 000.
+        assert!(number(&format!("/views/{view}/psnr")) > 80.0);
+        assert!(number(&format!("/views/{view}/ssim")) > 0.9999);
+        assert!(number(&format!("/views/{view}/flip")) < 1e-3);
+    }
+    assert_eq!((report["solver"].as_str(), report["engine"].as_str()), (Some("varpro"), Some("cpu")));
+    for count in ["iterations", "evaluations", "samples"] {
+        assert!(report[count].as_u64().unwrap() > 0, "{count}");
+    }
+    for stage in ["load", "bake", "samples", "fit"] {
+        assert!(number(&format!("/seconds/{stage}")) >= 0.0);
+    }
+    assert_eq!(report["warnings"], Value::Array(Vec::new()));
+}
+
+#[test]
+fn with_json_the_report_is_all_that_is_printed() {
+    let desk = Desk::new();
+    let ran = desk.fit("run", &["--json"]).done();
+    assert_eq!(ran.out, desk.text("run/report.json").trim_end().to_owned() + "\n");
+    let report: Value = serde_json::from_str(&ran.out).unwrap();
+    check_report(&report);
+}
+
+#[test]
+fn the_run_folders_scene_and_parameters_render_the_fits_picture() {
+    let desk = Desk::new();
+    desk.fit("run", &["--max-iterations", "2"]);
+    let rendered = desk.path("again.exr");
+    let arguments = ["--params", "run/params.toml", "--view", "side", "-o", "again.exr"];
+    // Under another name, so that every path must be absolute.
+    std::fs::create_dir(desk.path("elsewhere")).unwrap();
+    std::fs::copy(desk.path("run/scene.toml"), desk.path("elsewhere/s.toml")).unwrap();
+    desk.run(&[&["render", "elsewhere/s.toml", "--engine", "cpu"], &arguments[..]].concat()).done();
+    let (again, fitted) = (read_exr(&rendered), read_exr(&desk.path("run/side_terms.exr")));
+    for name in ["R", "G", "B", "A"] {
+        for (again, fitted) in again.planes[name].iter().zip(&fitted.planes[name]) {
+            // Only the cubes around the exponent are baked for a picture: a few roundings of f32.
+            assert!((again - fitted).abs() <= 1e-5 * (1.0 + fitted.abs()), "{name}: {again} is not {fitted}");
+        }
+    }
+    assert!(desk.text("run/scene.toml").starts_with("# a comment\n"));
+}
+
+#[test]
+fn a_fit_that_starts_at_the_answer_stays_there() {
+    let desk = Desk::new();
+    // Held at a wrong value, so that a loss is left and not rounding alone.
+    desk.edit("\"rim_exponent\", ", "");
+    desk.fit("a", &[]).done();
+    desk.fit("b", &["--params", "a/params.toml"]).done();
+    let (a, b) = (desk.json("a/report.json"), desk.json("b/report.json"));
+    let loss = |report: &Value, end: &str| report["loss"][end].as_f64().unwrap();
+    assert!(loss(&a, "end") > 1e-4 * loss(&a, "start"), "{a:#}");
+    for end in ["start", "end"] {
+        let (found, left) = (loss(&b, end), loss(&a, "end"));
+        // The last step of a fit is taken unmeasured, on sums whose f32 products round by 6e-8 each.
+        assert!((found - left).abs() <= 1e-6 * left, "{end}: {found} is not {left}");
+    }
+}
+
+#[test]
+fn the_loss_on_the_command_line_is_in_the_run_folders_scene() {
+    let desk = Desk::new();
+    desk.fit("run", &["--loss", "huber"]).done();
+    let scene: toml::Table = desk.text("run/scene.toml").parse().unwrap();
+    assert_eq!(scene["fit"]["loss"].as_str(), Some("huber"));
+    assert_eq!(desk.json("run/report.json")["loss_name"], "huber");
+    let first = desk.text("run/params.toml");
+    desk.run(&["fit", "run/scene.toml", "-o", "again"]).done();
+    let values = |text: &str| text.lines().skip(2).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(values(&first), values(&desk.text("again/params.toml")));
+}
+
+#[test]
+fn parameters_with_three_values_are_fitted_in_each_channel() {
+    let desk = Desk::new();
+    desk.write("p.toml", b"[params]\nhilite = [0.4, 0.5, 0.6]\n");
+    desk.fit("run", &["--params", "p.toml"]).done();
+    let values = desk.json("run/report.json")["params"]["hilite"]["value"].clone();
+    for value in values.as_array().unwrap() {
+        assert!((value.as_f64().unwrap() - 0.5).abs() < SHARE * 0.5, "{values}");
+    }
+}
+
+#[test]
+fn every_solver_fits_and_gains_are_found() {
+    let desk = Desk::new();
+    desk.edit("[fit]", "[fit]\ngains = true");
+    for solver in ["varpro", "lm", "lbfgs"] {
+        let ran = desk.fit(solver, &["--solver", solver]);
+        assert_ne!(ran.code, Some(2), "{ran:?}");
+        let report = desk.json(&format!("{solver}/report.json"));
+        assert_eq!(report["solver"], solver);
+        let fitted: toml::Table = desk.text(&format!("{solver}/params.toml")).parse().unwrap();
+        let gain = fitted["gains"]["side"].as_float().unwrap();
+        assert!((gain - 1.0).abs() < 1e-2, "{solver}: {gain}");
+    }
+}
+
+#[test]
+fn the_number_of_threads_changes_nothing() {
+    let desk = Desk::new();
+    let values = |threads: &str| {
+        let run = format!("run{threads}");
+        desk.fit(&run, &["--threads", threads, "--no-cache"]).done();
+        let mut report = desk.json(&format!("{run}/report.json"));
+        report["seconds"].take();
+        report["provenance"]["threads"].take();
+        for iteration in report["history"].as_array_mut().unwrap() {
+            iteration["seconds"].take();
+        }
+        (report, desk.text(&format!("{run}/params.toml")), desk.read(&format!("{run}/front.png")))
+    };
+    assert!(values("1") == values("2"));
+}
+
+#[test]
+fn pictures_of_views_that_are_gone_are_removed_and_nothing_else() {
+    let desk = Desk::new();
+    desk.fit("run", &[]).done();
+    // Not skinfit's, though they are called as if they were.
+    desk.write("run/notes.png", b"mine");
+    desk.write("run/mine_terms.exr", b"mine");
+    desk.write("kept.png", b"mine");
+    // A report that names what is not the folder's own is not believed.
+    let mut report = desk.json("run/report.json");
+    report["files"].as_array_mut().unwrap().push("../kept.png".into());
+    desk.write("run/report.json", report.to_string().as_bytes());
+    desk.edit("name = \"side\"", "name = \"left\"");
+    desk.fit("run", &[]).done();
+    for (name, there) in [
+        ("run/side.png", false),
+        ("run/side_terms.exr", false),
+        ("run/left.png", true),
+        ("run/left_terms.exr", true),
+        ("run/front.png", true),
+        ("run/notes.png", true),
+        ("run/mine_terms.exr", true),
+        ("kept.png", true),
+    ] {
+        assert_eq!(desk.path(name).exists(), there, "{name}");
+    }
+}
+
+#[test]
+fn the_start_values_on_the_command_line_are_in_the_run_folders_scene() {
+    let desk = Desk::new();
+    desk.write("p.toml", b"[params]\nrim_exponent = 3.5\nhilite = [0.4, 0.5, 0.6]\nnormal_strength = 0.9\n");
+    desk.fit("run", &["--params", "p.toml"]).done();
+    let scene: toml::Table = desk.text("run/scene.toml").parse().unwrap();
+    let start = &scene["model"]["params"];
+    assert_eq!(
+        (start["rim_exponent"].as_float(), start["normal_strength"].as_float()),
+        (Some(3.5), Some(0.9))
+    );
+    // So the same fit can be made again from the run folder alone, to the bit.
+    desk.run(&["fit", "run/scene.toml", "-o", "again"]).done();
+    let values = |text: &str| text.lines().skip(2).map(str::to_owned).collect::<Vec<_>>();
+    assert_eq!(values(&desk.text("run/params.toml")), values(&desk.text("again/params.toml")));
+}
+
+#[test]
+fn a_fit_of_nothing_says_that_nothing_was_free() {
+    let desk = Desk::new();
+    let text = desk.text("scene.toml");
+    let free = text.lines().find(|line| line.starts_with("free = ")).unwrap();
+    desk.edit(free, "free = []");
+    let ran = desk.fit("run", &[]).done();
+    assert_eq!(ran.out.lines().count(), 2, "{ran:?}");
+    let page = desk.text("run/report.html");
+    assert!(page.contains("Nothing was free: ") && page.contains("Nothing was free, so "));
+    assert!(!page.contains("determine every") && !page.contains("Every direction"));
+}
+
+/// Fit what a targets' `truth` says, with `effects` more, from the defaults; every value that it gives
+/// must be found.
+fn recovers(effects: &str, truth: &str) {
+    let desk = Desk::new();
+    desk.edit("\"reflection\"]", &format!("\"reflection\"{effects}]"));
+    desk.write("truth.toml", truth.as_bytes());
+    for view in ["front", "side"] {
+        let path = format!("targets/{view}.exr");
+        desk.run(&["render", "scene.toml", "--params", "truth.toml", "--view", view, "-o", &path]).done();
+    }
+    let truth: toml::Table = truth.parse().unwrap();
+    let truth = truth["params"].as_table().unwrap();
+    let quoted =
+        |names: Vec<&String>| names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
+    let free = quoted(truth.keys().collect());
+    let coloured = quoted(truth.iter().filter(|(_, value)| value.is_array()).map(|(name, _)| name).collect());
+    let text = desk.text("scene.toml");
+    let line = text.lines().find(|line| line.starts_with("free = ")).unwrap();
+    desk.edit(line, &format!("free = [{free}]\nper_channel = [{coloured}]"));
+    desk.fit("run", &[]).done();
+    let report = desk.json("run/report.json");
+    for (name, truth) in truth {
+        let found = &report["params"][name]["value"];
+        for c in 0..3 {
+            let channel = |value: &Value| value.get(c).unwrap_or(value).as_f64().unwrap();
+            let truth = truth.get(c).unwrap_or(truth).as_float().unwrap();
+            assert!((channel(found) - truth).abs() <= SHARE * truth.abs(), "{name}: {found} is not {truth}");
+        }
+    }
+}
+
+#[test]
+fn a_turned_environment_is_found_together_with_the_occlusion() {
+    recovers(
+        "",
+        "[params]\nenvironment_rotation = 14.0\nocclusion = 0.6\nbase_weight = 0.8\nrim_weight = 0.9\n",
+    );
+}
+
+#[test]
+fn a_key_lights_direction_and_colour_are_found() {
+    recovers(
+        ", \"key_light\"",
+        "[params]\nkey_azimuth = 25.0\nkey_elevation = 30.0\nkey_color = [1.4, 1.1, 0.7]\nbase_weight = 0.8\n",
+    );
+}

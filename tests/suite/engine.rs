@@ -1,0 +1,385 @@
+//! The CPU engine against the plain f64 model: images, losses, gradients and normal equations.
+
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use skinfit::bake::LobeStack;
+use skinfit::engine::cpu::{CpuEngine, Illumination};
+use skinfit::engine::residual::weighted_residual;
+use skinfit::engine::view::ObservedView;
+use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
+use skinfit::model::cube::{Cube, texel_direction};
+use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::evaluate::{Setup, derivative, shade};
+use skinfit::model::fragment::Fragment;
+use skinfit::model::lights::{Cubes, Lights};
+use skinfit::model::params::{Column, Param, Params};
+use skinfit::samples::{LANES, SurfaceArrays, ViewSamples};
+use skinfit::scene::Loss;
+
+fn wavy(size: usize, phase: f64) -> Cube<f32> {
+    Cube::from_fn(size, |face, column, row| {
+        let [x, y, z] = texel_direction(face, column, row, size);
+        let wave = |k: f64| (1.2 + (k * x + phase).sin() * (2.0 * y).cos() + 0.3 * z * k.sin()).abs() as f32;
+        [wave(1.0), wave(1.7), wave(2.3), wave(3.1)]
+    })
+}
+
+fn unit(rng: &mut StdRng) -> [f64; 3] {
+    let v: [f64; 3] = std::array::from_fn(|_| rng.random_range(-1.0..1.0));
+    let length = v.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-3);
+    v.map(|x| x / length)
+}
+
+/// `groups` groups with 1 to 3 records each; about one sample in ten is padding.
+fn view(groups: usize, seed: u64) -> ObservedView {
+    let mut rng = StdRng::seed_from_u64(seed);
+    let mut samples = ViewSamples { group_start: vec![0], ..ViewSamples::default() };
+    let mut surface = SurfaceArrays::default();
+    let mut target: [Vec<f32>; 4] = Default::default();
+    let mut weight = Vec::new();
+    for group in 0..groups {
+        let records = 1 + group % 3;
+        let mut shares = vec![[0.0_f32; LANES]; records];
+        for lane in 0..LANES {
+            let used = rng.random_range(1..=records);
+            (0..used).for_each(|r| shares[r][lane] = 1.0 / used as f32);
+        }
+        for row in shares {
+            samples.weight.extend(row);
+            for _ in 0..LANES {
+                let (n, view) = (unit(&mut rng), unit(&mut rng));
+                let bump = unit(&mut rng);
+                for c in 0..3 {
+                    surface.base[c].push(n[c] as f32);
+                    surface.normal[c].push(n[c] as f32);
+                    surface.bump[c].push(0.3 * bump[c] as f32);
+                    surface.view[c].push(view[c] as f32);
+                    surface.albedo[c].push(rng.random_range(0.1..0.9));
+                }
+                surface.occlusion.push(rng.random_range(0.2..1.0));
+                surface.silhouette.push(rng.random_range(0.0..1.0));
+                surface.dapple.push(rng.random_range(0.0..1.0));
+                surface.specular.push(rng.random_range(0.0..1.0));
+                surface.attenuator.push(rng.random_range(0.0..1.0));
+            }
+        }
+        let end = samples.group_start[group] + records as u32;
+        samples.group_start.push(end);
+        for lane in 0..LANES {
+            target.iter_mut().for_each(|plane| plane.push(rng.random_range(0.05..2.0)));
+            weight.push(if lane == 5 { 0.0 } else { rng.random_range(0.1..1.0) });
+        }
+    }
+    samples.surface = surface;
+    ObservedView { samples, target, weight, clip: None }
+}
+
+fn illumination() -> Illumination {
+    Illumination {
+        irradiance: Some(wavy(8, 0.3)),
+        lobes: Some(LobeStack {
+            exponents: vec![16.0, 32.0, 64.0],
+            cubes: vec![wavy(16, 0.7), wavy(16, 1.1), wavy(16, 1.3)],
+        }),
+        hilite: Some(wavy(16, 2.1)),
+    }
+}
+
+const EVERYTHING: Effects = Effects::SURFACE.with(Effect::Haze).with(Effect::KeyLight);
+
+fn params() -> Params {
+    let mut params = Params::defaults(Form::Corrected);
+    params.set_rgb(Param::RimWeight, [0.9, 0.45, 0.3]);
+    params.set(Param::RimExponent, 2.6);
+    params.set(Param::Reflection, 0.2);
+    params.set(Param::Occlusion, 0.8);
+    params.set(Param::NormalStrength, 1.3);
+    params.set(Param::SpecularLobe, 40.0);
+    params.set(Param::EnvironmentRotation, 20.0);
+    params.set(Param::KeyAzimuth, 30.0);
+    params.set_rgb(Param::KeyColor, [0.5, 0.4, 0.3]);
+    params.set(Param::HazeWeight, 0.5);
+    params
+}
+
+fn all_unknowns(gains: usize) -> Vec<Unknown> {
+    let columns = Param::all().flat_map(|p| match p {
+        Param::RimWeight => Column::per_channel(p).to_vec(),
+        _ => vec![Column::tied(p)],
+    });
+    columns.map(Unknown::Param).chain((1..gains).map(Unknown::Gain)).collect()
+}
+
+/// The same numbers, one sample after the other in f64.
+struct Plain<'a> {
+    setup: Setup,
+    views: &'a [ObservedView],
+    cubes: [Cube<f64>; 4],
+    loss: Loss,
+    unknowns: Vec<Unknown>,
+}
+
+impl<'a> Plain<'a> {
+    fn new(setup: Setup, views: &'a [ObservedView], loss: Loss, unknowns: &[Unknown], lobe: f64) -> Self {
+        let light = illumination();
+        let wide = |cube: &Cube<f32>| cube.map(|t| t.map(f64::from));
+        let (specular, slope) = light.lobes.as_ref().unwrap().at(lobe);
+        let cubes = [
+            wide(light.irradiance.as_ref().unwrap()),
+            wide(&specular),
+            wide(&slope),
+            wide(light.hilite.as_ref().unwrap()),
+        ];
+        Self { setup, views, cubes, loss, unknowns: unknowns.to_vec() }
+    }
+
+    fn lights(&self, params: &Params) -> Lights<'_, f64> {
+        let [irradiance, specular, lobe_slope, hilite] = self.cubes.each_ref().map(Some);
+        Lights::new(self.setup, params, Cubes { irradiance, specular, lobe_slope, hilite }, true, 0.0)
+    }
+
+    fn fragment(view: &ObservedView, at: usize) -> Fragment<f64> {
+        let s = &view.samples.surface;
+        let v = |planes: &[Vec<f32>; 3]| [0, 1, 2].map(|c| f64::from(planes[c][at]));
+        let x = |plane: &[f32]| f64::from(plane[at]);
+        Fragment {
+            base: v(&s.base),
+            bump: v(&s.bump),
+            normal: v(&s.normal),
+            view: v(&s.view),
+            occlusion: x(&s.occlusion),
+            silhouette: x(&s.silhouette),
+            dapple: x(&s.dapple),
+            albedo: v(&s.albedo),
+            specular: x(&s.specular),
+            attenuator: x(&s.attenuator),
+        }
+    }
+
+    /// Value and unknowns' columns of each channel of one pixel slot, the gain not applied.
+    fn pixel(&self, view: &ObservedView, slot: usize, params: &Params) -> [(f64, Vec<f64>); 4] {
+        let lights = self.lights(params);
+        let mut out: [(f64, Vec<f64>); 4] = std::array::from_fn(|_| (0.0, vec![0.0; self.unknowns.len()]));
+        let group = slot / LANES;
+        for record in view.samples.group_start[group]..view.samples.group_start[group + 1] {
+            let at = record as usize * LANES + slot % LANES;
+            let f = Self::fragment(view, at);
+            let w = f64::from(view.samples.weight[at]);
+            let value = shade(self.setup, &lights, &f, params);
+            (0..4).for_each(|c| out[c].0 += w * value[c]);
+            for (k, unknown) in self.unknowns.iter().enumerate() {
+                let Unknown::Param(column) = unknown else { continue };
+                if !column.param.asked_for(self.setup.effects) {
+                    continue;
+                }
+                let slope = derivative(self.setup, &lights, &f, params, column.param);
+                for c in 0..4 {
+                    if c == 3 || column.channels.includes(c) {
+                        out[c].1[k] += w * slope[c];
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    fn normal_equations(&self, point: &Point) -> NormalEquations {
+        let k = self.unknowns.len();
+        let mut sums = NormalEquations {
+            loss: 0.0,
+            residual: 0.0,
+            weight: 0.0,
+            count: 0,
+            jtr: vec![0.0; k],
+            jtj: vec![0.0; k * k],
+        };
+        for (index, view) in self.views.iter().enumerate() {
+            let gain = point.gains[index];
+            for slot in 0..view.samples.groups() * LANES {
+                let pixel = self.pixel(view, slot, &point.params);
+                let weight = f64::from(view.weight[slot]);
+                for (c, (value, mut row)) in pixel.into_iter().enumerate() {
+                    row.iter_mut().for_each(|x| *x *= gain);
+                    if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(index)) {
+                        row[g] = value;
+                    }
+                    let target = f64::from(view.target[c][slot]);
+                    let r = weighted_residual(self.loss, view.clip, gain * value, target, weight);
+                    sums.loss += r.loss;
+                    sums.residual += r.residual * r.residual;
+                    sums.weight += weight;
+                    sums.count += u64::from(weight > 0.0);
+                    for a in 0..k {
+                        sums.jtr[a] += r.scale * row[a] * r.residual;
+                        for b in 0..k {
+                            sums.jtj[a * k + b] += r.scale * row[a] * r.scale * row[b];
+                        }
+                    }
+                }
+            }
+        }
+        sums.loss /= sums.weight;
+        sums
+    }
+}
+
+/// f32 evaluation of a few hundred roundings, of either sign, against f64: 1e-5 of the largest entry
+/// that shares the row and the column.
+fn assert_equal(got: &NormalEquations, want: &NormalEquations, names: &[String], what: &str) {
+    let k = names.len();
+    let close = |g: f64, w: f64, scale: f64| (g - w).abs() <= 1e-5 * scale + 1e-12;
+    assert!(close(got.loss, want.loss, want.loss), "{what}: loss {} {}", got.loss, want.loss);
+    assert!(close(got.residual, want.residual, want.residual), "{what}: residual");
+    assert_eq!(got.count, want.count, "{what}");
+    assert!(close(got.weight, want.weight, want.weight), "{what}: weight");
+    for a in 0..k {
+        let size = want.jtj[a * k + a].sqrt();
+        let scale = size * want.residual.sqrt();
+        assert!(
+            close(got.jtr[a], want.jtr[a], scale),
+            "{what}: J^T r of {}: {} {}",
+            names[a],
+            got.jtr[a],
+            want.jtr[a]
+        );
+        for b in 0..k {
+            let scale = size * want.jtj[b * k + b].sqrt();
+            let (g, w) = (got.jtj[a * k + b], want.jtj[a * k + b]);
+            assert!(close(g, w, scale), "{what}: J^T J of {} and {}: {g} {w}", names[a], names[b]);
+        }
+    }
+}
+
+fn engine(setup: Setup, views: &[ObservedView], loss: Loss, unknowns: &[Unknown], keep: bool) -> CpuEngine {
+    CpuEngine::with_kept_terms(setup, illumination(), views.to_vec(), loss, unknowns.to_vec(), keep)
+}
+
+fn names(unknowns: &[Unknown]) -> Vec<String> {
+    unknowns.iter().map(Unknown::name).collect()
+}
+
+#[test]
+fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect() {
+    let views = [view(9, 1), view(4, 2)];
+    let unknowns = all_unknowns(2);
+    let mut sets: Vec<Effects> = Effect::ALL.into_iter().map(|e| Effects::of(&[e])).collect();
+    sets.extend([EVERYTHING, EVERYTHING.without(Effect::Rim), EVERYTHING.without(Effect::Occlusion)]);
+    for form in Form::ALL {
+        for silhouette in Silhouette::ALL {
+            for &effects in &sets {
+                let setup = Setup { form, silhouette, effects };
+                let point = Point { params: params(), gains: vec![1.0, 1.2] };
+                let plain = Plain::new(setup, &views, Loss::L2, &unknowns, 40.0);
+                let got = engine(setup, &views, Loss::L2, &unknowns, true).normal_equations(&point);
+                let what = format!("{form:?} {silhouette:?} {effects:?}");
+                assert_equal(&got, &plain.normal_equations(&point), &names(&unknowns), &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn any_subset_of_free_parameters_keeps_the_same_answers() {
+    let views = [view(7, 3)];
+    let all = all_unknowns(1);
+    let point = Point { params: params(), gains: vec![1.0] };
+    for silhouette in [Silhouette::Fragment, Silhouette::Bumped] {
+        let setup = Setup { form: Form::Corrected, silhouette, effects: EVERYTHING };
+        // Each lookup parameter alone beside the linear ones, none of them, and every unknown alone.
+        let lookups = [
+            Param::NormalStrength,
+            Param::SpecularLobe,
+            Param::EnvironmentRotation,
+            Param::KeyAzimuth,
+            Param::KeyElevation,
+        ];
+        let is_lookup = |u: &Unknown| matches!(u, Unknown::Param(c) if lookups.contains(&c.param));
+        let mut subsets: Vec<Vec<Unknown>> = all.iter().map(|&u| vec![u]).collect();
+        let cheap: Vec<Unknown> = all.iter().copied().filter(|u| !is_lookup(u)).collect();
+        for &unknown in all.iter().filter(|u| is_lookup(u)) {
+            subsets.push(cheap.iter().copied().chain([unknown]).collect());
+        }
+        subsets.push(cheap);
+        for unknowns in subsets {
+            for keep in [true, false] {
+                let plain = Plain::new(setup, &views, Loss::RelativeL2, &unknowns, 40.0);
+                let got = engine(setup, &views, Loss::RelativeL2, &unknowns, keep).normal_equations(&point);
+                let what = format!("{silhouette:?} keep {keep} {:?}", names(&unknowns));
+                assert_equal(&got, &plain.normal_equations(&point), &names(&unknowns), &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
+    let mut views = [view(8, 4)];
+    views[0].clip = Some(skinfit::scene::view::Clip { low: 0.1, high: 1.5 });
+    let unknowns = all_unknowns(1);
+    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: EVERYTHING };
+    let point = Point { params: params(), gains: vec![0.9] };
+    for loss in Loss::ALL {
+        let plain = Plain::new(setup, &views, loss, &unknowns, 40.0).normal_equations(&point);
+        let engine = engine(setup, &views, loss, &unknowns, true);
+        assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
+        let (value, gradient) = engine.gradient(&point);
+        assert_eq!(value, engine.loss(&point), "{}", loss.name());
+        for (k, g) in gradient.iter().enumerate() {
+            let want = 2.0 * plain.jtr[k] / plain.weight;
+            let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;
+            // As in `assert_equal`.
+            assert!((g - want).abs() <= 1e-5 * scale, "{} {}: {g} {want}", loss.name(), unknowns[k].name());
+        }
+    }
+}
+
+#[test]
+fn images_equal_the_plain_model() {
+    let views = [view(9, 5)];
+    for form in Form::ALL {
+        let setup = Setup { form, silhouette: Silhouette::Bumped, effects: EVERYTHING };
+        let point = Point { params: params(), gains: vec![1.5] };
+        let plain = Plain::new(setup, &views, Loss::L2, &[], 40.0);
+        let image = engine(setup, &views, Loss::L2, &[], true).image(0, &point);
+        for slot in 0..views[0].samples.groups() * LANES {
+            let pixel = plain.pixel(&views[0], slot, &point.params);
+            for c in 0..4 {
+                let (got, want) = (f64::from(image[c][slot]), 1.5 * pixel[c].0);
+                // The vectors' own figures for f32: 2e-6 + 2e-5 relative.
+                assert!((got - want).abs() < 2e-6 + 2e-5 * want.abs(), "{form:?} {slot} {c}: {got} {want}");
+            }
+        }
+    }
+}
+
+#[test]
+fn sums_are_the_same_to_the_bit_for_any_number_of_threads() {
+    let views = [view(300, 6), view(70, 7)];
+    let unknowns = all_unknowns(2);
+    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: EVERYTHING };
+    let engine = engine(setup, &views, Loss::Huber, &unknowns, true);
+    let point = Point { params: params(), gains: vec![1.0, 1.1] };
+    let with_threads = |n: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
+        pool.install(|| (engine.normal_equations(&point), engine.gradient(&point)))
+    };
+    let one = with_threads(1);
+    for threads in [2, 3, 7] {
+        assert_eq!(with_threads(threads), one, "{threads} threads");
+    }
+}
+
+#[test]
+fn strides_read_a_share_of_the_pixels_and_together_all_of_them() {
+    let views = [view(128, 8)];
+    let unknowns = all_unknowns(1);
+    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: EVERYTHING };
+    let point = Point { params: params(), gains: vec![1.0] };
+    let mut coarse = engine(setup, &views, Loss::L2, &unknowns, true);
+    let full = coarse.normal_equations(&point);
+    coarse.set_stride(4);
+    let quarter = coarse.normal_equations(&point);
+    assert_eq!(quarter.count * 4, full.count);
+    // A quarter of 2048 random pixels: their mean loss scatters by a few per cent.
+    assert!((quarter.loss / full.loss - 1.0).abs() < 0.2, "{} {}", quarter.loss, full.loss);
+}

@@ -1,0 +1,202 @@
+//! Small readers of the shared material, independent of the program's own, and scenes by hand.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
+use glam::{DMat4, Vec2, Vec3, Vec4};
+use serde_json::Value;
+use skinfit::model::effects::{Effects, Form, Silhouette};
+use skinfit::model::params::Params;
+use skinfit::scene::maps::{Environment, Map, Maps};
+use skinfit::scene::mesh::{Mesh, PosedMesh};
+use skinfit::scene::view::{Camera, View};
+use skinfit::scene::{FitSettings, Loss, Quality, Scene};
+
+/// The named planes of an EXR file, and its width and height.
+pub(crate) struct Planes {
+    pub(crate) width: usize,
+    pub(crate) height: usize,
+    pub(crate) planes: BTreeMap<String, Vec<f32>>,
+}
+
+pub(crate) fn read_exr(path: &Path) -> Planes {
+    use exr::prelude::*;
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .unwrap();
+    let layer = image.layer_data;
+    let planes = (layer.channel_data.list.iter())
+        .map(|channel| (channel.name.to_string(), channel.sample_data.values_as_f32().collect()))
+        .collect();
+    Planes { width: layer.size.width(), height: layer.size.height(), planes }
+}
+
+impl Planes {
+    /// Three planes as an image.
+    pub(crate) fn rgb(&self, names: [&str; 3]) -> Vec<[f32; 3]> {
+        let planes = names.map(|name| &self.planes[name]);
+        (0..planes[0].len()).map(|i| planes.map(|plane| plane[i])).collect()
+    }
+}
+
+pub(crate) fn environment(path: &Path, rotation_degrees: f64) -> Environment {
+    let planes = read_exr(path);
+    let texels = planes.rgb(["R", "G", "B"]);
+    let panorama = Map { width: planes.width, height: planes.height, texels };
+    Environment { panorama, rotation_degrees, intensity: 1.0 }
+}
+
+pub(crate) fn json(path: &Path) -> Value {
+    serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
+}
+
+/// Every vector of that kind, in the order of their files' names; none is a failure.
+pub(crate) fn vectors_of(folder: &Path, kind: &str) -> BTreeMap<String, Value> {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let files = entries.filter(|path| path.extension().is_some_and(|ending| ending == "json"));
+    let read = files.map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), json(&path)));
+    let found: BTreeMap<_, _> = read.filter(|(_, file)| file["kind"] == kind).collect();
+    assert!(!found.is_empty(), "{} holds no vector of kind {kind}", folder.display());
+    found
+}
+
+/// Nested arrays of numbers, flattened.
+pub(crate) fn numbers(value: &Value) -> Vec<f64> {
+    match value {
+        Value::Array(items) => items.iter().flat_map(numbers).collect(),
+        number => vec![number.as_f64().unwrap()],
+    }
+}
+
+/// |got - want| <= abs max(1, max |want|) + rel |want|, as the vectors' files say.
+pub(crate) fn assert_close(got: &[f64], want: &[f64], rel: f64, abs: f64, what: &str) {
+    assert_eq!(got.len(), want.len(), "{what}");
+    let scale = want.iter().fold(1.0, |a: f64, x| a.max(x.abs()));
+    for (i, (g, w)) in got.iter().zip(want).enumerate() {
+        assert!((g - w).abs() <= abs * scale + rel * w.abs(), "{what}[{i}]: {g} is not {w}");
+    }
+}
+
+/// The first primitive of a .glb, node transforms left out (the head's is the identity to 1e-7),
+/// with MikkTSpace tangents where vertices of one place agree.
+pub(crate) fn head(folder: &Path) -> PosedMesh {
+    let gltf = gltf::Gltf::open(folder.join("head/head.glb")).unwrap();
+    let blob = gltf.blob.as_deref().unwrap();
+    let primitive = gltf.document.meshes().next().unwrap().primitives().next().unwrap();
+    let reader = primitive.reader(|_| Some(blob));
+    let positions: Vec<Vec3> = reader.read_positions().unwrap().map(Vec3::from).collect();
+    let indices: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
+    let mut mesh = PosedMesh {
+        tangents: vec![Vec4::ZERO; positions.len()],
+        positions,
+        normals: reader.read_normals().unwrap().map(Vec3::from).collect(),
+        uvs: reader.read_tex_coords(0).unwrap().into_f32().map(Vec2::from).collect(),
+        triangles: indices.as_chunks::<3>().0.to_vec(),
+    };
+    generate_tangents(&mut Corners(&mut mesh)).unwrap();
+    for i in 0..mesh.normals.len() {
+        // Orthogonal to the normal, as the vertex stage leaves it.
+        let (n, t) = (mesh.normals[i].normalize(), mesh.tangents[i]);
+        mesh.normals[i] = n;
+        mesh.tangents[i] = (t.truncate() - n * n.dot(t.truncate())).normalize().extend(t.w);
+    }
+    mesh
+}
+
+struct Corners<'a>(&'a mut PosedMesh);
+
+impl Corners<'_> {
+    fn vertex(&self, face: usize, corner: usize) -> usize {
+        self.0.triangles[face][corner] as usize
+    }
+}
+
+impl Geometry for Corners<'_> {
+    fn num_faces(&self) -> usize {
+        self.0.triangles.len()
+    }
+    fn num_vertices_of_face(&self, _: usize) -> usize {
+        3
+    }
+    fn position(&self, face: usize, vert: usize) -> [f32; 3] {
+        self.0.positions[self.vertex(face, vert)].to_array()
+    }
+    fn normal(&self, face: usize, vert: usize) -> [f32; 3] {
+        self.0.normals[self.vertex(face, vert)].to_array()
+    }
+    fn tex_coord(&self, face: usize, vert: usize) -> [f32; 2] {
+        // glTF's v runs downwards; the bitangent runs up the image.
+        let uv = self.0.uvs[self.vertex(face, vert)];
+        [uv.x, 1.0 - uv.y]
+    }
+    fn set_tangent(&mut self, space: Option<TangentSpace>, face: usize, vert: usize) {
+        let tangent = Vec4::from(space.unwrap_or_default().tangent_encoded());
+        let vertex = self.vertex(face, vert);
+        self.0.tangents[vertex] = tangent;
+    }
+}
+
+/// A camera as scene files write it.
+pub(crate) fn camera(rows: [f64; 16], fov_y_degrees: f64, size: u32) -> Camera {
+    let world_to_camera = DMat4::from_cols_array(&rows).transpose();
+    Camera { world_to_camera, fov_y: fov_y_degrees.to_radians(), width: size, height: size }
+}
+
+/// The three cameras of the scanned head's scenes, read from the scene file.
+pub(crate) fn head_views(folder: &Path) -> Vec<View> {
+    let text = std::fs::read_to_string(folder.join("lps_forest/scene.toml")).unwrap();
+    let table: toml::Table = text.parse().unwrap();
+    let number = |value: &toml::Value| value.as_float().unwrap_or_else(|| value.as_integer().unwrap() as f64);
+    (table["view"].as_array().unwrap().iter())
+        .map(|view| {
+            let rows: Vec<f64> = view["world_to_camera"].as_array().unwrap().iter().map(number).collect();
+            let size = view["width"].as_integer().unwrap() as u32;
+            View {
+                name: view["name"].as_str().unwrap().to_owned(),
+                camera: camera(rows.try_into().unwrap(), number(&view["fov_y_degrees"]), size),
+                target: None,
+            }
+        })
+        .collect()
+}
+
+/// A scene of nothing but its switches.
+pub(crate) fn bare_scene(effects: Effects) -> Scene {
+    Scene {
+        path: "test/scene.toml".into(),
+        mesh: Mesh::default(),
+        metres_per_unit: 1.0,
+        maps: Maps::default(),
+        environment: None,
+        form: Form::Corrected,
+        silhouette: Silhouette::Fragment,
+        effects,
+        params: Params::defaults(Form::Corrected),
+        views: Vec::new(),
+        fit: FitSettings { free: Vec::new(), loss: Loss::L2, free_gains: false },
+        quality: Quality::default(),
+    }
+}
+
+/// Pearson's correlation.
+pub(crate) fn correlation(a: &[f64], b: &[f64]) -> f64 {
+    let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+    let (ma, mb) = (mean(a), mean(b));
+    let sum = |f: &dyn Fn(f64, f64) -> f64| -> f64 { a.iter().zip(b).map(|(x, y)| f(x - ma, y - mb)).sum() };
+    sum(&|x, y| x * y) / (sum(&|x, _| x * x) * sum(&|_, y| y * y)).sqrt()
+}
+
+/// The value below which a share `q` of `values` lies.
+pub(crate) fn quantile(values: &[f64], q: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted[((sorted.len() - 1) as f64 * q).round() as usize]
+}

@@ -1,0 +1,92 @@
+//! What a looser budget, multisampling and 16-bit targets may change.
+
+use std::collections::BTreeSet;
+
+use skinfit::gpu::{RenderOptions, Renderer};
+use skinfit::render::antialias::Antialias;
+use skinfit::render::image::Image;
+use skinfit::shader::Budget;
+
+use super::bench::*;
+
+const SIZE: u32 = 128;
+
+#[test]
+fn the_papers_budget_stays_near_the_cpu_engine() {
+    let Some(gpu) = gpu() else { return };
+    let mut prepared = prepared(&built_in(), SURFACE, SIZE);
+    let paper = RenderOptions { budget: Budget::Paper, ..EXACT };
+    let test = on_gpu(gpu, &prepared, paper);
+    let reference = on_cpu(&mut prepared, 2);
+    let Difference { interior, .. } = Difference::new(&reference, &test, 4);
+    let (median, most) = (quantile(&interior, 0.5), quantile(&interior, 0.99));
+    println!("paper: median {median}, 99 % {most}, greatest {:?}", interior.last());
+    // Filtering hardware has 8 bits of fraction and maps have 8 bits: 2e-3 of neighbouring texels' difference.
+    // Silhouettes interpolated over the triangles of this mesh, and 16-bit targets, add as much again.
+    let why = || keep("paper", &reference, &test);
+    assert!(median < 4e-3, "{median}: {}", why());
+    assert!(most < 4e-2, "{most}: {}", why());
+    // It would be no measurement if nothing had changed.
+    assert!(median > 1e-5, "{median}");
+}
+
+#[test]
+fn a_budget_in_numbers_is_kept() {
+    let Some(gpu) = gpu() else { return };
+    let mut prepared = prepared(&built_in(), SURFACE, SIZE);
+    let reference = on_cpu(&mut prepared, 2);
+    let mut last_cost = f64::INFINITY;
+    for budget in [0.0, 0.01, 0.1] {
+        let options = RenderOptions { budget: Budget::Within(budget), ..EXACT };
+        let mut renderer = Renderer::new(gpu, content(&prepared), options).unwrap();
+        let (error, cost) = (renderer.plan().error, renderer.plan().cost);
+        assert!(error <= budget && cost <= last_cost, "{budget}: error {error}, cost {cost}");
+        last_cost = cost;
+        let test = renderer.render(&prepared.scene.views[0].camera, 1.0).unwrap().image;
+        let Difference { interior, .. } = Difference::new(&reference, &test, 4);
+        // The budget is relative to white, the difference to the image's mean, which is darker than that; half
+        // of the pixels are well within it. f32 and what is drawn into add their own.
+        let median = quantile(&interior, 0.5);
+        assert!(
+            f64::from(median) < budget + 2e-3,
+            "{budget}: {median}; {}",
+            keep("budget", &reference, &test)
+        );
+    }
+}
+
+#[test]
+fn multisampling_smooths_the_outline_and_leaves_the_inside_as_it_is() {
+    let Some(gpu) = gpu() else { return };
+    let prepared = prepared(&built_in(), SURFACE, SIZE);
+    let with = |antialias| on_gpu(gpu, &prepared, RenderOptions { antialias, ..EXACT });
+    let many = with(Antialias::Grid(8));
+    let (single, multi) = (with(Antialias::Grid(1)), with(Antialias::Msaa4));
+    let shades: BTreeSet<u32> = multi.alpha.iter().map(|a| (4.0 * a) as u32).collect();
+    assert_eq!(shades, (0..=4).collect(), "coverage is counted in quarters");
+    assert!(single.alpha.iter().all(|&a| a == 0.0 || a == 1.0));
+    let coverage =
+        |image: &Image| -> f32 { many.alpha.iter().zip(&image.alpha).map(|(a, b)| (a - b).powi(2)).sum() };
+    // Four independent samples would have a quarter of the squared error; near a straight edge the hardware's
+    // four are worth about three.
+    assert!(coverage(&multi) < 0.4 * coverage(&single), "{}", keep("msaa", &many, &multi));
+    let inside = |image: &Image| quantile(&Difference::new(&many, image, 4).interior, 0.5);
+    // Shaded once a pixel and triangle, insides are as grainy as with one sample.
+    assert!(inside(&multi) < 1.2 * inside(&single), "{}", keep("msaa", &many, &multi));
+}
+
+#[test]
+fn radiance_beyond_16_bits_is_cut_and_counted_and_none_is_lost_in_32() {
+    let Some(gpu) = gpu() else { return };
+    let mut prepared = prepared(&built_in(), SURFACE, 32);
+    prepared.scene.params.set(skinfit::model::params::Param::BaseWeight, 1e6);
+    let camera = prepared.scene.views[0].camera;
+    for (antialias, cut) in [(Antialias::Msaa4, true), (Antialias::Grid(2), false)] {
+        let options = RenderOptions { antialias, ..EXACT };
+        let frame = Renderer::new(gpu, content(&prepared), options).unwrap().render(&camera, 1.0).unwrap();
+        let brightest = frame.image.rgb.iter().flatten().fold(0.0_f32, |most, &x| most.max(x));
+        assert_eq!(frame.clipped > 0, cut, "{antialias:?}");
+        assert_eq!(brightest <= 65504.0, cut, "{antialias:?}: {brightest}");
+        assert!(frame.image.rgb.iter().flatten().all(|x| x.is_finite()));
+    }
+}

@@ -1,0 +1,179 @@
+//! An adapter, scenes, and images of both engines.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use skinfit::demo;
+use skinfit::gpu::upload::Content;
+use skinfit::gpu::{Choice, Gpu, RenderOptions, Renderer};
+use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::prepare::{PrepareOptions, Prepared, Views};
+use skinfit::render::antialias::Antialias;
+use skinfit::render::bloom::add_bloom;
+use skinfit::render::files::{ImageOptions, write_exr};
+use skinfit::render::image::Image;
+use skinfit::render::shade::Shader;
+use skinfit::samples::sample_views;
+use skinfit::shader::Budget;
+
+/// The adapter's device that most tests share; `None`, said loudly, where `SKINFIT_NO_GPU_TESTS` allows it.
+pub(super) fn gpu() -> Option<&'static Gpu> {
+    static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
+    GPU.get_or_init(|| open(&Choice::default())).as_ref()
+}
+
+/// A device of its own.
+pub(super) fn open(choice: &Choice) -> Option<Gpu> {
+    match Gpu::open(choice) {
+        Ok(gpu) => Some(gpu),
+        Err(error) if std::env::var_os("SKINFIT_NO_GPU_TESTS").is_some() => {
+            eprintln!("NOT CHECKED, as SKINFIT_NO_GPU_TESTS is set: {error}");
+            None
+        }
+        Err(error) => panic!(
+            "{error}\nThe renderer's tests need an adapter: tests/run installs a software one where it can. \
+             SKINFIT_NO_GPU_TESTS=1 leaves them out."
+        ),
+    }
+}
+
+/// What both engines draw with, unless a test says otherwise.
+pub(super) const EXACT: RenderOptions =
+    RenderOptions { antialias: Antialias::Grid(2), budget: Budget::Exact, timed: false, animated: false };
+
+/// The paper's fragment program.
+pub(super) const SURFACE: Effects = Effects::SURFACE;
+
+/// Every effect.
+pub(super) fn everything() -> Effects {
+    Effect::ALL.into_iter().collect()
+}
+
+fn cache() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics")
+}
+
+/// The built-in scene's file, made once.
+pub(super) fn built_in() -> PathBuf {
+    static SCENE: OnceLock<PathBuf> = OnceLock::new();
+    SCENE.get_or_init(|| demo::kept_scene(&cache(), Some(&cache())).unwrap()).clone()
+}
+
+/// The first view of a scene at `size` x `size` pixels.
+pub(super) fn prepared(scene: &Path, effects: Effects, size: u32) -> Prepared {
+    let options = PrepareOptions {
+        effects: Some(effects),
+        views: Views::First,
+        cache: Some(cache()),
+        ..PrepareOptions::default()
+    };
+    let mut prepared = Prepared::baked(scene, &options).unwrap();
+    let camera = &mut prepared.scene.views[0].camera;
+    (camera.width, camera.height) = (size, size);
+    prepared
+}
+
+/// The scene read another way.
+pub(super) fn read_as(mut prepared: Prepared, form: Form, silhouette: Silhouette) -> Prepared {
+    (prepared.scene.form, prepared.scene.silhouette) = (form, silhouette);
+    prepared
+}
+
+/// What a renderer needs of a scene.
+pub(super) fn content(prepared: &Prepared) -> Content<'_> {
+    Content {
+        scene: &prepared.scene,
+        illumination: &prepared.illumination,
+        occlusion: prepared.occlusion.as_ref(),
+        params: &prepared.scene.params,
+    }
+}
+
+/// The CPU engine's image, with `n` x `n` samples a pixel.
+pub(super) fn on_cpu(prepared: &mut Prepared, n: u32) -> Image {
+    prepared.scene.quality.samples_per_axis = n;
+    let posed = prepared.scene.mesh.pose();
+    let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
+    let mut shaded = shader.shade(&samples[0], &prepared.scene.views[0].camera, prepared.gains[0]);
+    if prepared.scene.effects.has(Effect::Bloom) {
+        add_bloom(&mut shaded.image, &shaded.haze);
+    }
+    shaded.image
+}
+
+/// The adapter's image.
+pub(super) fn on_gpu(gpu: &Gpu, prepared: &Prepared, options: RenderOptions) -> Image {
+    let mut renderer = Renderer::new(gpu, content(prepared), options).unwrap();
+    renderer.render(&prepared.scene.views[0].camera, prepared.gains[0]).unwrap().image
+}
+
+/// How two images differ, by pixel: interior ones, which both cover wholly, and edge ones, which only part
+/// of the samples cover. Errors are the greatest of the channels, relative to the image's mean radiance.
+pub(super) struct Difference {
+    /// Sorted.
+    pub(super) interior: Vec<f32>,
+    /// Sorted: of edge pixels that both cover equally.
+    pub(super) edge: Vec<f32>,
+    /// Pixels whose coverage differs.
+    pub(super) uncovered: usize,
+    /// The greatest error of pixels whose coverage differs, beyond what one sample is worth.
+    pub(super) beyond_a_sample: f32,
+}
+
+impl Difference {
+    /// Of `test` from `reference`, with `samples` samples a pixel.
+    pub(super) fn new(reference: &Image, test: &Image, samples: u32) -> Self {
+        let covered: Vec<usize> = (0..reference.rgb.len()).filter(|&i| reference.alpha[i] > 0.0).collect();
+        let sum: f32 =
+            covered.iter().map(|&i| reference.rgb[i].iter().map(|x| x.abs()).sum::<f32>() / 3.0).sum();
+        let mean = sum / covered.len() as f32;
+        let brightest = reference.rgb.iter().flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
+        let (mut interior, mut edge) = (Vec::new(), Vec::new());
+        let (mut uncovered, mut beyond_a_sample) = (0, 0.0_f32);
+        for i in 0..reference.rgb.len() {
+            let (a, b) = (reference.alpha[i], test.alpha[i]);
+            let error = (0..3).map(|c| (reference.rgb[i][c] - test.rgb[i][c]).abs()).fold(0.0, f32::max);
+            assert!(error.is_finite(), "pixel {i}: {:?} is not {:?}", test.rgb[i], reference.rgb[i]);
+            if a == 1.0 && b == 1.0 {
+                interior.push(error / mean);
+            } else if (a - b).abs() > 0.5 / samples as f32 {
+                uncovered += 1;
+                let worth = (a - b).abs() * brightest;
+                beyond_a_sample = beyond_a_sample.max((error - worth) / mean);
+            } else if a > 0.0 {
+                edge.push(error / mean);
+            }
+        }
+        interior.sort_by(f32::total_cmp);
+        edge.sort_by(f32::total_cmp);
+        Self { interior, edge, uncovered, beyond_a_sample }
+    }
+}
+
+/// The error that a share of the pixels stays below.
+pub(super) fn quantile(sorted: &[f32], share: f64) -> f32 {
+    let at = ((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1));
+    sorted.get(at).copied().unwrap_or(0.0)
+}
+
+/// Leave both images and a FLIP map of a failed comparison under `target/parity`; returns where.
+pub(super) fn keep(name: &str, reference: &Image, test: &Image) -> String {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("../parity");
+    let seen = |image: &Image| -> Vec<[f64; 3]> {
+        image
+            .over(0.05)
+            .map(|rgb| rgb.map(|x| skinfit::render::tonemap::srgb_encode(x.clamp(0.0, 1.0)).into()))
+            .collect()
+    };
+    let map = skinfit::report::flip::flip(&seen(reference), &seen(test), reference.width);
+    let map = Image {
+        rgb: map.iter().map(|&x| [x; 3]).collect(),
+        alpha: vec![1.0; map.len()],
+        ..reference.clone()
+    };
+    for (what, image) in [("cpu", reference), ("gpu", test), ("flip", &map)] {
+        write_exr(&folder.join(format!("{name}_{what}.exr")), image, &ImageOptions::default()).unwrap();
+    }
+    format!("see {} in {}", format_args!("{name}_*.exr"), folder.display())
+}

@@ -1,0 +1,241 @@
+//! Scene files and what they name: what is read, and as what.
+
+use std::path::Path;
+
+use image::{ImageFormat, Rgb, Rgba, RgbaImage};
+use serde_json::{Value, json};
+use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::params::{Column, Param};
+use skinfit::scene::{LoadOptions, Loss, Scene};
+
+use super::common;
+use super::desk::{Desk, base64, encode, exr, png, quad, quad_parts, tampered};
+
+#[test]
+fn the_small_scene_is_read_as_it_stands() {
+    let desk = Desk::new();
+    let (scene, warnings) = desk.load().unwrap();
+    assert_eq!(warnings, []);
+    assert_eq!((scene.form, scene.silhouette), (Form::Corrected, Silhouette::Fragment));
+    assert_eq!(scene.effects, Effects::SURFACE);
+    assert_eq!(scene.fit.loss, Loss::RelativeL2);
+    assert_eq!(scene.fit.free.len(), 7);
+    assert_eq!((scene.mesh.triangles.len(), scene.mesh.tangents.len()), (2, 4));
+    // u runs along +X and green up along +Y: a right-handed frame.
+    assert_eq!(scene.mesh.tangents[0].to_array(), [1.0, 0.0, 0.0, 1.0]);
+    let color = scene.maps.color.unwrap().texels[0];
+    // sRGB 200 and 100 of 255, by the standard's formula in double precision.
+    assert!((color[0] - 0.577_580_4).abs() < 1e-6 && (color[1] - 0.127_437_68).abs() < 1e-6, "{color:?}");
+    assert_eq!(scene.maps.normal.unwrap().texels[0][1], (64.0_f64 / 255.0) as f32);
+    assert_eq!(scene.maps.specular.unwrap().texels[0], [0.2]);
+    let target = scene.views[0].target.as_ref().unwrap();
+    assert_eq!((target.rgb[3], target.clipped_at), ([0.25; 3], None));
+    assert_eq!(target.alpha.as_ref().unwrap()[3], 0.25);
+}
+
+#[test]
+fn keys_of_a_scene_do_what_they_say() {
+    let desk = Desk::new();
+    let edit = |from: &str, to: &str| desk.edited(from, to).unwrap().0;
+    let flipped = edit("[maps]", "[maps]\nnormal_y = \"down\"").maps.normal.unwrap();
+    assert_eq!(flipped.texels[0][1], 1.0 - (64.0_f64 / 255.0) as f32);
+    let listing = edit("[model]", "[model]\nform = \"listing\"");
+    assert_eq!((listing.form, listing.silhouette), (Form::Listing, Silhouette::Vertex));
+    assert_eq!(listing.params.scalar(Param::BaseWeight), 0.0);
+    let triple = edit("[model.params]", "[model.params]\nhilite = [0.1, 0.2, 0.3]\n");
+    assert_eq!(triple.params.rgb(Param::Hilite), [0.1, 0.2, 0.3]);
+    assert!(triple.fit.free.contains(&Column::per_channel(Param::Hilite)[2]));
+    let free = edit(
+        "[fit]",
+        "[fit]\nfree = [\"base_weight\", \"hilite\"]\nper_channel = [\"base_weight\"]\ngains = true\nloss = \"huber\"",
+    );
+    assert_eq!((free.fit.free.len(), free.fit.free_gains, free.fit.loss), (4, true, Loss::Huber));
+    assert_eq!(edit("[quality]", "[quality]\nsamples_per_axis = 3").quality.samples_per_axis, 3);
+    let masked = edit("[fit]", "mask = \"mask.png\"\n[fit]");
+    assert_eq!(masked.views[0].target.as_ref().unwrap().mask.as_ref().unwrap()[0], 1.0);
+}
+
+#[test]
+fn only_what_the_effects_ask_for_is_read() {
+    let desk = Desk::new();
+    for name in ["color.png", "normal.png", "data.png", "target.exr"] {
+        desk.write(name, b"nothing that could be read");
+    }
+    let options =
+        LoadOptions { effects: Some(Effects::of(&[Effect::Reflection])), targets: false, time: None };
+    let (scene, _) = Scene::load(&desk.path("scene.toml"), &options).unwrap();
+    assert!(scene.mesh.uvs.is_empty() && scene.mesh.tangents.is_empty() && scene.views[0].target.is_none());
+    std::fs::remove_file(desk.path("env.exr")).unwrap();
+    let options = LoadOptions { effects: Some(Effects::of(&[Effect::KeyLight])), targets: false, time: None };
+    desk.write("color.png", &png(1, 1, [1, 2, 3]));
+    assert!(Scene::load(&desk.path("scene.toml"), &options).unwrap().0.environment.is_none());
+}
+
+#[test]
+fn eight_bit_targets_are_decoded_premultiplied_and_known_to_clip() {
+    let desk = Desk::new();
+    desk.write("target.exr", &encode(RgbaImage::from_pixel(4, 4, Rgba([255, 10, 0, 51])), ImageFormat::Png));
+    let (scene, _) = desk.load().unwrap();
+    let target = scene.views[0].target.as_ref().unwrap();
+    assert_eq!((target.rgb[0][0], target.alpha.as_ref().unwrap()[0]), (0.2, 0.2));
+    let clip = target.clipped_at.unwrap();
+    // Half a code on the linear toe; and half a code below white, where the slope is 2.4 / 1.055.
+    assert!((clip.low - 0.5 / 255.0 / 12.92).abs() < 1e-9);
+    assert!((clip.high - (1.0 - 2.4 / 1.055 * 0.5 / 255.0)).abs() < 2e-5, "{}", clip.high);
+}
+
+#[test]
+fn layers_crops_and_grey_images_are_found() {
+    let desk = Desk::new();
+    desk.write("env.exr", &exr(8, 4, &["depth.Z", "beauty.R", "beauty.G", "beauty.B"], |c, _| c as f32));
+    assert_eq!(desk.load().unwrap().0.environment.unwrap().panorama.texels[0], [1.0, 2.0, 3.0]);
+    desk.write("env.exr", &exr(8, 4, &["Y"], |_, i| i as f32));
+    assert_eq!(desk.load().unwrap().0.environment.unwrap().panorama.texels[9], [9.0; 3]);
+    let hdr =
+        image::DynamicImage::ImageRgb32F(image::ImageBuffer::from_pixel(8, 4, Rgb([65504.0, 1.0, 0.5])));
+    desk.write("env.exr", &encode(hdr, ImageFormat::Hdr));
+    let texel = desk.load().unwrap().0.environment.unwrap().panorama.texels[0];
+    // RGBE keeps 8 bits of the largest channel: 1/256 of it at most.
+    assert!((texel[0] - 65504.0).abs() <= 256.0, "{texel:?}");
+    let deep = image::DynamicImage::ImageLuma16(image::ImageBuffer::from_pixel(4, 4, image::Luma([13107])));
+    desk.write("data.png", &encode(deep, ImageFormat::Png));
+    assert_eq!(desk.load().unwrap().0.maps.specular.unwrap().texels[0], [0.2]);
+}
+
+#[test]
+fn dwab_panoramas_decode_to_what_another_program_made_of_them() {
+    let Some(data) = common::data() else { return };
+    let desk = Desk::new();
+    let read = |file: &Path| {
+        let (scene, warnings) = desk.edited("\"env.exr\"", &format!("{file:?}")).unwrap();
+        (scene.environment.unwrap().panorama, warnings)
+    };
+    let (fine, _) = read(&data.join("env/source_dwab/studio_blender_dwab_f32.exr"));
+    let (half, _) = read(&data.join("env/studio.exr"));
+    assert_eq!((fine.width, fine.height), (2 * half.width, 2 * half.height));
+    for (i, want) in half.texels.iter().enumerate() {
+        let (x, y) = (2 * (i % half.width), 2 * (i / half.width));
+        for c in 0..3 {
+            let at = |dx: usize, dy: usize| f64::from(fine.texels[(y + dy) * fine.width + x + dx][c]);
+            let mean = (at(0, 0) + at(1, 0) + at(0, 1) + at(1, 1)) / 4.0;
+            // The copy was rounded to half floats (2^-11), and clamped at 0 after its mean.
+            let bound = 5e-4 * mean.abs() + 2e-3;
+            assert!((mean - f64::from(want[c])).abs() <= bound, "texel {i} channel {c}: {mean} {}", want[c]);
+        }
+    }
+    let (sunset, warnings) = read(&data.join("env/source_dwab/sunset_pmndrs_dwab_f16.exr"));
+    assert!(sunset.texels.iter().flatten().all(|&v| v >= 0.0));
+    assert!(warnings.iter().any(|w| w.message.contains("negative radiance")), "{warnings:?}");
+}
+
+#[test]
+fn the_real_scenes_load_without_a_warning() {
+    let Some(data) = common::data() else { return };
+    for name in ["lps_forest", "lps_sunrise"] {
+        let start = std::time::Instant::now();
+        let (scene, warnings) =
+            Scene::load(&data.join(name).join("scene.toml"), &LoadOptions::default()).unwrap();
+        println!("{name}: {:?}, {} vertices", start.elapsed(), scene.mesh.positions.len());
+        assert_eq!(warnings, []);
+        assert_eq!((scene.views.len(), scene.mesh.triangles.len(), scene.fit.free.len()), (3, 17684, 9));
+        let (mut along, mut corners) = (0, 0);
+        for triangle in &scene.mesh.triangles {
+            let [a, b, c] = triangle.map(|v| scene.mesh.uvs[v as usize]);
+            let det = (b - a).perp_dot(c - a);
+            if det == 0.0 {
+                continue;
+            }
+            let [p, q, r] = triangle.map(|v| scene.mesh.positions[v as usize]);
+            let by_u = ((q - p) * (c - a).y - (r - p) * (b - a).y) / det;
+            for tangent in triangle.map(|v| scene.mesh.tangents[v as usize]) {
+                // v runs down the image, so an image seen unmirrored from outside has det < 0.
+                assert_eq!(tangent.w, -det.signum());
+                corners += 1;
+                along += usize::from(tangent.truncate().dot(by_u) > 0.0);
+            }
+        }
+        // Corners are averaged over a smooth group, so a few of them lean the other way.
+        assert!(along as f64 > 0.999 * f64::from(corners), "{along} of {corners}");
+    }
+}
+
+#[test]
+fn strips_fans_sparse_and_quantised_accessors_and_mirrored_nodes_are_read() {
+    let desk = Desk::new();
+    let mesh = |bytes: &[u8]| {
+        desk.write("quad.glb", bytes);
+        let (scene, warnings) = desk.load().unwrap();
+        assert_eq!(warnings, []);
+        scene.mesh
+    };
+    let plain = mesh(&quad());
+    let order = |json: &mut Value, mode: u32| {
+        json["meshes"][0]["primitives"][0]["mode"] = json!(mode);
+        json["accessors"][5]["count"] = json!(4);
+    };
+    let put = |bin: &mut Vec<u8>, indices: [u16; 4]| {
+        for (i, index) in indices.into_iter().enumerate() {
+            bin[240 + 2 * i..242 + 2 * i].copy_from_slice(&index.to_le_bytes());
+        }
+    };
+    let facing = |mesh: &skinfit::scene::mesh::Mesh| {
+        mesh.triangles.iter().all(|t| {
+            let [a, b, c] = t.map(|v| mesh.positions[v as usize]);
+            (b - a).cross(c - a).z > 0.0
+        })
+    };
+    let strip = mesh(&tampered(|json, bin| {
+        order(json, 5);
+        put(bin, [0, 1, 3, 2]);
+    }));
+    let fan = mesh(&tampered(|json, bin| {
+        order(json, 6);
+        put(bin, [0, 1, 2, 3]);
+    }));
+    for mesh in [&strip, &fan] {
+        assert!(mesh.triangles.len() == 2 && facing(mesh), "{:?}", mesh.triangles);
+        assert_eq!(mesh.positions, plain.positions);
+    }
+    let sparse = mesh(&tampered(|json, bin| {
+        bin[252..254].copy_from_slice(&2_u16.to_le_bytes());
+        json["accessors"][0]["sparse"] = json!({
+            "count": 1,
+            "indices": {"bufferView": 6, "componentType": 5123},
+            "values": {"bufferView": 4},
+        });
+    }));
+    assert_eq!(sparse.positions[2].to_array(), [0.0, 0.0, 1.0]);
+    assert_eq!(sparse.positions[1], plain.positions[1]);
+    let quantised = mesh(&tampered(|json, bin| {
+        json["extensionsRequired"] = json!(["KHR_mesh_quantization"]);
+        json["accessors"][2] =
+            json!({"bufferView": 6, "componentType": 5121, "normalized": true, "count": 4, "type": "VEC2"});
+        json["bufferViews"][6]["byteStride"] = json!(4);
+        bin[252..268].copy_from_slice(&[0, 255, 0, 0, 255, 255, 0, 0, 255, 0, 0, 0, 0, 0, 0, 0]);
+    }));
+    assert_eq!(quantised.uvs, plain.uvs);
+    let mirrored = mesh(&tampered(|json, _| json["nodes"][0]["scale"] = json!([-1, 1, 1])));
+    assert!(facing(&mirrored) && mirrored.normals == plain.normals);
+    assert_eq!(mirrored.tangents[0].to_array(), [-1.0, 0.0, 0.0, -1.0]);
+    // Half of the quad's v mirrored at a shared vertex: it is split, so that each side has its frame.
+    let bare = mesh(&tampered(|json, _| {
+        json["meshes"][0]["primitives"][0]["attributes"].as_object_mut().unwrap().remove("NORMAL");
+    }));
+    assert_eq!(bare.normals, plain.normals);
+    let seam = mesh(&tampered(|_, bin| bin[120..124].copy_from_slice(&2_f32.to_le_bytes())));
+    println!("{:?} {:?}", seam.tangents, seam.triangles);
+    assert!(seam.positions.len() == seam.tangents.len() && seam.positions.len() == seam.uvs.len());
+}
+
+#[test]
+fn gltf_with_data_uris_and_files_beside_it_reads_as_the_glb_does() {
+    let desk = Desk::new();
+    let want = desk.load().unwrap().0.mesh;
+    let (mut json, bin) = quad_parts();
+    desk.write("a b.bin", &bin);
+    for uri in ["a%20b.bin".to_owned(), format!("data:application/octet-stream;base64,{}", base64(&bin))] {
+        json["buffers"][0]["uri"] = json!(uri);
+        desk.write("quad.glb", json.to_string().as_bytes());
+        assert_eq!(desk.load().unwrap().0.mesh, want, "{uri}");
+    }
+}

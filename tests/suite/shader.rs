@@ -1,0 +1,206 @@
+//! The shader planner: every plan is a valid module, the cheapest one, and asks for no more than its effects.
+
+use std::collections::BTreeSet;
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use rayon::prelude::*;
+use skinfit::model::compose::TermName;
+use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::evaluate::Setup;
+use skinfit::shader::facts::MapFacts;
+use skinfit::shader::{Budget, Facts, Plan, Resource, Source, plan};
+
+/// The effects that the fragment stage knows; morphs and bones are facts of their own.
+const FRAGMENT_EFFECTS: [Effect; 10] = [
+    Effect::Diffuse,
+    Effect::NormalMap,
+    Effect::Occlusion,
+    Effect::Rim,
+    Effect::SideSpecular,
+    Effect::Hilite,
+    Effect::Reflection,
+    Effect::Haze,
+    Effect::Bloom,
+    Effect::KeyLight,
+];
+
+fn effect_sets() -> impl Iterator<Item = Effects> {
+    (0..1_u32 << FRAGMENT_EFFECTS.len()).map(|bits| {
+        FRAGMENT_EFFECTS
+            .into_iter()
+            .enumerate()
+            .filter(|(i, _)| bits & (1 << i) != 0)
+            .map(|(_, e)| e)
+            .collect()
+    })
+}
+
+fn setups() -> Vec<Setup> {
+    let all = effect_sets().flat_map(|effects| {
+        Form::ALL.into_iter().flat_map(move |form| {
+            Silhouette::ALL.into_iter().map(move |silhouette| Setup { form, silhouette, effects })
+        })
+    });
+    all.collect()
+}
+
+fn must_plan(facts: &Facts) -> Plan {
+    plan(facts).unwrap_or_else(|error| panic!("{facts:?}: {error}"))
+}
+
+fn complain(plan: &Plan, error: &str) -> ! {
+    panic!("{:?}\n{error}\n{}", plan.facts, plan.wgsl)
+}
+
+/// Panics with the module's text where naga finds fault with it.
+fn validate(plan: &Plan) {
+    let module = naga::front::wgsl::parse_str(&plan.wgsl)
+        .unwrap_or_else(|error| complain(plan, &error.emit_to_string(&plan.wgsl)));
+    let capabilities = if plan.uses_f16() { Capabilities::SHADER_FLOAT16 } else { Capabilities::empty() };
+    Validator::new(ValidationFlags::all(), capabilities)
+        .validate(&module)
+        .unwrap_or_else(|error| complain(plan, &error.emit_to_string(&plan.wgsl)));
+}
+
+/// Ways in which a scene may differ beside its setup.
+fn variants() -> Vec<Facts> {
+    let exact = Facts::default();
+    let paper = Facts { budget: Budget::Paper, ..exact };
+    let no_maps = MapFacts::default();
+    vec![
+        exact,
+        paper,
+        Facts { source: Source::Samples, ..exact },
+        Facts { maps: no_maps, turned: true, ..exact },
+        Facts { morphs: 3, bones: true, square_rim: true, ..exact },
+        Facts {
+            maps: MapFacts { color_specular: false, normal_attenuator: false, ..exact.maps },
+            bones: true,
+            ..exact
+        },
+        Facts { f16: true, morphs: 1, turned: true, ..paper },
+        Facts { source: Source::Samples, turned: true, square_rim: true, ..paper },
+    ]
+}
+
+#[test]
+fn shaders_of_every_effect_set_form_and_silhouette_validate_in_every_kind_of_scene() {
+    let variants = variants();
+    let plans: Vec<Plan> = setups()
+        .into_par_iter()
+        .flat_map_iter(|setup| {
+            variants.iter().map(move |facts| must_plan(&Facts { setup, ..*facts })).collect::<Vec<_>>()
+        })
+        .collect();
+    let mut seen = BTreeSet::new();
+    let distinct: Vec<&Plan> = plans.iter().filter(|plan| seen.insert(plan.wgsl.as_str())).collect();
+    distinct.par_iter().for_each(|plan| validate(plan));
+    // Fewer would mean that effects no longer specialise the shader.
+    assert!(distinct.len() > 1000, "{} of {}", distinct.len(), plans.len());
+}
+
+#[test]
+fn shaders_of_every_combination_of_facts_validate() {
+    let setup = Setup {
+        form: Form::Corrected,
+        silhouette: Silhouette::Fragment,
+        effects: Effects::SURFACE.with(Effect::Haze).with(Effect::KeyLight),
+    };
+    let bit = |bits: u32, i: u32| bits & (1 << i) != 0;
+    let facts = |bits: u32, budget| Facts {
+        setup,
+        source: Source::Raster,
+        maps: MapFacts {
+            color: bit(bits, 0),
+            normal: bit(bits, 1),
+            specular: bit(bits, 2),
+            attenuator: bit(bits, 3),
+            color_specular: bit(bits, 0) && bit(bits, 2),
+            normal_attenuator: bit(bits, 1) && bit(bits, 3),
+        },
+        morphs: if bit(bits, 4) { 2 } else { 0 },
+        bones: bit(bits, 5),
+        turned: bit(bits, 6),
+        square_rim: bit(bits, 7),
+        f16: bit(bits, 8),
+        tessellation: 0.003,
+        budget,
+        output: None,
+    };
+    (0..1_u32 << 9).into_par_iter().for_each(|bits| {
+        for budget in [Budget::Exact, Budget::Paper, Budget::Within(0.01)] {
+            validate(&must_plan(&facts(bits, budget)));
+        }
+    });
+}
+
+#[test]
+fn each_term_alone_validates_and_costs_less_than_the_whole() {
+    let effects = Effects::SURFACE.with(Effect::KeyLight);
+    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects };
+    let whole = must_plan(&Facts { setup, ..Facts::default() });
+    for term in TermName::ALL {
+        let alone = must_plan(&Facts { setup, output: Some(term), ..Facts::default() });
+        validate(&alone);
+        assert!(alone.cost < whole.cost, "{}: {} of {}", term.name(), alone.cost, whole.cost);
+    }
+}
+
+#[test]
+fn turning_an_effect_off_never_costs_more() {
+    let paper = Facts { budget: Budget::Paper, f16: true, ..Facts::default() };
+    setups().into_par_iter().for_each(|setup| {
+        for facts in [Facts::default(), paper] {
+            let all = must_plan(&Facts { setup, ..facts });
+            for effect in setup.effects.iter() {
+                let less = Setup { effects: setup.effects.without(effect), ..setup };
+                let without = must_plan(&Facts { setup: less, ..facts });
+                let counts = |plan: &Plan| {
+                    [plan.steps.len(), plan.resources.len(), plan.attributes.len(), plan.constants.len()]
+                };
+                let fewer = counts(&without).iter().zip(counts(&all)).all(|(a, b)| *a <= b);
+                let saved = without.cost <= all.cost && fewer;
+                assert!(saved, "{facts:?}\n{setup:?} without {}", effect.name());
+            }
+        }
+    });
+}
+
+#[test]
+fn exact_plans_bring_no_error_and_budgets_are_kept() {
+    let coarse = Facts { tessellation: 0.02, ..Facts::default() };
+    assert_eq!(must_plan(&coarse).error, 0.0);
+    let mut last = f64::INFINITY;
+    for most in [0.0, 0.003, 0.005, 0.01, 0.02, 0.03, 0.1] {
+        let plan = must_plan(&Facts { budget: Budget::Within(most), ..coarse });
+        assert!(plan.error <= most + 1e-9, "{most}: {}", plan.error);
+        assert!(plan.cost <= last, "a larger budget costs more: {most}");
+        last = plan.cost;
+    }
+    let paper = must_plan(&Facts { budget: Budget::Paper, ..coarse });
+    assert!(paper.resources.contains(&Resource::SpecularCube) && paper.cost <= last);
+}
+
+#[test]
+fn the_silhouette_is_interpolated_only_where_the_mesh_is_fine_enough() {
+    // Where nothing else asks for V at the fragment; elsewhere there is nothing to save.
+    let effects = Effects::of(&[Effect::Diffuse, Effect::Rim]);
+    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects };
+    let chosen = |tessellation: f64| {
+        let facts = Facts { setup, tessellation, budget: Budget::Within(1e-3), ..Facts::default() };
+        must_plan(&facts).steps.iter().any(|step| step.rule.name == "silhouette_approximated")
+    };
+    assert!(chosen(5e-4) && !chosen(2e-3));
+}
+
+#[test]
+fn maps_of_one_size_are_packed_when_both_are_asked_for() {
+    let with = |effects: &[Effect]| {
+        let setup =
+            Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: Effects::of(effects) };
+        must_plan(&Facts { setup, ..Facts::default() }).resources
+    };
+    assert!(with(&[Effect::Diffuse, Effect::SideSpecular]).contains(&Resource::ColorSpecularTexels));
+    assert!(with(&[Effect::Diffuse]).contains(&Resource::ColorTexels));
+    assert!(with(&[Effect::SideSpecular]).contains(&Resource::SpecularTexels));
+}
