@@ -1,5 +1,7 @@
 //! Images from the device.
 
+use std::time::Duration;
+
 use exr::prelude::f16;
 use wgpu::{
     Buffer, BufferDescriptor, BufferSlice, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder,
@@ -73,15 +75,20 @@ impl Copy {
     }
 }
 
+/// How long a mapping that the device has finished may take to be told of.
+const TOLD: Duration = Duration::from_secs(60);
+
 /// Wait until a buffer's content can be read.
-fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
+pub(super) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
     let (send, received) = std::sync::mpsc::channel();
     slice.map_async(MapMode::Read, move |result| {
-        // The receiver lives until it has the answer.
+        // The receiver may have given up.
         let _ = send.send(result);
     });
     gpu.wait()?;
-    match received.try_recv() {
+    // Where threads share the device, another one's poll may have taken the word of this mapping, and tell of
+    // it only after this one's has returned.
+    match received.recv_timeout(TOLD) {
         Ok(Ok(())) => Ok(()),
         Ok(Err(error)) => Err(gpu.lost(&error.to_string())),
         Err(_) => Err(gpu.lost("what was computed never came back")),

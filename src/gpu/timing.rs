@@ -1,12 +1,13 @@
 //! GPU time by pass, from the adapter's timestamps.
 
 use wgpu::{
-    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, MapMode, QUERY_SIZE, QuerySet,
-    QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
+    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, QUERY_SIZE, QuerySet, QuerySetDescriptor,
+    QueryType, RenderPassTimestampWrites,
 };
 
 use super::device::Gpu;
 use super::error::GpuError;
+use super::readback::map;
 
 /// The passes of one tile.
 const MOST_PASSES: u32 = 8;
@@ -78,8 +79,7 @@ impl Timer {
         let passes = std::mem::take(&mut self.passes);
         let Some((_, _, read)) = &self.queries else { return Ok(()) };
         let slice = read.slice(..u64::from(2 * passes.len() as u32 * QUERY_SIZE));
-        slice.map_async(MapMode::Read, |_| {});
-        gpu.wait()?;
+        map(gpu, &slice)?;
         {
             let view = slice.get_mapped_range().map_err(|error| gpu.lost(&error.to_string()))?;
             let period = f64::from(gpu.queue.get_timestamp_period());
