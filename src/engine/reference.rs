@@ -1,0 +1,224 @@
+//! Normal equations in f64, one sample after another and without a shortcut: what the engines are held
+//! against. Some hundred times slower than they are.
+
+use rayon::prelude::*;
+
+use super::residual::weighted_residual;
+use super::view::ObservedView;
+use super::{NormalEquations, Objective, Point, Unknown};
+use crate::engine::cpu::Illumination;
+use crate::model::cube::Cube;
+use crate::model::evaluate::{Setup, derivative, shade};
+use crate::model::fragment::Fragment;
+use crate::model::lights::{Cubes, Lights};
+use crate::model::params::{Param, Params};
+use crate::model::vector::V3;
+use crate::samples::LANES;
+use crate::scene::Loss;
+
+/// Pixels of a unit of work; a fixed number, so that sums do not depend on threads.
+const CHUNK: usize = 64 * LANES;
+
+/// The plain f64 objective over views.
+#[derive(Debug)]
+pub struct Reference<'a> {
+    setup: Setup,
+    illumination: &'a Illumination,
+    views: &'a [ObservedView],
+    loss: Loss,
+    unknowns: Vec<Unknown>,
+}
+
+/// Cubes in f64, at one exponent.
+struct Wide {
+    irradiance: Option<Cube<f64>>,
+    specular: Option<Cube<f64>>,
+    lobe_slope: Option<Cube<f64>>,
+    hilite: Option<Cube<f64>>,
+}
+
+/// Value and columns of one pixel's four channels, the gain not applied.
+pub type PixelColumns = [(f64, Vec<f64>); 4];
+
+impl<'a> Reference<'a> {
+    /// Of the views, for the unknowns.
+    #[must_use]
+    pub fn new(
+        setup: Setup,
+        illumination: &'a Illumination,
+        views: &'a [ObservedView],
+        loss: Loss,
+        unknowns: &[Unknown],
+    ) -> Self {
+        Self { setup, illumination, views, loss, unknowns: unknowns.to_vec() }
+    }
+
+    fn cubes(&self, exponent: f64) -> Wide {
+        let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(f64::from));
+        let lobe = self.illumination.lobes.as_ref().map(|stack| stack.at(exponent));
+        Wide {
+            irradiance: self.illumination.irradiance.as_ref().map(wide),
+            specular: lobe.as_ref().map(|(cube, _)| wide(cube)),
+            lobe_slope: lobe.as_ref().map(|(_, slope)| wide(slope)),
+            hilite: self.illumination.hilite.as_ref().map(wide),
+        }
+    }
+
+    fn lights<'c>(&self, cubes: &'c Wide, params: &Params) -> Lights<'c, f64> {
+        let Wide { irradiance, specular, lobe_slope, hilite } = cubes;
+        let cubes = Cubes {
+            irradiance: irradiance.as_ref(),
+            specular: specular.as_ref(),
+            lobe_slope: lobe_slope.as_ref(),
+            hilite: hilite.as_ref(),
+        };
+        Lights::new(self.setup, params, cubes, true, 0.0)
+    }
+
+    /// Value and columns of one pixel slot of a view: the means over its samples.
+    #[must_use]
+    pub fn pixel(&self, view: usize, slot: usize, params: &Params) -> PixelColumns {
+        let cubes = self.cubes(params.scalar(Param::SpecularLobe));
+        self.pixel_in(&self.lights(&cubes, params), &self.views[view], slot, params)
+    }
+
+    fn pixel_in(
+        &self,
+        lights: &Lights<'_, f64>,
+        view: &ObservedView,
+        slot: usize,
+        params: &Params,
+    ) -> PixelColumns {
+        let mut out: PixelColumns = std::array::from_fn(|_| (0.0, vec![0.0; self.unknowns.len()]));
+        let starts = &view.samples.group_start;
+        for record in starts[slot / LANES]..starts[slot / LANES + 1] {
+            let at = record as usize * LANES + slot % LANES;
+            let f = fragment(view, at);
+            let share = view.samples.weight.get(at).map_or(1.0, |&w| f64::from(w));
+            let value = shade(self.setup, lights, &f, params);
+            (0..4).for_each(|c| out[c].0 += share * value[c]);
+            for (k, unknown) in self.unknowns.iter().enumerate() {
+                let Unknown::Param(column) = unknown else { continue };
+                if !column.param.asked_for(self.setup.effects) {
+                    continue;
+                }
+                let slope = derivative(self.setup, lights, &f, params, column.param);
+                for c in 0..4 {
+                    if c == 3 || column.channels.includes(c) {
+                        out[c].1[k] += share * slope[c];
+                    }
+                }
+            }
+        }
+        out
+    }
+
+    /// The sums over some of a view's pixels; the loss is not yet divided by the weight.
+    fn sums(
+        &self,
+        view: usize,
+        slots: std::ops::Range<usize>,
+        lights: &Lights<'_, f64>,
+        point: &Point,
+    ) -> NormalEquations {
+        let (k, observed, gain) = (self.unknowns.len(), &self.views[view], point.gains[view]);
+        let mut sums = empty(k);
+        for slot in slots {
+            let pixel = self.pixel_in(lights, observed, slot, &point.params);
+            let weight = observed.weight.get(slot).map_or(1.0, |&w| f64::from(w));
+            for (c, (value, mut row)) in pixel.into_iter().enumerate() {
+                let Some(&target) = observed.target[c].get(slot) else { continue };
+                row.iter_mut().for_each(|x| *x *= gain);
+                if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(view)) {
+                    row[g] = value;
+                }
+                let r = weighted_residual(self.loss, observed.clip, gain * value, f64::from(target), weight);
+                sums.loss += r.loss;
+                sums.residual += r.residual * r.residual;
+                sums.weight += weight;
+                sums.count += u64::from(weight > 0.0);
+                for a in 0..k {
+                    sums.jtr[a] += r.scale * row[a] * r.residual;
+                    for b in 0..k {
+                        sums.jtj[a * k + b] += r.scale * row[a] * r.scale * row[b];
+                    }
+                }
+            }
+        }
+        sums
+    }
+}
+
+impl Objective for Reference<'_> {
+    fn unknowns(&self) -> &[Unknown] {
+        &self.unknowns
+    }
+
+    fn normal_equations(&self, point: &Point) -> NormalEquations {
+        let cubes = self.cubes(point.params.scalar(Param::SpecularLobe));
+        let lights = self.lights(&cubes, &point.params);
+        let mut total = empty(self.unknowns.len());
+        for (index, view) in self.views.iter().enumerate() {
+            let slots = view.samples.groups() * LANES;
+            let chunks: Vec<NormalEquations> = (0..slots.div_ceil(CHUNK))
+                .into_par_iter()
+                .map(|chunk| self.sums(index, chunk * CHUNK..slots.min((chunk + 1) * CHUNK), &lights, point))
+                .collect();
+            chunks.iter().for_each(|chunk| add(&mut total, chunk));
+        }
+        if total.weight > 0.0 {
+            total.loss /= total.weight;
+        }
+        total
+    }
+
+    fn loss(&self, point: &Point) -> f64 {
+        self.normal_equations(point).loss
+    }
+
+    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
+        let sums = self.normal_equations(point);
+        (sums.loss, sums.jtr.iter().map(|x| 2.0 * x / sums.weight).collect())
+    }
+}
+
+fn empty(k: usize) -> NormalEquations {
+    NormalEquations {
+        loss: 0.0,
+        residual: 0.0,
+        weight: 0.0,
+        count: 0,
+        jtr: vec![0.0; k],
+        jtj: vec![0.0; k * k],
+    }
+}
+
+fn add(total: &mut NormalEquations, part: &NormalEquations) {
+    total.loss += part.loss;
+    total.residual += part.residual;
+    total.weight += part.weight;
+    total.count += part.count;
+    total.jtr.iter_mut().zip(&part.jtr).for_each(|(a, b)| *a += b);
+    total.jtj.iter_mut().zip(&part.jtj).for_each(|(a, b)| *a += b);
+}
+
+/// A stored sample; what no enabled effect asked for has its neutral value.
+fn fragment(view: &ObservedView, at: usize) -> Fragment<f64> {
+    let s = &view.samples.surface;
+    let number = |plane: &[f32], neutral: f64| plane.get(at).map_or(neutral, |&x| f64::from(x));
+    let vector =
+        |planes: &[Vec<f32>; 3], neutral: f64| -> V3<f64> { [0, 1, 2].map(|c| number(&planes[c], neutral)) };
+    let base = vector(&s.base, 0.0);
+    Fragment {
+        base,
+        bump: vector(&s.bump, 0.0),
+        normal: if s.normal[0].is_empty() { base } else { vector(&s.normal, 0.0) },
+        view: vector(&s.view, 0.0),
+        occlusion: number(&s.occlusion, 1.0),
+        silhouette: number(&s.silhouette, 0.0),
+        dapple: number(&s.dapple, 1.0),
+        albedo: vector(&s.albedo, 1.0),
+        specular: number(&s.specular, 1.0),
+        attenuator: number(&s.attenuator, 1.0),
+    }
+}
