@@ -3,9 +3,10 @@
 //! - [`Objective`]: all that the solvers see of an engine
 //! - [`cpu`]: the CPU engine; its parts are `plan` (what a pass computes), `kernel` (groups of pixels
 //!   to columns), `gram` (columns to products) and [`residual`] (the losses)
-//! - [`lanes`]: sixteen f32 lanes as one number of the model
+//! - [`lanes`]: sixteen f32 lanes as one number of the model; `corners`: their lookups in cubes
 //! - [`view`]: samples beside what was observed; `records`: the same as the kernel reads them
 
+mod corners;
 pub mod cpu;
 mod gram;
 mod kernel;

@@ -13,7 +13,9 @@ use skinfit::model::evaluate::{Setup, derivative, shade};
 use skinfit::model::fragment::Fragment;
 use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Column, Param, Params};
-use skinfit::samples::{LANES, SurfaceArrays, ViewSamples};
+use skinfit::samples::rows::{Row, Rows};
+use skinfit::samples::surface_records::Asked;
+use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::scene::Loss;
 
 fn wavy(size: usize, phase: f64) -> Cube<f32> {
@@ -33,45 +35,59 @@ fn unit(rng: &mut StdRng) -> [f64; 3] {
 /// `groups` groups with 1 to 3 records each; about one sample in ten is padding.
 fn view(groups: usize, seed: u64) -> ObservedView {
     let mut rng = StdRng::seed_from_u64(seed);
+    let records = |group: usize| 1 + group % 3;
+    let count = (0..groups).map(records).sum();
     let mut samples = ViewSamples { group_start: vec![0], ..ViewSamples::default() };
-    let mut surface = SurfaceArrays::default();
-    let mut target: [Vec<f32>; 4] = Default::default();
-    let mut weight = Vec::new();
+    samples.surface = SurfaceRecords::new(EVERY_NUMBER, count);
+    let (mut target, mut weight) = (Rows::new(4, groups), vec![Row::ZERO; groups]);
     for group in 0..groups {
-        let records = 1 + group % 3;
+        let (first, records) = (samples.group_start[group] as usize, records(group));
         let mut shares = vec![[0.0_f32; LANES]; records];
         for lane in 0..LANES {
             let used = rng.random_range(1..=records);
             (0..used).for_each(|r| shares[r][lane] = 1.0 / used as f32);
         }
-        for row in shares {
-            samples.weight.extend(row);
-            for _ in 0..LANES {
-                let (n, view) = (unit(&mut rng), unit(&mut rng));
-                let bump = unit(&mut rng);
-                for c in 0..3 {
-                    surface.base[c].push(n[c] as f32);
-                    surface.normal[c].push(n[c] as f32);
-                    surface.bump[c].push(0.3 * bump[c] as f32);
-                    surface.view[c].push(view[c] as f32);
-                    surface.albedo[c].push(rng.random_range(0.1..0.9));
-                }
-                surface.occlusion.push(rng.random_range(0.2..1.0));
-                surface.silhouette.push(rng.random_range(0.0..1.0));
-                surface.dapple.push(rng.random_range(0.0..1.0));
-                surface.specular.push(rng.random_range(0.0..1.0));
-                surface.attenuator.push(rng.random_range(0.0..1.0));
+        for (record, row) in shares.iter().enumerate() {
+            for (lane, &share) in row.iter().enumerate() {
+                samples.surface.set((first + record) * LANES + lane, &fragment(&mut rng), share);
             }
         }
-        let end = samples.group_start[group] + records as u32;
-        samples.group_start.push(end);
+        samples.group_start.push((first + records) as u32);
         for lane in 0..LANES {
-            target.iter_mut().for_each(|plane| plane.push(rng.random_range(0.05..2.0)));
-            weight.push(if lane == 5 { 0.0 } else { rng.random_range(0.1..1.0) });
+            target.record_mut(group).iter_mut().for_each(|row| row[lane] = rng.random_range(0.05..2.0));
+            weight[group][lane] = if lane == 5 { 0.0 } else { rng.random_range(0.1..1.0) };
         }
     }
-    samples.surface = surface;
     ObservedView { samples, target, weight, clip: None }
+}
+
+const EVERY_NUMBER: Asked = Asked {
+    bump: true,
+    normal: true,
+    albedo: true,
+    occlusion: true,
+    silhouette: true,
+    dapple: true,
+    specular: true,
+    attenuator: true,
+    weight: true,
+};
+
+fn fragment(rng: &mut StdRng) -> Fragment<f32> {
+    let single = |v: [f64; 3]| v.map(|x| x as f32);
+    let (normal, view, bump) = (single(unit(rng)), single(unit(rng)), single(unit(rng)));
+    Fragment {
+        base: normal,
+        bump: bump.map(|x| 0.3 * x),
+        normal,
+        view,
+        occlusion: rng.random_range(0.2..1.0),
+        silhouette: rng.random_range(0.0..1.0),
+        dapple: rng.random_range(0.0..1.0),
+        albedo: std::array::from_fn(|_| rng.random_range(0.1..0.9)),
+        specular: rng.random_range(0.0..1.0),
+        attenuator: rng.random_range(0.0..1.0),
+    }
 }
 
 fn illumination() -> Illumination {
@@ -139,20 +155,19 @@ impl<'a> Plain<'a> {
     }
 
     fn fragment(view: &ObservedView, at: usize) -> Fragment<f64> {
-        let s = &view.samples.surface;
-        let v = |planes: &[Vec<f32>; 3]| [0, 1, 2].map(|c| f64::from(planes[c][at]));
-        let x = |plane: &[f32]| f64::from(plane[at]);
+        let f = view.samples.surface.fragment(at);
+        let v = |x: [f32; 3]| x.map(f64::from);
         Fragment {
-            base: v(&s.base),
-            bump: v(&s.bump),
-            normal: v(&s.normal),
-            view: v(&s.view),
-            occlusion: x(&s.occlusion),
-            silhouette: x(&s.silhouette),
-            dapple: x(&s.dapple),
-            albedo: v(&s.albedo),
-            specular: x(&s.specular),
-            attenuator: x(&s.attenuator),
+            base: v(f.base),
+            bump: v(f.bump),
+            normal: v(f.normal),
+            view: v(f.view),
+            occlusion: f.occlusion.into(),
+            silhouette: f.silhouette.into(),
+            dapple: f.dapple.into(),
+            albedo: v(f.albedo),
+            specular: f.specular.into(),
+            attenuator: f.attenuator.into(),
         }
     }
 
@@ -164,7 +179,7 @@ impl<'a> Plain<'a> {
         for record in view.samples.group_start[group]..view.samples.group_start[group + 1] {
             let at = record as usize * LANES + slot % LANES;
             let f = Self::fragment(view, at);
-            let w = f64::from(view.samples.weight[at]);
+            let w = f64::from(view.samples.surface.weight(at));
             let value = shade(self.setup, &lights, &f, params);
             (0..4).for_each(|c| out[c].0 += w * value[c]);
             for (k, unknown) in self.unknowns.iter().enumerate() {
@@ -197,13 +212,13 @@ impl<'a> Plain<'a> {
             let gain = point.gains[index];
             for slot in 0..view.samples.groups() * LANES {
                 let pixel = self.pixel(view, slot, &point.params);
-                let weight = f64::from(view.weight[slot]);
+                let weight = f64::from(view.pixel_weight(slot));
                 for (c, (value, mut row)) in pixel.into_iter().enumerate() {
                     row.iter_mut().for_each(|x| *x *= gain);
                     if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(index)) {
                         row[g] = value;
                     }
-                    let target = f64::from(view.target[c][slot]);
+                    let target = f64::from(view.target.number(c, slot));
                     let r = weighted_residual(self.loss, view.clip, gain * value, target, weight);
                     sums.loss += r.loss;
                     sums.residual += r.residual * r.residual;
