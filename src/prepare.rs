@@ -13,7 +13,7 @@ use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::report::StageSeconds;
-use crate::samples::{self, SampleError, TargetArrays, ViewSamples};
+use crate::samples::{self, SampleError, TargetRows, ViewSamples};
 use crate::scene::Scene;
 use crate::scene::error::SceneError;
 use crate::scene::load::LoadOptions;
@@ -195,7 +195,7 @@ impl Prepared {
         let gains = std::mem::take(&mut self.gains);
         let mut observed = Vec::new();
         for ((view, samples), gain) in views.into_iter().zip(samples).zip(gains) {
-            let target = TargetArrays::new(&view, &samples).map_err(|error| PrepareError::Target {
+            let target = TargetRows::new(&view, &samples).map_err(|error| PrepareError::Target {
                 scene: self.scene.path.display().to_string(),
                 error,
             })?;
@@ -220,9 +220,8 @@ impl Prepared {
     }
 }
 
-fn observe(samples: ViewSamples, target: TargetArrays) -> ObservedView {
-    let [r, g, b] = target.rgb;
-    ObservedView { samples, target: [r, g, b, Vec::new()], weight: target.weight, clip: target.clip }
+fn observe(samples: ViewSamples, target: TargetRows) -> ObservedView {
+    ObservedView { samples, target: target.rgb, weight: target.weight, clip: target.clip }
 }
 
 /// The free columns, with one a channel for each parameter whose start has three different values: a

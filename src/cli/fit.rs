@@ -184,9 +184,10 @@ fn fingerprint(prepared: &Prepared, engine: &CpuEngine) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(format!("{:?} {:?}", prepared.setup(), prepared.scene.fit.loss).as_bytes());
     for view in engine.views() {
-        for plane in view.target.iter().chain([&view.weight, &view.samples.coverage]) {
-            hash.update(bytemuck::cast_slice(plane));
+        for rows in [view.target.all(), &view.weight] {
+            hash.update(bytemuck::cast_slice(rows));
         }
+        hash.update(bytemuck::cast_slice(&view.samples.coverage));
     }
     hash.finalize().to_hex()[..16].to_owned()
 }
@@ -227,7 +228,7 @@ fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f3
     target.alpha = source.alpha.clone().unwrap_or_else(|| vec![1.0; source.rgb.len()]);
     let mut coverage = vec![0.0; fit.alpha.len()];
     for (slot, &pixel) in observed.samples.pixel.iter().enumerate() {
-        if pixel != u32::MAX && observed.weight[slot] > 0.0 {
+        if pixel != u32::MAX && observed.pixel_weight(slot) > 0.0 {
             let at = pixel as usize;
             coverage[at] = observed.samples.coverage[slot].min(target.alpha[at]);
         }
@@ -261,7 +262,7 @@ fn run_info(
             ("effects".to_owned(), effects.join(", ")),
             ("starts".to_owned(), format!("{}, seed {}", arguments.starts, arguments.seed)),
             ("threads".to_owned(), rayon::current_num_threads().to_string()),
-            ("instructions".to_owned(), engine.instructions()),
+            ("instructions".to_owned(), crate::simd::instructions()),
         ],
     }
 }

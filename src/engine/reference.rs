@@ -94,7 +94,7 @@ impl<'a> Reference<'a> {
         for record in starts[slot / LANES]..starts[slot / LANES + 1] {
             let at = record as usize * LANES + slot % LANES;
             let f = fragment(view, at);
-            let share = view.samples.weight.get(at).map_or(1.0, |&w| f64::from(w));
+            let share = f64::from(view.samples.surface.weight(at));
             let value = shade(self.setup, lights, &f, params);
             (0..4).for_each(|c| out[c].0 += share * value[c]);
             for (k, unknown) in self.unknowns.iter().enumerate() {
@@ -125,14 +125,14 @@ impl<'a> Reference<'a> {
         let mut sums = empty(k);
         for slot in slots {
             let pixel = self.pixel_in(lights, observed, slot, &point.params);
-            let weight = observed.weight.get(slot).map_or(1.0, |&w| f64::from(w));
-            for (c, (value, mut row)) in pixel.into_iter().enumerate() {
-                let Some(&target) = observed.target[c].get(slot) else { continue };
+            let weight = f64::from(observed.pixel_weight(slot));
+            for (c, (value, mut row)) in pixel.into_iter().enumerate().take(observed.target.stride()) {
+                let target = f64::from(observed.target.number(c, slot));
                 row.iter_mut().for_each(|x| *x *= gain);
                 if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(view)) {
                     row[g] = value;
                 }
-                let r = weighted_residual(self.loss, observed.clip, gain * value, f64::from(target), weight);
+                let r = weighted_residual(self.loss, observed.clip, gain * value, target, weight);
                 sums.loss += r.loss;
                 sums.residual += r.residual * r.residual;
                 sums.weight += weight;
@@ -202,23 +202,20 @@ fn add(total: &mut NormalEquations, part: &NormalEquations) {
     total.jtj.iter_mut().zip(&part.jtj).for_each(|(a, b)| *a += b);
 }
 
-/// A stored sample; what no enabled effect asked for has its neutral value.
+/// A stored sample in f64.
 fn fragment(view: &ObservedView, at: usize) -> Fragment<f64> {
-    let s = &view.samples.surface;
-    let number = |plane: &[f32], neutral: f64| plane.get(at).map_or(neutral, |&x| f64::from(x));
-    let vector =
-        |planes: &[Vec<f32>; 3], neutral: f64| -> V3<f64> { [0, 1, 2].map(|c| number(&planes[c], neutral)) };
-    let base = vector(&s.base, 0.0);
+    let f = view.samples.surface.fragment(at);
+    let wide = |v: V3<f32>| -> V3<f64> { v.map(f64::from) };
     Fragment {
-        base,
-        bump: vector(&s.bump, 0.0),
-        normal: if s.normal[0].is_empty() { base } else { vector(&s.normal, 0.0) },
-        view: vector(&s.view, 0.0),
-        occlusion: number(&s.occlusion, 1.0),
-        silhouette: number(&s.silhouette, 0.0),
-        dapple: number(&s.dapple, 1.0),
-        albedo: vector(&s.albedo, 1.0),
-        specular: number(&s.specular, 1.0),
-        attenuator: number(&s.attenuator, 1.0),
+        base: wide(f.base),
+        bump: wide(f.bump),
+        normal: wide(f.normal),
+        view: wide(f.view),
+        occlusion: f.occlusion.into(),
+        silhouette: f.silhouette.into(),
+        dapple: f.dapple.into(),
+        albedo: wide(f.albedo),
+        specular: f.specular.into(),
+        attenuator: f.attenuator.into(),
     }
 }

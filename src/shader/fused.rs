@@ -23,6 +23,7 @@ use crate::engine::residual::{HUBER_THRESHOLD, RELATIVE_FLOOR, SMAPE_CORNER, SMA
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param};
 use crate::samples::LANES;
+use crate::samples::surface_records::Places;
 use crate::scene::Loss;
 
 /// Threads of a workgroup.
@@ -58,7 +59,11 @@ pub struct Fitted {
     pub alpha: bool,
     /// Whether the environment is turned, or will be.
     pub turned: bool,
-    /// Whether a pixel may have several samples, or a sample a share that is not 1.
+    /// Where a record's numbers stand, and how many rows it has.
+    pub places: Places,
+    /// Rows of a record.
+    pub rows: usize,
+    /// Whether a pixel may have several samples.
     pub several: bool,
     /// Whether pixels count differently.
     pub weighted: bool,
@@ -100,8 +105,6 @@ pub struct Slab {
 pub struct Fused {
     /// The rules; its constants and resources are group 0.
     pub plan: Plan,
-    /// What a sample stores, plane by plane: the fields, then the share where there are several.
-    pub planes: usize,
     /// The columns.
     pub columns: Vec<ColumnOf>,
     fitted: Fitted,
@@ -130,8 +133,7 @@ impl Fused {
             |seed: usize| chain.radiance[seed].is_some() || (fitted.alpha && chain.haze[seed].is_some());
         columns.retain(|column| column.seed.is_none_or(moves));
         plan.resources.extend(&chain.resources);
-        let fields: usize = sample_fields(&facts).iter().map(|(_, kind)| components(kind)).sum();
-        Ok(Self { planes: fields + usize::from(fitted.several), columns, fitted, chain, plan })
+        Ok(Self { columns, fitted, chain, plan })
     }
 
     /// The shaders that yield a wish; most fits have one.
@@ -206,7 +208,7 @@ impl Fused {
         }
         let _ = write!(
             wgsl,
-            "}}\n\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Numbers in a plane of samples.\n    plane: u32,\n    // Every so-many-th block is read.\n    stride: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n    // Where the sums of a workgroup stand: 16 numbers apart.\n    first_sum: u32,\n}}\n\n\
+            "}}\n\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Every so-many-th block is read.\n    stride: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
              @group(1) @binding(0) var<uniform> part: Part;\n\
              @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
              @group(1) @binding(2) var<storage, read> group_start: array<u32>;\n\
@@ -241,24 +243,24 @@ impl Fused {
     /// The value and the seeds' tangents of a pixel: over its samples.
     fn samples(&self, seeds: &[usize]) -> String {
         let mut wgsl = String::new();
+        let _ = writeln!(wgsl, "        let group = slot / {LANES}u;\n        let lane = slot % {LANES}u;");
         if self.fitted.several {
-            let _ = write!(
-                wgsl,
-                "        let group = slot / {LANES}u;\n        for (var record = group_start[group]; record < group_start[group + 1u]; record++) {{\n\
-                 \x20       let s = record * {LANES}u + slot % {LANES}u;\n        let share = samples[{}u * part.plane + s];\n",
-                self.planes - 1
-            );
+            wgsl.push_str("        for (var record = group_start[group]; record < group_start[group + 1u]; record++) {\n");
         } else {
-            wgsl.push_str("        {\n        let s = slot;\n        const share = 1.0;\n");
+            wgsl.push_str("        {\n        let record = group;\n");
         }
-        wgsl.push_str("        var at: Sample;\n");
-        let mut plane = 0;
+        let _ = writeln!(wgsl, "        let s = record * {}u + lane;", self.fitted.rows * LANES);
+        let number = |place: usize| format!("samples[s + {}u]", place * LANES);
+        let share = self.fitted.places.weight.map_or_else(|| "1.0".to_owned(), number);
+        let _ = writeln!(wgsl, "        let share = {share};\n        var at: Sample;");
         for (name, kind) in self.fields() {
-            let count = components(kind);
-            let number = |k: usize| format!("samples[{}u * part.plane + s]", plane + k);
-            let numbers: Vec<String> = (0..count).map(number).collect();
-            let _ = writeln!(wgsl, "        at.{name} = {kind}({});", numbers.join(", "));
-            plane += count;
+            // What the records lack has its neutral value, as `samples` has it.
+            if let Some(place) = place_of(&self.fitted.places, name) {
+                let numbers: Vec<String> = (0..components(kind)).map(|k| number(place + k)).collect();
+                let _ = writeln!(wgsl, "        at.{name} = {kind}({});", numbers.join(", "));
+            } else if matches!(name, "open" | "dapple" | "albedo" | "specular" | "attenuator") {
+                let _ = writeln!(wgsl, "        at.{name} = {kind}(1.0);");
+            }
         }
         wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
         wgsl.push_str(&self.chain.lines);
@@ -289,8 +291,12 @@ impl Fused {
             "        let weight = {weight};\n        var loss = 0.0;\n        var scale = vec4f();\n        var residual = vec4f();"
         );
         for c in 0..channels {
-            let _ =
-                writeln!(wgsl, "        {{\n            let observed = targets[{c}u * part.slots + slot];");
+            let _ = writeln!(
+                wgsl,
+                "        {{\n            let observed = targets[{}u * group + {}u + lane];",
+                channels * LANES,
+                c * LANES
+            );
             let _ = writeln!(wgsl, "            let value = part.gain * shown[{c}];");
             let counted = if self.fitted.clipped {
                 // A clipped target only says "at least" or "at most" (MODEL 7).
@@ -405,6 +411,23 @@ fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
         columns.push(ColumnOf { unknown: None, seed: None, channel: None });
     }
     (params.into_iter().map(Seed::of_param).collect(), columns)
+}
+
+/// The first row of a stored field.
+fn place_of(places: &Places, field: &str) -> Option<usize> {
+    match field {
+        "base" => places.base,
+        "bump" => places.bump,
+        "normal" => places.normal,
+        "view" => places.view,
+        "open" => places.occlusion,
+        "silhouette" => places.silhouette,
+        "dapple" => places.dapple,
+        "albedo" => places.albedo,
+        "specular" => places.specular,
+        "attenuator" => places.attenuator,
+        _ => None,
+    }
 }
 
 const fn loss_function(loss: Loss) -> &'static str {

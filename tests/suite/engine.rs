@@ -10,8 +10,11 @@ use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
 use skinfit::model::cube::{Cube, texel_direction};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
+use skinfit::model::fragment::Fragment;
 use skinfit::model::params::{Column, Param, Params};
-use skinfit::samples::{LANES, SurfaceArrays, ViewSamples};
+use skinfit::samples::rows::{Row, Rows};
+use skinfit::samples::surface_records::Asked;
+use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::scene::Loss;
 
 fn wavy(size: usize, phase: f64) -> Cube<f32> {
@@ -31,45 +34,59 @@ fn unit(rng: &mut StdRng) -> [f64; 3] {
 /// `groups` groups with 1 to 3 records each; about one sample in ten is padding.
 pub(crate) fn view(groups: usize, seed: u64) -> ObservedView {
     let mut rng = StdRng::seed_from_u64(seed);
+    let records = |group: usize| 1 + group % 3;
+    let count = (0..groups).map(records).sum();
     let mut samples = ViewSamples { group_start: vec![0], ..ViewSamples::default() };
-    let mut surface = SurfaceArrays::default();
-    let mut target: [Vec<f32>; 4] = Default::default();
-    let mut weight = Vec::new();
+    samples.surface = SurfaceRecords::new(EVERY_NUMBER, count);
+    let (mut target, mut weight) = (Rows::new(4, groups), vec![Row::ZERO; groups]);
     for group in 0..groups {
-        let records = 1 + group % 3;
+        let (first, records) = (samples.group_start[group] as usize, records(group));
         let mut shares = vec![[0.0_f32; LANES]; records];
         for lane in 0..LANES {
             let used = rng.random_range(1..=records);
             (0..used).for_each(|r| shares[r][lane] = 1.0 / used as f32);
         }
-        for row in shares {
-            samples.weight.extend(row);
-            for _ in 0..LANES {
-                let (n, view) = (unit(&mut rng), unit(&mut rng));
-                let bump = unit(&mut rng);
-                for c in 0..3 {
-                    surface.base[c].push(n[c] as f32);
-                    surface.normal[c].push(n[c] as f32);
-                    surface.bump[c].push(0.3 * bump[c] as f32);
-                    surface.view[c].push(view[c] as f32);
-                    surface.albedo[c].push(rng.random_range(0.1..0.9));
-                }
-                surface.occlusion.push(rng.random_range(0.2..1.0));
-                surface.silhouette.push(rng.random_range(0.0..1.0));
-                surface.dapple.push(rng.random_range(0.0..1.0));
-                surface.specular.push(rng.random_range(0.0..1.0));
-                surface.attenuator.push(rng.random_range(0.0..1.0));
+        for (record, row) in shares.iter().enumerate() {
+            for (lane, &share) in row.iter().enumerate() {
+                samples.surface.set((first + record) * LANES + lane, &fragment(&mut rng), share);
             }
         }
-        let end = samples.group_start[group] + records as u32;
-        samples.group_start.push(end);
+        samples.group_start.push((first + records) as u32);
         for lane in 0..LANES {
-            target.iter_mut().for_each(|plane| plane.push(rng.random_range(0.05..2.0)));
-            weight.push(if lane == 5 { 0.0 } else { rng.random_range(0.1..1.0) });
+            target.record_mut(group).iter_mut().for_each(|row| row[lane] = rng.random_range(0.05..2.0));
+            weight[group][lane] = if lane == 5 { 0.0 } else { rng.random_range(0.1..1.0) };
         }
     }
-    samples.surface = surface;
     ObservedView { samples, target, weight, clip: None }
+}
+
+const EVERY_NUMBER: Asked = Asked {
+    bump: true,
+    normal: true,
+    albedo: true,
+    occlusion: true,
+    silhouette: true,
+    dapple: true,
+    specular: true,
+    attenuator: true,
+    weight: true,
+};
+
+fn fragment(rng: &mut StdRng) -> Fragment<f32> {
+    let single = |v: [f64; 3]| v.map(|x| x as f32);
+    let (normal, view, bump) = (single(unit(rng)), single(unit(rng)), single(unit(rng)));
+    Fragment {
+        base: normal,
+        bump: bump.map(|x| 0.3 * x),
+        normal,
+        view,
+        occlusion: rng.random_range(0.2..1.0),
+        silhouette: rng.random_range(0.0..1.0),
+        dapple: rng.random_range(0.0..1.0),
+        albedo: std::array::from_fn(|_| rng.random_range(0.1..0.9)),
+        specular: rng.random_range(0.0..1.0),
+        attenuator: rng.random_range(0.0..1.0),
+    }
 }
 
 pub(crate) fn illumination() -> Illumination {

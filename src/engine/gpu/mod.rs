@@ -74,8 +74,8 @@ impl<'g> GpuEngine<'g> {
         start: &Point,
         memory: Memory,
     ) -> Result<Self, GpuError> {
-        let alpha = views.iter().any(|view| !view.target[3].is_empty());
-        let traits = Traits::of(&views);
+        let alpha = views.iter().any(ObservedView::compares_alpha);
+        let traits = Traits::of(gpu, &views)?;
         let mut engine = Self {
             gpu,
             setup,
@@ -93,8 +93,7 @@ impl<'g> GpuEngine<'g> {
             fault: Mutex::new(None),
             views,
         };
-        let fused = engine.fused(engine.turned(start))?;
-        let parts = Parts::new(gpu, &engine.views, &fused, &engine.traits, memory)?;
+        let parts = Parts::new(gpu, &engine.views, &engine.traits, memory)?;
         engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
         engine.set_stride(1);
         // Whatever the driver refuses shows here, and not in the midst of a fit.
@@ -121,7 +120,7 @@ impl<'g> GpuEngine<'g> {
         self.lock().parts.bytes()
     }
 
-    /// How many pixels there are.
+    /// How many blocks of pixels there are in all views.
     #[must_use]
     pub fn blocks(&self) -> usize {
         self.views
@@ -153,6 +152,8 @@ impl<'g> GpuEngine<'g> {
             loss: self.loss,
             alpha: self.alpha,
             turned,
+            places: self.traits.places,
+            rows: self.traits.rows,
             several: self.traits.several,
             weighted: self.traits.weighted,
             clipped: self.traits.clipped,

@@ -8,7 +8,9 @@ use super::Memory;
 use crate::engine::view::ObservedView;
 use crate::gpu::{Gpu, GpuError};
 use crate::samples::LANES;
-use crate::shader::fused::{BLOCK, Fused, WORKGROUP};
+use crate::samples::rows::{Row, Rows};
+use crate::samples::surface_records::Places;
+use crate::shader::fused::{BLOCK, WORKGROUP};
 
 /// Groups of a block of pixels; parts are cut between blocks.
 const BLOCK_GROUPS: usize = BLOCK as usize / LANES;
@@ -23,7 +25,12 @@ pub(super) const PART_BYTES: usize = 32;
 /// What is the same for all views.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Traits {
-    /// Whether a pixel has several samples, or a sample's share is not 1.
+    /// Where a record's numbers stand, and how many rows it has.
+    pub(super) places: Places,
+    pub(super) rows: usize,
+    /// Rows of a group's target.
+    channels: usize,
+    /// Whether a pixel has several samples.
     pub(super) several: bool,
     /// Whether pixels count differently.
     pub(super) weighted: bool,
@@ -32,16 +39,27 @@ pub(super) struct Traits {
 }
 
 impl Traits {
-    pub(super) fn of(views: &[ObservedView]) -> Self {
-        let single = |view: &ObservedView| {
-            let one_each = view.samples.records() == view.samples.groups();
-            one_each && view.samples.weight.iter().all(|&w| w == 1.0)
-        };
-        Self {
+    pub(super) fn of(gpu: &Gpu, views: &[ObservedView]) -> Result<Self, GpuError> {
+        let single = |view: &ObservedView| view.samples.records() == view.samples.groups();
+        let first = views.first();
+        let traits = Self {
+            places: first.map(|view| *view.samples.surface.places()).unwrap_or_default(),
+            rows: first.map_or(0, |view| view.samples.surface.rows().stride()),
+            channels: first.map_or(0, |view| view.target.stride()),
             several: !views.iter().all(single),
             weighted: views.iter().any(|view| !view.weight.is_empty()),
             clipped: views.iter().any(|view| view.clip.is_some()),
+        };
+        let alike = |view: &ObservedView| {
+            *view.samples.surface.places() == traits.places && view.target.stride() == traits.channels
+        };
+        if views.iter().all(alike) {
+            return Ok(traits);
         }
+        Err(GpuError::Refused {
+            adapter: gpu.name().to_owned(),
+            reason: "the views' samples or targets hold different numbers".to_owned(),
+        })
     }
 }
 
@@ -49,8 +67,6 @@ impl Traits {
 pub(super) struct Part {
     pub(super) view: usize,
     groups: Range<usize>,
-    /// Samples in a plane.
-    plane: usize,
     /// Whether its buffers are its own.
     resident: bool,
     pub(super) buffers: PartBuffers,
@@ -72,8 +88,6 @@ pub(super) struct PartBuffers {
 #[derive(Default)]
 pub(super) struct Parts {
     pub(super) parts: Vec<Part>,
-    /// What a sample stores.
-    fields: Vec<&'static str>,
     traits: Traits,
     stride: usize,
 }
@@ -82,18 +96,16 @@ impl Parts {
     pub(super) fn new(
         gpu: &Gpu,
         views: &[ObservedView],
-        fused: &Fused,
         traits: &Traits,
         memory: Memory,
     ) -> Result<Self, GpuError> {
-        let fields: Vec<&'static str> = fused.fields().iter().map(|(name, _)| *name).collect();
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let limit = memory.part.map_or(limit, |part| part.min(limit));
-        let mut parts = Self { parts: Vec::new(), fields, traits: *traits, stride: 1 };
+        let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1 };
         let (mut used, mut shared) = (0, None);
         for (index, view) in views.iter().enumerate() {
-            for groups in cut(view, fused.planes, limit) {
+            for groups in cut(view, limit) {
                 let size = parts.size(view, &groups);
                 let resident = memory.resident.is_none_or(|most| used + size.total() <= most);
                 let buffers = if resident {
@@ -110,7 +122,6 @@ impl Parts {
                 };
                 let part = Part {
                     view: index,
-                    plane: size.plane,
                     resident,
                     buffers,
                     blocks: blocks(view, &groups),
@@ -187,9 +198,9 @@ impl Parts {
         // A target without a clip lies between the largest numbers; WGSL promises nothing about infinities.
         let clip = views[part.view].clip.map_or((f32::MIN, f32::MAX), |clip| (clip.low, clip.high));
         let slots = part.groups.len() * LANES;
-        let counts = [part.read, slots as u32, part.plane as u32, self.stride as u32];
+        let counts = [part.read, slots as u32, self.stride as u32, first_sum];
         let numbers = [gain as f32, clip.0, clip.1].map(f32::to_bits);
-        let words = counts.into_iter().chain(numbers).chain([first_sum]);
+        let words = counts.into_iter().chain(numbers);
         let mut block = [0; PART_BYTES];
         for (bytes, word) in block.chunks_exact_mut(4).zip(words) {
             bytes.copy_from_slice(&word.to_ne_bytes());
@@ -208,61 +219,35 @@ impl Parts {
     }
 
     fn size(&self, view: &ObservedView, groups: &Range<usize>) -> Size {
-        let plane = records(view, groups).len() * LANES;
-        let slots = groups.len() * LANES;
-        let compared = view.target.iter().filter(|plane| !plane.is_empty()).count();
+        let rows = |count: usize| (count * size_of::<Row>()) as u64;
         Size {
-            plane,
-            samples: (4 * plane * self.planes(view)) as u64,
+            samples: rows(records(view, groups).len() * self.traits.rows),
             starts: (4 * (groups.len() + 1)) as u64,
-            targets: (4 * slots * (compared + usize::from(self.traits.weighted))) as u64,
+            targets: rows(groups.len() * (self.traits.channels + usize::from(self.traits.weighted))),
         }
-    }
-
-    fn planes(&self, view: &ObservedView) -> usize {
-        let fields: usize = self.fields.iter().map(|field| planes_of(view, field).len()).sum();
-        fields + usize::from(self.traits.several)
     }
 
     fn upload(&self, gpu: &Gpu, view: &ObservedView, part: &Part) -> Result<(), GpuError> {
-        let PartBuffers { samples, group_start, targets, .. } = &part.buffers;
+        let PartBuffers { samples, group_start, targets } = &part.buffers;
         let records = records(view, &part.groups);
-        let range = records.start * LANES..records.end * LANES;
-        let mut at = 0;
-        let mut put = |buffer: &Buffer, numbers: &[f32]| {
-            gpu.queue.write_buffer(buffer, at, bytemuck::cast_slice(numbers));
-            at += 4 * numbers.len() as u64;
-        };
-        for field in &self.fields {
-            for plane in planes_of(view, field) {
-                put(samples, &plane[range.clone()]);
-            }
-        }
-        if self.traits.several {
-            match view.samples.weight.get(range.clone()) {
-                Some(shares) => put(samples, shares),
-                None => put(samples, &vec![1.0; range.len()]),
-            }
-        }
+        gpu.queue.write_buffer(samples, 0, bytes_of(view.samples.surface.rows(), &records));
         let starts: Vec<u32> = view.samples.group_start[part.groups.start..=part.groups.end]
             .iter()
             .map(|&start| start - records.start as u32)
             .collect();
         gpu.queue.write_buffer(group_start, 0, bytemuck::cast_slice(&starts));
-        let slots = part.groups.start * LANES..part.groups.end * LANES;
-        at = 0;
-        let mut put = |buffer: &Buffer, numbers: &[f32]| {
-            gpu.queue.write_buffer(buffer, at, bytemuck::cast_slice(numbers));
-            at += 4 * numbers.len() as u64;
-        };
-        for plane in view.target.iter().filter(|plane| !plane.is_empty()) {
-            put(targets, &plane[slots.clone()]);
-        }
+        let observed = bytes_of(&view.target, &part.groups);
+        gpu.queue.write_buffer(targets, 0, observed);
         if self.traits.weighted {
-            match view.weight.get(slots.clone()) {
-                Some(weights) => put(targets, weights),
-                None => put(targets, &vec![1.0; slots.len()]),
-            }
+            let ones;
+            let weights = match view.weight.get(part.groups.clone()) {
+                Some(weights) => weights,
+                None => {
+                    ones = vec![Row::of([1.0; LANES]); part.groups.len()];
+                    &ones
+                }
+            };
+            gpu.queue.write_buffer(targets, observed.len() as u64, bytemuck::cast_slice(weights));
         }
         gpu.check()
     }
@@ -271,7 +256,6 @@ impl Parts {
 /// Bytes of a part's buffers.
 #[derive(Clone, Copy, Debug)]
 struct Size {
-    plane: usize,
     samples: u64,
     starts: u64,
     targets: u64,
@@ -288,7 +272,6 @@ impl Size {
 
     fn max(self, other: Self) -> Self {
         Self {
-            plane: self.plane,
             samples: self.samples.max(other.samples),
             starts: self.starts.max(other.starts),
             targets: self.targets.max(other.targets),
@@ -318,9 +301,10 @@ impl PartBuffers {
 
 /// Ranges of groups, whole blocks each, whose samples stay within the limit. A block that is beyond it on its
 /// own is left to the adapter to refuse.
-fn cut(view: &ObservedView, planes: usize, limit: u64) -> Vec<Range<usize>> {
+fn cut(view: &ObservedView, limit: u64) -> Vec<Range<usize>> {
     let groups = view.samples.groups();
-    let bytes = |range: &Range<usize>| (4 * LANES * planes * records(view, range).len()) as u64;
+    let rows = view.samples.surface.rows().stride();
+    let bytes = |range: &Range<usize>| (size_of::<Row>() * rows * records(view, range).len()) as u64;
     let (mut ranges, mut start, mut end) = (Vec::new(), 0, 0);
     while end < groups {
         let next = groups.min(end + BLOCK_GROUPS);
@@ -347,20 +331,8 @@ fn blocks(view: &ObservedView, groups: &Range<usize>) -> Vec<(f64, u64)> {
     groups.clone().step_by(BLOCK_GROUPS).map(block).collect()
 }
 
-/// The planes of a stored field, as shaders name it.
-fn planes_of<'v>(view: &'v ObservedView, field: &str) -> &'v [Vec<f32>] {
-    let s = &view.samples.surface;
-    match field {
-        "base" => &s.base,
-        "bump" => &s.bump,
-        "normal" => &s.normal,
-        "view" => &s.view,
-        "open" => std::slice::from_ref(&s.occlusion),
-        "silhouette" => std::slice::from_ref(&s.silhouette),
-        "dapple" => std::slice::from_ref(&s.dapple),
-        "albedo" => &s.albedo,
-        "specular" => std::slice::from_ref(&s.specular),
-        "attenuator" => std::slice::from_ref(&s.attenuator),
-        _ => &[],
-    }
+/// The bytes of a range of records.
+fn bytes_of<'r>(rows: &'r Rows, range: &Range<usize>) -> &'r [u8] {
+    let stride = rows.stride();
+    bytemuck::cast_slice(&rows.all()[range.start * stride..range.end * stride])
 }

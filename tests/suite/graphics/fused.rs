@@ -8,6 +8,7 @@ use skinfit::gpu::{Choice, Gpu};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Column, Param};
+use skinfit::samples::rows::Rows;
 use skinfit::scene::Loss;
 use skinfit::scene::view::Clip;
 
@@ -169,17 +170,18 @@ fn a_million_samples_keep_seven_digits() {
     let small = view(500, 10);
     let times = 66;
     let mut large = small.clone();
-    let repeat = |plane: &mut Vec<f32>| *plane = plane.repeat(times);
-    large.target.iter_mut().for_each(repeat);
-    repeat(&mut large.weight);
-    repeat(&mut large.samples.weight);
-    let s = &mut large.samples.surface;
-    for planes in [&mut s.base, &mut s.bump, &mut s.normal, &mut s.view, &mut s.albedo] {
-        planes.iter_mut().for_each(repeat);
-    }
-    for plane in [&mut s.occlusion, &mut s.silhouette, &mut s.dapple, &mut s.specular, &mut s.attenuator] {
-        repeat(plane);
-    }
+    let repeat = |rows: &Rows| {
+        let mut repeated = Rows::new(rows.stride(), times * rows.all().len() / rows.stride());
+        for (record, from) in (0..).zip(
+            rows.all().chunks_exact(rows.stride()).cycle().take(times * rows.all().len() / rows.stride()),
+        ) {
+            repeated.record_mut(record).copy_from_slice(from);
+        }
+        repeated
+    };
+    large.target = repeat(&small.target);
+    large.weight = small.weight.repeat(times);
+    *large.samples.surface.rows_mut() = repeat(small.samples.surface.rows());
     let records = small.samples.records() as u32;
     large.samples.group_start = (0..times as u32)
         .flat_map(|k| small.samples.group_start[..500].iter().map(move |start| start + k * records))

@@ -4,17 +4,27 @@
 //! f32 lanes (at most 64 terms a lane), then folded to f64; the chunks' sums are added pairwise in
 //! their order. So the order of additions never depends on threads, and the rounding error stays
 //! that of short sums however many samples there are.
+//!
+//! - `kept`: what stays from pass to pass: the lobe's cube, and terms that no free parameter moves
+//! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
+//! - `image`: the forward pass
 
-use std::sync::{Arc, Mutex, PoisonError};
+mod image;
+mod kept;
+mod sums;
 
-use fearless_simd::{Level, Simd, dispatch};
+use std::sync::{Arc, Mutex};
+
+use fearless_simd::Level;
 use rayon::prelude::*;
 
-use super::gram::{Columns, add_gram, add_last, pair};
+use self::kept::{Kept, Lobe};
+use self::sums::{BLOCK, Blocks, CHUNK, Scratch, Sums, Wish, pairwise};
+use super::gram::pair;
 use super::kernel::Kernel;
 use super::lanes::Lanes;
-use super::plan::{ChannelPlan, Plan, WINDOW};
-use super::records::{Records, Row};
+use super::plan::Plan;
+use super::records::Records;
 use super::view::ObservedView;
 use super::{NormalEquations, Objective, Point, Unknown};
 use crate::bake::LobeStack;
@@ -24,13 +34,10 @@ use crate::model::evaluate::Setup;
 use crate::model::fragment::LookupParam;
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
-use crate::samples::LANES;
+use crate::samples::rows::Row;
 use crate::scene::Loss;
-
-/// Groups in a block: what the scratch holds at once (it should stay in the nearest caches).
-const BLOCK: usize = 8;
-/// Blocks in a chunk: one unit of work, and 64 terms a lane.
-const CHUNK: usize = 8;
+use crate::simd::Simd;
+use crate::with_simd;
 
 /// The lights of a scene: the cubes that the enabled effects ask for.
 #[derive(Clone, Debug, Default)]
@@ -43,22 +50,12 @@ pub struct Illumination {
     pub hilite: Option<Cube<f32>>,
 }
 
-/// What a pass yields.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Wish {
-    Loss,
-    Gradient,
-    Normal,
-}
-
 /// Loss, gradient and normal equations on the CPU.
 #[derive(Debug)]
 pub struct CpuEngine {
     setup: Setup,
     illumination: Illumination,
     views: Vec<ObservedView>,
-    /// The views as the kernel reads them.
-    records: Vec<Records>,
     loss: Loss,
     unknowns: Vec<Unknown>,
     plan: Plan,
@@ -71,20 +68,6 @@ pub struct CpuEngine {
     lobe: Mutex<Option<Arc<Lobe>>>,
     /// Kept terms, and the parameters that they were made with.
     kept: Mutex<Option<Arc<Kept>>>,
-}
-
-#[derive(Debug)]
-struct Lobe {
-    exponent: f64,
-    cube: Cube<f32>,
-    slope: Cube<f32>,
-}
-
-#[derive(Debug)]
-struct Kept {
-    key: [f64; 5],
-    /// For each view, the plan's kept rows of each record.
-    views: Vec<Vec<Row>>,
 }
 
 impl CpuEngine {
@@ -110,12 +93,11 @@ impl CpuEngine {
         unknowns: Vec<Unknown>,
         keep: bool,
     ) -> Self {
-        let compare_alpha = views.iter().any(|view| !view.target[3].is_empty());
+        let compare_alpha = views.iter().any(ObservedView::compares_alpha);
         let plan = Plan::new(setup, &unknowns, compare_alpha, keep);
         let mut engine = Self {
             setup,
             illumination,
-            records: views.iter().map(Records::new).collect(),
             views,
             loss,
             unknowns,
@@ -157,17 +139,7 @@ impl CpuEngine {
     /// Surface samples of positive weight, over all views.
     #[must_use]
     pub fn samples(&self) -> u64 {
-        let samples = |view: &ObservedView| match view.samples.weight.as_slice() {
-            [] => view.samples.records() * LANES,
-            weights => weights.iter().filter(|&&w| w > 0.0).count(),
-        };
-        self.views.iter().map(|view| samples(view) as u64).sum()
-    }
-
-    /// The SIMD instructions that are used, by name.
-    #[must_use]
-    pub fn instructions(&self) -> String {
-        instructions_of(self.level)
+        self.views.iter().map(|view| view.samples.count() as u64).sum()
     }
 
     /// How many blocks of pixels there are in all views.
@@ -176,64 +148,11 @@ impl CpuEngine {
         self.views.iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
     }
 
-    fn lobe(&self, exponent: f64) -> Option<Arc<Lobe>> {
-        let stack = self.illumination.lobes.as_ref()?;
-        let mut slot = self.lobe.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(lobe) = slot.as_ref().filter(|lobe| lobe.exponent == exponent) {
-            return Some(Arc::clone(lobe));
-        }
-        let (cube, slope) = stack.at(exponent);
-        let lobe = Arc::new(Lobe { exponent, cube, slope });
-        *slot = Some(Arc::clone(&lobe));
-        Some(lobe)
-    }
-
-    /// Terms that no free parameter changes, made on the first pass (and again should one of the
-    /// held parameters differ).
-    fn kept(&self, params: &Params, lobe: Option<&Lobe>) -> Arc<Kept> {
-        let key = [
-            Param::NormalStrength,
-            Param::SpecularLobe,
-            Param::EnvironmentRotation,
-            Param::KeyAzimuth,
-            Param::KeyElevation,
-        ]
-        .map(|p| {
-            let free = self.unknowns.iter().any(|u| matches!(u, Unknown::Param(c) if c.param == p));
-            if free { 0.0 } else { params.scalar(p) }
-        });
-        let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = slot.as_ref().filter(|kept| kept.key == key) {
-            return Arc::clone(kept);
-        }
-        let views = (0..self.views.len()).map(|index| self.make_kept(index, params, lobe)).collect();
-        let kept = Arc::new(Kept { key, views });
-        *slot = Some(Arc::clone(&kept));
-        kept
-    }
-
-    fn make_kept(&self, index: usize, params: &Params, lobe: Option<&Lobe>) -> Vec<Row> {
-        let stride = self.plan.kept.rows;
-        let mut kept = vec![Row::ZERO; self.views[index].samples.records() * stride];
-        if stride > 0 {
-            let size = BLOCK * CHUNK;
-            kept.par_chunks_mut(stride * size).enumerate().for_each(|(chunk, rows)| {
-                dispatch!(self.level, simd => {
-                    let kernel = self.kernel(simd, &self.records[index], &[], params, lobe, 1.0);
-                    for (k, rows) in rows.chunks_exact_mut(stride).enumerate() {
-                        kernel.keep(chunk * size + k, rows);
-                    }
-                });
-            });
-        }
-        kept
-    }
-
     #[inline(always)]
     fn kernel<'a, S: Simd>(
         &'a self,
         simd: S,
-        view: &'a Records,
+        view: &'a ObservedView,
         kept: &'a [Row],
         params: &Params,
         lobe: Option<&'a Lobe>,
@@ -250,7 +169,7 @@ impl CpuEngine {
         Kernel {
             simd,
             plan: &self.plan,
-            view,
+            view: Records::new(view),
             kept,
             lights: Lights::new(self.setup, params, cubes, turning, like),
             weights: Weights::new(params, self.setup.effects, like),
@@ -258,44 +177,6 @@ impl CpuEngine {
             gain: gain as f32,
             loss: self.loss,
         }
-    }
-
-    /// The image of view `index` at `point`: for each pixel slot the mean over its visible samples,
-    /// colour and (where the haze is compared) alpha, times the view's gain.
-    #[must_use]
-    pub fn image(&self, index: usize, point: &Point) -> Vec<Vec<f32>> {
-        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
-        let kept = self.kept(&point.params, lobe.as_deref());
-        let view = &self.views[index];
-        let groups = view.samples.groups();
-        let channels = self.plan.channels.len();
-        let mut planes = vec![vec![0.0_f32; groups * LANES]; channels];
-        let size = BLOCK * CHUNK * LANES;
-        let mut parts: Vec<Vec<&mut [f32]>> =
-            planes.iter_mut().map(|plane| plane.chunks_mut(size).collect()).collect();
-        let mut by_chunk: Vec<Vec<&mut [f32]>> = Vec::new();
-        for _ in 0..groups.div_ceil(BLOCK * CHUNK) {
-            by_chunk.push(parts.iter_mut().map(|part| part.remove(0)).collect());
-        }
-        let gain = point.gains.get(index).copied().unwrap_or(1.0);
-        by_chunk.par_iter_mut().enumerate().for_each_init(
-            || [Row::ZERO; WINDOW],
-            |scratch, (chunk, outputs)| {
-                dispatch!(self.level, simd => {
-                    let kernel = self.kernel(simd, &self.records[index], &kept.views[index], &point.params, lobe.as_deref(), gain);
-                    for (k, group) in (chunk * BLOCK * CHUNK..groups.min((chunk + 1) * BLOCK * CHUNK)).enumerate() {
-                        kernel.group::<false>(group, scratch);
-                        for (c, channel) in self.plan.channels.iter().enumerate() {
-                            let row = &scratch[usize::from(channel.residual)];
-                            for (out, value) in outputs[c][k * LANES..][..LANES].iter_mut().zip(row.iter()) {
-                                *out = value * gain as f32;
-                            }
-                        }
-                    }
-                });
-            },
-        );
-        planes
     }
 
     /// One pass: sums over every chunk of every view.
@@ -320,9 +201,9 @@ impl CpuEngine {
                 .map_init(
                     || Scratch::new(&self.plan),
                     |scratch, blocks| {
-                        dispatch!(self.level, simd => {
-                            let kernel = self.kernel(simd, &self.records[index], &kept.views[index], &point.params, lobe.as_deref(), gain);
-                            chunk(&kernel, blocks, groups, wish, scratch)
+                        with_simd!(self.level, simd => {
+                            let kernel = self.kernel(simd, view, &kept.views[index], &point.params, lobe.as_deref(), gain);
+                            sums::chunk(&kernel, Blocks { blocks, groups }, wish, scratch)
                         })
                     },
                 )
@@ -377,91 +258,6 @@ impl CpuEngine {
     }
 }
 
-/// Packed sums of a chunk: each channel's triangle (or its last column), then the loss.
-struct Sums(Vec<f64>);
-
-/// Sum in a fixed binary tree: as accurate as it is deterministic.
-fn pairwise(mut sums: Vec<Sums>) -> Sums {
-    let mut width = sums.len();
-    while width > 1 {
-        let half = width.div_ceil(2);
-        let (low, high) = sums.split_at_mut(half);
-        for (a, b) in low.iter_mut().zip(&high[..width - half]) {
-            for (x, y) in a.0.iter_mut().zip(&b.0) {
-                *x += y;
-            }
-        }
-        width = half;
-    }
-    sums.into_iter().next().unwrap_or(Sums(Vec::new()))
-}
-
-struct Scratch {
-    rows: Vec<Row>,
-    sums: Vec<Row>,
-}
-
-impl Scratch {
-    fn new(plan: &Plan) -> Self {
-        let pairs: usize = plan.channels.iter().map(ChannelPlan::pairs).sum();
-        Self {
-            rows: vec![Row::ZERO; plan.all_columns() * (BLOCK - 1) + WINDOW],
-            sums: vec![Row::ZERO; pairs],
-        }
-    }
-}
-
-/// The sums over a few blocks.
-#[inline(always)]
-fn chunk<S: Simd>(
-    kernel: &Kernel<'_, S>,
-    blocks: &[usize],
-    groups: usize,
-    wish: Wish,
-    scratch: &mut Scratch,
-) -> Sums {
-    let simd = kernel.simd;
-    let Scratch { rows, sums } = scratch;
-    let stride = kernel.plan.all_columns();
-    sums.fill(Row::ZERO);
-    let mut loss = Lanes::splat(simd, 0.0);
-    let mut used = 0;
-    for &block in blocks {
-        let first = block * BLOCK;
-        let length = groups.min(first + BLOCK) - first;
-        for k in 0..length {
-            let Some(rows) = rows[k * stride..].first_chunk_mut() else { break };
-            if wish == Wish::Loss {
-                kernel.group::<false>(first + k, rows);
-                loss = loss + kernel.weigh::<false>(first + k, rows);
-            } else {
-                kernel.group::<true>(first + k, rows);
-                loss = loss + kernel.weigh::<true>(first + k, rows);
-            }
-        }
-        used = 0;
-        for channel in &kernel.plan.channels {
-            let count = channel.columns + 1;
-            let columns = Columns { rows: &rows[..length * stride], stride, first: channel.start, count };
-            match wish {
-                Wish::Loss => {}
-                Wish::Gradient => {
-                    add_last(simd, columns, &mut sums[used..]);
-                    used += count;
-                }
-                Wish::Normal => {
-                    add_gram(simd, columns, &mut sums[used..]);
-                    used += channel.pairs();
-                }
-            }
-        }
-    }
-    let fold = |lanes: &[f32; LANES]| lanes.iter().map(|&x| f64::from(x)).sum::<f64>();
-    let mut folded: Vec<f64> = sums[..used].iter().map(|row| fold(row)).collect();
-    folded.push(fold(&loss.to_array()));
-    Sums(folded)
-}
-
 impl Objective for CpuEngine {
     fn unknowns(&self) -> &[Unknown] {
         &self.unknowns
@@ -493,15 +289,4 @@ impl Objective for CpuEngine {
         let factor = if sums.weight > 0.0 { 2.0 / sums.weight } else { 0.0 };
         (sums.loss, sums.jtr.iter().map(|x| factor * x).collect())
     }
-}
-
-/// The SIMD instructions that engines use on this processor, by name.
-#[must_use]
-pub fn instructions() -> String {
-    instructions_of(Level::new())
-}
-
-fn instructions_of(level: Level) -> String {
-    let name = format!("{level:?}");
-    name.split('(').next().unwrap_or_default().to_owned()
 }
