@@ -96,7 +96,7 @@ pub(crate) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
 }
 
 /// Run the encoder's commands, and read the floats that they leave in `buffer`.
-pub(super) fn read_floats(
+pub(crate) fn read_floats(
     gpu: &Gpu,
     mut encoder: CommandEncoder,
     buffer: &Buffer,

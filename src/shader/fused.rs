@@ -168,8 +168,25 @@ impl Fused {
         sums
     }
 
-    fn channels(&self) -> usize {
+    /// Compared channels: three colours, and alpha where it is compared.
+    #[must_use]
+    pub const fn channels(&self) -> usize {
         if self.fitted.alpha { 4 } else { 3 }
+    }
+
+    /// The shader of the forward pass: the image, plane by plane, in the place of the sums.
+    #[must_use]
+    pub fn image_module(&self) -> String {
+        let mut wgsl = self.declarations(false);
+        wgsl.push_str(&self.head(&[]));
+        wgsl.push_str("        var shown = vec4f();\n");
+        wgsl.push_str(&self.samples(&[]));
+        for c in 0..self.channels() {
+            let _ =
+                writeln!(wgsl, "        partial_sums[{c}u * part.slots + slot] = part.gain * shown[{c}];");
+        }
+        wgsl.push_str("    }\n}\n");
+        wgsl
     }
 
     fn module(&self, sums: &[Sum]) -> String {
@@ -177,7 +194,7 @@ impl Fused {
         let columns: Vec<usize> = (0..self.columns.len()).filter(|&i| needed(i)).collect();
         let mut seeds: Vec<usize> = columns.iter().filter_map(|&i| self.columns[i].seed).collect();
         seeds.dedup();
-        let mut wgsl = self.declarations();
+        let mut wgsl = self.declarations(!seeds.is_empty());
         wgsl.push_str(&self.head(sums));
         for seed in &seeds {
             let _ = writeln!(wgsl, "        var d{seed} = vec4f();");
@@ -198,10 +215,12 @@ impl Fused {
         wgsl
     }
 
-    /// Everything outside the entry point.
-    fn declarations(&self) -> String {
+    /// Everything outside the entry point, with or without the tangents' functions.
+    fn declarations(&self, tangents: bool) -> String {
         let mut wgsl = self.plan.declarations(true);
-        wgsl.push_str(&self.chain.functions);
+        if tangents {
+            wgsl.push_str(&self.chain.functions);
+        }
         wgsl.push_str("\nstruct Sample {\n");
         for (name, kind) in self.fields() {
             let _ = writeln!(wgsl, "    {name}: {kind},");
@@ -263,7 +282,7 @@ impl Fused {
             }
         }
         wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
-        wgsl.push_str(&self.chain.lines);
+        seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
         let parts = parts(&self.plan.facts);
         let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
         let haze = if hazy(&self.plan.facts) { "haze" } else { "0.0" };

@@ -1,14 +1,17 @@
 //! The cubes and the uniform block of a fit.
 
-use wgpu::TextureView;
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, BindingType, Buffer,
+    BufferUsages, TextureSampleType, TextureView, TextureViewDimension,
+};
 
-use super::program::Program;
+use super::pipeline::{UNIFORM, buffer, layout};
 use crate::engine::cpu::Illumination;
 use crate::gpu::constants::model_block;
 use crate::gpu::{Gpu, GpuError, texels, upload};
 use crate::model::cube::Cube;
 use crate::model::params::{Param, Params};
-use crate::shader::Resource;
+use crate::shader::{Plan, Resource};
 
 /// The cubes, each uploaded once, but for the specular one: again when its exponent has changed.
 pub(super) struct DeviceLights {
@@ -27,9 +30,9 @@ impl DeviceLights {
     }
 
     /// Have what a program reads ready for a pass at `params`.
-    pub(super) fn set(&mut self, gpu: &Gpu, params: &Params, program: &mut Program) -> Result<(), GpuError> {
+    pub(super) fn set(&mut self, gpu: &Gpu, params: &Params, inputs: &mut Inputs) -> Result<(), GpuError> {
         let upload = |name: &str, cube: &Cube<f32>| upload::texture(gpu, name, &texels::faces(cube));
-        for &resource in program.resources() {
+        for &resource in &inputs.plan.resources {
             match resource {
                 Resource::IrradianceFaces if self.irradiance.is_none() => {
                     let cube = self.illumination.irradiance.as_ref();
@@ -56,16 +59,11 @@ impl DeviceLights {
                 _ => {}
             }
         }
-        program.set_constants(gpu, &model_block(program.constants(), params));
-        program.bind_lights(gpu, self)
-    }
-
-    pub(super) const fn version(&self) -> u64 {
-        self.version
+        inputs.bind(gpu, self, &model_block(&inputs.plan.constants, params))
     }
 
     /// A resource of the plan.
-    pub(super) fn view(&self, gpu: &Gpu, resource: Resource) -> Result<&TextureView, GpuError> {
+    fn view(&self, gpu: &Gpu, resource: Resource) -> Result<&TextureView, GpuError> {
         let found = match resource {
             Resource::IrradianceFaces => self.irradiance.as_ref(),
             Resource::HiliteFaces => self.hilite.as_ref(),
@@ -77,5 +75,56 @@ impl DeviceLights {
             adapter: gpu.name().to_owned(),
             reason: format!("the shader reads {}, which the scene does not have", resource.name()),
         })
+    }
+}
+
+/// Group 0 of a shader: its plan's constants and cubes.
+pub(super) struct Inputs {
+    plan: Plan,
+    pub(super) layout: BindGroupLayout,
+    constants: Option<Buffer>,
+    /// The cubes' version that is bound.
+    bound: Option<(u64, BindGroup)>,
+}
+
+impl Inputs {
+    pub(super) fn new(gpu: &Gpu, plan: &Plan) -> Self {
+        let faces = BindingType::Texture {
+            sample_type: TextureSampleType::Float { filterable: false },
+            view_dimension: TextureViewDimension::D2Array,
+            multisampled: false,
+        };
+        let has_constants = !plan.constants.is_empty();
+        let cubes = (1..=plan.resources.len() as u32).map(|binding| (binding, faces));
+        let kinds: Vec<_> = has_constants.then_some((0, UNIFORM)).into_iter().chain(cubes).collect();
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        let constants = has_constants.then(|| buffer(gpu, "constants", 16 * plan.constants.len(), usage));
+        Self { plan: plan.clone(), layout: layout(gpu, "lights", &kinds), constants, bound: None }
+    }
+
+    /// What is bound, once a pass has set it.
+    pub(super) fn bound(&self) -> Option<&BindGroup> {
+        self.bound.as_ref().map(|(_, group)| group)
+    }
+
+    fn bind(&mut self, gpu: &Gpu, lights: &DeviceLights, block: &[f32]) -> Result<(), GpuError> {
+        if let Some(buffer) = &self.constants {
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(block));
+        }
+        if self.bound.as_ref().is_some_and(|(version, _)| *version == lights.version) {
+            return Ok(());
+        }
+        let mut entries = Vec::new();
+        if let Some(buffer) = &self.constants {
+            entries.push(BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() });
+        }
+        for (binding, &resource) in (1..).zip(&self.plan.resources) {
+            let resource = BindingResource::TextureView(lights.view(gpu, resource)?);
+            entries.push(BindGroupEntry { binding, resource });
+        }
+        let descriptor =
+            BindGroupDescriptor { label: Some("lights"), layout: &self.layout, entries: &entries };
+        self.bound = Some((lights.version, gpu.device.create_bind_group(&descriptor)));
+        gpu.check()
     }
 }

@@ -3,16 +3,20 @@
 //! - [`GpuEngine`]: the objective; what it is made of and how sums become normal equations
 //! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
 //!   memory allowed is uploaded anew in each pass
-//! - `lights`: the cubes and the uniform block
-//! - `program`: the shaders of a wish as pipelines, and one run of them
+//! - `lights`: the cubes and the uniform block, as shaders are given them
+//! - `program`: the shaders of a wish, and one run of them; `images`: the forward pass
+//! - `pipeline`: what both make pipelines and bindings with
 
+mod images;
 mod lights;
 mod parts;
+mod pipeline;
 mod program;
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use self::images::Images;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
 use self::program::Program;
@@ -34,11 +38,26 @@ pub struct Memory {
     pub resident: Option<u64>,
 }
 
+/// What is fitted.
+#[derive(Clone, Debug)]
+pub struct Task<'v> {
+    /// The switches of the model.
+    pub setup: Setup,
+    /// The cubes that its effects ask for.
+    pub illumination: Illumination,
+    /// Samples and targets.
+    pub views: &'v [ObservedView],
+    /// What is minimised.
+    pub loss: Loss,
+    /// What is free.
+    pub unknowns: Vec<Unknown>,
+}
+
 /// Loss, gradient and normal equations on a graphics adapter.
 pub struct GpuEngine<'g> {
     gpu: &'g Gpu,
     setup: Setup,
-    views: Vec<ObservedView>,
+    views: &'g [ObservedView],
     loss: Loss,
     unknowns: Vec<Unknown>,
     stride: usize,
@@ -57,25 +76,19 @@ struct OnDevice {
     lights: DeviceLights,
     /// By wish, and by whether the environment is turned.
     programs: BTreeMap<(Wish, bool), Program>,
+    /// The forward pass, and whether it is for a turned environment.
+    images: Option<(bool, Images)>,
 }
 
 impl<'g> GpuEngine<'g> {
-    /// An engine over `views` for the `unknowns`; the shaders for passes at `start` are compiled.
+    /// An engine for a task; the shaders for passes at `start` are compiled.
     ///
     /// # Errors
     /// When the device does not take it.
-    pub fn new(
-        gpu: &'g Gpu,
-        setup: Setup,
-        illumination: Illumination,
-        views: Vec<ObservedView>,
-        loss: Loss,
-        unknowns: Vec<Unknown>,
-        start: &Point,
-        memory: Memory,
-    ) -> Result<Self, GpuError> {
+    pub fn new(gpu: &'g Gpu, task: Task<'g>, start: &Point, memory: Memory) -> Result<Self, GpuError> {
+        let Task { setup, illumination, views, loss, unknowns } = task;
         let alpha = views.iter().any(ObservedView::compares_alpha);
-        let traits = Traits::of(gpu, &views)?;
+        let traits = Traits::of(gpu, views)?;
         let mut engine = Self {
             gpu,
             setup,
@@ -89,11 +102,12 @@ impl<'g> GpuEngine<'g> {
                 parts: Parts::default(),
                 lights: DeviceLights::new(illumination),
                 programs: BTreeMap::new(),
+                images: None,
             }),
             fault: Mutex::new(None),
             views,
         };
-        let parts = Parts::new(gpu, &engine.views, &engine.traits, memory)?;
+        let parts = Parts::new(gpu, views, &engine.traits, memory)?;
         engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
         engine.set_stride(1);
         // Whatever the driver refuses shows here, and not in the midst of a fit.
@@ -110,14 +124,20 @@ impl<'g> GpuEngine<'g> {
 
     /// The views.
     #[must_use]
-    pub fn views(&self) -> &[ObservedView] {
-        &self.views
+    pub const fn views(&self) -> &'g [ObservedView] {
+        self.views
     }
 
     /// Bytes of samples, targets and weights that stay on the device, and bytes that each pass uploads.
     #[must_use]
     pub fn bytes(&self) -> (u64, u64) {
         self.lock().parts.bytes()
+    }
+
+    /// The adapter's name.
+    #[must_use]
+    pub fn adapter(&self) -> &str {
+        self.gpu.name()
     }
 
     /// How many blocks of pixels there are in all views.
@@ -165,16 +185,50 @@ impl<'g> GpuEngine<'g> {
     fn sums(&self, point: &Point, wish: Wish) -> Result<Passed, GpuError> {
         let turned = self.turned(point);
         let mut device = self.lock();
-        let OnDevice { parts, lights, programs } = &mut *device;
+        let OnDevice { parts, lights, programs, .. } = &mut *device;
         let program = match programs.entry((wish, turned)) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
                 entry.insert(Program::new(self.gpu, self.fused(turned)?, wish, parts)?)
             }
         };
-        lights.set(self.gpu, &point.params, program)?;
-        let sums = program.run(self.gpu, parts, &self.views, &point.gains)?;
+        lights.set(self.gpu, &point.params, &mut program.inputs)?;
+        let sums = program.run(self.gpu, parts, self.views, &point.gains)?;
         Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
+    }
+
+    /// The image of view `index` at `point`, as the CPU engine's: for each pixel slot the mean over its
+    /// samples, colour and (where the haze is compared) alpha, times the view's gain.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn image(&self, index: usize, point: &Point) -> Result<Vec<Vec<f32>>, GpuError> {
+        self.with_images(point, |images, parts| images.read(self.gpu, parts, index))
+    }
+
+    /// Shade every view and wait for it; the images stay on the device. To be timed.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn shade(&self, point: &Point) -> Result<(), GpuError> {
+        self.with_images(point, |_, _| self.gpu.wait())
+    }
+
+    fn with_images<T>(
+        &self,
+        point: &Point,
+        then: impl FnOnce(&Images, &Parts) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        let turned = self.turned(point);
+        let mut device = self.lock();
+        let OnDevice { parts, lights, images, .. } = &mut *device;
+        if images.as_ref().is_none_or(|(of, _)| *of != turned) {
+            *images = Some((turned, Images::new(self.gpu, self.fused(turned)?, parts)?));
+        }
+        let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
+        lights.set(self.gpu, &point.params, &mut images.inputs)?;
+        images.run(self.gpu, parts, self.views, &point.gains)?;
+        then(images, parts)
     }
 
     /// A pass as normal equations; after a fault, numbers that no solver takes.

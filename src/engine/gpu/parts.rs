@@ -175,6 +175,11 @@ impl Parts {
         total
     }
 
+    /// Pixels of a part.
+    pub(super) fn slots(part: &Part) -> usize {
+        part.groups.len() * LANES
+    }
+
     /// Workgroups of a part's dispatch.
     pub(super) fn workgroups(part: &Part) -> u32 {
         let tiles = (part.read as usize).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
@@ -183,7 +188,7 @@ impl Parts {
 
     /// Most workgroups that a part's dispatch may have, at any stride.
     pub(super) fn most_workgroups(part: &Part) -> u32 {
-        let tiles = (part.groups.len() * LANES).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
+        let tiles = Self::slots(part).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
         tiles.clamp(1, MOST_WORKGROUPS) as u32
     }
 

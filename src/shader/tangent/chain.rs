@@ -35,8 +35,8 @@ pub struct Chain {
     pub functions: String,
     /// Resources that they read beside the plan's.
     pub resources: Vec<Resource>,
-    /// The lines, to stand after the plan's calls; they name what those do.
-    pub lines: String,
+    /// For each seed its lines, to stand after the plan's calls; they name what those do.
+    pub lines: Vec<String>,
     /// For each seed, how the radiance moves (WGSL of a `vec3f`); `None` where it stays.
     pub radiance: Vec<Option<String>>,
     /// For each seed, how the haze moves (an `f32`).
@@ -52,6 +52,7 @@ impl Chain {
         let mut tangents = Tangents::new(&plan.declarations(true))?;
         let mut chain = Self::default();
         for (k, seed) in seeds.iter().enumerate() {
+            chain.lines.push(String::new());
             let moved = chain.follow(plan, k, seed, &mut tangents)?;
             let along: Vec<&str> = parts(&plan.facts)
                 .into_iter()
@@ -76,7 +77,7 @@ impl Chain {
         if let Seed::Named { name, tangent } = seed {
             let typed = plan.rules(Stage::Fragment).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
             if let Some((_, kind)) = typed {
-                let _ = writeln!(self.lines, "    let d{k}_{name}: {kind} = {tangent};");
+                let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
                 moved.insert(name, format!("d{k}_{name}"));
             }
         }
@@ -106,13 +107,13 @@ impl Chain {
     ) {
         if let [(quantity, "")] = rule.gives.as_slice() {
             if !held(quantity) {
-                let _ = writeln!(self.lines, "    let d{k}_{quantity}: {} = {call};", rule.returns);
+                let _ = writeln!(self.lines[k], "    let d{k}_{quantity}: {} = {call};", rule.returns);
                 moved.insert(quantity, format!("d{k}_{quantity}"));
             }
             return;
         }
         let both = format!("d{k}_{}_and_more", rule.gives[0].0);
-        let _ = writeln!(self.lines, "    let {both}: {} = {call};", rule.returns);
+        let _ = writeln!(self.lines[k], "    let {both}: {} = {call};", rule.returns);
         for (quantity, swizzle) in rule.gives.iter().filter(|(quantity, _)| !held(quantity)) {
             moved.insert(quantity, format!("{both}.{swizzle}"));
         }

@@ -1,6 +1,6 @@
 //! The fit engine on the adapter against the plain f64 model, and beside the CPU's.
 
-use skinfit::engine::gpu::{GpuEngine, Memory};
+use skinfit::engine::gpu::{GpuEngine, Memory, Task};
 use skinfit::engine::reference::Reference;
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
@@ -20,13 +20,13 @@ use crate::engine::{
 fn engine<'g>(
     gpu: &'g Gpu,
     setup: Setup,
-    views: &[ObservedView],
+    views: &'g [ObservedView],
     loss: Loss,
     unknowns: &[Unknown],
     at: &Point,
 ) -> GpuEngine<'g> {
-    let memory = Memory::default();
-    GpuEngine::new(gpu, setup, illumination(), views.to_vec(), loss, unknowns.to_vec(), at, memory).unwrap()
+    let task = Task { setup, illumination: illumination(), views, loss, unknowns: unknowns.to_vec() };
+    GpuEngine::new(gpu, task, at, Memory::default()).unwrap()
 }
 
 const FULL: Setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: EVERYTHING };
@@ -128,8 +128,9 @@ fn parts_and_streaming_give_the_same_sums() {
     let unknowns = some_unknowns();
     let point = Point { params: params(), gains: vec![1.0, 1.1] };
     let make = |memory| {
-        GpuEngine::new(gpu, FULL, illumination(), views.to_vec(), Loss::L2, unknowns.clone(), &point, memory)
-            .unwrap()
+        let (illumination, unknowns) = (illumination(), unknowns.clone());
+        let task = Task { setup: FULL, illumination, views: &views, loss: Loss::L2, unknowns };
+        GpuEngine::new(gpu, task, &point, memory).unwrap()
     };
     let whole = make(Memory::default());
     let want = whole.normal_equations(&point);
@@ -189,7 +190,8 @@ fn a_million_samples_keep_seven_digits() {
         .collect();
     let (unknowns, light) = (some_unknowns(), illumination());
     let point = Point { params: params(), gains: vec![1.0] };
-    let got = engine(gpu, FULL, &[large], Loss::L2, &unknowns, &point).normal_equations(&point);
+    let large = [large];
+    let got = engine(gpu, FULL, &large, Loss::L2, &unknowns, &point).normal_equations(&point);
     let small = [small];
     let mut want = Reference::new(FULL, &light, &small, Loss::L2, &unknowns).normal_equations(&point);
     let share = 1.0 / times as f64;
@@ -253,4 +255,26 @@ fn a_lost_device_ends_a_fit_with_its_reason_and_keeps_the_state() {
         skinfit::fit::fit(&cpu(FULL, &views, Loss::L2, &unknowns, true), &point, &options, &mut |_| {})
             .unwrap();
     assert!(outcome.loss_end < outcome.loss_start);
+}
+
+#[test]
+fn images_equal_the_cpu_engines() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(9, 5), view(30, 6)];
+    for form in Form::ALL {
+        let setup = Setup { form, ..FULL };
+        let point = Point { params: params(), gains: vec![1.5, 0.8] };
+        let ours = engine(gpu, setup, &views, Loss::L2, &[], &point);
+        let theirs = cpu(setup, &views, Loss::L2, &[], true);
+        for index in 0..2 {
+            let (got, want) = (ours.image(index, &point).unwrap(), theirs.image(index, &point));
+            assert_eq!(got.len(), want.len());
+            for (c, (got, want)) in got.iter().zip(&want).enumerate() {
+                for (slot, (g, w)) in got.iter().zip(want).enumerate() {
+                    // The vectors' own figures for f32, once for each engine.
+                    assert!((g - w).abs() < 4e-6 + 4e-5 * w.abs(), "{form:?} {index} {c} {slot}: {g} {w}");
+                }
+            }
+        }
+    }
 }
