@@ -202,6 +202,49 @@ fn add(total: &mut NormalEquations, part: &NormalEquations) {
     total.jtj.iter_mut().zip(&part.jtj).for_each(|(a, b)| *a += b);
 }
 
+/// The entry of normal equations that is furthest off.
+#[derive(Clone, Debug)]
+pub struct Deviation {
+    /// Which one, in words.
+    pub what: String,
+    /// How far, relative to the geometric mean of the diagonal entries that share its row and column.
+    pub size: f64,
+}
+
+/// How far normal equations are from others of the same unknowns; infinitely where a number is not finite.
+#[must_use]
+pub fn deviation(got: &NormalEquations, want: &NormalEquations, unknowns: &[Unknown]) -> Deviation {
+    let k = unknowns.len();
+    let mut worst = Deviation { what: "nothing".to_owned(), size: 0.0 };
+    let mut see = |got: f64, want: f64, scale: f64, what: &dyn Fn() -> String| {
+        // What is 0 by its nature has to be 0.
+        let off = (got - want).abs() / scale.max(f64::MIN_POSITIVE);
+        let off = if got == want {
+            0.0
+        } else if off.is_finite() {
+            off
+        } else {
+            f64::INFINITY
+        };
+        if off > worst.size {
+            worst = Deviation { what: what(), size: off };
+        }
+    };
+    see(got.loss, want.loss, want.loss, &|| "the loss".to_owned());
+    see(got.residual, want.residual, want.residual, &|| "r^T r".to_owned());
+    for a in 0..k {
+        let size = want.jtj[a * k + a].sqrt();
+        let name = || format!("J^T r of {}", unknowns[a].name());
+        see(got.jtr[a], want.jtr[a], size * want.residual.sqrt(), &name);
+        for b in 0..=a {
+            let name = || format!("J^T J of {} and {}", unknowns[a].name(), unknowns[b].name());
+            let scale = size * want.jtj[b * k + b].sqrt();
+            see(got.jtj[a * k + b], want.jtj[a * k + b], scale, &name);
+        }
+    }
+    worst
+}
+
 /// A stored sample in f64.
 fn fragment(view: &ObservedView, at: usize) -> Fragment<f64> {
     let f = view.samples.surface.fragment(at);
