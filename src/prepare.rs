@@ -185,11 +185,27 @@ impl Prepared {
         columns.chain((1..gains).map(Unknown::Gain)).collect()
     }
 
-    /// An engine over the views that have a target; views without one are dropped from the scene.
+    /// The CPU engine over the views that have a target; views without one are dropped from the scene.
+    ///
+    /// # Errors
+    /// As of [`Self::observed`].
+    pub fn engine(&mut self) -> Result<CpuEngine, PrepareError> {
+        let observed = self.observed()?;
+        Ok(self.engine_over(observed))
+    }
+
+    /// The CPU engine over views that [`Self::observed`] gave.
+    #[must_use]
+    pub fn engine_over(&self, observed: Vec<ObservedView>) -> CpuEngine {
+        let illumination = self.illumination.clone();
+        CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns())
+    }
+
+    /// The views that have a target, with their samples; views without one are dropped from the scene.
     ///
     /// # Errors
     /// When no view has a target, or a target asks nothing.
-    pub fn engine(&mut self) -> Result<CpuEngine, PrepareError> {
+    pub fn observed(&mut self) -> Result<Vec<ObservedView>, PrepareError> {
         let views = std::mem::take(&mut self.scene.views);
         let samples = std::mem::take(&mut self.samples);
         let gains = std::mem::take(&mut self.gains);
@@ -215,8 +231,7 @@ impl Prepared {
         if observed.is_empty() {
             return Err(PrepareError::NoTarget { scene: self.scene.path.display().to_string() });
         }
-        let illumination = self.illumination.clone();
-        Ok(CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns()))
+        Ok(observed)
     }
 }
 

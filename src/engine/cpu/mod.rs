@@ -268,14 +268,11 @@ impl Objective for CpuEngine {
     }
 
     fn rounding(&self) -> f64 {
-        // Half a unit in the last place of an f32, as a share of the number.
-        const SHARE: f64 = 1.0 / (1 << 24) as f64;
-        let power = |view: &ObservedView| {
-            let read =
-                self.read_blocks(view).flat_map(|b| b * BLOCK..view.samples.groups().min((b + 1) * BLOCK));
-            view.power(read, self.loss)
+        let read = |view: &ObservedView| {
+            let groups = view.samples.groups();
+            self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK)).collect()
         };
-        SHARE * SHARE * self.views.iter().map(power).sum::<f64>()
+        super::rounding(self.views.iter().map(|view| (view, read(view))), self.loss)
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {
