@@ -9,7 +9,7 @@
 //! ```
 
 use super::effects::{Effect, Effects};
-use super::fragment::Terms;
+use super::terms::Terms;
 use super::params::{Param, Params};
 use super::real::Real;
 use super::rim::{Rim, rim};
