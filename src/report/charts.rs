@@ -24,10 +24,14 @@ pub(super) fn convergence(summary: &Summary) -> String {
     format!("<div class=\"pair\">{}</div>", panels.concat())
 }
 
-/// The start, after its one pass, and every iteration.
+/// The start, after its one pass, and every iteration. Variable projection's history begins with the
+/// best linear unknowns there, the others' with the start itself.
 fn track(summary: &Summary) -> Vec<Iteration> {
     let start = Iteration { iteration: 0, loss: summary.loss.start, evaluations: 1, seconds: 0.0 };
-    std::iter::once(start).chain(summary.history.iter().copied()).collect()
+    let iterations = summary.history.iter().copied();
+    std::iter::once(start)
+        .chain(iterations.skip_while(|first| *first == Iteration { seconds: first.seconds, ..start }))
+        .collect()
 }
 
 fn convergence_panel(summary: &Summary, along: Along) -> String {
@@ -84,11 +88,11 @@ fn convergence_panel(summary: &Summary, along: Along) -> String {
     let _ = write!(svg, "<path class=\"curve\" d=\"M{}\"/>", path.join("L"));
     // Beyond a hundred iterations dots would hide the curve.
     let radius = if points.len() > 100 { 1.5 } else { 4.0 };
-    for ((x, y), i) in points.iter().zip(&track) {
+    for (k, ((x, y), i)) in points.iter().zip(&track).enumerate() {
         let _ = write!(
             svg,
             "<circle class=\"dot\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}: loss {}, {} {}, {}</title></circle>",
-            if i.iteration == 0 { "start".to_owned() } else { format!("iteration {}", i.iteration) },
+            if k == 0 { "start".to_owned() } else { format!("iteration {}", i.iteration) },
             number(i.loss, 5),
             i.evaluations,
             if i.evaluations == 1 { "pass" } else { "passes" },
