@@ -268,11 +268,7 @@ impl Objective for CpuEngine {
     }
 
     fn rounding(&self) -> f64 {
-        let read = |view: &ObservedView| {
-            let groups = view.samples.groups();
-            self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK)).collect()
-        };
-        super::rounding(self.views.iter().map(|view| (view, read(view))), self.loss)
+        super::rounding(&self.views, self.loss, BLOCK, self.stride)
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

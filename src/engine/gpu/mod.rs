@@ -26,6 +26,7 @@ use super::{NormalEquations, Objective, Point, Unknown};
 use crate::gpu::{Gpu, GpuError};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
+use crate::samples::LANES;
 use crate::scene::Loss;
 use crate::shader::fused::{BLOCK, ColumnOf, Fitted, Fused, Sum, Wish};
 
@@ -143,10 +144,7 @@ impl<'g> GpuEngine<'g> {
     /// How many blocks of pixels there are in all views.
     #[must_use]
     pub fn blocks(&self) -> usize {
-        self.views
-            .iter()
-            .map(|view| (view.samples.groups() * crate::samples::LANES).div_ceil(BLOCK as usize))
-            .sum()
+        self.views.iter().map(|view| (view.samples.groups() * LANES).div_ceil(BLOCK as usize)).sum()
     }
 
     /// Why no pass can be made any more, if so.
@@ -306,7 +304,7 @@ impl Objective for GpuEngine<'_> {
     }
 
     fn rounding(&self) -> f64 {
-        super::rounding(self.views.iter().map(|view| (view, (0..view.samples.groups()).collect())), self.loss)
+        super::rounding(self.views, self.loss, BLOCK as usize / LANES, self.stride)
     }
 
     fn fault(&self) -> Option<String> {

@@ -17,7 +17,7 @@ const BLOCK_GROUPS: usize = BLOCK as usize / LANES;
 /// Pixels that a thread shades, about: fewer leave processors idle, more leave sums long.
 const PIXELS_A_THREAD: usize = 4;
 /// Most workgroups of a part: enough for the largest adapters.
-const MOST_WORKGROUPS: usize = 2048;
+const MOST_WORKGROUPS: usize = 1056;
 
 /// Bytes of a dispatch's uniform block.
 pub(super) const PART_BYTES: usize = 32;
