@@ -17,6 +17,7 @@
 //! - [`report`]: metrics, pictures and pages that show how good a fit is.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
 //! - [`export`]: constants and shaders as text for other engines.
+//! - [`study`]: what is measured about the model and the fits.
 //! - [`cli`]: the command line.
 //! - [`output`], [`progress`]: files written whole or not at all; progress bars.
 
@@ -38,3 +39,4 @@ pub mod report;
 pub mod samples;
 pub mod scene;
 pub mod shader;
+pub mod study;

@@ -1,6 +1,7 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
-//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
+//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `stability`, `sweep`, `collect`: the
+//!   commands
 //! - `scene`: how a command finds its scene and its cache
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
@@ -15,6 +16,7 @@ mod render;
 mod run_folder;
 mod scene;
 mod shader;
+mod stability;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -83,6 +85,7 @@ enum Command {
     Shader(shader::Arguments),
     Export(export::Arguments),
     Info(info::Arguments),
+    Stability(stability::Arguments),
 }
 
 /// Run the program on the process' arguments.
@@ -99,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Shader(arguments) => shader::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Stability(arguments) => stability::run(&arguments),
     };
     match done {
         Ok(Exit::Done) => ExitCode::SUCCESS,

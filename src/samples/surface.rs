@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::SurfaceArrays;
 use super::trace::Hit;
 use crate::model::effects::{Form, Needs, Silhouette};
+use crate::model::fragment::guarded;
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
 use crate::scene::maps::Maps;
@@ -131,10 +132,10 @@ impl<'a> Surface<'a> {
             }
             Silhouette::Fragment | Silhouette::Bumped => 1.0 - normal.dot(view).abs().min(1.0),
         };
+        let (base, bump) = guarded(base.to_array(), bump.to_array(), exact_view.to_array());
         Point {
-            // Only a vanished N leaves no base: then the side that faces the eye counts.
-            base: if base == Vec3::ZERO || !base.is_finite() { -exact_view } else { base },
-            bump: if bump.is_finite() { bump } else { Vec3::ZERO },
+            base: base.into(),
+            bump: bump.into(),
             view,
             normal,
             occlusion: self.occlusion.map_or(1.0, scalar),

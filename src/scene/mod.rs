@@ -27,6 +27,7 @@ mod tangents;
 pub mod view;
 
 pub use error::{SceneError, Warning};
+pub(crate) use file::Source;
 pub use file::suggestion;
 pub use load::LoadOptions;
 pub use settings::{interval, read_params};
