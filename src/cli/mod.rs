@@ -17,6 +17,7 @@ mod run_folder;
 mod scene;
 mod shader;
 mod stability;
+mod sweep;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -86,6 +87,8 @@ enum Command {
     Export(export::Arguments),
     Info(info::Arguments),
     Stability(stability::Arguments),
+    Sweep(sweep::SweepArguments),
+    Collect(sweep::CollectArguments),
 }
 
 /// Run the program on the process' arguments.
@@ -103,6 +106,8 @@ pub fn main() -> ExitCode {
         Command::Export(arguments) => export::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Stability(arguments) => stability::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
+        Command::Collect(arguments) => sweep::run_collect(&arguments),
     };
     match done {
         Ok(Exit::Done) => ExitCode::SUCCESS,

@@ -228,6 +228,12 @@ impl Source {
     }
 }
 
+/// Refuse a text that is not a scene file's by its keys and the kinds of its values; what they mean is
+/// checked when the scene is loaded.
+pub(crate) fn check_text(path: &Path, text: &str) -> Result<(), SceneError> {
+    Source::of(path, text.to_owned()).parse::<SceneFile>().map(drop)
+}
+
 /// "Did you mean ...? Known: ...", for a name that is none of `known`.
 #[must_use]
 pub fn suggestion(given: &str, known: &[&str]) -> String {

@@ -27,8 +27,8 @@ mod tangents;
 pub mod view;
 
 pub use error::{SceneError, Warning};
-pub(crate) use file::Source;
 pub use file::suggestion;
+pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
 pub use settings::{interval, read_params};
 

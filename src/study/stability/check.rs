@@ -104,7 +104,7 @@ fn compare(answer: &Answer, reference: &Reference, slack: f64, holds: &[Holds]) 
         for (at, (value, wanted)) in values.iter().zip(&reference.fragments).enumerate() {
             for c in 0..4 {
                 let allowed = slack * wanted.value_tolerance[c];
-                let size = wanted.value.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                let size = wanted.value_size[c];
                 let number = Number { got: value[c], want: wanted.value[c], allowed, size };
                 verdict.note(number, Some(at), || CHANNELS[c].to_owned());
             }
@@ -114,8 +114,9 @@ fn compare(answer: &Answer, reference: &Reference, slack: f64, holds: &[Holds]) 
         for (at, (slope, wanted)) in slopes.iter().zip(&reference.fragments).enumerate() {
             for param in Param::all() {
                 let (got, want) = (slope[param as usize], wanted.slopes[param as usize]);
-                let size = want.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+                let sizes = wanted.slope_size[param as usize];
                 for c in 0..4 {
+                    let size = sizes[c];
                     let allowed = slack * wanted.slope_tolerance[param as usize][c];
                     let number = Number { got: got[c], want: want[c], allowed, size };
                     verdict.note(number, Some(at), || format!("d {} / d {}", CHANNELS[c], param.name()));

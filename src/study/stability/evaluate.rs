@@ -7,10 +7,10 @@ use super::lights::LightBox;
 use super::objectives::EngineFactory;
 use crate::engine::NormalEquations;
 use crate::engine::cpu::Illumination;
-use crate::model::compose::Composition;
+use crate::model::compose::{Composition, Weights};
 use crate::model::cube::Cube;
-use crate::model::evaluate::{Setup, compose};
-use crate::model::fragment::{Fragment, LookupParam, shading, terms_tangent};
+use crate::model::evaluate::Setup;
+use crate::model::fragment::{Fragment, LookupParam, Shading, Wanted, shading, terms, terms_tangent};
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
 use crate::model::real::Real;
@@ -125,6 +125,14 @@ impl<R: Scalar> WideCubes<R> {
         ])
     }
 
+    /// The same cubes, each texel changed by `change`.
+    #[must_use]
+    pub fn changed(&self, mut change: impl FnMut(R::Texel) -> R::Texel) -> Self {
+        let change = std::cell::RefCell::new(&mut change);
+        let texel = |texel: [R::Texel; 4]| texel.map(|x| change.borrow_mut()(x));
+        Self(self.0.each_ref().map(|cube| cube.as_ref().map(|cube| cube.map(texel))))
+    }
+
     /// The lights of `setup` at `params`; the environment's turn is always computed, as it may be free.
     pub fn lights(&self, setup: Setup, params: &Params) -> Lights<'_, R> {
         let [irradiance, specular, lobe_slope, hilite] = self.0.each_ref().map(Option::as_ref);
@@ -139,16 +147,16 @@ pub fn shade_with_slopes<R: Scalar>(
     setup: Setup,
     lights: &Lights<'_, R>,
     f: &Fragment<R>,
+    s: &Shading<R>,
     params: &Params,
 ) -> (Composition<R>, Slopes) {
-    let composition = compose(setup, lights, f, params);
-    let strength = R::ZERO.lit(params.scalar(Param::NormalStrength));
-    let s = shading(setup.form, setup.silhouette, f, strength);
+    let weights = Weights::new(params, setup.effects, R::ZERO);
+    let composition = Composition::new(terms(lights, f, s, Wanted::ALL), f.occlusion, weights);
     let mut slopes = [[0.0; 4]; Param::COUNT];
     for param in Param::all().filter(|param| param.asked_for(setup.effects)) {
         let by = match LookupParam::from_param(param) {
             Some(lookup) => {
-                let slope = terms_tangent(lights, f, &s, lookup);
+                let slope = terms_tangent(lights, f, s, lookup);
                 let along = |c| composition.along(&slope, c);
                 [along(0), along(1), along(2), composition.alpha_along(&slope)]
             }
@@ -161,6 +169,11 @@ pub fn shade_with_slopes<R: Scalar>(
         slopes[param as usize] = by.map(R::wide);
     }
     (composition, slopes)
+}
+
+/// The shading normal of a fragment at `params`.
+pub fn shading_at<R: Scalar>(setup: Setup, f: &Fragment<R>, params: &Params) -> Shading<R> {
+    shading(setup.form, setup.silhouette, f, R::ZERO.lit(params.scalar(Param::NormalStrength)))
 }
 
 /// The colour of a composition.
@@ -195,7 +208,8 @@ where
         let lights = cubes.lights(setting.setup, &setting.params);
         let each = |inputs: &FragmentInputs| {
             let f = inputs.fragment(setting.setup, R::ZERO);
-            let (composition, slopes) = shade_with_slopes(setting.setup, &lights, &f, &setting.params);
+            let s = shading_at(setting.setup, &f, &setting.params);
+            let (composition, slopes) = shade_with_slopes(setting.setup, &lights, &f, &s, &setting.params);
             (rgba(&composition), slopes)
         };
         let (values, slopes) = batch.fragments.iter().map(each).unzip();

@@ -2,23 +2,29 @@
 //!
 //! A tolerance that is one number for every input would be too wide for most and too narrow for a few: next
 //! to a texel of 65504 a direction's last bit moves the light by a hundredth of it. So each fragment is
-//! evaluated in f64 as given, and again with every number moved by a few units in the last place of an f32.
-//! What that does to the result, an evaluator in f32 may do as well.
+//! evaluated in f64 as given, and again with every number moved by a few units in the last place of an f32:
+//! what it is given, texels of lights, and what an f32 must round on the way, where later steps cancel (the
+//! shading normal, the reflection, their derivatives, S.z). What that does to the result, an evaluator in
+//! f32 may do as well.
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
 use super::case::{Batch, FragmentInputs, Setting};
-use super::evaluate::{Rgba, Slopes, TARGET, WideCubes, rgba, shade_with_slopes};
+use super::evaluate::{Rgba, Slopes, TARGET, WideCubes, rgba, shade_with_slopes, shading_at};
 use super::lights::LightBox;
 use crate::engine::residual::{Weighted, weighted_residual};
+use crate::model::effects::Silhouette;
+use crate::model::fragment::{Fragment, Shading};
 use crate::model::params::{Param, Params};
 
 /// By how much each number is moved, as a share of itself (of the largest component of its vector): eight
 /// roundings of 2^-24 either way, as many as lie one behind the other between an input and what a lookup or
 /// a power makes of it.
 const RADIUS: f64 = 8.0 / (1 << 24) as f64;
+/// By how much texels are moved, as a share of themselves: one rounding of a blend.
+const ROUNDED: f64 = 1.0 / (1 << 23) as f64;
 /// A component below the smallest normal f32 may be flushed to 0 (WGSL permits it).
 const FLUSHED: f64 = 1.2e-38;
 /// What roundings of sums add, as a share of the summands: some fifty of 2^-24, of either sign.
@@ -44,6 +50,10 @@ pub struct FragmentReference {
     pub value_tolerance: Rgba,
     /// How far the derivatives may be off.
     pub slope_tolerance: Slopes,
+    /// The largest that rounding makes of each channel.
+    pub value_size: Rgba,
+    /// The largest that rounding makes of each derivative.
+    pub slope_size: Slopes,
     /// What it adds to the sums, and how far that may be off.
     contribution: Contribution,
     contribution_tolerance: Contribution,
@@ -117,8 +127,11 @@ impl Reference {
         let setting = &batch.setting;
         let exponent = setting.params.scalar(Param::SpecularLobe);
         let cubes = WideCubes::<f64>::new(lights.of(setting.lights), exponent);
+        let mut rng = StdRng::seed_from_u64(0);
+        let mut rounded = || cubes.changed(|x| x * (1.0 + ROUNDED * step(&mut rng)));
+        let others = [rounded(), rounded(), rounded()];
         // The same moves for each, so that a fragment fares alike alone and among others.
-        let each = |inputs| one(setting, &cubes, inputs, moves, &mut StdRng::seed_from_u64(0));
+        let each = |inputs| one(setting, (&cubes, &others), inputs, moves, &mut StdRng::seed_from_u64(1));
         Self { fragments: batch.fragments.par_iter().map(each).collect() }
     }
 
@@ -160,22 +173,27 @@ pub const fn pair(a: usize, b: usize) -> usize {
 
 fn one(
     setting: &Setting,
-    cubes: &WideCubes<f64>,
+    (cubes, others): (&WideCubes<f64>, &[WideCubes<f64>]),
     inputs: &FragmentInputs,
     moves: usize,
     rng: &mut StdRng,
 ) -> FragmentReference {
-    let evaluate = |inputs: &FragmentInputs, params: &Params| {
-        let f = inputs.fragment(setting.setup, 0.0_f64);
-        let lights = cubes.lights(setting.setup, params);
-        let (composition, slopes) = shade_with_slopes(setting.setup, &lights, &f, params);
-        let summands: [f64; 4] = std::array::from_fn(|c| {
-            let terms = if c < 3 { composition.each_term(c) } else { return 0.0 };
-            terms.iter().map(|(_, x)| x.abs()).sum()
-        });
-        (rgba(&composition), slopes, summands)
-    };
-    let (value, slopes, summands) = evaluate(inputs, &setting.params);
+    let setup = setting.setup;
+    let evaluate =
+        |cubes: &WideCubes<f64>, inputs: &FragmentInputs, params: &Params, rng: Option<&mut StdRng>| {
+            let f = inputs.fragment(setup, 0.0_f64);
+            let mut s = shading_at(setup, &f, params);
+            if let Some(rng) = rng {
+                round_shading(&mut s, &f, (setup.silhouette, params.scalar(Param::NormalStrength)), rng);
+            }
+            let (composition, slopes) =
+                shade_with_slopes(setup, &cubes.lights(setup, params), &f, &s, params);
+            let summands: Rgba = std::array::from_fn(|c| {
+                if c == 3 { 0.0 } else { composition.each_term(c).iter().map(|(_, x)| x.abs()).sum() }
+            });
+            (rgba(&composition), slopes, summands)
+        };
+    let (value, slopes, summands) = evaluate(cubes, inputs, &setting.params, None);
     // The key light's term is a difference of two Lambert terms, each as large as this.
     let key = |c: usize| if c < 3 { inputs.albedo[c].abs() } else { 0.0 };
     let mut value_tolerance: Rgba = std::array::from_fn(|c| {
@@ -195,14 +213,18 @@ fn one(
     });
     let contribution = Contribution::of(setting, &value, &slopes);
     let mut contribution_tolerance = Contribution::NOTHING;
-    for _ in 0..moves {
+    let (mut value_size, mut slope_size) = (value.map(f64::abs), slopes.map(|slope| slope.map(f64::abs)));
+    for number in 0..moves {
         let (moved, params) = (moved(inputs, rng), moved_params(&setting.params, rng));
-        let (other, other_slopes, _) = evaluate(&moved, &params);
+        let cubes = &others[number % others.len()];
+        let (other, other_slopes, _) = evaluate(cubes, &moved, &params, Some(&mut *rng));
         let widen = |tolerance: &mut f64, a: f64, b: f64| *tolerance = tolerance.max(2.0 * (a - b).abs());
         for c in 0..4 {
             widen(&mut value_tolerance[c], other[c], value[c]);
+            value_size[c] = value_size[c].max(other[c].abs());
             for p in 0..Param::COUNT {
                 widen(&mut slope_tolerance[p][c], other_slopes[p][c], slopes[p][c]);
+                slope_size[p][c] = slope_size[p][c].max(other_slopes[p][c].abs());
             }
         }
         let mut difference = Contribution::of(setting, &other, &other_slopes);
@@ -214,8 +236,44 @@ fn one(
         slopes,
         value_tolerance,
         slope_tolerance,
+        value_size,
+        slope_size,
         contribution,
         contribution_tolerance,
+    }
+}
+
+/// What an f32 rounds off the shading normal and what follows from it. Only differences of their like feel
+/// it: 1 - |n.V| near 1, what is left of the bump across n, light along n less that along N.
+fn round_shading(
+    s: &mut Shading<f64>,
+    f: &Fragment<f64>,
+    (at, strength): (Silhouette, f64),
+    rng: &mut StdRng,
+) {
+    let size = |v: [f64; 3]| v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let mut round = |v: &mut [f64; 3], size: f64| {
+        v.iter_mut().for_each(|x| *x += RADIUS * size * step(rng));
+    };
+    let length = size(std::array::from_fn(|i| f.base[i] + strength * f.bump[i]));
+    // Beyond that the model itself cuts the derivative off.
+    let turning = (size(f.bump) / length.max(f64::MIN_POSITIVE)).min(1e6);
+    let n = size(s.n);
+    round(&mut s.n, n);
+    let reflection = size(s.reflection).max(2.0 * n);
+    round(&mut s.reflection, reflection);
+    if s.n_tangent != [0.0; 3] {
+        round(&mut s.n_tangent, turning);
+        round(&mut s.reflection_tangent, 4.0 * turning);
+    }
+    // Where it is given (not found from n) its own roundings are among the inputs'.
+    if at == Silhouette::Bumped {
+        let mut silhouette = [s.silhouette; 3];
+        round(&mut silhouette, 1.0);
+        s.silhouette = silhouette[0].max(0.0);
+        let mut tangent = [s.silhouette_tangent; 3];
+        round(&mut tangent, if tangent[0] == 0.0 { 0.0 } else { turning });
+        s.silhouette_tangent = tangent[0];
     }
 }
 
