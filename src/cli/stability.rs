@@ -9,6 +9,8 @@ use crate::prepare::{PrepareOptions, Prepared};
 use crate::progress;
 use crate::scene::{LoadOptions, Scene};
 use crate::study::stability::lights::LightBox;
+#[cfg(feature = "gpu")]
+use crate::study::stability::objectives::{EngineEvaluator, OnAdapter};
 use crate::study::stability::scene::{batches, sweepable};
 use crate::study::stability::{Study, evaluators, kept};
 
@@ -77,13 +79,18 @@ fn study_and_tell(arguments: &Arguments, study: &Study) -> Result<Exit, Refusal>
     let choice = crate::gpu::Choice { name: arguments.adapter.clone(), ..crate::gpu::Choice::default() };
     #[cfg(feature = "gpu")]
     match crate::gpu::Gpu::open(&choice) {
-        Ok(gpu) => evaluators.push(Box::new(crate::study::stability::shader::Rules(gpu))),
+        Ok(gpu) => {
+            say(&format!("on the adapter {}", gpu.name()))?;
+            let gpu = std::rc::Rc::new(gpu);
+            evaluators.push(Box::new(crate::study::stability::shader::Rules(std::rc::Rc::clone(&gpu))));
+            evaluators.push(Box::new(EngineEvaluator(OnAdapter(gpu))));
+        }
         Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => return Err(error.into()),
-        Err(error) => missing.push(format!("THE RENDERER'S SHADER RULES WERE NOT TRIED: {error}")),
+        Err(error) => missing.push(format!("SHADER RULES AND GPU ENGINE WERE NOT TRIED: {error}")),
     }
     #[cfg(not(feature = "gpu"))]
     missing.push(
-        "THE RENDERER'S SHADER RULES WERE NOT TRIED: skinfit was built without the feature gpu.".to_owned(),
+        "SHADER RULES AND GPU ENGINE WERE NOT TRIED: skinfit was built without the feature gpu.".to_owned(),
     );
     let bar = progress::bar("cases", study.steps() as u64);
     let mut report = study.run(&evaluators, &mut |done| bar.set_position(done as u64));

@@ -3,16 +3,20 @@
 
 use super::case::FragmentInputs;
 use super::lights::LightBox;
-use super::objectives::{EngineFactory, EngineInputs, ordinary_inputs, view};
+use super::objectives::{EngineFactory, EngineInputs, ordinary_inputs, targets, view};
 use crate::engine::cpu::Illumination;
 use crate::engine::view::ObservedView;
-use crate::engine::{NormalEquations, Objective, Point, Unknown};
+use crate::engine::{NormalEquations, Point, Unknown};
+use crate::fit::outcome::Outcome;
 use crate::fit::{FitError, FitOptions, fit};
 use crate::model::cube::Cube;
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::fragment::Fragment;
 use crate::model::params::{Column, Param, Params};
-use crate::samples::{LANES, SurfaceArrays, ViewSamples};
+use crate::samples::rows::Row;
+use crate::samples::surface_records::Asked;
+use crate::samples::{LANES, SurfaceRecords, ViewSamples};
 use crate::scene::Loss;
 use crate::scene::view::Clip;
 
@@ -65,6 +69,16 @@ pub const DEMANDS: [Demand; 7] = [
     },
 ];
 
+fn equations(
+    engine: &dyn EngineFactory,
+    inputs: &EngineInputs,
+    point: &Point,
+) -> Result<NormalEquations, String> {
+    let mut equations = None;
+    engine.with(inputs, point, &mut |objective| equations = Some(objective.normal_equations(point)))?;
+    equations.ok_or_else(|| "no engine was made".to_owned())
+}
+
 fn finite(equations: &NormalEquations) -> Result<(), String> {
     let scalars = [equations.loss, equations.residual, equations.weight];
     if scalars.iter().chain(&equations.jtr).chain(&equations.jtj).all(|x| x.is_finite()) {
@@ -80,8 +94,8 @@ fn clipped(engine: &dyn EngineFactory, given: &Circumstances<'_>, clip: Clip, ta
         let (mut inputs, point) = ordinary_inputs(&[FragmentInputs::ORDINARY; 20], given.lights);
         inputs.loss = loss;
         inputs.views[0].clip = Some(clip);
-        inputs.views[0].target = std::array::from_fn(|_| vec![target; 2 * LANES]);
-        let equations = engine.make(inputs)?.normal_equations(&point);
+        inputs.views[0].target = targets(&[target; 4], 2);
+        let equations = equations(engine, &inputs, &point)?;
         finite(&equations)?;
         let largest = [equations.loss, equations.residual].into_iter();
         let largest = largest.chain(equations.jtr).chain(equations.jtj).fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -100,17 +114,14 @@ fn grey(fragments: &[FragmentInputs], target: f32, free: &[Param]) -> (EngineInp
     let inputs = EngineInputs {
         setup,
         illumination: Illumination { irradiance: Some(even), lobes: None, hilite: None },
-        views: vec![view(setup, fragments, [target; 4])],
+        views: vec![ObservedView {
+            target: targets(&[target; 3], fragments.len().div_ceil(LANES)),
+            ..view(setup, fragments, [0.0; 4])
+        }],
         loss: Loss::L2,
         unknowns: free.iter().map(|&p| Unknown::Param(Column::tied(p))).collect(),
     };
-    let inputs = EngineInputs { views: inputs.views.into_iter().map(without_alpha).collect(), ..inputs };
     (inputs, Point { params: Params::defaults(Form::Corrected), gains: vec![1.0] })
-}
-
-fn without_alpha(mut view: ObservedView) -> ObservedView {
-    view.target[3].clear();
-    view
 }
 
 /// Facing the eye, where there is no rim.
@@ -122,14 +133,23 @@ const FACING: FragmentInputs = FragmentInputs {
     ..FragmentInputs::ORDINARY
 };
 
-fn solve(objective: &dyn Objective, point: &Point) -> Result<crate::fit::outcome::Outcome, String> {
-    let options = FitOptions::default();
-    fit(objective, point, &options, &mut |_| {}).map_err(|error| error.to_string())
+fn solve(engine: &dyn EngineFactory, inputs: &EngineInputs, point: &Point) -> Result<Outcome, FitError> {
+    let mut outcome = None;
+    let made = engine.with(inputs, point, &mut |objective| {
+        outcome = Some(fit(objective, point, &FitOptions::default(), &mut |_| {}));
+    });
+    let lost = |reason: String| FitError::Solver { solver: "none", reason };
+    made.map_err(lost)?;
+    outcome.unwrap_or_else(|| Err(lost("no engine was made".to_owned())))
+}
+
+fn words(error: FitError) -> String {
+    error.to_string()
 }
 
 fn unidentifiable(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
     let (inputs, point) = grey(&[FACING; 20], 0.25, &[Param::BaseWeight, Param::RimExponent]);
-    let outcome = solve(&*engine.make(inputs)?, &point)?;
+    let outcome = solve(engine, &inputs, &point).map_err(words)?;
     let [base, exponent] = &outcome.unknowns[..] else { return Err("unknowns are lost".to_owned()) };
     if exponent.value != exponent.start || exponent.identifiable {
         return Err(format!("rim_exponent went from {} to {}", exponent.start, exponent.value));
@@ -140,10 +160,9 @@ fn unidentifiable(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
 
 fn empty_mask(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
     let (mut inputs, point) = grey(&[FACING; 20], 0.25, &[Param::BaseWeight]);
-    inputs.views[0].weight = vec![0.0; 2 * LANES];
-    let objective = engine.make(inputs)?;
-    finite(&objective.normal_equations(&point))?;
-    match fit(&*objective, &point, &FitOptions::default(), &mut |_| {}) {
+    inputs.views[0].weight.fill(Row::ZERO);
+    finite(&equations(engine, &inputs, &point)?)?;
+    match solve(engine, &inputs, &point) {
         Err(FitError::Empty) => Ok((0.0, 0.0)),
         Err(other) => Err(format!("another error: {other}")),
         Ok(_) => Err("a fit of nothing was not refused".to_owned()),
@@ -155,7 +174,7 @@ fn black_target(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
     for loss in Loss::ALL {
         let (mut inputs, point) = grey(&[FACING; 20], 0.0, &[Param::BaseWeight]);
         inputs.loss = loss;
-        let outcome = solve(&*engine.make(inputs)?, &point)?;
+        let outcome = solve(engine, &inputs, &point).map_err(words)?;
         worst = worst.max(outcome.unknowns[0].value.abs()).max(outcome.loss_end);
     }
     // Robust losses close in by a factor an iteration, until 1e-8 of the loss is gained by one; SMAPE of a
@@ -165,7 +184,7 @@ fn black_target(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
 
 fn one_pixel(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
     let (inputs, point) = grey(&[FACING], 0.375, &[Param::BaseWeight]);
-    let outcome = solve(&*engine.make(inputs)?, &point)?;
+    let outcome = solve(engine, &inputs, &point).map_err(words)?;
     Ok(((outcome.unknowns[0].value - 0.75).abs(), 1e-5))
 }
 
@@ -174,44 +193,42 @@ fn shade_of(i: usize) -> f32 {
     0.25 + (i % 65_521) as f32 / 131_072.0
 }
 
-/// One plane that differs from pixel to pixel, and as few others as there can be.
+/// One number that differs from pixel to pixel, and as few others as there can be.
 fn many_pixels(engine: &dyn EngineFactory, given: &Circumstances<'_>) -> Met {
     let groups = given.pixels.div_ceil(LANES);
     let count = groups * LANES;
     let (mut inputs, point) = grey(&[FACING], 0.0, &[Param::BaseWeight]);
-    let plane = |x: f32| vec![x; count];
-    let albedo: Vec<f32> = (0..count).map(shade_of).collect();
-    let surface = SurfaceArrays {
-        base: [plane(0.0), plane(0.0), plane(1.0)],
-        albedo: [albedo.clone(), albedo.clone(), albedo],
-        ..SurfaceArrays::default()
-    };
+    let facing = FACING.fragment(inputs.setup, 0.0_f32);
+    let mut surface = SurfaceRecords::new(Asked { albedo: true, ..Asked::default() }, groups);
+    for slot in 0..count {
+        surface.set(slot, &Fragment { albedo: [shade_of(slot); 3], ..facing }, 1.0);
+    }
     let samples = ViewSamples {
         group_start: (0..=groups as u32).collect(),
         pixel: (0..count as u32).collect(),
         surface,
         ..ViewSamples::default()
     };
-    let target = [plane(0.0), plane(0.0), plane(0.0), Vec::new()];
+    let target = targets(&[0.0; 3], groups);
     inputs.views = vec![ObservedView { samples, target, weight: Vec::new(), clip: None }];
-    let objective = engine.make(inputs)?;
     // The same numbers, summed in pairs in f64.
     let want = pairwise(0, count, &|i| f64::from(shade_of(i)).powi(2)) * 3.0;
-    let mut first: Option<NormalEquations> = None;
+    let mut sums: Vec<NormalEquations> = Vec::new();
+    let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build());
+    engine.with(&inputs, &point, &mut |objective| {
+        let one = |pool: &rayon::ThreadPool| pool.install(|| objective.normal_equations(&point));
+        sums = pools.iter().flatten().map(one).collect();
+    })?;
     let mut worst = 0.0_f64;
-    for threads in [1, 2, 5] {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|error| error.to_string())?;
-        let got = pool.install(|| objective.normal_equations(&point));
-        finite(&got)?;
-        let sums = [got.residual, got.jtr[0], got.jtj[0]];
-        worst = sums.iter().fold(worst, |most, sum| most.max((sum / want - 1.0).abs()));
-        match &first {
-            Some(first) if *first != got => return Err(format!("{threads} threads sum otherwise than 1")),
-            _ => first = Some(got),
+    for got in &sums {
+        finite(got)?;
+        if *got != sums[0] {
+            return Err("other sums for another number of threads".to_owned());
         }
+        let all = [got.residual, got.jtr[0], got.jtj[0]];
+        worst = all.iter().fold(worst, |most, sum| most.max((sum / want - 1.0).abs()));
     }
-    Ok((worst, 1e-6))
+    if sums.len() == 3 { Ok((worst, 1e-6)) } else { Err("a thread pool could not be made".to_owned()) }
 }
 
 fn pairwise(first: usize, end: usize, term: &impl Fn(usize) -> f64) -> f64 {

@@ -4,11 +4,15 @@ use super::case::{Batch, EVERYTHING, FragmentInputs, Setting};
 use super::evaluate::{Answer, Evaluator, Sums, TARGET};
 use super::lights::LightBox;
 use crate::engine::cpu::{CpuEngine, Illumination};
+#[cfg(feature = "gpu")]
+use crate::engine::gpu::{GpuEngine, Memory, Task};
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Unknown};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
-use crate::samples::{LANES, SurfaceArrays, ViewSamples};
+use crate::samples::rows::{Row, Rows};
+use crate::samples::surface_records::Asked;
+use crate::samples::{LANES, SurfaceRecords, ViewSamples};
 use crate::scene::Loss;
 
 /// What an engine is made of.
@@ -27,21 +31,28 @@ pub struct EngineInputs {
 }
 
 /// Something that makes engines. An engine that has one is studied like every other.
-pub trait EngineFactory: Sync {
+pub trait EngineFactory {
     /// The engine's name in tables.
     fn name(&self) -> String;
-    /// An engine over these views.
+    /// By how much more than f32's correctly rounded operations its own may be off.
+    fn slack(&self) -> f64 {
+        1.0
+    }
+    /// Make an engine for passes at `point`, and do something with it.
     ///
     /// # Errors
     /// When it cannot be made, in words.
-    fn make(&self, inputs: EngineInputs) -> Result<Box<dyn Objective>, String>;
+    fn with(
+        &self,
+        inputs: &EngineInputs,
+        point: &Point,
+        then: &mut dyn FnMut(&dyn Objective),
+    ) -> Result<(), String>;
     /// The image of each slot of the first view, where the engine can show it.
     ///
     /// # Errors
-    /// As [`Self::make`].
-    fn image(&self, _inputs: EngineInputs, _point: &Point) -> Result<Option<Vec<Vec<f32>>>, String> {
-        Ok(None)
-    }
+    /// As [`Self::with`].
+    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String>;
 }
 
 /// The CPU engine.
@@ -49,8 +60,8 @@ pub trait EngineFactory: Sync {
 pub struct Cpu;
 
 impl Cpu {
-    fn engine(inputs: EngineInputs) -> CpuEngine {
-        let EngineInputs { setup, illumination, views, loss, unknowns } = inputs;
+    fn engine(inputs: &EngineInputs) -> CpuEngine {
+        let EngineInputs { setup, illumination, views, loss, unknowns } = inputs.clone();
         CpuEngine::new(setup, illumination, views, loss, unknowns)
     }
 }
@@ -59,11 +70,60 @@ impl EngineFactory for Cpu {
     fn name(&self) -> String {
         "CPU engine".to_owned()
     }
-    fn make(&self, inputs: EngineInputs) -> Result<Box<dyn Objective>, String> {
-        Ok(Box::new(Self::engine(inputs)))
+    fn with(
+        &self,
+        inputs: &EngineInputs,
+        _: &Point,
+        then: &mut dyn FnMut(&dyn Objective),
+    ) -> Result<(), String> {
+        then(&Self::engine(inputs));
+        Ok(())
     }
-    fn image(&self, inputs: EngineInputs, point: &Point) -> Result<Option<Vec<Vec<f32>>>, String> {
-        Ok(Some(Self::engine(inputs).image(0, point)))
+    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
+        Ok(Self::engine(inputs).image(0, point))
+    }
+}
+
+/// The GPU engine on an adapter.
+#[cfg(feature = "gpu")]
+pub struct OnAdapter(pub std::rc::Rc<crate::gpu::Gpu>);
+
+#[cfg(feature = "gpu")]
+impl OnAdapter {
+    fn engine<'a>(&'a self, inputs: &'a EngineInputs, point: &Point) -> Result<GpuEngine<'a>, String> {
+        let EngineInputs { setup, illumination, views, loss, unknowns } = inputs;
+        let task = Task {
+            setup: *setup,
+            illumination: illumination.clone(),
+            views,
+            loss: *loss,
+            unknowns: unknowns.clone(),
+        };
+        GpuEngine::new(&self.0, task, point, Memory::default()).map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl EngineFactory for OnAdapter {
+    fn name(&self) -> String {
+        "GPU engine".to_owned()
+    }
+    /// As of the shader rules.
+    fn slack(&self) -> f64 {
+        4.0
+    }
+    fn with(
+        &self,
+        inputs: &EngineInputs,
+        point: &Point,
+        then: &mut dyn FnMut(&dyn Objective),
+    ) -> Result<(), String> {
+        let engine = self.engine(inputs, point)?;
+        then(&engine);
+        engine.device_fault().map_or(Ok(()), |error| Err(error.to_string()))
+    }
+    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
+        self.engine(inputs, point)?.image(0, point).map_err(|error| error.to_string())
     }
 }
 
@@ -91,16 +151,20 @@ impl<F: EngineFactory> Evaluator for EngineEvaluator<F> {
             unknowns: unknowns(),
         };
         let point = Point { params, gains: vec![1.0] };
-        let count = batch.fragments.len();
-        let values = self.0.image(inputs.clone(), &point)?.map(|planes| {
-            let value = |slot: usize| [0, 1, 2, 3].map(|c: usize| f64::from(planes[c][slot]));
-            (0..count).map(value).collect()
-        });
-        let engine = self.0.make(inputs)?;
-        let equations = engine.normal_equations(&point);
-        let (_, gradient) = engine.gradient(&point);
-        let sums = Sums { equations, loss: engine.loss(&point), gradient };
-        Ok(Answer { values, slopes: None, sums: Some(sums) })
+        let planes = self.0.image(&inputs, &point)?;
+        let value = |slot: usize| [0, 1, 2, 3].map(|c: usize| f64::from(planes[c][slot]));
+        let values = (0..batch.fragments.len()).map(value).collect();
+        let mut sums = None;
+        self.0.with(&inputs, &point, &mut |engine| {
+            let equations = engine.normal_equations(&point);
+            let (_, gradient) = engine.gradient(&point);
+            sums = Some(Sums { equations, loss: engine.loss(&point), gradient });
+        })?;
+        Ok(Answer { values: Some(values), slopes: None, sums })
+    }
+
+    fn slack(&self) -> f64 {
+        self.0.slack()
     }
 
     fn engine(&self) -> Option<&dyn EngineFactory> {
@@ -112,39 +176,45 @@ impl<F: EngineFactory> Evaluator for EngineEvaluator<F> {
 #[must_use]
 pub fn view(setup: Setup, fragments: &[FragmentInputs], target: [f32; 4]) -> ObservedView {
     let groups = fragments.len().div_ceil(LANES);
-    let mut samples = ViewSamples { group_start: (0..=groups as u32).collect(), ..ViewSamples::default() };
-    let mut weight = Vec::new();
+    let mut samples = ViewSamples {
+        group_start: (0..=groups as u32).collect(),
+        surface: SurfaceRecords::new(EVERY_NUMBER, groups),
+        ..ViewSamples::default()
+    };
+    let mut weight = vec![Row::ZERO; groups];
     for slot in 0..groups * LANES {
         // Padding repeats a fragment, as `samples` does.
         let real = slot < fragments.len();
         let inputs = &fragments[if real { slot } else { slot / LANES * LANES }];
-        push(setup, inputs, &mut samples.surface);
+        let share = f32::from(u8::from(real));
+        samples.surface.set(slot, &inputs.fragment(setup, 0.0_f32), share);
         samples.pixel.push(if real { slot as u32 } else { u32::MAX });
-        samples.coverage.push(f32::from(u8::from(real)));
-        samples.weight.push(f32::from(u8::from(real)));
-        weight.push(f32::from(u8::from(real)));
+        samples.coverage.push(share);
+        weight[slot / LANES][slot % LANES] = share;
     }
-    let target = target.map(|x| vec![x; groups * LANES]);
-    ObservedView { samples, target, weight, clip: None }
+    ObservedView { samples, target: targets(&target, groups), weight, clip: None }
 }
 
-fn push(setup: Setup, inputs: &FragmentInputs, into: &mut SurfaceArrays) {
-    let f = inputs.fragment(setup, 0.0_f32);
-    let vectors = [
-        (f.base, &mut into.base),
-        (f.bump, &mut into.bump),
-        (f.view, &mut into.view),
-        (f.normal, &mut into.normal),
-        (f.albedo, &mut into.albedo),
-    ];
-    for (value, planes) in vectors {
-        planes.iter_mut().zip(value).for_each(|(plane, x)| plane.push(x));
+const EVERY_NUMBER: Asked = Asked {
+    bump: true,
+    normal: true,
+    albedo: true,
+    occlusion: true,
+    silhouette: true,
+    dapple: true,
+    specular: true,
+    attenuator: true,
+    weight: true,
+};
+
+/// The same target for each pixel of so many groups: three or four channels.
+#[must_use]
+pub fn targets(target: &[f32], groups: usize) -> Rows {
+    let mut rows = Rows::new(target.len(), groups);
+    for (channel, &x) in target.iter().enumerate() {
+        rows.plane_mut(channel).for_each(|pixel| *pixel = x);
     }
-    into.occlusion.push(f.occlusion);
-    into.silhouette.push(f.silhouette);
-    into.dapple.push(f.dapple);
-    into.specular.push(f.specular);
-    into.attenuator.push(f.attenuator);
+    rows
 }
 
 /// What the checks of [`super::demands`] start from: ordinary fragments seen in every effect.

@@ -253,7 +253,7 @@ fn round_shading(
 ) {
     let size = |v: [f64; 3]| v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut round = |v: &mut [f64; 3], size: f64| {
-        v.iter_mut().for_each(|x| *x += RADIUS * size * step(rng));
+        v.iter_mut().for_each(|x| *x += RADIUS * size * step(&mut *rng));
     };
     let length = size(std::array::from_fn(|i| f.base[i] + strength * f.bump[i]));
     // Beyond that the model itself cuts the derivative off.
@@ -268,12 +268,10 @@ fn round_shading(
     }
     // Where it is given (not found from n) its own roundings are among the inputs'.
     if at == Silhouette::Bumped {
-        let mut silhouette = [s.silhouette; 3];
-        round(&mut silhouette, 1.0);
-        s.silhouette = silhouette[0].max(0.0);
-        let mut tangent = [s.silhouette_tangent; 3];
-        round(&mut tangent, if tangent[0] == 0.0 { 0.0 } else { turning });
-        s.silhouette_tangent = tangent[0];
+        s.silhouette = (s.silhouette + RADIUS * step(rng)).max(0.0);
+        if s.silhouette_tangent != 0.0 {
+            s.silhouette_tangent += RADIUS * turning * step(rng);
+        }
     }
 }
 

@@ -3,9 +3,10 @@
 use super::case::{Batch, FragmentInputs, Setting};
 use super::lights::LightKind;
 use crate::model::effects::{Effect, Effects, Form};
+use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::prepare::Prepared;
-use crate::samples::{LANES, SurfaceArrays, ViewSamples};
+use crate::samples::{LANES, ViewSamples};
 
 /// Fragments that are taken of a view.
 const OF_A_VIEW: usize = 128;
@@ -44,35 +45,31 @@ pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
 
 /// Samples of a view, evenly drawn.
 fn fragments(view: &ViewSamples, form: Form) -> Vec<FragmentInputs> {
-    let samples: Vec<usize> = (0..view.records() * LANES)
-        .filter(|&at| view.weight.get(at).is_none_or(|&weight| weight > 0.0))
-        .collect();
+    let slots = 0..view.records() * LANES;
+    let samples: Vec<usize> = slots.filter(|&slot| view.surface.weight(slot) > 0.0).collect();
     let step = samples.len().div_ceil(OF_A_VIEW).max(1);
-    samples.into_iter().step_by(step).map(|at| fragment(&view.surface, at, form)).collect()
+    samples.into_iter().step_by(step).map(|slot| fragment(&view.surface.fragment(slot), form)).collect()
 }
 
 /// A stored sample as a rasteriser would give it: base for N and bump for T, under a texel that takes both as
 /// they are.
-fn fragment(surface: &SurfaceArrays, at: usize, form: Form) -> FragmentInputs {
-    let three = |planes: &[Vec<f32>; 3], neutral: f64| {
-        [0, 1, 2].map(|c: usize| planes[c].get(at).map_or(neutral, |&x| f64::from(x)))
-    };
-    let one = |plane: &[f32], neutral: f64| plane.get(at).map_or(neutral, |&x| f64::from(x));
+fn fragment(f: &Fragment<f32>, form: Form) -> FragmentInputs {
+    let wide = |v: [f32; 3]| v.map(f64::from);
     FragmentInputs {
         texel: match form {
             Form::Corrected => [1.0, 0.5, 1.0],
             Form::Listing => [1.0, 0.0, 1.0],
         },
-        tangent: three(&surface.bump, 0.0),
+        tangent: wide(f.bump),
         bitangent: [0.0; 3],
-        normal: three(&surface.base, 0.0),
-        view: three(&surface.view, 0.0),
-        occlusion: one(&surface.occlusion, 1.0),
-        silhouette: one(&surface.silhouette, 0.0),
-        dapple: one(&surface.dapple, 1.0),
-        albedo: three(&surface.albedo, 1.0),
-        specular: one(&surface.specular, 1.0),
-        attenuator: one(&surface.attenuator, 1.0),
+        normal: wide(f.base),
+        view: wide(f.view),
+        occlusion: f64::from(f.occlusion),
+        silhouette: f64::from(f.silhouette),
+        dapple: f64::from(f.dapple),
+        albedo: wide(f.albedo),
+        specular: f64::from(f.specular),
+        attenuator: f64::from(f.attenuator),
     }
 }
 

@@ -1,5 +1,7 @@
 //! The renderer's rules as an evaluator: planned for a batch's setting, run on a graphics adapter.
 
+use std::rc::Rc;
+
 use super::case::{Batch, EVERYTHING, FragmentInputs, VertexInputs};
 use super::evaluate::{Answer, Evaluator, Frame, Rgba};
 use super::lights::LightBox;
@@ -17,7 +19,7 @@ use crate::shader::probe::Probe;
 use crate::shader::rule::Stage;
 
 /// The exact rules of the renderer.
-pub struct Rules(pub Gpu);
+pub struct Rules(pub Rc<Gpu>);
 
 /// What a fragment gives: as a rasteriser interpolates it, and texels as they are read.
 const GIVEN: [(&str, &str); 12] = [
@@ -60,7 +62,7 @@ impl Rules {
 
 impl Evaluator for Rules {
     fn name(&self) -> String {
-        format!("shader rules, {}", self.0.name())
+        "shader rules".to_owned()
     }
 
     /// WGSL asks of exp2, log2, division and square roots a few units in the last place only.
