@@ -17,6 +17,7 @@
 //! - [`report`]: metrics, pictures and pages that show how good a fit is.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
 //! - [`export`]: constants and shaders as text for other engines.
+//! - [`study`]: what is measured about the model and the fits.
 //! - [`cli`]: the command line.
 //! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
 //!   instructions kernels are compiled for.
@@ -40,3 +41,4 @@ pub mod samples;
 pub mod scene;
 pub mod shader;
 pub mod simd;
+pub mod study;

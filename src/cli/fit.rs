@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::fit_engine::{FitEngine, FitEngineArguments};
+use super::fit_engine::{Chosen, FitEngine, FitEngineArguments};
 use super::fitted_scene::{Changes, Start};
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
@@ -84,10 +84,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let solving = Solving::of(arguments, folder.path())?;
     let observed = prepared.observed()?;
     tell_warnings(&prepared.warnings);
-    arguments.engine.with_engine(&prepared, observed, |engine| {
-        let outcome = solve(arguments, solving, &folder, &prepared, engine)?;
+    arguments.engine.with_engine(&prepared, observed, |chosen| {
+        let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine)?;
         folder.keep();
-        conclude(arguments, solving, &folder, &path, &prepared, engine, &outcome)
+        conclude(arguments, solving, &folder, &path, &prepared, chosen, &outcome)
     })
 }
 
@@ -124,9 +124,10 @@ fn conclude(
     folder: &RunFolder,
     path: &Path,
     prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    chosen: &Chosen<'_>,
     outcome: &Outcome,
 ) -> Result<Exit, Refusal> {
+    let engine = &chosen.engine;
     let clock = Instant::now();
     let views = evidence(prepared, engine, outcome);
     let mut seconds = prepared.seconds;
@@ -141,6 +142,9 @@ fn conclude(
         say(report.json.trim_end())?;
     } else {
         tell_outcome(outcome, &prepared.scene.views)?;
+        if let Some(why) = &chosen.why {
+            say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
+        }
         say(&format!("{}: final loss {:.6e}", folder.path().display(), outcome.loss_end))?;
     }
     if let Some(advice) = advice(outcome) {

@@ -1,6 +1,7 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
-//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
+//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `stability`, `sweep`, `collect`: the
+//!   commands
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
@@ -17,6 +18,8 @@ mod render;
 mod run_folder;
 mod scene;
 mod shader;
+mod stability;
+mod sweep;
 
 use std::io::Write as _;
 use std::path::Path;
@@ -100,6 +103,9 @@ enum Command {
     Shader(shader::Arguments),
     Export(export::Arguments),
     Info(info::Arguments),
+    Stability(stability::Arguments),
+    Sweep(sweep::SweepArguments),
+    Collect(sweep::CollectArguments),
 }
 
 /// Run the program on the process' arguments.
@@ -116,6 +122,9 @@ pub fn main() -> ExitCode {
         Command::Shader(arguments) => shader::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Stability(arguments) => stability::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
+        Command::Collect(arguments) => sweep::run_collect(&arguments),
     };
     match done {
         Ok(Exit::Done) => ExitCode::SUCCESS,

@@ -53,6 +53,18 @@ pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V
     (scale(d[2], n), scale_add(d[0], t, scale(d[1], b)))
 }
 
+/// Base and bump as a sample holds them: where no base is left the side that faces the eye counts, and a
+/// bump that is not finite counts nothing (MODEL 7).
+#[inline(always)]
+pub fn guarded<R: Real>(base: V3<R>, bump: V3<R>, view: V3<R>) -> (V3<R>, V3<R>) {
+    let zero = view[0].lit(0.0);
+    let size = |v: V3<R>| v[0].abs() + v[1].abs() + v[2].abs();
+    let (base_size, bump_size) = (size(base), size(bump));
+    let there = R::and(base_size.is_finite(), zero.lt(base_size));
+    let base = select::<R>(there, base, [-view[0], -view[1], -view[2]]);
+    (base, select::<R>(bump_size.is_finite(), bump, [zero; 3]))
+}
+
 /// The unit view vector of the corrected form; (0, 0, -1) for an eye on the surface.
 #[inline(always)]
 pub fn unit_view<R: Real>(view: V3<R>) -> V3<R> {
@@ -79,6 +91,10 @@ pub struct Shading<R> {
     pub silhouette_tangent: R,
 }
 
+/// The most by which a normal that all but vanishes turns with its map's strength: beyond, the squares of
+/// derivatives would overflow an f32.
+const STEEPEST: f64 = 1e6;
+
 /// The shading normal at `strength` and what follows from it.
 #[inline(always)]
 pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R) -> Shading<R> {
@@ -90,7 +106,9 @@ pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R
         Form::Corrected => {
             let (n, inverse_length) = unit_normal(m, f.normal, v);
             // d (m / |m|) = (dm - n (n . dm)) / |m|
-            (n, scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump)))
+            let turning = scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump));
+            let (least, most) = (strength.lit(-STEEPEST), strength.lit(STEEPEST));
+            (n, turning.map(|x| x.max(least).min(most)))
         }
     };
     let (q, dq) = (dot(n, v), dot(n_tangent, v));

@@ -29,6 +29,7 @@ pub mod view;
 
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
+pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
 pub(crate) use settings::short;
 pub use settings::{interval, read_params};
