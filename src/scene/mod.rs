@@ -6,12 +6,13 @@
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings` and `cameras`
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
-//! - [`pose`]: the mesh, morphed and skinned
+//! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
 //! - [`error`]: what is refused, and what is mended with a warning
 //!
 //! [`Scene`] is what the later stages see: validated, in memory, and holding only what the enabled
 //! effects ask for.
 
+pub mod animation;
 mod cameras;
 pub mod error;
 mod file;
@@ -30,6 +31,7 @@ pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
+pub(crate) use settings::short;
 pub use settings::{interval, read_params};
 
 use std::path::PathBuf;

@@ -5,7 +5,7 @@ use std::rc::Rc;
 use super::case::{Batch, EVERYTHING, FragmentInputs, VertexInputs};
 use super::evaluate::{Answer, Evaluator, Frame, Rgba};
 use super::lights::LightBox;
-use crate::engine::cpu::Illumination;
+use crate::bake::Illumination;
 use crate::gpu::Gpu;
 use crate::gpu::probe::{constants, evaluate};
 use crate::gpu::upload::Content;
