@@ -1,14 +1,15 @@
 //! The renderer's rules as an evaluator: planned for a batch's setting, run on a graphics adapter.
 
+use std::cell::RefCell;
 use std::rc::Rc;
 
 use super::case::{Batch, EVERYTHING, FragmentInputs, VertexInputs};
 use super::evaluate::{Answer, Evaluator, Frame, Rgba};
 use super::lights::LightBox;
 use crate::engine::cpu::Illumination;
-use crate::gpu::Gpu;
 use crate::gpu::probe::{constants, evaluate};
 use crate::gpu::upload::Content;
+use crate::gpu::{Choice, Gpu, GpuError};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
@@ -18,8 +19,49 @@ use crate::shader::facts::MapFacts;
 use crate::shader::probe::Probe;
 use crate::shader::rule::Stage;
 
+/// A device that is opened anew now and then: each batch compiles shaders of its own, and software drivers
+/// run out of memory mappings after some thousands.
+pub struct Adapter {
+    choice: Choice,
+    device: RefCell<(Rc<Gpu>, usize)>,
+}
+
+/// Uses of a device before it is opened anew.
+const USES: usize = 64;
+
+impl Adapter {
+    /// An adapter's device.
+    ///
+    /// # Errors
+    /// When there is no such adapter.
+    pub fn open(choice: Choice) -> Result<Self, GpuError> {
+        let gpu = Gpu::open(&choice)?;
+        Ok(Self { choice, device: RefCell::new((Rc::new(gpu), 0)) })
+    }
+
+    /// The device, for one batch.
+    ///
+    /// # Errors
+    /// When it cannot be opened anew, in words.
+    pub fn gpu(&self) -> Result<Rc<Gpu>, String> {
+        let mut device = self.device.borrow_mut();
+        device.1 += 1;
+        if device.1.is_multiple_of(USES) {
+            device.0.close();
+            device.0 = Rc::new(Gpu::open(&self.choice).map_err(|error| error.to_string())?);
+        }
+        Ok(Rc::clone(&device.0))
+    }
+
+    /// The adapter's name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.device.borrow().0.name().to_owned()
+    }
+}
+
 /// The exact rules of the renderer.
-pub struct Rules(pub Rc<Gpu>);
+pub struct Rules(pub Rc<Adapter>);
 
 /// What a fragment gives: as a rasteriser interpolates it, and texels as they are read.
 const GIVEN: [(&str, &str); 12] = [
@@ -56,7 +98,8 @@ impl Rules {
     ) -> Result<Vec<f32>, String> {
         let scene = scene();
         let content = Content { scene: &scene, illumination: lights, occlusion: None, params };
-        evaluate(&self.0, probe, content, &constants(probe, params), given).map_err(|error| error.to_string())
+        evaluate(&*self.0.gpu()?, probe, content, &constants(probe, params), given)
+            .map_err(|error| error.to_string())
     }
 }
 
