@@ -22,9 +22,12 @@ mod stability;
 mod sweep;
 
 use std::io::Write as _;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::output;
 
 /// How a command ended, as an exit code; `EXIT_CODES` says what each means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -141,6 +144,17 @@ fn say(line: &str) -> Result<(), Refusal> {
             "standard output cannot be written: {error}. Send it to a file or a terminal that takes it."
         ))),
         _ => Ok(()),
+    }
+}
+
+/// Write a text to a file and say so, or print it.
+fn write_or_say(file: Option<&Path>, text: &str) -> Result<(), Refusal> {
+    match file {
+        Some(file) => {
+            output::write(file, text.as_bytes())?;
+            say(&format!("wrote {}", file.display()))
+        }
+        None => say(text.trim_end()),
     }
 }
 

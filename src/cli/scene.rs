@@ -112,7 +112,14 @@ pub(super) fn parse_effects(list: &str) -> Result<Effects, String> {
             .ok_or_else(|| format!("unknown effect `{name}`. {}.", suggestion(name, &known)))
     };
     let names = list.split(',').map(str::trim).filter(|name| !name.is_empty());
-    let effects: Effects = names.map(parse).collect::<Result<_, _>>()?;
+    let mut effects = Effects::default();
+    for name in names {
+        let effect = parse(name)?;
+        if effects.has(effect) {
+            return Err(format!("the effect {name} is listed twice. Take one of them out."));
+        }
+        effects = effects.with(effect);
+    }
     if effects == Effects::default() {
         return Err(format!("it names no effect. {}.", suggestion("", &known)));
     }
