@@ -120,15 +120,17 @@ impl EngineFactory for OnAdapter {
         point: &Point,
         then: &mut dyn FnMut(&dyn Objective),
     ) -> Result<(), String> {
-        let gpu = self.0.gpu()?;
-        let engine = Self::engine(&gpu, inputs, point)?;
-        then(&engine);
-        engine.device_fault().map_or(Ok(()), |error| Err(error.to_string()))
+        self.0.run(|gpu| {
+            let engine = Self::engine(gpu, inputs, point)?;
+            then(&engine);
+            engine.device_fault().map_or(Ok(()), |error| Err(error.to_string()))
+        })
     }
     fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
-        let gpu = self.0.gpu()?;
-        let engine = Self::engine(&gpu, inputs, point)?;
-        engine.image(0, point).map_err(|error| error.to_string())
+        self.0.run(|gpu| {
+            let engine = Self::engine(gpu, inputs, point)?;
+            engine.image(0, point).map_err(|error| error.to_string())
+        })
     }
 }
 

@@ -18,6 +18,7 @@ use crate::engine::residual::{Weighted, weighted_residual};
 use crate::model::effects::Silhouette;
 use crate::model::fragment::{Fragment, Shading};
 use crate::model::params::{Param, Params};
+use crate::model::vector::dot;
 
 /// By how much each number is moved, as a share of itself (of the largest component of its vector): eight
 /// roundings of 2^-24 either way, as many as lie one behind the other between an input and what a lookup or
@@ -271,10 +272,14 @@ fn round_shading(
     }
     // Where it is given (not found from n) its own roundings are among the inputs'.
     if at == Silhouette::Bumped {
-        s.silhouette = (s.silhouette + RADIUS * step(rng)).max(0.0);
-        if s.silhouette_tangent != 0.0 {
+        let turned = dot(s.n_tangent, f.view);
+        if s.silhouette < RADIUS {
+            // In an f32 |n.V| may be 1 already, or not yet.
+            s.silhouette_tangent = turned * step(rng);
+        } else if s.silhouette_tangent != 0.0 {
             s.silhouette_tangent += RADIUS * turning * step(rng);
         }
+        s.silhouette = (s.silhouette + RADIUS * step(rng)).max(0.0);
     }
 }
 

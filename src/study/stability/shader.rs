@@ -19,15 +19,12 @@ use crate::shader::facts::MapFacts;
 use crate::shader::probe::Probe;
 use crate::shader::rule::Stage;
 
-/// A device that is opened anew now and then: each batch compiles shaders of its own, and software drivers
-/// run out of memory mappings after some thousands.
+/// An adapter whose device is opened anew when it was lost: software drivers do lose one now and then, and
+/// the case at hand is then not to blame. A case that loses it twice is.
 pub struct Adapter {
     choice: Choice,
-    device: RefCell<(Rc<Gpu>, usize)>,
+    device: RefCell<Rc<Gpu>>,
 }
-
-/// Uses of a device before it is opened anew.
-const USES: usize = 64;
 
 impl Adapter {
     /// An adapter's device.
@@ -36,27 +33,29 @@ impl Adapter {
     /// When there is no such adapter.
     pub fn open(choice: Choice) -> Result<Self, GpuError> {
         let gpu = Gpu::open(&choice)?;
-        Ok(Self { choice, device: RefCell::new((Rc::new(gpu), 0)) })
+        Ok(Self { choice, device: RefCell::new(Rc::new(gpu)) })
     }
 
-    /// The device, for one batch.
+    /// Do some work on the device.
     ///
     /// # Errors
-    /// When it cannot be opened anew, in words.
-    pub fn gpu(&self) -> Result<Rc<Gpu>, String> {
-        let mut device = self.device.borrow_mut();
-        device.1 += 1;
-        if device.1.is_multiple_of(USES) {
-            device.0.close();
-            device.0 = Rc::new(Gpu::open(&self.choice).map_err(|error| error.to_string())?);
+    /// Those of the work, in words.
+    pub fn run<T>(&self, mut work: impl FnMut(&Gpu) -> Result<T, String>) -> Result<T, String> {
+        let gpu = Rc::clone(&self.device.borrow());
+        match work(&gpu) {
+            Err(_) if matches!(gpu.check(), Err(GpuError::Lost { .. })) => {
+                let gpu = Rc::new(Gpu::open(&self.choice).map_err(|error| error.to_string())?);
+                *self.device.borrow_mut() = Rc::clone(&gpu);
+                work(&gpu)
+            }
+            done => done,
         }
-        Ok(Rc::clone(&device.0))
     }
 
     /// The adapter's name.
     #[must_use]
     pub fn name(&self) -> String {
-        self.device.borrow().0.name().to_owned()
+        self.device.borrow().name().to_owned()
     }
 }
 
@@ -98,8 +97,8 @@ impl Rules {
     ) -> Result<Vec<f32>, String> {
         let scene = scene();
         let content = Content { scene: &scene, illumination: lights, occlusion: None, params };
-        evaluate(&*self.0.gpu()?, probe, content, &constants(probe, params), given)
-            .map_err(|error| error.to_string())
+        let block = constants(probe, params);
+        self.0.run(|gpu| evaluate(gpu, probe, content, &block, given).map_err(|error| error.to_string()))
     }
 }
 

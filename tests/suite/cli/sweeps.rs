@@ -54,7 +54,7 @@ fn each_listed_command_runs_its_job_from_anywhere_and_any_order_gives_the_same_t
     assert!(rmse(1) > rmse(0) && rmse(0) > 0.0, "{} {}", rmse(0), rmse(1));
     // A job's scene stands there for whoever wants to look at its fit.
     let scene = format!("out/scenes/{}", results(&forward)[0].replace("job-", "").replace(".json", ".toml"));
-    forward.run(&["fit", &scene, "-o", "again"]).done();
+    assert_eq!(forward.run(&["fit", &scene, "-o", "again", "--engine", "cpu"]).code, Some(0));
     let again = forward.json("again/report.json")["loss"]["end"].as_f64().unwrap();
     let loss = all["jobs"][0]["figures"]["loss_end"].as_f64().unwrap();
     assert_eq!(again, loss);
