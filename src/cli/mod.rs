@@ -1,9 +1,11 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
+//! - `ablate`: studies
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
 //! - `scene`: how a command finds its scene and its cache
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
+mod ablate;
 mod bake;
 mod demo;
 mod export;
@@ -76,6 +78,7 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Fit(fit::Arguments),
+    Ablate(ablate::Arguments),
     Render(render::Arguments),
     Bake(bake::Arguments),
     Demo(demo::Arguments),
@@ -92,6 +95,7 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let done = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
+        Command::Ablate(arguments) => ablate::run(&arguments),
         Command::Render(arguments) => render::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),

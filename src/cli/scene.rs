@@ -56,6 +56,11 @@ impl SceneArguments {
         }
     }
 
+    /// What the scene at `path` is called in reports.
+    pub(super) fn name(&self, path: &Path) -> String {
+        self.scene.as_ref().map_or_else(|| "the built-in scene".to_owned(), |_| path.display().to_string())
+    }
+
     /// Where bakes are kept; `None` with `--no-cache`.
     pub(super) fn cache(&self) -> Option<PathBuf> {
         if self.no_cache { None } else { Some(self.cache.clone().unwrap_or_else(cache::default_folder)) }

@@ -1,0 +1,16 @@
+//! Studies: what is measured about the model and the fits.
+//!
+//! - [`ablation`]: what each effect and term is worth, and what it costs
+//! - [`subject`]: a scene ready to be evaluated in one setting; [`reference`]: what images are compared with
+//! - [`significance`]: a change of the loss against its sampling error
+//! - [`timing`]: times that can be trusted; [`cost`]: the counts that stand beside them
+
+pub mod ablation;
+pub mod cost;
+mod error;
+pub mod reference;
+pub mod significance;
+pub mod subject;
+pub mod timing;
+
+pub use error::StudyError;
