@@ -87,18 +87,23 @@ pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R
     let v = f.view;
     let m = scale_add(strength, f.bump, f.base);
     let (n, n_tangent) = match form {
-        Form::Listing => (m, f.bump),
+        Form::Listing => (m.map(R::half), f.bump),
         Form::Corrected => {
             let (n, inverse_length) = unit_normal(m, f.normal, v);
             // d (m / |m|) = (dm - n (n . dm)) / |m|
-            (n, scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump)))
+            (n.map(R::half), scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump)))
         }
     };
-    let (q, dq) = (dot(n, v), dot(n_tangent, v));
+    let (q, dq) = (dot(n, v).fixed(), dot(n_tangent, v));
     let (reflection, reflection_tangent) = match form {
         // Oddity 3: the two dot products look swapped.
-        Form::Listing => (sub(scale(q, v), scale(two, n)), sub(scale(dq, v), scale(two, n_tangent))),
-        Form::Corrected => (scale_add(-two * q, n, v), scale(-two, scale_add(dq, n, scale(q, n_tangent)))),
+        Form::Listing => {
+            let twice = scale(two.fixed(), n).map(R::half);
+            (sub(scale(q, v), twice).map(R::fixed), sub(scale(dq, v), scale(two, n_tangent)))
+        }
+        Form::Corrected => {
+            (scale_add(-two * q, n, v).map(R::fixed), scale(-two, scale_add(dq, n, scale(q, n_tangent))))
+        }
     };
     let (silhouette, silhouette_tangent) = match at {
         Silhouette::Bumped => (silhouette(q), silhouette_slope(q) * dq),
@@ -178,6 +183,61 @@ impl Wanted {
     pub const NONE: Self = Self { diffuse: false, side: false, hilite: false, mirror: false, key: false };
 }
 
+/// Where a direction meets the cubes.
+#[inline(always)]
+fn point<R: Real>(direction: V3<R>) -> CubePoint<R::Wide> {
+    CubePoint::new(direction.map(R::widen))
+}
+
+/// The lookup at a point.
+#[inline(always)]
+fn look_up<R: Real>(cube: &Cube<R::Texel>, at: &CubePoint<R::Wide>) -> [R; 4] {
+    cube.sample_at(at).map(R::narrow)
+}
+
+/// The lookup at a point, and its derivative as the direction moves by `d`.
+#[inline(always)]
+fn look_up_with_slope<R: Real>(cube: &Cube<R::Texel>, at: &CubePoint<R::Wide>, d: V3<R>) -> ([R; 4], [R; 4]) {
+    let (value, slope) = cube.sample_with_slope(at, at.tangent(d.map(R::widen)));
+    (value.map(R::narrow), slope.map(R::narrow))
+}
+
+impl Fragment<f64> {
+    /// The fragment in the number format that `like` is a number of.
+    #[must_use]
+    pub fn in_format<R: Real>(&self, like: R) -> Fragment<R> {
+        let lit = |v: V3<f64>| v.map(|x| like.lit(x));
+        let fragment = Fragment {
+            base: lit(self.base),
+            bump: lit(self.bump),
+            normal: lit(self.normal),
+            view: lit(self.view),
+            occlusion: like.lit(self.occlusion),
+            silhouette: like.lit(self.silhouette),
+            dapple: like.lit(self.dapple),
+            albedo: lit(self.albedo),
+            specular: like.lit(self.specular),
+            attenuator: like.lit(self.attenuator),
+        };
+        fragment.declared()
+    }
+}
+
+impl<R: Real> Fragment<R> {
+    /// The fragment with the types that the listing declares for what it reads: `half` textures, a `fixed`
+    /// attenuator.
+    #[must_use]
+    #[inline(always)]
+    pub fn declared(self) -> Self {
+        Self {
+            albedo: self.albedo.map(R::half),
+            specular: self.specular.half(),
+            attenuator: self.attenuator.fixed(),
+            ..self
+        }
+    }
+}
+
 /// The wanted terms of a fragment.
 #[inline(always)]
 pub fn terms<R: Real>(lights: &Lights<'_, R>, f: &Fragment<R>, s: &Shading<R>, wanted: Wanted) -> Terms<R> {
@@ -192,21 +252,21 @@ pub fn terms<R: Real>(lights: &Lights<'_, R>, f: &Fragment<R>, s: &Shading<R>, w
         silhouette: s.silhouette,
     };
     if (wanted.diffuse && lights.irradiance.is_some()) || (wanted.side && lights.side.is_some()) {
-        let n = CubePoint::new(lights.turned(s.n));
+        let n = point(lights.turned(s.n));
         if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-            terms.diffuse = mul(f.albedo, rgb(cube.sample_at(&n)));
+            terms.diffuse = mul(f.albedo, rgb(look_up(cube, &n))).map(R::fixed);
         }
         if let (true, Some(cube)) = (wanted.side, lights.side) {
-            terms.side = scale(f.specular, rgb(cube.sample_at(&n)));
+            terms.side = scale(f.specular, rgb(look_up(cube, &n))).map(R::fixed);
         }
     }
     if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let e = cube.sample(lights.turned(s.reflection));
-        terms.mirror = scale(f.dapple, rgb(e));
-        terms.haze = f.dapple * f.attenuator * e[3];
+        let e = look_up(cube, &point(lights.turned(s.reflection)));
+        terms.mirror = scale(f.dapple, rgb(e)).map(R::fixed);
+        terms.haze = ((f.dapple * e[3]).fixed() * f.attenuator).fixed();
     }
     if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
-        terms.hilite = scale(f.attenuator, rgb(cube.sample(lights.turned(f.view))));
+        terms.hilite = scale(f.attenuator, rgb(look_up(cube, &point(lights.turned(f.view)))));
     }
     if let (true, Some(key)) = (wanted.key, lights.key) {
         let lambert = |n: V3<R>| dot(n, key.direction).max(zero);
@@ -229,22 +289,22 @@ pub fn terms_with_strength_tangent<R: Real>(
     let mut terms = terms(lights, f, s, unmoved);
     let mut slope = Terms { hilite: [zero; 3], silhouette: s.silhouette_tangent, ..terms };
     if (wanted.diffuse && lights.irradiance.is_some()) || (wanted.side && lights.side.is_some()) {
-        let n = CubePoint::new(lights.turned(s.n));
-        let dn = n.tangent(lights.turned(s.n_tangent));
+        let n = point(lights.turned(s.n));
+        let dn = lights.turned(s.n_tangent);
         if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-            let (e, de) = cube.sample_with_slope(&n, dn);
+            let (e, de) = look_up_with_slope(cube, &n, dn);
             terms.diffuse = mul(f.albedo, rgb(e));
             slope.diffuse = mul(f.albedo, rgb(de));
         }
         if let (true, Some(cube)) = (wanted.side, lights.side) {
-            let (e, de) = cube.sample_with_slope(&n, dn);
+            let (e, de) = look_up_with_slope(cube, &n, dn);
             terms.side = scale(f.specular, rgb(e));
             slope.side = scale(f.specular, rgb(de));
         }
     }
     if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let r = CubePoint::new(lights.turned(s.reflection));
-        let (e, de) = cube.sample_with_slope(&r, r.tangent(lights.turned(s.reflection_tangent)));
+        let r = point(lights.turned(s.reflection));
+        let (e, de) = look_up_with_slope(cube, &r, lights.turned(s.reflection_tangent));
         terms.mirror = scale(f.dapple, rgb(e));
         slope.mirror = scale(f.dapple, rgb(de));
         terms.haze = f.dapple * f.attenuator * e[3];
@@ -282,20 +342,18 @@ pub fn terms_tangent<R: Real>(
         LookupParam::SpecularLobe => {
             if let Some(cube) = lights.lobe_slope {
                 if lights.side.is_some() {
-                    slope.side = scale(f.specular, rgb(cube.sample(n)));
+                    slope.side = scale(f.specular, rgb(look_up(cube, &point(n))));
                 }
                 if lights.mirror.is_some() {
-                    let e = cube.sample(r);
+                    let e = look_up(cube, &point(r));
                     slope.mirror = scale(f.dapple, rgb(e));
                     slope.haze = f.dapple * f.attenuator * e[3];
                 }
             }
         }
         LookupParam::EnvironmentRotation => {
-            let turned = |cube: &Cube<R::Texel>, d: V3<R>| {
-                let point = CubePoint::new(d);
-                cube.sample_with_slope(&point, point.tangent(lights.turning(d))).1
-            };
+            let turned =
+                |cube: &Cube<R::Texel>, d: V3<R>| look_up_with_slope(cube, &point(d), lights.turning(d)).1;
             if let Some(cube) = lights.irradiance {
                 slope.diffuse = mul(f.albedo, rgb(turned(cube, n)));
             }

@@ -131,9 +131,12 @@ pub(super) fn linear_ticks(end: f64) -> (Vec<f64>, f64) {
 
 pub(super) fn tick_label(tick: f64) -> String {
     let text = number(tick, 2);
-    match text.contains('.') && !text.contains('×') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
+    match text.split_once('×') {
+        // Powers of ten need no factor.
+        Some(("1.0", power)) => power.to_owned(),
+        Some((factor, power)) => format!("{}×{power}", factor.trim_end_matches(".0")),
+        None if text.contains('.') => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        None => text,
     }
 }
 

@@ -18,7 +18,7 @@ for (const triple of document.querySelectorAll(".triple")) {
   triple.querySelector(".hint").hidden = false;
   show();
 }
-// A click on a heading sorts by its column, a second one the other way round; what has no number stays last.
+/* A click on a heading sorts by its column, a second one the other way round; what has no number stays last. */
 for (const table of document.querySelectorAll("table.sortable")) {
   const body = table.tBodies[0];
   const headings = [...table.tHead.rows[0].cells];
@@ -28,12 +28,12 @@ for (const table of document.querySelectorAll("table.sortable")) {
     const down = heading.getAttribute("aria-sort") === (numeric ? "descending" : "ascending") ? !numeric : numeric;
     headings.forEach((other) => other.removeAttribute("aria-sort"));
     heading.setAttribute("aria-sort", down ? "descending" : "ascending");
-    const number = (row) => Number(row.cells[column].dataset.sort ?? NaN);
+    const number = (row) => row.cells[column].dataset.sort;
     const text = (row) => row.cells[column].textContent;
     const compare = (a, b) => {
       if (!numeric) return (down ? -1 : 1) * text(a).localeCompare(text(b), "en", { numeric: true });
       const [x, y] = [number(a), number(b)];
-      if (Number.isNaN(x) || Number.isNaN(y)) return Number.isNaN(x) - Number.isNaN(y);
+      if (x === undefined || y === undefined) return (x === undefined) - (y === undefined);
       return down ? y - x : x - y;
     };
     body.append(...[...body.rows].sort(compare));

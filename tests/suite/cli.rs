@@ -1,5 +1,7 @@
 //! The program as its users meet it: every test here runs the binary.
 
+mod ablation;
+mod browser;
 mod built_in;
 mod desk;
 mod exported;

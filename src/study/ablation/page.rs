@@ -22,7 +22,8 @@ pub fn page(scene: &str, ablation: &Ablation) -> Result<String, String> {
     let mut main = warnings(&ablation.warnings);
     main += &section("summary", "What each part is worth, and what it costs", &summary(ablation, full));
     main += &section("tradeoff", "Worth against cost", &tradeoff(ablation, full, cases));
-    main += &section("views", "View by view", &views(ablation));
+    let views = format!("<details><summary>Errors of each view</summary>{}</details>", views(ablation));
+    main += &section("views", "View by view", &views);
     if ablation.refitted {
         main += &section("constants", "What the others made of it", &constants(ablation));
     }
@@ -92,8 +93,11 @@ fn tiles(full: &Row, cases: &[Row]) -> String {
     tiles.iter().map(|(name, value, note)| tile(name, value, note)).collect()
 }
 
+/// Where the GPU's time stands in the table, when it was measured.
+const GPU_COLUMN: usize = 9;
+
 fn summary(ablation: &Ablation, full: &Row) -> String {
-    let mut table = Table::new(&[
+    let mut columns = vec![
         ("left out", "which effects or terms"),
         ("loss", "mean loss over all views"),
         ("change, %", "of the loss, with one standard error"),
@@ -107,10 +111,19 @@ fn summary(ablation: &Ablation, full: &Row) -> String {
         ("ops saved, %", "planned operations a fragment"),
         ("bytes saved, %", "attributes and texels that a sample reads"),
         ("bakes saved.", "what need not be baked"),
-    ]);
+    ];
+    let untimed = ablation.adapter.is_none();
+    if untimed {
+        columns.remove(GPU_COLUMN);
+    }
+    let mut table = Table::new(&columns);
     for row in &ablation.rows {
         let class = if row.left_out.left_out.is_empty() { "reference" } else { "" };
-        table.row(class, &cells(row, full));
+        let mut cells = cells(row, full);
+        if untimed {
+            cells.remove(GPU_COLUMN);
+        }
+        table.row(class, &cells);
     }
     let note = "<p class=\"quiet\">Click a heading to sort. The first row is the whole model; its time is taken beside itself, \
                 so that what it seems to save is the noise of the clock.</p>";
