@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings};
-use crate::study::ablation::{AblationOptions, ablate, files};
+use crate::study::ablation::{AblationOptions, GpuTiming, ablate, files};
 
 /// Leave each effect and term out in turn: what the images lose, and what is saved
 #[derive(clap::Args)]
@@ -28,13 +28,19 @@ pub(super) struct Arguments {
     /// scene's start values].
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
-    /// Do not time the renderer on a graphics adapter.
-    #[arg(long)]
-    no_gpu: bool,
+    /// Time the renderer, too: `auto`, where there is a graphics adapter of hardware; `always`, on one of software
+    /// as well; or `never`.
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = ["auto", "always", "never"])]
+    gpu: String,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    if !arguments.no_gpu {
+    let gpu = match arguments.gpu.as_str() {
+        "always" => GpuTiming::Always,
+        "never" => GpuTiming::Never,
+        _ => GpuTiming::Auto,
+    };
+    if gpu != GpuTiming::Never {
         quieten_graphics();
     }
     let mut folder = RunFolder::open(Some(&arguments.output), None)?;
@@ -46,7 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         refit: arguments.refit,
         params: arguments.params.clone(),
         cache: Some(arguments.scene.cache().unwrap_or_else(|| scratch.path().to_owned())),
-        gpu: !arguments.no_gpu,
+        gpu,
     };
     let ablation = ablate(&path, &options)?;
     tell_warnings(&ablation.warnings);

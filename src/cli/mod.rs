@@ -1,6 +1,6 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
-//! - `ablate`: studies
+//! - `ablate`, `tradeoff`: studies
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
 //! - `scene`: how a command finds its scene and its cache
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
@@ -17,6 +17,7 @@ mod render;
 mod run_folder;
 mod scene;
 mod shader;
+mod tradeoff;
 
 use std::io::Write as _;
 use std::process::ExitCode;
@@ -79,6 +80,7 @@ struct Arguments {
 enum Command {
     Fit(fit::Arguments),
     Ablate(ablate::Arguments),
+    Tradeoff(tradeoff::Arguments),
     Render(render::Arguments),
     Bake(bake::Arguments),
     Demo(demo::Arguments),
@@ -96,6 +98,7 @@ pub fn main() -> ExitCode {
     let done = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Ablate(arguments) => ablate::run(&arguments),
+        Command::Tradeoff(arguments) => tradeoff::run(&arguments),
         Command::Render(arguments) => render::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),

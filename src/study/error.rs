@@ -22,6 +22,12 @@ pub enum StudyError {
     #[cfg(feature = "gpu")]
     #[error(transparent)]
     Gpu(#[from] GpuError),
+    /// An axis was named that the scene does not ask for.
+    #[error("--axis {axis}: {why}. Leave it out, or name a scene that does.")]
+    Idle { axis: &'static str, why: &'static str },
+    /// A goal that no setting meets.
+    #[error("no settings are {goal}: {best}. Allow more.")]
+    NoChoice { goal: String, best: String },
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error(transparent)]

@@ -1,6 +1,7 @@
 //! Studies: what is measured about the model and the fits.
 //!
 //! - [`ablation`]: what each effect and term is worth, and what it costs
+//! - [`tradeoff`]: error against time for every approximation
 //! - [`subject`]: a scene ready to be evaluated in one setting; [`reference`]: what images are compared with
 //! - [`significance`]: a change of the loss against its sampling error
 //! - [`timing`]: times that can be trusted; [`cost`]: the counts that stand beside them
@@ -12,5 +13,6 @@ pub mod reference;
 pub mod significance;
 pub mod subject;
 pub mod timing;
+pub mod tradeoff;
 
 pub use error::StudyError;

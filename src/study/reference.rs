@@ -36,6 +36,56 @@ pub struct ReferenceView {
     clip: Option<Clip>,
 }
 
+/// How far images are from their references, over the fully covered pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Difference {
+    /// Root of the mean squared difference of linear radiance, over pixels and channels.
+    pub linear: f64,
+    /// The same over the reference's root mean square.
+    pub relative: f64,
+    /// dB, the mean of the views; none where no pixel is fully covered.
+    pub psnr: Option<f64>,
+    /// Mean FLIP error, of the views; none where no pixel is fully covered.
+    pub flip: Option<f64>,
+}
+
+impl Difference {
+    /// Of all views of a scene; what the references cover fully counts.
+    #[must_use]
+    pub fn of_all(references: &[Image], images: &[Image]) -> Self {
+        let (mut squares, mut size, mut values) = (0.0, 0.0, 0_usize);
+        let mut scores = Vec::new();
+        for (reference, image) in references.iter().zip(images) {
+            let (view_squares, view_size, count) = sums(reference, image, &reference.alpha);
+            (squares, size, values) = (squares + view_squares, size + view_size, values + count);
+            scores.extend(Comparison::new(reference, image, &reference.alpha).scores());
+        }
+        let mean = |score: fn(&Scores) -> f64| {
+            (!scores.is_empty()).then(|| scores.iter().map(score).sum::<f64>() / scores.len() as f64)
+        };
+        Self {
+            linear: (squares / values.max(1) as f64).sqrt(),
+            relative: relative(squares, size),
+            psnr: mean(|scores| scores.psnr),
+            flip: mean(|scores| scores.flip),
+        }
+    }
+}
+
+/// Sums over covered pixels and channels: of squared differences, of the reference's squares, and how many.
+fn sums(reference: &Image, image: &Image, coverage: &[f32]) -> (f64, f64, usize) {
+    let covered = (0..coverage.len()).filter(|&i| coverage[i] >= COVERED);
+    covered.flat_map(|i| (0..3).map(move |c| (i, c))).fold((0.0, 0.0, 0), |(squares, size, count), (i, c)| {
+        let (is, want) = (f64::from(image.rgb[i][c]), f64::from(reference.rgb[i][c]));
+        (squares + (is - want).powi(2), size + want * want, count + 1)
+    })
+}
+
+/// The root of a share; nothing is no error, whatever the size.
+fn relative(squares: f64, size: f64) -> f64 {
+    if squares == 0.0 { 0.0 } else { (squares / size.max(f64::MIN_POSITIVE)).sqrt() }
+}
+
 /// How far an image is from its reference.
 #[derive(Clone, Debug)]
 pub struct ViewErrors {
@@ -77,17 +127,10 @@ impl ReferenceView {
     #[must_use]
     pub fn errors(&self, image: &Image, loss: Loss) -> ViewErrors {
         let comparison = Comparison::new(&self.image, image, &self.coverage);
-        let covered = || (0..self.coverage.len()).filter(|&i| self.coverage[i] >= COVERED);
-        let mean = |value: &dyn Fn(usize, usize) -> f64| {
-            let sum: f64 = covered().map(|i| (0..3).map(|c| value(i, c).powi(2)).sum::<f64>()).sum();
-            (sum / (3 * covered().count().max(1)) as f64).sqrt()
-        };
-        let at = |image: &Image, i: usize, c: usize| f64::from(image.rgb[i][c]);
-        let linear = mean(&|i, c| at(image, i, c) - at(&self.image, i, c));
-        let size = mean(&|i, c| at(&self.image, i, c));
+        let (squares, size, count) = sums(&self.image, image, &self.coverage);
         ViewErrors {
-            linear,
-            relative: if linear == 0.0 { 0.0 } else { linear / size },
+            linear: (squares / count.max(1) as f64).sqrt(),
+            relative: relative(squares, size),
             scores: comparison.scores(),
             map: self.losses(image, loss),
             flip: Picture::of_error(&comparison, image.width),

@@ -15,7 +15,8 @@ use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
 use crate::samples::ViewSamples;
-use crate::scene::view::Target;
+use crate::scene::Scene;
+use crate::scene::view::{Target, View};
 
 /// A scene in one setting.
 #[derive(Debug)]
@@ -90,10 +91,16 @@ impl Subject {
 
 fn images(prepared: &Prepared, samples: &[&ViewSamples], point: &Point) -> Vec<Image> {
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &point.params);
-    let views = prepared.scene.views.iter().zip(samples).enumerate();
-    let image = |(i, (view, samples)): (usize, (&crate::scene::view::View, &&ViewSamples))| {
-        let mut shaded = shader.shade(samples, &view.camera, point.gains.get(i).copied().unwrap_or(1.0));
-        if prepared.scene.effects.has(Effect::Bloom) {
+    shaded(&prepared.scene, &shader, samples, &point.gains)
+}
+
+/// The image of each view of `scene`, bloom and all, times its gain.
+#[must_use]
+pub fn shaded(scene: &Scene, shader: &Shader, samples: &[&ViewSamples], gains: &[f64]) -> Vec<Image> {
+    let views = scene.views.iter().zip(samples).enumerate();
+    let image = |(i, (view, samples)): (usize, (&View, &&ViewSamples))| {
+        let mut shaded = shader.shade(samples, &view.camera, gains.get(i).copied().unwrap_or(1.0));
+        if scene.effects.has(Effect::Bloom) {
             add_bloom(&mut shaded.image, &shaded.haze);
         }
         shaded.image

@@ -13,4 +13,5 @@ mod refusals;
 mod refused_files;
 mod runs;
 mod stages;
+mod tradeoffs;
 mod words;

@@ -1,5 +1,6 @@
 //! The time of a case, taken in turns with the whole model's.
 
+use super::GpuTiming;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::{Objective, Point};
 use crate::study::StudyError;
@@ -16,12 +17,15 @@ pub struct Clocks<'a> {
 }
 
 impl<'a> Clocks<'a> {
-    /// Of the whole model; with `gpu` its renderer too, where there is an adapter.
+    /// Of the whole model, and of its renderer `when` that is wished for.
     ///
     /// # Errors
-    /// When the adapter that there is fails.
-    pub fn new(whole: &'a Subject, point: &Point, gpu: bool) -> Result<Self, StudyError> {
-        let (gpu, warning) = if gpu { gpu::Clock::open(whole, point) } else { (gpu::Clock::none(), None) };
+    /// When an adapter was wished for and there is none, or it fails.
+    pub fn new(whole: &'a Subject, point: &Point, when: GpuTiming) -> Result<Self, StudyError> {
+        let (gpu, warning) = match when {
+            GpuTiming::Never => (gpu::Clock::none(), None),
+            GpuTiming::Auto | GpuTiming::Always => gpu::Clock::open(whole, point, when == GpuTiming::Always)?,
+        };
         Ok(Self { engine: whole.live_engine(), point: point.clone(), gpu, warning })
     }
 
@@ -74,19 +78,23 @@ mod gpu {
             Self(None)
         }
 
-        /// Of the whole model, where there is an adapter; else why there is not.
-        pub(super) fn open(whole: &'a Subject, point: &Point) -> (Self, Option<String>) {
-            match Gpu::open(&Choice::default()) {
-                Ok(gpu) if gpu.timestamps() => {
-                    let open = Open { gpu, whole, params: point.params };
-                    (Self(Some(open)), None)
-                }
-                Ok(gpu) => {
-                    let name = gpu.name().to_owned();
-                    (Self(None), Some(format!("GPU time is not measured: {name} has no timestamps.")))
-                }
-                Err(error) => (Self(None), Some(format!("GPU time is not measured. {error}"))),
+        /// Of the whole model, where there is an adapter of hardware, or of any kind if it is `wished` for; and
+        /// why it is not timed all the same.
+        pub(super) fn open(
+            whole: &'a Subject,
+            point: &Point,
+            wished: bool,
+        ) -> Result<(Self, Option<String>), StudyError> {
+            let gpu = match Gpu::open(&Choice::default()) {
+                Ok(gpu) if wished || !gpu.is_software() => gpu,
+                Err(error) if wished => return Err(error.into()),
+                _ => return Ok((Self(None), None)),
+            };
+            if !gpu.timestamps() {
+                let warning = format!("GPU time is not measured: {} has no timestamps.", gpu.name());
+                return Ok((Self(None), Some(warning)));
             }
+            Ok((Self(Some(Open { gpu, whole, params: point.params })), None))
         }
 
         pub(super) fn adapter(&self) -> Option<String> {
@@ -145,11 +153,13 @@ mod gpu {
         pub(super) fn none() -> Self {
             Self(PhantomData)
         }
-        pub(super) fn open(_: &'a Subject, _: &Point) -> (Self, Option<String>) {
-            (
-                Self::none(),
-                Some("GPU time is not measured: this skinfit was built without its GPU renderer.".to_owned()),
-            )
+        pub(super) fn open(
+            _: &'a Subject,
+            _: &Point,
+            wished: bool,
+        ) -> Result<(Self, Option<String>), StudyError> {
+            let why = "GPU time is not measured: this skinfit was built without its GPU renderer.";
+            Ok((Self::none(), wished.then(|| why.to_owned())))
         }
         pub(super) fn adapter(&self) -> Option<String> {
             None

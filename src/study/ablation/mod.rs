@@ -45,8 +45,20 @@ pub struct AblationOptions {
     pub params: Option<PathBuf>,
     /// Where bakes are kept.
     pub cache: Option<PathBuf>,
-    /// Whether the renderer is timed on a graphics adapter, where there is one.
-    pub gpu: bool,
+    /// Whether the renderer is timed on a graphics adapter.
+    pub gpu: GpuTiming,
+}
+
+/// Whether the renderer is timed on a graphics adapter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum GpuTiming {
+    /// Where there is an adapter of hardware; on one of software the time would be the CPU's.
+    #[default]
+    Auto,
+    /// On whatever adapter there is.
+    Always,
+    /// Not at all.
+    Never,
 }
 
 /// What was found.

@@ -100,7 +100,7 @@ fn summary(ablation: &Ablation, full: &Row) -> String {
     let mut columns = vec![
         ("left out", "which effects or terms"),
         ("loss", "mean loss over all views"),
-        ("change, %", "of the loss, with one standard error"),
+        ("change", "of the loss, with one standard error"),
         ("t", "the change over its standard error; 3 and more is beyond chance"),
         ("linear RMS, %", "difference of linear radiance, relative to the reference's root mean square"),
         ("PSNR, dB", "mean of the views"),
@@ -150,18 +150,15 @@ fn cells(row: &Row, full: &Row) -> Vec<Cell> {
         })
     };
     let relative = |x: f64| if full.loss > 0.0 { 100.0 * x / full.loss } else { f64::NAN };
-    let change = match (relative(row.change.loss), row.change.loss) {
-        (_, 0.0) => Cell::value("0", 0.0),
-        (percent, _) if percent.is_finite() => Cell::value(
-            format!(
-                "{} <span class=\"pm inline\">± {}</span>",
-                signed(percent, 2),
-                number(relative(row.change.std_error), 2)
-            ),
-            percent,
-        ),
-        // From nothing there is no percentage.
-        (_, absolute) => Cell::value("from 0", absolute),
+    let percent = relative(row.change.loss);
+    let change = match row.change.loss {
+        0.0 => Cell::value("0", 0.0),
+        // Of next to nothing, percentages say nothing.
+        change if !(percent.abs() < 1e4) => Cell::value(format!("+{}", number(change, 3)), change),
+        change => {
+            let error = number(relative(row.change.std_error), 2);
+            Cell::value(format!("{}% <span class=\"pm inline\">± {error}</span>", signed(percent, 2)), change)
+        }
     };
     let t = if row.change.loss == 0.0 {
         Cell::none()
@@ -322,9 +319,11 @@ fn pictures(ablation: &Ablation, cases: &[Row]) -> Result<String, String> {
         Ok(format!(
             "<details class=\"case\"{open}><summary>{} <small>loss {} · FLIP {}</small></summary>{views}</details>",
             escape(&without),
-            signed(100.0 * row.change.loss / ablation.rows[0].loss.max(f64::MIN_POSITIVE), 1)
-                .replace("inf", "∞")
-                + "%",
+            if row.change.loss == 0.0 {
+                "unchanged".to_owned()
+            } else {
+                format!("{} more", number(row.change.loss, 3))
+            },
             row.mean().flip.map_or_else(|| "–".to_owned(), |flip| format!("{flip:.4}")),
         ))
     };

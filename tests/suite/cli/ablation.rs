@@ -32,7 +32,7 @@ fn what_contributes_nothing_is_missed_by_nothing_at_all() {
     let desk = Desk::new();
     without_targets(&desk);
     desk.edit("hilite = 0.7", "hilite = 0.0");
-    let ran = desk.run(&["ablate", "scene.toml", "-o", "parts", "--no-gpu"]).done();
+    let ran = desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]).done();
     let rows = rows(&desk, "parts");
     // The whole, seven effects, and the one term that is no effect.
     assert_eq!(rows.len(), 9, "{ran:?}");
@@ -62,7 +62,7 @@ fn what_contributes_nothing_is_missed_by_nothing_at_all() {
 #[test]
 fn fitting_again_never_makes_it_worse_and_pairs_are_all_there() {
     let desk = Desk::new();
-    let options = ["ablate", "scene.toml", "--no-gpu", "--pairs", "-o"];
+    let options = ["ablate", "scene.toml", "--gpu", "never", "--pairs", "-o"];
     desk.run(&[&options[..], &["held"]].concat()).done();
     desk.run(&[&options[..], &["again", "--refit"]].concat());
     let (held, again) = (rows(&desk, "held"), rows(&desk, "again"));
@@ -96,7 +96,7 @@ fn numbers_do_not_depend_on_threads_and_constants_may_be_given() {
     let desk = Desk::new();
     let measured = |folder: &str, threads: &str| {
         let options =
-            ["ablate", "scene.toml", "--params", "truth.toml", "--no-gpu", "--threads", threads, "-o"];
+            ["ablate", "scene.toml", "--params", "truth.toml", "--gpu", "never", "--threads", threads, "-o"];
         desk.run(&[&options[..], &[folder]].concat()).done();
         let without_times = |mut row: Value| {
             row["cpu"].take();
@@ -117,7 +117,7 @@ fn a_scene_of_one_effect_is_black_without_it() {
         "[\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"side_specular\", \"hilite\", \"reflection\"]",
         "[\"diffuse\"]",
     );
-    desk.run(&["ablate", "scene.toml", "-o", "parts", "--no-gpu"]);
+    desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]);
     let rows = rows(&desk, "parts");
     assert_eq!(rows.keys().collect::<Vec<_>>(), ["", "diffuse"]);
     let relative = rows["diffuse"]["views"][0]["relative_rms"].as_f64().unwrap();

@@ -170,8 +170,29 @@ fn check(browser: &str, page: &Path, tables: &[&str], pictures: bool, plots: boo
 fn pages_work_in_a_browser() {
     let Some(browser) = browser() else { return };
     let desk = Desk::new();
-    desk.run(&["ablate", "scene.toml", "-o", "parts", "--no-gpu", "--refit"]);
+    desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never", "--refit"]);
     desk.fit("run", &[]).done();
+    let goal = ["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml", "--within", "1%"];
+    desk.run(&goal).done();
+    let cost = desk.path("cost/report.html");
+    let axes = [
+        "format",
+        "silhouette",
+        "irradiance",
+        "specular",
+        "hilite",
+        "filter",
+        "lobes",
+        "rays",
+        "samples",
+        "pixels",
+        "solver",
+    ];
+    let tables: Vec<String> = axes.iter().map(|axis| format!("axis-{axis}")).collect();
+    let tables: Vec<&str> = std::iter::once("cheapest").chain(tables.iter().map(String::as_str)).collect();
+    check(browser, &cost, &tables, false, true);
+    let colours = screenshot(browser, &cost, "tradeoff_1100.png", 1100);
+    assert!(colours > 100, "{colours} colours");
     let parts = desk.path("parts/report.html");
     check(browser, &parts, &["cases", "by-view", "by-constant"], true, true);
     check(browser, &desk.path("run/report.html"), &[], true, false);
