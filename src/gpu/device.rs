@@ -13,8 +13,8 @@ use super::error::GpuError;
 /// An adapter's device, open for work.
 #[derive(Debug)]
 pub struct Gpu {
-    pub(super) device: Device,
-    pub(super) queue: Queue,
+    pub(crate) device: Device,
+    pub(crate) queue: Queue,
     info: AdapterInfo,
     /// The first thing that went wrong; errors after it are its consequences.
     fault: Arc<Mutex<Option<GpuError>>>,
@@ -93,14 +93,14 @@ impl Gpu {
     }
 
     /// Wait until all submitted work is done.
-    pub(super) fn wait(&self) -> Result<(), GpuError> {
+    pub(crate) fn wait(&self) -> Result<(), GpuError> {
         let waited = self.device.poll(PollType::wait_indefinitely());
         self.check()?;
         waited.map(|_| ()).map_err(|error| self.lost(&error.to_string()))
     }
 
     /// That the device does not answer, in the driver's words.
-    pub(super) fn lost(&self, reason: &str) -> GpuError {
+    pub(crate) fn lost(&self, reason: &str) -> GpuError {
         match self.check() {
             Err(error) => error,
             Ok(()) => GpuError::Lost { adapter: self.info.name.clone(), reason: sentence(reason) },

@@ -7,7 +7,6 @@ use super::subject::Subject;
 use crate::model::effects::Effect;
 use crate::model::params::Params;
 use crate::prepare::Prepared;
-use crate::samples::SurfaceArrays;
 use crate::shader::{Budget, Facts, plan};
 
 /// A cube lookup reads 2 x 2 texels of four 32-bit channels.
@@ -36,15 +35,15 @@ impl Counts {
     pub fn new(subject: &Subject, params: &Params) -> Result<Self, StudyError> {
         let scene = &subject.prepared.scene;
         let planned = plan(&Facts::of_scene(scene, params, Budget::Exact, false))?;
-        let attributes = subject.engine.views().first().map_or(0, |view| planes(&view.samples.surface));
+        let attributes =
+            subject.engine.views().first().map_or(0, |view| view.samples.surface.rows().stride());
         let needs = scene.effects.needs(scene.silhouette);
         let lookups = [needs.irradiance, scene.effects.has(Effect::SideSpecular), needs.dapple, needs.hilite];
         let lookups = lookups.into_iter().filter(|&wanted| wanted).count();
         let (bakes, baked_bytes) = bakes(&subject.prepared);
         Ok(Self {
             samples: subject.engine.samples(),
-            // A weight stands with each sample.
-            bytes_a_sample: (attributes + 1) * size_of::<f32>() + lookups * LOOKUP_BYTES,
+            bytes_a_sample: attributes * size_of::<f32>() + lookups * LOOKUP_BYTES,
             operations: planned.cost,
             bakes,
             baked_bytes,
@@ -56,25 +55,6 @@ impl Counts {
     pub fn bakes_saved(&self, other: &Self) -> Vec<String> {
         self.bakes.iter().filter(|name| !other.bakes.contains(name)).cloned().collect()
     }
-}
-
-/// How many numbers each sample has.
-fn planes(surface: &SurfaceArrays) -> usize {
-    let SurfaceArrays {
-        base,
-        bump,
-        view,
-        normal,
-        occlusion,
-        silhouette,
-        dapple,
-        albedo,
-        specular,
-        attenuator,
-    } = surface;
-    let vectors = [base, bump, view, normal, albedo].into_iter().flatten();
-    let scalars = [occlusion, silhouette, dapple, specular, attenuator];
-    vectors.chain(scalars).filter(|plane| !plane.is_empty()).count()
 }
 
 /// What was baked, and how many bytes it is.

@@ -114,10 +114,10 @@ impl ReferenceView {
         }
         let (mut coverage, mut weight) = (vec![0.0; width * height], vec![0.0; width * height]);
         for (slot, &pixel) in observed.samples.pixel.iter().enumerate() {
-            if pixel != u32::MAX && observed.weight[slot] > 0.0 {
+            if pixel != u32::MAX && observed.pixel_weight(slot) > 0.0 {
                 let at = pixel as usize;
                 coverage[at] = observed.samples.coverage[slot].min(image.alpha[at]);
-                weight[at] = observed.weight[slot];
+                weight[at] = observed.pixel_weight(slot);
             }
         }
         Self { name: view.name.clone(), image, coverage, weight, clip: observed.clip }

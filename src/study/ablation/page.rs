@@ -348,7 +348,7 @@ fn method(scene: &str, ablation: &Ablation, full: &Row) -> String {
         ("samples", full.counts.samples.to_string()),
         ("GPU", ablation.adapter.clone().unwrap_or_else(|| "not measured".to_owned())),
         ("threads", rayon::current_num_threads().to_string()),
-        ("instructions", crate::engine::cpu::instructions()),
+        ("instructions", crate::simd::instructions()),
     ];
     let rows: Vec<(String, String)> = rows.into_iter().map(|(name, text)| (name.to_owned(), text)).collect();
     format!(

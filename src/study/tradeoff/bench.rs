@@ -12,7 +12,8 @@ use crate::model::params::Param;
 use crate::prepare::{PrepareError, PrepareOptions, Prepared};
 use crate::render::image::Image;
 use crate::render::shade::Shader;
-use crate::samples::{self, LANES, ViewSamples};
+use crate::samples::rows::Rows;
+use crate::samples::{self, ViewSamples};
 use crate::scene::{Loss, Quality, Scene};
 use crate::study::StudyError;
 use crate::study::subject::shaded;
@@ -154,15 +155,10 @@ impl Evaluated {
     /// An engine over the samples that does every lookup anew, as a renderer does; its targets are black.
     #[must_use]
     pub fn live_engine(&self) -> CpuEngine {
-        let observed = |samples: &ViewSamples| {
-            let plane = || vec![0.0; samples.groups() * LANES];
-            let weight = samples.pixel.iter().map(|&pixel| f32::from(u8::from(pixel != u32::MAX)));
-            ObservedView {
-                samples: samples.clone(),
-                target: [plane(), plane(), plane(), Vec::new()],
-                weight: weight.collect(),
-                clip: None,
-            }
+        let observed = |samples: &ViewSamples| ObservedView {
+            target: Rows::new(3, samples.groups()),
+            samples: samples.clone(),
+            ..ObservedView::default()
         };
         let views = self.samples.iter().map(observed).collect();
         CpuEngine::with_kept_terms(

@@ -232,7 +232,7 @@ fn method(scene: &str) -> String {
         ("software", format!("skinfit {}", env!("CARGO_PKG_VERSION"))),
         ("scene", scene.to_owned()),
         ("threads", rayon::current_num_threads().to_string()),
-        ("instructions", crate::engine::cpu::instructions()),
+        ("instructions", crate::simd::instructions()),
     ]
     .map(|(name, text)| (name.to_owned(), text));
     format!(
