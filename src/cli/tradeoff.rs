@@ -28,11 +28,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
     /// Name the cheapest settings that are off by no more than this together, such as 0.5%.
-    #[arg(long, value_name = "ERROR", value_parser = parse_error)]
+    #[arg(long, value_name = "ERROR", allow_hyphen_values = true, value_parser = parse_error)]
     within: Option<f64>,
     /// Name the most accurate settings whose baking, tracing and one pass take no longer than this, such as 20ms or
     /// 1.5s.
-    #[arg(long, value_name = "TIME", value_parser = parse_time, conflicts_with = "within")]
+    #[arg(long, value_name = "TIME", allow_hyphen_values = true, value_parser = parse_time, conflicts_with = "within")]
     budget: Option<f64>,
 }
 

@@ -60,21 +60,28 @@ where
         problem: &mut Problem<O>,
         mut state: AdamState,
     ) -> Result<(AdamState, Option<KV>), Error> {
-        let (Some(mut at), Some(gradient)) = (state.take_param(), state.take_gradient()) else {
+        let (Some(at), Some(gradient)) = (state.take_param(), state.take_gradient()) else {
             return Err(Error::msg("there is no point to go on from"));
         };
         let step = state.get_iter() as f64 + 1.0;
         let rate = self.rate / (1.0 + step / COOLING);
         let unbiased = DECAY.map(|decay| 1.0 - decay.powf(step));
+        let mut moved = at.clone();
         for (i, g) in gradient.iter().enumerate() {
             self.mean[i] += (1.0 - DECAY[0]) * (g - self.mean[i]);
             self.square[i] += (1.0 - DECAY[1]) * (g * g - self.square[i]);
-            at[i] -= rate * self.mean[i] / unbiased[0] / ((self.square[i] / unbiased[1]).sqrt() + EPSILON);
+            moved[i] -= rate * self.mean[i] / unbiased[0] / ((self.square[i] / unbiased[1]).sqrt() + EPSILON);
         }
-        let cost = problem.cost(&at)?;
-        let gradient = problem.gradient(&at)?;
+        let Ok(cost) = problem.cost(&moved) else {
+            // Where the loss is not finite it turns back, slower and without its momentum.
+            self.rate *= 0.5;
+            self.mean.fill(0.0);
+            let cost = state.get_cost();
+            return Ok((state.param(at).cost(cost).gradient(gradient), None));
+        };
+        let gradient = problem.gradient(&moved)?;
         self.length = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
-        Ok((state.param(at).cost(cost).gradient(gradient), None))
+        Ok((state.param(moved).cost(cost).gradient(gradient), None))
     }
 
     fn terminate(&mut self, _: &AdamState) -> TerminationStatus {

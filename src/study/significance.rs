@@ -38,13 +38,21 @@ pub struct Change {
     pub t: f64,
     /// The side of the blocks, in pixels.
     pub block: usize,
+    /// What roundings of 32-bit numbers may do to the mean loss: a smaller change is none.
+    pub rounding: f64,
 }
 
 impl Change {
     /// Whether it is beyond chance.
     #[must_use]
     pub fn is_significant(&self) -> bool {
-        self.t.abs() >= SIGNIFICANT
+        self.t.abs() >= SIGNIFICANT && !self.is_nothing()
+    }
+
+    /// Whether it is none, but for rounding.
+    #[must_use]
+    pub fn is_nothing(&self) -> bool {
+        self.loss.abs() <= self.rounding
     }
 }
 
@@ -63,7 +71,7 @@ pub fn change(before: &[LossMap], after: &[LossMap]) -> Change {
             best = Some(found);
         }
     }
-    best.unwrap_or(Change { loss: 0.0, std_error: 0.0, t: 0.0, block: 0 })
+    best.unwrap_or(Change { loss: 0.0, std_error: 0.0, t: 0.0, block: 0, rounding: 0.0 })
 }
 
 /// For each block with any weight: the sum of differences, and of weights.
@@ -92,6 +100,7 @@ fn of_blocks(blocks: &[(f64, f64)], side: usize) -> Change {
             std_error: 0.0,
             t: 0.0,
             block: side,
+            rounding: 0.0,
         };
     }
     let loss = sum / weight;
@@ -100,7 +109,7 @@ fn of_blocks(blocks: &[(f64, f64)], side: usize) -> Change {
     let std_error = (squares * n / (n - 1.0)).sqrt() / weight;
     // Blocks that all change by the same share leave no error at all.
     let t = if loss == 0.0 { 0.0 } else { loss / std_error.max(1e-12 * loss.abs()) };
-    Change { loss, std_error, t, block: side }
+    Change { loss, std_error, t, block: side, rounding: 0.0 }
 }
 
 #[cfg(test)]

@@ -167,7 +167,7 @@ pub fn table(ablation: &Ablation) -> String {
             row.left_out.name(),
             row.loss,
             if row.change.loss == 0.0 { "0".to_owned() } else { format!("{:+.2e}", row.change.loss) },
-            if row.change.loss == 0.0 { "-".to_owned() } else { format!("{:+.1}", row.change.t) },
+            if row.change.is_nothing() { "-".to_owned() } else { format!("{:+.1}", row.change.t) },
             score(mean.psnr, 2),
             score(mean.ssim, 4),
             score(mean.flip, 4),

@@ -21,7 +21,7 @@ use super::reference::{ReferenceView, Source, ViewErrors, mean_loss};
 use super::significance::{Change, LossMap, change};
 use super::subject::Subject;
 use super::timing::Timed;
-use crate::engine::{Point, Unknown};
+use crate::engine::{Objective, Point, Unknown};
 use crate::fit::FitOptions;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::model::effects::Effects;
@@ -180,16 +180,26 @@ pub fn ablate(scene: &Path, options: &AblationOptions) -> Result<Ablation, Study
     let full = Evaluated { case: Case::default(), images, errors, point: point.clone(), outcome };
     let before: Vec<LossMap> = full.errors.iter().map(|errors| errors.map.clone()).collect();
     let cases = Case::all(whole.prepared.scene.effects, options.pairs);
+    let mut held = Vec::new();
     let bar = progress::bar("cases", 1 + cases.len() as u64);
     let mut rows = vec![full.row(&whole, &clocks, &before)?];
     bar.inc(1);
     for case in cases {
         bar.set_message(case.name());
         let (subject, evaluated) = study.evaluate(case, whole.prepared.scene.effects)?;
+        // A mesh that the scene poses stays posed.
+        if subject.prepared.scene.effects != evaluated.case.effects(whole.prepared.scene.effects) {
+            held.push(evaluated.case.name());
+            continue;
+        }
         rows.push(evaluated.row(&subject, &clocks, &before)?);
         bar.inc(1);
     }
     bar.finish_and_clear();
+    if !held.is_empty() {
+        let held = held.join(", ");
+        warnings.push(format!("Not left out, as the scene's own morph_weights or time ask for it: {held}."));
+    }
     Ok(Ablation {
         source,
         constants: words(options, source),
@@ -281,7 +291,7 @@ impl Evaluated {
         };
         Ok(Row {
             loss: mean_loss(&maps),
-            change: change(before, &maps),
+            change: Change { rounding: rounding(subject, before), ..change(before, &maps) },
             views: names.zip(self.errors.iter().zip(&self.images)).map(view).collect(),
             counts: Counts::new(subject, &self.point.params)?,
             cpu: Some(cpu),
@@ -291,6 +301,12 @@ impl Evaluated {
             left_out: self.case,
         })
     }
+}
+
+/// What roundings may do to the mean loss, of either of two fits and in either direction.
+fn rounding(subject: &Subject, before: &[LossMap]) -> f64 {
+    let weight: f64 = before.iter().flat_map(|map| &map.weight).sum();
+    if weight > 0.0 { 4.0 * subject.engine.rounding() / weight } else { 0.0 }
 }
 
 /// What is free, its value and its error.

@@ -60,9 +60,9 @@ fn lead(ablation: &Ablation, cases: &[Row]) -> String {
             rows.iter().map(|row| format!("<b>{}</b>", escape(&row.left_out.name()))).collect();
         names.join(", ")
     };
-    let nothing: Vec<_> = single.iter().filter(|row| row.change.loss == 0.0).collect();
+    let nothing: Vec<_> = single.iter().filter(|row| row.change.is_nothing()).collect();
     let chance: Vec<_> =
-        single.iter().filter(|row| row.change.loss != 0.0 && !row.change.is_significant()).collect();
+        single.iter().filter(|row| !row.change.is_nothing() && !row.change.is_significant()).collect();
     let better: Vec<_> =
         single.iter().filter(|row| row.change.loss < 0.0 && row.change.is_significant()).collect();
     for (rows, words) in [
@@ -160,7 +160,7 @@ fn cells(row: &Row, full: &Row) -> Vec<Cell> {
             Cell::value(format!("{}% <span class=\"pm inline\">± {error}</span>", signed(percent, 2)), change)
         }
     };
-    let t = if row.change.loss == 0.0 {
+    let t = if row.change.is_nothing() {
         Cell::none()
     } else {
         Cell::value(signed(row.change.t, 1), row.change.t)

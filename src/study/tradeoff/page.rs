@@ -236,7 +236,7 @@ fn method(scene: &str) -> String {
     ]
     .map(|(name, text)| (name.to_owned(), text));
     format!(
-        "<p>Times are medians of rounds in which all settings of an axis take turns, with half the distance of their quartiles. Counts \
+        "<p>Times are medians of rounds in which all settings of an axis take turns, with half the distance of their quartiles; a bake or a trace of more than half a second is run once. Counts \
          stand beside them, as they are the same on every machine. Filled dots are on the front: nothing is both as cheap and as \
          accurate; the dashed line joins them. Dots on the line marked 0 have no error at all.</p>{}",
         facts(&rows)

@@ -171,7 +171,7 @@ fn pages_work_in_a_browser() {
     let Some(browser) = browser() else { return };
     let desk = Desk::new();
     desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never", "--refit"]);
-    desk.fit("run", &[]).done();
+    desk.fit("run", &["--engine", "cpu"]).done();
     let goal = ["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml", "--within", "1%"];
     desk.run(&goal).done();
     let cost = desk.path("cost/report.html");

@@ -109,7 +109,7 @@ fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
     assert_eq!(quality("lobe_size"), text("specular"));
     let mut best = table.clone();
     let references =
-        [("irradiance_size", 128), ("lobe_size", 256), ("hilite_size", 512), ("occlusion_rays", 4096)];
+        [("irradiance_size", 128), ("lobe_size", 256), ("hilite_size", 512), ("occlusion_rays", 1024)];
     for (key, value) in references {
         best["quality"].as_table_mut().unwrap().insert(key.to_owned(), value.into());
     }

@@ -8,6 +8,9 @@ use crate::study::timing::{Job, Rounds, interleaved};
 use crate::study::tradeoff::axis::{Choose, Knob, Setting, Sweep, mark_front};
 use crate::study::tradeoff::bench::{Bench, Settings, baked};
 
+/// Seconds from which on a job is run once.
+const LONG: f64 = 0.5;
+
 /// A number of the `[quality]` table to be swept.
 pub(super) struct Swept<'a> {
     pub(super) axis: &'static str,
@@ -41,7 +44,16 @@ impl Swept<'_> {
         let mut times: Vec<Box<dyn FnMut() -> Result<f64, StudyError> + '_>> = Vec::new();
         for &value in self.values {
             let settings = self.settings(bench, value);
-            times.push(Box::new(move || work(settings)));
+            let mut before: Option<f64> = None;
+            times.push(Box::new(move || {
+                let seconds = match before {
+                    // So long a job is not run again: what disturbs it for a moment does not show in it.
+                    Some(seconds) if seconds > LONG => seconds,
+                    _ => work(settings)?,
+                };
+                before = Some(seconds);
+                Ok(seconds)
+            }));
         }
         let mut jobs: Vec<Job<'_, StudyError>> =
             times.iter_mut().map(|job| &mut **job as Job<'_, StudyError>).collect();

@@ -29,7 +29,7 @@ impl Axis for Rays {
                 "Images with occlusion traced by so many rays. Seconds are those of tracing, nothing cached."
                     .to_owned(),
             knob: Knob::OcclusionRays,
-            values: &[4, 8, 16, 32, 64, 128, 256, 512, 1024, 4096],
+            values: &[4, 8, 16, 32, 64, 128, 256, 1024],
             count: ("million rays", &|rays| 1e-6 * vertices * f64::from(rays)),
         };
         swept.sweep(bench, &bench.point(), &|settings| {

@@ -131,12 +131,8 @@ impl Finer {
     ) -> Result<Setting, StudyError> {
         let evaluated = self.evaluated(bench, silhouette)?;
         let scene = &evaluated.scene;
-        let metres = bench.prepared.scene.metres_per_unit;
-        let edge = self.edge() * metres;
-        // What the paper's programs do: the planner may interpolate.
-        let budget = if silhouette == Silhouette::Vertex { Budget::Paper } else { Budget::Exact };
-        let facts =
-            Facts { budget: Budget::Exact, ..Facts::of_scene(scene, &bench.point().params, budget, false) };
+        let edge = self.edge() * scene.metres_per_unit;
+        let facts = Facts::of_scene(scene, &bench.point().params, Budget::Exact, false);
         let name = match silhouette {
             Silhouette::Vertex => format!("vertex, edges of {:.1} mm", 1e3 * edge),
             _ => silhouette.name().to_owned(),

@@ -17,7 +17,7 @@ use crate::study::tradeoff::bench::Bench;
 pub(super) struct Solvers;
 
 /// A solver that has not ended by then is stopped; the best of them take some ten iterations.
-const MOST_ITERATIONS: u64 = 600;
+const MOST_ITERATIONS: u64 = 300;
 
 impl Axis for Solvers {
     fn name(&self) -> &'static str {
