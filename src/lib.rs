@@ -18,6 +18,7 @@
 //! - [`study`]: what is measured about the model and the fits.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
 //! - [`export`]: constants and shaders as text for other engines.
+//! - [`study`]: what is measured about the model and the fits.
 //! - [`cli`]: the command line.
 //! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
 //!   instructions kernels are compiled for.

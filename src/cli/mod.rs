@@ -1,7 +1,7 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
-//! - `ablate`, `tradeoff`: studies
-//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
+//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `stability`,
+//!   `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
@@ -19,12 +19,17 @@ mod render;
 mod run_folder;
 mod scene;
 mod shader;
+mod stability;
+mod sweep;
 mod tradeoff;
 
 use std::io::Write as _;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::output;
 
 /// How a command ended, as an exit code; `EXIT_CODES` says what each means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +107,9 @@ enum Command {
     Shader(shader::Arguments),
     Export(export::Arguments),
     Info(info::Arguments),
+    Stability(stability::Arguments),
+    Sweep(sweep::SweepArguments),
+    Collect(sweep::CollectArguments),
 }
 
 /// Run the program on the process' arguments.
@@ -120,6 +128,9 @@ pub fn main() -> ExitCode {
         Command::Shader(arguments) => shader::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Stability(arguments) => stability::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
+        Command::Collect(arguments) => sweep::run_collect(&arguments),
     };
     match done {
         Ok(Exit::Done) => ExitCode::SUCCESS,
@@ -139,6 +150,17 @@ fn say(line: &str) -> Result<(), Refusal> {
             "standard output cannot be written: {error}. Send it to a file or a terminal that takes it."
         ))),
         _ => Ok(()),
+    }
+}
+
+/// Write a text to a file and say so, or print it.
+fn write_or_say(file: Option<&Path>, text: &str) -> Result<(), Refusal> {
+    match file {
+        Some(file) => {
+            output::write(file, text.as_bytes())?;
+            say(&format!("wrote {}", file.display()))
+        }
+        None => say(text.trim_end()),
     }
 }
 

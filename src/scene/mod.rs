@@ -28,6 +28,7 @@ pub mod view;
 
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
+pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
 pub use settings::{interval, read_params};
 
