@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use rayon::prelude::*;
 
 use super::{Ablation, Row};
+use crate::model::effects::Effect;
 use crate::report::figures::triple;
 use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
 use crate::report::pictures::Picture;
@@ -154,7 +155,9 @@ fn cells(row: &Row, full: &Row) -> Vec<Cell> {
     let change = match row.change.loss {
         0.0 => Cell::value("0", 0.0),
         // Of next to nothing, percentages say nothing.
-        change if !(percent.abs() < 1e4) => Cell::value(format!("+{}", number(change, 3)), change),
+        change if percent.is_nan() || percent.abs() >= 1e4 => {
+            Cell::value(format!("+{}", number(change, 3)), change)
+        }
         change => {
             let error = number(relative(row.change.std_error), 2);
             Cell::value(format!("{}% <span class=\"pm inline\">± {error}</span>", signed(percent, 2)), change)
@@ -335,7 +338,7 @@ fn method(scene: &str, ablation: &Ablation, full: &Row) -> String {
         Source::Targets => "the scene's target images",
         Source::Model => "the whole model's images: the scene names no target",
     };
-    let effects: Vec<&str> = ablation.setup.effects.iter().map(|effect| effect.name()).collect();
+    let effects: Vec<&str> = ablation.setup.effects.iter().map(Effect::name).collect();
     let rows = [
         ("software", format!("skinfit {}", env!("CARGO_PKG_VERSION"))),
         ("scene", scene.to_owned()),
