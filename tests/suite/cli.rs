@@ -1,5 +1,7 @@
 //! The program as its users meet it: every test here runs the binary.
 
+mod ablation;
+mod browser;
 mod built_in;
 pub(crate) mod desk;
 mod exported;
@@ -13,4 +15,5 @@ mod runs;
 mod stability;
 mod stages;
 mod sweeps;
+mod tradeoffs;
 mod words;

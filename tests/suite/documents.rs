@@ -25,6 +25,8 @@ fn pages() -> Vec<PathBuf> {
         "data",
         "docs",
         "experiments",
+        "experiments/ablation",
+        "experiments/accuracy_vs_time",
         "experiments/bench",
         "experiments/race",
         "experiments/scaling",

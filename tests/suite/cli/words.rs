@@ -10,6 +10,8 @@ fn every_help_page_holds_an_example_that_is_understood() {
     for command in [
         "",
         "fit",
+        "ablate",
+        "tradeoff",
         "render",
         "bake",
         "demo",
