@@ -16,6 +16,7 @@
 //! - [`demo`]: the built-in scene as files, its targets rendered.
 //! - [`report`]: metrics, pictures and pages that show how good a fit is.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
+//! - `tensor`: the model on burn's tensors, differentiable (feature `burn`).
 //! - [`export`]: constants and shaders as text for other engines.
 //! - [`cli`]: the command line.
 //! - [`output`], [`progress`]: files written whole or not at all; progress bars.
@@ -38,3 +39,5 @@ pub mod report;
 pub mod samples;
 pub mod scene;
 pub mod shader;
+#[cfg(feature = "burn")]
+pub mod tensor;
