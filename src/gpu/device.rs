@@ -98,15 +98,37 @@ impl Gpu {
     /// When it is larger than a binding may be, or the device does not take it.
     #[cfg(feature = "burn")]
     pub(crate) fn storage(&self, what: &str, contents: &[u8]) -> Result<Buffer, GpuError> {
-        let (bytes, limits) = (contents.len() as u64, self.device.limits());
-        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        if bytes > limit {
-            let adapter = self.name().to_owned();
-            return Err(GpuError::BufferSize { adapter, what: what.to_owned(), bytes, limit });
-        }
+        self.check_binding(what, contents.len() as u64)?;
         let made = self.buffer(what, contents, BufferUsages::STORAGE);
         self.check()?;
         Ok(made)
+    }
+
+    /// A buffer of so many bytes for shaders to write and read; they are 0 at first.
+    ///
+    /// # Errors
+    /// When it is larger than a binding may be, or the device has no room for it.
+    #[cfg(feature = "burn")]
+    pub(crate) fn scratch(&self, what: &str, bytes: u64) -> Result<Buffer, GpuError> {
+        self.check_binding(what, bytes)?;
+        let made = self.device.create_buffer(&BufferDescriptor {
+            label: Some(what),
+            size: bytes,
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.check()?;
+        Ok(made)
+    }
+
+    #[cfg(feature = "burn")]
+    fn check_binding(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
+        let limits = self.device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes <= limit {
+            return Ok(());
+        }
+        Err(GpuError::BufferSize { adapter: self.name().to_owned(), what: what.to_owned(), bytes, limit })
     }
 
     /// Keep what went wrong where nothing can be returned, for [`check`](Self::check) to tell.

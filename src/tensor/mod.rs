@@ -2,14 +2,22 @@
 //!
 //! - [`device`]: one wgpu device for burn and for us
 //! - [`buffer`]: tensors as ranges of wgpu buffers, both ways without a copy
+//! - [`shade`]: the model as an operation; [`inputs`]: what it takes; `stage`: its passes; `scatter`: what lookups of
+//!   a cube gained, added to its texels
 //! - [`sparse`]: fixed linear maps, forwards and transposed: how maps are sampled, and how pixels are averaged
 
 pub mod buffer;
 pub mod device;
+pub mod inputs;
 mod pass;
+mod scatter;
+pub mod shade;
 pub mod sparse;
+mod stage;
 
 pub use device::SharedDevice;
+pub use inputs::{Input, Inputs};
+pub use shade::{Scatter, Shade, Shaded};
 pub use sparse::Sparse;
 
 use burn::backend::ops::FloatTensorOps as _;
@@ -18,7 +26,7 @@ use burn::backend::{FloatDType, Shape};
 use burn_cubecl::CubeDevice;
 
 use crate::gpu::{Gpu, GpuError};
-use crate::shader::PlanError;
+use crate::shader::adjoint::AdjointError;
 
 /// A tensor operation that cannot be done.
 #[derive(Clone, Debug, thiserror::Error)]
@@ -54,9 +62,9 @@ pub enum TensorError {
         /// The shape that is asked for.
         wanted: Vec<usize>,
     },
-    /// No shader yields the image.
+    /// No shader yields the image, or its derivatives.
     #[error(transparent)]
-    Plan(#[from] PlanError),
+    Model(#[from] AdjointError),
 }
 
 /// What a backward pass leaves when it cannot be done: zeros in the place of a gradient of so many rows, and the
