@@ -181,6 +181,18 @@ impl Gpu {
         self.device.features().contains(Features::TIMESTAMP_QUERY)
     }
 
+    /// How many storage buffers a shader may have.
+    #[must_use]
+    pub fn storage_buffers(&self) -> u32 {
+        self.device.limits().max_storage_buffers_per_shader_stage
+    }
+
+    /// Write into a buffer, before whatever is submitted next.
+    pub fn write(&self, buffer: &Buffer, offset: u64, contents: &[u8]) {
+        self.queue.write_buffer(buffer, offset, contents);
+        self.queue.submit([]);
+    }
+
     /// The longest side of a texture.
     #[must_use]
     pub fn max_side(&self) -> u32 {

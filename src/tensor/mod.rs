@@ -4,10 +4,12 @@
 //! - [`buffer`]: tensors as ranges of wgpu buffers, both ways without a copy
 //! - [`shade`]: the model as an operation; [`inputs`]: what it takes; `stage`: its passes; `scatter`: what lookups of
 //!   a cube gained, added to its texels
+//! - [`footprint`]: the linear maps of a scene: texels, vertices, cube borders
 //! - [`sparse`]: fixed linear maps, forwards and transposed: how maps are sampled, and how pixels are averaged
 
 pub mod buffer;
 pub mod device;
+pub mod footprint;
 pub mod inputs;
 mod pass;
 mod scatter;

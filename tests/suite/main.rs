@@ -23,4 +23,6 @@ mod reports;
 mod samples;
 mod scene_files;
 mod shader;
+#[cfg(feature = "burn")]
+mod tensors;
 mod vectors;

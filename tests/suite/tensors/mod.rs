@@ -1,0 +1,11 @@
+//! The model on burn's tensors, beside the CPU model in f64.
+//!
+//! - `bench`: the shared device, and numbers to try
+//! - `device`: one device, no copies
+//! - `matrices`: fixed linear maps
+//! - `gradients`: the shading operation and its adjoint
+
+mod bench;
+mod device;
+mod gradients;
+mod matrices;
