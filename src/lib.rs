@@ -7,7 +7,7 @@
 //! - [`scene`]: scene files, meshes, maps, cameras: everything that is read.
 //! - [`builtin`]: the scene that the program makes by itself.
 //! - [`bake`]: environment to cube maps, ambient occlusion, and their cache.
-//! - [`samples`]: the visible surface of each view, as a structure of arrays.
+//! - [`samples`]: the visible surface of each view, as records of sixteen pixels.
 //! - [`engine`]: loss, gradient and normal equations over samples.
 //! - [`fit`]: the solvers, and what is known of the answer afterwards.
 //! - [`render`]: images from samples, and image files.
@@ -19,7 +19,8 @@
 //! - `tensor`: the model on burn's tensors, differentiable (feature `burn`).
 //! - [`export`]: constants and shaders as text for other engines.
 //! - [`cli`]: the command line.
-//! - [`output`], [`progress`]: files written whole or not at all; progress bars.
+//! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
+//!   instructions kernels are compiled for.
 
 pub mod bake;
 pub mod builtin;
@@ -39,5 +40,6 @@ pub mod report;
 pub mod samples;
 pub mod scene;
 pub mod shader;
+pub mod simd;
 #[cfg(feature = "burn")]
 pub mod tensor;

@@ -13,7 +13,7 @@ use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::report::StageSeconds;
-use crate::samples::{self, SampleError, TargetArrays, ViewSamples};
+use crate::samples::{self, SampleError, TargetRows, ViewSamples};
 use crate::scene::Scene;
 use crate::scene::error::SceneError;
 use crate::scene::load::LoadOptions;
@@ -185,17 +185,33 @@ impl Prepared {
         columns.chain((1..gains).map(Unknown::Gain)).collect()
     }
 
-    /// An engine over the views that have a target; views without one are dropped from the scene.
+    /// The CPU engine over the views that have a target; views without one are dropped from the scene.
+    ///
+    /// # Errors
+    /// As of [`Self::observed`].
+    pub fn engine(&mut self) -> Result<CpuEngine, PrepareError> {
+        let observed = self.observed()?;
+        Ok(self.engine_over(observed))
+    }
+
+    /// The CPU engine over views that [`Self::observed`] gave.
+    #[must_use]
+    pub fn engine_over(&self, observed: Vec<ObservedView>) -> CpuEngine {
+        let illumination = self.illumination.clone();
+        CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns())
+    }
+
+    /// The views that have a target, with their samples; views without one are dropped from the scene.
     ///
     /// # Errors
     /// When no view has a target, or a target asks nothing.
-    pub fn engine(&mut self) -> Result<CpuEngine, PrepareError> {
+    pub fn observed(&mut self) -> Result<Vec<ObservedView>, PrepareError> {
         let views = std::mem::take(&mut self.scene.views);
         let samples = std::mem::take(&mut self.samples);
         let gains = std::mem::take(&mut self.gains);
         let mut observed = Vec::new();
         for ((view, samples), gain) in views.into_iter().zip(samples).zip(gains) {
-            let target = TargetArrays::new(&view, &samples).map_err(|error| PrepareError::Target {
+            let target = TargetRows::new(&view, &samples).map_err(|error| PrepareError::Target {
                 scene: self.scene.path.display().to_string(),
                 error,
             })?;
@@ -215,14 +231,12 @@ impl Prepared {
         if observed.is_empty() {
             return Err(PrepareError::NoTarget { scene: self.scene.path.display().to_string() });
         }
-        let illumination = self.illumination.clone();
-        Ok(CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns()))
+        Ok(observed)
     }
 }
 
-fn observe(samples: ViewSamples, target: TargetArrays) -> ObservedView {
-    let [r, g, b] = target.rgb;
-    ObservedView { samples, target: [r, g, b, Vec::new()], weight: target.weight, clip: target.clip }
+fn observe(samples: ViewSamples, target: TargetRows) -> ObservedView {
+    ObservedView { samples, target: target.rgb, weight: target.weight, clip: target.clip }
 }
 
 /// The free columns, with one a channel for each parameter whose start has three different values: a

@@ -101,7 +101,7 @@ fn surface(c: &mut Criterion) {
     let camera = &prepared.scene.views[0].camera;
     let mut group = c.benchmark_group("samples");
     group.sample_size(20);
-    let count = prepared.samples[0].weight.iter().filter(|&&w| w > 0.0).count();
+    let count = prepared.samples[0].count();
     group.throughput(Throughput::Elements(count as u64));
     group.bench_function("one view", |b| {
         b.iter(|| black_box(sample_view(&prepared.scene, &posed, &rays, None, camera)));

@@ -9,7 +9,9 @@ use skinfit::engine::view::ObservedView;
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::Form;
 use skinfit::model::params::{Channels, Column, Param, Params};
-use skinfit::samples::{LANES, SurfaceArrays, ViewSamples};
+use skinfit::samples::rows::{Row, Rows};
+use skinfit::samples::surface_records::Asked;
+use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 
 /// What the data folder says of itself.
 #[derive(Debug, Deserialize)]
@@ -79,61 +81,77 @@ impl Manifest {
     }
 }
 
-fn plane(folder: &Path, name: &str) -> Result<Vec<f32>> {
+fn numbers(folder: &Path, name: &str) -> Result<Vec<u8>> {
     let path = folder.join(format!("{name}.f32"));
-    let bytes = std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// `C` planes of `pixels` numbers, each padded to whole groups by repeating its last number.
-fn planes<const C: usize>(folder: &Path, name: &str, pixels: usize) -> Result<[Vec<f32>; C]> {
-    let all = plane(folder, name)?;
-    if all.len() != C * pixels {
+fn parse(bytes: &[u8]) -> impl Iterator<Item = f32> {
+    bytes.as_chunks().0.iter().map(|&four| f32::from_le_bytes(four))
+}
+
+/// `count` planes of `pixels` numbers into the rows from `place` on, each padded to whole groups by
+/// repeating its last number.
+fn fill(rows: &mut Rows, place: usize, count: usize, pixels: usize, folder: &Path, name: &str) -> Result<()> {
+    let bytes = numbers(folder, name)?;
+    if bytes.len() != 4 * count * pixels {
+        let found = bytes.len() / 4;
         return Err(format!(
-            "{name}.f32 in {} has {} numbers, not {C} x {pixels}",
-            folder.display(),
-            all.len()
+            "{name}.f32 in {} has {found} numbers, not {count} x {pixels}",
+            folder.display()
         ));
     }
-    Ok(std::array::from_fn(|c| {
-        let mut plane = all[c * pixels..(c + 1) * pixels].to_vec();
-        plane.resize(pixels.next_multiple_of(LANES), plane[pixels - 1]);
-        plane
-    }))
+    for (c, plane) in bytes.chunks_exact(4 * pixels).enumerate() {
+        let last = parse(plane).last().unwrap_or(0.0);
+        let padded = parse(plane).chain(std::iter::repeat(last));
+        rows.plane_mut(place + c).zip(padded).for_each(|(number, value)| *number = value);
+    }
+    Ok(())
 }
 
 /// The samples, one a pixel, beside the target `target_<which>`.
 pub(crate) fn view(folder: &Path, manifest: &Manifest, which: &str) -> Result<ObservedView> {
     let n = manifest.pixels;
-    let [occlusion] = planes(folder, "occ", n)?;
-    let [specular] = planes(folder, "spec", n)?;
-    let [attenuator] = planes(folder, "atten", n)?;
-    let surface = SurfaceArrays {
-        base: planes(folder, "base", n)?,
-        bump: planes(folder, "bump", n)?,
-        view: planes(folder, "view", n)?,
-        occlusion,
-        albedo: planes(folder, "albedo", n)?,
-        specular,
-        attenuator,
-        ..SurfaceArrays::default()
+    let groups = n.div_ceil(LANES);
+    let asked = Asked {
+        bump: true,
+        albedo: true,
+        occlusion: true,
+        specular: true,
+        attenuator: true,
+        ..Asked::default()
     };
-    let groups = n.div_ceil(LANES) as u32;
+    let mut surface = SurfaceRecords::new(asked, groups);
+    let at = *surface.places();
+    let files = [
+        ("base", at.base, 3),
+        ("bump", at.bump, 3),
+        ("view", at.view, 3),
+        ("occ", at.occlusion, 1),
+        ("albedo", at.albedo, 3),
+        ("spec", at.specular, 1),
+        ("atten", at.attenuator, 1),
+    ];
+    for (name, place, count) in files {
+        if let Some(place) = place {
+            fill(surface.rows_mut(), place, count, n, folder, name)?;
+        }
+    }
+    let mut target = Rows::new(4, groups);
+    fill(&mut target, 0, 4, n, folder, &format!("target_{which}"))?;
+    let one = |i: usize| if i < n { 1.0 } else { 0.0 };
     let weight = if n.is_multiple_of(LANES) {
         Vec::new()
     } else {
-        (0..n.next_multiple_of(LANES)).map(|i| if i < n { 1.0 } else { 0.0 }).collect()
+        (0..groups).map(|group| Row::of(std::array::from_fn(|lane| one(group * LANES + lane)))).collect()
     };
-    Ok(ObservedView {
-        samples: ViewSamples { group_start: (0..=groups).collect(), surface, ..ViewSamples::default() },
-        target: planes(folder, &format!("target_{which}"), n)?,
-        weight,
-        clip: None,
-    })
+    let samples =
+        ViewSamples { group_start: (0..=groups as u32).collect(), surface, ..ViewSamples::default() };
+    Ok(ObservedView { samples, target, weight, clip: None })
 }
 
 fn cube(folder: &Path, name: &str, size: usize) -> Result<Cube<f32>> {
-    let texels = plane(folder, name)?;
+    let texels: Vec<f32> = parse(&numbers(folder, name)?).collect();
     if texels.len() != 6 * size * size * 4 {
         return Err(format!("{name}.f32 in {} is not a cube of {size} texels a side", folder.display()));
     }

@@ -178,8 +178,10 @@ fn run(arguments: &Arguments) -> Result<Value> {
     let image = timed_engine.image(0, &truth);
     let first_forward = first.elapsed().as_secs_f64();
     let target = &timed_engine.views()[0].target;
-    let error =
-        |c: usize, i: usize| f64::from((image[c][i] - target[c][i]).abs() / (1.0 + target[c][i].abs()));
+    let error = |c: usize, i: usize| {
+        let want = target.number(c, i);
+        f64::from((image[c][i] - want).abs() / (1.0 + want.abs()))
+    };
     let max_error = (0..4)
         .flat_map(|c| (0..manifest.pixels).map(move |i| (c, i)))
         .map(|(c, i)| error(c, i))

@@ -4,13 +4,14 @@
 //! is taken out before and added after, so that a constant environment stays exactly that constant.
 //! Each cell counts with the mean of the lobe over it to second order (see `lobe_kernel`).
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::lobe_kernel::{BLOCK, Cells, Lobe, WIDE, gather};
 use super::panorama::Radiance;
 use super::pyramid::{Cell, Pyramid};
 use crate::model::cube::{Cube, texel_direction, texel_solid_angle};
+use crate::with_simd;
 
 /// Cells are wide by this share of a lobe's standard deviation, at most (see `pyramid`).
 const CELL_WIDTH: f64 = 0.5;
@@ -76,7 +77,7 @@ impl Prefilter {
                 let directions = tile_directions(tile, tiles, size);
                 let near = blocks_near(&blocks, &directions);
                 let texel = |&r: &[f64; 3]| {
-                    let sums = dispatch!(level, simd => gather(simd, near.iter().map(|block| &block.cells), r, lobe));
+                    let sums = with_simd!(level, simd => gather(simd, near.iter().map(|block| &block.cells), r, lobe));
                     self.finish(sums)
                 };
                 let texels: Vec<[f32; 4]> = directions.iter().map(texel).collect();

@@ -1,16 +1,16 @@
 //! `skinfit fit`: a scene goes in, fitted constants come out, with the evidence of how good they are.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use super::fit_engine::{FitEngine, FitEngineArguments};
 use super::fitted_scene::{Changes, Start};
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, say, tell, tell_warnings};
+use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings};
 use crate::engine::Unknown;
-use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::params_file::ParamsFile;
@@ -55,12 +55,17 @@ pub(super) struct Arguments {
     /// Go on from where an interrupted fit in this run folder stopped.
     #[arg(long, help_heading = "Solver")]
     resume: bool,
+    #[command(flatten)]
+    engine: FitEngineArguments,
     /// Print report.json on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    if arguments.engine.may_be_gpu() {
+        quieten_graphics();
+    }
     let mut folder = RunFolder::open(arguments.output.as_deref(), arguments.scene.scene.as_deref())?;
     let path = arguments.scene.kept_path(folder.path())?;
     let options = PrepareOptions {
@@ -73,28 +78,41 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if let Some(loss) = &arguments.loss {
         prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
     }
-    let engine = prepared.engine()?;
+    let observed = prepared.observed()?;
     tell_warnings(&prepared.warnings);
+    arguments.engine.with_engine(&prepared, observed, |engine| {
+        let outcome = solve(arguments, &folder, &prepared, engine)?;
+        folder.keep();
+        conclude(arguments, &folder, &path, &prepared, engine, &outcome)
+    })
+}
 
-    let outcome = solve(arguments, &folder, &prepared, &engine)?;
-    folder.keep();
-    // Of every process that had a part in it, where the fit was resumed.
-    prepared.seconds.fit = outcome.seconds;
-
+/// Leave the run folder's files, and tell how it ended.
+fn conclude(
+    arguments: &Arguments,
+    folder: &RunFolder,
+    path: &Path,
+    prepared: &Prepared,
+    engine: &FitEngine<'_>,
+    outcome: &Outcome,
+) -> Result<Exit, Refusal> {
     let clock = Instant::now();
-    let views = evidence(&prepared, &engine, &outcome);
-    prepared.seconds.render = clock.elapsed().as_secs_f64();
-    folder.write_scene(&path, changes(arguments, &prepared))?;
-    params_file(&prepared, &outcome).write(&folder.path().join("params.toml"), &path, Some(&outcome))?;
-    let run = run_info(arguments, &path, &prepared, &engine, views);
-    let report = report::write_run(folder.path(), &run, &outcome)?;
+    let views = evidence(prepared, engine, outcome);
+    let mut seconds = prepared.seconds;
+    // Of every process that had a part in it, where the fit was resumed.
+    seconds.fit = outcome.seconds;
+    seconds.render = clock.elapsed().as_secs_f64();
+    folder.write_scene(path, changes(arguments, prepared))?;
+    params_file(prepared, outcome).write(&folder.path().join("params.toml"), path, Some(outcome))?;
+    let run = RunInfo { seconds, ..run_info(arguments, path, prepared, engine, views) };
+    let report = report::write_run(folder.path(), &run, outcome)?;
     if arguments.json {
         say(report.json.trim_end())?;
     } else {
-        tell_outcome(&outcome, &prepared.scene.views)?;
+        tell_outcome(outcome, &prepared.scene.views)?;
         say(&format!("{}: final loss {:.6e}", folder.path().display(), outcome.loss_end))?;
     }
-    if let Some(advice) = advice(&outcome) {
+    if let Some(advice) = advice(outcome) {
         tell(&format!("{}: {advice}", folder.path().display()));
         return Ok(Exit::Failed);
     }
@@ -143,7 +161,7 @@ fn solve(
     arguments: &Arguments,
     folder: &RunFolder,
     prepared: &Prepared,
-    engine: &CpuEngine,
+    engine: &FitEngine<'_>,
 ) -> Result<Outcome, Refusal> {
     let interrupt = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&interrupt);
@@ -167,7 +185,7 @@ fn solve(
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");
-    let outcome = fit::fit(engine, &prepared.start(), &options, &mut |iteration| {
+    let outcome = fit::fit(engine.objective(), &prepared.start(), &options, &mut |iteration| {
         bar.set_position(iteration.iteration);
         bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
     });
@@ -175,24 +193,28 @@ fn solve(
     outcome.map_err(|error| match error {
         // It names its file itself.
         FitError::State(error) => Refusal::from(error),
+        FitError::Engine(fault) => {
+            Refusal::failure(format!("{}: {}", prepared.scene.path.display(), FitError::Engine(fault)))
+        }
         error => Refusal::new(format!("{}: {error}", prepared.scene.path.display())),
     })
 }
 
 /// A hash of what a state belongs to: switches, loss, lights' sizes, and what was observed.
-fn fingerprint(prepared: &Prepared, engine: &CpuEngine) -> String {
+fn fingerprint(prepared: &Prepared, engine: &FitEngine<'_>) -> String {
     let mut hash = blake3::Hasher::new();
     hash.update(format!("{:?} {:?}", prepared.setup(), prepared.scene.fit.loss).as_bytes());
     for view in engine.views() {
-        for plane in view.target.iter().chain([&view.weight, &view.samples.coverage]) {
-            hash.update(bytemuck::cast_slice(plane));
+        for rows in [view.target.all(), &view.weight] {
+            hash.update(bytemuck::cast_slice(rows));
         }
+        hash.update(bytemuck::cast_slice(&view.samples.coverage));
     }
     hash.finalize().to_hex()[..16].to_owned()
 }
 
 /// For each view the target, the fit and its terms.
-fn evidence(prepared: &Prepared, engine: &CpuEngine, outcome: &Outcome) -> Vec<ViewEvidence> {
+fn evidence(prepared: &Prepared, engine: &FitEngine<'_>, outcome: &Outcome) -> Vec<ViewEvidence> {
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
     let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
     let views = prepared.scene.views.iter().zip(engine.views()).enumerate();
@@ -227,7 +249,7 @@ fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f3
     target.alpha = source.alpha.clone().unwrap_or_else(|| vec![1.0; source.rgb.len()]);
     let mut coverage = vec![0.0; fit.alpha.len()];
     for (slot, &pixel) in observed.samples.pixel.iter().enumerate() {
-        if pixel != u32::MAX && observed.weight[slot] > 0.0 {
+        if pixel != u32::MAX && observed.pixel_weight(slot) > 0.0 {
             let at = pixel as usize;
             coverage[at] = observed.samples.coverage[slot].min(target.alpha[at]);
         }
@@ -237,9 +259,9 @@ fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f3
 
 fn run_info(
     arguments: &Arguments,
-    path: &std::path::Path,
+    path: &Path,
     prepared: &Prepared,
-    engine: &CpuEngine,
+    engine: &FitEngine<'_>,
     views: Vec<ViewEvidence>,
 ) -> RunInfo {
     let scene = match &arguments.scene.scene {
@@ -250,8 +272,8 @@ fn run_info(
     RunInfo {
         scene,
         loss: prepared.scene.fit.loss,
-        engine: "cpu".to_owned(),
-        samples: engine.samples(),
+        engine: engine.name().to_owned(),
+        samples: engine.views().iter().map(|view| view.samples.count() as u64).sum(),
         seconds: prepared.seconds,
         views,
         warnings: prepared.warnings.clone(),
@@ -260,9 +282,10 @@ fn run_info(
             ("silhouette".to_owned(), prepared.scene.silhouette.name().to_owned()),
             ("effects".to_owned(), effects.join(", ")),
             ("starts".to_owned(), format!("{}, seed {}", arguments.starts, arguments.seed)),
-            ("threads".to_owned(), rayon::current_num_threads().to_string()),
-            ("instructions".to_owned(), engine.instructions()),
-        ],
+        ]
+        .into_iter()
+        .chain(engine.provenance())
+        .collect(),
     }
 }
 

@@ -68,8 +68,7 @@ struct Feature {
 
 impl Report {
     fn new(wanted: Option<&str>) -> Self {
-        let cpu =
-            Cpu { threads: rayon::current_num_threads(), instructions: crate::engine::cpu::instructions() };
+        let cpu = Cpu { threads: rayon::current_num_threads(), instructions: crate::simd::instructions() };
         let (adapters, choice) = graphics::adapters(wanted);
         let (adapter, why) = match choice {
             Ok((name, why)) => (Some(name), why),

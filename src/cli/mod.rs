@@ -1,6 +1,7 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
+//! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
@@ -8,6 +9,7 @@ mod bake;
 mod demo;
 mod export;
 mod fit;
+mod fit_engine;
 mod fitted_scene;
 mod info;
 mod params;
@@ -30,8 +32,11 @@ pub enum Exit {
 }
 
 /// What the exit codes 0, 1 and 2 mean: for every help page, and docs/scene-files.md.
-const EXIT_CODES: [&str; 3] =
-    ["done", "the fit failed: it stalled, ran out of iterations or was interrupted", "the input was refused"];
+const EXIT_CODES: [&str; 3] = [
+    "done",
+    "the fit failed: it stalled, ran out of iterations, was interrupted or lost its device",
+    "the input was refused",
+];
 
 /// A help page's end.
 fn with_exit_codes(text: &str) -> String {
@@ -39,20 +44,29 @@ fn with_exit_codes(text: &str) -> String {
     format!("{text}\n\nExit codes:\n  0  {done}\n  1  {failed}\n  2  {refused}")
 }
 
-/// Why a command was refused: one paragraph that says file, place, what is wrong, and what to do.
+/// Why a command was refused, or failed: one paragraph that says file, place, what is wrong, and what to do.
 #[derive(Debug)]
-pub struct Refusal(String);
+pub struct Refusal {
+    words: String,
+    /// Whether the input was good and the work failed.
+    failed: bool,
+}
 
 impl<E: std::error::Error> From<E> for Refusal {
     fn from(error: E) -> Self {
-        Self(error.to_string())
+        Self::new(error.to_string())
     }
 }
 
 impl Refusal {
     /// A refusal in these words.
     pub fn new(words: impl Into<String>) -> Self {
-        Self(words.into())
+        Self { words: words.into(), failed: false }
+    }
+
+    /// A failure of the work, not of its input, in these words.
+    pub fn failure(words: impl Into<String>) -> Self {
+        Self { words: words.into(), failed: true }
     }
 }
 
@@ -103,9 +117,9 @@ pub fn main() -> ExitCode {
     match done {
         Ok(Exit::Done) => ExitCode::SUCCESS,
         Ok(Exit::Failed) => ExitCode::from(1),
-        Err(Refusal(words)) => {
+        Err(Refusal { words, failed }) => {
             tell(&words);
-            ExitCode::from(2)
+            ExitCode::from(if failed { 1 } else { 2 })
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Gram matrices of the scratch's columns: J^T J, J^T r and r^T r of one channel in one sweep.
 
+use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
-use fearless_simd::{Simd, f32x16};
 
-use super::records::Row;
+use crate::samples::rows::Row;
+use crate::simd::Simd;
 
 /// Columns within the scratch: of each group of pixels, `stride` rows, of which `count` from `first`
 /// on are meant. A group's rows stand together, so that they never compete for the same cache sets.
@@ -108,7 +109,8 @@ impl Tile<'_> {
 mod tests {
     use super::*;
     use crate::samples::LANES;
-    use fearless_simd::{Level, dispatch};
+    use crate::with_simd;
+    use fearless_simd::Level;
 
     #[test]
     fn every_entry_equals_the_plain_product_for_any_number_of_columns() {
@@ -121,9 +123,9 @@ mod tests {
                 .collect();
             let columns = Columns { rows: &rows, stride, first, count };
             let mut sums = vec![Row::ZERO; count * (count + 1) / 2];
-            dispatch!(Level::new(), simd => add_gram(simd, columns, &mut sums));
+            with_simd!(Level::new(), simd => add_gram(simd, columns, &mut sums));
             let mut last = vec![Row::ZERO; count];
-            dispatch!(Level::new(), simd => add_last(simd, columns, &mut last));
+            with_simd!(Level::new(), simd => add_last(simd, columns, &mut last));
             for i in 0..count {
                 for j in i..count {
                     let at = |column: usize, k: usize| {

@@ -5,12 +5,10 @@
 //! the sample's weight: the residual of a pixel is that of the *mean* over its visible samples, as
 //! the target's pixel is.
 
-use fearless_simd::Simd;
-
 use super::lanes::Lanes;
 use super::plan::Plan;
 use super::plan::WINDOW;
-use super::records::{AHEAD, Records, Row, prefetch_rows};
+use super::records::{AHEAD, Records};
 use super::residual::{Weighted, weighted_residual};
 use crate::model::compose::{Composition, Weights};
 use crate::model::effects::Silhouette;
@@ -21,13 +19,16 @@ use crate::model::lights::Lights;
 use crate::model::params::Param;
 use crate::model::real::Real;
 use crate::model::vector::V3;
+use crate::samples::rows::{Row, prefetch_rows};
+use crate::samples::surface_records::NEUTRAL;
 use crate::scene::Loss;
+use crate::simd::Simd;
 
 /// Everything that is the same for the groups of one view in one pass.
 pub(super) struct Kernel<'a, S: Simd> {
     pub simd: S,
     pub plan: &'a Plan,
-    pub view: &'a Records,
+    pub view: Records<'a>,
     /// The kept terms, `plan.kept.rows` rows a record.
     pub kept: &'a [Row],
     pub lights: Lights<'a, Lanes<S>>,
@@ -53,7 +54,7 @@ impl<S: Simd> Kernel<'_, S> {
     }
 
     #[inline(always)]
-    fn load3(&self, record: &[Row], place: Option<usize>, neutral: f32) -> V3<Lanes<S>> {
+    fn load3(&self, record: &[Row], place: Option<usize>, neutral: [f32; 3]) -> V3<Lanes<S>> {
         match place {
             Some(at) => {
                 let rows = &record[at..][..3];
@@ -63,25 +64,25 @@ impl<S: Simd> Kernel<'_, S> {
                     Lanes::of_row(self.simd, &rows[2]),
                 ]
             }
-            None => [self.lit(neutral); 3],
+            None => [self.lit(neutral[0]), self.lit(neutral[1]), self.lit(neutral[2])],
         }
     }
 
     #[inline(always)]
     fn fragment(&self, record: usize) -> Fragment<Lanes<S>> {
-        let (at, rows) = (&self.view.places, self.view.record(record));
-        let base = self.load3(rows, at.base, 0.0);
+        let (at, rows) = (self.view.places, self.view.record(record));
+        let base = self.load3(rows, at.base, NEUTRAL.base);
         Fragment {
             base,
-            bump: self.load3(rows, at.bump, 0.0),
-            normal: if at.normal.is_none() { base } else { self.load3(rows, at.normal, 0.0) },
-            view: self.load3(rows, at.view, 0.0),
-            occlusion: self.load(rows, at.occlusion, 1.0),
-            silhouette: self.load(rows, at.silhouette, 0.0),
-            dapple: self.load(rows, at.dapple, 1.0),
-            albedo: self.load3(rows, at.albedo, 1.0),
-            specular: self.load(rows, at.specular, 1.0),
-            attenuator: self.load(rows, at.attenuator, 1.0),
+            bump: self.load3(rows, at.bump, NEUTRAL.bump),
+            normal: if at.normal.is_none() { base } else { self.load3(rows, at.normal, NEUTRAL.normal) },
+            view: self.load3(rows, at.view, NEUTRAL.view),
+            occlusion: self.load(rows, at.occlusion, NEUTRAL.occlusion),
+            silhouette: self.load(rows, at.silhouette, NEUTRAL.silhouette),
+            dapple: self.load(rows, at.dapple, NEUTRAL.dapple),
+            albedo: self.load3(rows, at.albedo, NEUTRAL.albedo),
+            specular: self.load(rows, at.specular, NEUTRAL.specular),
+            attenuator: self.load(rows, at.attenuator, NEUTRAL.attenuator),
         }
     }
 

@@ -3,15 +3,21 @@
 //! - [`Objective`]: all that the solvers see of an engine
 //! - [`cpu`]: the CPU engine; its parts are `plan` (what a pass computes), `kernel` (groups of pixels
 //!   to columns), `gram` (columns to products) and [`residual`] (the losses)
-//! - [`lanes`]: sixteen f32 lanes as one number of the model
+//! - [`lanes`]: sixteen f32 lanes as one number of the model; `corners`: their lookups in cubes
+//! - [`gpu`]: the same on a graphics adapter (feature `gpu`)
+//! - [`reference`]: the same in f64, plainly: what both are held against
 //! - [`view`]: samples beside what was observed; `records`: the same as the kernel reads them
 
+mod corners;
 pub mod cpu;
+#[cfg(feature = "gpu")]
+pub mod gpu;
 mod gram;
 mod kernel;
 pub mod lanes;
 mod plan;
 mod records;
+pub mod reference;
 pub mod residual;
 pub mod view;
 
@@ -53,12 +59,26 @@ pub trait Objective: Sync {
     fn rounding(&self) -> f64 {
         0.0
     }
+    /// Why passes cannot be made any more, as when a device is lost; what they yielded since is void.
+    fn fault(&self) -> Option<String> {
+        None
+    }
     /// Loss and normal equations at `point` (parameters and gains), for all unknowns.
     fn normal_equations(&self, point: &Point) -> NormalEquations;
     /// The loss alone.
     fn loss(&self, point: &Point) -> f64;
     /// The loss and its gradient with respect to the unknowns.
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>);
+}
+
+/// [`Objective::rounding`] of an engine that computes in f32, over so much of each view.
+fn rounding<'a>(
+    views: impl IntoIterator<Item = (&'a view::ObservedView, Vec<usize>)>,
+    loss: crate::scene::Loss,
+) -> f64 {
+    // Half a unit in the last place of an f32, as a share of the number.
+    const SHARE: f64 = 1.0 / (1 << 24) as f64;
+    SHARE * SHARE * views.into_iter().map(|(view, groups)| view.power(groups.into_iter(), loss)).sum::<f64>()
 }
 
 /// One unknown of a fit.

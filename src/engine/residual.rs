@@ -12,7 +12,7 @@ pub const RELATIVE_FLOOR: f64 = 0.01;
 /// Added to the denominator of SMAPE.
 pub const SMAPE_FLOOR: f64 = 0.01;
 /// SMAPE's residuals below this are treated as quadratic, so that their weight stays finite.
-const SMAPE_CORNER: f64 = 1e-4;
+pub(crate) const SMAPE_CORNER: f64 = 1e-4;
 
 /// One residual as the normal equations see it.
 #[derive(Clone, Copy, Debug)]

@@ -16,7 +16,7 @@ use argmin::solver::neldermead::NelderMead;
 use argmin::solver::quasinewton::LBFGS;
 
 use super::bounded;
-use super::linearisation::{Linearisation, Passes};
+use super::linearisation::{EngineFault, Linearisation, Passes};
 use super::lm::{LevenbergMarquardt, LmState};
 use super::memory::Memory;
 use super::options::{FitError, FitOptions, SolverKind};
@@ -71,7 +71,9 @@ impl<'a> Log<'a> {
         &mut self.saved.runs[last]
     }
 
-    fn record(&mut self, at: Vec<f64>, loss: f64, memory: Option<&Memory>) -> Result<(), StateError> {
+    fn record(&mut self, at: Vec<f64>, loss: f64, memory: Option<&Memory>) -> Result<(), Error> {
+        // What a lost engine yields must not stand in the state that a later process resumes.
+        self.passes.check()?;
         let run = self.run();
         // Our own solvers' point is the one to go on from; the others' best is kept.
         if memory.is_some() || loss < run.loss {
@@ -86,7 +88,7 @@ impl<'a> Log<'a> {
         (self.progress)(&entry);
         match self.written {
             Some(then) if then.elapsed() < WRITE_EVERY => Ok(()),
-            _ => self.write(),
+            _ => Ok(self.write()?),
         }
     }
 
@@ -220,6 +222,7 @@ fn run_unbounded(kind: SolverKind, log: &mut Log<'_>) -> Result<(), FitError> {
         let ending = run_once(kind, log)?;
         // What is known of the answer needs its normal equations; their loss is the exact one.
         let model = log.passes.linearise(&log.run().at.clone());
+        log.passes.check()?;
         let ending = match ending {
             Ending::Converged | Ending::Stalled if is_settled(log, &model) => Ending::Converged,
             Ending::Converged | Ending::Stalled => Ending::Stalled,
@@ -291,7 +294,10 @@ where
         }),
         Err(error) => Err(match error.downcast::<StateError>() {
             Ok(error) => FitError::State(error),
-            Err(error) => FitError::Solver { solver: kind.name(), reason: error.to_string() },
+            Err(error) => match error.downcast::<EngineFault>() {
+                Ok(fault) => FitError::Engine(fault),
+                Err(error) => FitError::Solver { solver: kind.name(), reason: error.to_string() },
+            },
         }),
     }
 }

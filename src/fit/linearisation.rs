@@ -93,6 +93,11 @@ impl Linearisation {
     }
 }
 
+/// Why an engine cannot go on, in its words.
+#[derive(Clone, Debug, thiserror::Error)]
+#[error("{0}")]
+pub struct EngineFault(pub String);
+
 /// An objective that is seen in solver coordinates, and whose passes are counted.
 pub struct Passes<'a> {
     objective: &'a dyn Objective,
@@ -117,6 +122,14 @@ impl<'a> Passes<'a> {
     #[must_use]
     pub fn coordinates(&self) -> &'a Coordinates {
         self.coordinates
+    }
+
+    /// That passes can still be made.
+    ///
+    /// # Errors
+    /// When the engine says that they cannot.
+    pub fn check(&self) -> Result<(), EngineFault> {
+        self.objective.fault().map_or(Ok(()), |reason| Err(EngineFault(reason)))
     }
 
     /// Whether the objective is exactly quadratic in its linear unknowns.

@@ -73,6 +73,7 @@ pub fn fit(
         }
         if log.saved.runs.len() <= index as usize {
             let run = begin_run(&passes, &log.saved.origin, options.seed, index);
+            passes.check()?;
             log.saved.runs.push(run);
         }
         let most = options.max_iterations.unwrap_or(options.solver.default_iterations());
@@ -106,6 +107,7 @@ fn begin(
 ) -> Result<Saved, FitError> {
     let passes = Passes::new(objective, coordinates, 0);
     let origin = passes.linearise(coordinates.origin());
+    passes.check()?;
     if origin.count == 0 || origin.weight.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
         return Err(FitError::Empty);
     }

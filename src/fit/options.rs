@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
+use super::linearisation::EngineFault;
 use super::state::StateError;
 
 /// The solvers.
@@ -163,6 +164,9 @@ pub enum FitError {
     /// The state file cannot be used.
     #[error(transparent)]
     State(#[from] StateError),
+    /// The engine failed.
+    #[error("{0} What was found up to then is kept: go on with --resume.")]
+    Engine(#[from] EngineFault),
     /// The solver failed.
     #[error("the solver {solver} failed: {reason}. Try another one (--solver varpro).")]
     Solver {

@@ -24,25 +24,43 @@ pub(super) struct Values<'a> {
 /// The block of `constants`, in their order.
 pub(super) fn block(constants: &[Constant], values: &Values<'_>) -> Vec<f32> {
     let mut block = Vec::new();
-    for constant in constants {
+    for &constant in constants {
         match constant {
-            Constant::Param(param) => push(&mut block, &values.params.rgb(*param)),
             Constant::Eye => push(&mut block, &values.camera.eye().to_array()),
             Constant::ViewProjection => {
                 let matrix = view_projection(values.camera, values.tile).to_cols_array();
                 matrix.chunks(4).for_each(|column| push(&mut block, column));
             }
-            Constant::Turn => {
-                let (sin, cos) = values.params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
-                push(&mut block, &[cos, sin]);
-            }
-            Constant::KeyDirection => push(&mut block, &KeyLight::new(values.params, 0.0_f64).direction),
             Constant::MorphWeights => {
                 values.morph_weights.iter().for_each(|&weight| push(&mut block, &[f64::from(weight)]));
             }
+            of_model => push(&mut block, &of_params(of_model, values.params)),
         }
     }
     block
+}
+
+/// The block of constants that the parameters alone give, as those of stored samples are.
+pub(crate) fn model_block(constants: &[Constant], params: &Params) -> Vec<f32> {
+    let mut block = Vec::new();
+    constants.iter().for_each(|&constant| push(&mut block, &of_params(constant, params)));
+    block
+}
+
+/// A constant that the parameters give; a camera's or a mesh's is 0.
+fn of_params(constant: Constant, params: &Params) -> [f64; 3] {
+    let key = || KeyLight::new(params, 0.0_f64);
+    match constant {
+        Constant::Param(param) => params.rgb(param),
+        Constant::Turn => {
+            let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
+            [cos, sin, 0.0]
+        }
+        Constant::KeyDirection => key().direction,
+        Constant::KeyByAzimuth => key().by_azimuth,
+        Constant::KeyByElevation => key().by_elevation,
+        Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => [0.0; 3],
+    }
 }
 
 /// The block's bytes, with that many morph weights.

@@ -145,7 +145,7 @@ impl Gpu {
     }
 
     /// That the device does not answer, in the driver's words.
-    pub(super) fn lost(&self, reason: &str) -> GpuError {
+    pub(crate) fn lost(&self, reason: &str) -> GpuError {
         match self.check() {
             Err(error) => error,
             Ok(()) => GpuError::Lost { adapter: self.info.name.clone(), reason: sentence(reason) },

@@ -18,17 +18,17 @@
 
 pub mod adapter;
 mod bloom;
-mod constants;
+pub(crate) mod constants;
 pub mod device;
 pub mod error;
 mod filter;
 pub mod probe;
 mod program;
-mod readback;
+pub(crate) mod readback;
 pub mod renderer;
 mod resolve;
 mod targets;
-mod texels;
+pub(crate) mod texels;
 pub mod timing;
 pub mod upload;
 mod vertices;

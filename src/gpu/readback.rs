@@ -79,7 +79,7 @@ impl Copy {
 const TOLD: Duration = Duration::from_secs(60);
 
 /// Wait until a buffer's content can be read.
-pub(super) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
+pub(crate) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
     let (send, received) = std::sync::mpsc::channel();
     slice.map_async(MapMode::Read, move |result| {
         // The receiver may have given up.
@@ -96,7 +96,7 @@ pub(super) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
 }
 
 /// Run the encoder's commands, and read the floats that they leave in `buffer`.
-pub(super) fn read_floats(
+pub(crate) fn read_floats(
     gpu: &Gpu,
     mut encoder: CommandEncoder,
     buffer: &Buffer,

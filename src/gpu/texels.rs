@@ -10,7 +10,7 @@ use crate::scene::maps::{Map, Maps};
 use crate::shader::Resource;
 
 /// A texture's content, layer by layer, row by row.
-pub(super) struct Texels {
+pub(crate) struct Texels {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) layers: u32,
@@ -20,7 +20,7 @@ pub(super) struct Texels {
 }
 
 /// Six padded faces in 32 bits: the texels that the CPU filters.
-pub(super) fn faces(cube: &Cube<f32>) -> Texels {
+pub(crate) fn faces(cube: &Cube<f32>) -> Texels {
     let side = cube.size() as u32 + 2;
     Texels {
         width: side,

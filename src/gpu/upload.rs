@@ -124,6 +124,8 @@ impl<'a> Uploads<'a> {
             Resource::Bones => return self.storage(gpu, "bones", &vertices::bones(&scene.mesh.bones)),
             Resource::IrradianceFaces => cube(&illumination.irradiance, texels::faces),
             Resource::SpecularFaces => cube(&self.specular, texels::faces),
+            // A fit's: no renderer's plan reads it.
+            Resource::SpecularSlopeFaces => None,
             Resource::HiliteFaces => cube(&illumination.hilite, texels::faces),
             Resource::IrradianceCube => cube(&illumination.irradiance, texels::cube),
             Resource::SpecularCube => cube(&self.specular, texels::cube),
@@ -182,7 +184,7 @@ fn buffer(gpu: &Gpu, label: &str, contents: &[u8], usage: BufferUsages) -> Resul
     Ok(made)
 }
 
-fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureView, GpuError> {
+pub(crate) fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureView, GpuError> {
     let limit = gpu.device.limits().max_texture_dimension_2d;
     if texels.width.max(texels.height) > limit {
         return Err(GpuError::TextureSize {

@@ -11,7 +11,7 @@ use crate::model::evaluate::{Setup, compose};
 use crate::model::fragment::Fragment;
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
-use crate::samples::{LANES, SurfaceArrays, ViewSamples};
+use crate::samples::{LANES, ViewSamples};
 use crate::scene::view::Camera;
 
 /// A view's image and what it is made of.
@@ -102,11 +102,12 @@ impl Shader {
             let mut pixel = Pixel { index: index as usize, coverage, terms: [[0.0; 3]; 6], haze: 0.0 };
             for record in records.clone() {
                 let at = record * LANES + lane;
-                let share = f64::from(samples.weight[at]) * f64::from(coverage) * gain;
+                let share = f64::from(samples.surface.weight(at)) * f64::from(coverage) * gain;
                 if share == 0.0 {
                     continue;
                 }
-                let composition = compose(self.setup, &lights, &fragment(&samples.surface, at), &self.params);
+                let composition =
+                    compose(self.setup, &lights, &wide(&samples.surface.fragment(at)), &self.params);
                 for c in 0..3 {
                     for (name, value) in composition.each_term(c) {
                         pixel.terms[name as usize][c] += share * value;
@@ -127,21 +128,18 @@ struct Pixel {
     haze: f64,
 }
 
-/// The sample's fragment; planes that no effect asked for have their neutral value.
-fn fragment(s: &SurfaceArrays, at: usize) -> Fragment<f64> {
-    let x = |plane: &[f32], neutral: f64| plane.get(at).map_or(neutral, |&x| f64::from(x));
-    let v = |planes: &[Vec<f32>; 3], neutral: f64| [0, 1, 2].map(|c| x(&planes[c], neutral));
-    let base = v(&s.base, 0.0);
+fn wide(f: &Fragment<f32>) -> Fragment<f64> {
+    let v = |x: [f32; 3]| x.map(f64::from);
     Fragment {
-        base,
-        bump: v(&s.bump, 0.0),
-        normal: if s.normal[0].is_empty() { base } else { v(&s.normal, 0.0) },
-        view: v(&s.view, 0.0),
-        occlusion: x(&s.occlusion, 1.0),
-        silhouette: x(&s.silhouette, 0.0),
-        dapple: x(&s.dapple, 1.0),
-        albedo: v(&s.albedo, 1.0),
-        specular: x(&s.specular, 1.0),
-        attenuator: x(&s.attenuator, 1.0),
+        base: v(f.base),
+        bump: v(f.bump),
+        normal: v(f.normal),
+        view: v(f.view),
+        occlusion: f.occlusion.into(),
+        silhouette: f.silhouette.into(),
+        dapple: f.dapple.into(),
+        albedo: v(f.albedo),
+        specular: f.specular.into(),
+        attenuator: f.attenuator.into(),
     }
 }

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::surface::Surface;
 use super::trace::Hits;
-use super::{LANES, SurfaceArrays, ViewSamples};
+use super::{LANES, SurfaceRecords, ViewSamples};
 
-/// Groups that one task fills.
+/// The fewest groups that one task fills.
 const CHUNK: usize = 64;
 
 /// Pack the hits of a view of `width` pixels with `per_pixel` samples a pixel.
@@ -17,62 +17,45 @@ pub(super) fn pack(hits: &Hits, surface: &Surface<'_>, width: u32, per_pixel: u3
         let (pixel, range) = &hits.pixels[i as usize];
         (std::cmp::Reverse(range.len()), z_order(pixel % width, pixel / width))
     });
-    let groups: Vec<&[u32]> = order.chunks(LANES).collect();
-    let parts: Vec<ViewSamples> =
-        groups.par_chunks(CHUNK).map(|groups| pack_groups(hits, surface, groups, per_pixel)).collect();
-    join(parts)
-}
-
-fn pack_groups(hits: &Hits, surface: &Surface<'_>, groups: &[&[u32]], per_pixel: u32) -> ViewSamples {
     let mut samples = ViewSamples { group_start: vec![0], ..Default::default() };
-    for group in groups {
-        // Lanes beyond the last pixel repeat the first, without weight.
-        let lane = |lane: usize| &hits.pixels[group[if lane < group.len() { lane } else { 0 }] as usize];
-        for i in 0..LANES {
-            let (pixel, range) = lane(i);
-            let real = i < group.len();
-            samples.pixel.push(if real { *pixel } else { u32::MAX });
-            samples.coverage.push(if real { range.len() as f32 / per_pixel as f32 } else { 0.0 });
+    for group in order.chunks(LANES) {
+        for lane in 0..LANES {
+            let pixel = group.get(lane).map(|&i| &hits.pixels[i as usize]);
+            samples.pixel.push(pixel.map_or(u32::MAX, |(index, _)| *index));
+            samples.coverage.push(pixel.map_or(0.0, |(_, range)| range.len() as f32 / per_pixel as f32));
         }
-        let records = (0..LANES).map(|i| lane(i).1.len()).max().unwrap_or(0);
-        for record in 0..records {
-            for i in 0..LANES {
-                let range = &lane(i).1;
-                let real = i < group.len() && record < range.len();
-                samples.weight.push(if real { 1.0 / range.len() as f32 } else { 0.0 });
-                let hit = range.start as usize + if record < range.len() { record } else { 0 };
-                surface.push(hits.hits[hit], &mut samples.surface);
-            }
-        }
-        let end = samples.records() + records;
-        samples.group_start.push(end as u32);
+        // The first pixel has the most samples.
+        let records = hits.pixels[group[0] as usize].1.len();
+        samples.group_start.push((samples.records() + records) as u32);
     }
+    samples.surface = SurfaceRecords::new(surface.asked(), samples.records());
+    fill(hits, surface, &order, &samples.group_start, &mut samples.surface);
     samples
 }
 
-fn join(parts: Vec<ViewSamples>) -> ViewSamples {
-    let mut all = ViewSamples { group_start: vec![0], ..Default::default() };
-    for mut part in parts {
-        let base = all.records() as u32;
-        all.group_start.extend(part.group_start[1..].iter().map(|end| base + end));
-        all.pixel.append(&mut part.pixel);
-        all.coverage.append(&mut part.coverage);
-        all.weight.append(&mut part.weight);
-        for (plane, more) in all.surface.planes_mut().into_iter().zip(part.surface.planes_mut()) {
-            plane.append(more);
+/// Fill each group's records.
+fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], into: &mut SurfaceRecords) {
+    let (places, stride) = (*into.places(), into.rows().stride());
+    let mut rest = into.rows_mut().all_mut();
+    let mut parts = Vec::with_capacity(group_start.len());
+    for ends in group_start.windows(2) {
+        let (rows, more) = rest.split_at_mut((ends[1] - ends[0]) as usize * stride);
+        parts.push(rows);
+        rest = more;
+    }
+    let parts = parts.into_par_iter().with_min_len(CHUNK);
+    parts.zip(order.par_chunks(LANES)).for_each(|(rows, group)| {
+        for lane in 0..LANES {
+            // Lanes beyond the last pixel repeat the first, without weight; so do missing samples.
+            let (_, range) = &hits.pixels[group[if lane < group.len() { lane } else { 0 }] as usize];
+            for (record, rows) in rows.chunks_exact_mut(stride).enumerate() {
+                let real = lane < group.len() && record < range.len();
+                let hit = range.start as usize + if record < range.len() { record } else { 0 };
+                let weight = if real { 1.0 / range.len() as f32 } else { 0.0 };
+                places.put(rows, lane, &surface.at(hits.hits[hit]), weight);
+            }
         }
-    }
-    all
-}
-
-impl SurfaceArrays {
-    /// Every plane, in the order of declaration.
-    fn planes_mut(&mut self) -> Vec<&mut Vec<f32>> {
-        let Self { base, bump, view, normal, occlusion, silhouette, dapple, albedo, specular, attenuator } =
-            self;
-        let vectors = [base, bump, view, normal, albedo].into_iter().flatten();
-        vectors.chain([occlusion, silhouette, dapple, specular, attenuator]).collect()
-    }
+    });
 }
 
 /// The bits of x and y interleaved.

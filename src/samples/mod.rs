@@ -1,18 +1,22 @@
-//! The visible surface of each view, as a structure of arrays that the engine streams through.
+//! The visible surface of each view, as records that the engine streams through.
 //!
 //! Pixels are taken [`LANES`] at a time: a *group*. A group has as many *records* as the most
 //! densely covered of its pixels has samples; record r of lane l is the r-th sample of that lane's
-//! pixel, or padding of weight 0. Every per-sample array is indexed `record * LANES + lane`, every
-//! per-pixel array `group * LANES + lane`. Groups with equally many records stand together, so that
-//! silhouettes (few samples) cost no padding inside.
+//! pixel, or padding of weight 0. A sample's slot is `record * LANES + lane`, a pixel's
+//! `group * LANES + lane`. Groups with equally many records stand together, so that silhouettes (few
+//! samples) cost no padding inside.
 //!
 //! - `trace`: primary rays, and what they hit
 //! - `surface`: frames, silhouette and maps at a hit
 //! - `group`: samples packed into groups
+//! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
+//! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
 
 mod group;
+pub mod rows;
 mod surface;
+pub mod surface_records;
 pub mod targets;
 mod trace;
 
@@ -24,7 +28,8 @@ use crate::progress;
 use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
-pub use targets::TargetArrays;
+pub use surface_records::SurfaceRecords;
+pub use targets::TargetRows;
 
 /// Pixels in a group: the widest vector of 32-bit floats on today's processors.
 pub const LANES: usize = 16;
@@ -38,39 +43,9 @@ pub struct ViewSamples {
     pub pixel: Vec<u32>,
     /// For each pixel slot: the covered share of the pixel's area.
     pub coverage: Vec<f32>,
-    /// For each sample: its share of the pixel's covered area; the samples of a pixel sum to 1,
-    /// padding has 0.
-    pub weight: Vec<f32>,
-    /// What the model reads of each sample.
-    pub surface: SurfaceArrays,
-}
-
-/// What the model reads of each sample, a plane a component; planes that no enabled effect asks for
-/// are empty.
-///
-/// The shading normal is the direction of `base + normal_strength * bump`.
-#[derive(Clone, Debug, Default)]
-pub struct SurfaceArrays {
-    /// Decoded normal map's z times the smooth normal N (N itself without a normal map).
-    pub base: [Vec<f32>; 3],
-    /// Decoded normal map's x T + y B; empty without a normal map.
-    pub bump: [Vec<f32>; 3],
-    /// Unit vector from the eye to the surface.
-    pub view: [Vec<f32>; 3],
-    /// The unit smooth normal N; only for the key light.
-    pub normal: [Vec<f32>; 3],
-    /// Open share of the hemisphere, S.x.
-    pub occlusion: Vec<f32>,
-    /// S.z = 1 - |N.V|; empty when it follows the bumped normal.
-    pub silhouette: Vec<f32>,
-    /// S.w.
-    pub dapple: Vec<f32>,
-    /// Albedo, linear.
-    pub albedo: [Vec<f32>; 3],
-    /// Specular map s.
-    pub specular: Vec<f32>,
-    /// Attenuator map a.
-    pub attenuator: Vec<f32>,
+    /// What the model reads of each sample, and its share of the pixel's covered area; the shares of
+    /// a pixel's samples sum to 1.
+    pub surface: SurfaceRecords,
 }
 
 impl ViewSamples {
@@ -84,6 +59,12 @@ impl ViewSamples {
     #[must_use]
     pub fn records(&self) -> usize {
         self.group_start.last().map_or(0, |&end| end as usize)
+    }
+
+    /// Samples of positive weight: all but the padding.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        (0..self.surface.slots()).filter(|&slot| self.surface.weight(slot) > 0.0).count()
     }
 }
 

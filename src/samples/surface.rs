@@ -3,9 +3,10 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::SurfaceArrays;
+use super::surface_records::Asked;
 use super::trace::Hit;
 use crate::model::effects::{Form, Needs, Silhouette};
+use crate::model::fragment::Fragment;
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
 use crate::scene::maps::Maps;
@@ -27,20 +28,6 @@ pub(super) struct Surface<'a> {
     bitangents: Vec<Vec3>,
     /// Unit vectors from the eye to each vertex; empty where no one asks.
     views: Vec<Vec3>,
-}
-
-/// One sample; fields that no effect asks for are never read.
-struct Point {
-    base: Vec3,
-    bump: Vec3,
-    view: Vec3,
-    normal: Vec3,
-    occlusion: f32,
-    silhouette: f32,
-    dapple: f32,
-    albedo: [f32; 3],
-    specular: f32,
-    attenuator: f32,
 }
 
 impl<'a> Surface<'a> {
@@ -68,37 +55,24 @@ impl<'a> Surface<'a> {
         Self { mesh, maps, occlusion, form, silhouette, needs, eye, bitangents, views }
     }
 
-    /// Append the surface at `hit` to each plane that is asked for.
-    pub(super) fn push(&self, hit: Hit, into: &mut SurfaceArrays) {
-        let point = self.at(hit);
+    /// What the effects read of each sample.
+    pub(super) fn asked(&self) -> Asked {
         let needs = &self.needs;
-        let vectors = [
-            (true, point.base.to_array(), &mut into.base),
-            (!self.bitangents.is_empty(), point.bump.to_array(), &mut into.bump),
-            (true, point.view.to_array(), &mut into.view),
-            (needs.key_light, point.normal.to_array(), &mut into.normal),
-            (needs.color_map, point.albedo, &mut into.albedo),
-        ];
-        for (wanted, value, planes) in vectors {
-            if wanted {
-                planes.iter_mut().zip(value).for_each(|(plane, x)| plane.push(x));
-            }
-        }
-        let scalars = [
-            (needs.occlusion, point.occlusion, &mut into.occlusion),
-            (needs.rim && self.silhouette != Silhouette::Bumped, point.silhouette, &mut into.silhouette),
-            (needs.dapple, point.dapple, &mut into.dapple),
-            (needs.specular_map, point.specular, &mut into.specular),
-            (needs.attenuator_map, point.attenuator, &mut into.attenuator),
-        ];
-        for (wanted, value, plane) in scalars {
-            if wanted {
-                plane.push(value);
-            }
+        Asked {
+            bump: !self.bitangents.is_empty(),
+            normal: needs.key_light,
+            albedo: needs.color_map,
+            occlusion: needs.occlusion,
+            silhouette: needs.rim && self.silhouette != Silhouette::Bumped,
+            dapple: needs.dapple,
+            specular: needs.specular_map,
+            attenuator: needs.attenuator_map,
+            weight: true,
         }
     }
 
-    fn at(&self, hit: Hit) -> Point {
+    /// The surface at `hit`.
+    pub(super) fn at(&self, hit: Hit) -> Fragment<f32> {
         let corners = self.mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let [u, v] = hit.barycentric;
         let weights = [1.0 - u - v, u, v];
@@ -131,12 +105,12 @@ impl<'a> Surface<'a> {
             }
             Silhouette::Fragment | Silhouette::Bumped => 1.0 - normal.dot(view).abs().min(1.0),
         };
-        Point {
+        Fragment {
             // Only a vanished N leaves no base: then the side that faces the eye counts.
-            base: if base == Vec3::ZERO || !base.is_finite() { -exact_view } else { base },
-            bump: if bump.is_finite() { bump } else { Vec3::ZERO },
-            view,
-            normal,
+            base: if base == Vec3::ZERO || !base.is_finite() { -exact_view } else { base }.to_array(),
+            bump: if bump.is_finite() { bump } else { Vec3::ZERO }.to_array(),
+            view: view.to_array(),
+            normal: normal.to_array(),
             occlusion: self.occlusion.map_or(1.0, scalar),
             silhouette,
             dapple: match self.form {

@@ -1,6 +1,7 @@
 //! What each pixel of a target asks of the model: its colour, and how much it counts.
 
-use super::{SampleError, ViewSamples};
+use super::rows::{Row, Rows};
+use super::{LANES, SampleError, ViewSamples};
 use crate::scene::view::{Clip, View};
 
 /// A pixel of which less than this is covered, in the target or by the samples, is left out: what
@@ -9,16 +10,17 @@ const LEAST_COVERAGE: f32 = 0.05;
 
 /// A target in the order of a [`ViewSamples`]' pixel slots.
 #[derive(Clone, Debug, Default)]
-pub struct TargetArrays {
-    /// Linear radiance of the surface, no longer premultiplied; 0 where the weight is 0.
-    pub rgb: [Vec<f32>; 3],
-    /// What the pixel counts: mask times coverage; 0 for padding.
-    pub weight: Vec<f32>,
+pub struct TargetRows {
+    /// For each group three rows: linear radiance of the surface, no longer premultiplied; 0 where the
+    /// weight is 0.
+    pub rgb: Rows,
+    /// For each group what its pixels count: mask times coverage; 0 for padding.
+    pub weight: Vec<Row>,
     /// The values at and beyond which residuals are one-sided.
     pub clip: Option<Clip>,
 }
 
-impl TargetArrays {
+impl TargetRows {
     /// The target of `view` for `samples`; `None` when the view has no target.
     ///
     /// The colour is the target's over its alpha, so that a silhouette pixel is compared with the
@@ -35,8 +37,9 @@ impl TargetArrays {
         if let Some(found) = lengths.into_iter().flatten().find(|&length| length != pixels) {
             return Err(SampleError::TargetSize { view: view.name.clone(), found, pixels });
         }
-        let mut arrays = Self { clip: target.clipped_at, ..Self::default() };
-        for (&pixel, &coverage) in samples.pixel.iter().zip(&samples.coverage) {
+        let groups = samples.groups();
+        let (mut colours, mut weights) = (Rows::new(3, groups), vec![Row::ZERO; groups]);
+        for (slot, (&pixel, &coverage)) in samples.pixel.iter().zip(&samples.coverage).enumerate() {
             let (rgb, weight) = if pixel == u32::MAX {
                 ([0.0; 3], 0.0)
             } else {
@@ -54,12 +57,13 @@ impl TargetArrays {
                     ([0.0; 3], 0.0)
                 }
             };
-            arrays.rgb.iter_mut().zip(rgb).for_each(|(plane, x)| plane.push(x));
-            arrays.weight.push(weight);
+            let (group, lane) = (slot / LANES, slot % LANES);
+            colours.record_mut(group).iter_mut().zip(rgb).for_each(|(row, x)| row[lane] = x);
+            weights[group][lane] = weight;
         }
-        if arrays.weight.iter().all(|&weight| weight == 0.0) {
+        if weights.iter().all(|row| *row == Row::ZERO) {
             return Err(SampleError::EmptyMask { view: view.name.clone() });
         }
-        Ok(Some(arrays))
+        Ok(Some(Self { rgb: colours, weight: weights, clip: target.clipped_at }))
     }
 }

@@ -301,7 +301,7 @@ impl Adjoint {
         wgsl.push_str(&text.record());
         wgsl.push_str("        let adjoint = share * pixel;\n");
         wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
-        wgsl.push_str(&chain.lines);
+        chain.lines.iter().for_each(|lines| wgsl.push_str(lines));
         for (k, gains) in gains.iter().enumerate() {
             for gain in gains {
                 self.gain(&mut wgsl, *gain, chain.radiance[k].as_deref(), chain.haze[k].as_deref());

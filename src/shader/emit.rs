@@ -248,6 +248,27 @@ impl Plan {
         wgsl
     }
 
+    /// The rules of a stage, in the order of their evaluation.
+    pub(super) fn rules(&self, stage: Stage) -> impl Iterator<Item = &'static Rule> {
+        self.steps.iter().map(|step| step.rule).filter(move |rule| rule.stage == stage)
+    }
+
+    /// What a rule's function is called with; see [`Self::calls`].
+    pub(super) fn arguments(
+        &self,
+        rule: &Rule,
+        constant: &impl Fn(Constant, &str) -> String,
+        leaf: &impl Fn(&'static str) -> String,
+    ) -> Vec<String> {
+        let local = |q: &str| self.rules(rule.stage).any(|r| r.gives.iter().any(|(given, _)| *given == q));
+        let argument = |&(name, kind): &(&'static str, &'static str)| match Constant::from_name(name) {
+            Some(known) => constant(known, kind),
+            None if local(name) => name.to_owned(),
+            None => leaf(name),
+        };
+        rule.needs.iter().map(argument).collect()
+    }
+
     /// The calls of a stage's rules, one a line; `constant` and `leaf` write what is there without a rule,
     /// by its name and WGSL type.
     pub(super) fn calls(
@@ -257,15 +278,8 @@ impl Plan {
         leaf: impl Fn(&'static str) -> String,
     ) -> String {
         let mut wgsl = String::new();
-        let steps = || self.steps.iter().filter(|step| step.rule.stage == stage).map(|step| step.rule);
-        for rule in steps() {
-            let local = |q: &str| steps().any(|r| r.gives.iter().any(|(given, _)| *given == q));
-            let argument = |&(name, kind): &(&'static str, &'static str)| match Constant::from_name(name) {
-                Some(known) => constant(known, kind),
-                None if local(name) => name.to_owned(),
-                None => leaf(name),
-            };
-            let arguments: Vec<String> = rule.needs.iter().map(argument).collect();
+        for rule in self.rules(stage) {
+            let arguments = self.arguments(rule, &constant, &leaf);
             let call = match rule.plain_value() {
                 Some("") => arguments.concat(),
                 Some(value) => value.to_owned(),

@@ -10,6 +10,8 @@
 //! - [`emit`]: the plan: the chosen rules, and what they read; `module`: its WGSL, for rasterised
 //!   fragments, for stored samples, or as a function for other engines
 //! - [`probe`]: its rules one by one, for given numbers
+//! - [`tangent`]: the rules' derivatives, made from their own text
+//! - [`fused`]: a plan over stored samples, its loss and its normal equations in one compute pass
 //!
 //! Nothing that the [`Plan`] does not name is uploaded, bound or compiled.
 
@@ -17,11 +19,15 @@
 pub mod adjoint;
 pub mod emit;
 pub mod facts;
+#[cfg(feature = "gpu")]
+pub mod fused;
 mod module;
 pub mod probe;
 pub mod quantity;
 pub mod rule;
 pub mod search;
+#[cfg(feature = "gpu")]
+pub mod tangent;
 
 pub use emit::{Plan, Step, plan};
 pub use facts::{Budget, Facts, Source};

@@ -163,7 +163,11 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
             Some(("vec2f", vec![cos, sin]))
         }
         Constant::KeyDirection => Some(("vec3f", KeyLight::new(params, 0.0_f64).direction.to_vec())),
-        Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => None,
+        Constant::Eye
+        | Constant::ViewProjection
+        | Constant::KeyByAzimuth
+        | Constant::KeyByElevation
+        | Constant::MorphWeights => None,
     }
 }
 

@@ -76,6 +76,8 @@ pub enum Resource {
     IrradianceFaces,
     /// E_s at the current `specular_lobe`, likewise.
     SpecularFaces,
+    /// d E_s / d specular_lobe, likewise; only for fits.
+    SpecularSlopeFaces,
     /// E_h, likewise.
     HiliteFaces,
     /// E_d as `texture_cube<f32>`, 16-bit float RGBA.
@@ -152,9 +154,10 @@ impl Kind {
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 23] = [
         Self::IrradianceFaces,
         Self::SpecularFaces,
+        Self::SpecularSlopeFaces,
         Self::HiliteFaces,
         Self::IrradianceCube,
         Self::SpecularCube,
@@ -183,6 +186,7 @@ impl Resource {
         match self {
             Self::IrradianceFaces => "irradiance_faces",
             Self::SpecularFaces => "specular_faces",
+            Self::SpecularSlopeFaces => "specular_slope_faces",
             Self::HiliteFaces => "hilite_faces",
             Self::IrradianceCube => "irradiance_cube",
             Self::SpecularCube => "specular_cube",
@@ -210,7 +214,9 @@ impl Resource {
     #[must_use]
     pub const fn kind(self) -> Kind {
         match self {
-            Self::IrradianceFaces | Self::SpecularFaces | Self::HiliteFaces => Kind::Faces,
+            Self::IrradianceFaces | Self::SpecularFaces | Self::SpecularSlopeFaces | Self::HiliteFaces => {
+                Kind::Faces
+            }
             Self::IrradianceCube | Self::SpecularCube | Self::HiliteCube => Kind::Cube,
             Self::ColorTexels
             | Self::NormalTexels
@@ -246,14 +252,25 @@ pub enum Constant {
     Turn,
     /// Unit vector towards the key light, in xyz.
     KeyDirection,
+    /// Its derivative by `key_azimuth`, a degree, in xyz; only for fits.
+    KeyByAzimuth,
+    /// Its derivative by `key_elevation`, a degree, in xyz; only for fits.
+    KeyByElevation,
     /// A weight for each active morph target, in x of `array<vec4f, N>`.
     MorphWeights,
 }
 
 impl Constant {
     /// Those that are not parameters of the model.
-    pub const OWN: [Self; 5] =
-        [Self::Eye, Self::ViewProjection, Self::Turn, Self::KeyDirection, Self::MorphWeights];
+    pub const OWN: [Self; 7] = [
+        Self::Eye,
+        Self::ViewProjection,
+        Self::Turn,
+        Self::KeyDirection,
+        Self::KeyByAzimuth,
+        Self::KeyByElevation,
+        Self::MorphWeights,
+    ];
 
     /// The constant of that name in rules.
     #[must_use]
@@ -270,6 +287,8 @@ impl Constant {
             Self::ViewProjection => "view_projection",
             Self::Turn => "turn",
             Self::KeyDirection => "key_direction",
+            Self::KeyByAzimuth => "key_by_azimuth",
+            Self::KeyByElevation => "key_by_elevation",
             Self::MorphWeights => "morph_weights",
         }
     }

@@ -16,8 +16,9 @@ use super::{SharedDevice, TensorError};
 use crate::engine::cpu::Illumination;
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
+use crate::model::fragment::Fragment;
 use crate::model::params::{Column, Param, Params};
-use crate::samples::{LANES, ViewSamples};
+use crate::samples::ViewSamples;
 
 /// How the adjoints of lookups are added up to those of a cube's texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
@@ -140,17 +141,14 @@ fn inputs(
     let matrix = |rows: usize, columns: usize, numbers: Vec<f32>| {
         Tensor::<2>::from_data(TensorData::new(numbers, [rows, columns]), device)
     };
-    let planes = |input: Input, of: fn(&ViewSamples) -> Vec<&Vec<f32>>| {
+    let planes = |input: Input, of: fn(&Fragment<f32>) -> &[f32]| {
         if !stage.adjoint.reads(input) {
             return matrix(1, 1, vec![0.0]);
         }
         let width = input.width().unwrap_or(1);
         let mut numbers = Vec::with_capacity(width * stage.samples);
         for view in views {
-            let planes = of(view);
-            // A scene without a normal map has no bump.
-            let number = |i: usize, c: usize| planes[c].get(i).copied().unwrap_or(0.0);
-            numbers.extend((0..view.records() * LANES).flat_map(|i| (0..width).map(move |c| (i, c))).map(|(i, c)| number(i, c)));
+            (0..view.surface.slots()).for_each(|slot| numbers.extend(of(&view.surface.fragment(slot))));
         }
         matrix(stage.samples, width, numbers)
     };
@@ -161,11 +159,11 @@ fn inputs(
     let columns: Vec<f32> = shaded.columns.iter().map(|column| column.get(shaded.params) as f32).collect();
     Inputs {
         columns: Tensor::from_data(TensorData::new(columns, [shaded.columns.len()]), device),
-        albedo: planes(Input::Albedo, |v| v.surface.albedo.iter().collect()),
-        specular: planes(Input::Specular, |v| vec![&v.surface.specular]),
-        attenuator: planes(Input::Attenuator, |v| vec![&v.surface.attenuator]),
-        open: planes(Input::Open, |v| vec![&v.surface.occlusion]),
-        bump: planes(Input::Bump, |v| v.surface.bump.iter().collect()),
+        albedo: planes(Input::Albedo, |at| &at.albedo),
+        specular: planes(Input::Specular, |at| std::slice::from_ref(&at.specular)),
+        attenuator: planes(Input::Attenuator, |at| std::slice::from_ref(&at.attenuator)),
+        open: planes(Input::Open, |at| std::slice::from_ref(&at.occlusion)),
+        bump: planes(Input::Bump, |at| &at.bump),
         irradiance: cube(cubes[0]),
         lobe: cube(cubes[1]),
         hilite: cube(cubes[2]),

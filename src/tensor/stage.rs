@@ -18,6 +18,7 @@ use super::shade::{Scatter, Shaded};
 use super::{SharedDevice, TensorError, pass};
 use crate::gpu::{Gpu, GpuError};
 use crate::model::cube::Cube;
+use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::samples::ViewSamples;
 use crate::shader::adjoint::{Adjoint, Binding, Module};
@@ -86,7 +87,7 @@ impl Stage {
         let turned = shaded.params.scalar(Param::EnvironmentRotation) != 0.0;
         let adjoint = Adjoint::new(shaded.setup, shaded.columns, turned)?;
         let slots = views.iter().map(|view| view.pixel.len()).sum();
-        let samples = views.iter().map(|view| view.weight.len()).sum();
+        let samples = views.iter().map(|view| view.surface.slots()).sum();
         let mut faces = [None, None, None];
         for (i, cube) in cubes.into_iter().enumerate() {
             if let Some(cube) = cube.filter(|_| adjoint.reads(CUBES[i])) {
@@ -383,23 +384,21 @@ impl Faces {
 
 /// What is no tensor of each sample, plane by plane; the share last.
 fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32> {
+    let slots = || views.iter().flat_map(|view| (0..view.surface.slots()).map(|slot| (&view.surface, slot)));
     let mut numbers = Vec::new();
-    let mut push = |of: &dyn Fn(&ViewSamples) -> Vec<f32>| views.iter().for_each(|view| numbers.extend(of(view)));
     for (name, width) in adjoint.fixed() {
+        let number = |fragment: Fragment<f32>, c: usize| match name {
+            "base" => fragment.base[c],
+            "view" => fragment.view[c],
+            "normal" => fragment.normal[c],
+            "silhouette" => fragment.silhouette,
+            _ => fragment.dapple,
+        };
         for c in 0..width {
-            push(&|view| {
-                let surface = &view.surface;
-                match name {
-                    "base" => surface.base[c].clone(),
-                    "view" => surface.view[c].clone(),
-                    "normal" => surface.normal[c].clone(),
-                    "silhouette" => surface.silhouette.clone(),
-                    _ => surface.dapple.clone(),
-                }
-            });
+            numbers.extend(slots().map(|(surface, slot)| number(surface.fragment(slot), c)));
         }
     }
-    push(&|view| view.weight.clone());
+    numbers.extend(slots().map(|(surface, slot)| surface.weight(slot)));
     numbers
 }
 

@@ -4,16 +4,17 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use skinfit::bake::LobeStack;
 use skinfit::engine::cpu::{CpuEngine, Illumination};
-use skinfit::engine::residual::weighted_residual;
+use skinfit::engine::reference::Reference;
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
 use skinfit::model::cube::{Cube, texel_direction};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
-use skinfit::model::evaluate::{Setup, derivative, shade};
+use skinfit::model::evaluate::Setup;
 use skinfit::model::fragment::Fragment;
-use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Column, Param, Params};
-use skinfit::samples::{LANES, SurfaceArrays, ViewSamples};
+use skinfit::samples::rows::{Row, Rows};
+use skinfit::samples::surface_records::Asked;
+use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::scene::Loss;
 
 fn wavy(size: usize, phase: f64) -> Cube<f32> {
@@ -31,50 +32,64 @@ fn unit(rng: &mut StdRng) -> [f64; 3] {
 }
 
 /// `groups` groups with 1 to 3 records each; about one sample in ten is padding.
-fn view(groups: usize, seed: u64) -> ObservedView {
+pub(crate) fn view(groups: usize, seed: u64) -> ObservedView {
     let mut rng = StdRng::seed_from_u64(seed);
+    let records = |group: usize| 1 + group % 3;
+    let count = (0..groups).map(records).sum();
     let mut samples = ViewSamples { group_start: vec![0], ..ViewSamples::default() };
-    let mut surface = SurfaceArrays::default();
-    let mut target: [Vec<f32>; 4] = Default::default();
-    let mut weight = Vec::new();
+    samples.surface = SurfaceRecords::new(EVERY_NUMBER, count);
+    let (mut target, mut weight) = (Rows::new(4, groups), vec![Row::ZERO; groups]);
     for group in 0..groups {
-        let records = 1 + group % 3;
+        let (first, records) = (samples.group_start[group] as usize, records(group));
         let mut shares = vec![[0.0_f32; LANES]; records];
         for lane in 0..LANES {
             let used = rng.random_range(1..=records);
             (0..used).for_each(|r| shares[r][lane] = 1.0 / used as f32);
         }
-        for row in shares {
-            samples.weight.extend(row);
-            for _ in 0..LANES {
-                let (n, view) = (unit(&mut rng), unit(&mut rng));
-                let bump = unit(&mut rng);
-                for c in 0..3 {
-                    surface.base[c].push(n[c] as f32);
-                    surface.normal[c].push(n[c] as f32);
-                    surface.bump[c].push(0.3 * bump[c] as f32);
-                    surface.view[c].push(view[c] as f32);
-                    surface.albedo[c].push(rng.random_range(0.1..0.9));
-                }
-                surface.occlusion.push(rng.random_range(0.2..1.0));
-                surface.silhouette.push(rng.random_range(0.0..1.0));
-                surface.dapple.push(rng.random_range(0.0..1.0));
-                surface.specular.push(rng.random_range(0.0..1.0));
-                surface.attenuator.push(rng.random_range(0.0..1.0));
+        for (record, row) in shares.iter().enumerate() {
+            for (lane, &share) in row.iter().enumerate() {
+                samples.surface.set((first + record) * LANES + lane, &fragment(&mut rng), share);
             }
         }
-        let end = samples.group_start[group] + records as u32;
-        samples.group_start.push(end);
+        samples.group_start.push((first + records) as u32);
         for lane in 0..LANES {
-            target.iter_mut().for_each(|plane| plane.push(rng.random_range(0.05..2.0)));
-            weight.push(if lane == 5 { 0.0 } else { rng.random_range(0.1..1.0) });
+            target.record_mut(group).iter_mut().for_each(|row| row[lane] = rng.random_range(0.05..2.0));
+            weight[group][lane] = if lane == 5 { 0.0 } else { rng.random_range(0.1..1.0) };
         }
     }
-    samples.surface = surface;
     ObservedView { samples, target, weight, clip: None }
 }
 
-fn illumination() -> Illumination {
+const EVERY_NUMBER: Asked = Asked {
+    bump: true,
+    normal: true,
+    albedo: true,
+    occlusion: true,
+    silhouette: true,
+    dapple: true,
+    specular: true,
+    attenuator: true,
+    weight: true,
+};
+
+fn fragment(rng: &mut StdRng) -> Fragment<f32> {
+    let single = |v: [f64; 3]| v.map(|x| x as f32);
+    let (normal, view, bump) = (single(unit(rng)), single(unit(rng)), single(unit(rng)));
+    Fragment {
+        base: normal,
+        bump: bump.map(|x| 0.3 * x),
+        normal,
+        view,
+        occlusion: rng.random_range(0.2..1.0),
+        silhouette: rng.random_range(0.0..1.0),
+        dapple: rng.random_range(0.0..1.0),
+        albedo: std::array::from_fn(|_| rng.random_range(0.1..0.9)),
+        specular: rng.random_range(0.0..1.0),
+        attenuator: rng.random_range(0.0..1.0),
+    }
+}
+
+pub(crate) fn illumination() -> Illumination {
     Illumination {
         irradiance: Some(wavy(8, 0.3)),
         lobes: Some(LobeStack {
@@ -85,9 +100,9 @@ fn illumination() -> Illumination {
     }
 }
 
-const EVERYTHING: Effects = Effects::SURFACE.with(Effect::Haze).with(Effect::KeyLight);
+pub(crate) const EVERYTHING: Effects = Effects::SURFACE.with(Effect::Haze).with(Effect::KeyLight);
 
-fn params() -> Params {
+pub(crate) fn params() -> Params {
     let mut params = Params::defaults(Form::Corrected);
     params.set_rgb(Param::RimWeight, [0.9, 0.45, 0.3]);
     params.set(Param::RimExponent, 2.6);
@@ -102,7 +117,7 @@ fn params() -> Params {
     params
 }
 
-fn all_unknowns(gains: usize) -> Vec<Unknown> {
+pub(crate) fn all_unknowns(gains: usize) -> Vec<Unknown> {
     let columns = Param::all().flat_map(|p| match p {
         Param::RimWeight => Column::per_channel(p).to_vec(),
         _ => vec![Column::tied(p)],
@@ -110,122 +125,9 @@ fn all_unknowns(gains: usize) -> Vec<Unknown> {
     columns.map(Unknown::Param).chain((1..gains).map(Unknown::Gain)).collect()
 }
 
-/// The same numbers, one sample after the other in f64.
-struct Plain<'a> {
-    setup: Setup,
-    views: &'a [ObservedView],
-    cubes: [Cube<f64>; 4],
-    loss: Loss,
-    unknowns: Vec<Unknown>,
-}
-
-impl<'a> Plain<'a> {
-    fn new(setup: Setup, views: &'a [ObservedView], loss: Loss, unknowns: &[Unknown], lobe: f64) -> Self {
-        let light = illumination();
-        let wide = |cube: &Cube<f32>| cube.map(|t| t.map(f64::from));
-        let (specular, slope) = light.lobes.as_ref().unwrap().at(lobe);
-        let cubes = [
-            wide(light.irradiance.as_ref().unwrap()),
-            wide(&specular),
-            wide(&slope),
-            wide(light.hilite.as_ref().unwrap()),
-        ];
-        Self { setup, views, cubes, loss, unknowns: unknowns.to_vec() }
-    }
-
-    fn lights(&self, params: &Params) -> Lights<'_, f64> {
-        let [irradiance, specular, lobe_slope, hilite] = self.cubes.each_ref().map(Some);
-        Lights::new(self.setup, params, Cubes { irradiance, specular, lobe_slope, hilite }, true, 0.0)
-    }
-
-    fn fragment(view: &ObservedView, at: usize) -> Fragment<f64> {
-        let s = &view.samples.surface;
-        let v = |planes: &[Vec<f32>; 3]| [0, 1, 2].map(|c| f64::from(planes[c][at]));
-        let x = |plane: &[f32]| f64::from(plane[at]);
-        Fragment {
-            base: v(&s.base),
-            bump: v(&s.bump),
-            normal: v(&s.normal),
-            view: v(&s.view),
-            occlusion: x(&s.occlusion),
-            silhouette: x(&s.silhouette),
-            dapple: x(&s.dapple),
-            albedo: v(&s.albedo),
-            specular: x(&s.specular),
-            attenuator: x(&s.attenuator),
-        }
-    }
-
-    /// Value and unknowns' columns of each channel of one pixel slot, the gain not applied.
-    fn pixel(&self, view: &ObservedView, slot: usize, params: &Params) -> [(f64, Vec<f64>); 4] {
-        let lights = self.lights(params);
-        let mut out: [(f64, Vec<f64>); 4] = std::array::from_fn(|_| (0.0, vec![0.0; self.unknowns.len()]));
-        let group = slot / LANES;
-        for record in view.samples.group_start[group]..view.samples.group_start[group + 1] {
-            let at = record as usize * LANES + slot % LANES;
-            let f = Self::fragment(view, at);
-            let w = f64::from(view.samples.weight[at]);
-            let value = shade(self.setup, &lights, &f, params);
-            (0..4).for_each(|c| out[c].0 += w * value[c]);
-            for (k, unknown) in self.unknowns.iter().enumerate() {
-                let Unknown::Param(column) = unknown else { continue };
-                if !column.param.asked_for(self.setup.effects) {
-                    continue;
-                }
-                let slope = derivative(self.setup, &lights, &f, params, column.param);
-                for c in 0..4 {
-                    if c == 3 || column.channels.includes(c) {
-                        out[c].1[k] += w * slope[c];
-                    }
-                }
-            }
-        }
-        out
-    }
-
-    fn normal_equations(&self, point: &Point) -> NormalEquations {
-        let k = self.unknowns.len();
-        let mut sums = NormalEquations {
-            loss: 0.0,
-            residual: 0.0,
-            weight: 0.0,
-            count: 0,
-            jtr: vec![0.0; k],
-            jtj: vec![0.0; k * k],
-        };
-        for (index, view) in self.views.iter().enumerate() {
-            let gain = point.gains[index];
-            for slot in 0..view.samples.groups() * LANES {
-                let pixel = self.pixel(view, slot, &point.params);
-                let weight = f64::from(view.weight[slot]);
-                for (c, (value, mut row)) in pixel.into_iter().enumerate() {
-                    row.iter_mut().for_each(|x| *x *= gain);
-                    if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(index)) {
-                        row[g] = value;
-                    }
-                    let target = f64::from(view.target[c][slot]);
-                    let r = weighted_residual(self.loss, view.clip, gain * value, target, weight);
-                    sums.loss += r.loss;
-                    sums.residual += r.residual * r.residual;
-                    sums.weight += weight;
-                    sums.count += u64::from(weight > 0.0);
-                    for a in 0..k {
-                        sums.jtr[a] += r.scale * row[a] * r.residual;
-                        for b in 0..k {
-                            sums.jtj[a * k + b] += r.scale * row[a] * r.scale * row[b];
-                        }
-                    }
-                }
-            }
-        }
-        sums.loss /= sums.weight;
-        sums
-    }
-}
-
 /// f32 evaluation of a few hundred roundings, of either sign, against f64: 1e-5 of the largest entry
 /// that shares the row and the column.
-fn assert_equal(got: &NormalEquations, want: &NormalEquations, names: &[String], what: &str) {
+pub(crate) fn assert_equal(got: &NormalEquations, want: &NormalEquations, names: &[String], what: &str) {
     let k = names.len();
     let close = |g: f64, w: f64, scale: f64| (g - w).abs() <= 1e-5 * scale + 1e-12;
     assert!(close(got.loss, want.loss, want.loss), "{what}: loss {} {}", got.loss, want.loss);
@@ -250,17 +152,24 @@ fn assert_equal(got: &NormalEquations, want: &NormalEquations, names: &[String],
     }
 }
 
-fn engine(setup: Setup, views: &[ObservedView], loss: Loss, unknowns: &[Unknown], keep: bool) -> CpuEngine {
+pub(crate) fn engine(
+    setup: Setup,
+    views: &[ObservedView],
+    loss: Loss,
+    unknowns: &[Unknown],
+    keep: bool,
+) -> CpuEngine {
     CpuEngine::with_kept_terms(setup, illumination(), views.to_vec(), loss, unknowns.to_vec(), keep)
 }
 
-fn names(unknowns: &[Unknown]) -> Vec<String> {
+pub(crate) fn names(unknowns: &[Unknown]) -> Vec<String> {
     unknowns.iter().map(Unknown::name).collect()
 }
 
 #[test]
 fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect() {
     let views = [view(9, 1), view(4, 2)];
+    let light = illumination();
     let unknowns = all_unknowns(2);
     let mut sets: Vec<Effects> = Effect::ALL.into_iter().map(|e| Effects::of(&[e])).collect();
     sets.extend([EVERYTHING, EVERYTHING.without(Effect::Rim), EVERYTHING.without(Effect::Occlusion)]);
@@ -269,7 +178,7 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
             for &effects in &sets {
                 let setup = Setup { form, silhouette, effects };
                 let point = Point { params: params(), gains: vec![1.0, 1.2] };
-                let plain = Plain::new(setup, &views, Loss::L2, &unknowns, 40.0);
+                let plain = Reference::new(setup, &light, &views, Loss::L2, &unknowns);
                 let got = engine(setup, &views, Loss::L2, &unknowns, true).normal_equations(&point);
                 let what = format!("{form:?} {silhouette:?} {effects:?}");
                 assert_equal(&got, &plain.normal_equations(&point), &names(&unknowns), &what);
@@ -281,6 +190,7 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
 #[test]
 fn any_subset_of_free_parameters_keeps_the_same_answers() {
     let views = [view(7, 3)];
+    let light = illumination();
     let all = all_unknowns(1);
     let point = Point { params: params(), gains: vec![1.0] };
     for silhouette in [Silhouette::Fragment, Silhouette::Bumped] {
@@ -302,7 +212,7 @@ fn any_subset_of_free_parameters_keeps_the_same_answers() {
         subsets.push(cheap);
         for unknowns in subsets {
             for keep in [true, false] {
-                let plain = Plain::new(setup, &views, Loss::RelativeL2, &unknowns, 40.0);
+                let plain = Reference::new(setup, &light, &views, Loss::RelativeL2, &unknowns);
                 let got = engine(setup, &views, Loss::RelativeL2, &unknowns, keep).normal_equations(&point);
                 let what = format!("{silhouette:?} keep {keep} {:?}", names(&unknowns));
                 assert_equal(&got, &plain.normal_equations(&point), &names(&unknowns), &what);
@@ -314,12 +224,13 @@ fn any_subset_of_free_parameters_keeps_the_same_answers() {
 #[test]
 fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
     let mut views = [view(8, 4)];
+    let light = illumination();
     views[0].clip = Some(skinfit::scene::view::Clip { low: 0.1, high: 1.5 });
     let unknowns = all_unknowns(1);
     let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: EVERYTHING };
     let point = Point { params: params(), gains: vec![0.9] };
     for loss in Loss::ALL {
-        let plain = Plain::new(setup, &views, loss, &unknowns, 40.0).normal_equations(&point);
+        let plain = Reference::new(setup, &light, &views, loss, &unknowns).normal_equations(&point);
         let engine = engine(setup, &views, loss, &unknowns, true);
         assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
         let (value, gradient) = engine.gradient(&point);
@@ -336,13 +247,14 @@ fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
 #[test]
 fn images_equal_the_plain_model() {
     let views = [view(9, 5)];
+    let light = illumination();
     for form in Form::ALL {
         let setup = Setup { form, silhouette: Silhouette::Bumped, effects: EVERYTHING };
         let point = Point { params: params(), gains: vec![1.5] };
-        let plain = Plain::new(setup, &views, Loss::L2, &[], 40.0);
+        let plain = Reference::new(setup, &light, &views, Loss::L2, &[]);
         let image = engine(setup, &views, Loss::L2, &[], true).image(0, &point);
         for slot in 0..views[0].samples.groups() * LANES {
-            let pixel = plain.pixel(&views[0], slot, &point.params);
+            let pixel = plain.pixel(0, slot, &point.params);
             for c in 0..4 {
                 let (got, want) = (f64::from(image[c][slot]), 1.5 * pixel[c].0);
                 // The vectors' own figures for f32: 2e-6 + 2e-5 relative.

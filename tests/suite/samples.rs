@@ -5,7 +5,7 @@
 use glam::{Vec2, Vec3};
 use skinfit::bake::VertexOcclusion;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
-use skinfit::samples::{LANES, TargetArrays, ViewSamples, sample_views};
+use skinfit::samples::{LANES, TargetRows, ViewSamples, sample_views};
 use skinfit::scene::Scene;
 use skinfit::scene::maps::Map;
 use skinfit::scene::mesh::PosedMesh;
@@ -14,8 +14,8 @@ use skinfit::scene::view::{Clip, Target};
 use crate::common;
 use crate::fixtures::{Planes, bare_scene, camera, head, head_views, quantile, read_exr};
 
-fn vector(planes: &[Vec<f32>; 3], i: usize) -> Vec3 {
-    Vec3::new(planes[0][i], planes[1][i], planes[2][i])
+fn base(view: &ViewSamples, sample: usize) -> Vec3 {
+    Vec3::from(view.surface.fragment(sample).base)
 }
 
 /// What `read` gives for the first sample of each pixel that the other renderer covers fully; and
@@ -59,7 +59,7 @@ fn the_scanned_head_lies_where_the_independent_renderer_sees_it() {
         let aov = read_exr(&data.join(format!("targets/aov_{}.exr", view.name)));
         let want = aov.rgb(["P.X", "P.Y", "P.Z"]);
         let (errors, missing) = compare(positions, &aov, |sample, pixel| {
-            f64::from(vector(&positions.surface.base, sample).distance(Vec3::from(want[pixel])))
+            f64::from(base(positions, sample).distance(Vec3::from(want[pixel])))
         });
         let (median, most) = report("position", &view.name, &errors, "units");
         // The renderer's own f32 rays: a few ten-thousandths of a pixel of 0.018 units; the farthest
@@ -69,7 +69,7 @@ fn the_scanned_head_lies_where_the_independent_renderer_sees_it() {
 
         let (u, v) = (&aov.planes["UV.U"], &aov.planes["UV.V"]);
         let (errors, _) = compare(uvs, &aov, |sample, pixel| {
-            f64::from(vector(&uvs.surface.base, sample).truncate().distance(Vec2::new(u[pixel], v[pixel])))
+            f64::from(base(uvs, sample).truncate().distance(Vec2::new(u[pixel], v[pixel])))
         });
         let (median, _) = report("UV", &view.name, &errors, "");
         // The file's UVs are filtered over a pixel, which is about 0.002 wide.
@@ -98,10 +98,9 @@ fn the_scanned_heads_shading_normals_agree_with_the_independent_renderer() {
             let aov = read_exr(&data.join(format!("targets/aov_{}.exr", view.name)));
             let want = aov.rgb(["N.X", "N.Y", "N.Z"]);
             let (errors, _) = compare(samples, &aov, |sample, pixel| {
-                let mut n = vector(&samples.surface.base, sample);
-                if scene.maps.normal.is_some() {
-                    n += vector(&samples.surface.bump, sample);
-                }
+                let f = samples.surface.fragment(sample);
+                // Without a map there is no bump, which then reads as zero.
+                let n = Vec3::from(f.base) + Vec3::from(f.bump);
                 f64::from(n.normalize().angle_between(Vec3::from(want[pixel]).normalize())).to_degrees()
             });
             medians.push(report("normal", &view.name, &errors, "degrees").0);
@@ -182,21 +181,14 @@ fn sheet_scene(effects: Effects) -> Scene {
     scene
 }
 
-fn lengths(view: &ViewSamples) -> [usize; 10] {
-    let s = &view.surface;
-    let one = |planes: &[Vec<f32>; 3]| planes[0].len();
-    [
-        one(&s.base),
-        one(&s.bump),
-        one(&s.view),
-        one(&s.normal),
-        one(&s.albedo),
-        s.occlusion.len(),
-        s.silhouette.len(),
-        s.dapple.len(),
-        s.specular.len(),
-        s.attenuator.len(),
-    ]
+/// Which numbers are there.
+fn present(view: &ViewSamples) -> [bool; 10] {
+    let at = view.surface.places();
+    let vectors = [at.base, at.bump, at.view, at.normal, at.albedo];
+    let scalars = [at.occlusion, at.silhouette, at.dapple, at.specular, at.attenuator];
+    let mut present = [false; 10];
+    vectors.iter().chain(&scalars).zip(&mut present).for_each(|(place, flag)| *flag = place.is_some());
+    present
 }
 
 #[test]
@@ -209,11 +201,10 @@ fn groups_stand_by_their_count_of_records_and_weights_sum_to_one() {
     let view = sample_views(&scene, &mesh, Some(&occlusion)).unwrap().remove(0);
     let samples = view.records() * LANES;
     assert_eq!(view.pixel.len(), view.groups() * LANES);
-    assert_eq!(view.weight.len(), samples);
-    assert_eq!(
-        lengths(&view),
-        [samples, samples, samples, 0, samples, samples, samples, samples, samples, samples]
-    );
+    assert_eq!(view.surface.slots(), samples);
+    assert_eq!(present(&view), [true, true, true, false, true, true, true, true, true, true]);
+    // Four vectors, five numbers, and the weight.
+    assert_eq!(view.surface.rows().stride(), 4 * 3 + 5 + 1);
     let records: Vec<u32> = view.group_start.windows(2).map(|w| w[1] - w[0]).collect();
     assert!(records.windows(2).all(|w| w[0] >= w[1]) && records[0] == 9);
     let mut seen = std::collections::HashSet::new();
@@ -221,7 +212,7 @@ fn groups_stand_by_their_count_of_records_and_weights_sum_to_one() {
         for lane in 0..LANES {
             let slot = group * LANES + lane;
             let weights: Vec<f32> = (view.group_start[group]..view.group_start[group + 1])
-                .map(|record| view.weight[record as usize * LANES + lane])
+                .map(|record| view.surface.weight(record as usize * LANES + lane))
                 .collect();
             let sum: f32 = weights.iter().sum();
             let filled = weights.iter().filter(|&&w| w > 0.0).count();
@@ -235,34 +226,30 @@ fn groups_stand_by_their_count_of_records_and_weights_sum_to_one() {
             }
         }
     }
-    let s = &view.surface;
-    for plane in s.base.iter().chain(&s.bump).chain(&s.view).chain([&s.silhouette, &s.dapple]) {
-        assert!(plane.iter().all(|x| x.is_finite()));
-    }
-    assert!(s.occlusion.iter().all(|&o| (o - 0.5).abs() < 1e-6));
+    assert!(view.surface.rows().all().iter().all(|row| row.iter().all(|x| x.is_finite())));
+    assert!((0..samples).all(|i| (view.surface.fragment(i).occlusion - 0.5).abs() < 1e-6));
 }
 
 #[test]
-fn planes_that_no_effect_asks_for_are_empty() {
+fn numbers_that_no_effect_asks_for_are_not_kept() {
     let mesh = sheet();
-    let planes = |effects: &[Effect], silhouette: Silhouette| {
+    let kept = |effects: &[Effect], silhouette: Silhouette| {
         let mut scene = sheet_scene(Effects::of(effects));
         scene.silhouette = silhouette;
-        let view = sample_views(&scene, &mesh, None).unwrap().remove(0);
-        lengths(&view).map(|length| length > 0)
+        present(&sample_views(&scene, &mesh, None).unwrap().remove(0))
     };
     use Effect as E;
     let fragment = Silhouette::Fragment;
     //                base  bump   view  normal albedo occl.  silh.  dapple spec.  att.
     let diffuse = [true, false, true, false, true, false, false, false, false, false];
-    assert_eq!(planes(&[E::Diffuse], fragment), diffuse);
+    assert_eq!(kept(&[E::Diffuse], fragment), diffuse);
     let rim = [true, false, true, false, true, false, true, false, false, false];
-    assert_eq!(planes(&[E::Diffuse, E::Rim], fragment), rim);
-    assert_eq!(planes(&[E::Diffuse, E::Rim], Silhouette::Bumped), diffuse);
+    assert_eq!(kept(&[E::Diffuse, E::Rim], fragment), rim);
+    assert_eq!(kept(&[E::Diffuse, E::Rim], Silhouette::Bumped), diffuse);
     let key = [true, false, true, true, true, false, false, false, false, false];
-    assert_eq!(planes(&[E::KeyLight], fragment), key);
+    assert_eq!(kept(&[E::KeyLight], fragment), key);
     let mirror = [true, false, true, false, false, false, false, true, false, false];
-    assert_eq!(planes(&[E::Reflection], fragment), mirror);
+    assert_eq!(kept(&[E::Reflection], fragment), mirror);
 }
 
 #[test]
@@ -283,17 +270,16 @@ fn silhouettes_per_vertex_and_per_fragment_follow_their_definitions() {
         let mut scene = sheet_scene(effects);
         scene.silhouette = silhouette;
         let view = sample_views(&scene, &mesh, None).unwrap().remove(0);
-        let s = &view.surface;
         let (mut apart, eye) = (0.0_f32, scene.views[0].camera.eye().as_vec3());
-        for i in 0..s.silhouette.len() {
-            let exact = 1.0 - vector(&s.normal, i).dot(vector(&s.view, i)).abs();
-            apart = apart.max((exact - s.silhouette[i]).abs());
+        for i in 0..view.surface.slots() {
+            let f = view.surface.fragment(i);
+            let (normal, v) = (Vec3::from(f.normal), Vec3::from(f.view));
+            apart = apart.max((1.0 - normal.dot(v).abs() - f.silhouette).abs());
             // The point is where the view ray meets the plane z = 0.
-            let v = vector(&s.view, i);
             let point = eye - v * (eye.z / v.z);
             let n = left.lerp(right, 0.5 * (point.x + 1.0)).normalize();
             // Rounding of f32 in a handful of operations.
-            assert!(n.distance(vector(&s.normal, i)) < 5e-6);
+            assert!(n.distance(normal) < 5e-6);
         }
         match silhouette {
             Silhouette::Fragment => assert!(apart < 1e-6, "{apart}"),
@@ -315,14 +301,15 @@ fn hard_texels_and_normals_leave_a_base_that_is_a_direction() {
                 mesh = sheet();
             }
             let s = sample_views(&scene, &mesh, None).unwrap().remove(0).surface;
-            for i in 0..s.base[0].len() {
-                let (base, bump) = (vector(&s.base, i), vector(&s.bump, i));
+            for i in 0..s.slots() {
+                let f = s.fragment(i);
+                let (base, bump) = (Vec3::from(f.base), Vec3::from(f.bump));
                 assert!(base.length() > 0.0 && base.is_finite() && bump.is_finite(), "{texel:?}");
                 if texel[0].is_nan() || texel == [0.5; 3] {
                     assert_eq!(bump, Vec3::ZERO);
                 }
                 if zero_normals {
-                    assert_eq!(base, -vector(&s.view, i));
+                    assert_eq!(base, -Vec3::from(f.view));
                 }
             }
         }
@@ -350,8 +337,8 @@ fn padding_is_below_a_hundredth_of_the_samples() {
     scene.views = head_views(&data);
     scene.maps.normal = Some(normal_map(&data));
     let views = sample_views(&scene, &mesh, None).unwrap();
-    let samples: usize = views.iter().map(|v| v.weight.iter().filter(|&&w| w > 0.0).count()).sum();
-    let slots: usize = views.iter().map(|v| v.weight.len()).sum();
+    let samples: usize = views.iter().map(ViewSamples::count).sum();
+    let slots: usize = views.iter().map(|v| v.surface.slots()).sum();
     // Padding is confined to the groups between two counts.
     assert!(slots < samples + samples / 100);
 }
@@ -371,20 +358,20 @@ fn with_target(rgb: [f32; 3], alpha: Option<f32>, mask: Option<f32>) -> (Scene, 
 #[test]
 fn targets_are_divided_by_their_alpha_and_count_by_the_smaller_coverage() {
     let (scene, samples) = with_target([0.2, 0.4, 0.8], Some(0.5), Some(0.25));
-    let arrays = TargetArrays::new(&scene.views[0], &samples).unwrap().unwrap();
-    assert_eq!(arrays.clip, Some(Clip { low: 0.0, high: 1.0 }));
+    let target = TargetRows::new(&scene.views[0], &samples).unwrap().unwrap();
+    assert_eq!(target.clip, Some(Clip { low: 0.0, high: 1.0 }));
     for (i, &coverage) in samples.coverage.iter().enumerate() {
         let want = if samples.pixel[i] == u32::MAX { 0.0 } else { 0.25 * coverage.min(0.5) };
-        assert_eq!(arrays.weight[i], want);
+        assert_eq!(target.weight[i / LANES][i % LANES], want);
         if want > 0.0 {
-            assert_eq!([0, 1, 2].map(|c| arrays.rgb[c][i]), [0.4, 0.8, 1.6]);
+            assert_eq!([0, 1, 2].map(|c| target.rgb.number(c, i)), [0.4, 0.8, 1.6]);
         }
     }
     // Without alpha only full pixels count.
     let (scene, samples) = with_target([0.2; 3], None, None);
-    let arrays = TargetArrays::new(&scene.views[0], &samples).unwrap().unwrap();
+    let target = TargetRows::new(&scene.views[0], &samples).unwrap().unwrap();
     let full = samples.coverage.iter().map(|&c| if c == 1.0 { 1.0 } else { 0.0 });
-    assert!(arrays.weight.iter().copied().eq(full));
+    assert!(target.weight.iter().flat_map(|row| row.iter()).copied().eq(full));
     assert!(samples.coverage.iter().any(|&c| c > 0.0 && c < 1.0), "the test needs edge pixels");
 }
 
@@ -392,12 +379,12 @@ fn targets_are_divided_by_their_alpha_and_count_by_the_smaller_coverage() {
 fn what_cannot_be_sampled_or_compared_is_said() {
     for (alpha, mask) in [(Some(0.0), None), (None, Some(0.0)), (Some(f32::NAN), None)] {
         let (scene, samples) = with_target([0.2; 3], alpha, mask);
-        let error = TargetArrays::new(&scene.views[0], &samples).unwrap_err().to_string();
+        let error = TargetRows::new(&scene.views[0], &samples).unwrap_err().to_string();
         assert!(error.contains("front") && error.contains("mask is empty"), "{error}");
     }
     let (mut scene, samples) = with_target([0.2; 3], None, None);
     scene.views[0].target.as_mut().unwrap().rgb.pop();
-    assert!(TargetArrays::new(&scene.views[0], &samples).unwrap_err().to_string().contains("2499"));
+    assert!(TargetRows::new(&scene.views[0], &samples).unwrap_err().to_string().contains("2499"));
 
     let (mut scene, mut mesh) = (sheet_scene(Effects::of(&[Effect::Diffuse])), sheet());
     let wrong = VertexOcclusion { base: vec![1.0; 3], morphs: Vec::new() };

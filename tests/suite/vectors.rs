@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use fearless_simd::{Level, dispatch};
+use fearless_simd::Level;
 use serde_json::Value;
 use skinfit::engine::lanes::Lanes;
 use skinfit::model::cube::Cube;
@@ -411,7 +411,7 @@ fn vectors_hold_in_f32() {
 }
 
 fn run_lanes(level: Level) {
-    dispatch!(level, simd => run(Lanes::splat(simd, 0.0)));
+    skinfit::with_simd!(level, simd => run(Lanes::splat(simd, 0.0)));
 }
 
 #[test]

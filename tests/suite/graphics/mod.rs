@@ -6,6 +6,7 @@
 //! - `frames`: tiles, sequences, layers
 //! - `faults`: what is refused, and lost devices
 //! - `vectors`: the conformance vectors through the shader rules
+//! - `fused`: the fit engine on the adapter against the plain f64 model
 //! - `exported`: exported GLSL in place of the renderer's own
 
 mod accuracy;
@@ -13,5 +14,6 @@ mod bench;
 mod exported;
 mod faults;
 mod frames;
+mod fused;
 mod parity;
 mod vectors;

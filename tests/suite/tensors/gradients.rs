@@ -9,7 +9,8 @@ use skinfit::model::evaluate::{Setup, shade};
 use skinfit::model::fragment::Fragment;
 use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Column, Param, Params};
-use skinfit::samples::{LANES, SurfaceArrays, ViewSamples};
+use skinfit::samples::surface_records::{Asked, NEUTRAL};
+use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::tensor::footprint::cube_border;
 use skinfit::tensor::{Input, Inputs, Scatter, Shade, Shaded, Sparse};
 
@@ -18,6 +19,18 @@ use super::bench::{Random, assert_near, matrix, numbers, shared};
 const SIZES: [usize; 3] = [3, 4, 6];
 const GROUPS: usize = 3;
 const N: usize = (1 + 2 + 4) * LANES;
+
+const EVERYTHING: Asked = Asked {
+    bump: true,
+    normal: true,
+    albedo: true,
+    occlusion: true,
+    silhouette: true,
+    dapple: true,
+    specular: true,
+    attenuator: true,
+    weight: true,
+};
 
 /// Everything that the operation takes, in f64: by the order of [`Input::ALL`], cubes without their borders.
 type Numbers = [Vec<f64>; 9];
@@ -37,34 +50,24 @@ fn f32s(list: &[f64]) -> Vec<f32> {
 impl Case {
     fn new(form: Form, silhouette: Silhouette, effects: Effects, columns: Vec<Column>) -> Self {
         let mut random = Random::new(11);
-        let mut vectors = |count: usize| {
-            let list: Vec<[f64; 3]> = (0..count).map(|_| random.unit()).collect();
-            let plane = |c: usize| list.iter().map(|v| v[c] as f32).collect();
-            [plane(0), plane(1), plane(2)]
-        };
-        let [base, normal, view] = [vectors(N), vectors(N), vectors(N)];
         let group_start = vec![0, 1, 3, 7];
         let mut samples = ViewSamples {
             group_start: group_start.clone(),
             pixel: (0..(GROUPS * LANES) as u32).collect(),
             coverage: vec![1.0; GROUPS * LANES],
-            weight: vec![0.0; N],
-            surface: SurfaceArrays {
-                base,
-                normal,
-                view,
-                silhouette: f32s(&random.list(N, 0.05, 0.95)),
-                dapple: f32s(&random.list(N, 0.1, 1.0)),
-                ..SurfaceArrays::default()
-            },
+            surface: SurfaceRecords::new(EVERYTHING, N / LANES),
         };
         for group in 0..GROUPS {
-            let records = group_start[group]..group_start[group + 1];
-            for record in records.clone() {
+            let records = group_start[group] as usize..group_start[group + 1] as usize;
+            for slot in records.start * LANES..records.end * LANES {
                 // The last lane of each group is padding.
-                for lane in 0..LANES - 1 {
-                    samples.weight[record as usize * LANES + lane] = 1.0 / records.len() as f32;
-                }
+                let share = if slot % LANES == LANES - 1 { 0.0 } else { 1.0 / records.len() as f32 };
+                let mut unit = || random.unit().map(|x| x as f32);
+                let (base, normal, view) = (unit(), unit(), unit());
+                let silhouette = (0.05 + 0.9 * random.next()) as f32;
+                let dapple = (0.1 + 0.9 * random.next()) as f32;
+                let fragment = Fragment { base, normal, view, silhouette, dapple, ..NEUTRAL };
+                samples.surface.set(slot, &fragment, share);
             }
         }
         let mut params = Params::defaults(form);
@@ -117,22 +120,22 @@ impl Case {
             let group = slot / LANES;
             for record in self.samples.group_start[group]..self.samples.group_start[group + 1] {
                 let s = record as usize * LANES + slot % LANES;
-                let plane = |planes: &[Vec<f32>; 3]| std::array::from_fn(|c| f64::from(planes[c][s]));
+                let at = self.samples.surface.fragment(s);
                 let triple = |i: usize| std::array::from_fn(|c| numbers[i][3 * s + c]);
                 let fragment = Fragment {
-                    base: plane(&surface.base),
+                    base: at.base.map(f64::from),
                     bump: triple(5),
-                    normal: plane(&surface.normal),
-                    view: plane(&surface.view),
+                    normal: at.normal.map(f64::from),
+                    view: at.view.map(f64::from),
                     occlusion: numbers[4][s],
-                    silhouette: f64::from(surface.silhouette[s]),
-                    dapple: f64::from(surface.dapple[s]),
+                    silhouette: f64::from(at.silhouette),
+                    dapple: f64::from(at.dapple),
                     albedo: triple(1),
                     specular: numbers[2][s],
                     attenuator: numbers[3][s],
                 };
                 let shown = shade(self.setup, &lights, &fragment, &params);
-                let share = f64::from(self.samples.weight[s]);
+                let share = f64::from(self.samples.surface.weight(s));
                 (0..4).for_each(|c| image[4 * slot + c] += share * shown[c]);
             }
         }
@@ -153,12 +156,19 @@ impl Case {
             hilite: Some(cube(2)),
         };
         let mut samples = self.samples.clone();
-        let planes = |i: usize| std::array::from_fn(|c| (0..N).map(|s| self.numbers[i][3 * s + c] as f32).collect());
-        samples.surface.albedo = planes(1);
-        samples.surface.bump = planes(5);
-        samples.surface.specular = f32s(&self.numbers[2]);
-        samples.surface.attenuator = f32s(&self.numbers[3]);
-        samples.surface.occlusion = f32s(&self.numbers[4]);
+        for s in 0..N {
+            let triple = |i: usize| std::array::from_fn(|c| self.numbers[i][3 * s + c] as f32);
+            let fragment = Fragment {
+                albedo: triple(1),
+                specular: self.numbers[2][s] as f32,
+                attenuator: self.numbers[3][s] as f32,
+                occlusion: self.numbers[4][s] as f32,
+                bump: triple(5),
+                ..samples.surface.fragment(s)
+            };
+            let share = samples.surface.weight(s);
+            samples.surface.set(s, &fragment, share);
+        }
         let shaded =
             Shaded { setup: self.setup, params: &self.params, columns: &self.columns, illumination: &illumination };
         Shade::new(shared().unwrap(), &shaded, &[&samples], scatter).unwrap()

@@ -1,0 +1,280 @@
+//! What evaluates the passes of a fit, and how it is chosen.
+
+use super::{Refusal, tell};
+use crate::engine::Objective;
+use crate::engine::cpu::CpuEngine;
+use crate::engine::reference::{Reference, deviation};
+use crate::engine::view::ObservedView;
+use crate::prepare::Prepared;
+use crate::progress;
+
+/// How far an engine's sums may be from those in f64, relative to the largest entry that shares row and
+/// column: a few hundred roundings of f32, of either sign.
+const TOLERANCE: f64 = 1e-5;
+
+/// Which engine, and its options.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Engine")]
+pub(super) struct FitEngineArguments {
+    /// What makes the passes: the CPU, the GPU, or `auto`: a graphics card where there are so many samples
+    /// that opening it pays off.
+    #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = ["auto", "cpu", "gpu"])]
+    engine: String,
+    /// Part of the name of the graphics adapter to use [default: $WGPU_ADAPTER_NAME, or the fastest kind].
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Most megabytes of samples that stay on the graphics adapter; the others are uploaded in each pass
+    /// [default: as many as it takes].
+    #[arg(long, value_name = "MB")]
+    device_memory: Option<u64>,
+    /// Hold the first pass against the model in f64 before the fit, and stop if they differ. Takes as long as
+    /// some hundred passes.
+    #[arg(long)]
+    verify: bool,
+}
+
+/// An engine over the views of a scene.
+pub(super) enum FitEngine<'g> {
+    /// On the CPU.
+    Cpu(CpuEngine),
+    /// On a graphics adapter.
+    #[cfg(feature = "gpu")]
+    Gpu(crate::engine::gpu::GpuEngine<'g>),
+    /// There is none without the feature.
+    #[cfg(not(feature = "gpu"))]
+    Gpu(std::convert::Infallible, std::marker::PhantomData<&'g ()>),
+}
+
+impl FitEngine<'_> {
+    /// What solvers see of it.
+    pub(super) fn objective(&self) -> &dyn Objective {
+        match self {
+            Self::Cpu(engine) => engine,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(engine) => engine,
+            #[cfg(not(feature = "gpu"))]
+            Self::Gpu(never, _) => match *never {},
+        }
+    }
+
+    /// The views.
+    pub(super) fn views(&self) -> &[ObservedView] {
+        match self {
+            Self::Cpu(engine) => engine.views(),
+            #[cfg(feature = "gpu")]
+            Self::Gpu(engine) => engine.views(),
+            #[cfg(not(feature = "gpu"))]
+            Self::Gpu(never, _) => match *never {},
+        }
+    }
+
+    /// `cpu` or `gpu`.
+    pub(super) const fn name(&self) -> &'static str {
+        match self {
+            Self::Cpu(_) => "cpu",
+            Self::Gpu(..) => "gpu",
+        }
+    }
+
+    /// What it ran on, for the report.
+    pub(super) fn provenance(&self) -> Vec<(String, String)> {
+        match self {
+            Self::Cpu(_) => vec![
+                ("threads".to_owned(), rayon::current_num_threads().to_string()),
+                ("instructions".to_owned(), crate::simd::instructions()),
+            ],
+            #[cfg(feature = "gpu")]
+            Self::Gpu(engine) => {
+                let (resident, streamed) = engine.bytes();
+                vec![
+                    ("adapter".to_owned(), engine.adapter().to_owned()),
+                    ("bytes on the device".to_owned(), resident.to_string()),
+                    ("bytes uploaded a pass".to_owned(), streamed.to_string()),
+                ]
+            }
+            #[cfg(not(feature = "gpu"))]
+            Self::Gpu(never, _) => match *never {},
+        }
+    }
+}
+
+impl FitEngineArguments {
+    /// Whether an adapter may be opened.
+    pub(super) fn may_be_gpu(&self) -> bool {
+        self.engine != "cpu"
+    }
+
+    /// Call `then` with the engine that was asked for, over the scene's views.
+    pub(super) fn with_engine<T>(
+        &self,
+        prepared: &Prepared,
+        observed: Vec<ObservedView>,
+        then: impl FnOnce(&FitEngine<'_>) -> Result<T, Refusal>,
+    ) -> Result<T, Refusal> {
+        if self.wants_gpu(&observed) {
+            return self.with_gpu(prepared, observed, then);
+        }
+        let engine = FitEngine::Cpu(prepared.engine_over(observed));
+        self.check(prepared, &engine)?;
+        then(&engine)
+    }
+
+    /// Hold an engine against the model in f64, where that is asked for.
+    fn check(&self, prepared: &Prepared, engine: &FitEngine<'_>) -> Result<(), Refusal> {
+        if !self.verify {
+            return Ok(());
+        }
+        let (objective, point) = (engine.objective(), prepared.start());
+        let bar = progress::spinner("verify");
+        let reference = Reference::new(
+            prepared.setup(),
+            &prepared.illumination,
+            engine.views(),
+            prepared.scene.fit.loss,
+            objective.unknowns(),
+        );
+        let want = reference.normal_equations(&point);
+        let found = deviation(&objective.normal_equations(&point), &want, objective.unknowns());
+        bar.finish_and_clear();
+        let words = format!("{} of {} is off by {:.1e}", found.what, engine.name(), found.size);
+        if found.size <= TOLERANCE {
+            tell(&format!("verified against the model in f64: at most, {words}"));
+            return Ok(());
+        }
+        Err(Refusal::failure(format!(
+            "{}: the first pass differs from the model in f64: {words}, where {TOLERANCE:.0e} is allowed. Its driver \
+             may compute wrongly: fit with --engine cpu, and please report it.",
+            prepared.scene.path.display()
+        )))
+    }
+}
+
+#[cfg(feature = "gpu")]
+mod gpu {
+    use super::{FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, tell};
+    use crate::engine::gpu::{GpuEngine, Memory, Task};
+    use crate::gpu::{Choice, Gpu, GpuError};
+
+    /// Samples from which `auto` takes a graphics card, for each thread of the CPU: opening a device and
+    /// compiling take about 0.6 s, the ten passes of a fit 30 ns a sample and thread each.
+    const WORTH_A_THREAD: usize = 2_000_000;
+
+    impl FitEngineArguments {
+        /// Whether the GPU is to be tried; `auto` says why.
+        pub(super) fn wants_gpu(&self, observed: &[ObservedView]) -> bool {
+            match self.engine.as_str() {
+                "cpu" => false,
+                "gpu" => true,
+                _ => self.adapter.is_some() || self.is_worth_it(observed),
+            }
+        }
+
+        fn is_worth_it(&self, observed: &[ObservedView]) -> bool {
+            let samples: usize = observed.iter().map(|view| view.samples.count()).sum();
+            let threads = rayon::current_num_threads();
+            let enough = WORTH_A_THREAD * threads;
+            let engine = if samples >= enough { "a graphics card, if there is one" } else { "the CPU" };
+            tell(&format!(
+                "{engine} makes the passes: {samples} samples, and opening a card pays off from {enough} on \
+                 ({threads} threads)."
+            ));
+            samples >= enough
+        }
+
+        pub(super) fn with_gpu<T>(
+            &self,
+            prepared: &Prepared,
+            observed: Vec<ObservedView>,
+            then: impl FnOnce(&FitEngine<'_>) -> Result<T, Refusal>,
+        ) -> Result<T, Refusal> {
+            let must = self.engine == "gpu" || self.adapter.is_some();
+            let gpu = match self.open() {
+                Ok(gpu) if must || !gpu.is_software() => gpu,
+                Ok(gpu) => {
+                    tell(&format!(
+                        "{} is a program on the CPU: the CPU engine makes the passes.",
+                        gpu.name()
+                    ));
+                    return then(&FitEngine::Cpu(prepared.engine_over(observed)));
+                }
+                Err(error) if must => return Err(error.into()),
+                Err(error) => {
+                    tell(&format!("{error} The CPU engine makes the passes."));
+                    return then(&FitEngine::Cpu(prepared.engine_over(observed)));
+                }
+            };
+            let mut gpu = gpu;
+            let mut resident = self.device_memory.map(|megabytes| megabytes * 1_000_000);
+            loop {
+                match self.engine_on(&gpu, prepared, &observed, resident) {
+                    Ok(engine) => {
+                        let engine = FitEngine::Gpu(engine);
+                        self.check(prepared, &engine)?;
+                        return then(&engine);
+                    }
+                    // A device that ran out of memory is not to be trusted any more; half as much may fit.
+                    Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
+                        let all: u64 = observed.iter().map(bytes).sum();
+                        let most = resident.map_or(all, |most| most.min(all)) / 2;
+                        resident = Some(if most < 16_000_000 { 0 } else { most });
+                        tell(&format!(
+                            "{}: out of memory; trying again with {} MB of samples on it.",
+                            gpu.name(),
+                            resident.unwrap_or_default() / 1_000_000
+                        ));
+                        gpu = self.open()?;
+                    }
+                    Err(error) => return Err(error.into()),
+                }
+            }
+        }
+
+        fn open(&self) -> Result<Gpu, GpuError> {
+            Gpu::open(&Choice { name: self.adapter.clone(), max_side: None })
+        }
+
+        fn engine_on<'g>(
+            &self,
+            gpu: &'g Gpu,
+            prepared: &Prepared,
+            observed: &'g [ObservedView],
+            resident: Option<u64>,
+        ) -> Result<GpuEngine<'g>, GpuError> {
+            let task = Task {
+                setup: prepared.setup(),
+                illumination: prepared.illumination.clone(),
+                views: observed,
+                loss: prepared.scene.fit.loss,
+                unknowns: prepared.unknowns(),
+            };
+            GpuEngine::new(gpu, task, &prepared.start(), Memory { part: None, resident })
+        }
+    }
+
+    fn bytes(view: &ObservedView) -> u64 {
+        size_of_val(view.samples.surface.rows().all()) as u64
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+mod gpu {
+    use super::{FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal};
+
+    impl FitEngineArguments {
+        pub(super) fn wants_gpu(&self, _observed: &[ObservedView]) -> bool {
+            self.engine == "gpu" || self.adapter.is_some() || self.device_memory.is_some()
+        }
+
+        pub(super) fn with_gpu<T>(
+            &self,
+            _prepared: &Prepared,
+            _observed: Vec<ObservedView>,
+            _then: impl FnOnce(&FitEngine<'_>) -> Result<T, Refusal>,
+        ) -> Result<T, Refusal> {
+            Err(Refusal::new(
+                "this skinfit was built without its GPU engine. Build it with the feature `gpu` (a default one), or \
+                 fit with --engine cpu.",
+            ))
+        }
+    }
+}

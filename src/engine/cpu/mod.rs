@@ -1,0 +1,292 @@
+//! The CPU engine: all cores, SIMD, and the same sums for any number of threads.
+//!
+//! Samples are cut into chunks of a fixed number of groups. Within a chunk products are summed in
+//! f32 lanes (at most 64 terms a lane), then folded to f64; the chunks' sums are added pairwise in
+//! their order. So the order of additions never depends on threads, and the rounding error stays
+//! that of short sums however many samples there are.
+//!
+//! - `kept`: what stays from pass to pass: the lobe's cube, and terms that no free parameter moves
+//! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
+//! - `image`: the forward pass
+
+mod image;
+mod kept;
+mod sums;
+
+use std::sync::{Arc, Mutex};
+
+use fearless_simd::Level;
+use rayon::prelude::*;
+
+use self::kept::{Kept, Lobe};
+use self::sums::{BLOCK, Blocks, CHUNK, Scratch, Sums, Wish, pairwise};
+use super::gram::pair;
+use super::kernel::Kernel;
+use super::lanes::Lanes;
+use super::plan::Plan;
+use super::records::Records;
+use super::view::ObservedView;
+use super::{NormalEquations, Objective, Point, Unknown};
+use crate::bake::LobeStack;
+use crate::model::compose::Weights;
+use crate::model::cube::Cube;
+use crate::model::evaluate::Setup;
+use crate::model::fragment::LookupParam;
+use crate::model::lights::{Cubes, Lights};
+use crate::model::params::{Param, Params};
+use crate::samples::rows::Row;
+use crate::scene::Loss;
+use crate::simd::Simd;
+use crate::with_simd;
+
+/// The lights of a scene: the cubes that the enabled effects ask for.
+#[derive(Clone, Debug, Default)]
+pub struct Illumination {
+    /// E_d.
+    pub irradiance: Option<Cube<f32>>,
+    /// E_s over its exponents.
+    pub lobes: Option<LobeStack>,
+    /// E_h.
+    pub hilite: Option<Cube<f32>>,
+}
+
+/// Loss, gradient and normal equations on the CPU.
+#[derive(Debug)]
+pub struct CpuEngine {
+    setup: Setup,
+    illumination: Illumination,
+    views: Vec<ObservedView>,
+    loss: Loss,
+    unknowns: Vec<Unknown>,
+    plan: Plan,
+    level: Level,
+    /// Each pass reads every `stride`-th block of groups only.
+    stride: usize,
+    /// Sum of weights over the pixels that a pass reads, and how many of them count.
+    weight: (f64, u64),
+    /// The specular cube of the last exponent, and its slope.
+    lobe: Mutex<Option<Arc<Lobe>>>,
+    /// Kept terms, and the parameters that they were made with.
+    kept: Mutex<Option<Arc<Kept>>>,
+}
+
+impl CpuEngine {
+    /// An engine over `views` for the `unknowns`.
+    #[must_use]
+    pub fn new(
+        setup: Setup,
+        illumination: Illumination,
+        views: Vec<ObservedView>,
+        loss: Loss,
+        unknowns: Vec<Unknown>,
+    ) -> Self {
+        Self::with_kept_terms(setup, illumination, views, loss, unknowns, true)
+    }
+
+    /// As [`Self::new`]; with `keep` false every lookup is done anew in each pass.
+    #[must_use]
+    pub fn with_kept_terms(
+        setup: Setup,
+        illumination: Illumination,
+        views: Vec<ObservedView>,
+        loss: Loss,
+        unknowns: Vec<Unknown>,
+        keep: bool,
+    ) -> Self {
+        let compare_alpha = views.iter().any(ObservedView::compares_alpha);
+        let plan = Plan::new(setup, &unknowns, compare_alpha, keep);
+        let mut engine = Self {
+            setup,
+            illumination,
+            views,
+            loss,
+            unknowns,
+            plan,
+            level: Level::new(),
+            stride: 1,
+            weight: (0.0, 0),
+            lobe: Mutex::new(None),
+            kept: Mutex::new(None),
+        };
+        engine.set_stride(1);
+        engine
+    }
+
+    /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
+    pub fn set_stride(&mut self, stride: usize) {
+        self.stride = stride.max(1);
+        self.weight = (0.0, 0);
+        for view in &self.views {
+            let groups = view.samples.groups();
+            let read = self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK));
+            let (weight, count) = view.weight_and_count(read);
+            self.weight.0 += weight;
+            self.weight.1 += count;
+        }
+    }
+
+    /// The blocks that a pass reads.
+    fn read_blocks(&self, view: &ObservedView) -> impl Iterator<Item = usize> + use<> {
+        (0..view.samples.groups().div_ceil(BLOCK)).step_by(self.stride)
+    }
+
+    /// The views.
+    #[must_use]
+    pub fn views(&self) -> &[ObservedView] {
+        &self.views
+    }
+
+    /// Surface samples of positive weight, over all views.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.views.iter().map(|view| view.samples.count() as u64).sum()
+    }
+
+    /// How many blocks of pixels there are in all views.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.views.iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
+    }
+
+    #[inline(always)]
+    fn kernel<'a, S: Simd>(
+        &'a self,
+        simd: S,
+        view: &'a ObservedView,
+        kept: &'a [Row],
+        params: &Params,
+        lobe: Option<&'a Lobe>,
+        gain: f64,
+    ) -> Kernel<'a, S> {
+        let like = Lanes::splat(simd, 0.0);
+        let cubes = Cubes {
+            irradiance: self.illumination.irradiance.as_ref(),
+            specular: lobe.map(|l| &l.cube),
+            lobe_slope: lobe.map(|l| &l.slope),
+            hilite: self.illumination.hilite.as_ref(),
+        };
+        let turning = self.plan.lookups.contains(&LookupParam::EnvironmentRotation);
+        Kernel {
+            simd,
+            plan: &self.plan,
+            view: Records::new(view),
+            kept,
+            lights: Lights::new(self.setup, params, cubes, turning, like),
+            weights: Weights::new(params, self.setup.effects, like),
+            strength: params.scalar(Param::NormalStrength) as f32,
+            gain: gain as f32,
+            loss: self.loss,
+        }
+    }
+
+    /// One pass: sums over every chunk of every view.
+    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let kept = self.kept(&point.params, lobe.as_deref());
+        let k = self.unknowns.len();
+        let mut total = NormalEquations {
+            loss: 0.0,
+            residual: 0.0,
+            weight: self.weight.0 * self.plan.channels.len() as f64,
+            count: self.weight.1 * self.plan.channels.len() as u64,
+            jtr: vec![0.0; k],
+            jtj: vec![0.0; k * k],
+        };
+        for (index, view) in self.views.iter().enumerate() {
+            let gain = point.gains.get(index).copied().unwrap_or(1.0);
+            let groups = view.samples.groups();
+            let blocks: Vec<usize> = self.read_blocks(view).collect();
+            let sums: Vec<Sums> = blocks
+                .par_chunks(CHUNK)
+                .map_init(
+                    || Scratch::new(&self.plan),
+                    |scratch, blocks| {
+                        with_simd!(self.level, simd => {
+                            let kernel = self.kernel(simd, view, &kept.views[index], &point.params, lobe.as_deref(), gain);
+                            sums::chunk(&kernel, Blocks { blocks, groups }, wish, scratch)
+                        })
+                    },
+                )
+                .collect();
+            self.add(index, &pairwise(sums), wish, &mut total);
+        }
+        if total.weight > 0.0 {
+            total.loss /= total.weight;
+        }
+        total
+    }
+
+    /// One view's packed sums into the full matrices.
+    fn add(&self, view: usize, sums: &Sums, wish: Wish, total: &mut NormalEquations) {
+        let Some(loss) = sums.0.last() else { return };
+        total.loss += loss;
+        let k = self.unknowns.len();
+        let gain = self.unknowns.iter().position(|u| *u == Unknown::Gain(view));
+        let mut base = 0;
+        for channel in &self.plan.channels {
+            let count = channel.columns + 1;
+            let unknown: Vec<Option<usize>> = channel.unknowns.iter().map(|u| u.or(gain)).collect();
+            match wish {
+                Wish::Loss => {}
+                Wish::Gradient => {
+                    for i in 0..channel.columns {
+                        if let Some(a) = unknown[i] {
+                            total.jtr[a] += sums.0[base + i];
+                        }
+                    }
+                    total.residual += sums.0[base + channel.columns];
+                    base += count;
+                }
+                Wish::Normal => {
+                    for i in 0..channel.columns {
+                        let Some(a) = unknown[i] else { continue };
+                        total.jtr[a] += sums.0[base + pair(i, channel.columns, count)];
+                        for j in i..channel.columns {
+                            let Some(b) = unknown[j] else { continue };
+                            let value = sums.0[base + pair(i, j, count)];
+                            total.jtj[a * k + b] += value;
+                            if a != b {
+                                total.jtj[b * k + a] += value;
+                            }
+                        }
+                    }
+                    total.residual += sums.0[base + pair(channel.columns, channel.columns, count)];
+                    base += channel.pairs();
+                }
+            }
+        }
+    }
+}
+
+impl Objective for CpuEngine {
+    fn unknowns(&self) -> &[Unknown] {
+        &self.unknowns
+    }
+
+    fn is_quadratic(&self) -> bool {
+        matches!(self.loss, Loss::L2 | Loss::RelativeL2) && self.views.iter().all(|view| view.clip.is_none())
+    }
+
+    fn rounding(&self) -> f64 {
+        let read = |view: &ObservedView| {
+            let groups = view.samples.groups();
+            self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK)).collect()
+        };
+        super::rounding(self.views.iter().map(|view| (view, read(view))), self.loss)
+    }
+
+    fn normal_equations(&self, point: &Point) -> NormalEquations {
+        self.pass(point, Wish::Normal)
+    }
+
+    fn loss(&self, point: &Point) -> f64 {
+        self.pass(point, Wish::Loss).loss
+    }
+
+    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
+        let sums = self.pass(point, Wish::Gradient);
+        // The loss is a mean of rho, and J^T r sums d rho / 2.
+        let factor = if sums.weight > 0.0 { 2.0 / sums.weight } else { 0.0 };
+        (sums.loss, sums.jtr.iter().map(|x| factor * x).collect())
+    }
+}

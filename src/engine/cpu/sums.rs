@@ -1,0 +1,113 @@
+//! The sums of a chunk of blocks, and of chunks in a fixed order.
+
+use crate::engine::gram::{Columns, add_gram, add_last};
+use crate::engine::kernel::Kernel;
+use crate::engine::lanes::Lanes;
+use crate::engine::plan::{ChannelPlan, Plan, WINDOW};
+use crate::samples::LANES;
+use crate::samples::rows::Row;
+use crate::simd::Simd;
+
+/// Groups in a block: what the scratch holds at once (it should stay in the nearest caches).
+pub(super) const BLOCK: usize = 8;
+/// Blocks in a chunk: one unit of work, and 64 terms a lane.
+pub(super) const CHUNK: usize = 8;
+
+/// What a pass yields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wish {
+    Loss,
+    Gradient,
+    Normal,
+}
+
+/// The blocks of a chunk.
+pub(super) struct Blocks<'a> {
+    pub(super) blocks: &'a [usize],
+    /// How many groups there are in all; the last block may be short of some.
+    pub(super) groups: usize,
+}
+
+/// Packed sums of a chunk: each channel's triangle (or its last column), then the loss.
+pub(super) struct Sums(pub(super) Vec<f64>);
+
+/// Sum in a fixed binary tree: as accurate as it is deterministic.
+pub(super) fn pairwise(mut sums: Vec<Sums>) -> Sums {
+    let mut width = sums.len();
+    while width > 1 {
+        let half = width.div_ceil(2);
+        let (low, high) = sums.split_at_mut(half);
+        for (a, b) in low.iter_mut().zip(&high[..width - half]) {
+            for (x, y) in a.0.iter_mut().zip(&b.0) {
+                *x += y;
+            }
+        }
+        width = half;
+    }
+    sums.into_iter().next().unwrap_or(Sums(Vec::new()))
+}
+
+pub(super) struct Scratch {
+    rows: Vec<Row>,
+    sums: Vec<Row>,
+}
+
+impl Scratch {
+    pub(super) fn new(plan: &Plan) -> Self {
+        let pairs: usize = plan.channels.iter().map(ChannelPlan::pairs).sum();
+        Self {
+            rows: vec![Row::ZERO; plan.all_columns() * (BLOCK - 1) + WINDOW],
+            sums: vec![Row::ZERO; pairs],
+        }
+    }
+}
+
+/// The sums over a few blocks.
+#[inline(always)]
+pub(super) fn chunk<S: Simd>(
+    kernel: &Kernel<'_, S>,
+    Blocks { blocks, groups }: Blocks<'_>,
+    wish: Wish,
+    scratch: &mut Scratch,
+) -> Sums {
+    let simd = kernel.simd;
+    let Scratch { rows, sums } = scratch;
+    let stride = kernel.plan.all_columns();
+    sums.fill(Row::ZERO);
+    let mut loss = Lanes::splat(simd, 0.0);
+    let mut used = 0;
+    for &block in blocks {
+        let first = block * BLOCK;
+        let length = groups.min(first + BLOCK) - first;
+        for k in 0..length {
+            let Some(rows) = rows[k * stride..].first_chunk_mut() else { break };
+            if wish == Wish::Loss {
+                kernel.group::<false>(first + k, rows);
+                loss = loss + kernel.weigh::<false>(first + k, rows);
+            } else {
+                kernel.group::<true>(first + k, rows);
+                loss = loss + kernel.weigh::<true>(first + k, rows);
+            }
+        }
+        used = 0;
+        for channel in &kernel.plan.channels {
+            let count = channel.columns + 1;
+            let columns = Columns { rows: &rows[..length * stride], stride, first: channel.start, count };
+            match wish {
+                Wish::Loss => {}
+                Wish::Gradient => {
+                    add_last(simd, columns, &mut sums[used..]);
+                    used += count;
+                }
+                Wish::Normal => {
+                    add_gram(simd, columns, &mut sums[used..]);
+                    used += channel.pairs();
+                }
+            }
+        }
+    }
+    let fold = |lanes: &[f32; LANES]| lanes.iter().map(|&x| f64::from(x)).sum::<f64>();
+    let mut folded: Vec<f64> = sums[..used].iter().map(|row| fold(row)).collect();
+    folded.push(fold(&loss.to_array()));
+    Sums(folded)
+}

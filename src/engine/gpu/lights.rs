@@ -1,0 +1,130 @@
+//! The cubes and the uniform block of a fit.
+
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, BindingType, Buffer,
+    BufferUsages, TextureSampleType, TextureView, TextureViewDimension,
+};
+
+use super::pipeline::{UNIFORM, buffer, layout};
+use crate::engine::cpu::Illumination;
+use crate::gpu::constants::model_block;
+use crate::gpu::{Gpu, GpuError, texels, upload};
+use crate::model::cube::Cube;
+use crate::model::params::{Param, Params};
+use crate::shader::{Plan, Resource};
+
+/// The cubes, each uploaded once, but for the specular one: again when its exponent has changed.
+pub(super) struct DeviceLights {
+    illumination: Illumination,
+    irradiance: Option<TextureView>,
+    hilite: Option<TextureView>,
+    /// The exponent, E_s there, and how it moves.
+    specular: Option<(f64, TextureView, TextureView)>,
+    /// Counts changes, so that bindings can follow.
+    version: u64,
+}
+
+impl DeviceLights {
+    pub(super) const fn new(illumination: Illumination) -> Self {
+        Self { illumination, irradiance: None, hilite: None, specular: None, version: 0 }
+    }
+
+    /// Have what a program reads ready for a pass at `params`.
+    pub(super) fn set(&mut self, gpu: &Gpu, params: &Params, inputs: &mut Inputs) -> Result<(), GpuError> {
+        let upload = |name: &str, cube: &Cube<f32>| upload::texture(gpu, name, &texels::faces(cube));
+        for &resource in &inputs.plan.resources {
+            match resource {
+                Resource::IrradianceFaces if self.irradiance.is_none() => {
+                    let cube = self.illumination.irradiance.as_ref();
+                    self.irradiance = cube.map(|cube| upload("irradiance faces", cube)).transpose()?;
+                    self.version += 1;
+                }
+                Resource::HiliteFaces if self.hilite.is_none() => {
+                    let cube = self.illumination.hilite.as_ref();
+                    self.hilite = cube.map(|cube| upload("hilite faces", cube)).transpose()?;
+                    self.version += 1;
+                }
+                Resource::SpecularFaces | Resource::SpecularSlopeFaces => {
+                    let exponent = params.scalar(Param::SpecularLobe);
+                    if self.specular.as_ref().is_none_or(|(at, ..)| *at != exponent)
+                        && let Some(stack) = &self.illumination.lobes
+                    {
+                        let (cube, slope) = stack.at(exponent);
+                        let (cube, slope) =
+                            (upload("specular faces", &cube)?, upload("specular slope faces", &slope)?);
+                        self.specular = Some((exponent, cube, slope));
+                        self.version += 1;
+                    }
+                }
+                _ => {}
+            }
+        }
+        inputs.bind(gpu, self, &model_block(&inputs.plan.constants, params))
+    }
+
+    /// A resource of the plan.
+    fn view(&self, gpu: &Gpu, resource: Resource) -> Result<&TextureView, GpuError> {
+        let found = match resource {
+            Resource::IrradianceFaces => self.irradiance.as_ref(),
+            Resource::HiliteFaces => self.hilite.as_ref(),
+            Resource::SpecularFaces => self.specular.as_ref().map(|(_, cube, _)| cube),
+            Resource::SpecularSlopeFaces => self.specular.as_ref().map(|(.., slope)| slope),
+            _ => None,
+        };
+        found.ok_or_else(|| GpuError::Refused {
+            adapter: gpu.name().to_owned(),
+            reason: format!("the shader reads {}, which the scene does not have", resource.name()),
+        })
+    }
+}
+
+/// Group 0 of a shader: its plan's constants and cubes.
+pub(super) struct Inputs {
+    plan: Plan,
+    pub(super) layout: BindGroupLayout,
+    constants: Option<Buffer>,
+    /// The cubes' version that is bound.
+    bound: Option<(u64, BindGroup)>,
+}
+
+impl Inputs {
+    pub(super) fn new(gpu: &Gpu, plan: &Plan) -> Self {
+        let faces = BindingType::Texture {
+            sample_type: TextureSampleType::Float { filterable: false },
+            view_dimension: TextureViewDimension::D2Array,
+            multisampled: false,
+        };
+        let has_constants = !plan.constants.is_empty();
+        let cubes = (1..=plan.resources.len() as u32).map(|binding| (binding, faces));
+        let kinds: Vec<_> = has_constants.then_some((0, UNIFORM)).into_iter().chain(cubes).collect();
+        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+        let constants = has_constants.then(|| buffer(gpu, "constants", 16 * plan.constants.len(), usage));
+        Self { plan: plan.clone(), layout: layout(gpu, "lights", &kinds), constants, bound: None }
+    }
+
+    /// What is bound, once a pass has set it.
+    pub(super) fn bound(&self) -> Option<&BindGroup> {
+        self.bound.as_ref().map(|(_, group)| group)
+    }
+
+    fn bind(&mut self, gpu: &Gpu, lights: &DeviceLights, block: &[f32]) -> Result<(), GpuError> {
+        if let Some(buffer) = &self.constants {
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(block));
+        }
+        if self.bound.as_ref().is_some_and(|(version, _)| *version == lights.version) {
+            return Ok(());
+        }
+        let mut entries = Vec::new();
+        if let Some(buffer) = &self.constants {
+            entries.push(BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() });
+        }
+        for (binding, &resource) in (1..).zip(&self.plan.resources) {
+            let resource = BindingResource::TextureView(lights.view(gpu, resource)?);
+            entries.push(BindGroupEntry { binding, resource });
+        }
+        let descriptor =
+            BindGroupDescriptor { label: Some("lights"), layout: &self.layout, entries: &entries };
+        self.bound = Some((lights.version, gpu.device.create_bind_group(&descriptor)));
+        gpu.check()
+    }
+}

@@ -1,0 +1,330 @@
+//! The GPU engine: the fused pass ([`crate::shader::fused`]) over samples on a graphics adapter.
+//!
+//! - [`GpuEngine`]: the objective; what it is made of and how sums become normal equations
+//! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
+//!   memory allowed is uploaded anew in each pass
+//! - `lights`: the cubes and the uniform block, as shaders are given them
+//! - `program`: the shaders of a wish, and one run of them; `images`: the forward pass
+//! - `pipeline`: what both make pipelines and bindings with
+
+mod images;
+mod lights;
+mod parts;
+mod pipeline;
+mod program;
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use self::images::Images;
+use self::lights::DeviceLights;
+use self::parts::{Parts, Traits};
+use self::program::Program;
+use super::cpu::Illumination;
+use super::view::ObservedView;
+use super::{NormalEquations, Objective, Point, Unknown};
+use crate::gpu::{Gpu, GpuError};
+use crate::model::evaluate::Setup;
+use crate::model::params::Param;
+use crate::scene::Loss;
+use crate::shader::fused::{BLOCK, ColumnOf, Fitted, Fused, Sum, Wish};
+
+/// How much of the device is used.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Memory {
+    /// Most bytes of a part: the adapter's limit for a binding, unless this is lower.
+    pub part: Option<u64>,
+    /// Most bytes that stay on the device; parts beyond it are uploaded in each pass. Without: all stay.
+    pub resident: Option<u64>,
+}
+
+/// What is fitted.
+#[derive(Clone, Debug)]
+pub struct Task<'v> {
+    /// The switches of the model.
+    pub setup: Setup,
+    /// The cubes that its effects ask for.
+    pub illumination: Illumination,
+    /// Samples and targets.
+    pub views: &'v [ObservedView],
+    /// What is minimised.
+    pub loss: Loss,
+    /// What is free.
+    pub unknowns: Vec<Unknown>,
+}
+
+/// Loss, gradient and normal equations on a graphics adapter.
+pub struct GpuEngine<'g> {
+    gpu: &'g Gpu,
+    setup: Setup,
+    views: &'g [ObservedView],
+    loss: Loss,
+    unknowns: Vec<Unknown>,
+    stride: usize,
+    /// Sum of weights over the pixels that a pass reads, and how many of them count.
+    weight: (f64, u64),
+    alpha: bool,
+    traits: Traits,
+    /// What changes between passes; a pass at a time.
+    device: Mutex<OnDevice>,
+    fault: Mutex<Option<GpuError>>,
+}
+
+/// What is on the device.
+struct OnDevice {
+    parts: Parts,
+    lights: DeviceLights,
+    /// By wish, and by whether the environment is turned.
+    programs: BTreeMap<(Wish, bool), Program>,
+    /// The forward pass, and whether it is for a turned environment.
+    images: Option<(bool, Images)>,
+}
+
+impl<'g> GpuEngine<'g> {
+    /// An engine for a task; the shaders for passes at `start` are compiled.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn new(gpu: &'g Gpu, task: Task<'g>, start: &Point, memory: Memory) -> Result<Self, GpuError> {
+        let Task { setup, illumination, views, loss, unknowns } = task;
+        let alpha = views.iter().any(ObservedView::compares_alpha);
+        let traits = Traits::of(gpu, views)?;
+        let mut engine = Self {
+            gpu,
+            setup,
+            loss,
+            unknowns,
+            stride: 1,
+            weight: (0.0, 0),
+            alpha,
+            traits,
+            device: Mutex::new(OnDevice {
+                parts: Parts::default(),
+                lights: DeviceLights::new(illumination),
+                programs: BTreeMap::new(),
+                images: None,
+            }),
+            fault: Mutex::new(None),
+            views,
+        };
+        let parts = Parts::new(gpu, views, &engine.traits, memory)?;
+        engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
+        engine.set_stride(1);
+        // Whatever the driver refuses shows here, and not in the midst of a fit.
+        engine.sums(start, Wish::Normal)?;
+        Ok(engine)
+    }
+
+    /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
+    pub fn set_stride(&mut self, stride: usize) {
+        self.stride = stride.max(1);
+        let device = self.device.get_mut().unwrap_or_else(PoisonError::into_inner);
+        self.weight = device.parts.set_stride(self.stride);
+    }
+
+    /// The views.
+    #[must_use]
+    pub const fn views(&self) -> &'g [ObservedView] {
+        self.views
+    }
+
+    /// Bytes of samples, targets and weights that stay on the device, and bytes that each pass uploads.
+    #[must_use]
+    pub fn bytes(&self) -> (u64, u64) {
+        self.lock().parts.bytes()
+    }
+
+    /// The adapter's name.
+    #[must_use]
+    pub fn adapter(&self) -> &str {
+        self.gpu.name()
+    }
+
+    /// How many blocks of pixels there are in all views.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.views
+            .iter()
+            .map(|view| (view.samples.groups() * crate::samples::LANES).div_ceil(BLOCK as usize))
+            .sum()
+    }
+
+    /// Why no pass can be made any more, if so.
+    #[must_use]
+    pub fn device_fault(&self) -> Option<GpuError> {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, OnDevice> {
+        self.device.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether the environment is turned at `point`, or will be.
+    fn turned(&self, point: &Point) -> bool {
+        let free = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
+        point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.unknowns.iter().any(free)
+    }
+
+    fn fused(&self, turned: bool) -> Result<Fused, GpuError> {
+        let fitted = Fitted {
+            setup: self.setup,
+            unknowns: self.unknowns.clone(),
+            loss: self.loss,
+            alpha: self.alpha,
+            turned,
+            places: self.traits.places,
+            rows: self.traits.rows,
+            several: self.traits.several,
+            weighted: self.traits.weighted,
+            clipped: self.traits.clipped,
+        };
+        Fused::new(fitted).map_err(GpuError::Plan)
+    }
+
+    /// One pass: for each part of each view its sums.
+    fn sums(&self, point: &Point, wish: Wish) -> Result<Passed, GpuError> {
+        let turned = self.turned(point);
+        let mut device = self.lock();
+        let OnDevice { parts, lights, programs, .. } = &mut *device;
+        let program = match programs.entry((wish, turned)) {
+            std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
+            std::collections::btree_map::Entry::Vacant(entry) => {
+                entry.insert(Program::new(self.gpu, self.fused(turned)?, wish, parts)?)
+            }
+        };
+        lights.set(self.gpu, &point.params, &mut program.inputs)?;
+        let sums = program.run(self.gpu, parts, self.views, &point.gains)?;
+        Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
+    }
+
+    /// The image of view `index` at `point`, as the CPU engine's: for each pixel slot the mean over its
+    /// samples, colour and (where the haze is compared) alpha, times the view's gain.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn image(&self, index: usize, point: &Point) -> Result<Vec<Vec<f32>>, GpuError> {
+        self.with_images(point, |images, parts| images.read(self.gpu, parts, index))
+    }
+
+    /// Shade every view and wait for it; the images stay on the device. To be timed.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn shade(&self, point: &Point) -> Result<(), GpuError> {
+        self.with_images(point, |_, _| self.gpu.wait())
+    }
+
+    fn with_images<T>(
+        &self,
+        point: &Point,
+        then: impl FnOnce(&Images, &Parts) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        let turned = self.turned(point);
+        let mut device = self.lock();
+        let OnDevice { parts, lights, images, .. } = &mut *device;
+        if images.as_ref().is_none_or(|(of, _)| *of != turned) {
+            *images = Some((turned, Images::new(self.gpu, self.fused(turned)?, parts)?));
+        }
+        let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
+        lights.set(self.gpu, &point.params, &mut images.inputs)?;
+        images.run(self.gpu, parts, self.views, &point.gains)?;
+        then(images, parts)
+    }
+
+    /// A pass as normal equations; after a fault, numbers that no solver takes.
+    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+        let channels: u32 = if self.alpha { 4 } else { 3 };
+        let k = self.unknowns.len();
+        let mut total = NormalEquations {
+            loss: 0.0,
+            residual: 0.0,
+            weight: self.weight.0 * f64::from(channels),
+            count: self.weight.1 * u64::from(channels),
+            jtr: vec![0.0; k],
+            jtj: vec![0.0; k * k],
+        };
+        match self.sums(point, wish) {
+            Ok(passed) => passed.add_to(&mut total, &self.unknowns),
+            Err(error) => {
+                self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                total.loss = f64::NAN;
+            }
+        }
+        if total.weight > 0.0 {
+            total.loss /= total.weight;
+        }
+        total
+    }
+}
+
+/// What a pass yielded.
+struct Passed {
+    /// For each part, its sums.
+    sums: Vec<Vec<(Sum, f64)>>,
+    columns: Vec<ColumnOf>,
+    /// For each part, its view.
+    view_of: Vec<usize>,
+}
+
+impl Passed {
+    /// Add the parts' sums, in their order.
+    fn add_to(&self, total: &mut NormalEquations, unknowns: &[Unknown]) {
+        let k = unknowns.len();
+        for (sums, &view) in self.sums.iter().zip(&self.view_of) {
+            let gain = unknowns.iter().position(|u| *u == Unknown::Gain(view));
+            let unknown = |i: usize| self.columns[i].unknown.or(gain);
+            let last = self.columns.len();
+            for &(sum, value) in sums {
+                match sum {
+                    Sum::Loss => total.loss += value,
+                    Sum::Product(i, j) if i == last && j == last => total.residual += value,
+                    Sum::Product(i, j) if j == last => {
+                        if let Some(a) = unknown(i) {
+                            total.jtr[a] += value;
+                        }
+                    }
+                    Sum::Product(i, j) => {
+                        let (Some(a), Some(b)) = (unknown(i), unknown(j)) else { continue };
+                        total.jtj[a * k + b] += value;
+                        if a != b {
+                            total.jtj[b * k + a] += value;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Objective for GpuEngine<'_> {
+    fn unknowns(&self) -> &[Unknown] {
+        &self.unknowns
+    }
+
+    fn is_quadratic(&self) -> bool {
+        matches!(self.loss, Loss::L2 | Loss::RelativeL2) && !self.traits.clipped
+    }
+
+    fn rounding(&self) -> f64 {
+        super::rounding(self.views.iter().map(|view| (view, (0..view.samples.groups()).collect())), self.loss)
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.device_fault().map(|error| error.to_string())
+    }
+
+    fn normal_equations(&self, point: &Point) -> NormalEquations {
+        self.pass(point, Wish::Normal)
+    }
+
+    fn loss(&self, point: &Point) -> f64 {
+        self.pass(point, Wish::Loss).loss
+    }
+
+    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
+        let sums = self.pass(point, Wish::Gradient);
+        // The loss is a mean of rho, and J^T r sums d rho / 2.
+        let factor = if sums.weight > 0.0 { 2.0 / sums.weight } else { 0.0 };
+        (sums.loss, sums.jtr.iter().map(|x| factor * x).collect())
+    }
+}

@@ -1,0 +1,191 @@
+//! The chain rule over a plan's steps: how its output moves with a constant, a quantity or a resource.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+
+use super::{TangentError, Tangents};
+use crate::shader::emit::{Plan, hazy, parts};
+use crate::shader::module::uniform;
+use crate::shader::quantity::{Constant, Resource};
+use crate::shader::rule::{Rule, Stage};
+
+/// What moves.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Seed {
+    /// A constant or a quantity, by its name; `tangent` is WGSL of its type.
+    Named {
+        /// Its name in rules.
+        name: &'static str,
+        /// How it moves.
+        tangent: String,
+    },
+    /// The content of a resource, which every lookup is linear in: `slope` holds how its texels move.
+    Resource {
+        /// What rules read.
+        resource: Resource,
+        /// What is read instead.
+        slope: Resource,
+    },
+}
+
+/// How a plan's output moves along seeds.
+#[derive(Clone, Debug, Default)]
+pub struct Chain {
+    /// Functions that the lines call, to stand after the plan's own.
+    pub functions: String,
+    /// Resources that they read beside the plan's.
+    pub resources: Vec<Resource>,
+    /// For each seed its lines, to stand after the plan's calls; they name what those do.
+    pub lines: Vec<String>,
+    /// For each seed, how the radiance moves (WGSL of a `vec3f`); `None` where it stays.
+    pub radiance: Vec<Option<String>>,
+    /// For each seed, how the haze moves (an `f32`).
+    pub haze: Vec<Option<String>>,
+}
+
+impl Chain {
+    /// Of the fragment stage of a plan over stored samples, whose fields stand in `at`.
+    ///
+    /// # Errors
+    /// When a rule does what the chain rule is not written for.
+    pub fn new(plan: &Plan, seeds: &[Seed]) -> Result<Self, TangentError> {
+        let mut tangents = Tangents::new(&plan.declarations(true))?;
+        let mut chain = Self::default();
+        for (k, seed) in seeds.iter().enumerate() {
+            chain.lines.push(String::new());
+            let moved = chain.follow(plan, k, seed, &mut tangents)?;
+            let along: Vec<&str> = parts(&plan.facts)
+                .into_iter()
+                .filter_map(|part| moved.get(part).map(String::as_str))
+                .collect();
+            chain.radiance.push((!along.is_empty()).then(|| along.join(" + ")));
+            chain.haze.push(if hazy(&plan.facts) { moved.get("haze").cloned() } else { None });
+        }
+        chain.functions.push_str(tangents.text());
+        Ok(chain)
+    }
+
+    /// The lines of one seed; returns the quantities that move with it, and how.
+    fn follow(
+        &mut self,
+        plan: &Plan,
+        k: usize,
+        seed: &Seed,
+        tangents: &mut Tangents,
+    ) -> Result<BTreeMap<&'static str, String>, TangentError> {
+        let mut moved: BTreeMap<&'static str, String> = BTreeMap::new();
+        if let Seed::Named { name, tangent } = seed {
+            let typed = plan.rules(Stage::Fragment).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
+            if let Some((_, kind)) = typed {
+                let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
+                moved.insert(name, format!("d{k}_{name}"));
+            }
+        }
+        for rule in plan.rules(Stage::Fragment) {
+            let call = match seed {
+                Seed::Resource { resource, slope } if rule.reads.contains(&resource.name()) => {
+                    Some(self.slope_call(plan, rule, *resource, *slope))
+                }
+                _ => tangent_call(plan, rule, &moved, tangents)?,
+            };
+            // A seed's own quantity moves as it was told to.
+            let held = |quantity: &str| matches!(seed, Seed::Named { name, .. } if *name == quantity);
+            if let Some(call) = call {
+                self.lines_of(k, rule, &call, &mut moved, held);
+            }
+        }
+        Ok(moved)
+    }
+
+    fn lines_of(
+        &mut self,
+        k: usize,
+        rule: &Rule,
+        call: &str,
+        moved: &mut BTreeMap<&'static str, String>,
+        held: impl Fn(&str) -> bool,
+    ) {
+        if let [(quantity, "")] = rule.gives.as_slice() {
+            if !held(quantity) {
+                let _ = writeln!(self.lines[k], "    let d{k}_{quantity}: {} = {call};", rule.returns);
+                moved.insert(quantity, format!("d{k}_{quantity}"));
+            }
+            return;
+        }
+        let both = format!("d{k}_{}_and_more", rule.gives[0].0);
+        let _ = writeln!(self.lines[k], "    let {both}: {} = {call};", rule.returns);
+        for (quantity, swizzle) in rule.gives.iter().filter(|(quantity, _)| !held(quantity)) {
+            moved.insert(quantity, format!("{both}.{swizzle}"));
+        }
+    }
+
+    /// A rule's function with another resource in the place of the one that it reads.
+    fn slope_call(&mut self, plan: &Plan, rule: &Rule, resource: Resource, slope: Resource) -> String {
+        let name = format!("{}_slope", rule.function);
+        let definition = format!("fn {name}(");
+        if !self.functions.contains(&definition) {
+            let body = rule.body.replacen(&format!("fn {}(", rule.function), &definition, 1);
+            let _ = write!(self.functions, "\n{}", body.replace(resource.name(), slope.name()));
+        }
+        if !self.resources.contains(&slope) {
+            self.resources.push(slope);
+        }
+        format!("{name}({})", arguments(plan, rule).join(", "))
+    }
+}
+
+/// The call that yields how a rule's value moves; `None` where nothing that it needs does.
+fn tangent_call(
+    plan: &Plan,
+    rule: &Rule,
+    moved: &BTreeMap<&'static str, String>,
+    tangents: &mut Tangents,
+) -> Result<Option<String>, TangentError> {
+    let moving: Vec<bool> = rule.needs.iter().map(|(name, _)| moved.contains_key(name)).collect();
+    if !moving.contains(&true) {
+        return Ok(None);
+    }
+    match rule.plain_value() {
+        Some("") => return Ok(moved.get(rule.needs[0].0).cloned()),
+        Some(_) => return Ok(None),
+        None => {}
+    }
+    let Some(tangent) = tangents.of(rule.function, &moving)? else { return Ok(None) };
+    let mut given = arguments(plan, rule);
+    for (name, kind) in &rule.needs {
+        match moved.get(name) {
+            Some(moved) => given.push(moved.clone()),
+            None if tangent.of_all => given.push(format!("{kind}()")),
+            None => {}
+        }
+    }
+    Ok(Some(format!("{}({})", tangent.name, given.join(", "))))
+}
+
+fn arguments(plan: &Plan, rule: &Rule) -> Vec<String> {
+    plan.arguments(rule, &|constant: Constant, kind: &str| uniform(constant, kind), &|name| {
+        format!("at.{name}")
+    })
+}
+
+impl Seed {
+    /// A parameter of the model: each channel of a colour moves at once, as channels never mix.
+    #[must_use]
+    pub fn of_param(param: crate::model::params::Param) -> Self {
+        use crate::model::params::Param;
+        let named = |name: &'static str, tangent: &str| Self::Named { name, tangent: tangent.to_owned() };
+        match param {
+            Param::SpecularLobe => {
+                Self::Resource { resource: Resource::SpecularFaces, slope: Resource::SpecularSlopeFaces }
+            }
+            // A degree.
+            Param::EnvironmentRotation => {
+                named(Constant::Turn.name(), "0.017453292 * vec2f(-constants.turn.y, constants.turn.x)")
+            }
+            Param::KeyAzimuth => named(Constant::KeyDirection.name(), "constants.key_by_azimuth.xyz"),
+            Param::KeyElevation => named(Constant::KeyDirection.name(), "constants.key_by_elevation.xyz"),
+            colour if colour.info().rgb => named(colour.name(), "vec3f(1.0)"),
+            scalar => named(scalar.name(), "1.0"),
+        }
+    }
+}

@@ -1,0 +1,280 @@
+//! The fit engine on the adapter against the plain f64 model, and beside the CPU's.
+
+use skinfit::engine::gpu::{GpuEngine, Memory, Task};
+use skinfit::engine::reference::Reference;
+use skinfit::engine::view::ObservedView;
+use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
+use skinfit::gpu::{Choice, Gpu};
+use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::evaluate::Setup;
+use skinfit::model::params::{Column, Param};
+use skinfit::samples::rows::Rows;
+use skinfit::scene::Loss;
+use skinfit::scene::view::Clip;
+
+use super::bench::{gpu, open};
+use crate::engine::{
+    EVERYTHING, all_unknowns, assert_equal, engine as cpu, illumination, names, params, view,
+};
+
+fn engine<'g>(
+    gpu: &'g Gpu,
+    setup: Setup,
+    views: &'g [ObservedView],
+    loss: Loss,
+    unknowns: &[Unknown],
+    at: &Point,
+) -> GpuEngine<'g> {
+    let task = Task { setup, illumination: illumination(), views, loss, unknowns: unknowns.to_vec() };
+    GpuEngine::new(gpu, task, at, Memory::default()).unwrap()
+}
+
+const FULL: Setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: EVERYTHING };
+
+#[test]
+fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(9, 1), view(4, 2)];
+    let light = illumination();
+    let point = Point { params: params(), gains: vec![1.0, 1.2] };
+    let all = [EVERYTHING];
+    // One effect at a time where the form and the silhouette are the defaults; all of them elsewhere.
+    let single: Vec<Effects> = Effect::ALL.into_iter().map(|e| Effects::of(&[e])).collect();
+    for form in Form::ALL {
+        for silhouette in Silhouette::ALL {
+            let default = form == Form::Corrected && silhouette == Silhouette::Fragment;
+            for &effects in if default { single.as_slice() } else { &all } {
+                let setup = Setup { form, silhouette, effects };
+                // Those that the effects ask for: a fit frees no others.
+                let asked = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param.asked_for(effects));
+                let unknowns: Vec<Unknown> = all_unknowns(2)
+                    .into_iter()
+                    .filter(|u| asked(u) || matches!(u, Unknown::Gain(_)))
+                    .collect();
+                let want =
+                    Reference::new(setup, &light, &views, Loss::L2, &unknowns).normal_equations(&point);
+                let got = engine(gpu, setup, &views, Loss::L2, &unknowns, &point).normal_equations(&point);
+                let what = format!("{form:?} {silhouette:?} {effects:?}");
+                assert_equal(&got, &want, &names(&unknowns), &what);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_parameter_alone_gives_the_same_answers() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(7, 3)];
+    let light = illumination();
+    let point = Point { params: params(), gains: vec![1.0] };
+    for unknown in all_unknowns(1) {
+        let unknowns = [unknown];
+        let want = Reference::new(FULL, &light, &views, Loss::RelativeL2, &unknowns).normal_equations(&point);
+        let got = engine(gpu, FULL, &views, Loss::RelativeL2, &unknowns, &point).normal_equations(&point);
+        assert_equal(&got, &want, &names(&unknowns), &unknown.name());
+    }
+}
+
+#[test]
+fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
+    let Some(gpu) = gpu() else { return };
+    let mut views = [view(8, 4)];
+    views[0].clip = Some(Clip { low: 0.1, high: 1.5 });
+    let light = illumination();
+    let unknowns: Vec<Unknown> =
+        [Param::BaseWeight, Param::RimExponent, Param::NormalStrength, Param::HazeWeight]
+            .map(|param| Unknown::Param(Column::tied(param)))
+            .to_vec();
+    let point = Point { params: params(), gains: vec![0.9] };
+    for loss in Loss::ALL {
+        let plain = Reference::new(FULL, &light, &views, loss, &unknowns).normal_equations(&point);
+        let engine = engine(gpu, FULL, &views, loss, &unknowns, &point);
+        assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
+        let (value, gradient) = engine.gradient(&point);
+        // The same sum by two shaders: the same order of additions, but not the same multiply-adds.
+        assert!((value / engine.loss(&point) - 1.0).abs() < 1e-6, "{}", loss.name());
+        for (k, g) in gradient.iter().enumerate() {
+            let want = 2.0 * plain.jtr[k] / plain.weight;
+            let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;
+            // As in `assert_equal`.
+            assert!((g - want).abs() <= 1e-5 * scale, "{} {}: {g} {want}", loss.name(), unknowns[k].name());
+        }
+    }
+}
+
+/// A few unknowns that take every kind of tangent: weights, powers, normals.
+fn some_unknowns() -> Vec<Unknown> {
+    [Param::BaseWeight, Param::RimWeight, Param::RimExponent, Param::Occlusion, Param::NormalStrength]
+        .map(|param| Unknown::Param(Column::tied(param)))
+        .to_vec()
+}
+
+#[test]
+fn sums_are_the_same_to_the_bit_from_run_to_run() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(300, 6), view(70, 7)];
+    let point = Point { params: params(), gains: vec![1.0, 1.1] };
+    let make = || engine(gpu, FULL, &views, Loss::Huber, &some_unknowns(), &point);
+    let one = make();
+    let first = one.normal_equations(&point);
+    assert_eq!(one.normal_equations(&point), first);
+    assert_eq!(make().normal_equations(&point), first);
+}
+
+#[test]
+fn parts_and_streaming_give_the_same_sums() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(100, 8), view(37, 9)];
+    let unknowns = some_unknowns();
+    let point = Point { params: params(), gains: vec![1.0, 1.1] };
+    let make = |memory| {
+        let (illumination, unknowns) = (illumination(), unknowns.clone());
+        let task = Task { setup: FULL, illumination, views: &views, loss: Loss::L2, unknowns };
+        GpuEngine::new(gpu, task, &point, memory).unwrap()
+    };
+    let whole = make(Memory::default());
+    let want = whole.normal_equations(&point);
+    let (resident, streamed) = whole.bytes();
+    assert_eq!(streamed, 0);
+    let part = Some(resident / 5);
+    for most in [None, Some(resident / 2), Some(0)] {
+        let cut = make(Memory { part, resident: most });
+        assert_eq!(cut.bytes().1 > 0, most.is_some());
+        // The additions are cut elsewhere: a few roundings of f32 sums.
+        assert_close(&cut.normal_equations(&point), &want, 1e-6);
+        assert_eq!(cut.normal_equations(&point), cut.normal_equations(&point));
+    }
+}
+
+fn assert_close(got: &NormalEquations, want: &NormalEquations, tolerance: f64) {
+    let k = want.jtr.len();
+    let close = |g: f64, w: f64, scale: f64| assert!((g - w).abs() <= tolerance * scale, "{g} {w}");
+    close(got.loss, want.loss, want.loss);
+    close(got.residual, want.residual, want.residual);
+    assert_eq!((got.weight, got.count), (want.weight, want.count));
+    for a in 0..k {
+        close(got.jtr[a], want.jtr[a], (want.jtj[a * k + a] * want.residual).sqrt());
+        for b in 0..k {
+            close(
+                got.jtj[a * k + b],
+                want.jtj[a * k + b],
+                (want.jtj[a * k + a] * want.jtj[b * k + b]).sqrt(),
+            );
+        }
+    }
+}
+
+#[test]
+fn a_million_samples_keep_seven_digits() {
+    let Some(gpu) = gpu() else { return };
+    // 500 groups of 16, over and over: 1.05 million samples, whose sums are so many times the first's.
+    let small = view(500, 10);
+    let times = 66;
+    let mut large = small.clone();
+    let repeat = |rows: &Rows| {
+        let mut repeated = Rows::new(rows.stride(), times * rows.all().len() / rows.stride());
+        for (record, from) in (0..).zip(
+            rows.all().chunks_exact(rows.stride()).cycle().take(times * rows.all().len() / rows.stride()),
+        ) {
+            repeated.record_mut(record).copy_from_slice(from);
+        }
+        repeated
+    };
+    large.target = repeat(&small.target);
+    large.weight = small.weight.repeat(times);
+    *large.samples.surface.rows_mut() = repeat(small.samples.surface.rows());
+    let records = small.samples.records() as u32;
+    large.samples.group_start = (0..times as u32)
+        .flat_map(|k| small.samples.group_start[..500].iter().map(move |start| start + k * records))
+        .chain([times as u32 * records])
+        .collect();
+    let (unknowns, light) = (some_unknowns(), illumination());
+    let point = Point { params: params(), gains: vec![1.0] };
+    let large = [large];
+    let got = engine(gpu, FULL, &large, Loss::L2, &unknowns, &point).normal_equations(&point);
+    let small = [small];
+    let mut want = Reference::new(FULL, &light, &small, Loss::L2, &unknowns).normal_equations(&point);
+    let share = 1.0 / times as f64;
+    want.jtj
+        .iter_mut()
+        .chain(&mut want.jtr)
+        .chain([&mut want.residual, &mut want.weight])
+        .for_each(|x| *x /= share);
+    want.count *= times as u64;
+    // Every copy rounds alike, so what remains is the mean rounding of 24,000 residuals: 6e-8 times some
+    // tens of operations over the root of their number, and that of the last sums.
+    assert_eq!(got.count, want.count);
+    let got = NormalEquations { weight: want.weight, ..got };
+    assert_close(&got, &want, 1e-6);
+}
+
+#[test]
+fn strides_read_the_pixels_that_the_cpu_engine_reads() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(130, 11)];
+    let unknowns = some_unknowns();
+    let point = Point { params: params(), gains: vec![1.0] };
+    let mut ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
+    let mut theirs = cpu(FULL, &views, Loss::L2, &unknowns, true);
+    for stride in [4, 3, 1] {
+        ours.set_stride(stride);
+        theirs.set_stride(stride);
+        assert_equal(
+            &ours.normal_equations(&point),
+            &theirs.normal_equations(&point),
+            &names(&unknowns),
+            &format!("every {stride}th block"),
+        );
+    }
+}
+
+#[test]
+fn a_lost_device_ends_a_fit_with_its_reason_and_keeps_the_state() {
+    let Some(gpu) = open(&Choice::default()) else { return };
+    let views = [view(8, 12)];
+    let unknowns = some_unknowns();
+    let point = Point { params: params(), gains: vec![1.0] };
+    let engine = engine(&gpu, FULL, &views, Loss::L2, &unknowns, &point);
+    let folder = tempfile::tempdir().unwrap();
+    let state = folder.path().join("state.json");
+    let mut options = skinfit::fit::FitOptions { state: Some(state.clone()), ..Default::default() };
+    let mut lost = 0;
+    let error = skinfit::fit::fit(&engine, &point, &options, &mut |iteration| {
+        if iteration.iteration == 1 {
+            gpu.close();
+            lost += 1;
+        }
+    })
+    .unwrap_err();
+    assert_eq!(lost, 1);
+    assert!(matches!(error, skinfit::fit::FitError::Engine(_)), "{error}");
+    assert!(error.to_string().contains("device was lost"), "{error}");
+    // What was found before it stands, and another engine goes on from there.
+    options.resume = Some(state);
+    let outcome =
+        skinfit::fit::fit(&cpu(FULL, &views, Loss::L2, &unknowns, true), &point, &options, &mut |_| {})
+            .unwrap();
+    assert!(outcome.loss_end < outcome.loss_start);
+}
+
+#[test]
+fn images_equal_the_cpu_engines() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(9, 5), view(30, 6)];
+    for form in Form::ALL {
+        let setup = Setup { form, ..FULL };
+        let point = Point { params: params(), gains: vec![1.5, 0.8] };
+        let ours = engine(gpu, setup, &views, Loss::L2, &[], &point);
+        let theirs = cpu(setup, &views, Loss::L2, &[], true);
+        for index in 0..2 {
+            let (got, want) = (ours.image(index, &point).unwrap(), theirs.image(index, &point));
+            assert_eq!(got.len(), want.len());
+            for (c, (got, want)) in got.iter().zip(&want).enumerate() {
+                for (slot, (g, w)) in got.iter().zip(want).enumerate() {
+                    // The vectors' own figures for f32, once for each engine.
+                    assert!((g - w).abs() < 4e-6 + 4e-5 * w.abs(), "{form:?} {index} {c} {slot}: {g} {w}");
+                }
+            }
+        }
+    }
+}
