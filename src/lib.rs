@@ -17,6 +17,7 @@
 //! - [`report`]: metrics, pictures and pages that show how good a fit is.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
 //! - `tensor`: the model on burn's tensors, differentiable (feature `burn`).
+//! - `maps`: fits of whole maps (feature `burn`).
 //! - [`export`]: constants and shaders as text for other engines.
 //! - [`cli`]: the command line.
 //! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
@@ -31,6 +32,8 @@ pub mod export;
 pub mod fit;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(feature = "burn")]
+pub mod maps;
 pub mod model;
 pub mod output;
 pub mod prepare;

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::fit_engine::{FitEngine, FitEngineArguments};
 use super::fitted_scene::{Changes, Start};
+use super::maps::{MapArguments, MapsFound};
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings};
@@ -26,7 +27,7 @@ use crate::scene::{Loss, Scene};
 /// Fit a scene's free parameters to its target images
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1")
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -56,6 +57,8 @@ pub(super) struct Arguments {
     #[arg(long, help_heading = "Solver")]
     resume: bool,
     #[command(flatten)]
+    maps: MapArguments,
+    #[command(flatten)]
     engine: FitEngineArguments,
     /// Print report.json on standard output, and nothing else there.
     #[arg(long)]
@@ -63,6 +66,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    arguments.maps.check()?;
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
@@ -80,10 +84,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     }
     let observed = prepared.observed()?;
     tell_warnings(&prepared.warnings);
+    let (observed, maps) = arguments.maps.fit(&mut prepared, observed, arguments.engine.adapter())?;
     arguments.engine.with_engine(&prepared, observed, |engine| {
         let outcome = solve(arguments, &folder, &prepared, engine)?;
         folder.keep();
-        conclude(arguments, &folder, &path, &prepared, engine, &outcome)
+        conclude(arguments, &folder, &path, &prepared, engine, &outcome, maps.as_ref())
     })
 }
 
@@ -95,6 +100,7 @@ fn conclude(
     prepared: &Prepared,
     engine: &FitEngine<'_>,
     outcome: &Outcome,
+    maps: Option<&MapsFound>,
 ) -> Result<Exit, Refusal> {
     let clock = Instant::now();
     let views = evidence(prepared, engine, outcome);
@@ -102,13 +108,17 @@ fn conclude(
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
-    folder.write_scene(path, changes(arguments, prepared))?;
+    let map_files = maps.map(|maps| maps.write(folder.path())).transpose()?.unwrap_or_default();
+    folder.write_scene(path, Changes { maps: &map_files, ..changes(arguments, prepared) })?;
     params_file(prepared, outcome).write(&folder.path().join("params.toml"), path, Some(outcome))?;
     let run = RunInfo { seconds, ..run_info(arguments, path, prepared, engine, views) };
     let report = report::write_run(folder.path(), &run, outcome)?;
     if arguments.json {
         say(report.json.trim_end())?;
     } else {
+        if let Some(maps) = maps {
+            maps.tell()?;
+        }
         tell_outcome(outcome, &prepared.scene.views)?;
         say(&format!("{}: final loss {:.6e}", folder.path().display(), outcome.loss_end))?;
     }
@@ -123,7 +133,7 @@ fn conclude(
 fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> {
     let Scene { form, params, fit, .. } = &prepared.scene;
     let start = Start { form: *form, params, free: &fit.free };
-    Changes { loss: arguments.loss.as_deref(), start: arguments.params.as_ref().map(|_| start) }
+    Changes { loss: arguments.loss.as_deref(), start: arguments.params.as_ref().map(|_| start), maps: &[] }
 }
 
 /// What to do about a fit that did not converge.
@@ -241,7 +251,7 @@ fn evidence(prepared: &Prepared, engine: &FitEngine<'_>, outcome: &Outcome) -> V
 }
 
 /// The target as an image, and how much of each pixel is compared.
-fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
+pub(super) fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
     let mut target = Image::new(fit.width, fit.height);
     let Some(source) = &view.target else { return (target, fit.alpha.clone()) };
     target.rgb.clone_from(&source.rgb);

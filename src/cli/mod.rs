@@ -3,6 +3,7 @@
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
+//! - `maps`: fits of whole maps, where the program is built with them
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
 mod bake;
@@ -12,6 +13,7 @@ mod fit;
 mod fit_engine;
 mod fitted_scene;
 mod info;
+mod maps;
 mod params;
 mod render;
 mod run_folder;

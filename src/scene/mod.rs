@@ -5,6 +5,7 @@
 //! - [`maps`]: texture maps and the panorama
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings` and `cameras`
+//! - [`map_fit`]: how whole maps are fitted
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
 //! - [`pose`]: the mesh, morphed and skinned
 //! - [`error`]: what is refused, and what is mended with a warning
@@ -16,6 +17,7 @@ mod cameras;
 pub mod error;
 mod file;
 mod gltf;
+pub mod map_fit;
 pub mod images;
 pub mod load;
 pub mod maps;
@@ -29,6 +31,7 @@ pub mod view;
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub use load::LoadOptions;
+pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
 pub use settings::{interval, read_params};
 
 use std::path::PathBuf;
@@ -75,6 +78,8 @@ pub struct FitSettings {
     pub loss: Loss,
     /// Whether each view has a gain of its own (the first view's is held at 1).
     pub free_gains: bool,
+    /// How whole maps are fitted, when they are asked for.
+    pub maps: MapSettings,
 }
 
 /// What a fit minimises, over the residual r = model - target of each pixel and channel.

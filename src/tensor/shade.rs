@@ -80,6 +80,12 @@ impl Shade {
         self.0.samples
     }
 
+    /// Whether the enabled effects read an input.
+    #[must_use]
+    pub fn reads(&self, input: Input) -> bool {
+        self.0.adjoint.reads(input)
+    }
+
     /// The image, \[slots, 4\]: radiance (linear Rec.709, the mean over a pixel's samples) and haze of each pixel slot;
     /// 0 where a slot is padding. It is differentiable in whatever input is tracked, once.
     ///

@@ -114,7 +114,6 @@ impl Case {
             hilite: Some(&hilite),
         };
         let lights = Lights::new(self.setup, &params, cubes, true, 0.0_f64);
-        let surface = &self.samples.surface;
         let mut image = vec![0.0; 4 * GROUPS * LANES];
         for slot in 0..GROUPS * LANES {
             let group = slot / LANES;
