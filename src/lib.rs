@@ -19,6 +19,7 @@
 //! - `tensor`: the model on burn's tensors, differentiable (feature `burn`).
 //! - `maps`: fits of whole maps (feature `burn`).
 //! - [`export`]: constants and shaders as text for other engines.
+//! - [`study`]: what is measured about the model and the fits.
 //! - [`cli`]: the command line.
 //! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
 //!   instructions kernels are compiled for.
@@ -44,5 +45,6 @@ pub mod samples;
 pub mod scene;
 pub mod shader;
 pub mod simd;
+pub mod study;
 #[cfg(feature = "burn")]
 pub mod tensor;

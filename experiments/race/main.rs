@@ -1,33 +1,39 @@
 //! The race: the same forward pass, gradient, normal equations and fits, on the same inputs, as
 //! other frameworks do them. Reads a data folder, writes one row of the table as JSON.
 //!
-//! `cargo run --release --example race -- DATA_DIR [--mode sampled|pre] -o row.json`
+//! `cargo run --release --example race -- DATA_DIR [--mode sampled|pre] [--engine cpu|gpu] -o row.json`
 
 mod data;
+mod racer;
 
 use std::path::PathBuf;
 use std::time::Instant;
 
 use clap::Parser;
 use data::{Manifest, Result};
+use racer::Racer;
 use serde_json::{Value, json};
 use skinfit::engine::cpu::CpuEngine;
-use skinfit::engine::{Objective, Point, Unknown};
+use skinfit::engine::{Point, Unknown};
 use skinfit::fit::coordinates::Coordinates;
 use skinfit::fit::{FitOptions, bounded, fit};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::Param;
+use skinfit::samples::rows::Rows;
 use skinfit::scene::Loss;
 
 #[derive(Parser)]
-#[command(about = "Time skinfit's CPU engine on the race's data")]
+#[command(about = "Time skinfit's engines on the race's data")]
 struct Arguments {
     /// Folder with manifest.json and the raw planes.
     data: PathBuf,
     /// `sampled`: all four lookups in each pass; `pre`: the bump strength is held at its true value.
     #[arg(long, default_value = "sampled", value_parser = ["sampled", "pre"])]
     mode: String,
+    /// What makes the passes.
+    #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
+    engine: String,
     /// Where the row is written; standard output when left out.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -60,16 +66,38 @@ fn peak_rss_mb() -> f64 {
     line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
 }
 
-fn engine(arguments: &Arguments, manifest: &Manifest, which: &str, keep: bool) -> Result<CpuEngine> {
+/// Call `then` with the engine over the target `which`. With `keep` false the CPU's looks everything up anew
+/// in each pass; the GPU's does so where the bump strength is free.
+fn with_engine<T>(
+    arguments: &Arguments,
+    manifest: &Manifest,
+    which: &str,
+    keep: bool,
+    then: impl FnOnce(&mut dyn Racer, &Rows) -> Result<T>,
+) -> Result<T> {
     let columns = Manifest::columns(arguments.mode == "sampled");
-    Ok(CpuEngine::with_kept_terms(
-        SETUP,
-        data::illumination(&arguments.data, manifest)?,
-        vec![data::view(&arguments.data, manifest, which)?],
-        Loss::L2,
-        columns.into_iter().map(Unknown::Param).collect(),
-        keep,
-    ))
+    let unknowns: Vec<Unknown> = columns.into_iter().map(Unknown::Param).collect();
+    let illumination = data::illumination(&arguments.data, manifest)?;
+    let views = vec![data::view(&arguments.data, manifest, which)?];
+    if arguments.engine == "cpu" {
+        let mut engine = CpuEngine::with_kept_terms(SETUP, illumination, views, Loss::L2, unknowns, keep);
+        let target = engine.views()[0].target.clone();
+        return then(&mut engine, &target);
+    }
+    #[cfg(feature = "gpu")]
+    {
+        use skinfit::engine::gpu::{GpuEngine, Memory, Task};
+        let words = |error: skinfit::gpu::GpuError| error.to_string();
+        let gpu = skinfit::gpu::Gpu::open(&skinfit::gpu::Choice::default()).map_err(words)?;
+        let task = Task { setup: SETUP, illumination, views: &views, loss: Loss::L2, unknowns };
+        let start = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };
+        let mut engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(words)?;
+        let (resident, _) = engine.bytes();
+        eprintln!("race: {:.1} bytes a pixel on the device", resident as f64 / manifest.pixels as f64);
+        then(&mut engine, &views[0].target)
+    }
+    #[cfg(not(feature = "gpu"))]
+    Err("built without the feature gpu".to_owned())
 }
 
 /// Pixels that the coarse stage of a fit reads, about.
@@ -95,14 +123,14 @@ fn criterion(manifest: &Manifest, which: &str, point: &Point) -> (f64, f64) {
 ///
 /// In mode `pre` the noisy criterion, whose optimum has the bump strength free, can be out of reach on
 /// few pixels; the fit then ends where it no longer comes closer.
-fn fit_to_criterion(engine: &mut CpuEngine, manifest: &Manifest, which: &str, start: &Point) -> Result<Run> {
+fn fit_to_criterion(engine: &mut dyn Racer, manifest: &Manifest, which: &str, start: &Point) -> Result<Run> {
     let clock = Instant::now();
     let stride = (manifest.pixels / COARSE_PIXELS).max(1);
-    engine.set_stride(stride);
+    engine.read_every(stride);
     let coarse = fit(engine, start, &FitOptions::default(), &mut |_| {}).map_err(|e| e.to_string())?;
     let mut evaluations = coarse.evaluations as f64 / stride as f64;
     let mut point = coarse.end;
-    engine.set_stride(1);
+    engine.read_every(1);
     let mut best = f64::INFINITY;
     for _ in 0..20 {
         let (error, tolerance) = criterion(manifest, which, &point);
@@ -126,7 +154,7 @@ struct Run {
 }
 
 /// One bounded Gauss-Newton step over all pixels.
-fn gauss_newton_step(engine: &CpuEngine, point: &Point) -> Point {
+fn gauss_newton_step(engine: &dyn Racer, point: &Point) -> Point {
     let sums = engine.normal_equations(point);
     let coordinates = Coordinates::new(engine.unknowns(), point);
     let at = coordinates.origin();
@@ -142,20 +170,21 @@ fn gauss_newton_step(engine: &CpuEngine, point: &Point) -> Point {
 fn fits(arguments: &Arguments, manifest: &Manifest, start: &Point) -> Result<Value> {
     let mut fits = serde_json::Map::new();
     for which in ["clean", "noisy"] {
-        let mut engine = engine(arguments, manifest, which, true)?;
-        // The first pass makes the kept terms (mode `pre`: what peers are given in files).
-        engine.normal_equations(start);
-        let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
-        let runs = arguments.reps.max(5);
-        for _ in 0..runs {
-            let run = fit_to_criterion(&mut engine, manifest, which, start)?;
-            seconds.extend(run.seconds);
-            (evaluations, best) = (run.evaluations, run.best);
-        }
-        seconds.sort_by(f64::total_cmp);
-        let row = json!({"median": seconds.get(seconds.len() / 2), "min": seconds.first(),
-                         "evals": (evaluations * 100.0).round() / 100.0,
-                         "best": best, "ok": seconds.len(), "runs": runs});
+        let row = with_engine(arguments, manifest, which, true, |engine, _| {
+            // The first pass makes the kept terms (mode `pre`: what peers are given in files).
+            engine.normal_equations(start);
+            let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
+            let runs = arguments.reps.max(5);
+            for _ in 0..runs {
+                let run = fit_to_criterion(engine, manifest, which, start)?;
+                seconds.extend(run.seconds);
+                (evaluations, best) = (run.evaluations, run.best);
+            }
+            seconds.sort_by(f64::total_cmp);
+            Ok(json!({"median": seconds.get(seconds.len() / 2), "min": seconds.first(),
+                      "evals": (evaluations * 100.0).round() / 100.0,
+                      "best": best, "ok": seconds.len(), "runs": runs}))
+        })?;
         fits.insert(format!("{which}/lm"), row);
     }
     Ok(Value::Object(fits))
@@ -172,34 +201,35 @@ fn run(arguments: &Arguments) -> Result<Value> {
     let before = peak_rss_mb();
     // In mode `sampled` every lookup is done anew; in mode `pre` what the bump strength decides is
     // kept from the first (untimed) pass, as the peers are given it in files.
-    let timed_engine = engine(arguments, &manifest, "clean", pre)?;
-    let inputs = peak_rss_mb();
-    let first = Instant::now();
-    let image = timed_engine.image(0, &truth);
-    let first_forward = first.elapsed().as_secs_f64();
-    let target = &timed_engine.views()[0].target;
-    let error = |c: usize, i: usize| {
-        let want = target.number(c, i);
-        f64::from((image[c][i] - want).abs() / (1.0 + want.abs()))
-    };
-    let max_error = (0..4)
-        .flat_map(|c| (0..manifest.pixels).map(move |i| (c, i)))
-        .map(|(c, i)| error(c, i))
-        .fold(0.0, f64::max);
-    drop(image);
-    let forward = timed(arguments.reps, || drop(std::hint::black_box(timed_engine.image(0, &start))));
-    let grad = timed(arguments.reps, || drop(std::hint::black_box(timed_engine.gradient(&start))));
-    let normal = timed(arguments.reps, || drop(std::hint::black_box(timed_engine.normal_equations(&start))));
-    drop(timed_engine);
-    let fits = fits(arguments, &manifest, &start)?;
-    let peak = peak_rss_mb();
-    Ok(json!({
-        "peer": "skinfit", "version": format!("skinfit {} (rustc, f32 lanes)", env!("CARGO_PKG_VERSION")),
-        "pixels": manifest.pixels, "mode": arguments.mode, "device": "cpu",
-        "forward": forward, "grad": grad, "normal": normal, "fits": fits,
-        "first_forward_s": first_forward, "forward_max_err": max_error,
-        "peak_rss_mb": peak, "rss_import_mb": before, "rss_before_fits_mb": inputs, "other_cpu": 0,
-    }))
+    let mut row = with_engine(arguments, &manifest, "clean", pre, |engine, target| {
+        let inputs = peak_rss_mb();
+        let first = Instant::now();
+        let image = engine.image_planes(&truth);
+        let first_forward = first.elapsed().as_secs_f64();
+        let error = |c: usize, i: usize| {
+            let want = target.number(c, i);
+            f64::from((image[c][i] - want).abs() / (1.0 + want.abs()))
+        };
+        let max_error = (0..4)
+            .flat_map(|c| (0..manifest.pixels).map(move |i| (c, i)))
+            .map(|(c, i)| error(c, i))
+            .fold(0.0, f64::max);
+        drop(image);
+        let forward = timed(arguments.reps, || engine.forward(&start));
+        let grad = timed(arguments.reps, || drop(std::hint::black_box(engine.gradient(&start))));
+        let normal = timed(arguments.reps, || drop(std::hint::black_box(engine.normal_equations(&start))));
+        engine.fault().map_or(Ok(()), Err)?;
+        Ok(json!({
+            "peer": "skinfit", "version": format!("skinfit {} ({})", env!("CARGO_PKG_VERSION"), engine.version()),
+            "pixels": manifest.pixels, "mode": arguments.mode, "device": engine.device(),
+            "forward": forward, "grad": grad, "normal": normal,
+            "first_forward_s": first_forward, "forward_max_err": max_error,
+            "rss_import_mb": before, "rss_before_fits_mb": inputs, "other_cpu": 0,
+        }))
+    })?;
+    row["fits"] = fits(arguments, &manifest, &start)?;
+    row["peak_rss_mb"] = json!(peak_rss_mb());
+    Ok(row)
 }
 
 fn main() -> std::process::ExitCode {

@@ -16,6 +16,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    if arguments.folder.is_file() {
+        return Err(Refusal::new(format!(
+            "{}: is a file, and the scene needs a folder. Name another place; the folder is made if need be.",
+            arguments.folder.display()
+        )));
+    }
     let there = arguments.folder.join("scene.toml");
     if there.exists() {
         return Err(Refusal::new(format!(

@@ -2,12 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Exit, Refusal, say, tell_warnings};
+use super::{Exit, Refusal, tell, tell_warnings, write_or_say};
 use crate::export::{self, Provenance, Target};
 use crate::fit::params_file::ParamsFile;
-use crate::model::effects::Form;
+use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Param, Params};
-use crate::output;
 use crate::scene::load::LoadOptions;
 use crate::scene::{Scene, suggestion};
 use crate::shader::{Budget, Facts};
@@ -52,6 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     }
     let (scene, warnings) = Scene::load(&path, &LoadOptions { targets: false, ..LoadOptions::default() })?;
     let file = ParamsFile::read(&arguments.params, scene.form, &scene.params)?;
+    tell_foreign(arguments, &path, &scene, &file);
     let from = provenance(arguments, &path, &file, &beside("report.json"));
     // Some targets hold nothing else.
     let text = if arguments.constants || arguments.to.dialect().is_none() {
@@ -60,14 +60,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
         export::function(arguments.to, &facts(&scene, &file), &file.params, &from)?
     };
-    match &arguments.output {
-        Some(output) => {
-            output::write(output, text.as_bytes())?;
-            say(&format!("wrote {}", output.display()))?;
-        }
-        None => say(text.trim_end())?,
-    }
+    write_or_say(arguments.output.as_deref(), &text)?;
     Ok(Exit::Done)
+}
+
+/// Say so when the parameters were fitted with other effects than the scene has.
+fn tell_foreign(arguments: &Arguments, path: &Path, scene: &Scene, file: &ParamsFile) {
+    let Some(fitted) = file.effects.filter(|&effects| effects != scene.effects) else { return };
+    let names = |effects: Effects| effects.iter().map(Effect::name).collect::<Vec<_>>().join(", ");
+    tell(&format!(
+        "{}: was fitted with the effects {}, but {} has {}. What is exported is the latter's, with constants that \
+         were not tuned for it. If that is not meant, name the scene that was fitted with --scene.",
+        arguments.params.display(),
+        names(fitted),
+        path.display(),
+        names(scene.effects)
+    ));
 }
 
 /// What the scene calls for in an engine: maps stay apart, the mesh is not known.

@@ -5,9 +5,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-use super::fit_engine::{FitEngine, FitEngineArguments};
+use super::fit_engine::{Chosen, FitEngine, FitEngineArguments};
 use super::fitted_scene::{Changes, Start};
-use super::maps::{MapArguments, MapsFound};
+use super::maps::MapArguments;
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings};
@@ -15,6 +15,7 @@ use crate::engine::Unknown;
 use crate::engine::view::ObservedView;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::params_file::ParamsFile;
+use crate::fit::state::Saved;
 use crate::fit::{self, FitError, FitOptions, SolverKind};
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::progress;
@@ -38,22 +39,24 @@ pub(super) struct Arguments {
     /// Start from these parameters, instead of the scene's start values.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
-    /// Which solver: varpro and lm take few passes; lbfgs and nelder-mead are there to compare.
-    #[arg(long, default_value = "varpro", value_parser = ["varpro", "lm", "lbfgs", "nelder-mead"], help_heading = "Solver")]
-    solver: String,
+    /// Which solver: varpro and lm take few passes; lbfgs and nelder-mead are there to compare
+    /// [default: varpro].
+    #[arg(long, value_parser = ["varpro", "lm", "lbfgs", "nelder-mead"], help_heading = "Solver")]
+    solver: Option<String>,
     /// What is minimised, instead of the scene's loss.
     #[arg(long, value_parser = ["l2", "relative_l2", "huber", "smape"], help_heading = "Solver")]
     loss: Option<String>,
-    /// Fit from this many starts and keep the best: the given one, and others drawn about it.
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Solver")]
-    starts: u32,
-    /// What the other starts are drawn from.
-    #[arg(long, default_value_t = 0, help_heading = "Solver")]
-    seed: u64,
+    /// Fit from this many starts and keep the best: the given one, and others drawn about it
+    /// [default: 1].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Solver")]
+    starts: Option<u32>,
+    /// What the other starts are drawn from [default: 0].
+    #[arg(long, help_heading = "Solver")]
+    seed: Option<u64>,
     /// Most iterations of each start.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Solver")]
     max_iterations: Option<u64>,
-    /// Go on from where an interrupted fit in this run folder stopped.
+    /// Go on from where an interrupted fit in this run folder stopped, with its solver, starts and seed.
     #[arg(long, help_heading = "Solver")]
     resume: bool,
     #[command(flatten)]
@@ -82,44 +85,80 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if let Some(loss) = &arguments.loss {
         prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
     }
+    let solving = Solving::of(arguments, folder.path())?;
     let observed = prepared.observed()?;
     tell_warnings(&prepared.warnings);
     let (observed, maps) = arguments.maps.fit(&mut prepared, observed, arguments.engine.adapter())?;
-    arguments.engine.with_engine(&prepared, observed, |engine| {
-        let outcome = solve(arguments, &folder, &prepared, engine)?;
+    arguments.engine.with_engine(&prepared, observed, |chosen| {
+        let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine)?;
         folder.keep();
-        conclude(arguments, &folder, &path, &prepared, engine, &outcome, maps.as_ref())
+        let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
+        let fitted = Fitted { path: &path, maps: &maps.unwrap_or_default() };
+        conclude(arguments, solving, &folder, fitted, &prepared, chosen, &outcome)
     })
+}
+
+/// How the unknowns are searched for: as the command line says, else as the fit that is resumed was
+/// begun.
+#[derive(Clone, Copy)]
+struct Solving {
+    solver: SolverKind,
+    starts: u32,
+    seed: u64,
+}
+
+impl Solving {
+    fn of(arguments: &Arguments, folder: &Path) -> Result<Self, Refusal> {
+        let (solver, starts, seed) = match arguments.resume {
+            true => Saved::begun_with(&folder.join(STATE))?,
+            false => (SolverKind::default(), 1, 0),
+        };
+        Ok(Self {
+            solver: arguments.solver.as_deref().and_then(SolverKind::from_name).unwrap_or(solver),
+            starts: arguments.starts.unwrap_or(starts),
+            seed: arguments.seed.unwrap_or(seed),
+        })
+    }
+}
+
+/// What a fit goes on from, in its run folder.
+const STATE: &str = "state.json";
+
+/// The scene file that was fitted, and the files of fitted maps: key in `[maps]` and path.
+#[derive(Clone, Copy)]
+struct Fitted<'a> {
+    path: &'a Path,
+    maps: &'a [(&'static str, String)],
 }
 
 /// Leave the run folder's files, and tell how it ended.
 fn conclude(
     arguments: &Arguments,
+    solving: Solving,
     folder: &RunFolder,
-    path: &Path,
+    Fitted { path, maps }: Fitted<'_>,
     prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    chosen: &Chosen<'_>,
     outcome: &Outcome,
-    maps: Option<&MapsFound>,
 ) -> Result<Exit, Refusal> {
+    let engine = &chosen.engine;
     let clock = Instant::now();
     let views = evidence(prepared, engine, outcome);
     let mut seconds = prepared.seconds;
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
-    let map_files = maps.map(|maps| maps.write(folder.path())).transpose()?.unwrap_or_default();
-    folder.write_scene(path, Changes { maps: &map_files, ..changes(arguments, prepared) })?;
+    folder.write_scene(path, Changes { maps, ..changes(arguments, prepared) })?;
     params_file(prepared, outcome).write(&folder.path().join("params.toml"), path, Some(outcome))?;
-    let run = RunInfo { seconds, ..run_info(arguments, path, prepared, engine, views) };
+    let run = RunInfo { seconds, ..run_info(arguments, solving, path, prepared, engine, views) };
     let report = report::write_run(folder.path(), &run, outcome)?;
     if arguments.json {
         say(report.json.trim_end())?;
     } else {
-        if let Some(maps) = maps {
-            maps.tell()?;
-        }
         tell_outcome(outcome, &prepared.scene.views)?;
+        if let Some(why) = &chosen.why {
+            say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
+        }
         say(&format!("{}: final loss {:.6e}", folder.path().display(), outcome.loss_end))?;
     }
     if let Some(advice) = advice(outcome) {
@@ -142,7 +181,7 @@ fn advice(outcome: &Outcome) -> Option<String> {
     match outcome.ending {
         Ending::Converged => None,
         Ending::RanOut => Some(format!(
-            "the fit ran out after {iterations} iterations and has not converged. Go on with --resume and a greater \
+            "the fit ran out after {iterations} iterations and has not converged. Go on with the same command, --resume and a greater \
              --max-iterations."
         )),
         Ending::Stalled => Some(
@@ -150,7 +189,7 @@ fn advice(outcome: &Outcome) -> Option<String> {
                 .to_owned(),
         ),
         Ending::Interrupted => {
-            Some(format!("the fit was interrupted after {iterations} iterations. Go on with --resume."))
+            Some(format!("the fit was interrupted after {iterations} iterations. Go on with the same command and --resume."))
         }
     }
 }
@@ -160,6 +199,7 @@ fn params_file(prepared: &Prepared, outcome: &Outcome) -> ParamsFile {
     let names = prepared.scene.views.iter().map(|view| view.name.clone());
     ParamsFile {
         form: prepared.scene.form,
+        effects: Some(prepared.scene.effects),
         loss: Some(prepared.scene.fit.loss),
         params: outcome.end.params,
         gains: names.zip(outcome.end.gains.iter().copied()).collect(),
@@ -169,6 +209,7 @@ fn params_file(prepared: &Prepared, outcome: &Outcome) -> ParamsFile {
 /// Fit, with a progress line and Ctrl-C that keeps the state.
 fn solve(
     arguments: &Arguments,
+    solving: Solving,
     folder: &RunFolder,
     prepared: &Prepared,
     engine: &FitEngine<'_>,
@@ -182,12 +223,12 @@ fn solve(
             std::process::exit(1);
         }
     });
-    let state = folder.path().join("state.json");
+    let state = folder.path().join(STATE);
     let options = FitOptions {
-        solver: SolverKind::from_name(&arguments.solver).unwrap_or_default(),
+        solver: solving.solver,
         max_iterations: arguments.max_iterations,
-        starts: arguments.starts,
-        seed: arguments.seed,
+        starts: solving.starts,
+        seed: solving.seed,
         fingerprint: fingerprint(prepared, engine),
         resume: arguments.resume.then(|| state.clone()),
         state: Some(state),
@@ -269,6 +310,7 @@ pub(super) fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Im
 
 fn run_info(
     arguments: &Arguments,
+    solving: Solving,
     path: &Path,
     prepared: &Prepared,
     engine: &FitEngine<'_>,
@@ -291,7 +333,7 @@ fn run_info(
             ("form".to_owned(), prepared.scene.form.name().to_owned()),
             ("silhouette".to_owned(), prepared.scene.silhouette.name().to_owned()),
             ("effects".to_owned(), effects.join(", ")),
-            ("starts".to_owned(), format!("{}, seed {}", arguments.starts, arguments.seed)),
+            ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
         ]
         .into_iter()
         .chain(engine.provenance())

@@ -33,6 +33,12 @@ pub(super) struct FitEngineArguments {
     verify: bool,
 }
 
+/// An engine, and why `auto` took it.
+pub(super) struct Chosen<'g> {
+    pub(super) engine: FitEngine<'g>,
+    pub(super) why: Option<String>,
+}
+
 /// An engine over the views of a scene.
 pub(super) enum FitEngine<'g> {
     /// On the CPU.
@@ -42,6 +48,7 @@ pub(super) enum FitEngine<'g> {
     Gpu(crate::engine::gpu::GpuEngine<'g>),
     /// There is none without the feature.
     #[cfg(not(feature = "gpu"))]
+    #[allow(dead_code, reason = "nothing can make it")]
     Gpu(std::convert::Infallible, std::marker::PhantomData<&'g ()>),
 }
 
@@ -114,14 +121,25 @@ impl FitEngineArguments {
         &self,
         prepared: &Prepared,
         observed: Vec<ObservedView>,
-        then: impl FnOnce(&FitEngine<'_>) -> Result<T, Refusal>,
+        then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
-        if self.wants_gpu(&observed) {
-            return self.with_gpu(prepared, observed, then);
+        let (gpu, why) = self.wants_gpu(&observed);
+        if gpu {
+            return self.with_gpu(prepared, observed, why, then);
         }
+        self.on_cpu(prepared, observed, why, then)
+    }
+
+    fn on_cpu<T>(
+        &self,
+        prepared: &Prepared,
+        observed: Vec<ObservedView>,
+        why: Option<String>,
+        then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
+    ) -> Result<T, Refusal> {
         let engine = FitEngine::Cpu(prepared.engine_over(observed));
         self.check(prepared, &engine)?;
-        then(&engine)
+        then(&Chosen { engine, why })
     }
 
     /// Hold an engine against the model in f64, where that is asked for.
@@ -156,7 +174,7 @@ impl FitEngineArguments {
 
 #[cfg(feature = "gpu")]
 mod gpu {
-    use super::{FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, tell};
+    use super::{Chosen, FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, tell};
     use crate::engine::gpu::{GpuEngine, Memory, Task};
     use crate::gpu::{Choice, Gpu, GpuError};
 
@@ -165,47 +183,45 @@ mod gpu {
     const WORTH_A_THREAD: usize = 2_000_000;
 
     impl FitEngineArguments {
-        /// Whether the GPU is to be tried; `auto` says why.
-        pub(super) fn wants_gpu(&self, observed: &[ObservedView]) -> bool {
+        /// Whether the GPU is to be tried, and where `auto` decides, why.
+        pub(super) fn wants_gpu(&self, observed: &[ObservedView]) -> (bool, Option<String>) {
             match self.engine.as_str() {
-                "cpu" => false,
-                "gpu" => true,
-                _ => self.adapter.is_some() || self.is_worth_it(observed),
+                "cpu" => (false, None),
+                "gpu" => (true, None),
+                _ if self.adapter.is_some() => (true, None),
+                _ => {
+                    let samples: usize = observed.iter().map(|view| view.samples.count()).sum();
+                    let threads = rayon::current_num_threads();
+                    let enough = WORTH_A_THREAD * threads;
+                    let words = if samples < enough { "fewer than the" } else { "more than the" };
+                    let why = format!(
+                        "{samples} samples are {words} {enough} from which opening a graphics card pays off \
+                         ({threads} threads)"
+                    );
+                    (samples >= enough, Some(why))
+                }
             }
-        }
-
-        fn is_worth_it(&self, observed: &[ObservedView]) -> bool {
-            let samples: usize = observed.iter().map(|view| view.samples.count()).sum();
-            let threads = rayon::current_num_threads();
-            let enough = WORTH_A_THREAD * threads;
-            let engine = if samples >= enough { "a graphics card, if there is one" } else { "the CPU" };
-            tell(&format!(
-                "{engine} makes the passes: {samples} samples, and opening a card pays off from {enough} on \
-                 ({threads} threads)."
-            ));
-            samples >= enough
         }
 
         pub(super) fn with_gpu<T>(
             &self,
             prepared: &Prepared,
             observed: Vec<ObservedView>,
-            then: impl FnOnce(&FitEngine<'_>) -> Result<T, Refusal>,
+            why: Option<String>,
+            then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
         ) -> Result<T, Refusal> {
-            let must = self.engine == "gpu" || self.adapter.is_some();
+            let must = why.is_none();
             let gpu = match self.open() {
                 Ok(gpu) if must || !gpu.is_software() => gpu,
                 Ok(gpu) => {
-                    tell(&format!(
-                        "{} is a program on the CPU: the CPU engine makes the passes.",
-                        gpu.name()
-                    ));
-                    return then(&FitEngine::Cpu(prepared.engine_over(observed)));
+                    let why = why.map(|why| format!("{why}, but {} is a program on the CPU", gpu.name()));
+                    return self.on_cpu(prepared, observed, why, then);
                 }
                 Err(error) if must => return Err(error.into()),
                 Err(error) => {
                     tell(&format!("{error} The CPU engine makes the passes."));
-                    return then(&FitEngine::Cpu(prepared.engine_over(observed)));
+                    let why = why.map(|why| format!("{why}, but none could be opened"));
+                    return self.on_cpu(prepared, observed, why, then);
                 }
             };
             let mut gpu = gpu;
@@ -215,7 +231,7 @@ mod gpu {
                     Ok(engine) => {
                         let engine = FitEngine::Gpu(engine);
                         self.check(prepared, &engine)?;
-                        return then(&engine);
+                        return then(&Chosen { engine, why });
                     }
                     // A device that ran out of memory is not to be trusted any more; half as much may fit.
                     Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
@@ -263,18 +279,20 @@ mod gpu {
 
 #[cfg(not(feature = "gpu"))]
 mod gpu {
-    use super::{FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal};
+    use super::{Chosen, FitEngineArguments, ObservedView, Prepared, Refusal};
 
     impl FitEngineArguments {
-        pub(super) fn wants_gpu(&self, _observed: &[ObservedView]) -> bool {
-            self.engine == "gpu" || self.adapter.is_some() || self.device_memory.is_some()
+        pub(super) fn wants_gpu(&self, _observed: &[ObservedView]) -> (bool, Option<String>) {
+            let asked = self.engine == "gpu" || self.adapter.is_some() || self.device_memory.is_some();
+            (asked, (!asked).then(|| "this skinfit was built without its GPU engine".to_owned()))
         }
 
         pub(super) fn with_gpu<T>(
             &self,
             _prepared: &Prepared,
             _observed: Vec<ObservedView>,
-            _then: impl FnOnce(&FitEngine<'_>) -> Result<T, Refusal>,
+            _why: Option<String>,
+            _then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
         ) -> Result<T, Refusal> {
             Err(Refusal::new(
                 "this skinfit was built without its GPU engine. Build it with the feature `gpu` (a default one), or \

@@ -68,15 +68,22 @@ impl MapArguments {
 }
 
 impl MapsFound {
-    /// Write the maps, their changes, and `maps.json`; returns the maps that a scene file can name.
-    #[cfg(not(feature = "burn"))]
-    #[allow(clippy::unused_self, clippy::unnecessary_wraps, reason = "as where maps are fitted")]
-    pub(super) fn write(&self, _: &Path) -> Result<Vec<(&'static str, String)>, Refusal> {
-        Ok(Vec::new())
+    /// Write the maps, their changes, and `maps.json`; tell of them, unless `quiet`. Returns the maps that a scene file
+    /// can name: key in `[maps]` and path.
+    #[cfg_attr(not(feature = "burn"), allow(clippy::unnecessary_wraps, reason = "as where maps are fitted"))]
+    pub(super) fn conclude(&self, run: &Path, quiet: bool) -> Result<Vec<(&'static str, String)>, Refusal> {
+        #[cfg(feature = "burn")]
+        let files = self.write(run)?;
+        #[cfg(not(feature = "burn"))]
+        let files = Vec::new();
+        if !quiet {
+            self.tell()?;
+        }
+        Ok(files)
     }
 
     /// How well each view is met, before and after.
-    pub(super) fn tell(&self) -> Result<(), Refusal> {
+    fn tell(&self) -> Result<(), Refusal> {
         for Gained { name, held_out, before, after } in &self.gained {
             if let (Some(before), Some(after)) = (before, after) {
                 let held = if *held_out { " (held out)" } else { "" };
@@ -260,7 +267,7 @@ mod burn {
     }
 
     impl MapsFound {
-        pub(in crate::cli) fn write(&self, run: &Path) -> Result<Vec<(&'static str, String)>, Refusal> {
+        pub(super) fn write(&self, run: &Path) -> Result<Vec<(&'static str, String)>, Refusal> {
             let folder = std::path::absolute(run.join("maps"))
                 .map_err(|error| output::OutputError::new(run, &error))?;
             std::fs::create_dir_all(&folder).map_err(|error| output::OutputError::new(&folder, &error))?;

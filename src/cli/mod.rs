@@ -1,6 +1,7 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
-//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`: the commands
+//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `stability`, `sweep`, `collect`: the
+//!   commands
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
@@ -19,11 +20,16 @@ mod render;
 mod run_folder;
 mod scene;
 mod shader;
+mod stability;
+mod sweep;
 
 use std::io::Write as _;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+use crate::output;
 
 /// How a command ended, as an exit code; `EXIT_CODES` says what each means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -99,6 +105,9 @@ enum Command {
     Shader(shader::Arguments),
     Export(export::Arguments),
     Info(info::Arguments),
+    Stability(stability::Arguments),
+    Sweep(sweep::SweepArguments),
+    Collect(sweep::CollectArguments),
 }
 
 /// Run the program on the process' arguments.
@@ -115,6 +124,9 @@ pub fn main() -> ExitCode {
         Command::Shader(arguments) => shader::run(&arguments),
         Command::Export(arguments) => export::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
+        Command::Stability(arguments) => stability::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
+        Command::Collect(arguments) => sweep::run_collect(&arguments),
     };
     match done {
         Ok(Exit::Done) => ExitCode::SUCCESS,
@@ -134,6 +146,17 @@ fn say(line: &str) -> Result<(), Refusal> {
             "standard output cannot be written: {error}. Send it to a file or a terminal that takes it."
         ))),
         _ => Ok(()),
+    }
+}
+
+/// Write a text to a file and say so, or print it.
+fn write_or_say(file: Option<&Path>, text: &str) -> Result<(), Refusal> {
+    match file {
+        Some(file) => {
+            output::write(file, text.as_bytes())?;
+            say(&format!("wrote {}", file.display()))
+        }
+        None => say(text.trim_end()),
     }
 }
 

@@ -15,6 +15,13 @@ use crate::scene::suggestion;
 pub(super) struct SceneArguments {
     /// The scene file; the built-in scene when left out.
     pub scene: Option<PathBuf>,
+    #[command(flatten)]
+    bakes: BakeArguments,
+}
+
+/// Where bakes are kept, and on how many threads they and all else are computed.
+#[derive(clap::Args)]
+pub(super) struct BakeArguments {
     /// Folder that keeps bakes between runs [default: $SKINFIT_CACHE, or the user's cache folder].
     #[arg(long, value_name = "DIR", help_heading = "Baking")]
     cache: Option<PathBuf>,
@@ -23,14 +30,14 @@ pub(super) struct SceneArguments {
     no_cache: bool,
     /// Threads to use [default: all cores].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
-    threads: Option<u16>,
+    pub threads: Option<u16>,
 }
 
 impl SceneArguments {
     /// The scene's file, and what must stay alive for as long as it is read: without a cache the
     /// built-in scene lives in a folder of its own that goes with it.
     pub(super) fn path(&self) -> Result<(PathBuf, Option<TempDir>), Refusal> {
-        if self.scene.is_some() || !self.no_cache {
+        if self.scene.is_some() || !self.bakes.no_cache {
             return Ok((self.kept_path(Path::new(""))?, None));
         }
         let scratch = tempfile::tempdir().map_err(|error| {
@@ -43,12 +50,24 @@ impl SceneArguments {
         Ok((self.kept_path(scratch.path())?, Some(scratch)))
     }
 
+    /// As [`BakeArguments::kept_path`], of the scene that is named.
+    pub(super) fn kept_path(&self, folder: &Path) -> Result<PathBuf, Refusal> {
+        self.bakes.kept_path(self.scene.as_deref(), folder)
+    }
+
+    /// Where bakes are kept; `None` with `--no-cache`.
+    pub(super) fn cache(&self) -> Option<PathBuf> {
+        self.bakes.cache()
+    }
+}
+
+impl BakeArguments {
     /// The scene's file; the built-in scene is written first if it is not there yet, into the cache
     /// or, when there is none, into `folder`.
-    pub(super) fn kept_path(&self, folder: &Path) -> Result<PathBuf, Refusal> {
+    pub(super) fn kept_path(&self, scene: Option<&Path>, folder: &Path) -> Result<PathBuf, Refusal> {
         self.set_threads();
-        match &self.scene {
-            Some(scene) => Ok(scene.clone()),
+        match scene {
+            Some(scene) => Ok(scene.to_owned()),
             None => {
                 let cache = self.cache();
                 Ok(demo::kept_scene(cache.as_deref().unwrap_or(folder), cache.as_deref())?)
@@ -59,6 +78,22 @@ impl SceneArguments {
     /// Where bakes are kept; `None` with `--no-cache`.
     pub(super) fn cache(&self) -> Option<PathBuf> {
         if self.no_cache { None } else { Some(self.cache.clone().unwrap_or_else(cache::default_folder)) }
+    }
+
+    /// The same, as words of a command line that is run from elsewhere.
+    pub(super) fn words(&self) -> Vec<String> {
+        let mut words = Vec::new();
+        if self.no_cache {
+            words.push("--no-cache".to_owned());
+        }
+        if let Some(cache) = &self.cache {
+            let cache = std::path::absolute(cache).unwrap_or_else(|_| cache.clone());
+            words.extend(["--cache".to_owned(), cache.display().to_string()]);
+        }
+        if let Some(threads) = self.threads {
+            words.extend(["--threads".to_owned(), threads.to_string()]);
+        }
+        words
     }
 
     fn set_threads(&self) {
@@ -77,7 +112,14 @@ pub(super) fn parse_effects(list: &str) -> Result<Effects, String> {
             .ok_or_else(|| format!("unknown effect `{name}`. {}.", suggestion(name, &known)))
     };
     let names = list.split(',').map(str::trim).filter(|name| !name.is_empty());
-    let effects: Effects = names.map(parse).collect::<Result<_, _>>()?;
+    let mut effects = Effects::default();
+    for name in names {
+        let effect = parse(name)?;
+        if effects.has(effect) {
+            return Err(format!("the effect {name} is listed twice. Take one of them out."));
+        }
+        effects = effects.with(effect);
+    }
     if effects == Effects::default() {
         return Err(format!("it names no effect. {}.", suggestion("", &known)));
     }

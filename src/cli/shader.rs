@@ -4,10 +4,9 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use super::scene::{SceneArguments, parse_effects};
-use super::{Exit, Refusal, say, tell_warnings};
+use super::{Exit, Refusal, tell_warnings, write_or_say};
 use crate::fit::params_file::ParamsFile;
 use crate::model::effects::Effects;
-use crate::output;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
 use crate::shader::rule::Stage;
@@ -57,13 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         "wgsl" => plan.wgsl.clone(),
         _ => format!("{}\n{}", table(&plan, "// "), plan.wgsl),
     };
-    match &arguments.output {
-        Some(path) => {
-            output::write(path, text.as_bytes())?;
-            say(&format!("wrote {}", path.display()))?;
-        }
-        None => say(text.trim_end())?,
-    }
+    write_or_say(arguments.output.as_deref(), &text)?;
     Ok(Exit::Done)
 }
 

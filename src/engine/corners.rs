@@ -1,75 +1,74 @@
 //! The texels of sixteen bilinear lookups, and their transposition to a number a lane.
 
 use fearless_simd::prelude::*;
-use fearless_simd::{f32x4, f32x16, i32x16};
+use fearless_simd::{f32x8, f32x16, i32x16};
 
 use super::lanes::Lanes;
 use crate::simd::Simd;
 
-/// The 2 x 2 texels of each lane's lookup: for each corner, four channels of sixteen lanes.
+/// The 2 x 2 texels of each lane's lookup: the upper and the lower row, of each four channels, of each
+/// the left and the right one.
 ///
-/// A texel is one 16-byte load; four lanes' texels are joined in a register and transposed. Gathers
-/// of single floats are several times slower.
-pub(super) struct Corners<S: Simd>([[Lanes<S>; 4]; 4]);
+/// Two neighbours are one load of 32 bytes; two lanes' share a register, and eight registers are
+/// transposed together. Gathers of single floats are several times slower.
+pub(super) struct Corners<S: Simd>([[[Lanes<S>; 2]; 4]; 2]);
 
 impl<S: Simd> Corners<S> {
+    /// The texels at `first`, right of it, and those `row` texels later.
     #[inline(always)]
     pub(super) fn load(texels: &[[f32; 4]], row: usize, first: Lanes<S>) -> Self {
         let simd = first.0.simd;
         let first: i32x16<S> = first.0.to_int();
-        // Through memory: taking sixteen numbers out of a register costs more.
-        let first = std::hint::black_box(first.to_array());
+        // Four numbers a texel. Through memory: taking sixteen numbers out of a register costs more.
+        let first = std::hint::black_box((first << 2).to_array());
         // Slices of equal length, so that one check of an index covers all four corners.
-        let count = texels.len() - row - 1;
-        let (a, b) = (&texels[..count], &texels[1..][..count]);
-        let (c, d) = (&texels[row..][..count], &texels[row + 1..][..count]);
-        let mut joined = [[f32x16::splat(simd, 0.0); 4]; 4];
-        // Lane by lane, so that few indices are held at a time.
-        for quarter in 0..4 {
-            let lane = 4 * quarter;
-            let index = [first[lane], first[lane + 1], first[lane + 2], first[lane + 3]];
-            joined[0][quarter] = four_texels(simd, a, index);
-            joined[1][quarter] = four_texels(simd, b, index);
-            joined[2][quarter] = four_texels(simd, c, index);
-            joined[3][quarter] = four_texels(simd, d, index);
+        let numbers = texels.as_flattened();
+        let count = numbers.len() - 4 * row;
+        let (upper, lower) = (&numbers[..count], &numbers[4 * row..][..count]);
+        let mut rows = [[f32x16::splat(simd, 0.0); 8]; 2];
+        for pair in 0..8 {
+            // By way of u32, so that the end of a range cannot overflow, which would be asked too.
+            let (i, j) = (first[2 * pair] as u32 as usize, first[2 * pair + 1] as u32 as usize);
+            rows[0][pair] = joined(simd, &upper[i..i + 8], &upper[j..j + 8]);
+            rows[1][pair] = joined(simd, &lower[i..i + 8], &lower[j..j + 8]);
         }
-        let [a, b, c, d] = joined;
-        Self([transpose(simd, a), transpose(simd, b), transpose(simd, c), transpose(simd, d)])
+        Self([transposed(simd, rows[0]), transposed(simd, rows[1])])
     }
 
     /// A channel's four corners.
     #[inline(always)]
     pub(super) fn of(&self, channel: usize) -> [Lanes<S>; 4] {
-        let [a, b, c, d] = &self.0;
-        [a[channel], b[channel], c[channel], d[channel]]
+        let [upper, lower] = &self.0;
+        let ([a, b], [c, d]) = (upper[channel], lower[channel]);
+        [a, b, c, d]
     }
 }
 
-/// Four RGBA quadruples in one register.
+/// Two lanes' pairs of texels in one register.
 #[inline(always)]
-fn four_texels<S: Simd>(simd: S, texels: &[[f32; 4]], index: [i32; 4]) -> f32x16<S> {
-    join(
-        simd,
-        f32x4::load_array_ref(simd, &texels[index[0] as usize]),
-        f32x4::load_array_ref(simd, &texels[index[1] as usize]),
-        f32x4::load_array_ref(simd, &texels[index[2] as usize]),
-        f32x4::load_array_ref(simd, &texels[index[3] as usize]),
-    )
+fn joined<S: Simd>(simd: S, i: &[f32], j: &[f32]) -> f32x16<S> {
+    simd.combine_f32x8(f32x8::from_slice(simd, i), f32x8::from_slice(simd, j))
 }
 
-/// Four RGBA quadruples in one register, without a detour through memory: wide loads of what was
-/// just stored in parts would stall.
+/// Sixteen lanes' pairs of RGBA texels, two lanes a register, to channels of left and right texels.
 #[inline(always)]
-fn join<S: Simd>(simd: S, a: f32x4<S>, b: f32x4<S>, c: f32x4<S>, d: f32x4<S>) -> f32x16<S> {
-    simd.combine_f32x8(simd.combine_f32x4(a, b), simd.combine_f32x4(c, d))
-}
-
-/// Sixteen RGBA quadruples to four channels of sixteen.
-#[inline(always)]
-fn transpose<S: Simd>(simd: S, lanes: [f32x16<S>; 4]) -> [Lanes<S>; 4] {
+fn transposed<S: Simd>(simd: S, lanes: [f32x16<S>; 8]) -> [[Lanes<S>; 2]; 4] {
     let (rb0, ga0) = simd.deinterleave_f32x16(lanes[0], lanes[1]);
     let (rb1, ga1) = simd.deinterleave_f32x16(lanes[2], lanes[3]);
-    let (r, b) = simd.deinterleave_f32x16(rb0, rb1);
-    let (g, a) = simd.deinterleave_f32x16(ga0, ga1);
-    [Lanes(r), Lanes(g), Lanes(b), Lanes(a)]
+    let (rb2, ga2) = simd.deinterleave_f32x16(lanes[4], lanes[5]);
+    let (rb3, ga3) = simd.deinterleave_f32x16(lanes[6], lanes[7]);
+    let (r0, b0) = simd.deinterleave_f32x16(rb0, rb1);
+    let (r1, b1) = simd.deinterleave_f32x16(rb2, rb3);
+    let (g0, a0) = simd.deinterleave_f32x16(ga0, ga1);
+    let (g1, a1) = simd.deinterleave_f32x16(ga2, ga3);
+    let (r, r_right) = simd.deinterleave_f32x16(r0, r1);
+    let (g, g_right) = simd.deinterleave_f32x16(g0, g1);
+    let (b, b_right) = simd.deinterleave_f32x16(b0, b1);
+    let (a, a_right) = simd.deinterleave_f32x16(a0, a1);
+    [
+        [Lanes(r), Lanes(r_right)],
+        [Lanes(g), Lanes(g_right)],
+        [Lanes(b), Lanes(b_right)],
+        [Lanes(a), Lanes(a_right)],
+    ]
 }

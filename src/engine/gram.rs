@@ -18,9 +18,18 @@ pub(super) struct Columns<'a> {
 
 /// Add the upper triangle of the Gram matrix of the columns to `sums`, lane by lane.
 ///
-/// Entry (i, j), i <= j, stands at [`pair`]`(i, j, count)` of `sums`.
-#[inline(always)]
+/// Entry (i, j), i <= j, stands at [`pair`]`(i, j, count)` of `sums`. A function of its own, with
+/// registers of its own: as part of a kernel that needs them all, it takes half as long again.
+#[inline(never)]
 pub(super) fn add_gram<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
+    simd.vectorize(
+        #[inline(always)]
+        || add_tiles(simd, columns, sums),
+    );
+}
+
+#[inline(always)]
+fn add_tiles<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
     let count = columns.count;
     // Tiles of 4 x 4 columns: 16 products for 8 loads.
     let mut i = 0;

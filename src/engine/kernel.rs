@@ -12,12 +12,11 @@ use super::records::{AHEAD, Records};
 use super::residual::{Weighted, weighted_residual};
 use crate::model::compose::{Composition, Weights};
 use crate::model::effects::Silhouette;
-use crate::model::fragment::{
-    Fragment, LookupParam, Terms, shading, terms, terms_tangent, terms_with_strength_tangent,
-};
+use crate::model::fragment::{Fragment, Shading, shading};
 use crate::model::lights::Lights;
 use crate::model::params::Param;
 use crate::model::real::Real;
+use crate::model::terms::{LookupParam, Terms, terms, terms_tangent, terms_with_strength_tangent};
 use crate::model::vector::V3;
 use crate::samples::rows::{Row, prefetch_rows};
 use crate::samples::surface_records::NEUTRAL;
@@ -199,20 +198,11 @@ impl<S: Simd> Kernel<'_, S> {
 
     #[inline(always)]
     fn no_terms(&self, record: usize) -> Terms<Lanes<S>> {
-        let zero = self.lit(0.0);
         let silhouette = match self.plan.setup.silhouette {
-            Silhouette::Bumped => zero,
+            Silhouette::Bumped => self.lit(0.0),
             _ => self.load(self.view.record(record), self.view.places.silhouette, 0.0),
         };
-        Terms {
-            diffuse: [zero; 3],
-            side: [zero; 3],
-            hilite: [zero; 3],
-            mirror: [zero; 3],
-            haze: zero,
-            key: [zero; 3],
-            silhouette,
-        }
+        Terms::none(silhouette)
     }
 
     #[inline(always)]
@@ -262,7 +252,7 @@ impl<S: Simd> Kernel<'_, S> {
         &self,
         composition: &Composition<Lanes<S>>,
         f: &Fragment<Lanes<S>>,
-        s: &crate::model::fragment::Shading<Lanes<S>>,
+        s: &Shading<Lanes<S>>,
         sink: &mut Sink<'_, S>,
     ) {
         macro_rules! put {

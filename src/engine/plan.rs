@@ -4,8 +4,8 @@
 use super::Unknown;
 use crate::model::effects::{Effect, Silhouette};
 use crate::model::evaluate::Setup;
-use crate::model::fragment::{LookupParam, Wanted};
 use crate::model::params::{Channels, Column, Param};
+use crate::model::terms::{LookupParam, Wanted};
 
 /// Rows of a group's window in the scratch: the columns of all channels fit. Windows overlap: a group's
 /// own columns are fewer, and the next group writes later.

@@ -26,8 +26,11 @@ pub struct Dialect {
     pub map_lookup: &'static str,
     /// A lookup of a cube.
     pub cube_lookup: &'static str,
-    /// Declarations of a 2D map, a cube and a sampler: `{n}` name, `{b}` binding. Empty: none.
+    /// Declarations of a 2D map, a cube and a sampler: `{n}` name, `{b}` binding, `{h}` what a map of
+    /// colours is marked with. Empty: none.
     pub declarations: [&'static str; 3],
+    /// What has the engine decode a map from sRGB.
+    pub colour_hint: &'static str,
     /// The names of the samplers of maps and cubes.
     pub samplers: [&'static str; 2],
     /// The bits of a vector's floats; empty where the language has none, but `isfinite`.
@@ -38,10 +41,23 @@ pub struct Dialect {
     pub epilogue: &'static str,
 }
 
+/// What most of them share.
+const BASE: Dialect = Dialect {
+    family: Family::Glsl,
+    constant: "const",
+    map_lookup: "textureLod({t}, {c}, 0.0)",
+    cube_lookup: "textureLod({t}, {c}, 0.0)",
+    declarations: [""; 3],
+    colour_hint: "",
+    samplers: ["map_sampler", "cube_sampler"],
+    bits: "",
+    prologue: "",
+    epilogue: "",
+};
+
 /// WebGPU's language.
 pub const WGSL: Dialect = Dialect {
     family: Family::Wgsl,
-    constant: "const",
     map_lookup: "textureSampleLevel({t}, {s}, {c}, 0.0)",
     cube_lookup: "textureSampleLevel({t}, {s}, {c}, 0.0)",
     declarations: [
@@ -49,27 +65,30 @@ pub const WGSL: Dialect = Dialect {
         "@group(0) @binding({b}) var {n}: texture_cube<f32>;",
         "@group(0) @binding({b}) var {n}: sampler;",
     ],
-    samplers: ["map_sampler", "cube_sampler"],
     bits: "bitcast<vec3u>",
-    prologue: "",
-    epilogue: "",
+    ..BASE
 };
 
 /// OpenGL 4.3, OpenGL ES 3.1 and up.
 pub const GLSL: Dialect = Dialect {
-    family: Family::Glsl,
-    constant: "const",
-    map_lookup: "textureLod({t}, {c}, 0.0)",
-    cube_lookup: "textureLod({t}, {c}, 0.0)",
     declarations: [
         "layout(binding = {b}) uniform sampler2D {n};",
         "layout(binding = {b}) uniform samplerCube {n};",
         "",
     ],
-    samplers: ["map_sampler", "cube_sampler"],
     bits: "floatBitsToUint",
-    prologue: "",
-    epilogue: "",
+    ..BASE
+};
+
+/// Godot 4, as an include of a spatial shader.
+pub const GODOT: Dialect = Dialect {
+    declarations: [
+        "uniform sampler2D {n} : {h}filter_linear, repeat_enable;",
+        "uniform samplerCube {n} : filter_linear;",
+        "",
+    ],
+    colour_hint: "source_color, ",
+    ..GLSL
 };
 
 /// Direct3D 11 and up.
@@ -83,23 +102,26 @@ pub const HLSL: Dialect = Dialect {
         "TextureCube<float4> {n} : register(t{b});",
         "SamplerState {n} : register(s{b});",
     ],
-    samplers: ["map_sampler", "cube_sampler"],
     bits: "asuint",
-    prologue: "",
-    epilogue: "",
+    ..BASE
+};
+
+/// Unity, as an include of an HLSLPROGRAM.
+pub const UNITY: Dialect = Dialect {
+    declarations: ["Texture2D<float4> {n};", "TextureCube<float4> {n};", "SamplerState {n};"],
+    samplers: ["sampler_linear_repeat", "sampler_linear_clamp"],
+    prologue: "#ifndef SKINFIT_INCLUDED\n#define SKINFIT_INCLUDED\n",
+    epilogue: "\n#endif\n",
+    ..HLSL
 };
 
 /// The paper's language (profiles with `texCUBElod`: fp40, gp4 and up).
 pub const CG: Dialect = Dialect {
-    family: Family::Hlsl,
-    constant: "static const",
     map_lookup: "tex2Dlod({t}, float4({c}, 0.0, 0.0))",
     cube_lookup: "texCUBElod({t}, float4({c}, 0.0))",
     declarations: ["uniform sampler2D {n};", "uniform samplerCUBE {n};", ""],
-    samplers: ["map_sampler", "cube_sampler"],
     bits: "",
-    prologue: "",
-    epilogue: "",
+    ..HLSL
 };
 
 /// Metal 2 and up. Textures are arguments of a shader there: a struct holds them and has the functions.
@@ -109,40 +131,9 @@ pub const MSL: Dialect = Dialect {
     map_lookup: "{t}.sample({s}, {c}, level(0.0))",
     cube_lookup: "{t}.sample({s}, {c}, level(0.0))",
     declarations: ["texture2d<float> {n};", "texturecube<float> {n};", "sampler {n};"],
-    samplers: ["map_sampler", "cube_sampler"],
     bits: "as_type<uint3>",
     prologue: "#include <metal_stdlib>\nusing namespace metal;\n",
-    epilogue: "",
-};
-
-/// Godot 4, as an include of a spatial shader.
-pub const GODOT: Dialect = Dialect {
-    family: Family::Glsl,
-    constant: "const",
-    map_lookup: "textureLod({t}, {c}, 0.0)",
-    cube_lookup: "textureLod({t}, {c}, 0.0)",
-    declarations: [
-        "uniform sampler2D {n} : filter_linear, repeat_enable;",
-        "uniform samplerCube {n} : filter_linear;",
-        "",
-    ],
-    samplers: ["map_sampler", "cube_sampler"],
-    bits: "floatBitsToUint",
-    prologue: "",
-    epilogue: "",
-};
-
-/// Unity, as an include of an HLSLPROGRAM.
-pub const UNITY: Dialect = Dialect {
-    family: Family::Hlsl,
-    constant: "static const",
-    map_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
-    cube_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
-    declarations: ["Texture2D<float4> {n};", "TextureCube<float4> {n};", "SamplerState {n};"],
-    samplers: ["sampler_linear_repeat", "sampler_linear_clamp"],
-    bits: "asuint",
-    prologue: "#ifndef SKINFIT_INCLUDED\n#define SKINFIT_INCLUDED\n",
-    epilogue: "\n#endif\n",
+    ..BASE
 };
 
 impl Dialect {
@@ -205,6 +196,8 @@ impl Dialect {
             Kind::Sampler => self.declarations[2],
             _ => self.declarations[0],
         };
-        text.replace("{n}", self.resource(resource.name())).replace("{b}", &binding.to_string())
+        let hint = if resource == Resource::ColorMap { self.colour_hint } else { "" };
+        let name = self.resource(resource.name());
+        text.replace("{n}", name).replace("{b}", &binding.to_string()).replace("{h}", hint)
     }
 }

@@ -4,6 +4,7 @@
 //! # Fitted by skinfit 0.1.0 with varpro to scenes/forest.toml.
 //! # Loss 3.1e-2 at the start, 4.2e-3 at the end.
 //! form = "corrected"
+//! effects = ["diffuse", "hilite"]
 //! loss = "relative_l2"
 //!
 //! [params]
@@ -26,7 +27,7 @@ use parse::{Problem, parse};
 
 use crate::engine::Unknown;
 use crate::fit::outcome::{Outcome, UnknownOutcome};
-use crate::model::effects::Form;
+use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Channels, Param, Params};
 use crate::output::{self, OutputError};
 use crate::scene::Loss;
@@ -36,6 +37,8 @@ use crate::scene::Loss;
 pub struct ParamsFile {
     /// The form that the parameters are of.
     pub form: Form,
+    /// The effects that they were fitted with, where the file says.
+    pub effects: Option<Effects>,
     /// The loss that they minimise, where the file says.
     pub loss: Option<Loss>,
     /// The parameters.
@@ -77,6 +80,10 @@ impl ParamsFile {
             }
         }
         writeln!(text, "form = \"{}\"", self.form.name())?;
+        if let Some(effects) = self.effects {
+            let names: Vec<&str> = effects.iter().map(Effect::name).collect();
+            writeln!(text, "effects = {names:?}")?;
+        }
         if let Some(loss) = self.loss {
             writeln!(text, "loss = \"{}\"", loss.name())?;
         }
@@ -188,7 +195,8 @@ mod tests {
             }
             params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e20]);
             let gains = vec![("front \"left\"".to_owned(), 0.7), ("b\nc\u{7f}\u{1}".to_owned(), 1.0 / 3.0)];
-            let file = ParamsFile { form, loss: Some(Loss::Huber), params, gains };
+            let effects = Some(Effects::SURFACE);
+            let file = ParamsFile { form, effects, loss: Some(Loss::Huber), params, gains };
             let text = file.to_toml(Path::new("a\nform = 1"), None);
             assert_eq!(read(&text, form).unwrap(), file, "{text}");
         }

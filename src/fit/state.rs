@@ -170,6 +170,15 @@ impl Saved {
         }
     }
 
+    /// What the state at `path` was begun with: solver, number of starts, seed.
+    ///
+    /// # Errors
+    /// When it cannot be read or is damaged.
+    pub fn begun_with(path: &Path) -> Result<(SolverKind, u32, u64), StateError> {
+        let saved = Self::parse(path)?;
+        Ok((saved.solver, saved.starts, saved.seed))
+    }
+
     /// Whether every start ran to an end of its own.
     #[must_use]
     pub fn is_complete(&self) -> bool {
@@ -195,15 +204,19 @@ impl Saved {
         start: &Point,
         options: &FitOptions,
     ) -> Result<Self, StateError> {
+        let saved = Self::parse(path)?;
+        let now = Self::new(unknowns, start, options, saved.origin.clone());
+        saved.belongs_to(&now, path)?;
+        saved.check().map_err(|reason| StateError::Corrupt { path: path.to_owned(), reason })?;
+        Ok(saved)
+    }
+
+    fn parse(path: &Path) -> Result<Self, StateError> {
         let unreadable =
             |e: std::io::Error| StateError::Unreadable { path: path.to_owned(), reason: e.to_string() };
         let corrupt = |reason: String| StateError::Corrupt { path: path.to_owned(), reason };
         let bytes = std::fs::read(path).map_err(unreadable)?;
-        let saved: Self = serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
-        let now = Self::new(unknowns, start, options, saved.origin.clone());
-        saved.belongs_to(&now, path)?;
-        saved.check().map_err(corrupt)?;
-        Ok(saved)
+        serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))
     }
 
     fn belongs_to(&self, now: &Self, path: &Path) -> Result<(), StateError> {

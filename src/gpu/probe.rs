@@ -7,11 +7,23 @@ use wgpu::{
     ShaderSource,
 };
 
+use super::constants::{self, Values};
 use super::device::Gpu;
 use super::error::GpuError;
 use super::readback::read_floats;
+use super::targets::Tile;
 use super::upload::{Content, Uploads};
+use crate::model::params::Params;
+use crate::scene::view::Camera;
 use crate::shader::probe::{Probe, WORKGROUP};
+
+/// The uniform block of a probe's plan at `params`: the eye at the origin, no morph targets.
+#[must_use]
+pub fn constants(probe: &Probe, params: &Params) -> Vec<f32> {
+    let camera = Camera { world_to_camera: glam::DMat4::IDENTITY, fov_y: 1.0, width: 1, height: 1 };
+    let tile = Tile { x: 0, y: 0, width: 1, height: 1 };
+    constants::block(&probe.plan.constants, &Values { params, camera: &camera, tile, morph_weights: &[] })
+}
 
 /// What the probe yields for each item of `given` ([`Probe::stride`] numbers each): [`Probe::width`] numbers
 /// an item. Resources come from `content`, whose active morph targets are summed; `constants` is the

@@ -9,10 +9,10 @@
 //! ```
 
 use super::effects::{Effect, Effects};
-use super::fragment::Terms;
 use super::params::{Param, Params};
 use super::real::Real;
 use super::rim::{Rim, rim};
+use super::terms::Terms;
 use super::vector::V3;
 
 /// The parameters of the sum, in the scalar of the evaluator. A weight whose effect is off is 0.

@@ -121,6 +121,15 @@ impl<R: Real> CubePoint<R> {
     }
 }
 
+/// Where a lookup falls in a cube.
+#[derive(Clone, Copy)]
+pub struct Footprint<R> {
+    /// The first of the four texels.
+    pub first: R,
+    /// The place among them, in [0, 1]^2.
+    pub place: [R; 2],
+}
+
 impl<T: Copy> Cube<T> {
     /// Texels along a face's side.
     #[must_use]
@@ -154,38 +163,43 @@ impl<T: Copy> Cube<T> {
     /// The seamless bilinear lookup along `d`.
     #[inline(always)]
     pub fn sample<R: Real<Texel = T>>(&self, d: V3<R>) -> [R; 4] {
-        self.sample_at(&CubePoint::new(d))
+        self.sample_at(&self.footprint(&CubePoint::new(d)))
     }
 
-    /// The lookup at a point.
+    /// The lookup at a footprint.
     #[inline(always)]
-    pub fn sample_at<R: Real<Texel = T>>(&self, point: &CubePoint<R>) -> [R; 4] {
-        let (index, [fx, fy]) = self.footprint(point);
-        R::bilinear(&self.padded, self.size + 2, index, fx, fy)
+    pub fn sample_at<R: Real<Texel = T>>(&self, at: &Footprint<R>) -> [R; 4] {
+        let [fx, fy] = at.place;
+        R::bilinear(&self.padded, self.size + 2, at.first, fx, fy)
     }
 
-    /// The lookup at a point, and its derivative as (s, t) moves along `tangent`.
+    /// The lookup at a footprint, and its derivative as the footprint moves along `tangent`, in
+    /// texels.
     #[inline(always)]
     pub fn sample_with_slope<R: Real<Texel = T>>(
         &self,
-        point: &CubePoint<R>,
+        at: &Footprint<R>,
         tangent: [R; 2],
     ) -> ([R; 4], [R; 4]) {
-        let (index, f) = self.footprint(point);
-        let size = point.s.lit(self.size as f64);
-        let d = [tangent[0] * size, tangent[1] * size];
-        R::bilinear_with_slope(&self.padded, self.size + 2, index, f, d)
+        R::bilinear_with_slope(&self.padded, self.size + 2, at.first, at.place, tangent)
     }
 
-    /// The first of the four texels around a point, and the point's place among them.
+    /// The texels around a point.
     #[inline(always)]
-    fn footprint<R: Real>(&self, point: &CubePoint<R>) -> (R, [R; 2]) {
+    pub fn footprint<R: Real>(&self, point: &CubePoint<R>) -> Footprint<R> {
         let (zero, half) = (point.s.lit(0.0), point.s.lit(0.5));
         let (size, side) = (half.lit(self.size as f64), half.lit((self.size + 2) as f64));
         let (x, y) = (point.s.mul_add(size, half), point.t.mul_add(size, half));
         let (column, row) = (x.floor().max(zero).min(size), y.floor().max(zero).min(size));
-        let index = point.face.mul_add(side, row).mul_add(side, column);
-        (index, [x - column, y - row])
+        let first = point.face.mul_add(side, row).mul_add(side, column);
+        Footprint { first, place: [x - column, y - row] }
+    }
+
+    /// How footprints move, in texels, when their point moves along `tangent`.
+    #[inline(always)]
+    pub fn texels<R: Real>(&self, tangent: [R; 2]) -> [R; 2] {
+        let size = tangent[0].lit(self.size as f64);
+        [tangent[0] * size, tangent[1] * size]
     }
 }
 

@@ -3,10 +3,11 @@
 
 use super::compose::{Composition, Weights};
 use super::effects::{Effects, Form, Silhouette};
-use super::fragment::{Fragment, LookupParam, Wanted, shading, terms, terms_tangent};
+use super::fragment::{Fragment, shading};
 use super::lights::Lights;
 use super::params::{Param, Params};
 use super::real::Real;
+use super::terms::{LookupParam, Wanted, terms, terms_tangent};
 
 /// What is evaluated: the switches that are the same for every fragment of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -1,15 +1,14 @@
 //! The fragment stage (listing 3-4): from interpolated values and texels to what the lights see.
 //!
-//! A [`Fragment`] is shaded in three steps: its [`Shading`] normal and reflection, the light's
-//! [`Terms`] along them, and their weighted sum (see [`super::compose`]). Only the first two depend
-//! on the non-linear parameters `normal_strength`, `specular_lobe` and `environment_rotation`.
+//! A [`Fragment`] is shaded in three steps: its [`Shading`] normal and reflection, the light's terms
+//! along them (see [`super::terms`]), and their weighted sum (see [`super::compose`]). Only the first
+//! two depend on the non-linear parameters `normal_strength`, `specular_lobe` and
+//! `environment_rotation`.
 
-use super::cube::{Cube, CubePoint};
 use super::effects::{Form, Silhouette};
-use super::lights::Lights;
 use super::real::Real;
 use super::rim::{silhouette, silhouette_slope};
-use super::vector::{V3, dot, mul, normalize_or, scale, scale_add, select, sub};
+use super::vector::{V3, dot, normalize_or, scale, scale_add, select, sub};
 
 /// One fragment, as the model reads it.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +53,18 @@ pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V
     (scale(d[2], n), scale_add(d[0], t, scale(d[1], b)))
 }
 
+/// Base and bump as a sample holds them: where no base is left the side that faces the eye counts, and a
+/// bump that is not finite counts nothing (MODEL 7).
+#[inline(always)]
+pub fn guarded<R: Real>(base: V3<R>, bump: V3<R>, view: V3<R>) -> (V3<R>, V3<R>) {
+    let zero = view[0].lit(0.0);
+    let size = |v: V3<R>| v[0].abs() + v[1].abs() + v[2].abs();
+    let (base_size, bump_size) = (size(base), size(bump));
+    let there = R::and(base_size.is_finite(), zero.lt(base_size));
+    let base = select::<R>(there, base, [-view[0], -view[1], -view[2]]);
+    (base, select::<R>(bump_size.is_finite(), bump, [zero; 3]))
+}
+
 /// The unit view vector of the corrected form; (0, 0, -1) for an eye on the surface.
 #[inline(always)]
 pub fn unit_view<R: Real>(view: V3<R>) -> V3<R> {
@@ -80,6 +91,10 @@ pub struct Shading<R> {
     pub silhouette_tangent: R,
 }
 
+/// The most by which a normal that all but vanishes turns with its map's strength: beyond, the squares of
+/// derivatives would overflow an f32.
+const STEEPEST: f64 = 1e6;
+
 /// The shading normal at `strength` and what follows from it.
 #[inline(always)]
 pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R) -> Shading<R> {
@@ -91,7 +106,9 @@ pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R
         Form::Corrected => {
             let (n, inverse_length) = unit_normal(m, f.normal, v);
             // d (m / |m|) = (dm - n (n . dm)) / |m|
-            (n, scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump)))
+            let turning = scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump));
+            let (least, most) = (strength.lit(-STEEPEST), strength.lit(STEEPEST));
+            (n, turning.map(|x| x.max(least).min(most)))
         }
     };
     let (q, dq) = (dot(n, v), dot(n_tangent, v));
@@ -119,205 +136,4 @@ fn unit_normal<R: Real>(m: V3<R>, smooth: V3<R>, view: V3<R>) -> (V3<R>, R) {
     }
     let (normal, _) = normalize_or(smooth, [-view[0], -view[1], -view[2]]);
     normalize_or(m, normal)
-}
-
-/// The light's contributions before their weights: each is linear in one weight of the model.
-#[derive(Clone, Copy, Debug)]
-pub struct Terms<R> {
-    /// albedo E_d(n)
-    pub diffuse: V3<R>,
-    /// s E_s(n)
-    pub side: V3<R>,
-    /// a E_h(V)
-    pub hilite: V3<R>,
-    /// dapple E_s(R)
-    pub mirror: V3<R>,
-    /// dapple a E_s(R).a
-    pub haze: R,
-    /// albedo (max(0, n.L) - max(0, N.L))
-    pub key: V3<R>,
-    /// S.z
-    pub silhouette: R,
-}
-
-/// A non-linear parameter whose derivative needs lookups.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LookupParam {
-    /// `normal_strength`
-    NormalStrength,
-    /// `specular_lobe`
-    SpecularLobe,
-    /// `environment_rotation`
-    EnvironmentRotation,
-    /// `key_azimuth`
-    KeyAzimuth,
-    /// `key_elevation`
-    KeyElevation,
-}
-
-#[inline(always)]
-fn rgb<R: Copy>(texel: [R; 4]) -> V3<R> {
-    [texel[0], texel[1], texel[2]]
-}
-
-/// Which of the terms are wanted; the others are left 0 and cost nothing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "named as the terms")]
-pub struct Wanted {
-    pub diffuse: bool,
-    pub side: bool,
-    pub hilite: bool,
-    pub mirror: bool,
-    pub key: bool,
-}
-
-impl Wanted {
-    /// Every term.
-    pub const ALL: Self = Self { diffuse: true, side: true, hilite: true, mirror: true, key: true };
-    /// No term.
-    pub const NONE: Self = Self { diffuse: false, side: false, hilite: false, mirror: false, key: false };
-}
-
-/// The wanted terms of a fragment.
-#[inline(always)]
-pub fn terms<R: Real>(lights: &Lights<'_, R>, f: &Fragment<R>, s: &Shading<R>, wanted: Wanted) -> Terms<R> {
-    let zero = f.view[0].lit(0.0);
-    let mut terms = Terms {
-        diffuse: [zero; 3],
-        side: [zero; 3],
-        hilite: [zero; 3],
-        mirror: [zero; 3],
-        haze: zero,
-        key: [zero; 3],
-        silhouette: s.silhouette,
-    };
-    if (wanted.diffuse && lights.irradiance.is_some()) || (wanted.side && lights.side.is_some()) {
-        let n = CubePoint::new(lights.turned(s.n));
-        if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-            terms.diffuse = mul(f.albedo, rgb(cube.sample_at(&n)));
-        }
-        if let (true, Some(cube)) = (wanted.side, lights.side) {
-            terms.side = scale(f.specular, rgb(cube.sample_at(&n)));
-        }
-    }
-    if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let e = cube.sample(lights.turned(s.reflection));
-        terms.mirror = scale(f.dapple, rgb(e));
-        terms.haze = f.dapple * f.attenuator * e[3];
-    }
-    if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
-        terms.hilite = scale(f.attenuator, rgb(cube.sample(lights.turned(f.view))));
-    }
-    if let (true, Some(key)) = (wanted.key, lights.key) {
-        let lambert = |n: V3<R>| dot(n, key.direction).max(zero);
-        terms.key = scale(lambert(s.n) - lambert(f.normal), f.albedo);
-    }
-    terms
-}
-
-/// The wanted terms, and their derivative with respect to `normal_strength`: the same texels serve
-/// both.
-#[inline(always)]
-pub fn terms_with_strength_tangent<R: Real>(
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    s: &Shading<R>,
-    wanted: Wanted,
-) -> (Terms<R>, Terms<R>) {
-    let zero = f.view[0].lit(0.0);
-    let unmoved = Wanted { diffuse: false, side: false, mirror: false, key: false, ..wanted };
-    let mut terms = terms(lights, f, s, unmoved);
-    let mut slope = Terms { hilite: [zero; 3], silhouette: s.silhouette_tangent, ..terms };
-    if (wanted.diffuse && lights.irradiance.is_some()) || (wanted.side && lights.side.is_some()) {
-        let n = CubePoint::new(lights.turned(s.n));
-        let dn = n.tangent(lights.turned(s.n_tangent));
-        if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-            let (e, de) = cube.sample_with_slope(&n, dn);
-            terms.diffuse = mul(f.albedo, rgb(e));
-            slope.diffuse = mul(f.albedo, rgb(de));
-        }
-        if let (true, Some(cube)) = (wanted.side, lights.side) {
-            let (e, de) = cube.sample_with_slope(&n, dn);
-            terms.side = scale(f.specular, rgb(e));
-            slope.side = scale(f.specular, rgb(de));
-        }
-    }
-    if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let r = CubePoint::new(lights.turned(s.reflection));
-        let (e, de) = cube.sample_with_slope(&r, r.tangent(lights.turned(s.reflection_tangent)));
-        terms.mirror = scale(f.dapple, rgb(e));
-        slope.mirror = scale(f.dapple, rgb(de));
-        terms.haze = f.dapple * f.attenuator * e[3];
-        slope.haze = f.dapple * f.attenuator * de[3];
-    }
-    if let (true, Some(key)) = (wanted.key, lights.key) {
-        let (bumped, smooth) = (dot(s.n, key.direction), dot(f.normal, key.direction));
-        terms.key = scale(bumped.max(zero) - smooth.max(zero), f.albedo);
-        slope.key = scale(R::select(zero.lt(bumped), dot(s.n_tangent, key.direction), zero), f.albedo);
-    }
-    (terms, slope)
-}
-
-/// The derivative of the terms with respect to a parameter other than `normal_strength`.
-#[inline(always)]
-pub fn terms_tangent<R: Real>(
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    s: &Shading<R>,
-    param: LookupParam,
-) -> Terms<R> {
-    let zero = f.view[0].lit(0.0);
-    let mut slope = Terms {
-        diffuse: [zero; 3],
-        side: [zero; 3],
-        hilite: [zero; 3],
-        mirror: [zero; 3],
-        haze: zero,
-        key: [zero; 3],
-        silhouette: zero,
-    };
-    let (n, r) = (lights.turned(s.n), lights.turned(s.reflection));
-    match param {
-        LookupParam::NormalStrength => return terms_with_strength_tangent(lights, f, s, Wanted::ALL).1,
-        LookupParam::SpecularLobe => {
-            if let Some(cube) = lights.lobe_slope {
-                if lights.side.is_some() {
-                    slope.side = scale(f.specular, rgb(cube.sample(n)));
-                }
-                if lights.mirror.is_some() {
-                    let e = cube.sample(r);
-                    slope.mirror = scale(f.dapple, rgb(e));
-                    slope.haze = f.dapple * f.attenuator * e[3];
-                }
-            }
-        }
-        LookupParam::EnvironmentRotation => {
-            let turned = |cube: &Cube<R::Texel>, d: V3<R>| {
-                let point = CubePoint::new(d);
-                cube.sample_with_slope(&point, point.tangent(lights.turning(d))).1
-            };
-            if let Some(cube) = lights.irradiance {
-                slope.diffuse = mul(f.albedo, rgb(turned(cube, n)));
-            }
-            if let Some(cube) = lights.side {
-                slope.side = scale(f.specular, rgb(turned(cube, n)));
-            }
-            if let Some(cube) = lights.mirror {
-                let e = turned(cube, r);
-                slope.mirror = scale(f.dapple, rgb(e));
-                slope.haze = f.dapple * f.attenuator * e[3];
-            }
-            if let Some(cube) = lights.hilite {
-                slope.hilite = scale(f.attenuator, rgb(turned(cube, lights.turned(f.view))));
-            }
-        }
-        LookupParam::KeyAzimuth | LookupParam::KeyElevation => {
-            if let Some(key) = lights.key {
-                let moving = if param == LookupParam::KeyAzimuth { key.by_azimuth } else { key.by_elevation };
-                let lambert = |n: V3<R>| R::select(zero.lt(dot(n, key.direction)), dot(n, moving), zero);
-                slope.key = scale(lambert(s.n) - lambert(f.normal), f.albedo);
-            }
-        }
-    }
-    slope
 }

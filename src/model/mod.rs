@@ -5,7 +5,8 @@
 //! - [`params`]: the one table of parameters
 //! - [`effects`]: what can be switched on, and what each effect asks for
 //! - [`rim`]: the silhouette and its power
-//! - [`fragment`]: the fragment stage: shading normal, and the light's terms along it
+//! - [`fragment`]: the fragment stage: shading normal and reflection
+//! - [`terms`]: the light's terms along them
 //! - [`lights`]: what shines on a fragment
 //! - [`compose`]: the weighted sum of the terms, and its derivatives
 //! - [`evaluate`]: the whole model for one fragment
@@ -21,5 +22,6 @@ pub mod lights;
 pub mod params;
 pub mod real;
 pub mod rim;
+pub mod terms;
 pub mod vector;
 pub mod vertex;

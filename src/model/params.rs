@@ -64,6 +64,24 @@ pub struct ParamInfo {
     pub meaning: &'static str,
 }
 
+/// Greater numbers leave the range in which images and their squares are finite in f32.
+pub const LARGEST: f64 = 1e9;
+
+impl ParamInfo {
+    /// The least and the greatest number that may be given for it: its bounds, where they are finite.
+    #[must_use]
+    pub const fn range(&self) -> (f64, f64) {
+        (self.lower.max(-LARGEST), self.upper.min(LARGEST))
+    }
+
+    /// Whether `value` may be given for it.
+    #[must_use]
+    pub fn admits(&self, value: f64) -> bool {
+        let (lower, upper) = self.range();
+        (lower..=upper).contains(&value)
+    }
+}
+
 const INF: f64 = f64::INFINITY;
 
 macro_rules! row {

@@ -6,6 +6,7 @@ use std::fmt::Write as _;
 use super::html::escape;
 use super::json::{Correlations, Summary, UnknownSummary};
 use super::words::{number, seconds};
+use crate::fit::outcome::Iteration;
 
 /// What a chart draws along x.
 #[derive(Clone, Copy)]
@@ -16,11 +17,21 @@ enum Along {
 
 /// The loss (logarithmic) against passes and against seconds, side by side.
 pub(super) fn convergence(summary: &Summary) -> String {
-    if summary.history.len() < 2 {
+    if summary.history.is_empty() {
         return "<p class=\"quiet\">No iteration was made, so there is no curve.</p>".to_owned();
     }
     let panels = [Along::Passes, Along::Seconds].map(|along| convergence_panel(summary, along));
     format!("<div class=\"pair\">{}</div>", panels.concat())
+}
+
+/// The start, after its one pass, and every iteration. Variable projection's history begins with the
+/// best linear unknowns there, the others' with the start itself.
+fn track(summary: &Summary) -> Vec<Iteration> {
+    let start = Iteration { iteration: 0, loss: summary.loss.start, evaluations: 1, seconds: 0.0 };
+    let iterations = summary.history.iter().copied();
+    std::iter::once(start)
+        .chain(iterations.skip_while(|first| *first == Iteration { seconds: first.seconds, ..start }))
+        .collect()
 }
 
 fn convergence_panel(summary: &Summary, along: Along) -> String {
@@ -34,8 +45,8 @@ fn convergence_panel(summary: &Summary, along: Along) -> String {
         Along::Passes => "passes over the samples",
         Along::Seconds => "seconds",
     };
-    let xs: Vec<f64> = summary
-        .history
+    let track = track(summary);
+    let xs: Vec<f64> = track
         .iter()
         .map(|i| match along {
             Along::Passes => i.evaluations as f64,
@@ -43,7 +54,7 @@ fn convergence_panel(summary: &Summary, along: Along) -> String {
         })
         .map(|x| if x.is_finite() { x } else { 0.0 })
         .collect();
-    let losses: Vec<f64> = summary.history.iter().map(|i| i.loss).collect();
+    let losses: Vec<f64> = track.iter().map(|i| i.loss).collect();
     let (low, high) = log_range(&losses);
     let (x_ticks, x_end) = linear_ticks(xs.iter().copied().fold(0.0, f64::max));
     let x_at = |x: f64| LEFT + (RIGHT - LEFT) * x / x_end;
@@ -77,13 +88,14 @@ fn convergence_panel(summary: &Summary, along: Along) -> String {
     let _ = write!(svg, "<path class=\"curve\" d=\"M{}\"/>", path.join("L"));
     // Beyond a hundred iterations dots would hide the curve.
     let radius = if points.len() > 100 { 1.5 } else { 4.0 };
-    for ((x, y), i) in points.iter().zip(&summary.history) {
+    for (k, ((x, y), i)) in points.iter().zip(&track).enumerate() {
         let _ = write!(
             svg,
-            "<circle class=\"dot\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>iteration {}: loss {}, {} passes, {}</title></circle>",
-            i.iteration,
+            "<circle class=\"dot\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}: loss {}, {} {}, {}</title></circle>",
+            if k == 0 { "start".to_owned() } else { format!("iteration {}", i.iteration) },
             number(i.loss, 5),
             i.evaluations,
+            if i.evaluations == 1 { "pass" } else { "passes" },
             seconds(i.seconds)
         );
     }

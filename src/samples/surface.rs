@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::surface_records::Asked;
 use super::trace::Hit;
 use crate::model::effects::{Form, Needs, Silhouette};
-use crate::model::fragment::Fragment;
+use crate::model::fragment::{Fragment, guarded};
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
 use crate::scene::maps::Maps;
@@ -100,10 +100,10 @@ impl<'a> Surface<'a> {
             }
             Silhouette::Fragment | Silhouette::Bumped => 1.0 - normal.dot(view).abs().min(1.0),
         };
+        let (base, bump) = guarded(base.to_array(), bump.to_array(), exact_view.to_array());
         Fragment {
-            // Only a vanished N leaves no base: then the side that faces the eye counts.
-            base: if base == Vec3::ZERO || !base.is_finite() { -exact_view } else { base }.to_array(),
-            bump: if bump.is_finite() { bump } else { Vec3::ZERO }.to_array(),
+            base,
+            bump,
             view: view.to_array(),
             normal: normal.to_array(),
             occlusion: self.occlusion.map_or(1.0, scalar),

@@ -10,6 +10,8 @@ use super::file::{Source, ViewTable};
 use super::settings::number;
 use super::view::Camera;
 
+/// Degrees; seen through less, the rays of a thousand pixels are no longer a hundred different f32.
+const NARROWEST_FOV: f64 = 1e-3;
 /// The most pixels along a side of a view.
 const LARGEST_SIDE: i64 = 16384;
 
@@ -71,8 +73,9 @@ fn file_name(source: &Source, name: &Spanned<String>) -> Result<String, SceneErr
 }
 
 fn camera(source: &Source, table: &ViewTable) -> Result<Camera, SceneError> {
-    let fov = number(source, Some(&table.fov_y_degrees), 0.0, "fov_y_degrees", "degrees in (0, 180)", |f| {
-        f > 0.0 && f < 180.0
+    let wanted = format!("degrees from {NARROWEST_FOV} to below 180");
+    let fov = number(source, Some(&table.fov_y_degrees), 0.0, "fov_y_degrees", &wanted, |f| {
+        (NARROWEST_FOV..180.0).contains(&f)
     })?;
     Ok(Camera {
         world_to_camera: rigid(source, &table.world_to_camera)?,

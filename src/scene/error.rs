@@ -40,6 +40,12 @@ impl SceneError {
         Self { place: Some(place.into()), ..self }
     }
 
+    /// What is wrong, and what to do.
+    #[must_use]
+    pub(crate) fn what(&self) -> String {
+        format!("{}. {}", self.what, self.remedy)
+    }
+
     /// The file that was refused.
     #[must_use]
     pub fn path(&self) -> &Path {

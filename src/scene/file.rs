@@ -189,14 +189,14 @@ impl<'de> Deserialize<'de> for ParamValue {
 }
 
 /// The text of a TOML file and where it is: turns spans into lines.
-pub(super) struct Source {
+pub(crate) struct Source {
     pub path: PathBuf,
     text: String,
 }
 
 impl Source {
     /// Read a text file of at most 16 MB.
-    pub(super) fn read(path: &Path) -> Result<Self, SceneError> {
+    pub(crate) fn read(path: &Path) -> Result<Self, SceneError> {
         let inside = path.join("scene.toml");
         if inside.is_file() {
             let remedy = format!("Name the scene file in it, {}", inside.display());
@@ -212,8 +212,13 @@ impl Source {
         Ok(Self { path: path.to_owned(), text })
     }
 
+    /// A text that stands at `path`, or comes with the program.
+    pub(crate) fn of(path: &Path, text: String) -> Self {
+        Self { path: path.to_owned(), text }
+    }
+
     /// Parse the text.
-    pub(super) fn parse<'de, T: Deserialize<'de>>(&'de self) -> Result<T, SceneError> {
+    pub(crate) fn parse<'de, T: Deserialize<'de>>(&'de self) -> Result<T, SceneError> {
         toml::from_str(&self.text).map_err(|e| {
             let (what, remedy) = explain(e.message());
             let error = SceneError::new(&self.path, what, remedy);
@@ -231,7 +236,7 @@ impl Source {
     }
 
     /// An error about the value (or key) `at`.
-    pub(super) fn error<T>(
+    pub(crate) fn error<T>(
         &self,
         at: &Spanned<T>,
         what: impl Into<String>,
@@ -241,7 +246,7 @@ impl Source {
     }
 
     /// The value of that `name` in `all`; an unknown name is refused with the nearest known one.
-    pub(super) fn choose<T: Copy>(
+    pub(crate) fn choose<T: Copy>(
         &self,
         kind: &str,
         name: &Spanned<String>,
@@ -253,6 +258,12 @@ impl Source {
             self.error(name, format!("unknown {kind} `{given}`"), suggestion(given, &names))
         })
     }
+}
+
+/// Refuse a text that is not a scene file's by its keys and the kinds of its values; what they mean is
+/// checked when the scene is loaded.
+pub(crate) fn check_text(path: &Path, text: &str) -> Result<(), SceneError> {
+    Source::of(path, text.to_owned()).parse::<SceneFile>().map(drop)
 }
 
 /// "Did you mean ...? Known: ...", for a name that is none of `known`.

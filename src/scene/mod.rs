@@ -30,6 +30,7 @@ pub mod view;
 
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
+pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
 pub use settings::{interval, read_params};

@@ -27,7 +27,16 @@ pub(super) fn form(source: &Source, model: &ModelTable) -> Result<(Form, Silhoue
 pub(super) fn effects(source: &Source, model: &ModelTable) -> Result<Option<Effects>, SceneError> {
     let all = Effect::ALL.map(|effect| (effect.name(), effect));
     let parse = |names: &Vec<Spanned<String>>| {
-        names.iter().map(|name| source.choose("effect", name, &all)).collect::<Result<Effects, _>>()
+        let mut effects = Effects::default();
+        for name in names {
+            let effect = source.choose("effect", name, &all)?;
+            if effects.has(effect) {
+                let what = format!("the effect {} is listed twice", effect.name());
+                return Err(source.error(name, what, "Take one of them out"));
+            }
+            effects = effects.with(effect);
+        }
+        Ok(effects)
     };
     model.effects.as_ref().map(parse).transpose()
 }
@@ -55,11 +64,12 @@ fn apply(source: &Source, table: &ParamsTable, params: &mut Params) -> Result<()
         let info = param.info();
         let values = value.get_ref().channels();
         for number in values {
-            if !number.is_finite() || !(info.lower..=info.upper).contains(&number) {
+            if !info.admits(number) {
+                let (lower, upper) = info.range();
                 return Err(source.error(
                     value,
                     format!("{} = {number} is out of bounds", info.name),
-                    format!("Give a finite number in {}", interval(info.lower, info.upper)),
+                    format!("Give a finite number in {}", interval(lower, upper)),
                 ));
             }
         }

@@ -74,7 +74,7 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
             let wgsl = plan.raster_module(&parts);
             Ok(Plan { wgsl, ..plan })
         }
-        Source::Samples => {
+        Source::Samples | Source::Terms => {
             let given: Vec<&'static str> = sample_fields(facts).iter().map(|(name, _)| *name).collect();
             let plan = Plan::search(facts, &[], &goals, &given)?;
             let wgsl = plan.sample_module(&parts);
@@ -83,23 +83,57 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
     }
 }
 
-/// The fields of a stored sample that a scene's effects ask for.
+/// What is kept of a stored sample's terms, with WGSL types.
+pub const TERMS: [(&str, &str); 8] = [
+    ("diffuse_term", "vec3f"),
+    ("side_term", "vec3f"),
+    ("hilite_term", "vec3f"),
+    ("mirror_term", "vec3f"),
+    ("haze_term", "f32"),
+    ("key_term", "vec3f"),
+    ("silhouette", "f32"),
+    ("open", "f32"),
+];
+
+/// The fields of a stored sample, or of its terms, that a scene's effects ask for.
 #[must_use]
 pub fn sample_fields(facts: &Facts) -> Vec<(&'static str, &'static str)> {
     let needs = facts.needs();
     let bumped_silhouette = facts.holds("bumped_silhouette") == Some(true);
+    let of_terms = facts.source == Source::Terms;
+    let part = |name: &str| parts(facts).contains(&name);
     let wanted = |name: &str| match name {
         "bump" => needs.normal_map,
         "normal" => needs.key_light,
         "open" => needs.occlusion,
-        "silhouette" => needs.rim && !bumped_silhouette,
+        "silhouette" => needs.rim && (of_terms || !bumped_silhouette),
         "dapple" => needs.dapple,
         "albedo" => needs.color_map,
         "specular" => needs.specular_map,
         "attenuator" => needs.attenuator_map,
+        "diffuse_term" => part("diffuse_part"),
+        "side_term" => part("side_part"),
+        "hilite_term" => part("hilite_part"),
+        "mirror_term" => part("mirror_part"),
+        "key_term" => part("key_part"),
+        "haze_term" => hazy(facts),
         _ => true,
     };
-    SAMPLE.into_iter().filter(|(name, _)| wanted(name)).collect()
+    let all: &[_] = if of_terms { &TERMS } else { &SAMPLE };
+    all.iter().copied().filter(|(name, _)| wanted(name)).collect()
+}
+
+/// The rules that yield a stored sample's terms: a plan whose goals are the fields of [`Source::Terms`].
+///
+/// # Errors
+/// When no rules yield them.
+pub fn plan_terms(facts: &Facts) -> Result<(Plan, Vec<(&'static str, &'static str)>), PlanError> {
+    let facts = Facts { source: Source::Samples, ..*facts };
+    let given: Vec<&'static str> = sample_fields(&facts).iter().map(|(name, _)| *name).collect();
+    let terms = sample_fields(&Facts { source: Source::Terms, ..facts });
+    let goals: Vec<&'static str> =
+        terms.iter().map(|(name, _)| *name).filter(|t| !given.contains(t)).collect();
+    Ok((Plan::search(&facts, &[], &goals, &given)?, terms))
 }
 
 /// Whether the haze goes to alpha.

@@ -26,6 +26,9 @@ pub enum Source {
     Raster,
     /// Stored samples: what `model::fragment::Fragment` holds, read in a compute shader.
     Samples,
+    /// Stored terms: what `model::fragment::Terms` holds, and S.x. That is all that shading reads where
+    /// nothing changes that needs a lookup.
+    Terms,
 }
 
 /// Which maps a scene has, and which are of one size.
@@ -161,6 +164,7 @@ impl Facts {
         }
         Some(match condition {
             "raster" => self.source == Source::Raster,
+            "terms" => self.source == Source::Terms,
             "bumped" => self.bumped(),
             "has_color_map" => self.maps.color,
             "has_normal_map" => self.maps.normal,
@@ -181,7 +185,7 @@ impl Facts {
     /// its neutral value, which it does not decode.
     fn bumped(&self) -> bool {
         let normal_map = self.needs().normal_map;
-        normal_map && (self.source == Source::Samples || self.maps.normal || self.setup.form == Form::Listing)
+        normal_map && (self.source != Source::Raster || self.maps.normal || self.setup.form == Form::Listing)
     }
 }
 

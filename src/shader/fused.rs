@@ -11,7 +11,7 @@
 
 use std::fmt::Write as _;
 
-use super::emit::{Plan, hazy, parts, plan, sample_fields};
+use super::emit::{Plan, hazy, parts, plan, plan_terms, sample_fields};
 use super::facts::{Budget, Facts, MapFacts, Source};
 use super::module::uniform;
 use super::quantity::Constant;
@@ -59,16 +59,65 @@ pub struct Fitted {
     pub alpha: bool,
     /// Whether the environment is turned, or will be.
     pub turned: bool,
-    /// Where a record's numbers stand, and how many rows it has.
-    pub places: Places,
-    /// Rows of a record.
-    pub rows: usize,
+    /// What records hold.
+    pub layout: Layout,
     /// Whether a pixel may have several samples.
     pub several: bool,
     /// Whether pixels count differently.
     pub weighted: bool,
     /// Whether targets are clipped.
     pub clipped: bool,
+}
+
+/// Where a record's numbers stand.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// Whether samples or their terms are stored.
+    pub source: Source,
+    /// Fields, by the planner's names, and the first row of each.
+    fields: Vec<(&'static str, usize)>,
+    /// The row of the sample's share of its pixel.
+    share: Option<usize>,
+    /// Rows of a record.
+    pub rows: usize,
+}
+
+impl Layout {
+    /// Of samples as the CPU stores them.
+    #[must_use]
+    pub fn of_samples(places: &Places, rows: usize) -> Self {
+        let fields = [
+            ("base", places.base),
+            ("bump", places.bump),
+            ("normal", places.normal),
+            ("view", places.view),
+            ("open", places.occlusion),
+            ("silhouette", places.silhouette),
+            ("dapple", places.dapple),
+            ("albedo", places.albedo),
+            ("specular", places.specular),
+            ("attenuator", places.attenuator),
+        ];
+        let fields = fields.into_iter().filter_map(|(name, place)| Some((name, place?))).collect();
+        Self { source: Source::Samples, fields, share: places.weight, rows }
+    }
+
+    /// Of the terms that `setup` asks for, with the samples' shares where those have them.
+    #[must_use]
+    pub fn of_terms(setup: Setup, samples: &Self) -> Self {
+        let mut rows = 0;
+        let mut fields = Vec::new();
+        for (name, kind) in sample_fields(&Facts { setup, source: Source::Terms, ..Facts::default() }) {
+            fields.push((name, rows));
+            rows += components(kind);
+        }
+        let share = samples.share.map(|_| rows);
+        Self { source: Source::Terms, fields, share, rows: rows + usize::from(share.is_some()) }
+    }
+
+    fn place(&self, field: &str) -> Option<usize> {
+        self.fields.iter().find(|(name, _)| *name == field).map(|(_, place)| *place)
+    }
 }
 
 /// One sum over pixels and channels.
@@ -268,19 +317,10 @@ impl Fused {
         } else {
             wgsl.push_str("        {\n        let record = group;\n");
         }
-        let _ = writeln!(wgsl, "        let s = record * {}u + lane;", self.fitted.rows * LANES);
-        let number = |place: usize| format!("samples[s + {}u]", place * LANES);
-        let share = self.fitted.places.weight.map_or_else(|| "1.0".to_owned(), number);
+        let _ = writeln!(wgsl, "        let s = record * {}u + lane;", self.fitted.layout.rows * LANES);
+        let share = self.fitted.layout.share.map_or_else(|| "1.0".to_owned(), number);
         let _ = writeln!(wgsl, "        let share = {share};\n        var at: Sample;");
-        for (name, kind) in self.fields() {
-            // What the records lack has its neutral value, as `samples` has it.
-            if let Some(place) = place_of(&self.fitted.places, name) {
-                let numbers: Vec<String> = (0..components(kind)).map(|k| number(place + k)).collect();
-                let _ = writeln!(wgsl, "        at.{name} = {kind}({});", numbers.join(", "));
-            } else if matches!(name, "open" | "dapple" | "albedo" | "specular" | "attenuator") {
-                let _ = writeln!(wgsl, "        at.{name} = {kind}(1.0);");
-            }
-        }
+        wgsl.push_str(&fields_read(&self.fitted.layout, &self.fields()));
         wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
         seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
         let parts = parts(&self.plan.facts);
@@ -380,6 +420,72 @@ pub fn gather_module() -> String {
     )
 }
 
+/// The number at a row of the record that starts at `s`.
+fn number(place: usize) -> String {
+    format!("samples[s + {}u]", place * LANES)
+}
+
+/// A record's fields into `at`.
+fn fields_read(layout: &Layout, fields: &[(&'static str, &'static str)]) -> String {
+    let mut wgsl = String::new();
+    for (name, kind) in fields {
+        if let Some(place) = layout.place(name) {
+            let numbers: Vec<String> = (0..components(kind)).map(|k| number(place + k)).collect();
+            let _ = writeln!(wgsl, "        at.{name} = {kind}({});", numbers.join(", "));
+        } else if matches!(*name, "open" | "dapple" | "albedo" | "specular" | "attenuator") {
+            // What the records lack has its neutral value, as `samples` has it.
+            let _ = writeln!(wgsl, "        at.{name} = {kind}(1.0);");
+        }
+    }
+    wgsl
+}
+
+/// The shader that makes records of terms from records of samples, one sample a thread; and its plan, whose
+/// constants and resources are group 0. Bindings of group 1: the count of samples, samples, terms.
+///
+/// # Errors
+/// When no rules yield the terms; in words.
+pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), String> {
+    let facts = facts(fitted);
+    let (plan, wanted) = plan_terms(&facts).map_err(|error| error.to_string())?;
+    let fields = sample_fields(&Facts { source: Source::Samples, ..facts });
+    let mut wgsl = plan.declarations(true);
+    wgsl.push_str("\nstruct Sample {\n");
+    for (name, kind) in &fields {
+        let _ = writeln!(wgsl, "    {name}: {kind},");
+    }
+    let _ = write!(
+        wgsl,
+        "}}\n\n@group(1) @binding(0) var<uniform> count: vec4u;\n\
+         @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
+         @group(1) @binding(2) var<storage, read_write> terms: array<f32>;\n\n\
+         @compute @workgroup_size({WORKGROUP})\nfn cs_main(\n    @builtin(global_invocation_id) id: vec3u,\n    @builtin(num_workgroups) workgroups: vec3u,\n) {{\n\
+         \x20   for (var i = id.x; i < count.x; i += {WORKGROUP}u * workgroups.x) {{\n\
+         \x20       let lane = i % {LANES}u;\n        let s = (i / {LANES}u) * {}u + lane;\n        let t = (i / {LANES}u) * {}u + lane;\n        var at: Sample;\n",
+        fitted.layout.rows * LANES,
+        terms.rows * LANES
+    );
+    wgsl.push_str(&fields_read(&fitted.layout, &fields));
+    wgsl.push_str(&plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+    for (name, kind) in wanted {
+        let Some(place) = terms.place(name) else { continue };
+        let value = if fields.iter().any(|(field, _)| *field == name) {
+            format!("at.{name}")
+        } else {
+            name.to_owned()
+        };
+        for k in 0..components(kind) {
+            let component = if kind == "f32" { String::new() } else { format!("[{k}]") };
+            let _ = writeln!(wgsl, "        terms[t + {}u] = {value}{component};", (place + k) * LANES);
+        }
+    }
+    if let (Some(from), Some(to)) = (fitted.layout.share, terms.share) {
+        let _ = writeln!(wgsl, "        terms[t + {}u] = {};", to * LANES, number(from));
+    }
+    wgsl.push_str("    }\n}\n");
+    Ok((plan, wgsl))
+}
+
 /// The end of the entry point: a thread's sums to the workgroup's.
 fn reduction(count: usize) -> String {
     let mut wgsl = String::new();
@@ -402,7 +508,7 @@ fn reduction(count: usize) -> String {
 fn facts(fitted: &Fitted) -> Facts {
     Facts {
         setup: fitted.setup,
-        source: Source::Samples,
+        source: fitted.layout.source,
         maps: MapFacts::default(),
         turned: fitted.turned,
         square_rim: false,
@@ -430,23 +536,6 @@ fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
         columns.push(ColumnOf { unknown: None, seed: None, channel: None });
     }
     (params.into_iter().map(Seed::of_param).collect(), columns)
-}
-
-/// The first row of a stored field.
-fn place_of(places: &Places, field: &str) -> Option<usize> {
-    match field {
-        "base" => places.base,
-        "bump" => places.bump,
-        "normal" => places.normal,
-        "view" => places.view,
-        "open" => places.occlusion,
-        "silhouette" => places.silhouette,
-        "dapple" => places.dapple,
-        "albedo" => places.albedo,
-        "specular" => places.specular,
-        "attenuator" => places.attenuator,
-        _ => None,
-    }
 }
 
 const fn loss_function(loss: Loss) -> &'static str {

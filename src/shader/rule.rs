@@ -210,7 +210,7 @@ const VERTEX: [(Stage, &str, &str); 19] = rules! { Vertex in "vertex":
 };
 
 #[rustfmt::skip]
-const FRAGMENT: [(Stage, &str, &str); 71] = rules! { Fragment in "fragment":
+const FRAGMENT: [(Stage, &str, &str); 77] = rules! { Fragment in "fragment":
     view_exact view_interpolated smooth_normal smooth_normal_unguarded normal_of_base
     color_texels color_map color_neutral specular_texels specular_map specular_neutral
     attenuator_texels attenuator_map attenuator_neutral normal_texels normal_map normal_neutral
@@ -223,6 +223,7 @@ const FRAGMENT: [(Stage, &str, &str); 71] = rules! { Fragment in "fragment":
     view_turned view_unturned view_place
     irradiance_faces irradiance_cube side_light_faces side_light_cube
     mirror_light_faces mirror_light_cube hilite_light_faces hilite_light_cube
+    diffuse_term side_term hilite_term mirror_term haze_term key_term
     base_part rim_part diffuse_part diffuse_part_f16 diffuse_part_without_rim
     side_part hilite_part mirror_part key_part haze
 };

@@ -80,6 +80,7 @@ fn variants() -> Vec<Facts> {
         },
         Facts { f16: true, morphs: 1, turned: true, ..paper },
         Facts { source: Source::Samples, turned: true, square_rim: true, ..paper },
+        Facts { source: Source::Terms, ..exact },
     ]
 }
 
@@ -97,6 +98,58 @@ fn shaders_of_every_effect_set_form_and_silhouette_validate_in_every_kind_of_sce
     distinct.par_iter().for_each(|plan| validate(plan));
     // Fewer would mean that effects no longer specialise the shader.
     assert!(distinct.len() > 1000, "{} of {}", distinct.len(), plans.len());
+}
+
+/// What a fit of everything that an effect set asks for compiles, over samples and over their terms.
+#[cfg(feature = "gpu")]
+#[test]
+fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
+    use skinfit::engine::Unknown;
+    use skinfit::model::params::{Column, Param};
+    use skinfit::samples::surface_records::Places;
+    use skinfit::scene::Loss;
+    use skinfit::shader::fused::{Fitted, Fused, Layout, Wish, gather_module, terms_module};
+    let places = Places { base: Some(0), view: Some(3), ..Places::default() };
+    let check = |wgsl: &str| {
+        let module = naga::front::wgsl::parse_str(wgsl)
+            .unwrap_or_else(|error| panic!("{}\n{wgsl}", error.emit_to_string(wgsl)));
+        let valid = Validator::new(ValidationFlags::all(), Capabilities::default()).validate(&module);
+        valid.unwrap_or_else(|error| panic!("{}\n{wgsl}", error.emit_to_string(wgsl)));
+    };
+    check(&gather_module());
+    setups().into_par_iter().for_each(|setup| {
+        let free = |param: Param| param.asked_for(setup.effects);
+        let lookups = [
+            Param::NormalStrength,
+            Param::SpecularLobe,
+            Param::EnvironmentRotation,
+            Param::KeyAzimuth,
+            Param::KeyElevation,
+        ];
+        let all: Vec<Unknown> =
+            Param::all().filter(|&p| free(p)).map(|p| Unknown::Param(Column::tied(p))).collect();
+        let held = |u: &Unknown| !matches!(u, Unknown::Param(c) if lookups.contains(&c.param));
+        let kept: Vec<Unknown> = all.iter().copied().filter(held).collect();
+        let samples = Layout::of_samples(&places, 6);
+        let fitted = |unknowns: Vec<Unknown>, layout: &Layout| Fitted {
+            setup,
+            unknowns,
+            loss: Loss::RelativeL2,
+            alpha: true,
+            turned: true,
+            layout: layout.clone(),
+            several: true,
+            weighted: true,
+            clipped: true,
+        };
+        let terms = Layout::of_terms(setup, &samples);
+        check(&terms_module(&fitted(Vec::new(), &samples), &terms).unwrap().1);
+        for (unknowns, layout) in [(all, &samples), (kept, &terms)] {
+            let fused = Fused::new(fitted(unknowns, layout)).unwrap();
+            fused.slabs(Wish::Normal).iter().for_each(|slab| check(&slab.wgsl));
+            check(&fused.image_module());
+        }
+    });
 }
 
 #[test]

@@ -31,9 +31,9 @@ use crate::bake::LobeStack;
 use crate::model::compose::Weights;
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
-use crate::model::fragment::LookupParam;
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
+use crate::model::terms::LookupParam;
 use crate::samples::rows::Row;
 use crate::scene::Loss;
 use crate::simd::Simd;
@@ -268,11 +268,7 @@ impl Objective for CpuEngine {
     }
 
     fn rounding(&self) -> f64 {
-        let read = |view: &ObservedView| {
-            let groups = view.samples.groups();
-            self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK)).collect()
-        };
-        super::rounding(self.views.iter().map(|view| (view, read(view))), self.loss)
+        super::rounding(&self.views, self.loss, BLOCK, self.stride)
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

@@ -9,9 +9,9 @@ use crate::samples::rows::Row;
 use crate::simd::Simd;
 
 /// Groups in a block: what the scratch holds at once (it should stay in the nearest caches).
-pub(super) const BLOCK: usize = 8;
+pub(super) const BLOCK: usize = 16;
 /// Blocks in a chunk: one unit of work, and 64 terms a lane.
-pub(super) const CHUNK: usize = 8;
+pub(super) const CHUNK: usize = 4;
 
 /// What a pass yields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

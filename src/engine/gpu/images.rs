@@ -4,7 +4,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeli
 
 use super::lights::Inputs;
 use super::parts::{PART_BYTES, Parts};
-use super::pipeline::{bind, buffer, encoder, part_layout, pipeline};
+use super::pipeline::{Uniform, bind, buffer, encoder, part_layout, pipeline};
 use crate::engine::view::ObservedView;
 use crate::gpu::readback::read_floats;
 use crate::gpu::{Gpu, GpuError};
@@ -16,7 +16,7 @@ pub(super) struct Images {
     pipeline: ComputePipeline,
     channels: usize,
     /// For each part its uniform block, its image and their bindings.
-    parts: Vec<(Buffer, Buffer, BindGroup)>,
+    parts: Vec<(Uniform, Buffer, BindGroup)>,
 }
 
 impl Images {
@@ -25,11 +25,12 @@ impl Images {
         let pipeline = pipeline(gpu, "forward pass", &fused.image_module(), &[&inputs.layout, &layout]);
         let channels = fused.channels();
         let images = parts.parts.iter().map(|part| {
-            let block = buffer(gpu, "part", PART_BYTES, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+            let block = Uniform::new(gpu, "part", PART_BYTES);
             let bytes = 4 * channels * Parts::slots(part);
             let image = buffer(gpu, "image", bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
             let of = &part.buffers;
-            let bindings = bind(gpu, &layout, &[&block, &of.samples, &of.group_start, &of.targets, &image]);
+            let bindings =
+                bind(gpu, &layout, &[block.buffer(), &of.samples, &of.group_start, &of.targets, &image]);
             (block, image, bindings)
         });
         let parts = images.collect();
@@ -52,7 +53,7 @@ impl Images {
                 gpu.wait()?;
                 parts.stream(gpu, views, part)?;
             }
-            gpu.queue.write_buffer(block, 0, &parts.block(views, part, gain, 0));
+            block.write(gpu, &parts.block(views, part, gain, 0));
             let mut commands = encoder(gpu);
             {
                 let mut pass = commands.begin_compute_pass(&ComputePassDescriptor::default());

@@ -1,11 +1,11 @@
 //! The cubes and the uniform block of a fit.
 
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, BindingType, Buffer,
-    BufferUsages, TextureSampleType, TextureView, TextureViewDimension,
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, BindingType,
+    TextureSampleType, TextureView, TextureViewDimension,
 };
 
-use super::pipeline::{UNIFORM, buffer, layout};
+use super::pipeline::{UNIFORM, Uniform, layout};
 use crate::engine::cpu::Illumination;
 use crate::gpu::constants::model_block;
 use crate::gpu::{Gpu, GpuError, texels, upload};
@@ -82,7 +82,7 @@ impl DeviceLights {
 pub(super) struct Inputs {
     plan: Plan,
     pub(super) layout: BindGroupLayout,
-    constants: Option<Buffer>,
+    constants: Option<Uniform>,
     /// The cubes' version that is bound.
     bound: Option<(u64, BindGroup)>,
 }
@@ -97,8 +97,7 @@ impl Inputs {
         let has_constants = !plan.constants.is_empty();
         let cubes = (1..=plan.resources.len() as u32).map(|binding| (binding, faces));
         let kinds: Vec<_> = has_constants.then_some((0, UNIFORM)).into_iter().chain(cubes).collect();
-        let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
-        let constants = has_constants.then(|| buffer(gpu, "constants", 16 * plan.constants.len(), usage));
+        let constants = has_constants.then(|| Uniform::new(gpu, "constants", 16 * plan.constants.len()));
         Self { plan: plan.clone(), layout: layout(gpu, "lights", &kinds), constants, bound: None }
     }
 
@@ -108,15 +107,15 @@ impl Inputs {
     }
 
     fn bind(&mut self, gpu: &Gpu, lights: &DeviceLights, block: &[f32]) -> Result<(), GpuError> {
-        if let Some(buffer) = &self.constants {
-            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(block));
+        if let Some(constants) = &self.constants {
+            constants.write(gpu, bytemuck::cast_slice(block));
         }
         if self.bound.as_ref().is_some_and(|(version, _)| *version == lights.version) {
             return Ok(());
         }
         let mut entries = Vec::new();
-        if let Some(buffer) = &self.constants {
-            entries.push(BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() });
+        if let Some(constants) = &self.constants {
+            entries.push(BindGroupEntry { binding: 0, resource: constants.buffer().as_entire_binding() });
         }
         for (binding, &resource) in (1..).zip(&self.plan.resources) {
             let resource = BindingResource::TextureView(lights.view(gpu, resource)?);

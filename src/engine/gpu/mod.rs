@@ -3,6 +3,7 @@
 //! - [`GpuEngine`]: the objective; what it is made of and how sums become normal equations
 //! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
 //!   memory allowed is uploaded anew in each pass
+//! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
 //! - `lights`: the cubes and the uniform block, as shaders are given them
 //! - `program`: the shaders of a wish, and one run of them; `images`: the forward pass
 //! - `pipeline`: what both make pipelines and bindings with
@@ -12,6 +13,7 @@ mod lights;
 mod parts;
 mod pipeline;
 mod program;
+mod terms;
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -20,14 +22,16 @@ use self::images::Images;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
 use self::program::Program;
+use self::terms::{HELD, replace_samples};
 use super::cpu::Illumination;
 use super::view::ObservedView;
 use super::{NormalEquations, Objective, Point, Unknown};
 use crate::gpu::{Gpu, GpuError};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
+use crate::samples::LANES;
 use crate::scene::Loss;
-use crate::shader::fused::{BLOCK, ColumnOf, Fitted, Fused, Sum, Wish};
+use crate::shader::fused::{BLOCK, ColumnOf, Fitted, Fused, Layout, Sum, Wish};
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,6 +69,8 @@ pub struct GpuEngine<'g> {
     weight: (f64, u64),
     alpha: bool,
     traits: Traits,
+    /// Whether terms stand in the place of samples.
+    keeps: bool,
     /// What changes between passes; a pass at a time.
     device: Mutex<OnDevice>,
     fault: Mutex<Option<GpuError>>,
@@ -76,6 +82,8 @@ struct OnDevice {
     lights: DeviceLights,
     /// By wish, and by whether the environment is turned.
     programs: BTreeMap<(Wish, bool), Program>,
+    /// What the terms were made with that stand in the samples' place.
+    terms: Option<[f64; 5]>,
     /// The forward pass, and whether it is for a turned environment.
     images: Option<(bool, Images)>,
 }
@@ -98,16 +106,20 @@ impl<'g> GpuEngine<'g> {
             weight: (0.0, 0),
             alpha,
             traits,
+            keeps: false,
             device: Mutex::new(OnDevice {
                 parts: Parts::default(),
                 lights: DeviceLights::new(illumination),
                 programs: BTreeMap::new(),
+                terms: None,
                 images: None,
             }),
             fault: Mutex::new(None),
             views,
         };
         let parts = Parts::new(gpu, views, &engine.traits, memory)?;
+        let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if HELD.contains(&c.param));
+        engine.keeps = !engine.unknowns.iter().any(moves) && parts.all_resident();
         engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
         engine.set_stride(1);
         // Whatever the driver refuses shows here, and not in the midst of a fit.
@@ -143,10 +155,7 @@ impl<'g> GpuEngine<'g> {
     /// How many blocks of pixels there are in all views.
     #[must_use]
     pub fn blocks(&self) -> usize {
-        self.views
-            .iter()
-            .map(|view| (view.samples.groups() * crate::samples::LANES).div_ceil(BLOCK as usize))
-            .sum()
+        self.views.iter().map(|view| (view.samples.groups() * LANES).div_ceil(BLOCK as usize)).sum()
     }
 
     /// Why no pass can be made any more, if so.
@@ -165,26 +174,54 @@ impl<'g> GpuEngine<'g> {
         point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.unknowns.iter().any(free)
     }
 
-    fn fused(&self, turned: bool) -> Result<Fused, GpuError> {
-        let fitted = Fitted {
+    /// What is the same for every view, over samples.
+    fn fitted(&self, turned: bool) -> Fitted {
+        Fitted {
             setup: self.setup,
             unknowns: self.unknowns.clone(),
             loss: self.loss,
             alpha: self.alpha,
             turned,
-            places: self.traits.places,
-            rows: self.traits.rows,
+            layout: Layout::of_samples(&self.traits.places, self.traits.rows),
             several: self.traits.several,
             weighted: self.traits.weighted,
             clipped: self.traits.clipped,
-        };
+        }
+    }
+
+    fn fused(&self, turned: bool) -> Result<Fused, GpuError> {
+        let mut fitted = self.fitted(turned);
+        if self.keeps {
+            fitted.layout = Layout::of_terms(self.setup, &fitted.layout);
+        }
         Fused::new(fitted).map_err(GpuError::Plan)
+    }
+
+    /// Have the terms at `point` in the place of the samples, where that is how passes are made.
+    fn keep(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
+        let key = HELD.map(|param| point.params.scalar(param));
+        if !self.keeps || device.terms == Some(key) {
+            return Ok(());
+        }
+        let OnDevice { parts, lights, programs, images, terms } = device;
+        if terms.take().is_some() {
+            parts.reload(self.gpu, self.views)?;
+        }
+        // Their bindings are to the buffers before.
+        programs.clear();
+        *images = None;
+        let fitted = self.fitted(self.turned(point));
+        let layout = Layout::of_terms(self.setup, &fitted.layout);
+        replace_samples(self.gpu, &fitted, &layout, &point.params, lights, parts, self.views)?;
+        *terms = Some(key);
+        Ok(())
     }
 
     /// One pass: for each part of each view its sums.
     fn sums(&self, point: &Point, wish: Wish) -> Result<Passed, GpuError> {
         let turned = self.turned(point);
         let mut device = self.lock();
+        self.keep(point, &mut device)?;
         let OnDevice { parts, lights, programs, .. } = &mut *device;
         let program = match programs.entry((wish, turned)) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
@@ -221,6 +258,7 @@ impl<'g> GpuEngine<'g> {
     ) -> Result<T, GpuError> {
         let turned = self.turned(point);
         let mut device = self.lock();
+        self.keep(point, &mut device)?;
         let OnDevice { parts, lights, images, .. } = &mut *device;
         if images.as_ref().is_none_or(|(of, _)| *of != turned) {
             *images = Some((turned, Images::new(self.gpu, self.fused(turned)?, parts)?));
@@ -306,7 +344,7 @@ impl Objective for GpuEngine<'_> {
     }
 
     fn rounding(&self) -> f64 {
-        super::rounding(self.views.iter().map(|view| (view, (0..view.samples.groups()).collect())), self.loss)
+        super::rounding(self.views, self.loss, BLOCK as usize / LANES, self.stride)
     }
 
     fn fault(&self) -> Option<String> {

@@ -17,7 +17,7 @@ const BLOCK_GROUPS: usize = BLOCK as usize / LANES;
 /// Pixels that a thread shades, about: fewer leave processors idle, more leave sums long.
 const PIXELS_A_THREAD: usize = 4;
 /// Most workgroups of a part: enough for the largest adapters.
-const MOST_WORKGROUPS: usize = 2048;
+const MOST_WORKGROUPS: usize = 1056;
 
 /// Bytes of a dispatch's uniform block.
 pub(super) const PART_BYTES: usize = 32;
@@ -25,7 +25,7 @@ pub(super) const PART_BYTES: usize = 32;
 /// What is the same for all views.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Traits {
-    /// Where a record's numbers stand, and how many rows it has.
+    /// Where a sample's numbers stand, and how many rows a record has.
     pub(super) places: Places,
     pub(super) rows: usize,
     /// Rows of a group's target.
@@ -173,6 +173,27 @@ impl Parts {
             }
         }
         total
+    }
+
+    /// Whether every part stays on the device.
+    pub(super) fn all_resident(&self) -> bool {
+        self.parts.iter().all(|part| part.resident)
+    }
+
+    /// Upload every part's samples anew.
+    pub(super) fn reload(&mut self, gpu: &Gpu, views: &[ObservedView]) -> Result<(), GpuError> {
+        for index in 0..self.parts.len() {
+            let part = &self.parts[index];
+            let size = self.size(&views[part.view], &part.groups);
+            self.parts[index].buffers = PartBuffers::new(gpu, size)?;
+            self.upload(gpu, &views[self.parts[index].view], &self.parts[index])?;
+        }
+        Ok(())
+    }
+
+    /// Samples of a part, padding included.
+    pub(super) fn samples(part: &Part, views: &[ObservedView]) -> usize {
+        records(&views[part.view], &part.groups).len() * LANES
     }
 
     /// Pixels of a part.

@@ -1,5 +1,7 @@
 //! Pipelines, layouts and bindings of compute shaders.
 
+use std::sync::{Mutex, PoisonError};
+
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferDescriptor, BufferUsages,
@@ -8,6 +10,31 @@ use wgpu::{
 };
 
 use crate::gpu::Gpu;
+
+/// A uniform block, which is only written when it changes: each write is a copy and a wait on the device.
+pub(super) struct Uniform {
+    buffer: Buffer,
+    written: Mutex<Vec<u8>>,
+}
+
+impl Uniform {
+    pub(super) fn new(gpu: &Gpu, label: &str, bytes: usize) -> Self {
+        let buffer = buffer(gpu, label, bytes, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+        Self { buffer, written: Mutex::default() }
+    }
+
+    pub(super) const fn buffer(&self) -> &Buffer {
+        &self.buffer
+    }
+
+    pub(super) fn write(&self, gpu: &Gpu, bytes: &[u8]) {
+        let mut written = self.written.lock().unwrap_or_else(PoisonError::into_inner);
+        if *written != bytes {
+            gpu.queue.write_buffer(&self.buffer, 0, bytes);
+            *written = bytes.to_vec();
+        }
+    }
+}
 
 /// A buffer of so many bytes; of 16 at the least, as bindings may not be empty.
 pub(super) fn buffer(gpu: &Gpu, label: &str, bytes: usize, usage: BufferUsages) -> Buffer {

@@ -4,7 +4,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescripto
 
 use super::lights::Inputs;
 use super::parts::{PART_BYTES, Part, Parts};
-use super::pipeline::{READ, UNIFORM, WRITE, bind, buffer, encoder, layout, part_layout, pipeline};
+use super::pipeline::{READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, part_layout, pipeline};
 use crate::engine::view::ObservedView;
 use crate::gpu::readback::map;
 use crate::gpu::{Gpu, GpuError};
@@ -28,10 +28,10 @@ struct Run {
     part: usize,
     first_sum: u32,
     first_result: usize,
-    block: Buffer,
+    block: Uniform,
     bindings: BindGroup,
     gather: BindGroup,
-    counts: Buffer,
+    counts: Uniform,
 }
 
 impl Program {
@@ -62,12 +62,15 @@ impl Program {
         let results_buffer = buffer(gpu, "sums", 4 * results, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
         let readback = buffer(gpu, "sums read", 4 * results, BufferUsages::MAP_READ | BufferUsages::COPY_DST);
         let runs = places.into_iter().map(|(slab, part, first_sum, first_result)| {
-            let counts = buffer(gpu, "counts", 16, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
-            let block = buffer(gpu, "part", PART_BYTES, BufferUsages::UNIFORM | BufferUsages::COPY_DST);
+            let counts = Uniform::new(gpu, "counts", 16);
+            let block = Uniform::new(gpu, "part", PART_BYTES);
             let of = &parts.parts[part].buffers;
-            let bindings =
-                bind(gpu, &of_part, &[&block, &of.samples, &of.group_start, &of.targets, &partial_sums]);
-            let gather = bind(gpu, &of_gather, &[&counts, &partial_sums, &results_buffer]);
+            let bindings = bind(
+                gpu,
+                &of_part,
+                &[block.buffer(), &of.samples, &of.group_start, &of.targets, &partial_sums],
+            );
+            let gather = bind(gpu, &of_gather, &[counts.buffer(), &partial_sums, &results_buffer]);
             Run { slab, part, first_sum: first_sum as u32, first_result, block, bindings, gather, counts }
         });
         let runs = runs.collect();
@@ -97,7 +100,7 @@ impl Program {
                 gpu.wait()?;
                 parts.stream(gpu, views, part)?;
             }
-            gpu.queue.write_buffer(&run.block, 0, &parts.block(views, part, gain, run.first_sum));
+            run.block.write(gpu, &parts.block(views, part, gain, run.first_sum));
             self.encode(gpu, &mut commands, run, part);
         }
         commands.copy_buffer_to_buffer(&self.results, 0, &self.readback, 0, self.results.size());
@@ -116,7 +119,7 @@ impl Program {
         let (slab, pipeline) = &self.slabs[run.slab];
         let workgroups = Parts::workgroups(part);
         let counts = [workgroups, run.first_sum, run.first_result as u32, 0];
-        gpu.queue.write_buffer(&run.counts, 0, bytemuck::cast_slice(&counts));
+        run.counts.write(gpu, bytemuck::cast_slice(&counts));
         let Some(lights) = self.inputs.bound() else { return };
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
         pass.set_pipeline(pipeline);

@@ -3,11 +3,11 @@
 use std::ops::Range;
 
 use toml::Spanned;
-use toml::de::{DeTable, DeValue};
+use toml::de::{DeArray, DeTable, DeValue};
 
 use super::ParamsFile;
 use crate::engine::Unknown;
-use crate::model::effects::Form;
+use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Param, Params};
 use crate::scene::Loss;
 
@@ -27,19 +27,20 @@ pub(super) fn parse(text: &str, form: Form, base: &Params) -> Result<ParamsFile,
         place: e.span(),
         problem: format!("not TOML: {}. Correct the line or fit anew.", e.message().trim_end_matches('.')),
     })?;
-    let mut file = ParamsFile { form, loss: None, params: *base, gains: Vec::new() };
+    let mut file = ParamsFile { form, effects: None, loss: None, params: *base, gains: Vec::new() };
     for (key, value) in table.get_ref() {
         match (key.get_ref().as_ref(), value.get_ref()) {
             ("form", DeValue::String(name)) => check_form(name, form, value.span())?,
+            ("effects", DeValue::Array(names)) => file.effects = Some(read_effects(names)?),
             ("loss", DeValue::String(name)) => file.loss = Some(read_loss(name, value.span())?),
             ("params", DeValue::Table(params)) => read_params(params, &mut file.params)?,
             ("gains", DeValue::Table(gains)) => file.gains = read_gains(gains)?,
-            ("form" | "loss" | "params" | "gains", _) => {
-                let what = "form and loss are strings, params and gains tables";
+            ("form" | "effects" | "loss" | "params" | "gains", _) => {
+                let what = "form and loss are strings, effects a list of them, params and gains tables";
                 return problem(value.span(), format!("`{}` is of the wrong kind: {what}.", key.get_ref()));
             }
             (name, _) => {
-                let known = "form, loss, [params] and [gains]";
+                let known = "form, effects, loss, [params] and [gains]";
                 return problem(key.span(), format!("unknown key `{name}`. This file knows {known}."));
             }
         }
@@ -61,6 +62,20 @@ fn check_form(name: &str, form: Form, place: Range<usize>) -> Result<(), Problem
         ),
         None => problem(place, format!("unknown form `{name}`. It is `listing` or `corrected`.")),
     }
+}
+
+fn read_effects(names: &DeArray<'_>) -> Result<Effects, Problem> {
+    let effect = |name: &Spanned<DeValue<'_>>| {
+        let known = || Effect::ALL.map(Effect::name).join(", ");
+        match name.get_ref() {
+            DeValue::String(text) => Effect::from_name(text).ok_or_else(|| Problem {
+                place: Some(name.span()),
+                problem: format!("unknown effect `{text}`. There are {}.", known()),
+            }),
+            _ => problem(name.span(), format!("an effect is a name. There are {}.", known())),
+        }
+    };
+    names.iter().map(effect).collect()
 }
 
 fn read_loss(name: &str, place: Range<usize>) -> Result<Loss, Problem> {
@@ -90,10 +105,10 @@ fn read_rgb(param: Param, value: &Spanned<DeValue<'_>>) -> Result<[f64; 3], Prob
     let info = param.info();
     let bounded = |value: &Spanned<DeValue<'_>>| {
         let number = number(param.name(), value)?;
-        if (info.lower..=info.upper).contains(&number) {
+        if info.admits(number) {
             return Ok(number);
         }
-        let (name, low, high) = (info.name, info.lower, info.upper);
+        let (name, (low, high)) = (info.name, info.range());
         problem(value.span(), format!("{name} = {number} is outside its bounds {low} to {high}."))
     };
     match value.get_ref() {

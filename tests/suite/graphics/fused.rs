@@ -38,8 +38,10 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
     let light = illumination();
     let point = Point { params: params(), gains: vec![1.0, 1.2] };
     let all = [EVERYTHING];
-    // One effect at a time where the form and the silhouette are the defaults; all of them elsewhere.
-    let single: Vec<Effects> = Effect::ALL.into_iter().map(|e| Effects::of(&[e])).collect();
+    // One effect at a time where the form and the silhouette are the defaults; all of them elsewhere. With the
+    // normal map, as the samples have one.
+    let single: Vec<Effects> =
+        Effect::ALL.into_iter().map(|e| Effects::of(&[e, Effect::NormalMap])).collect();
     for form in Form::ALL {
         for silhouette in Silhouette::ALL {
             let default = form == Form::Corrected && silhouette == Silhouette::Fragment;
@@ -255,6 +257,29 @@ fn a_lost_device_ends_a_fit_with_its_reason_and_keeps_the_state() {
         skinfit::fit::fit(&cpu(FULL, &views, Loss::L2, &unknowns, true), &point, &options, &mut |_| {})
             .unwrap();
     assert!(outcome.loss_end < outcome.loss_start);
+}
+
+#[test]
+fn kept_terms_follow_the_parameters_that_are_held() {
+    let Some(gpu) = gpu() else { return };
+    let views = [view(40, 13)];
+    let light = illumination();
+    let unknowns: Vec<Unknown> = [Param::BaseWeight, Param::RimExponent, Param::Hilite, Param::HazeWeight]
+        .map(|param| Unknown::Param(Column::tied(param)))
+        .to_vec();
+    let mut point = Point { params: params(), gains: vec![1.0] };
+    let ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
+    let plain = Reference::new(FULL, &light, &views, Loss::L2, &unknowns);
+    for strength in [1.3, 0.4, 0.4, 1.3] {
+        point.params.set(Param::NormalStrength, strength);
+        let what = format!("normal_strength {strength}");
+        assert_equal(
+            &ours.normal_equations(&point),
+            &plain.normal_equations(&point),
+            &names(&unknowns),
+            &what,
+        );
+    }
 }
 
 #[test]

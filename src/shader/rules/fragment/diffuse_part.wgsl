@@ -2,14 +2,7 @@
 //
 // gives: diffuse_part
 // when: rim
-// cost: 12
-fn diffuse_light(
-    albedo: vec3f,
-    irradiance: vec3f,
-    occ: f32,
-    rim: f32,
-    base_weight: vec3f,
-    rim_weight: vec3f,
-) -> vec3f {
-    return albedo * irradiance * (occ * (base_weight + rim * rim_weight));
+// cost: 9
+fn diffuse_light(diffuse_term: vec3f, occ: f32, rim: f32, base_weight: vec3f, rim_weight: vec3f) -> vec3f {
+    return diffuse_term * (occ * (base_weight + rim * rim_weight));
 }

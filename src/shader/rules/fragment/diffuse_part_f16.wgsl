@@ -1,7 +1,7 @@
 // diffuse (base_weight + rim_weight rim), in 16 bits; radiance beyond their range is cut at 65504.
 //
 // gives: diffuse_part
-// when: rim, f16
+// when: rim, f16, !terms
 // cost: 9
 // error: 0.002
 // paper: yes

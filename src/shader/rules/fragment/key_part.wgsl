@@ -1,7 +1,7 @@
-// albedo key_color (max(0, n.L) - max(0, N.L)): the bump map's contribution (GPU Gems chapter 3, last page).
+// key_color key (GPU Gems chapter 3, last page).
 //
 // gives: key_part
-// cost: 14
-fn key_light_part(albedo: vec3f, n: vec3f, normal: vec3f, key_direction: vec3f, key_color: vec3f) -> vec3f {
-    return (max(dot(n, key_direction), 0.0) - max(dot(normal, key_direction), 0.0)) * albedo * key_color;
+// cost: 3
+fn key_light_part(key_term: vec3f, key_color: vec3f) -> vec3f {
+    return key_color * key_term;
 }

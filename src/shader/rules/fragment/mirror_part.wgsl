@@ -1,7 +1,7 @@
 // reflection dapple E_s(R).rgb (MODEL 3).
 //
 // gives: mirror_part
-// cost: 6
-fn mirrored_light(mirror_light: vec4f, dapple: f32, reflection: vec3f) -> vec3f {
-    return dapple * reflection * mirror_light.rgb;
+// cost: 3
+fn mirrored_light(mirror_term: vec3f, reflection: vec3f) -> vec3f {
+    return reflection * mirror_term;
 }

@@ -1,7 +1,7 @@
 // The diffuse light that is added towards the silhouette (MODEL 3).
 //
 // gives: rim_part
-// cost: 10
-fn rim_light(albedo: vec3f, irradiance: vec3f, occ: f32, rim: f32, rim_weight: vec3f) -> vec3f {
-    return albedo * irradiance * (occ * rim * rim_weight);
+// cost: 7
+fn rim_light(diffuse_term: vec3f, occ: f32, rim: f32, rim_weight: vec3f) -> vec3f {
+    return diffuse_term * (occ * rim * rim_weight);
 }

@@ -1,9 +1,9 @@
-// Where a direction of any length but 0 meets the cube: the face in x (+X -X +Y -Y +Z -Z), then s and t in
-// [0, 1]. A zero or non-finite direction has no face; +Z stands in. Ties of the major axis go to x before y
-// before z; seamlessness makes the choice immaterial.
+// Where a direction of any length from 1e-36 on meets the cube: the face in x (+X -X +Y -Y +Z -Z), then s and
+// t in [0, 1]. A shorter or non-finite direction has no face; +Z stands in. Ties of the major axis go to x
+// before y before z; seamlessness makes the choice immaterial.
 fn cube_place(direction: vec3f) -> vec3f {
     let size = abs(direction.x) + abs(direction.y) + abs(direction.z);
-    let ok = size > 0.0 && is_finite(direction);
+    let ok = size >= 1e-36 && is_finite(direction);
     let d = select(vec3f(0.0, 0.0, 1.0), direction, ok);
     let a = abs(d);
     if a.x >= a.y && a.x >= a.z {

@@ -1,4 +1,4 @@
-// Whether no component is NaN or infinite: by the bits, as WGSL lets compilers assume that there is none.
+// Whether no component is NaN or infinite, asked in a way that compilers do not assume away.
 fn is_finite(v: vec3f) -> bool {
     let bits: vec3u = bitcast<vec3u>(v) & vec3u(0x7f800000u);
     return bits.x != 0x7f800000u && bits.y != 0x7f800000u && bits.z != 0x7f800000u;

@@ -1,0 +1,114 @@
+//! `skinfit stability`: hard cases on every evaluator, and a random search for new ones.
+
+use std::path::PathBuf;
+
+use super::scene::SceneArguments;
+use super::{Exit, Refusal, say, tell, tell_warnings};
+use crate::output;
+use crate::prepare::{PrepareOptions, Prepared};
+use crate::progress;
+use crate::scene::{LoadOptions, Scene};
+use crate::study::stability::lights::LightBox;
+#[cfg(feature = "gpu")]
+use crate::study::stability::objectives::{EngineEvaluator, OnAdapter};
+use crate::study::stability::scene::{batches, sweepable};
+use crate::study::stability::{Study, evaluators, kept};
+
+/// Try hard cases on every evaluator, and search for new ones
+#[derive(clap::Args)]
+#[command(
+    after_help = super::with_exit_codes("Each evaluator (the model in f64 and f32, the CPU engine, the renderer's shader rules where there is a graphics adapter) is given every hard case of docs/model.md, samples of the scene with each parameter at its bounds and each effect on and off, and random numbers made to break it. Each result must be finite, and as near to f64 as roundings explain. Cases that fail are made as simple as they stay failing and written to DIR/new_cases.toml; DIR/stability.json has every figure.\n\nExamples:\n  skinfit stability                                    the built-in scene\n  skinfit stability scene.toml -o stable --cases 50000 --seed 7\n  skinfit stability --replay stable/new_cases.toml     try again what failed")
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The folder for stability.json and new_cases.toml; without it only the tables are printed.
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+    /// Random cases.
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    cases: usize,
+    /// What the random cases are drawn from.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Try the cases of this file too, as an earlier study left it.
+    #[arg(long, value_name = "FILE")]
+    replay: Option<PathBuf>,
+    /// Pixels of the case that sums over many.
+    #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    pixels: u64,
+    /// Part of a graphics adapter's name, in any case [default: $WGPU_ADAPTER_NAME, or the fastest].
+    #[cfg(feature = "gpu")]
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    super::quieten_graphics();
+    let mut cases = kept::built_in()?;
+    if let Some(path) = &arguments.replay {
+        cases.extend(kept::read(path)?);
+    }
+    let (path, _scratch) = arguments.scene.path()?;
+    let load = LoadOptions { targets: false, ..LoadOptions::default() };
+    let (scene, _) = Scene::load(&path, &load)?;
+    let effects = sweepable(scene.effects, scene.environment.is_some());
+    drop(scene);
+    let options = PrepareOptions {
+        effects: Some(effects),
+        cache: arguments.scene.cache(),
+        ..PrepareOptions::default()
+    };
+    let prepared = Prepared::new(&path, &options)?;
+    tell_warnings(&prepared.warnings);
+    let study = Study {
+        swept: batches(&prepared, effects),
+        lights: LightBox::new(Some(prepared.illumination)),
+        kept: cases,
+        seed: arguments.seed,
+        cases: arguments.cases,
+        pixels: usize::try_from(arguments.pixels).unwrap_or(usize::MAX),
+    };
+    study_and_tell(arguments, &study)
+}
+
+fn study_and_tell(arguments: &Arguments, study: &Study) -> Result<Exit, Refusal> {
+    #[allow(unused_mut, reason = "without the feature there is nothing to add")]
+    let (mut evaluators, mut missing) = (evaluators(), Vec::new());
+    #[cfg(feature = "gpu")]
+    let choice = crate::gpu::Choice { name: arguments.adapter.clone(), ..crate::gpu::Choice::default() };
+    #[cfg(feature = "gpu")]
+    match crate::gpu::Gpu::open(&choice) {
+        Ok(gpu) => {
+            say(&format!("on the adapter {}", gpu.name()))?;
+            let gpu = std::rc::Rc::new(gpu);
+            evaluators.push(Box::new(crate::study::stability::shader::Rules(std::rc::Rc::clone(&gpu))));
+            evaluators.push(Box::new(EngineEvaluator(OnAdapter(gpu))));
+        }
+        Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => return Err(error.into()),
+        Err(error) => missing.push(format!("SHADER RULES AND GPU ENGINE WERE NOT TRIED: {error}")),
+    }
+    #[cfg(not(feature = "gpu"))]
+    missing.push(
+        "SHADER RULES AND GPU ENGINE WERE NOT TRIED: skinfit was built without the feature gpu.".to_owned(),
+    );
+    let bar = progress::bar("cases", study.steps() as u64);
+    let mut report = study.run(&evaluators, &mut |done| bar.set_position(done as u64));
+    bar.finish_and_clear();
+    report.missing = missing;
+    say(report.text().trim_end())?;
+    report.missing.iter().for_each(|words| tell(words));
+    if let Some(folder) = &arguments.output {
+        let plain = |error: &dyn std::fmt::Display| Refusal::new(format!("{}: {error}", folder.display()));
+        let json = report.json().map_err(|error| plain(&error))?;
+        output::write(&folder.join("stability.json"), json.as_bytes())?;
+        let cases = kept::to_toml(&report.found).map_err(|error| plain(&error))?;
+        output::write(&folder.join("new_cases.toml"), cases.as_bytes())?;
+        say(&format!("wrote {}", folder.display()))?;
+    }
+    let failures = report.failures();
+    for failure in &failures {
+        tell(failure);
+    }
+    Ok(if failures.is_empty() { Exit::Done } else { Exit::Failed })
+}

@@ -1,0 +1,228 @@
+//! What an evaluator is to the study, and the model itself as one: in f64, the reference, and in f32.
+
+use std::marker::PhantomData;
+
+use super::case::{Batch, FragmentInputs, VertexInputs};
+use super::lights::LightBox;
+use super::objectives::EngineFactory;
+use crate::engine::NormalEquations;
+use crate::engine::cpu::Illumination;
+use crate::model::compose::{Composition, Weights};
+use crate::model::cube::Cube;
+use crate::model::evaluate::Setup;
+use crate::model::fragment::{Fragment, LookupParam, Shading, Wanted, shading, terms, terms_tangent};
+use crate::model::lights::{Cubes, Lights};
+use crate::model::params::{Param, Params};
+use crate::model::real::Real;
+use crate::model::vertex::deform;
+
+/// Red, green, blue, and the haze in alpha.
+pub type Rgba = [f64; 4];
+/// How the four move with each parameter of the table (all of its channels together).
+pub type Slopes = [Rgba; Param::COUNT];
+/// N, T and B of a vertex.
+pub type Frame = [f64; 9];
+
+/// What an evaluator says of a batch; it leaves out what it does not compute.
+#[derive(Clone, Debug, Default)]
+pub struct Answer {
+    /// The colour of each fragment.
+    pub values: Option<Vec<Rgba>>,
+    /// Its derivatives.
+    pub slopes: Option<Vec<Slopes>>,
+    /// The sums over all fragments against [`TARGET`], for the unknowns of [`unknowns`](super::objectives::unknowns).
+    pub sums: Option<Sums>,
+}
+
+/// What engines sum.
+#[derive(Clone, Debug)]
+pub struct Sums {
+    /// Loss and normal equations in one pass.
+    pub equations: NormalEquations,
+    /// The loss of a pass that asks for nothing else.
+    pub loss: f64,
+    /// The gradient of a pass that asks for no more.
+    pub gradient: Vec<f64>,
+}
+
+/// What engines compare every fragment with.
+pub const TARGET: [f32; 4] = [0.5, 0.25, 0.75, 0.125];
+
+/// Something that computes the model.
+pub trait Evaluator {
+    /// Its name in tables.
+    fn name(&self) -> String;
+    /// By how much more than f32's correctly rounded operations its own may be off.
+    fn slack(&self) -> f64 {
+        1.0
+    }
+    /// What it makes of a batch.
+    ///
+    /// # Errors
+    /// When it could not run at all, in words.
+    fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String>;
+    /// The frames of vertices; `None` when it has no vertex stage.
+    ///
+    /// # Errors
+    /// As [`Self::fragments`].
+    fn frames(&self, _vertices: &[VertexInputs]) -> Result<Option<Vec<Frame>>, String> {
+        Ok(None)
+    }
+    /// The engine that sums over many pixels, if it is one.
+    fn engine(&self) -> Option<&dyn EngineFactory> {
+        None
+    }
+}
+
+/// A plain number that the model is evaluated in.
+pub trait Scalar: Real + Send + Sync {
+    /// Its name in tables.
+    const NAME: &'static str;
+    /// Zero, from which constants come.
+    const ZERO: Self;
+    /// A texel's channel.
+    fn texel(x: f32) -> Self::Texel;
+    /// The value.
+    fn wide(self) -> f64;
+}
+
+impl Scalar for f32 {
+    const NAME: &'static str = "model f32";
+    const ZERO: Self = 0.0;
+    fn texel(x: f32) -> f32 {
+        x
+    }
+    fn wide(self) -> f64 {
+        f64::from(self)
+    }
+}
+
+impl Scalar for f64 {
+    const NAME: &'static str = "model f64";
+    const ZERO: Self = 0.0;
+    fn texel(x: f32) -> Self {
+        Self::from(x)
+    }
+    fn wide(self) -> f64 {
+        self
+    }
+}
+
+/// The cubes at one lobe exponent, in a scalar's texels.
+pub struct WideCubes<R: Real>([Option<Cube<R::Texel>>; 4]);
+
+impl<R: Scalar> WideCubes<R> {
+    /// The cubes of `light` at `exponent`.
+    #[must_use]
+    pub fn new(light: &Illumination, exponent: f64) -> Self {
+        let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(R::texel));
+        let lobe = light.lobes.as_ref().map(|stack| stack.at(exponent));
+        Self([
+            light.irradiance.as_ref().map(wide),
+            lobe.as_ref().map(|(cube, _)| wide(cube)),
+            lobe.as_ref().map(|(_, slope)| wide(slope)),
+            light.hilite.as_ref().map(wide),
+        ])
+    }
+
+    /// The same cubes, each texel changed by `change`.
+    #[must_use]
+    pub fn changed(&self, mut change: impl FnMut(R::Texel) -> R::Texel) -> Self {
+        let change = std::cell::RefCell::new(&mut change);
+        let texel = |texel: [R::Texel; 4]| texel.map(|x| change.borrow_mut()(x));
+        Self(self.0.each_ref().map(|cube| cube.as_ref().map(|cube| cube.map(texel))))
+    }
+
+    /// The lights of `setup` at `params`; the environment's turn is always computed, as it may be free.
+    pub fn lights(&self, setup: Setup, params: &Params) -> Lights<'_, R> {
+        let [irradiance, specular, lobe_slope, hilite] = self.0.each_ref().map(Option::as_ref);
+        let cubes = Cubes { irradiance, specular, lobe_slope, hilite };
+        Lights::new(setup, params, cubes, true, R::ZERO)
+    }
+}
+
+/// A fragment with its terms, and its derivatives by every parameter that its effects read.
+#[inline(never)]
+pub fn shade_with_slopes<R: Scalar>(
+    setup: Setup,
+    lights: &Lights<'_, R>,
+    f: &Fragment<R>,
+    s: &Shading<R>,
+    params: &Params,
+) -> (Composition<R>, Slopes) {
+    let weights = Weights::new(params, setup.effects, R::ZERO);
+    let composition = Composition::new(terms(lights, f, s, Wanted::ALL), f.occlusion, weights);
+    let mut slopes = [[0.0; 4]; Param::COUNT];
+    for param in Param::all().filter(|param| param.asked_for(setup.effects)) {
+        let by = match LookupParam::from_param(param) {
+            Some(lookup) => {
+                let slope = terms_tangent(lights, f, s, lookup);
+                let along = |c| composition.along(&slope, c);
+                [along(0), along(1), along(2), composition.alpha_along(&slope)]
+            }
+            None => {
+                let by = |c| composition.derivative(param, c);
+                let alpha = if param == Param::HazeWeight { composition.terms.haze } else { R::ZERO };
+                [by(0), by(1), by(2), alpha]
+            }
+        };
+        slopes[param as usize] = by.map(R::wide);
+    }
+    (composition, slopes)
+}
+
+/// The shading normal of a fragment at `params`.
+pub fn shading_at<R: Scalar>(setup: Setup, f: &Fragment<R>, params: &Params) -> Shading<R> {
+    shading(setup.form, setup.silhouette, f, R::ZERO.lit(params.scalar(Param::NormalStrength)))
+}
+
+/// The colour of a composition.
+pub fn rgba<R: Scalar>(composition: &Composition<R>) -> Rgba {
+    [composition.result(0), composition.result(1), composition.result(2), composition.alpha()].map(R::wide)
+}
+
+/// The model, one fragment after the other.
+#[derive(Debug, Default)]
+pub struct Plain<R>(PhantomData<R>);
+
+impl<R: Scalar> Plain<R> {
+    /// The model in that scalar.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self(PhantomData)
+    }
+}
+
+impl<R: Scalar> Evaluator for Plain<R>
+where
+    R::Texel: Send + Sync,
+{
+    fn name(&self) -> String {
+        R::NAME.to_owned()
+    }
+
+    fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
+        let setting = &batch.setting;
+        let cubes =
+            WideCubes::<R>::new(lights.of(setting.lights), setting.params.scalar(Param::SpecularLobe));
+        let lights = cubes.lights(setting.setup, &setting.params);
+        let each = |inputs: &FragmentInputs| {
+            let f = inputs.fragment(setting.setup, R::ZERO);
+            let s = shading_at(setting.setup, &f, &setting.params);
+            let (composition, slopes) = shade_with_slopes(setting.setup, &lights, &f, &s, &setting.params);
+            (rgba(&composition), slopes)
+        };
+        let (values, slopes) = batch.fragments.iter().map(each).unzip();
+        Ok(Answer { values: Some(values), slopes: Some(slopes), sums: None })
+    }
+
+    fn frames(&self, vertices: &[VertexInputs]) -> Result<Option<Vec<Frame>>, String> {
+        let frame = |inputs: &VertexInputs| {
+            let surface = deform(&inputs.vertex(R::ZERO), [], []);
+            let parts = [surface.normal, surface.tangent, surface.bitangent];
+            let mut numbers = parts.into_iter().flatten().map(R::wide);
+            std::array::from_fn(|_| numbers.next().unwrap_or(f64::NAN))
+        };
+        Ok(Some(vertices.iter().map(frame).collect()))
+    }
+}

@@ -1,0 +1,203 @@
+//! Cases kept in a file: what a search found, to be tried again on every run.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use toml::Spanned;
+
+use super::case::{Batch, FragmentInputs, Setting};
+use super::lights::LightKind;
+use super::search::Found;
+use crate::model::effects::{Effect, Effects, Form, Silhouette};
+use crate::model::evaluate::Setup;
+use crate::model::params::{Param, Params};
+use crate::scene::error::SceneError;
+use crate::scene::{Loss, Source};
+
+/// The cases that every study tries again.
+const KEPT: &str = include_str!("kept.toml");
+
+/// A named batch.
+#[derive(Clone, Debug)]
+pub struct KeptCase {
+    /// Its name in tables.
+    pub name: String,
+    /// The fragments.
+    pub batch: Batch,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct File {
+    #[serde(default)]
+    case: Vec<CaseTable<Spanned<String>>>,
+}
+
+#[derive(Serialize)]
+struct OutFile {
+    case: Vec<CaseTable<String>>,
+}
+
+/// One case; `S` is text, with its place where it was read.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct CaseTable<S> {
+    name: String,
+    /// Which evaluator failed it, and how: for the reader.
+    #[serde(default)]
+    found_by: String,
+    #[serde(default)]
+    failure: String,
+    form: S,
+    silhouette: S,
+    effects: Vec<S>,
+    lights: S,
+    loss: S,
+    #[serde(default)]
+    params: BTreeMap<String, [f64; 3]>,
+    fragment: Vec<FragmentTable>,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct FragmentTable {
+    texel: [f64; 3],
+    tangent: [f64; 3],
+    bitangent: [f64; 3],
+    normal: [f64; 3],
+    view: [f64; 3],
+    occlusion: f64,
+    silhouette: f64,
+    dapple: f64,
+    albedo: [f64; 3],
+    specular: f64,
+    attenuator: f64,
+}
+
+macro_rules! same_fields {
+    ($from:ty => $to:ty) => {
+        impl From<$from> for $to {
+            fn from(f: $from) -> Self {
+                Self {
+                    texel: f.texel,
+                    tangent: f.tangent,
+                    bitangent: f.bitangent,
+                    normal: f.normal,
+                    view: f.view,
+                    occlusion: f.occlusion,
+                    silhouette: f.silhouette,
+                    dapple: f.dapple,
+                    albedo: f.albedo,
+                    specular: f.specular,
+                    attenuator: f.attenuator,
+                }
+            }
+        }
+    };
+}
+
+same_fields!(FragmentTable => FragmentInputs);
+same_fields!(FragmentInputs => FragmentTable);
+
+/// The cases that come with the program.
+///
+/// # Errors
+/// Never, as a test reads them too.
+pub fn built_in() -> Result<Vec<KeptCase>, SceneError> {
+    parse(&Source::of(Path::new("kept.toml"), KEPT.to_owned()))
+}
+
+/// The cases of a file, such as a study leaves.
+///
+/// # Errors
+/// When it cannot be read or holds something else.
+pub fn read(path: &Path) -> Result<Vec<KeptCase>, SceneError> {
+    parse(&Source::read(path)?)
+}
+
+fn parse(source: &Source) -> Result<Vec<KeptCase>, SceneError> {
+    let file: File = source.parse()?;
+    file.case.into_iter().map(|table| case(source, table)).collect()
+}
+
+fn case(source: &Source, table: CaseTable<Spanned<String>>) -> Result<KeptCase, SceneError> {
+    let all = Effect::ALL.map(|effect| (effect.name(), effect));
+    let effects: Effects =
+        table.effects.iter().map(|name| source.choose("effect", name, &all)).collect::<Result<_, _>>()?;
+    let form = source.choose("form", &table.form, &Form::ALL.map(|form| (form.name(), form)))?;
+    let silhouettes = Silhouette::ALL.map(|s| (s.name(), s));
+    let silhouette = source.choose("silhouette", &table.silhouette, &silhouettes)?;
+    let lights = source.choose("light", &table.lights, &LightKind::ALL.map(|l| (l.name(), l)))?;
+    let loss = source.choose("loss", &table.loss, &Loss::ALL.map(|loss| (loss.name(), loss)))?;
+    let mut params = Params::defaults(form);
+    for (name, value) in &table.params {
+        let Some(param) = Param::from_name(name) else {
+            let words = format!("case \"{}\": unknown parameter `{name}`", table.name);
+            let known: Vec<&str> = Param::all().map(Param::name).collect();
+            return Err(SceneError::new(&source.path, words, crate::scene::suggestion(name, &known)));
+        };
+        params.set_rgb(param, *value);
+    }
+    let setup = Setup { form, silhouette, effects };
+    let setting = Setting { setup, params, lights, loss };
+    let fragments = table.fragment.into_iter().map(Into::into).collect();
+    Ok(KeptCase { name: table.name, batch: Batch { setting, fragments } })
+}
+
+/// What was found, as the text of a file that [`read`] takes.
+///
+/// # Errors
+/// Never: the tables are plain.
+pub fn to_toml(found: &[Found]) -> Result<String, toml::ser::Error> {
+    let table = |(number, found): (usize, &Found)| {
+        let Setting { setup, params, lights, loss } = found.batch.setting;
+        let default = Params::defaults(setup.form);
+        let changed = Param::all().filter(|&param| params.rgb(param) != default.rgb(param));
+        CaseTable {
+            name: format!("found {}", number + 1),
+            found_by: found.evaluator.clone(),
+            failure: found.failure.clone(),
+            form: setup.form.name().to_owned(),
+            silhouette: setup.silhouette.name().to_owned(),
+            effects: setup.effects.iter().map(|effect| effect.name().to_owned()).collect(),
+            lights: lights.name().to_owned(),
+            loss: loss.name().to_owned(),
+            params: changed.map(|param| (param.name().to_owned(), params.rgb(param))).collect(),
+            fragment: found.batch.fragments.iter().map(|&fragment| fragment.into()).collect(),
+        }
+    };
+    toml::to_string(&OutFile { case: found.iter().enumerate().map(table).collect() })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::stability::random::batch;
+
+    #[test]
+    fn cases_read_back_as_they_were_written_nan_and_signed_zeros_included() {
+        let found: Vec<Found> = (0..30)
+            .map(|i| Found { evaluator: "a".into(), failure: "b \"c\"".into(), batch: batch(3, i, 20) })
+            .collect();
+        let text = to_toml(&found).unwrap();
+        let cases = parse(&Source::of(Path::new("a.toml"), text)).unwrap();
+        for (case, found) in cases.iter().zip(&found) {
+            assert_eq!(format!("{:?}", case.batch), format!("{:?}", found.batch));
+        }
+    }
+
+    #[test]
+    fn the_kept_cases_are_sound_and_what_is_not_is_refused_with_its_place() {
+        assert!(built_in().is_ok());
+        let refused =
+            |text: &str| parse(&Source::of(Path::new("a.toml"), text.to_owned())).unwrap_err().to_string();
+        assert!(
+            refused("[[cases]]\n").starts_with("a.toml: line 1: unknown key `cases`. Did you mean `case`?")
+        );
+        let text =
+            to_toml(&[Found { evaluator: String::new(), failure: String::new(), batch: batch(1, 1, 1) }]);
+        let text = text.unwrap().replace("lights = \"", "lights = \"x");
+        assert!(refused(&text).contains("unknown light `x"), "{}", refused(&text));
+    }
+}

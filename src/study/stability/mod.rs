@@ -1,0 +1,154 @@
+//! Whether every evaluator stays finite and agrees with the model in f64 where that is hard.
+//!
+//! - [`case`]: the numbers that evaluators are given; [`lights`]: what they look up
+//! - [`hard`]: the hard cases of MODEL 7, a declaration each; [`demands`]: those of engines and fits
+//! - [`random`]: random cases; [`scene`]: a scene's own samples; [`kept`]: cases kept in files
+//! - [`evaluate`]: what an evaluator is, and the model as one; [`objectives`]: engines; `shader`: the
+//!   renderer's rules
+//! - [`reference`]: the model in f64, and how far rounding may move it
+//! - [`check`]: an answer held against the reference; [`search`]: the search, and failures made simple
+//! - [`report`]: what came of it
+//!
+//! Another engine is studied once it is a [`objectives::EngineFactory`] in the list of evaluators.
+
+pub mod case;
+pub mod check;
+pub mod demands;
+pub mod evaluate;
+pub mod hard;
+pub mod kept;
+pub mod lights;
+pub mod objectives;
+pub mod random;
+pub mod reference;
+pub mod report;
+pub mod scene;
+pub mod search;
+#[cfg(feature = "gpu")]
+pub mod shader;
+
+use case::Batch;
+use check::{Verdict, check_against, check_frame};
+use demands::{Circumstances, DEMANDS};
+use evaluate::{Evaluator, Plain};
+use kept::KeptCase;
+use lights::LightBox;
+use objectives::{Cpu, EngineEvaluator};
+use reference::{FEW, Reference};
+use report::Report;
+use search::Hunt;
+
+/// What is studied.
+#[derive(Debug)]
+pub struct Study {
+    /// The lights, with a scene's own where one is swept.
+    pub lights: LightBox,
+    /// Cases from files.
+    pub kept: Vec<KeptCase>,
+    /// A scene's samples.
+    pub swept: Vec<Batch>,
+    /// What random cases are drawn from.
+    pub seed: u64,
+    /// How many of them.
+    pub cases: usize,
+    /// Pixels of the case that sums over many.
+    pub pixels: usize,
+}
+
+/// The model itself, and the CPU engine.
+#[must_use]
+pub fn evaluators() -> Vec<Box<dyn Evaluator>> {
+    vec![Box::new(Plain::<f64>::new()), Box::new(Plain::<f32>::new()), Box::new(EngineEvaluator(Cpu))]
+}
+
+impl Study {
+    /// How many steps [`run`](Self::run) tells of.
+    #[must_use]
+    pub fn steps(&self) -> usize {
+        hard::cases().len()
+            + hard::frames().len()
+            + DEMANDS.len()
+            + self.kept.len()
+            + self.swept.len()
+            + self.cases
+    }
+
+    /// Every case on every evaluator; `progress` is told after each how many are done.
+    pub fn run(&self, evaluators: &[Box<dyn Evaluator>], progress: &mut dyn FnMut(usize)) -> Report {
+        let names = evaluators.iter().map(|evaluator| evaluator.name()).collect();
+        let mut report = Report::new(names, self.seed);
+        let mut done = 0;
+        let mut step = |count: usize| {
+            done += count;
+            progress(done);
+        };
+        for case in hard::cases() {
+            let verdicts = self.verdicts(evaluators, &case.batch, &case.holds);
+            report.add(case.name, case.hard, verdicts);
+            step(1);
+        }
+        for frame in hard::frames() {
+            let verdicts =
+                evaluators.iter().map(|evaluator| check_frame(&**evaluator, frame.vertex)).collect();
+            report.add(frame.name, "any unit frame, the same on every evaluator", verdicts);
+            step(1);
+        }
+        let given = Circumstances { lights: &self.lights, pixels: self.pixels };
+        for demand in &DEMANDS {
+            let verdict = |evaluator: &Box<dyn Evaluator>| {
+                let met = (demand.check)(evaluator.engine()?, &given);
+                Some(demanded(met))
+            };
+            report.add(demand.name, demand.hard, evaluators.iter().map(verdict).collect());
+            step(1);
+        }
+        for case in &self.kept {
+            let verdicts = self.verdicts(evaluators, &case.batch, &[]);
+            report.add(&format!("kept: {}", case.name), "found by a search", verdicts);
+            step(1);
+        }
+        let mut swept = Hunt::new(evaluators.len());
+        for batch in &self.swept {
+            swept.try_batch(evaluators, &self.lights, batch);
+            step(1);
+        }
+        let mut hunt = Hunt::new(evaluators.len());
+        let mut before = 0;
+        hunt.random(evaluators, &self.lights, self.seed, self.cases, &mut |tried| {
+            step(tried - before);
+            before = tried;
+        });
+        report.swept = swept.tallies;
+        report.random = hunt.tallies;
+        report.found = swept.found.into_iter().chain(hunt.found).collect();
+        report
+    }
+
+    fn verdicts(
+        &self,
+        evaluators: &[Box<dyn Evaluator>],
+        batch: &Batch,
+        holds: &[hard::Holds],
+    ) -> Vec<Option<Verdict>> {
+        let reference = Reference::new(&self.lights, batch, FEW);
+        let check = |evaluator: &Box<dyn Evaluator>| {
+            Some(check_against(&**evaluator, &self.lights, batch, holds, &reference))
+        };
+        evaluators.iter().map(check).collect()
+    }
+}
+
+/// How far an engine is from what is demanded, as a verdict.
+fn demanded(met: demands::Met) -> Verdict {
+    let (deviation, allowed) = match met {
+        Ok(met) => met,
+        Err(words) => return Verdict::failed(words),
+    };
+    let mut verdict = Verdict::default();
+    let number = check::Number { got: deviation, want: 0.0, allowed, size: 1.0 };
+    verdict.note(number, None, || "the deviation".to_owned());
+    verdict
+}
+
+#[cfg(test)]
+mod tests;

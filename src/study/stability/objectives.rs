@@ -1,0 +1,233 @@
+//! Engines as evaluators: the sums over a batch's fragments, each a pixel with one sample.
+
+use super::case::{Batch, EVERYTHING, FragmentInputs, Setting};
+use super::evaluate::{Answer, Evaluator, Sums, TARGET};
+use super::lights::LightBox;
+use crate::engine::cpu::{CpuEngine, Illumination};
+#[cfg(feature = "gpu")]
+use crate::engine::gpu::{GpuEngine, Memory, Task};
+use crate::engine::view::ObservedView;
+use crate::engine::{Objective, Point, Unknown};
+use crate::model::evaluate::Setup;
+use crate::model::params::{Column, Param};
+use crate::samples::rows::{Row, Rows};
+use crate::samples::surface_records::Asked;
+use crate::samples::{LANES, SurfaceRecords, ViewSamples};
+use crate::scene::Loss;
+
+/// What an engine is made of.
+#[derive(Clone, Debug)]
+pub struct EngineInputs {
+    /// The switches of the model.
+    pub setup: Setup,
+    /// The cubes.
+    pub illumination: Illumination,
+    /// Samples and targets.
+    pub views: Vec<ObservedView>,
+    /// What is minimised.
+    pub loss: Loss,
+    /// What is free.
+    pub unknowns: Vec<Unknown>,
+}
+
+/// Something that makes engines. An engine that has one is studied like every other.
+pub trait EngineFactory {
+    /// The engine's name in tables.
+    fn name(&self) -> String;
+    /// By how much more than f32's correctly rounded operations its own may be off.
+    fn slack(&self) -> f64 {
+        1.0
+    }
+    /// Make an engine for passes at `point`, and do something with it.
+    ///
+    /// # Errors
+    /// When it cannot be made, in words.
+    fn with(
+        &self,
+        inputs: &EngineInputs,
+        point: &Point,
+        then: &mut dyn FnMut(&dyn Objective),
+    ) -> Result<(), String>;
+    /// The image of each slot of the first view, where the engine can show it.
+    ///
+    /// # Errors
+    /// As [`Self::with`].
+    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String>;
+}
+
+/// The CPU engine.
+#[derive(Debug)]
+pub struct Cpu;
+
+impl Cpu {
+    fn engine(inputs: &EngineInputs) -> CpuEngine {
+        let EngineInputs { setup, illumination, views, loss, unknowns } = inputs.clone();
+        CpuEngine::new(setup, illumination, views, loss, unknowns)
+    }
+}
+
+impl EngineFactory for Cpu {
+    fn name(&self) -> String {
+        "CPU engine".to_owned()
+    }
+    fn with(
+        &self,
+        inputs: &EngineInputs,
+        _: &Point,
+        then: &mut dyn FnMut(&dyn Objective),
+    ) -> Result<(), String> {
+        then(&Self::engine(inputs));
+        Ok(())
+    }
+    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
+        Ok(Self::engine(inputs).image(0, point))
+    }
+}
+
+/// The GPU engine on an adapter.
+#[cfg(feature = "gpu")]
+pub struct OnAdapter(pub std::rc::Rc<crate::gpu::Gpu>);
+
+#[cfg(feature = "gpu")]
+impl OnAdapter {
+    fn engine<'a>(&'a self, inputs: &'a EngineInputs, point: &Point) -> Result<GpuEngine<'a>, String> {
+        let EngineInputs { setup, illumination, views, loss, unknowns } = inputs;
+        let task = Task {
+            setup: *setup,
+            illumination: illumination.clone(),
+            views,
+            loss: *loss,
+            unknowns: unknowns.clone(),
+        };
+        GpuEngine::new(&self.0, task, point, Memory::default()).map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(feature = "gpu")]
+impl EngineFactory for OnAdapter {
+    fn name(&self) -> String {
+        "GPU engine".to_owned()
+    }
+    /// As of the shader rules.
+    fn slack(&self) -> f64 {
+        4.0
+    }
+    fn with(
+        &self,
+        inputs: &EngineInputs,
+        point: &Point,
+        then: &mut dyn FnMut(&dyn Objective),
+    ) -> Result<(), String> {
+        let engine = self.engine(inputs, point)?;
+        then(&engine);
+        engine.device_fault().map_or(Ok(()), |error| Err(error.to_string()))
+    }
+    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
+        self.engine(inputs, point)?.image(0, point).map_err(|error| error.to_string())
+    }
+}
+
+/// Every parameter, tied.
+#[must_use]
+pub fn unknowns() -> Vec<Unknown> {
+    Param::all().map(|param| Unknown::Param(Column::tied(param))).collect()
+}
+
+/// An engine as an evaluator.
+pub struct EngineEvaluator<F>(pub F);
+
+impl<F: EngineFactory> Evaluator for EngineEvaluator<F> {
+    fn name(&self) -> String {
+        self.0.name()
+    }
+
+    fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
+        let Setting { setup, params, lights: light, loss } = batch.setting;
+        let inputs = EngineInputs {
+            setup,
+            illumination: lights.of(light).clone(),
+            views: vec![view(setup, &batch.fragments, TARGET)],
+            loss,
+            unknowns: unknowns(),
+        };
+        let point = Point { params, gains: vec![1.0] };
+        let planes = self.0.image(&inputs, &point)?;
+        let value = |slot: usize| [0, 1, 2, 3].map(|c: usize| f64::from(planes[c][slot]));
+        let values = (0..batch.fragments.len()).map(value).collect();
+        let mut sums = None;
+        self.0.with(&inputs, &point, &mut |engine| {
+            let equations = engine.normal_equations(&point);
+            let (_, gradient) = engine.gradient(&point);
+            sums = Some(Sums { equations, loss: engine.loss(&point), gradient });
+        })?;
+        Ok(Answer { values: Some(values), slopes: None, sums })
+    }
+
+    fn slack(&self) -> f64 {
+        self.0.slack()
+    }
+
+    fn engine(&self) -> Option<&dyn EngineFactory> {
+        Some(&self.0)
+    }
+}
+
+/// A view of one pixel a fragment, against one target; what fills the last group has no weight.
+#[must_use]
+pub fn view(setup: Setup, fragments: &[FragmentInputs], target: [f32; 4]) -> ObservedView {
+    let groups = fragments.len().div_ceil(LANES);
+    let mut samples = ViewSamples {
+        group_start: (0..=groups as u32).collect(),
+        surface: SurfaceRecords::new(EVERY_NUMBER, groups),
+        ..ViewSamples::default()
+    };
+    let mut weight = vec![Row::ZERO; groups];
+    for slot in 0..groups * LANES {
+        // Padding repeats a fragment, as `samples` does.
+        let real = slot < fragments.len();
+        let inputs = &fragments[if real { slot } else { slot / LANES * LANES }];
+        let share = f32::from(u8::from(real));
+        samples.surface.set(slot, &inputs.fragment(setup, 0.0_f32), share);
+        samples.pixel.push(if real { slot as u32 } else { u32::MAX });
+        samples.coverage.push(share);
+        weight[slot / LANES][slot % LANES] = share;
+    }
+    ObservedView { samples, target: targets(&target, groups), weight, clip: None }
+}
+
+const EVERY_NUMBER: Asked = Asked {
+    bump: true,
+    normal: true,
+    albedo: true,
+    occlusion: true,
+    silhouette: true,
+    dapple: true,
+    specular: true,
+    attenuator: true,
+    weight: true,
+};
+
+/// The same target for each pixel of so many groups: three or four channels.
+#[must_use]
+pub fn targets(target: &[f32], groups: usize) -> Rows {
+    let mut rows = Rows::new(target.len(), groups);
+    for (channel, &x) in target.iter().enumerate() {
+        rows.plane_mut(channel).for_each(|pixel| *pixel = x);
+    }
+    rows
+}
+
+/// What the checks of [`super::demands`] start from: ordinary fragments seen in every effect.
+#[must_use]
+pub fn ordinary_inputs(fragments: &[FragmentInputs], lights: &LightBox) -> (EngineInputs, Point) {
+    let setting = Setting::ordinary();
+    let setup = Setup { effects: EVERYTHING, ..setting.setup };
+    let inputs = EngineInputs {
+        setup,
+        illumination: lights.of(setting.lights).clone(),
+        views: vec![view(setup, fragments, TARGET)],
+        loss: setting.loss,
+        unknowns: unknowns(),
+    };
+    (inputs, Point { params: setting.params, gains: vec![1.0] })
+}

@@ -1,0 +1,312 @@
+//! The reference: the model in f64, and how far rounding may move it.
+//!
+//! A tolerance that is one number for every input would be too wide for most and too narrow for a few: next
+//! to a texel of 65504 a direction's last bit moves the light by a hundredth of it. So each fragment is
+//! evaluated in f64 as given, and again with every number moved by a few units in the last place of an f32:
+//! what it is given, texels of lights, and what an f32 must round on the way, where later steps cancel (the
+//! shading normal, the reflection, their derivatives, S.z). What that does to the result, an evaluator in
+//! f32 may do as well.
+
+use rand::rngs::StdRng;
+use rand::{RngExt, SeedableRng};
+use rayon::prelude::*;
+
+use super::case::{Batch, FragmentInputs, Setting};
+use super::evaluate::{Rgba, Slopes, TARGET, WideCubes, rgba, shade_with_slopes, shading_at};
+use super::lights::LightBox;
+use crate::engine::residual::{Weighted, weighted_residual};
+use crate::model::effects::Silhouette;
+use crate::model::fragment::{Fragment, Shading};
+use crate::model::params::{Param, Params};
+
+/// By how much each number is moved, as a share of itself (of the largest component of its vector): eight
+/// roundings of 2^-24 either way, as many as lie one behind the other between an input and what a lookup or
+/// a power makes of it.
+const RADIUS: f64 = 8.0 / (1 << 24) as f64;
+/// By how much texels are moved, as a share of themselves: one rounding of a blend.
+const ROUNDED: f64 = 1.0 / (1 << 23) as f64;
+/// A component below the smallest normal f32 may be flushed to 0 (WGSL permits it).
+const FLUSHED: f64 = 1.2e-38;
+/// What roundings of sums add, as a share of the summands: some fifty of 2^-24, of either sign.
+const SUMMED: f64 = 5e-6;
+/// Nothing below is told apart from 0: products of two factors above it do not vanish in an f32.
+const TINY: f64 = 1e-18;
+/// How often each fragment is moved: first, and again where that was too few to be sure.
+pub const FEW: usize = 6;
+/// See [`FEW`]: near a corner of the function there are many sides to fall on.
+pub const MANY: usize = 200;
+
+/// Entries of the packed upper triangle of J^T J.
+pub const PAIRS: usize = Param::COUNT * (Param::COUNT + 1) / 2;
+
+/// One fragment in f64.
+#[derive(Clone, Debug)]
+pub struct FragmentReference {
+    /// As given.
+    pub value: Rgba,
+    /// Its derivatives as given.
+    pub slopes: Slopes,
+    /// How far the colour may be off.
+    pub value_tolerance: Rgba,
+    /// How far the derivatives may be off.
+    pub slope_tolerance: Slopes,
+    /// The largest that rounding makes of each channel.
+    pub value_size: Rgba,
+    /// The largest that rounding makes of each derivative.
+    pub slope_size: Slopes,
+    /// What it adds to the sums, and how far that may be off.
+    contribution: Contribution,
+    contribution_tolerance: Contribution,
+}
+
+/// What a fragment adds to the sums of engines.
+#[derive(Clone, Debug)]
+struct Contribution {
+    loss: f64,
+    residual: f64,
+    jtr: [f64; Param::COUNT],
+    jtj: [f64; PAIRS],
+}
+
+impl Contribution {
+    const NOTHING: Self = Self { loss: 0.0, residual: 0.0, jtr: [0.0; Param::COUNT], jtj: [0.0; PAIRS] };
+
+    fn of(setting: &Setting, value: &Rgba, slopes: &Slopes) -> Self {
+        let mut sum = Self::NOTHING;
+        for c in 0..4 {
+            let target = f64::from(TARGET[c]);
+            let Weighted { loss, scale, residual } =
+                weighted_residual(setting.loss, None, value[c], target, 1.0);
+            sum.loss += loss;
+            sum.residual += residual * residual;
+            let mut at = 0;
+            for a in 0..Param::COUNT {
+                let row = scale * slopes[a][c];
+                sum.jtr[a] += row * residual;
+                for b in a..Param::COUNT {
+                    sum.jtj[at] += row * scale * slopes[b][c];
+                    at += 1;
+                }
+            }
+        }
+        sum
+    }
+
+    fn combine(&mut self, other: &Self, with: impl Fn(&mut f64, f64)) {
+        with(&mut self.loss, other.loss);
+        with(&mut self.residual, other.residual);
+        self.jtr.iter_mut().zip(other.jtr).for_each(|(a, b)| with(a, b));
+        self.jtj.iter_mut().zip(other.jtj).for_each(|(a, b)| with(a, b));
+    }
+}
+
+/// The sums over a batch, and how far they may be off.
+#[derive(Clone, Debug)]
+pub struct SumReference {
+    /// (value, tolerance) of the summed loss.
+    pub loss: (f64, f64),
+    /// Of the weighted squared residuals.
+    pub residual: (f64, f64),
+    /// Of J^T r.
+    pub jtr: Vec<(f64, f64)>,
+    /// Of J^T J, the upper triangle row by row.
+    pub jtj: Vec<(f64, f64)>,
+}
+
+/// A batch in f64.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    /// Each fragment.
+    pub fragments: Vec<FragmentReference>,
+}
+
+impl Reference {
+    /// The batch in f64, each fragment moved `moves` times.
+    #[must_use]
+    pub fn new(lights: &LightBox, batch: &Batch, moves: usize) -> Self {
+        let setting = &batch.setting;
+        let exponent = setting.params.scalar(Param::SpecularLobe);
+        let cubes = WideCubes::<f64>::new(lights.of(setting.lights), exponent);
+        let mut rng = StdRng::seed_from_u64(0);
+        let mut rounded = || cubes.changed(|x| x * (1.0 + ROUNDED * step(&mut rng)));
+        let others = [rounded(), rounded(), rounded()];
+        // The same moves for each, so that a fragment fares alike alone and among others.
+        let each = |inputs| one(setting, (&cubes, &others), inputs, moves, &mut StdRng::seed_from_u64(1));
+        Self { fragments: batch.fragments.par_iter().map(each).collect() }
+    }
+
+    /// The sums over all fragments.
+    #[must_use]
+    pub fn sums(&self) -> SumReference {
+        let (mut sum, mut wide) = (Contribution::NOTHING, Contribution::NOTHING);
+        for fragment in &self.fragments {
+            sum.combine(&fragment.contribution, |a, b| *a += b);
+            wide.combine(&fragment.contribution_tolerance, |a, b| *a += b);
+        }
+        // Products of f32 are rounded as shares of what Cauchy-Schwarz bounds them by.
+        let diagonal: Vec<f64> = (0..Param::COUNT).map(|a| sum.jtj[pair(a, a)].sqrt()).collect();
+        let root = sum.residual.sqrt();
+        let jtr = (0..Param::COUNT)
+            .map(|a| (sum.jtr[a], wide.jtr[a] + SUMMED * diagonal[a] * root + TINY))
+            .collect();
+        let pairs = (0..Param::COUNT).flat_map(|a| (a..Param::COUNT).map(move |b| (a, b)));
+        let jtj = pairs
+            .map(|(a, b)| {
+                let at = pair(a, b);
+                (sum.jtj[at], wide.jtj[at] + SUMMED * diagonal[a] * diagonal[b] + TINY)
+            })
+            .collect();
+        SumReference {
+            loss: (sum.loss, wide.loss + SUMMED * sum.loss + TINY),
+            residual: (sum.residual, wide.residual + SUMMED * sum.residual + TINY),
+            jtr,
+            jtj,
+        }
+    }
+}
+
+/// Where (a, b), a <= b, stands in the packed triangle.
+#[must_use]
+pub const fn pair(a: usize, b: usize) -> usize {
+    a * Param::COUNT - a * (a + 1) / 2 + b
+}
+
+fn one(
+    setting: &Setting,
+    (cubes, others): (&WideCubes<f64>, &[WideCubes<f64>]),
+    inputs: &FragmentInputs,
+    moves: usize,
+    rng: &mut StdRng,
+) -> FragmentReference {
+    let setup = setting.setup;
+    let evaluate =
+        |cubes: &WideCubes<f64>, inputs: &FragmentInputs, params: &Params, rng: Option<&mut StdRng>| {
+            let f = inputs.fragment(setup, 0.0_f64);
+            let mut s = shading_at(setup, &f, params);
+            if let Some(rng) = rng {
+                round_shading(&mut s, &f, (setup.silhouette, params.scalar(Param::NormalStrength)), rng);
+            }
+            let (composition, slopes) =
+                shade_with_slopes(setup, &cubes.lights(setup, params), &f, &s, params);
+            let summands: Rgba = std::array::from_fn(|c| {
+                if c == 3 { 0.0 } else { composition.each_term(c).iter().map(|(_, x)| x.abs()).sum() }
+            });
+            (rgba(&composition), slopes, summands)
+        };
+    let (value, slopes, summands) = evaluate(cubes, inputs, &setting.params, None);
+    // The key light's term is a difference of two Lambert terms, each as large as this.
+    let key = |c: usize| if c < 3 { inputs.albedo[c].abs() } else { 0.0 };
+    let mut value_tolerance: Rgba = std::array::from_fn(|c| {
+        let light = key(c) * setting.params.rgb(Param::KeyColor)[c % 3].abs();
+        SUMMED * (summands[c] + value[c].abs() + light) + TINY
+    });
+    let mut slope_tolerance: Slopes = std::array::from_fn(|p| {
+        std::array::from_fn(|c| {
+            let color = setting.params.rgb(Param::KeyColor)[c % 3].abs();
+            let parts = match Param::all().nth(p) {
+                Some(Param::KeyColor) => key(c),
+                Some(Param::KeyAzimuth | Param::KeyElevation) => key(c) * color,
+                _ => 0.0,
+            };
+            SUMMED * (2.0 * slopes[p][c].abs() + parts) + TINY
+        })
+    });
+    let contribution = Contribution::of(setting, &value, &slopes);
+    let mut contribution_tolerance = Contribution::NOTHING;
+    let (mut value_size, mut slope_size) = (value.map(f64::abs), slopes.map(|slope| slope.map(f64::abs)));
+    for number in 0..moves {
+        let (moved, params) = (moved(inputs, rng), moved_params(&setting.params, rng));
+        let cubes = &others[number % others.len()];
+        let (other, other_slopes, _) = evaluate(cubes, &moved, &params, Some(&mut *rng));
+        let widen = |tolerance: &mut f64, a: f64, b: f64| *tolerance = tolerance.max(2.0 * (a - b).abs());
+        for c in 0..4 {
+            widen(&mut value_tolerance[c], other[c], value[c]);
+            value_size[c] = value_size[c].max(other[c].abs());
+            for p in 0..Param::COUNT {
+                widen(&mut slope_tolerance[p][c], other_slopes[p][c], slopes[p][c]);
+                slope_size[p][c] = slope_size[p][c].max(other_slopes[p][c].abs());
+            }
+        }
+        let mut difference = Contribution::of(setting, &other, &other_slopes);
+        difference.combine(&contribution, |a, b| *a = 2.0 * (*a - b).abs());
+        contribution_tolerance.combine(&difference, |a, b| *a = a.max(b));
+    }
+    FragmentReference {
+        value,
+        slopes,
+        value_tolerance,
+        slope_tolerance,
+        value_size,
+        slope_size,
+        contribution,
+        contribution_tolerance,
+    }
+}
+
+/// What an f32 rounds off the shading normal and what follows from it. Only differences of their like feel
+/// it: 1 - |n.V| near 1, what is left of the bump across n, light along n less that along N.
+fn round_shading(
+    s: &mut Shading<f64>,
+    f: &Fragment<f64>,
+    (at, strength): (Silhouette, f64),
+    rng: &mut StdRng,
+) {
+    let size = |v: [f64; 3]| v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+    let mut round = |v: &mut [f64; 3], size: f64| {
+        v.iter_mut().for_each(|x| *x += RADIUS * size * step(&mut *rng));
+    };
+    let length = size(std::array::from_fn(|i| f.base[i] + strength * f.bump[i]));
+    // Beyond that the model itself cuts the derivative off.
+    let turning = (size(f.bump) / length.max(f64::MIN_POSITIVE)).min(1e6);
+    let n = size(s.n);
+    round(&mut s.n, n);
+    let reflection = size(s.reflection).max(2.0 * n);
+    round(&mut s.reflection, reflection);
+    if s.n_tangent != [0.0; 3] {
+        round(&mut s.n_tangent, turning);
+        round(&mut s.reflection_tangent, 4.0 * turning);
+    }
+    // Where it is given (not found from n) its own roundings are among the inputs'.
+    if at == Silhouette::Bumped {
+        s.silhouette = (s.silhouette + RADIUS * step(rng)).max(0.0);
+        if s.silhouette_tangent != 0.0 {
+            s.silhouette_tangent += RADIUS * turning * step(rng);
+        }
+    }
+}
+
+fn moved(inputs: &FragmentInputs, rng: &mut StdRng) -> FragmentInputs {
+    let mut moved = *inputs;
+    for vector in
+        [&mut moved.texel, &mut moved.tangent, &mut moved.bitangent, &mut moved.normal, &mut moved.view]
+    {
+        let size = vector.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
+        // A vector of nothing but zeros stays: every evaluator sees that.
+        if size > 0.0 && size.is_finite() {
+            vector.iter_mut().for_each(|x| *x += (RADIUS * size + FLUSHED) * step(rng));
+        }
+    }
+    let FragmentInputs { occlusion, silhouette, dapple, albedo, specular, attenuator, .. } = &mut moved;
+    for x in [occlusion, silhouette, dapple, specular, attenuator].into_iter().chain(albedo) {
+        *x += RADIUS * *x * step(rng);
+    }
+    moved
+}
+
+/// The parameters that evaluators round to f32; angles they turn into sines and cosines in f64.
+fn moved_params(params: &Params, rng: &mut StdRng) -> Params {
+    let mut moved = *params;
+    for param in Param::all() {
+        let fixed = [Param::SpecularLobe, Param::EnvironmentRotation, Param::KeyAzimuth, Param::KeyElevation];
+        if !fixed.contains(&param) {
+            let factor = 1.0 + RADIUS * step(rng);
+            moved.set_rgb(param, params.rgb(param).map(|x| x * factor));
+        }
+    }
+    moved
+}
+
+/// -1, 0 or 1: on the edge of what is allowed, more is moved than inside.
+fn step(rng: &mut StdRng) -> f64 {
+    f64::from(rng.random_range(-1_i32..=1))
+}

@@ -1,0 +1,237 @@
+//! What a study of stability found: for people, and as JSON.
+
+use std::fmt::Write as _;
+
+use serde::Serialize;
+
+use super::check::Verdict;
+use super::search::{Found, Tally};
+
+/// One case on every evaluator.
+#[derive(Clone, Debug)]
+pub struct CaseRow {
+    /// Its name; cases of one name are told as one.
+    pub name: String,
+    /// What is hard about it.
+    pub hard: String,
+    /// How each evaluator did; `None` where it has no such stage.
+    pub verdicts: Vec<Option<Verdict>>,
+}
+
+/// What a study found.
+#[derive(Clone, Debug, Default)]
+pub struct Report {
+    /// The evaluators' names.
+    pub evaluators: Vec<String>,
+    /// Hard cases and kept ones.
+    pub rows: Vec<CaseRow>,
+    /// For each evaluator, how many hard cases it was given.
+    pub hard: Vec<usize>,
+    /// For each evaluator, the random search.
+    pub random: Vec<Tally>,
+    /// For each evaluator, the scene's samples.
+    pub swept: Vec<Tally>,
+    /// New hard cases.
+    pub found: Vec<Found>,
+    /// What the search was drawn from.
+    pub seed: u64,
+    /// What is missing, loudly.
+    pub missing: Vec<String>,
+}
+
+impl Report {
+    /// Nothing yet, of these evaluators.
+    #[must_use]
+    pub fn new(evaluators: Vec<String>, seed: u64) -> Self {
+        let count = evaluators.len();
+        let tallies = vec![Tally::default(); count];
+        Self {
+            evaluators,
+            hard: vec![0; count],
+            random: tallies.clone(),
+            swept: tallies,
+            seed,
+            ..Self::default()
+        }
+    }
+
+    /// Take note of a case; those of one name become one row.
+    pub fn add(&mut self, name: &str, hard: &str, verdicts: Vec<Option<Verdict>>) {
+        for (count, verdict) in self.hard.iter_mut().zip(&verdicts) {
+            *count += usize::from(verdict.is_some());
+        }
+        match self.rows.iter_mut().find(|row| row.name == name) {
+            None => self.rows.push(CaseRow { name: name.to_owned(), hard: hard.to_owned(), verdicts }),
+            Some(row) => {
+                for (old, new) in row.verdicts.iter_mut().zip(verdicts) {
+                    match (old, new) {
+                        (Some(old), Some(new)) => old.merge(new),
+                        (old, new) => *old = old.take().or(new),
+                    }
+                }
+            }
+        }
+    }
+
+    /// Everything that is not finite or out of tolerance, a line each.
+    #[must_use]
+    pub fn failures(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        for row in &self.rows {
+            for (verdict, evaluator) in row.verdicts.iter().zip(&self.evaluators) {
+                if let Some(failure) = verdict.as_ref().and_then(|v| v.failure.as_ref()) {
+                    lines.push(format!("{}: {evaluator}: {failure}", row.name));
+                }
+            }
+        }
+        for (what, tallies) in [("random search", &self.random), ("scene", &self.swept)] {
+            for (tally, evaluator) in tallies.iter().zip(&self.evaluators) {
+                if let Some(failure) = &tally.worst.failure {
+                    let Tally { failed, tried, .. } = tally;
+                    lines.push(format!("{what}: {evaluator}: {failed} of {tried} failed: {failure}"));
+                }
+            }
+        }
+        lines
+    }
+
+    /// The tables for a terminal: a row a case, a column an evaluator.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let width = self.rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max(24);
+        let _ = writeln!(
+            text,
+            "Worst deviation from the model in f64, as a share of the number (and of what rounding explains):\n"
+        );
+        let columns: Vec<usize> = self.evaluators.iter().map(|name| name.len().max(14)).collect();
+        let _ = write!(text, "{:<width$}", "");
+        for (name, column) in self.evaluators.iter().zip(&columns) {
+            let _ = write!(text, "  {name:>column$}");
+        }
+        text.push('\n');
+        let mut row = |name: &str, cells: Vec<String>| {
+            let _ = write!(text, "{name:<width$}");
+            for (cell, column) in cells.iter().zip(&columns) {
+                let _ = write!(text, "  {cell:>column$}");
+            }
+            text.push('\n');
+        };
+        for case in &self.rows {
+            row(&case.name, case.verdicts.iter().map(|v| v.as_ref().map_or("-".into(), cell)).collect());
+        }
+        for (name, tallies) in [("random search", &self.random), ("the scene's samples", &self.swept)] {
+            let cell = |tally: &Tally| if tally.tried == 0 { "-".to_owned() } else { cell(&tally.worst) };
+            row(name, tallies.iter().map(cell).collect());
+        }
+        text.push('\n');
+        for (index, name) in self.evaluators.iter().enumerate() {
+            let (random, swept) = (&self.random[index], &self.swept[index]);
+            let _ = writeln!(
+                text,
+                "{name}: {} hard cases, {} random ones, {} samples of the scene; {} failed",
+                self.hard[index],
+                random.tried,
+                swept.tried,
+                self.failed(index)
+            );
+        }
+        text
+    }
+
+    /// How many cases an evaluator failed.
+    fn failed(&self, index: usize) -> usize {
+        let failed = |row: &&CaseRow| row.verdicts[index].as_ref().is_some_and(|v| v.failure.is_some());
+        self.rows.iter().filter(failed).count() + self.random[index].failed + self.swept[index].failed
+    }
+
+    /// Everything as JSON.
+    ///
+    /// # Errors
+    /// Never: the structures are plain.
+    pub fn json(&self) -> serde_json::Result<String> {
+        let number = |verdict: &Verdict| OutVerdict {
+            deviation: verdict.deviation,
+            share_of_tolerance: verdict.share,
+            failure: verdict.failure.clone(),
+        };
+        let tally = |tally: &Tally| OutTally {
+            tried: tally.tried,
+            failed: tally.failed,
+            worst: number(&tally.worst),
+        };
+        let engines = self.evaluators.iter().enumerate().map(|(i, name)| OutEngine {
+            name,
+            hard: self.hard[i],
+            random: tally(&self.random[i]),
+            scene: tally(&self.swept[i]),
+            cases: self
+                .rows
+                .iter()
+                .filter_map(|row| {
+                    let verdict = number(row.verdicts[i].as_ref()?);
+                    Some(OutCase { name: &row.name, hard: &row.hard, verdict })
+                })
+                .collect(),
+        });
+        let out = Out {
+            version: env!("CARGO_PKG_VERSION"),
+            seed: self.seed,
+            failed: self.failures().len(),
+            new_cases: self.found.len(),
+            missing: &self.missing,
+            engines: engines.collect(),
+        };
+        serde_json::to_string_pretty(&out).map(|text| text + "\n")
+    }
+}
+
+/// A deviation, its share of the tolerance, and that it failed.
+fn cell(verdict: &Verdict) -> String {
+    match &verdict.failure {
+        Some(_) => "FAILED".to_owned(),
+        None if verdict.deviation == 0.0 => "0".to_owned(),
+        None => format!("{:.1e} ({:.0}%)", verdict.deviation, 100.0 * verdict.share),
+    }
+}
+
+#[derive(Serialize)]
+struct Out<'a> {
+    version: &'a str,
+    seed: u64,
+    failed: usize,
+    new_cases: usize,
+    missing: &'a [String],
+    engines: Vec<OutEngine<'a>>,
+}
+
+#[derive(Serialize)]
+struct OutEngine<'a> {
+    name: &'a str,
+    hard: usize,
+    random: OutTally,
+    scene: OutTally,
+    cases: Vec<OutCase<'a>>,
+}
+
+#[derive(Serialize)]
+struct OutTally {
+    tried: usize,
+    failed: usize,
+    worst: OutVerdict,
+}
+
+#[derive(Serialize)]
+struct OutVerdict {
+    deviation: f64,
+    share_of_tolerance: f64,
+    failure: Option<String>,
+}
+
+#[derive(Serialize)]
+struct OutCase<'a> {
+    name: &'a str,
+    hard: &'a str,
+    #[serde(flatten)]
+    verdict: OutVerdict,
+}

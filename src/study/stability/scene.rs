@@ -1,0 +1,83 @@
+//! A scene's own samples through every evaluator: parameters at each bound, effects one by one.
+
+use super::case::{Batch, FragmentInputs, Setting};
+use super::lights::LightKind;
+use crate::model::effects::{Effect, Effects, Form};
+use crate::model::fragment::Fragment;
+use crate::model::params::Param;
+use crate::prepare::Prepared;
+use crate::samples::{LANES, ViewSamples};
+
+/// Fragments that are taken of a view.
+const OF_A_VIEW: usize = 128;
+/// Where a parameter has no bound.
+const FAR: f64 = 1e3;
+
+/// Every setting that a scene is swept through, on a share of its samples.
+#[must_use]
+pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
+    let fragments: Vec<FragmentInputs> =
+        prepared.samples.iter().flat_map(|view| fragments(view, prepared.scene.form)).collect();
+    let setup = crate::model::evaluate::Setup { effects, ..prepared.setup() };
+    let loss = prepared.scene.fit.loss;
+    let own = Setting { setup, params: prepared.scene.params, lights: LightKind::Scene, loss };
+    let mut settings = vec![own];
+    for end in [0, 1] {
+        // One parameter at its bound, and then all of them.
+        let mut all = own;
+        for param in Param::all().filter(|&param| param != Param::SpecularLobe) {
+            let info = param.info();
+            let bound = [info.lower.max(-FAR), info.upper.min(FAR)][end];
+            all.params.set(param, bound);
+            let mut one = own;
+            one.params.set(param, bound);
+            settings.push(one);
+        }
+        settings.push(all);
+    }
+    for effect in effects.iter() {
+        for effects in [Effects::of(&[effect]), effects.without(effect)] {
+            settings.push(Setting { setup: crate::model::evaluate::Setup { effects, ..setup }, ..own });
+        }
+    }
+    settings.into_iter().map(|setting| Batch { setting, fragments: fragments.clone() }).collect()
+}
+
+/// Samples of a view, evenly drawn.
+fn fragments(view: &ViewSamples, form: Form) -> Vec<FragmentInputs> {
+    let slots = 0..view.records() * LANES;
+    let samples: Vec<usize> = slots.filter(|&slot| view.surface.weight(slot) > 0.0).collect();
+    let step = samples.len().div_ceil(OF_A_VIEW).max(1);
+    samples.into_iter().step_by(step).map(|slot| fragment(&view.surface.fragment(slot), form)).collect()
+}
+
+/// A stored sample as a rasteriser would give it: base for N and bump for T, under a texel that takes both as
+/// they are.
+fn fragment(f: &Fragment<f32>, form: Form) -> FragmentInputs {
+    let wide = |v: [f32; 3]| v.map(f64::from);
+    FragmentInputs {
+        texel: match form {
+            Form::Corrected => [1.0, 0.5, 1.0],
+            Form::Listing => [1.0, 0.0, 1.0],
+        },
+        tangent: wide(f.bump),
+        bitangent: [0.0; 3],
+        normal: wide(f.base),
+        view: wide(f.view),
+        occlusion: f64::from(f.occlusion),
+        silhouette: f64::from(f.silhouette),
+        dapple: f64::from(f.dapple),
+        albedo: wide(f.albedo),
+        specular: f64::from(f.specular),
+        attenuator: f64::from(f.attenuator),
+    }
+}
+
+/// The effects that a scene can be swept with: all that shade where it has an environment, else its own.
+#[must_use]
+pub fn sweepable(own: Effects, environment: bool) -> Effects {
+    let shading =
+        Effect::ALL.into_iter().filter(|e| !matches!(e, Effect::Bloom | Effect::Morph | Effect::Skin));
+    let deforming = [Effect::Morph, Effect::Skin].into_iter().filter(|&effect| own.has(effect));
+    if environment { shading.chain(deforming).collect() } else { own }
+}

@@ -1,0 +1,152 @@
+//! A broken evaluator is told, and the same seed finds the same.
+
+use super::case::{FragmentInputs, VertexInputs};
+use super::evaluate::{Answer, Frame};
+use super::hard::cases;
+use super::*;
+
+fn study(seed: u64, cases: usize) -> Study {
+    Study { lights: LightBox::new(None), kept: Vec::new(), swept: Vec::new(), seed, cases, pixels: 10_000 }
+}
+
+/// The model in f32 with one of its guards taken out.
+struct Broken(fn(&FragmentInputs, &mut [f64; 4], &mut evaluate::Slopes));
+
+impl Evaluator for Broken {
+    fn name(&self) -> String {
+        "broken".to_owned()
+    }
+    fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
+        let mut answer = Plain::<f32>::new().fragments(lights, batch)?;
+        let (values, slopes) = (answer.values.iter_mut().flatten(), answer.slopes.iter_mut().flatten());
+        for ((inputs, value), slopes) in batch.fragments.iter().zip(values).zip(slopes) {
+            (self.0)(inputs, value, slopes);
+        }
+        Ok(answer)
+    }
+    fn frames(&self, vertices: &[VertexInputs]) -> Result<Option<Vec<Frame>>, String> {
+        Plain::<f32>::new().frames(vertices)
+    }
+}
+
+#[test]
+fn sound_evaluators_pass_every_case() {
+    let report = study(1, 600).run(&evaluators(), &mut |_| {});
+    assert!(report.failures().is_empty(), "{:#?}\n{:#?}", report.failures(), report.found);
+    assert!(report.hard.iter().all(|&count| count > 100), "{:?}", report.hard);
+    assert!(report.random.iter().all(|tally| tally.tried == 600));
+    // f32 is not f64: a deviation of exactly 0 would mean that nothing was compared.
+    assert!(report.random[1].worst.deviation > 0.0 && report.random[2].worst.deviation > 0.0);
+}
+
+#[test]
+fn every_guard_that_is_taken_out_turns_the_study_red() {
+    // 0 / 0 where a normal is normalised unguarded; 0 times minus infinity where the logarithm of 0 is taken;
+    // a view of no length; a derivative that overflows; a colour off by a thousandth.
+    let guards: [(Broken, &[&str]); 5] = [
+        (
+            Broken(|f, value, _| {
+                if f.texel == [0.5; 3] {
+                    *value = [f64::NAN; 4];
+                }
+            }),
+            &["texel that decodes to nothing", "random search"],
+        ),
+        (
+            Broken(|f, _, slopes| {
+                if f.silhouette == 0.0 {
+                    slopes[crate::model::params::Param::RimExponent as usize] = [f64::NAN; 4];
+                }
+            }),
+            &["facing", "random search"],
+        ),
+        (
+            Broken(|f, value, _| {
+                if f.view == [0.0; 3] {
+                    value[1] = f64::INFINITY;
+                }
+            }),
+            &["eye on the surface", "random search"],
+        ),
+        (
+            Broken(|f, _, slopes| {
+                if f.normal.iter().all(|x| x.abs() < 1e-19) {
+                    slopes[crate::model::params::Param::NormalStrength as usize][2] = f64::INFINITY;
+                }
+            }),
+            &["nearly no tangent frame", "random search"],
+        ),
+        (Broken(|_, value, _| value[0] += 1e-3 * value[0].abs()), &["grazing", "random search"]),
+    ];
+    for (broken, where_told) in guards {
+        let report = study(2, 512).run(&[Box::new(broken)], &mut |_| {});
+        let failures = report.failures().join("\n");
+        for place in where_told {
+            assert!(failures.contains(place), "{place} is not told:\n{failures}");
+        }
+        assert!(!report.found.is_empty() && report.text().contains("FAILED"));
+    }
+}
+
+#[test]
+fn a_failing_case_is_made_simple_and_stays_failing_when_it_is_read_back() {
+    let broken = || -> Vec<Box<dyn Evaluator>> {
+        vec![Box::new(Broken(|f, value, _| {
+            if f.attenuator == 1.0 {
+                value[3] = f64::NAN;
+            }
+        }))]
+    };
+    let report = study(3, 256).run(&broken(), &mut |_| {});
+    let found = report.found.first().expect("a case");
+    let [fragment] = &found.batch.fragments[..] else { panic!("not simple: {found:?}") };
+    // All but the number that it needs is ordinary.
+    assert_eq!(*fragment, FragmentInputs { attenuator: 1.0, ..FragmentInputs::ORDINARY });
+    let text = kept::to_toml(&report.found).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("new_cases.toml");
+    std::fs::write(&path, text).unwrap();
+    let kept = kept::read(&path).unwrap();
+    assert!(hard::cases().iter().all(|case| case.batch.fragments.iter().all(|f| f.attenuator != 1.0)));
+    let replayed = Study { kept, ..study(3, 0) }.run(&broken(), &mut |_| {});
+    assert!(replayed.failures().iter().any(|line| line.starts_with("kept: found 1: broken: alpha is NaN")));
+    let sound = Study { kept: kept::read(&path).unwrap(), ..study(3, 0) }.run(&evaluators(), &mut |_| {});
+    assert!(sound.failures().is_empty(), "{:#?}", sound.failures());
+}
+
+#[test]
+fn the_same_seed_finds_the_same_and_another_one_something_else() {
+    let report = |seed| study(seed, 300).run(&evaluators(), &mut |_| {}).json().unwrap();
+    assert_eq!(report(5), report(5));
+    assert_ne!(report(5), report(6));
+}
+
+#[test]
+fn every_row_of_the_models_table_of_hard_cases_has_a_case() {
+    let mut names: Vec<&str> = cases().iter().map(|case| case.name).collect();
+    names.extend(hard::frames().iter().map(|frame| frame.name));
+    names.extend(DEMANDS.iter().map(|demand| demand.name));
+    for name in [
+        "facing",
+        "grazing",
+        "seen edge-on",
+        "texel that decodes to nothing",
+        "no tangent frame",
+        "vertex without N and T",
+        "65504 beside 0",
+        "texel that is not finite",
+        "edge of a cube",
+        "corner of a cube",
+        "nothing open",
+        "nothing open under a key light",
+        "target clipped at white",
+        "target clipped at black",
+        "parameter without a pixel",
+        "empty mask",
+        "all-zero target",
+        "one pixel",
+        "many pixels",
+    ] {
+        assert!(names.contains(&name), "{name}");
+    }
+}

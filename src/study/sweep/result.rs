@@ -1,0 +1,80 @@
+//! The one file that a job leaves: its settings, its figures, or why it failed.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::plan::Job;
+use crate::output::{self, OutputError};
+
+/// What a job found, by name.
+pub type Figures = BTreeMap<String, Value>;
+
+/// How a job ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// It has figures.
+    Done,
+    /// It has none, for this reason.
+    Failed(String),
+}
+
+/// The content of a result file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct JobResult {
+    /// The job's number.
+    pub job: usize,
+    /// Its identity.
+    pub identity: String,
+    /// What ran.
+    pub command: String,
+    /// How it ended.
+    pub status: Status,
+    /// Its settings.
+    pub settings: BTreeMap<String, Value>,
+    /// What it found.
+    pub figures: Figures,
+    /// How long it took; no figure, as it is another one each time.
+    pub seconds: f64,
+}
+
+impl JobResult {
+    /// The result file of a job in the plan's folder of results.
+    #[must_use]
+    pub fn path(results: &Path, identity: &str) -> PathBuf {
+        results.join(format!("job-{identity}.json"))
+    }
+
+    /// Read a result file; `None` when there is none, or it is damaged.
+    #[must_use]
+    pub fn read(path: &Path) -> Option<Self> {
+        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+    }
+
+    /// Write it, whole or not at all.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn write(&self, results: &Path) -> Result<(), OutputError> {
+        let path = Self::path(results, &self.identity);
+        let text = serde_json::to_string_pretty(self).map_err(|error| OutputError::new(&path, &error))?;
+        output::write(&path, (text + "\n").as_bytes())
+    }
+
+    /// Whether there is nothing left to do.
+    #[must_use]
+    pub fn done(&self) -> bool {
+        self.status == Status::Done
+    }
+}
+
+/// A job's settings as a result holds them.
+#[must_use]
+pub fn settings(job: &Job) -> BTreeMap<String, Value> {
+    let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
+    job.settings.iter().map(|(key, setting)| (key.clone(), value(setting))).collect()
+}
