@@ -16,7 +16,7 @@ const BUILD: &str = "cargo build --release --features burn";
 pub(super) struct MapArguments {
     /// Besides the constants, fit every texel of these maps (comma-separated): color, specular, attenuator,
     /// occlusion (every vertex), environment (every texel of the cubes). The scene's [fit.maps] says how.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = ["color", "specular", "attenuator", "occlusion", "environment"])]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = ["color", "specular", "attenuator", "occlusion", "environment"], conflicts_with = "resume")]
     maps: Vec<String>,
     /// Leave a view out of the fit of maps, and tell how well it is met all the same.
     #[arg(long, value_name = "VIEW", requires = "maps")]
@@ -101,10 +101,10 @@ mod burn {
     use super::super::fit::compared;
     use super::*;
     use crate::gpu::Choice;
+    use crate::maps::fit::columns_beside;
     use crate::maps::pictures::{change, picture};
     use crate::maps::problem::read;
     use crate::maps::{FittedMaps, Grid, Layer, MapTask, fit_maps};
-    use crate::maps::fit::columns_beside;
     use crate::output;
     use crate::progress;
     use crate::render::files::{ImageOptions, write_exr, write_png, write_png_bytes};

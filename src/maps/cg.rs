@@ -66,7 +66,12 @@ fn free(x: &Tensor<2>, g: &Tensor<2>, lower: f32, upper: f32) -> Tensor<2> {
 }
 
 /// 1 / (H 1 + the diagonal of the smoothness), where that is positive.
-fn inverse_diagonal(problem: &Problem, index: usize, x: &Tensor<2>, g: &Tensor<2>) -> Result<Tensor<2>, MapError> {
+fn inverse_diagonal(
+    problem: &Problem,
+    index: usize,
+    x: &Tensor<2>,
+    g: &Tensor<2>,
+) -> Result<Tensor<2>, MapError> {
     let layer = &problem.layers[index];
     let (_, moved) = problem.slope(index, &(x.clone() + 1.0))?;
     // A texel and its neighbours: 2 on the diagonal for each, 2 again for the rows beside it.

@@ -7,8 +7,8 @@ use burn::tensor::{Tensor, TensorData};
 use super::layer::{Grid, Layer, LayerParts};
 use super::problem::{Observed, Problem, read};
 use super::{MapError, adam, cg};
-use crate::bake::rays::RayMesh;
 use crate::bake::LobeStack;
+use crate::bake::rays::RayMesh;
 use crate::engine::cpu::{CpuEngine, Illumination};
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
@@ -136,7 +136,15 @@ pub fn fit_maps(
             step(problem.layers[index].name, losses);
         }
         take_back(&problem, &mut observed, &mut illumination, &constants)?;
-        let (next, losses) = solve_constants(&task.unknowns, setup, &illumination, &observed, task.held_out, &constants, settings.loss)?;
+        let (next, losses) = solve_constants(
+            &task.unknowns,
+            setup,
+            &illumination,
+            &observed,
+            task.held_out,
+            &constants,
+            settings.loss,
+        )?;
         constants = next;
         problem.inputs.columns = column_tensor(shared, &columns, &constants);
         step("constants", losses);
@@ -164,14 +172,16 @@ fn seen<'a>(observed: &'a [ObservedView], constants: &Point, held_out: Option<us
 }
 
 /// The layers of a task.
-fn layers(shared: &SharedDevice, task: &MapTask<'_>, shade: &Shade, lobe: f64) -> Result<Vec<Layer>, MapError> {
+fn layers(
+    shared: &SharedDevice,
+    task: &MapTask<'_>,
+    shade: &Shade,
+    lobe: f64,
+) -> Result<Vec<Layer>, MapError> {
     let scene = task.scene;
     let rays = RayMesh::new(&task.posed.positions, &task.posed.triangles);
-    let hits: Vec<Hit> = scene
-        .views
-        .iter()
-        .flat_map(|view| sample_hits(scene, task.posed, &rays, &view.camera))
-        .collect();
+    let hits: Vec<Hit> =
+        scene.views.iter().flat_map(|view| sample_hits(scene, task.posed, &rays, &view.camera)).collect();
     let mut layers = Vec::new();
     for &kind in &task.kinds {
         let parts = parts(task, kind, &hits, lobe);

@@ -34,7 +34,9 @@ pub enum MapError {
     #[error(transparent)]
     Constants(#[from] FitError),
     /// A map that no enabled effect reads.
-    #[error("no enabled effect reads {map}: it cannot be fitted. Leave it out of --maps, or enable {effects}.")]
+    #[error(
+        "no enabled effect reads {map}: it cannot be fitted. Leave it out of --maps, or enable {effects}."
+    )]
     Unread {
         /// The map's name.
         map: &'static str,

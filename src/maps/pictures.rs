@@ -26,7 +26,12 @@ pub fn picture(grid: Grid, numbers: &[f32], channels: usize, mesh: &PosedMesh) -
             let (width, height) = (6 * size, size);
             let texel = |i: usize| (i % width / size * size + i / width) * size + i % size;
             let texels = width * height;
-            Image { width, height, rgb: (0..texels).map(|i| colour(texel(i))).collect(), alpha: vec![1.0; texels] }
+            Image {
+                width,
+                height,
+                rgb: (0..texels).map(|i| colour(texel(i))).collect(),
+                alpha: vec![1.0; texels],
+            }
         }
         Grid::Vertices(_) => unwrapped(numbers, mesh),
     }
@@ -53,7 +58,8 @@ fn unwrapped(numbers: &[f32], mesh: &PosedMesh) -> Image {
                 let weights = [(c - b).perp_dot(p - b), (a - c).perp_dot(p - c), (b - a).perp_dot(p - a)];
                 let weights = weights.map(|w| w / area);
                 if weights.iter().all(|&w| w >= 0.0) {
-                    let value: f32 = weights.iter().zip(triangle).map(|(w, &i)| w * numbers[i as usize]).sum();
+                    let value: f32 =
+                        weights.iter().zip(triangle).map(|(w, &i)| w * numbers[i as usize]).sum();
                     image.rgb[y * UNWRAPPED + x] = [value; 3];
                     image.alpha[y * UNWRAPPED + x] = 1.0;
                 }

@@ -68,7 +68,12 @@ impl Problem {
     ///
     /// # Errors
     /// When the device does not take it.
-    pub fn reweight(&mut self, shared: &SharedDevice, views: &[Observed<'_>], loss: Loss) -> Result<(), TensorError> {
+    pub fn reweight(
+        &mut self,
+        shared: &SharedDevice,
+        views: &[Observed<'_>],
+        loss: Loss,
+    ) -> Result<(), TensorError> {
         let image = read(self.shade.image(self.inputs.clone())?)?;
         let (mut gains, mut targets, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let mut total = 0.0;
@@ -94,7 +99,8 @@ impl Problem {
                 gains.push(*gain as f32);
             }
         }
-        let weights: Vec<f32> = weights.into_iter().map(|w| (w / total.max(f64::MIN_POSITIVE)) as f32).collect();
+        let weights: Vec<f32> =
+            weights.into_iter().map(|w| (w / total.max(f64::MIN_POSITIVE)) as f32).collect();
         let slots = gains.len();
         let matrix = |numbers: Vec<f32>, columns: usize| {
             Tensor::<2>::from_data(TensorData::new(numbers, [slots, columns]), shared.device())
@@ -114,7 +120,8 @@ impl Problem {
         layer.show(texels.clone(), &mut inputs)?;
         let image = self.shade.image(inputs)?;
         let residual = image * self.gain.clone().autodiff() - self.target.clone().autodiff();
-        let loss = (residual.square() * self.weight.clone().autodiff()).sum() + layer.penalty(texels.clone())?;
+        let loss =
+            (residual.square() * self.weight.clone().autodiff()).sum() + layer.penalty(texels.clone())?;
         let value = f64::from(read(loss.clone().inner())?[0]);
         let gradients = loss.backward();
         match texels.grad(&gradients) {

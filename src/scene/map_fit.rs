@@ -110,7 +110,7 @@ impl MapSettings {
 
 impl Default for MapSettings {
     fn default() -> Self {
-        let share = MapPrior { smoothness: 1e-2, closeness: 1e-4, lower: 0.0, upper: 1.0 };
+        let share = MapPrior { smoothness: 0.1, closeness: 1e-3, lower: 0.0, upper: 1.0 };
         // Radiance up to the largest number of 16 bits, as the renderer stores it.
         let light = MapPrior { upper: 65504.0, ..share };
         let priors = [share, share, share, share, light];

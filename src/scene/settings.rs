@@ -207,10 +207,12 @@ pub(super) fn whole(
     default: u32,
 ) -> Result<u32, SceneError> {
     let Some(number) = value else { return Ok(default) };
-    u32::try_from(*number.get_ref()).ok().filter(|&n| (least..=most).contains(&i64::from(n))).ok_or_else(|| {
-        let what = format!("{name} = {} is out of bounds", number.get_ref());
-        source.error(number, what, format!("Give a whole number in [{least}, {most}]"))
-    })
+    u32::try_from(*number.get_ref()).ok().filter(|&n| (least..=most).contains(&i64::from(n))).ok_or_else(
+        || {
+            let what = format!("{name} = {} is out of bounds", number.get_ref());
+            source.error(number, what, format!("Give a whole number in [{least}, {most}]"))
+        },
+    )
 }
 
 /// A number that must be finite and satisfy `test`, or `default` when it is not given.

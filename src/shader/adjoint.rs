@@ -203,10 +203,9 @@ impl Adjoint {
         };
         let mut plan = plan(&facts)?;
         if plan.constants.contains(&Constant::KeyDirection) {
-            for (param, slope) in [
-                (Param::KeyAzimuth, Constant::KeyByAzimuth),
-                (Param::KeyElevation, Constant::KeyByElevation),
-            ] {
+            for (param, slope) in
+                [(Param::KeyAzimuth, Constant::KeyByAzimuth), (Param::KeyElevation, Constant::KeyByElevation)]
+            {
                 if free(param) {
                     plan.constants.push(slope);
                 }
@@ -229,7 +228,10 @@ impl Adjoint {
     #[must_use]
     pub fn fixed(&self) -> Vec<(&'static str, usize)> {
         let fields = sample_fields(&self.plan.facts).into_iter();
-        fields.filter(|(name, _)| Input::of_field(name).is_none()).map(|(name, kind)| (name, components(kind))).collect()
+        fields
+            .filter(|(name, _)| Input::of_field(name).is_none())
+            .map(|(name, kind)| (name, components(kind)))
+            .collect()
     }
 
     /// The lookups of a cube that the plan does.
@@ -324,7 +326,8 @@ impl Adjoint {
         match input {
             Input::Columns => {
                 let columns = || self.columns.iter().enumerate();
-                let first = |k: usize| columns().position(|(_, c)| c.param == self.columns[k].param) == Some(k);
+                let first =
+                    |k: usize| columns().position(|(_, c)| c.param == self.columns[k].param) == Some(k);
                 let of = |param: Param| {
                     columns().filter(move |(_, c)| c.param == param).map(|(k, _)| Gain::Column(k)).collect()
                 };
@@ -378,7 +381,9 @@ impl Adjoint {
                     writeln!(wgsl, "        light{index}_adjoint[4u * s + {c}u] = gained_light{index}[{c}];")
                 });
                 let place = LOOKUPS[index].place;
-                (0..3).try_for_each(|c| writeln!(wgsl, "        light{index}_place[3u * s + {c}u] = {place}[{c}];"))
+                (0..3).try_for_each(|c| {
+                    writeln!(wgsl, "        light{index}_place[3u * s + {c}u] = {place}[{c}];")
+                })
             }
         };
     }

@@ -92,11 +92,11 @@ pub fn lend(
     };
     let buffer = |(what, tensor)| TensorBuffer::of(gpu, what, tensor);
     let lent = inputs.into_iter().map(local).map(buffer).collect::<Result<Vec<_>, _>>()?;
-    let made = outputs.iter().map(|shape| buffer(("the result", room(shape)))).collect::<Result<Vec<_>, _>>()?;
-    client.flush().map_err(|error| TensorError::Gpu(GpuError::Refused {
-        adapter: gpu.name().to_owned(),
-        reason: error.to_string(),
-    }))?;
+    let made =
+        outputs.iter().map(|shape| buffer(("the result", room(shape)))).collect::<Result<Vec<_>, _>>()?;
+    client.flush().map_err(|error| {
+        TensorError::Gpu(GpuError::Refused { adapter: gpu.name().to_owned(), reason: error.to_string() })
+    })?;
     Ok((lent, made))
 }
 
@@ -110,7 +110,10 @@ pub fn buffer_of<const D: usize>(gpu: &Gpu, tensor: Tensor<D>) -> Result<TensorB
 }
 
 /// A tensor's primitive, cut from its graph.
-pub(super) fn plain<const D: usize>(what: &'static str, tensor: Tensor<D>) -> Result<CubeTensor, TensorError> {
+pub(super) fn plain<const D: usize>(
+    what: &'static str,
+    tensor: Tensor<D>,
+) -> Result<CubeTensor, TensorError> {
     let primitive = tensor.without_autodiff().try_into_primitive::<CubeBackend>();
     primitive.map_err(|error| TensorError::Foreign { what, reason: format!("{error:?}") })
 }
@@ -125,7 +128,11 @@ pub(super) fn tracked<const D: usize>(
 }
 
 /// That the tensor has this shape.
-pub(super) fn check_shape(what: &'static str, tensor: &CubeTensor, wanted: &[usize]) -> Result<(), TensorError> {
+pub(super) fn check_shape(
+    what: &'static str,
+    tensor: &CubeTensor,
+    wanted: &[usize],
+) -> Result<(), TensorError> {
     let found: Vec<usize> = tensor.shape().iter().copied().collect();
     if found == wanted { Ok(()) } else { Err(TensorError::Shape { what, found, wanted: wanted.to_vec() }) }
 }

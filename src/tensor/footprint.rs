@@ -36,7 +36,11 @@ pub fn texels(width: usize, height: usize, uvs: impl IntoIterator<Item = Vec2>) 
 
 /// From numbers of each vertex to those interpolated at points of the mesh.
 #[must_use]
-pub fn vertices<'h>(count: usize, triangles: &[[u32; 3]], hits: impl IntoIterator<Item = &'h Hit>) -> Entries {
+pub fn vertices<'h>(
+    count: usize,
+    triangles: &[[u32; 3]],
+    hits: impl IntoIterator<Item = &'h Hit>,
+) -> Entries {
     let mut entries = Entries::new(count);
     for hit in hits {
         entries.push_row(triangles[hit.triangle as usize].into_iter().zip(hit.weights()));
@@ -87,7 +91,12 @@ pub fn cube_pairs(size: usize) -> Vec<[u32; 2]> {
         for row in 1..=size {
             for column in 1..=size {
                 let here = at(face, row, column);
-                let near = [at(face, row, column + 1), at(face, row + 1, column), at(face, row, column - 1), at(face, row - 1, column)];
+                let near = [
+                    at(face, row, column + 1),
+                    at(face, row + 1, column),
+                    at(face, row, column - 1),
+                    at(face, row - 1, column),
+                ];
                 pairs.extend(near.into_iter().filter_map(|near| Some([here?.min(near?), here?.max(near?)])));
             }
         }

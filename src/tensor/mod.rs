@@ -47,7 +47,9 @@ pub enum TensorError {
         reason: String,
     },
     /// A tensor of another device, backend or kind.
-    #[error("{what}: the tensor is not one of 32-bit floats on the shared device: {reason}. Make it on SharedDevice::device().")]
+    #[error(
+        "{what}: the tensor is not one of 32-bit floats on the shared device: {reason}. Make it on SharedDevice::device()."
+    )]
     Foreign {
         /// Which tensor.
         what: &'static str,

@@ -1,8 +1,9 @@
 //! One compute pass of ours on the shared queue.
 
 use wgpu::{
-    BindGroupDescriptor, BindGroupEntry, BindingResource, CommandEncoder, ComputePassDescriptor, ComputePipeline,
-    ComputePipelineDescriptor, PipelineCompilationOptions, ShaderModule, ShaderModuleDescriptor, ShaderSource,
+    BindGroupDescriptor, BindGroupEntry, BindingResource, CommandEncoder, ComputePassDescriptor,
+    ComputePipeline, ComputePipelineDescriptor, PipelineCompilationOptions, ShaderModule,
+    ShaderModuleDescriptor, ShaderSource,
 };
 
 use crate::gpu::{Gpu, GpuError};

@@ -50,7 +50,8 @@ impl Scattering {
         let threads = samples as u64;
         if self.way == Scatter::Exact {
             for [adjoint, _] in lights {
-                let resources = vec![size(), (1, adjoint.as_entire_binding()), (3, largest.as_entire_binding())];
+                let resources =
+                    vec![size(), (1, adjoint.as_entire_binding()), (3, largest.as_entire_binding())];
                 pass::dispatch(gpu, encoder, &self.largest, &[resources], threads);
             }
         }

@@ -62,7 +62,8 @@ impl Shade {
     ) -> Result<(Self, Inputs), TensorError> {
         let lobe = shaded.params.scalar(Param::SpecularLobe);
         let specular = shaded.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
-        let cubes = [shaded.illumination.irradiance.as_ref(), specular.as_ref(), shaded.illumination.hilite.as_ref()];
+        let cubes =
+            [shaded.illumination.irradiance.as_ref(), specular.as_ref(), shaded.illumination.hilite.as_ref()];
         let stage = Stage::new(shared, shaded, cubes, views, scatter)?;
         let inputs = inputs(shared, &stage, shaded, cubes, views);
         Ok((Self(Arc::new(stage)), inputs))

@@ -199,7 +199,8 @@ impl Matrix {
             bytemuck::cast_slice(&[rows.count as u32, channels as u32]),
             BufferUsages::UNIFORM,
         );
-        let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("sparse") });
+        let mut encoder =
+            gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("sparse") });
         let resources = vec![
             (0, size.as_entire_binding()),
             (1, rows.starts.as_entire_binding()),
@@ -223,7 +224,8 @@ impl Rows {
         let made = Self {
             count: entries.rows(),
             starts: gpu.storage("rows of a sparse matrix", bytemuck::cast_slice(&entries.starts))?,
-            columns: gpu.storage("columns of a sparse matrix", bytemuck::cast_slice(&padded(&entries.column)))?,
+            columns: gpu
+                .storage("columns of a sparse matrix", bytemuck::cast_slice(&padded(&entries.column)))?,
             weights: gpu.storage("weights of a sparse matrix", bytemuck::cast_slice(&weights))?,
         };
         Ok(made)

@@ -6,8 +6,8 @@ use std::sync::{Mutex, PoisonError};
 use burn::backend::Shape;
 use burn::backend::wgpu::CubeTensor;
 use wgpu::{
-    BindingResource, Buffer, BufferUsages, CommandEncoder, CommandEncoderDescriptor,
-    ComputePipeline, Extent3d, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
+    BindingResource, Buffer, BufferUsages, CommandEncoder, CommandEncoderDescriptor, ComputePipeline,
+    Extent3d, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
     TextureViewDescriptor, TextureViewDimension,
 };
 
@@ -98,7 +98,11 @@ impl Stage {
             pass::pipeline(gpu, &pass::module(gpu, name, wgsl)?, "cs_main")
         };
         Ok(Self {
-            part: gpu.buffer("part", bytemuck::cast_slice(&[slots as u32, samples as u32]), BufferUsages::UNIFORM),
+            part: gpu.buffer(
+                "part",
+                bytemuck::cast_slice(&[slots as u32, samples as u32]),
+                BufferUsages::UNIFORM,
+            ),
             fixed: gpu.storage("samples", bytemuck::cast_slice(&fixed_planes(&adjoint, views)))?,
             group_start: gpu.storage("groups", bytemuck::cast_slice(&group_starts(views)))?,
             constants: Constants::new(gpu, &adjoint, shaded)?,
@@ -168,20 +172,30 @@ impl Stage {
             let gradient = |input: Input| &made[wanted.iter().position(|&w| w == input).unwrap_or(0)];
             let resource = |binding: Binding| match binding {
                 Binding::Gradient(input) => gradient(input).binding(),
-                other => scratch.get(&other).map_or_else(|| self.resource(other, &lent), Buffer::as_entire_binding),
+                other => {
+                    scratch.get(&other).map_or_else(|| self.resource(other, &lent), Buffer::as_entire_binding)
+                }
             };
             self.dispatch(&mut encoder, &compiled, &resource);
             if part.contains(&Input::Columns) {
                 self.add_up(&mut encoder, &scratch[&Binding::PartialSums], gradient(Input::Columns))?;
             }
             for &cube in part.iter().filter(|input| input.faces().is_some()) {
-                let size = self.faces[at(cube) - at(Input::Irradiance)].as_ref().map_or(0, |faces| faces.size);
+                let size =
+                    self.faces[at(cube) - at(Input::Irradiance)].as_ref().map_or(0, |faces| faces.size);
                 let lookups = self.adjoint.lookups(cube);
                 let lights: Vec<[&Buffer; 2]> = lookups
                     .iter()
                     .map(|(i, _)| [&scratch[&Binding::LightAdjoint(*i)], &scratch[&Binding::LightPlace(*i)]])
                     .collect();
-                self.scattering.encode(self.shared.gpu(), &mut encoder, &lights, self.samples, size, gradient(cube))?;
+                self.scattering.encode(
+                    self.shared.gpu(),
+                    &mut encoder,
+                    &lights,
+                    self.samples,
+                    size,
+                    gradient(cube),
+                )?;
             }
         }
         self.submit(encoder)?;
@@ -237,21 +251,31 @@ impl Stage {
     fn fill(&self, encoder: &mut CommandEncoder, lent: &HashMap<usize, TensorBuffer>) {
         let gpu = self.shared.gpu();
         if let Some(constants) = &self.constants {
-            let mut resources = vec![(1, constants.values.as_entire_binding()), (2, constants.filled.as_entire_binding())];
-            resources.extend(lent.get(&at(Input::Columns)).filter(|_| !self.adjoint.columns.is_empty()).map(|columns| (0, columns.binding())));
+            let mut resources =
+                vec![(1, constants.values.as_entire_binding()), (2, constants.filled.as_entire_binding())];
+            resources.extend(
+                lent.get(&at(Input::Columns))
+                    .filter(|_| !self.adjoint.columns.is_empty())
+                    .map(|columns| (0, columns.binding())),
+            );
             pass::dispatch(gpu, encoder, &constants.pipeline, &[resources], 1);
             encoder.copy_buffer_to_buffer(&constants.filled, 0, &constants.block, 0, constants.block.size());
         }
         for (faces, cube) in self.faces.iter().zip(CUBES) {
             if let (Some(faces), Some(texels)) = (faces, lent.get(&at(cube))) {
-                let resources = vec![(0, texels.binding()), (1, BindingResource::TextureView(&faces.storage))];
+                let resources =
+                    vec![(0, texels.binding()), (1, BindingResource::TextureView(&faces.storage))];
                 pass::dispatch(gpu, encoder, &self.fill_faces, &[resources], faces.texels() as u64);
             }
         }
     }
 
     /// What is bound, but for what a pass writes.
-    fn resource<'a>(&'a self, binding: Binding, lent: &'a HashMap<usize, TensorBuffer>) -> BindingResource<'a> {
+    fn resource<'a>(
+        &'a self,
+        binding: Binding,
+        lent: &'a HashMap<usize, TensorBuffer>,
+    ) -> BindingResource<'a> {
         match binding {
             Binding::Fixed => self.fixed.as_entire_binding(),
             Binding::GroupStart => self.group_start.as_entire_binding(),
@@ -270,10 +294,14 @@ impl Stage {
         let mut planned: Vec<(u32, BindingResource<'a>)> = Vec::new();
         planned.extend(self.constants.as_ref().map(|constants| (0, constants.block.as_entire_binding())));
         for (i, read) in self.adjoint.plan.resources.iter().enumerate() {
-            let faces = CUBES.iter().position(|cube| cube.faces() == Some(*read)).and_then(|k| self.faces[k].as_ref());
+            let faces = CUBES
+                .iter()
+                .position(|cube| cube.faces() == Some(*read))
+                .and_then(|k| self.faces[k].as_ref());
             planned.extend(faces.map(|faces| (1 + i as u32, BindingResource::TextureView(&faces.view))));
         }
-        let bound = compiled.bindings.iter().enumerate().map(|(i, &binding)| (i as u32, resource(binding))).collect();
+        let bound =
+            compiled.bindings.iter().enumerate().map(|(i, &binding)| (i as u32, resource(binding))).collect();
         pass::dispatch(self.shared.gpu(), encoder, &compiled.pipeline, &[planned, bound], self.slots as u64);
     }
 
@@ -303,7 +331,12 @@ impl Stage {
     }
 
     /// The sums of all workgroups' rows, in a fixed tree.
-    fn add_up(&self, encoder: &mut CommandEncoder, partial: &Buffer, result: &TensorBuffer) -> Result<(), GpuError> {
+    fn add_up(
+        &self,
+        encoder: &mut CommandEncoder,
+        partial: &Buffer,
+        result: &TensorBuffer,
+    ) -> Result<(), GpuError> {
         let gpu = self.shared.gpu();
         let columns = self.adjoint.columns.len();
         let mut rows = pass::workgroup_count(self.slots as u64) as usize;
@@ -374,7 +407,11 @@ impl Faces {
                 ..TextureViewDescriptor::default()
             })
         };
-        Ok(Self { size, view: view(TextureUsages::TEXTURE_BINDING), storage: view(TextureUsages::STORAGE_BINDING) })
+        Ok(Self {
+            size,
+            view: view(TextureUsages::TEXTURE_BINDING),
+            storage: view(TextureUsages::STORAGE_BINDING),
+        })
     }
 
     fn texels(&self) -> usize {

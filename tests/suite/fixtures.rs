@@ -181,7 +181,12 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         effects,
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),
-        fit: FitSettings { free: Vec::new(), loss: Loss::L2, free_gains: false, maps: MapSettings::default() },
+        fit: FitSettings {
+            free: Vec::new(),
+            loss: Loss::L2,
+            free_gains: false,
+            maps: MapSettings::default(),
+        },
         quality: Quality::default(),
     }
 }

@@ -16,7 +16,9 @@ pub(super) fn shared() -> Option<&'static SharedDevice> {
                 eprintln!("NOT CHECKED, as SKINFIT_NO_GPU_TESTS is set: {error}");
                 None
             }
-            Err(error) => panic!("{error}\nSKINFIT_NO_GPU_TESTS=1 leaves the tests out that need an adapter."),
+            Err(error) => {
+                panic!("{error}\nSKINFIT_NO_GPU_TESTS=1 leaves the tests out that need an adapter.")
+            }
         })
         .as_ref()
 }
@@ -70,6 +72,9 @@ pub(super) fn assert_near(got: &[f32], want: &[f64], share: f64, what: &str) {
     let largest = want.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
     assert!(largest > 0.0, "{what}: there is nothing to compare");
     for (i, (&g, w)) in got.iter().zip(want).enumerate() {
-        assert!((f64::from(g) - w).abs() <= share * largest, "{what}[{i}]: {g} is not {w} (largest {largest})");
+        assert!(
+            (f64::from(g) - w).abs() <= share * largest,
+            "{what}[{i}]: {g} is not {w} (largest {largest})"
+        );
     }
 }

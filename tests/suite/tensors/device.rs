@@ -3,8 +3,8 @@
 use burn::tensor::Tensor;
 use skinfit::gpu::{Choice, Gpu};
 use skinfit::tensor::buffer::buffer_of;
-use skinfit::tensor::{Sparse, TensorError};
 use skinfit::tensor::sparse::Entries;
+use skinfit::tensor::{Sparse, TensorError};
 
 use super::bench::{matrix, numbers, shared};
 

@@ -168,8 +168,12 @@ impl Case {
             let share = samples.surface.weight(s);
             samples.surface.set(s, &fragment, share);
         }
-        let shaded =
-            Shaded { setup: self.setup, params: &self.params, columns: &self.columns, illumination: &illumination };
+        let shaded = Shaded {
+            setup: self.setup,
+            params: &self.params,
+            columns: &self.columns,
+            illumination: &illumination,
+        };
         Shade::new(shared().unwrap(), &shaded, &[&samples], scatter).unwrap()
     }
 
@@ -178,17 +182,28 @@ impl Case {
         let device = shared().unwrap().device().clone().autodiff();
         let (shade, _) = self.operation(scatter);
         let leaf = |i: usize, width: usize| matrix(&self.numbers[i], width, &device).require_grad();
-        let columns: Tensor<1> = Tensor::from_data(TensorData::new(f32s(&self.numbers[0]), [self.columns.len()]), &device);
+        let columns: Tensor<1> =
+            Tensor::from_data(TensorData::new(f32s(&self.numbers[0]), [self.columns.len()]), &device);
         let columns = columns.require_grad();
-        let leaves = [leaf(1, 3), leaf(2, 1), leaf(3, 1), leaf(4, 1), leaf(5, 3), leaf(6, 4), leaf(7, 4), leaf(8, 4)];
+        let leaves =
+            [leaf(1, 3), leaf(2, 1), leaf(3, 1), leaf(4, 1), leaf(5, 3), leaf(6, 4), leaf(7, 4), leaf(8, 4)];
         let padded = |i: usize| {
             let border = Sparse::new(shared().unwrap(), &cube_border(SIZES[i])).unwrap();
             border.apply(leaves[5 + i].clone()).unwrap()
         };
         let [albedo, specular, attenuator, open, bump, ..] = leaves.clone();
         let (irradiance, lobe, hilite) = (padded(0), padded(1), padded(2));
-        let inputs =
-            Inputs { columns: columns.clone(), albedo, specular, attenuator, open, bump, irradiance, lobe, hilite };
+        let inputs = Inputs {
+            columns: columns.clone(),
+            albedo,
+            specular,
+            attenuator,
+            open,
+            bump,
+            irradiance,
+            lobe,
+            hilite,
+        };
         let image = shade.image(inputs).unwrap();
         let gradients = (image * matrix(weights, 4, &device)).sum().backward();
         let first = columns.grad(&gradients).map(numbers);
@@ -238,7 +253,8 @@ fn cases() -> Vec<(&'static str, Case)> {
             _ => vec![Column::tied(param)],
         })
         .collect();
-    let surface: Vec<Column> = [Param::BaseWeight, Param::RimExponent, Param::Occlusion].map(Column::tied).to_vec();
+    let surface: Vec<Column> =
+        [Param::BaseWeight, Param::RimExponent, Param::Occlusion].map(Column::tied).to_vec();
     vec![
         ("corrected", Case::new(Form::Corrected, Silhouette::Fragment, all, free.clone())),
         ("bumped", Case::new(Form::Corrected, Silhouette::Bumped, all, free.clone())),

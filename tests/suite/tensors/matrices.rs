@@ -73,7 +73,8 @@ fn the_same_numbers_give_the_same_bits() {
 fn a_cubes_border_is_the_one_that_the_cube_itself_makes() {
     for size in [1, 2, 5] {
         let mut random = Random::new(size as u64);
-        let texels: Vec<[f64; 4]> = (0..6 * size * size).map(|_| std::array::from_fn(|_| random.next())).collect();
+        let texels: Vec<[f64; 4]> =
+            (0..6 * size * size).map(|_| std::array::from_fn(|_| random.next())).collect();
         let cube = Cube::from_fn(size, |face, column, row| texels[(face * size + row) * size + column]);
         let padded = multiply(&cube_border(size), texels.as_flattened(), 4);
         for (got, want) in padded.iter().zip(cube.padded().as_flattened()) {
