@@ -324,7 +324,8 @@ mod tests {
         for d in [[0.9, 0.2, -0.3], [0.13, -0.8, 0.33], [-0.2, 0.4, 0.7], [-0.9, 0.3, 0.2]] {
             for dd in [[0.3, 0.1, -0.2], [-0.1, 0.5, 0.4]] {
                 let point = CubePoint::new(d);
-                let (_, got) = cube.sample_with_slope(&point, point.tangent(dd));
+                let (_, got) =
+                    cube.sample_with_slope(&cube.footprint(&point), cube.texels(point.tangent(dd)));
                 let h = 1e-7;
                 let at = |h: f64| -> [f64; 4] { cube.sample(std::array::from_fn(|i| d[i] + h * dd[i])) };
                 let (plus, minus) = (at(h), at(-h));
@@ -342,7 +343,8 @@ mod tests {
         let cube = wavy(4);
         for bad in [[0.0; 3], [f64::NAN, 0.0, 1.0], [f64::INFINITY, 0.0, 0.0]] {
             let point = CubePoint::new(bad);
-            let (value, slope) = cube.sample_with_slope(&point, point.tangent([1.0, 0.0, 0.0]));
+            let (value, slope) =
+                cube.sample_with_slope(&cube.footprint(&point), cube.texels(point.tangent([1.0, 0.0, 0.0])));
             assert!(value.iter().chain(&slope).all(|x| x.is_finite()), "{bad:?}");
         }
     }

@@ -10,10 +10,11 @@ use crate::engine::cpu::Illumination;
 use crate::model::compose::{Composition, Weights};
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
-use crate::model::fragment::{Fragment, LookupParam, Shading, Wanted, shading, terms, terms_tangent};
+use crate::model::fragment::{Fragment, Shading, shading};
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
 use crate::model::real::Real;
+use crate::model::terms::{LookupParam, Wanted, terms, terms_tangent};
 use crate::model::vertex::deform;
 
 /// Red, green, blue, and the haze in alpha.

@@ -107,7 +107,7 @@ fn a_failing_case_is_made_simple_and_stays_failing_when_it_is_read_back() {
     let path = folder.path().join("new_cases.toml");
     std::fs::write(&path, text).unwrap();
     let kept = kept::read(&path).unwrap();
-    assert!(hard::cases().iter().all(|case| case.batch.fragments.iter().all(|f| f.attenuator != 1.0)));
+    assert!(cases().iter().all(|case| case.batch.fragments.iter().all(|f| f.attenuator != 1.0)));
     let replayed = Study { kept, ..study(3, 0) }.run(&broken(), &mut |_| {});
     assert!(replayed.failures().iter().any(|line| line.starts_with("kept: found 1: broken: alpha is NaN")));
     let sound = Study { kept: kept::read(&path).unwrap(), ..study(3, 0) }.run(&evaluators(), &mut |_| {});
