@@ -104,7 +104,7 @@ mod burn {
     use crate::maps::fit::columns_beside;
     use crate::maps::pictures::{change, picture};
     use crate::maps::problem::read;
-    use crate::maps::{FittedMaps, Grid, Layer, MapTask, fit_maps};
+    use crate::maps::{FittedMaps, Grid, Layer, MapError, MapTask, fit_maps};
     use crate::output;
     use crate::progress;
     use crate::render::files::{ImageOptions, write_exr, write_png, write_png_bytes};
@@ -160,8 +160,13 @@ mod burn {
                 bar.set_message(format!("round {} {}: loss {:.6e}", step.round, step.what, step.after));
             });
             bar.finish_and_clear();
-            let found =
-                found.map_err(|error| Refusal::new(format!("{}: {error}", prepared.scene.path.display())))?;
+            let found = found.map_err(|error| {
+                let words = format!("{}: {error}", prepared.scene.path.display());
+                match error {
+                    MapError::Tensor(_) | MapError::NotFinite { .. } => Refusal::failure(words),
+                    MapError::Constants(_) | MapError::Unread { .. } => Refusal::new(words),
+                }
+            })?;
             let gained = gained(prepared, &observed, &found, held_out);
             let pictures = found
                 .layers

@@ -10,6 +10,11 @@ use burn::tensor::Tensor;
 use super::MapError;
 use super::problem::{Problem, read};
 
+/// A direction is forgotten when the slope has grown by more than this.
+const MOST_GROWTH: f64 = 1e4;
+/// No step changes a texel by more than this.
+const MOST_CHANGE: f64 = 1e6;
+
 /// Improve layer `index` by at most `steps` steps; returns the loss before and after.
 ///
 /// # Errors
@@ -28,15 +33,16 @@ pub fn solve(problem: &mut Problem, index: usize, steps: usize) -> Result<(f64, 
         let free = free(&x, &g, lower, upper);
         let z = -g.clone() * inverse.clone() * free.clone();
         let descent = -sum(g.clone() * z.clone())?;
-        if descent <= 0.0 {
+        if descent <= 0.0 || !descent.is_finite() {
             break;
         }
         let d = match &last {
-            Some((d, before)) => z.clone() + d.clone() * free * (descent / before),
-            None => z.clone(),
+            Some((d, before)) if descent <= MOST_GROWTH * before => {
+                z.clone() + d.clone() * free * (descent / before)
+            }
+            _ => z.clone(),
         };
-        let (along, curvature) = curvature(problem, index, &x, &g, &d)?;
-        let step = if curvature > 0.0 && along < 0.0 { -along / curvature } else { 0.0 };
+        let step = step(problem, index, &x, &g, &d)?;
         let wanted = x.clone() + d.clone() * step;
         let next = bounded(wanted.clone());
         let cut = sum((next.clone() - wanted).abs())? > 0.0;
@@ -77,24 +83,24 @@ fn inverse_diagonal(
     // A texel and its neighbours: 2 on the diagonal for each, 2 again for the rows beside it.
     let rough = layer.neighbours.clone() * (4.0 * layer.roughness());
     let diagonal = (moved - g.clone()).abs() + rough;
-    let least = f64::from(read(diagonal.clone().max())?[0]) * 1e-7;
-    Ok(diagonal.clamp_min(least.max(f64::from(f32::MIN_POSITIVE))).recip())
+    let most = f64::from(read(diagonal.clone().max())?[0]);
+    // Texels that next to nothing sees are moved as if a little more did.
+    Ok(diagonal.clamp_min((1e-6 * most).max(1e-30)).recip())
 }
 
-/// Slope and curvature along d.
-fn curvature(
-    problem: &Problem,
-    index: usize,
-    x: &Tensor<2>,
-    g: &Tensor<2>,
-    d: &Tensor<2>,
-) -> Result<(f64, f64), MapError> {
-    let longest = f64::from(read(d.clone().abs().max())?[0]).max(1e-30);
-    // As long as texels are, so that the difference of slopes is not rounded away.
+/// How far to go along d: to the least of the loss; 0 where rounding leaves none to be seen.
+fn step(problem: &Problem, index: usize, x: &Tensor<2>, g: &Tensor<2>, d: &Tensor<2>) -> Result<f64, MapError> {
+    let longest = f64::from(read(d.clone().abs().max())?[0]);
+    if longest < f64::from(f32::MIN_POSITIVE) || !longest.is_finite() {
+        return Ok(0.0);
+    }
+    // As far as texels are from 0, so that the difference of slopes is not rounded away.
     let reach = 0.5 / longest;
     let (_, there) = problem.slope(index, &(x.clone() + d.clone() * reach))?;
     let along = sum(g.clone() * d.clone())?;
-    Ok((along, sum((there - g.clone()) * d.clone())? / reach))
+    let curvature = sum((there - g.clone()) * d.clone())? / reach;
+    let step = if curvature > 0.0 && along < 0.0 { -along / curvature } else { 0.0 };
+    Ok(if step * longest <= MOST_CHANGE { step } else { 0.0 })
 }
 
 fn sum(tensor: Tensor<2>) -> Result<f64, MapError> {

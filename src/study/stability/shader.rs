@@ -148,7 +148,12 @@ fn scene() -> Scene {
         effects: Effects::default(),
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),
-        fit: FitSettings { free: Vec::new(), loss: Loss::L2, free_gains: false, maps: MapSettings::default() },
+        fit: FitSettings {
+            free: Vec::new(),
+            loss: Loss::L2,
+            free_gains: false,
+            maps: MapSettings::default(),
+        },
         quality: Quality::default(),
     }
 }

@@ -65,10 +65,8 @@ fn targets(truth: &Prepared) -> Vec<(View, Target)> {
     (truth.scene.views.iter().zip(&samples))
         .map(|(view, samples)| {
             let image = shader.shade(samples, &view.camera, 1.0).image;
-            // Premultiplied, as files are.
-            let rgb = image.rgb.iter().zip(&image.alpha).map(|(rgb, a)| rgb.map(|c| c * f32::from(*a > 0.0)));
             let target =
-                Target { rgb: rgb.collect(), alpha: Some(image.alpha), mask: None, clipped_at: None };
+                Target { rgb: image.rgb, alpha: Some(image.alpha), mask: None, clipped_at: None };
             (view.clone(), target)
         })
         .collect()
