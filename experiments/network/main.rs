@@ -134,7 +134,7 @@ impl Scene {
         let told = network.tell(lift(self.seen(images)?));
         let mut sum: Option<Tensor<1>> = None;
         for (i, image) in images.iter().enumerate() {
-            let again = self.image(told.clone().slice([i..i + 1]))?;
+            let again = self.image(told.clone().slice([i..i + 1, 0..TOLD.len()]))?;
             let difference = (again - lift(image.clone())).square().mean();
             sum = Some(match sum {
                 Some(sum) => sum + difference,

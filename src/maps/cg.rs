@@ -89,7 +89,13 @@ fn inverse_diagonal(
 }
 
 /// How far to go along d: to the least of the loss; 0 where rounding leaves none to be seen.
-fn step(problem: &Problem, index: usize, x: &Tensor<2>, g: &Tensor<2>, d: &Tensor<2>) -> Result<f64, MapError> {
+fn step(
+    problem: &Problem,
+    index: usize,
+    x: &Tensor<2>,
+    g: &Tensor<2>,
+    d: &Tensor<2>,
+) -> Result<f64, MapError> {
     let longest = f64::from(read(d.clone().abs().max())?[0]);
     if longest < f64::from(f32::MIN_POSITIVE) || !longest.is_finite() {
         return Ok(0.0);

@@ -10,7 +10,7 @@ use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::wgpu::{CubeBackend, CubeTensor};
 use burn::tensor::{Tensor, TensorData};
 
-use super::inputs::{Input, Inputs};
+use super::inputs::{Input, Inputs, TrackedTensor};
 use super::stage::Stage;
 use super::{SharedDevice, TensorError};
 use crate::engine::cpu::Illumination;
@@ -98,9 +98,9 @@ impl Shade {
             return Ok(Tensor::from_primitive::<CubeBackend>(image));
         }
         let inputs = inputs.tracked()?;
-        let nodes = inputs.each_ref().map(|input| input.node());
+        let nodes = inputs.each_ref().map(TrackedTensor::node);
         let prepared = Adjoints.prepare::<NoCheckpointing>(nodes).compute_bound().stateful();
-        let inputs = inputs.map(|input| input.into_primitive());
+        let inputs = inputs.map(TrackedTensor::into_primitive);
         let image = self.0.forward(&inputs)?;
         let image = match prepared {
             OpsKind::Tracked(ops) => ops.finish((self.clone(), inputs), image),

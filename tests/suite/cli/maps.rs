@@ -36,14 +36,27 @@ fn a_fit_of_maps_leaves_them_as_images_and_in_the_scene_file() {
     for name in ["color", "occlusion"] {
         for what in ["initial", "fitted", "change"] {
             for ending in ["png", "exr"] {
-                assert!(desk.path(&format!("run/maps/{name}_{what}.{ending}")).exists(), "{name}_{what}.{ending}");
+                assert!(
+                    desk.path(&format!("run/maps/{name}_{what}.{ending}")).exists(),
+                    "{name}_{what}.{ending}"
+                );
             }
         }
     }
     // The view that was held out is no part of the fit that is reported.
     assert!(desk.json("run/report.json")["views"].get("side").is_none());
     assert!(desk.text("run/scene.toml").contains("maps/color_fitted.exr"));
-    desk.run(&["render", "run/scene.toml", "--params", "run/params.toml", "--engine", "cpu", "-o", "again.exr"]).done();
+    desk.run(&[
+        "render",
+        "run/scene.toml",
+        "--params",
+        "run/params.toml",
+        "--engine",
+        "cpu",
+        "-o",
+        "again.exr",
+    ])
+    .done();
     assert!(desk.path("again.exr").exists());
 }
 
@@ -74,7 +87,10 @@ fn what_cannot_be_held_out_or_fitted_is_refused_and_leaves_nothing() {
     let (one, _) = SCENE.split_once("[[view]]\nname = \"side\"").unwrap();
     let (_, fit) = SCENE.split_once("[fit]").unwrap();
     refused(&format!("{one}[fit]{fit}"), &[&maps[..], &["front"]].concat(), &["only view"]);
-    let without = SCENE.replace(", \"side_specular\", \"hilite\", \"reflection\"]\n[model", ", \"hilite\", \"reflection\"]\n[model");
+    let without = SCENE.replace(
+        ", \"side_specular\", \"hilite\", \"reflection\"]\n[model",
+        ", \"hilite\", \"reflection\"]\n[model",
+    );
     refused(&without, &["--maps", "specular"], &["specular", "side_specular"]);
 }
 

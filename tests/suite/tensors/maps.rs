@@ -65,8 +65,7 @@ fn targets(truth: &Prepared) -> Vec<(View, Target)> {
     (truth.scene.views.iter().zip(&samples))
         .map(|(view, samples)| {
             let image = shader.shade(samples, &view.camera, 1.0).image;
-            let target =
-                Target { rgb: image.rgb, alpha: Some(image.alpha), mask: None, clipped_at: None };
+            let target = Target { rgb: image.rgb, alpha: Some(image.alpha), mask: None, clipped_at: None };
             (view.clone(), target)
         })
         .collect()
@@ -173,10 +172,10 @@ fn every_kind_of_map_explains_what_was_changed_in_it() {
                 .iter_mut()
                 .for_each(|t| *t = t.map(|x| 0.8 * x)),
             MapKind::Specular => {
-                changed.scene.maps.specular.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6)
+                changed.scene.maps.specular.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6);
             }
             MapKind::Attenuator => {
-                changed.scene.maps.attenuator.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6)
+                changed.scene.maps.attenuator.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6);
             }
             MapKind::Occlusion => {
                 let base = &mut changed.occlusion.as_mut().unwrap().base;
