@@ -87,10 +87,7 @@ fn what_cannot_be_held_out_or_fitted_is_refused_and_leaves_nothing() {
     let (one, _) = SCENE.split_once("[[view]]\nname = \"side\"").unwrap();
     let (_, fit) = SCENE.split_once("[fit]").unwrap();
     refused(&format!("{one}[fit]{fit}"), &[&maps[..], &["front"]].concat(), &["only view"]);
-    let without = SCENE.replace(
-        ", \"side_specular\", \"hilite\", \"reflection\"]\n[model",
-        ", \"hilite\", \"reflection\"]\n[model",
-    );
+    let without = SCENE.replace("\"side_specular\", ", "");
     refused(&without, &["--maps", "specular"], &["specular", "side_specular"]);
 }
 
