@@ -94,6 +94,8 @@ struct Scene {
     shade: Shade,
     inputs: Inputs,
     small: Sparse,
+    /// Mean and spread of what the network sees, each \[1, 3 SEEN^2\].
+    usual: Option<(Tensor<2>, Tensor<2>)>,
 }
 
 impl Scene {
@@ -105,7 +107,7 @@ impl Scene {
             Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: Effects::SURFACE };
         let shaded = Shaded { setup, params: &params, columns: &columns, illumination: &illumination };
         let (shade, inputs) = Shade::new(shared, &shaded, &[&samples], Scatter::Exact)?;
-        Ok(Self { shade, inputs, small: Sparse::new(shared, &shrinking(&samples))? })
+        Ok(Self { shade, inputs, small: Sparse::new(shared, &shrinking(&samples))?, usual: None })
     }
 
     /// The image of one row of constants: \[slots, 4\].
@@ -120,7 +122,13 @@ impl Scene {
             let all = self.small.apply(image.clone())?;
             Ok(all.slice([0..SEEN * SEEN, 0..3]).reshape([1, 3 * SEEN * SEEN]))
         };
-        Ok(Tensor::cat(images.iter().map(small).collect::<Result<Vec<_>, Box<dyn Error>>>()?, 0))
+        // Highlights are ten times as bright as the rest; what matters of them is their share.
+        let seen =
+            Tensor::cat(images.iter().map(small).collect::<Result<Vec<_>, Box<dyn Error>>>()?, 0).log1p();
+        Ok(match &self.usual {
+            Some((mean, spread)) => (seen - mean.clone()) / spread.clone(),
+            None => seen,
+        })
     }
 
     /// How far the images of what the network tells are from those that it was given: the mean squared difference.
@@ -151,9 +159,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     let shared = SharedDevice::open(&Choice::default())?;
     let device = shared.device();
     device.seed(arguments.seed);
-    let scene = Scene::new(&shared)?;
+    let mut scene = Scene::new(&shared)?;
     let mut random = StdRng::seed_from_u64(arguments.seed);
-    let mut draw = |count: usize| -> Result<Vec<Tensor<2>>, Box<dyn Error>> {
+    let mut draw = |scene: &Scene, count: usize| -> Result<Vec<Tensor<2>>, Box<dyn Error>> {
         (0..count)
             .map(|_| {
                 let constants = TOLD.map(|(_, lower, upper)| random.random_range(lower..upper) as f32);
@@ -162,7 +170,11 @@ fn main() -> Result<(), Box<dyn Error>> {
             })
             .collect()
     };
-    let held_out = draw(arguments.held_out.max(1))?;
+    let seen = scene.seen(&draw(&scene, 64)?)?;
+    let mean = seen.clone().mean_dim(0);
+    let spread = (seen - mean.clone()).square().mean_dim(0).sqrt() + 1e-3;
+    scene.usual = Some((mean, spread));
+    let held_out = draw(&scene, arguments.held_out.max(1))?;
     let measure = |network: &Network| -> Result<f64, Box<dyn Error>> {
         let loss = scene.loss(&network.clone().valid(), &held_out, false)?;
         Ok(f64::from(loss.try_into_scalar::<f32>().map_err(|e| e.to_string())?))
@@ -177,10 +189,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         held_out.len()
     );
     for step in 1..=arguments.steps {
-        let images = draw(arguments.batch.max(1))?;
+        let images = draw(&scene, arguments.batch.max(1))?;
         let gradients = scene.loss(&network, &images, true)?.backward();
         let gradients = GradientsParams::from_grads(gradients, &network);
-        network = optimiser.step(3e-3, network, gradients);
+        // From long steps to short ones.
+        let rate = 1e-2 * 0.05_f64.powf(step as f64 / arguments.steps as f64);
+        network = optimiser.step(rate, network, gradients);
         if step % 50 == 0 {
             println!("step {step:>5}: {:.3e}", measure(&network)?);
         }
