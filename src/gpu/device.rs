@@ -16,7 +16,7 @@ pub struct Gpu {
     pub(crate) device: Device,
     pub(crate) queue: Queue,
     #[cfg(feature = "burn")]
-    pub(crate) adapter: wgpu::Adapter,
+    pub(crate) adapter: Adapter,
     info: AdapterInfo,
     /// The first thing that went wrong; errors after it are its consequences.
     fault: Arc<Mutex<Option<GpuError>>>,
