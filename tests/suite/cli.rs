@@ -1,11 +1,14 @@
 //! The program as its users meet it: every test here runs the binary.
 
+mod ablation;
+mod browser;
 mod built_in;
 pub(crate) mod desk;
 mod exported;
 #[cfg(feature = "gpu")]
 mod graphics;
 mod interrupted;
+mod maps;
 mod outputs;
 mod refusals;
 mod refused_files;
@@ -13,4 +16,5 @@ mod runs;
 mod stability;
 mod stages;
 mod sweeps;
+mod tradeoffs;
 mod words;

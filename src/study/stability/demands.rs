@@ -4,7 +4,7 @@
 use super::case::FragmentInputs;
 use super::lights::LightBox;
 use super::objectives::{EngineFactory, EngineInputs, ordinary_inputs, targets, view};
-use crate::engine::cpu::Illumination;
+use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
 use crate::engine::{NormalEquations, Point, Unknown};
 use crate::fit::outcome::Outcome;

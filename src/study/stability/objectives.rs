@@ -3,7 +3,8 @@
 use super::case::{Batch, EVERYTHING, FragmentInputs, Setting};
 use super::evaluate::{Answer, Evaluator, Sums, TARGET};
 use super::lights::LightBox;
-use crate::engine::cpu::{CpuEngine, Illumination};
+use crate::bake::Illumination;
+use crate::engine::cpu::CpuEngine;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu::{GpuEngine, Memory, Task};
 use crate::engine::view::ObservedView;

@@ -10,6 +10,8 @@ fn every_help_page_holds_an_example_that_is_understood() {
     for command in [
         "",
         "fit",
+        "ablate",
+        "tradeoff",
         "render",
         "bake",
         "demo",
@@ -100,6 +102,7 @@ fn words_that_the_command_line_does_not_know() {
             "unknown effect `difuse`. Did you mean `diffuse`?",
         ),
         (&["render", "scene.toml", "-o", "a.png", "--effects", ","], "names no effect"),
+        (&["render", "scene.toml", "-o", "a.png", "--effects", "rim,rim"], "rim is listed twice"),
         (&["render", "scene.toml", "-o", "a.png", "--exposure", "nan"], "give stops in [-64, 64]"),
         (
             &["render", "scene.toml", "-o", "a.png", "--tone", "filmic"],
