@@ -104,7 +104,7 @@ fn unit(rng: &mut StdRng) -> [f64; 3] {
 /// Onto an axis, an edge or a corner of the cube, or a last place beside it.
 fn special(rng: &mut StdRng) -> [f64; 3] {
     let free = single(rng.random_range(-1.0..=1.0));
-    let near = [0.0, -0.0, 1.0, -1.0, single(1.0 + 1.2e-7), single(1.0 - 6e-8), 1e-40, free];
+    let near = [0.0, -0.0, 1.0, -1.0, single(1.0 + 1.2e-7), single(1.0 - 6e-8), single(1e-40), free];
     std::array::from_fn(|_| one_of(rng, &near))
 }
 

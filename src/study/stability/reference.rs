@@ -260,8 +260,8 @@ fn round_shading(
         v.iter_mut().for_each(|x| *x += RADIUS * size * step(&mut *rng));
     };
     let length = size(std::array::from_fn(|i| f.base[i] + strength * f.bump[i]));
-    // Beyond that the model itself cuts the derivative off.
-    let turning = (size(f.bump) / length.max(f64::MIN_POSITIVE)).min(1e6);
+    // At 1e6 the model itself cuts the derivative off.
+    let turning = (size(f.bump) / length.max(f64::MIN_POSITIVE)).min(1e6 / RADIUS);
     let n = size(s.n);
     round(&mut s.n, n);
     let reflection = size(s.reflection).max(2.0 * n);
@@ -296,7 +296,8 @@ fn moved(inputs: &FragmentInputs, rng: &mut StdRng) -> FragmentInputs {
     }
     let FragmentInputs { occlusion, silhouette, dapple, albedo, specular, attenuator, .. } = &mut moved;
     for x in [occlusion, silhouette, dapple, specular, attenuator].into_iter().chain(albedo) {
-        *x += RADIUS * *x * step(rng);
+        let flushed = if *x == 0.0 { 0.0 } else { FLUSHED };
+        *x += (RADIUS * x.abs() + flushed) * step(rng);
     }
     moved
 }

@@ -1,5 +1,4 @@
-// The part of the shading normal that the normal map's strength leaves alone; where none is left, the side
-// that faces the eye.
+// The part of the shading normal that the normal map's strength leaves alone.
 //
 // gives: base
 // when: bumped, raster
