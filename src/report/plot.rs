@@ -214,12 +214,13 @@ fn place(
 ) -> Option<(f64, f64, &'static str)> {
     // A letter of the style sheet's size is about 6.4 wide, a line 14 high.
     let width = 6.4 * letters as f64;
+    // Above first: the front's line leaves a dot to the right and meets it from above.
     let places = [
+        (8.0, -8.0, "start"),
         (8.0, 4.0, "start"),
         (-8.0, 4.0, "end"),
         (0.0, -9.0, "middle"),
         (0.0, 18.0, "middle"),
-        (8.0, -8.0, "start"),
         (8.0, 16.0, "start"),
         (-8.0, -8.0, "end"),
         (-8.0, 16.0, "end"),

@@ -125,12 +125,12 @@ fn axis(sweep: &Sweep) -> String {
         };
         let time = setting.time.map_or_else(Cell::none, |time| {
             let half = 0.5 * (time.seconds.upper - time.seconds.lower);
-            let spread = if time.rounds > 1 {
-                format!(" <span class=\"pm inline\">± {}</span>", seconds(half))
-            } else {
-                String::new()
-            };
-            Cell::value(format!("{}{spread}", seconds(time.seconds.median)), time.seconds.median)
+            // What was run once has no spread to tell of.
+            let spread = if half == 0.0 { "once".to_owned() } else { format!("± {}", seconds(half)) };
+            Cell::value(
+                format!("{} <span class=\"pm inline\">{spread}</span>", seconds(time.seconds.median)),
+                time.seconds.median,
+            )
         });
         let mut cells = vec![
             Cell::text(&setting.name),
