@@ -5,6 +5,7 @@
 //! - [`bounded`]: the bounded least-squares step
 //! - [`lm`], [`memory`]: Levenberg-Marquardt; [`varpro`]: what makes it variable projection
 //! - [`transform`], [`unbounded`]: bounds and costs for `argmin`'s own solvers
+//! - `adam`: Adam, as one of `argmin`'s solvers
 //! - `drive`: the executor, watched
 //! - [`state`]: interrupted fits, resumed
 //! - [`starts`]: where the other starts of a multi-start fit begin
@@ -14,6 +15,7 @@
 
 use std::time::Instant;
 
+mod adam;
 pub mod bounded;
 pub mod coordinates;
 mod drive;

@@ -22,5 +22,7 @@ mod refusals;
 mod reports;
 mod samples;
 mod scene_files;
+#[cfg(target_os = "linux")]
+mod scheduler;
 mod shader;
 mod vectors;

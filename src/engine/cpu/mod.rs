@@ -256,7 +256,7 @@ impl Objective for CpuEngine {
     }
 
     fn rounding(&self) -> f64 {
-        super::rounding(&self.views, self.loss, BLOCK, self.stride)
+        super::rounding(&self.views, self.loss, self.stride)
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

@@ -1,6 +1,8 @@
 //! The sums of a chunk of blocks, and of chunks in a fixed order.
 
 use crate::engine::gram::{Columns, add_gram, add_last};
+// What the scratch holds at once: it should stay in the nearest caches.
+pub(super) use crate::engine::BLOCK;
 use crate::engine::kernel::Kernel;
 use crate::engine::lanes::Lanes;
 use crate::engine::plan::{ChannelPlan, Plan, WINDOW};
@@ -8,13 +10,8 @@ use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
-/// Groups in a block: what a pass over a share of the pixels reads or leaves out.
-pub(super) const BLOCK: usize = 8;
-/// Blocks that the scratch holds at once: it should stay in the nearest caches, and the Gram matrix's
-/// sums be fetched seldom.
-const HELD: usize = 2;
 /// Blocks in a chunk: one unit of work, and 64 terms a lane.
-pub(super) const CHUNK: usize = 8;
+pub(super) const CHUNK: usize = 4;
 
 /// What a pass yields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +56,7 @@ impl Scratch {
     pub(super) fn new(plan: &Plan) -> Self {
         let pairs: usize = plan.channels.iter().map(ChannelPlan::pairs).sum();
         Self {
-            rows: vec![Row::ZERO; plan.all_columns() * (HELD * BLOCK - 1) + WINDOW],
+            rows: vec![Row::ZERO; plan.all_columns() * (BLOCK - 1) + WINDOW],
             sums: vec![Row::ZERO; pairs],
         }
     }
@@ -79,19 +76,17 @@ pub(super) fn chunk<S: Simd>(
     sums.fill(Row::ZERO);
     let mut loss = Lanes::splat(simd, 0.0);
     let mut used = 0;
-    for blocks in blocks.chunks(HELD) {
-        let mut length = 0;
-        for block in blocks {
-            for group in block * BLOCK..groups.min((block + 1) * BLOCK) {
-                let Some(rows) = rows[length * stride..].first_chunk_mut() else { break };
-                if wish == Wish::Loss {
-                    kernel.group::<false>(group, rows);
-                    loss = loss + kernel.weigh::<false>(group, rows);
-                } else {
-                    kernel.group::<true>(group, rows);
-                    loss = loss + kernel.weigh::<true>(group, rows);
-                }
-                length += 1;
+    for &block in blocks {
+        let first = block * BLOCK;
+        let length = groups.min(first + BLOCK) - first;
+        for k in 0..length {
+            let Some(rows) = rows[k * stride..].first_chunk_mut() else { break };
+            if wish == Wish::Loss {
+                kernel.group::<false>(first + k, rows);
+                loss = loss + kernel.weigh::<false>(first + k, rows);
+            } else {
+                kernel.group::<true>(first + k, rows);
+                loss = loss + kernel.weigh::<true>(first + k, rows);
             }
         }
         used = 0;

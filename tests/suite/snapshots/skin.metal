@@ -112,7 +112,7 @@ struct Skinfit {
     // The part of the shading normal that the normal map's strength leaves alone.
     float3 base_of_texel(float3 decoded, float3 vertex_normal, float3 view) {
         float3 base = decoded.z * vertex_normal;
-        return (is_zero(base) || !is_finite(base) ? -view : base);
+        return (abs(base.x) + abs(base.y) + abs(base.z) < 1e-37 || !is_finite(base) ? -view : base);
     }
 
     // The smooth normal N of unit length; +Z where it vanishes, whatever the eye sees. That needs no V, and
