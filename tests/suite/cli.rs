@@ -8,6 +8,7 @@ mod exported;
 #[cfg(feature = "gpu")]
 mod graphics;
 mod interrupted;
+mod maps;
 mod outputs;
 mod refusals;
 mod refused_files;

@@ -28,6 +28,7 @@ fn pages() -> Vec<PathBuf> {
         "experiments/ablation",
         "experiments/accuracy_vs_time",
         "experiments/bench",
+        "experiments/network",
         "experiments/race",
         "experiments/scaling",
         "experiments/stability",

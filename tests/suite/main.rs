@@ -25,4 +25,6 @@ mod scene_files;
 #[cfg(target_os = "linux")]
 mod scheduler;
 mod shader;
+#[cfg(feature = "burn")]
+mod tensors;
 mod vectors;

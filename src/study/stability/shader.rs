@@ -13,7 +13,7 @@ use crate::gpu::{Choice, Gpu, GpuError};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::scene::{FitSettings, Loss, Quality, Scene, maps, mesh};
+use crate::scene::{FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;
 use crate::shader::probe::Probe;
@@ -190,7 +190,12 @@ fn scene() -> Scene {
         effects: Effects::default(),
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),
-        fit: FitSettings { free: Vec::new(), loss: Loss::L2, free_gains: false },
+        fit: FitSettings {
+            free: Vec::new(),
+            loss: Loss::L2,
+            free_gains: false,
+            maps: MapSettings::default(),
+        },
         quality: Quality::default(),
     }
 }

@@ -111,8 +111,7 @@ impl<'a> Bench<'a> {
         let posed = scene.mesh.pose();
         let samples =
             samples::sample_views(&scene, &posed, bake.occlusion.as_ref()).map_err(PrepareError::from)?;
-        let illumination = bake.illumination;
-        Ok(Evaluated { scene, illumination, samples })
+        Ok(Evaluated { scene, illumination: bake.illumination, samples })
     }
 }
 
