@@ -39,9 +39,10 @@ pub(super) struct Arguments {
     /// Start from these parameters, instead of the scene's start values.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
-    /// Which solver: varpro and lm take few passes; lbfgs and nelder-mead are there to compare
+    /// Which solver: varpro and lm take few passes; lbfgs, nelder-mead and adam are there to
+    /// compare
     /// [default: varpro].
-    #[arg(long, value_parser = ["varpro", "lm", "lbfgs", "nelder-mead"], help_heading = "Solver")]
+    #[arg(long, value_parser = ["varpro", "lm", "lbfgs", "nelder-mead", "adam"], help_heading = "Solver")]
     solver: Option<String>,
     /// What is minimised, instead of the scene's loss.
     #[arg(long, value_parser = ["l2", "relative_l2", "huber", "smape"], help_heading = "Solver")]
@@ -172,7 +173,11 @@ fn conclude(
 fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> {
     let Scene { form, params, fit, .. } = &prepared.scene;
     let start = Start { form: *form, params, free: &fit.free };
-    Changes { loss: arguments.loss.as_deref(), start: arguments.params.as_ref().map(|_| start), maps: &[] }
+    Changes {
+        loss: arguments.loss.as_deref(),
+        start: arguments.params.as_ref().map(|_| start),
+        ..Changes::default()
+    }
 }
 
 /// What to do about a fit that did not converge.

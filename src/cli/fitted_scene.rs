@@ -7,6 +7,7 @@ use toml_edit::{Array, DocumentMut, Item, Table, TableLike, TomlError, Value};
 
 use crate::model::effects::Form;
 use crate::model::params::{Channels, Column, Param, Params};
+use crate::study::tradeoff::axis::Choose;
 
 /// What the command line changed.
 #[derive(Clone, Copy, Default)]
@@ -17,6 +18,8 @@ pub(super) struct Changes<'a> {
     pub(super) start: Option<Start<'a>>,
     /// Fitted maps, instead of the file's: key in `[maps]` and path.
     pub(super) maps: &'a [(&'static str, String)],
+    /// Settings, instead of the file's.
+    pub(super) settings: &'a [Choose],
 }
 
 /// Start values that a fit used.
@@ -71,6 +74,15 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
             set_params(params, start);
         }
     }
+    for choose in changes.settings {
+        let (table, key, value): (_, _, Value) = match choose {
+            Choose::Quality(knob, value) => ("quality", knob.key(), i64::from(*value).into()),
+            Choose::Silhouette(silhouette) => ("model", "silhouette", silhouette.name().into()),
+        };
+        if let Some(table) = section(scene.as_table_mut(), table) {
+            set(table, key, value);
+        }
+    }
     Ok(scene.to_string())
 }
 
@@ -118,6 +130,8 @@ fn set_params(table: &mut dyn TableLike, start: Start<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::effects::Silhouette;
+    use crate::study::tradeoff::axis::Knob;
 
     const SCENE: &str = "# kept\n[mesh]\nfile = \"a b.glb\" # here too\n[maps]\ncolor = '/c.png'\n\
         [[view]]\ntarget = \"t\\u0041.exr\"\n";
@@ -133,6 +147,19 @@ mod tests {
         let inline = "view = [{ target = \"a.exr\", mask = \"b.png\" }] # views\n";
         let text = as_fitted(inline, Path::new("/s"), Changes::default()).unwrap();
         assert_eq!(text, "view = [{ target = \"/s/a.exr\", mask = \"/s/b.png\" }] # views\n");
+    }
+
+    #[test]
+    fn settings_stand_in_the_place_of_the_files_own() {
+        let settings = [Choose::Quality(Knob::LobeSize, 16), Choose::Silhouette(Silhouette::Vertex)];
+        let changes = Changes { settings: &settings, ..Changes::default() };
+        for quality in ["", "[quality]\nlobe_size = 99 # coarse\n", "[model]\nsilhouette = \"bumped\"\n"] {
+            let text = as_fitted(&format!("{quality}{SCENE}"), Path::new("/s"), changes).unwrap();
+            let table: toml::Table = text.parse().unwrap();
+            assert_eq!(table["quality"]["lobe_size"].as_integer(), Some(16), "{text}");
+            assert_eq!(table["model"]["silhouette"].as_str(), Some("vertex"), "{text}");
+            assert_eq!(text.matches("# coarse").count(), quality.matches("# coarse").count());
+        }
     }
 
     #[test]

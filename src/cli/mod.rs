@@ -1,12 +1,13 @@
 //! The command line: one file a command. Every command ends with an [`Exit`].
 //!
-//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `stability`, `sweep`, `collect`: the
-//!   commands
+//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `stability`,
+//!   `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
+mod ablate;
 mod bake;
 mod demo;
 mod export;
@@ -22,6 +23,7 @@ mod scene;
 mod shader;
 mod stability;
 mod sweep;
+mod tradeoff;
 
 use std::io::Write as _;
 use std::path::Path;
@@ -98,6 +100,8 @@ struct Arguments {
 #[derive(Subcommand)]
 enum Command {
     Fit(fit::Arguments),
+    Ablate(ablate::Arguments),
+    Tradeoff(tradeoff::Arguments),
     Render(render::Arguments),
     Bake(bake::Arguments),
     Demo(demo::Arguments),
@@ -117,6 +121,8 @@ pub fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let done = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
+        Command::Ablate(arguments) => ablate::run(&arguments),
+        Command::Tradeoff(arguments) => tradeoff::run(&arguments),
         Command::Render(arguments) => render::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),

@@ -55,6 +55,11 @@ impl SceneArguments {
         self.bakes.kept_path(self.scene.as_deref(), folder)
     }
 
+    /// What the scene at `path` is called in reports.
+    pub(super) fn name(&self, path: &Path) -> String {
+        self.scene.as_ref().map_or_else(|| "the built-in scene".to_owned(), |_| path.display().to_string())
+    }
+
     /// Where bakes are kept; `None` with `--no-cache`.
     pub(super) fn cache(&self) -> Option<PathBuf> {
         self.bakes.cache()

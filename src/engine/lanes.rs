@@ -75,7 +75,16 @@ impl<S: Simd> Lanes<S> {
 impl<S: Simd> Real for Lanes<S> {
     type Mask = mask32x16<S>;
     type Texel = f32;
+    type Wide = Self;
 
+    #[inline(always)]
+    fn widen(self) -> Self {
+        self
+    }
+    #[inline(always)]
+    fn narrow(wide: Self) -> Self {
+        wide
+    }
     #[inline(always)]
     #[allow(clippy::cast_possible_truncation, reason = "rounds to the scalar")]
     fn lit(self, value: f64) -> Self {

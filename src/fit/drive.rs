@@ -15,6 +15,7 @@ use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::quasinewton::LBFGS;
 
+use super::adam::{Adam, AdamState};
 use super::bounded;
 use super::linearisation::{EngineFault, Linearisation, Passes};
 use super::lm::{LevenbergMarquardt, LmState};
@@ -128,6 +129,7 @@ impl Remembers for LevenbergMarquardt<'_> {
 }
 impl<L, P, G, F> Remembers for LBFGS<L, P, G, F> {}
 impl<P, F> Remembers for NelderMead<P, F> {}
+impl Remembers for Adam {}
 
 /// A solver whose iterations are written down, and that ends when it is told to.
 struct Watched<'w, 'a, S, M> {
@@ -185,7 +187,7 @@ where
 pub(super) fn run(kind: SolverKind, log: &mut Log<'_>) -> Result<(), FitError> {
     match kind {
         SolverKind::Varpro | SolverKind::Lm => run_lm(kind, log),
-        SolverKind::Lbfgs | SolverKind::NelderMead => run_unbounded(kind, log),
+        SolverKind::Lbfgs | SolverKind::NelderMead | SolverKind::Adam => run_unbounded(kind, log),
     }
 }
 
@@ -255,7 +257,7 @@ fn run_once(kind: SolverKind, log: &mut Log<'_>) -> Result<Ending, FitError> {
     let first = first.unwrap_or_else(|| passes.linearise(&at));
     let transform = Transform::new(passes.coordinates(), &first);
     let (left, scale) = (log.iterations_left(), log.run().loss_start);
-    let problem = Unbounded::new(passes, &transform, kind == SolverKind::Lbfgs);
+    let problem = Unbounded::new(passes, &transform, kind != SolverKind::NelderMead);
     let coordinates = |y: &[f64]| transform.coordinates(y);
     let failed = |e: Error| FitError::Solver { solver: kind.name(), reason: e.to_string() };
     if kind == SolverKind::Lbfgs {
@@ -266,6 +268,12 @@ fn run_once(kind: SolverKind, log: &mut Log<'_>) -> Result<Ending, FitError> {
             .map_err(failed)?;
         let start = transform.start().to_vec();
         let configure = |s: LmState| s.param(start).max_iters(left);
+        let watched = Watched { solver, log, coordinates };
+        execute(Executor::new(problem, watched).configure(configure), kind)
+    } else if kind == SolverKind::Adam {
+        let solver = Adam::new(scale.sqrt(), GRADIENT_TOLERANCE * scale.sqrt());
+        let start = transform.start().to_vec();
+        let configure = |s: AdamState| s.param(start).max_iters(left);
         let watched = Watched { solver, log, coordinates };
         execute(Executor::new(problem, watched).configure(configure), kind)
     } else {

@@ -5,21 +5,24 @@
 //! - [`bounded`]: the bounded least-squares step
 //! - [`lm`], [`memory`]: Levenberg-Marquardt; [`varpro`]: what makes it variable projection
 //! - [`transform`], [`unbounded`]: bounds and costs for `argmin`'s own solvers
+//! - `adam`: Adam, as one of `argmin`'s solvers
 //! - `drive`: the executor, watched
 //! - [`state`]: interrupted fits, resumed
 //! - [`starts`]: where the other starts of a multi-start fit begin
-//! - [`statistics`]: standard errors, correlations, and what is undetermined
+//! - [`statistics`]: standard errors and correlations; `null_space`: what is undetermined
 //! - [`outcome`]: what a fit yields
 //! - [`params_file`]: what was fitted, as `params.toml`
 
 use std::time::Instant;
 
+mod adam;
 pub mod bounded;
 pub mod coordinates;
 mod drive;
 pub mod linearisation;
 pub mod lm;
 pub mod memory;
+mod null_space;
 pub mod options;
 pub mod outcome;
 pub mod params_file;

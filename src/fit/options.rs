@@ -22,11 +22,13 @@ pub enum SolverKind {
     Lbfgs,
     /// The simplex of Nelder and Mead, bounds by transforms; for comparison.
     NelderMead,
+    /// Adam's gradient steps, bounds by transforms; for comparison.
+    Adam,
 }
 
 impl SolverKind {
     /// Every solver, in the order of documentation.
-    pub const ALL: [Self; 4] = [Self::Varpro, Self::Lm, Self::Lbfgs, Self::NelderMead];
+    pub const ALL: [Self; 5] = [Self::Varpro, Self::Lm, Self::Lbfgs, Self::NelderMead, Self::Adam];
 
     /// The name on the command line.
     #[must_use]
@@ -36,6 +38,7 @@ impl SolverKind {
             Self::Lm => "lm",
             Self::Lbfgs => "lbfgs",
             Self::NelderMead => "nelder-mead",
+            Self::Adam => "adam",
         }
     }
 
@@ -54,6 +57,8 @@ impl SolverKind {
             Self::Lbfgs => 1000,
             // A simplex needs some hundreds for each unknown.
             Self::NelderMead => 20_000,
+            // Its steps have shrunk to a fortieth by then.
+            Self::Adam => 2_000,
         }
     }
 }

@@ -110,10 +110,25 @@ impl<R: Real> Composition<R> {
     /// The result in channel `c`, 0 to 2.
     #[inline(always)]
     pub fn result(&self, c: usize) -> R {
+        if R::DECLARED {
+            return self.declared(c);
+        }
         let (t, w) = (&self.terms, &self.weights);
         let side = w.side_specular[c] * t.side[c];
         let rest = w.reflection[c].mul_add(t.mirror[c], side);
         self.occ.mul_add(self.occluded(c), w.key[c].mul_add(t.key[c], rest))
+    }
+
+    /// The sum in the listing's order, each of its variables of the type that it declares. (The attenuator is
+    /// in the hilite's term already, which is thus rounded once where the listing rounds twice.)
+    #[inline(always)]
+    fn declared(&self, c: usize) -> R {
+        let (t, w) = (&self.terms, &self.weights);
+        let diffuse = (t.diffuse[c] * self.occ).fixed();
+        let lit = diffuse.mul_add(self.facing(c), w.side_specular[c] * t.side[c]).fixed();
+        let mirrored = (t.mirror[c] * w.reflection[c].fixed()).fixed();
+        let hilite = (w.hilite[c] * self.occ_rim * t.hilite[c]).fixed();
+        ((lit + mirrored).fixed() + hilite).fixed() + (w.key[c] * t.key[c]).fixed()
     }
 
     /// What each term adds to channel `c`.
@@ -134,7 +149,7 @@ impl<R: Real> Composition<R> {
     /// The haze written to alpha.
     #[inline(always)]
     pub fn alpha(&self) -> R {
-        self.weights.haze * self.terms.haze
+        (self.weights.haze * self.terms.haze).fixed()
     }
 
     /// d result / d param in channel `c`, for a parameter that needs no lookup.

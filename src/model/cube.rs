@@ -54,7 +54,7 @@ pub struct CubePoint<R: Real> {
     face: R,
     s: R,
     t: R,
-    /// 1 / the major axis' length.
+    /// 1 / the major axis' length, at most 1e6.
     inverse_major: R,
     x_major: R::Mask,
     y_major: R::Mask,
@@ -88,7 +88,8 @@ impl<R: Real> CubePoint<R> {
             face: face + R::select(positive, zero, one),
             s: (s * inverse_major).mul_add(half, half),
             t: (t * inverse_major).mul_add(half, half),
-            inverse_major,
+            // A shorter direction turns no faster, or squares of derivatives would overflow an f32.
+            inverse_major: inverse_major.min(one.lit(1e6)),
             ..point
         }
     }

@@ -53,14 +53,14 @@ pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V
     (scale(d[2], n), scale_add(d[0], t, scale(d[1], b)))
 }
 
-/// Base and bump as a sample holds them: where no base is left the side that faces the eye counts, and a
-/// bump that is not finite counts nothing (MODEL 7).
+/// Base and bump as a sample holds them: where no base is left (below 1e-37 it is noise) the side that faces
+/// the eye counts, and a bump that is not finite counts nothing (MODEL 7).
 #[inline(always)]
 pub fn guarded<R: Real>(base: V3<R>, bump: V3<R>, view: V3<R>) -> (V3<R>, V3<R>) {
     let zero = view[0].lit(0.0);
     let size = |v: V3<R>| v[0].abs() + v[1].abs() + v[2].abs();
     let (base_size, bump_size) = (size(base), size(bump));
-    let there = R::and(base_size.is_finite(), zero.lt(base_size));
+    let there = R::and(base_size.is_finite(), base_size.ge(zero.lit(1e-37)));
     let base = select::<R>(there, base, [-view[0], -view[1], -view[2]]);
     (base, select::<R>(bump_size.is_finite(), bump, [zero; 3]))
 }
@@ -102,20 +102,25 @@ pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R
     let v = f.view;
     let m = scale_add(strength, f.bump, f.base);
     let (n, n_tangent) = match form {
-        Form::Listing => (m, f.bump),
+        Form::Listing => (m.map(R::half), f.bump),
         Form::Corrected => {
             let (n, inverse_length) = unit_normal(m, f.normal, v);
             // d (m / |m|) = (dm - n (n . dm)) / |m|
             let turning = scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump));
             let (least, most) = (strength.lit(-STEEPEST), strength.lit(STEEPEST));
-            (n, turning.map(|x| x.max(least).min(most)))
+            (n.map(R::half), turning.map(|x| x.max(least).min(most)))
         }
     };
-    let (q, dq) = (dot(n, v), dot(n_tangent, v));
+    let (q, dq) = (dot(n, v).fixed(), dot(n_tangent, v));
     let (reflection, reflection_tangent) = match form {
         // Oddity 3: the two dot products look swapped.
-        Form::Listing => (sub(scale(q, v), scale(two, n)), sub(scale(dq, v), scale(two, n_tangent))),
-        Form::Corrected => (scale_add(-two * q, n, v), scale(-two, scale_add(dq, n, scale(q, n_tangent)))),
+        Form::Listing => {
+            let twice = scale(two.fixed(), n).map(R::half);
+            (sub(scale(q, v), twice).map(R::fixed), sub(scale(dq, v), scale(two, n_tangent)))
+        }
+        Form::Corrected => {
+            (scale_add(-two * q, n, v).map(R::fixed), scale(-two, scale_add(dq, n, scale(q, n_tangent))))
+        }
     };
     let (silhouette, silhouette_tangent) = match at {
         Silhouette::Bumped => (silhouette(q), silhouette_slope(q) * dq),
@@ -136,4 +141,40 @@ fn unit_normal<R: Real>(m: V3<R>, smooth: V3<R>, view: V3<R>) -> (V3<R>, R) {
     }
     let (normal, _) = normalize_or(smooth, [-view[0], -view[1], -view[2]]);
     normalize_or(m, normal)
+}
+
+impl Fragment<f64> {
+    /// The fragment in the number format that `like` is a number of.
+    #[must_use]
+    pub fn in_format<R: Real>(&self, like: R) -> Fragment<R> {
+        let lit = |v: V3<f64>| v.map(|x| like.lit(x));
+        let fragment = Fragment {
+            base: lit(self.base),
+            bump: lit(self.bump),
+            normal: lit(self.normal),
+            view: lit(self.view),
+            occlusion: like.lit(self.occlusion),
+            silhouette: like.lit(self.silhouette),
+            dapple: like.lit(self.dapple),
+            albedo: lit(self.albedo),
+            specular: like.lit(self.specular),
+            attenuator: like.lit(self.attenuator),
+        };
+        fragment.declared()
+    }
+}
+
+impl<R: Real> Fragment<R> {
+    /// The fragment with the types that the listing declares for what it reads: `half` textures, a `fixed`
+    /// attenuator.
+    #[must_use]
+    #[inline(always)]
+    pub fn declared(self) -> Self {
+        Self {
+            albedo: self.albedo.map(R::half),
+            specular: self.specular.half(),
+            attenuator: self.attenuator.fixed(),
+            ..self
+        }
+    }
 }

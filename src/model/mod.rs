@@ -1,6 +1,7 @@
 //! The skin model: formulas, parameters and effects, generic over the scalar.
 //!
-//! - [`real`]: what the model asks of a number (f32, f64, SIMD lanes; number formats can follow)
+//! - [`real`]: what the model asks of a number (f32, f64, SIMD lanes)
+//! - [`formats`]: number formats of graphics processors
 //! - [`vector`]: the few 3-vector operations that the formulas use
 //! - [`params`]: the one table of parameters
 //! - [`effects`]: what can be switched on, and what each effect asks for
@@ -17,6 +18,7 @@ pub mod compose;
 pub mod cube;
 pub mod effects;
 pub mod evaluate;
+pub mod formats;
 pub mod fragment;
 pub mod lights;
 pub mod params;

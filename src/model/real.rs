@@ -1,5 +1,5 @@
 //! What the model asks of a number. The formulas are written once over [`Real`]; f32 and f64
-//! stand here, SIMD lanes in the engine, and reduced number formats can follow.
+//! stand here, SIMD lanes in the engine, reduced number formats in [`super::formats`].
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -14,6 +14,25 @@ pub trait Real:
     type Mask: Copy;
     /// What a texel's channel is stored as.
     type Texel: Copy;
+    /// What textures are addressed with: a reduced format has too few numbers for that.
+    type Wide: Real<Texel = Self::Texel>;
+    /// Whether variables have the types that listing 3-4 declares; then the sum is taken in its order.
+    const DECLARED: bool = false;
+
+    /// This number as an address.
+    fn widen(self) -> Self::Wide;
+    /// What a lookup yields, as a number of this kind.
+    fn narrow(wide: Self::Wide) -> Self;
+    /// As assigned to a variable that the listing declares `half`.
+    #[inline(always)]
+    fn half(self) -> Self {
+        self
+    }
+    /// As assigned to a variable that the listing declares `fixed`.
+    #[inline(always)]
+    fn fixed(self) -> Self {
+        self
+    }
 
     /// The constant `value`, in as many lanes as `self`.
     fn lit(self, value: f64) -> Self;
@@ -72,7 +91,16 @@ macro_rules! real_for_float {
         impl Real for $float {
             type Mask = bool;
             type Texel = $float;
+            type Wide = Self;
 
+            #[inline(always)]
+            fn widen(self) -> Self {
+                self
+            }
+            #[inline(always)]
+            fn narrow(wide: Self) -> Self {
+                wide
+            }
             #[inline(always)]
             #[allow(clippy::cast_possible_truncation, trivial_numeric_casts, reason = "rounds to the scalar")]
             fn lit(self, value: f64) -> Self {

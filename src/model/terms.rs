@@ -74,27 +74,39 @@ impl Wanted {
     pub const NONE: Self = Self { diffuse: false, side: false, hilite: false, mirror: false, key: false };
 }
 
+/// Where a direction meets the cubes.
+#[inline(always)]
+fn point<R: Real>(direction: V3<R>) -> CubePoint<R::Wide> {
+    CubePoint::new(direction.map(R::widen))
+}
+
+/// The lookup at a point.
+#[inline(always)]
+fn look_up<R: Real>(cube: &Cube<R::Texel>, at: &CubePoint<R::Wide>) -> [R; 4] {
+    cube.sample_at(&cube.footprint(at)).map(R::narrow)
+}
+
 /// The wanted terms of a fragment.
 #[inline(always)]
 pub fn terms<R: Real>(lights: &Lights<'_, R>, f: &Fragment<R>, s: &Shading<R>, wanted: Wanted) -> Terms<R> {
     let zero = f.view[0].lit(0.0);
     let mut terms = Terms::none(s.silhouette);
     if (wanted.diffuse && lights.irradiance.is_some()) || (wanted.side && lights.side.is_some()) {
-        let n = CubePoint::new(lights.turned(s.n));
+        let n = point(lights.turned(s.n));
         if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-            terms.diffuse = mul(f.albedo, rgb(cube.sample_at(&cube.footprint(&n))));
+            terms.diffuse = mul(f.albedo, rgb(look_up(cube, &n))).map(R::fixed);
         }
         if let (true, Some(cube)) = (wanted.side, lights.side) {
-            terms.side = scale(f.specular, rgb(cube.sample_at(&cube.footprint(&n))));
+            terms.side = scale(f.specular, rgb(look_up(cube, &n))).map(R::fixed);
         }
     }
     if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let e = cube.sample(lights.turned(s.reflection));
-        terms.mirror = scale(f.dapple, rgb(e));
-        terms.haze = f.dapple * f.attenuator * e[3];
+        let e = look_up(cube, &point(lights.turned(s.reflection)));
+        terms.mirror = scale(f.dapple, rgb(e)).map(R::fixed);
+        terms.haze = ((f.dapple * e[3]).fixed() * f.attenuator).fixed();
     }
     if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
-        terms.hilite = scale(f.attenuator, rgb(cube.sample(lights.turned(f.view))));
+        terms.hilite = scale(f.attenuator, rgb(look_up(cube, &point(lights.turned(f.view)))));
     }
     if let (true, Some(key)) = (wanted.key, lights.key) {
         let lambert = |n: V3<R>| dot(n, key.direction).max(zero);
@@ -116,6 +128,13 @@ impl<R: Real> Lookup<R> {
     fn new(cube: &Cube<R::Texel>, point: &CubePoint<R>, tangent: [R; 2]) -> Self {
         Self { at: cube.footprint(point), tangent: cube.texels(tangent) }
     }
+
+    /// The lookup, and its derivative, as numbers of a kind that is addressed so.
+    #[inline(always)]
+    fn read<N: Real<Texel = R::Texel, Wide = R>>(&self, cube: &Cube<R::Texel>) -> ([N; 4], [N; 4]) {
+        let (value, slope) = cube.sample_with_slope(&self.at, self.tangent);
+        (value.map(N::narrow), slope.map(N::narrow))
+    }
 }
 
 /// The wanted terms, and their derivative with respect to `normal_strength`: the same texels serve
@@ -131,11 +150,12 @@ pub fn terms_with_strength_tangent<R: Real>(
     wanted: Wanted,
 ) -> (Terms<R>, Terms<R>) {
     let zero = f.view[0].lit(0.0);
-    let nowhere = Lookup { at: Footprint { first: zero, place: [zero; 2] }, tangent: [zero; 2] };
+    let origin = zero.widen();
+    let nowhere = Lookup { at: Footprint { first: origin, place: [origin; 2] }, tangent: [origin; 2] };
     let (mut diffuse, mut side, mut mirror, mut hilite) = (nowhere, nowhere, nowhere, nowhere.at);
     if (wanted.diffuse && lights.irradiance.is_some()) || (wanted.side && lights.side.is_some()) {
-        let n = CubePoint::new(lights.turned(s.n));
-        let tangent = n.tangent(lights.turned(s.n_tangent));
+        let n = point(lights.turned(s.n));
+        let tangent = n.tangent(lights.turned(s.n_tangent).map(R::widen));
         if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
             diffuse = Lookup::new(cube, &n, tangent);
         }
@@ -144,34 +164,34 @@ pub fn terms_with_strength_tangent<R: Real>(
         }
     }
     if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let r = CubePoint::new(lights.turned(s.reflection));
-        mirror = Lookup::new(cube, &r, r.tangent(lights.turned(s.reflection_tangent)));
+        let r = point(lights.turned(s.reflection));
+        mirror = Lookup::new(cube, &r, r.tangent(lights.turned(s.reflection_tangent).map(R::widen)));
     }
     if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
-        hilite = cube.footprint(&CubePoint::new(lights.turned(f.view)));
+        hilite = cube.footprint(&point(lights.turned(f.view)));
     }
 
     let mut terms = Terms::none(s.silhouette);
     let mut slope = Terms::none(s.silhouette_tangent);
     if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-        let (e, de) = cube.sample_with_slope(&diffuse.at, diffuse.tangent);
+        let (e, de) = diffuse.read(cube);
         terms.diffuse = mul(f.albedo, rgb(e));
         slope.diffuse = mul(f.albedo, rgb(de));
     }
     if let (true, Some(cube)) = (wanted.side, lights.side) {
-        let (e, de) = cube.sample_with_slope(&side.at, side.tangent);
+        let (e, de) = side.read(cube);
         terms.side = scale(f.specular, rgb(e));
         slope.side = scale(f.specular, rgb(de));
     }
     if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let (e, de) = cube.sample_with_slope(&mirror.at, mirror.tangent);
+        let (e, de) = mirror.read(cube);
         terms.mirror = scale(f.dapple, rgb(e));
         slope.mirror = scale(f.dapple, rgb(de));
         terms.haze = f.dapple * f.attenuator * e[3];
         slope.haze = f.dapple * f.attenuator * de[3];
     }
     if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
-        terms.hilite = scale(f.attenuator, rgb(cube.sample_at(&hilite)));
+        terms.hilite = scale(f.attenuator, rgb(cube.sample_at(&hilite).map(R::narrow)));
     }
     if let (true, Some(key)) = (wanted.key, lights.key) {
         let (bumped, smooth) = (dot(s.n, key.direction), dot(f.normal, key.direction));
@@ -197,20 +217,20 @@ pub fn terms_tangent<R: Real>(
         LookupParam::SpecularLobe => {
             if let Some(cube) = lights.lobe_slope {
                 if lights.side.is_some() {
-                    slope.side = scale(f.specular, rgb(cube.sample(n)));
+                    slope.side = scale(f.specular, rgb(look_up(cube, &point(n))));
                 }
                 if lights.mirror.is_some() {
-                    let e = cube.sample(r);
+                    let e = look_up(cube, &point(r));
                     slope.mirror = scale(f.dapple, rgb(e));
                     slope.haze = f.dapple * f.attenuator * e[3];
                 }
             }
         }
         LookupParam::EnvironmentRotation => {
-            let turned = |cube: &Cube<R::Texel>, d: V3<R>| {
-                let point = CubePoint::new(d);
-                let tangent = cube.texels(point.tangent(lights.turning(d)));
-                cube.sample_with_slope(&cube.footprint(&point), tangent).1
+            let turned = |cube: &Cube<R::Texel>, d: V3<R>| -> [R; 4] {
+                let at = point(d);
+                let tangent = cube.texels(at.tangent(lights.turning(d).map(R::widen)));
+                cube.sample_with_slope(&cube.footprint(&at), tangent).1.map(R::narrow)
             };
             if let Some(cube) = lights.irradiance {
                 slope.diffuse = mul(f.albedo, rgb(turned(cube, n)));

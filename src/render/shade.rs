@@ -3,14 +3,15 @@
 use rayon::prelude::*;
 
 use super::image::Image;
-use crate::engine::cpu::Illumination;
+use crate::bake::Illumination;
 use crate::model::compose::TermName;
 use crate::model::cube::Cube;
 use crate::model::effects::Effect;
-use crate::model::evaluate::{Setup, compose};
+use crate::model::evaluate::{Setup, compose, shade};
 use crate::model::fragment::Fragment;
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
+use crate::model::real::Real;
 use crate::samples::{LANES, ViewSamples};
 use crate::scene::view::Camera;
 
@@ -49,6 +50,67 @@ impl Shader {
         }
     }
 
+    /// The image of a view in another number format: what `like` is a number of. No terms, no haze.
+    #[must_use]
+    pub fn shade_in<R>(&self, samples: &ViewSamples, camera: &Camera, gain: f64, like: R) -> Image
+    where
+        R: Real<Texel = f64> + Into<f64> + Sync,
+    {
+        let mut image = Image::new(camera.width as usize, camera.height as usize);
+        let groups: Vec<Vec<(usize, f32, [f64; 3])>> = (0..samples.groups())
+            .into_par_iter()
+            .map(|group| self.group_in(samples, group, gain, like))
+            .collect();
+        for (at, coverage, rgb) in groups.into_iter().flatten() {
+            image.rgb[at] = rgb.map(|x| x as f32);
+            image.alpha[at] = coverage;
+        }
+        image
+    }
+
+    /// The pixels of a group, each sample in another number format; their mean is exact.
+    fn group_in<R>(
+        &self,
+        samples: &ViewSamples,
+        group: usize,
+        gain: f64,
+        like: R,
+    ) -> Vec<(usize, f32, [f64; 3])>
+    where
+        R: Real<Texel = f64> + Into<f64>,
+    {
+        let lights = Lights::new(self.setup, &self.params, self.cubes(), false, like);
+        let records = samples.group_start[group] as usize..samples.group_start[group + 1] as usize;
+        let mut pixels = Vec::new();
+        for lane in 0..LANES {
+            let slot = group * LANES + lane;
+            if samples.pixel[slot] == u32::MAX {
+                continue;
+            }
+            let coverage = samples.coverage[slot];
+            let mut sum = [0.0; 3];
+            for at in records.clone().map(|record| record * LANES + lane) {
+                let share = f64::from(samples.surface.weight(at)) * f64::from(coverage) * gain;
+                if share != 0.0 {
+                    let fragment = wide(&samples.surface.fragment(at)).in_format(like);
+                    let rgba = shade(self.setup, &lights, &fragment, &self.params);
+                    (0..3).for_each(|c| sum[c] += share * rgba[c].into());
+                }
+            }
+            pixels.push((samples.pixel[slot] as usize, coverage, sum));
+        }
+        pixels
+    }
+
+    fn cubes(&self) -> Cubes<'_, f64> {
+        Cubes {
+            irradiance: self.irradiance.as_ref(),
+            specular: self.specular.as_ref(),
+            lobe_slope: None,
+            hilite: self.hilite.as_ref(),
+        }
+    }
+
     /// The image of a view, times `gain`. All cores; the same for any number of threads.
     #[must_use]
     pub fn shade(&self, samples: &ViewSamples, camera: &Camera, gain: f64) -> Shaded {
@@ -84,13 +146,7 @@ impl Shader {
 
     /// The pixels of a group: means over their samples, premultiplied by their coverage.
     fn group(&self, samples: &ViewSamples, group: usize, gain: f64) -> Vec<Pixel> {
-        let cubes = Cubes {
-            irradiance: self.irradiance.as_ref(),
-            specular: self.specular.as_ref(),
-            lobe_slope: None,
-            hilite: self.hilite.as_ref(),
-        };
-        let lights = Lights::new(self.setup, &self.params, cubes, false, 0.0_f64);
+        let lights = Lights::new(self.setup, &self.params, self.cubes(), false, 0.0_f64);
         let records = samples.group_start[group] as usize..samples.group_start[group + 1] as usize;
         let lane = |lane: usize| {
             let slot = group * LANES + lane;

@@ -3,8 +3,8 @@
 
 use std::fmt::Write as _;
 
-use super::html::escape;
 use super::json::{Correlations, Summary, UnknownSummary};
+use super::page::escape;
 use super::words::{number, seconds};
 use crate::fit::outcome::Iteration;
 
@@ -103,7 +103,7 @@ fn convergence_panel(summary: &Summary, along: Along) -> String {
 }
 
 /// Decades that hold every positive value, with some room; at least half a decade.
-fn log_range(values: &[f64]) -> (f64, f64) {
+pub(super) fn log_range(values: &[f64]) -> (f64, f64) {
     let logs = values.iter().filter(|v| **v > 0.0 && v.is_finite()).map(|v| v.log10());
     let (low, high) = logs.fold((f64::MAX, f64::MIN), |(a, b), x| (a.min(x), b.max(x)));
     if low > high {
@@ -114,7 +114,7 @@ fn log_range(values: &[f64]) -> (f64, f64) {
 }
 
 /// Round values on a logarithmic axis: as many of 1, 2, 5 times powers of ten as read well.
-fn log_ticks(low: f64, high: f64) -> Vec<f64> {
+pub(super) fn log_ticks(low: f64, high: f64) -> Vec<f64> {
     let decades = (low.floor() as i32)..=(high.ceil() as i32);
     let every = ((high - low) / 7.0).ceil().max(1.0) as i32;
     let steps: &[f64] = match high - low {
@@ -132,7 +132,7 @@ fn log_ticks(low: f64, high: f64) -> Vec<f64> {
 }
 
 /// Round values from 0 to `end` or a little beyond, and where the axis ends.
-fn linear_ticks(end: f64) -> (Vec<f64>, f64) {
+pub(super) fn linear_ticks(end: f64) -> (Vec<f64>, f64) {
     let end = if end.is_finite() && end > 0.0 { end } else { 1.0 };
     let rough = end / 5.0;
     let power = 10.0_f64.powf(rough.log10().floor());
@@ -141,11 +141,14 @@ fn linear_ticks(end: f64) -> (Vec<f64>, f64) {
     (ticks, end * 1.02)
 }
 
-fn tick_label(tick: f64) -> String {
+pub(super) fn tick_label(tick: f64) -> String {
     let text = number(tick, 2);
-    match text.contains('.') && !text.contains('×') {
-        true => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
-        false => text,
+    match text.split_once('×') {
+        // Powers of ten need no factor.
+        Some(("1.0", power)) => power.to_owned(),
+        Some((factor, power)) => format!("{}×{power}", factor.trim_end_matches(".0")),
+        None if text.contains('.') => text.trim_end_matches('0').trim_end_matches('.').to_owned(),
+        None => text,
     }
 }
 

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::ViewEvidence;
-use super::html::escape;
 use super::json::ViewSummary;
+use super::page::escape;
 use super::pictures::Picture;
 use crate::render::files::{Image, encode_png};
 
@@ -19,27 +19,41 @@ const LONGEST_TERM: usize = 320;
 /// When a picture cannot be encoded.
 pub(super) fn view(view: &ViewEvidence, scores: &ViewSummary, error: &Picture) -> Result<String, String> {
     let name = escape(&view.name);
-    let target = data_uri(&Picture::of_image(&view.target.shrunk(LONGEST)))?;
-    let fit = data_uri(&Picture::of_image(&view.fit.shrunk(LONGEST)))?;
-    let error = data_uri(&thinned(error, LONGEST))?;
-    let legend = "FLIP error <span class=\"bar\"><i>0</i><b></b><i>1</i></span>";
-    let hint = "fit<span class=\"hint\" hidden> · drag across it to wipe in the target</span>";
+    let target = Picture::of_image(&view.target.shrunk(LONGEST));
+    let fit = Picture::of_image(&view.fit.shrunk(LONGEST));
+    let triple = triple(&view.name, &target, &fit, error, ["target", "fit", "wipe in the target"])?;
+    let (scores, terms) = (score_list(scores), terms(view)?);
+    Ok(format!("<article class=\"view\"><header><h3>{name}</h3>{scores}</header>{triple}{terms}</article>"))
+}
+
+/// Two pictures of one thing and the error between them, side by side; `words` name the first and the
+/// second, and say what dragging across the second does.
+///
+/// # Errors
+/// When a picture cannot be encoded.
+pub fn triple(
+    name: &str,
+    before: &Picture,
+    after: &Picture,
+    error: &Picture,
+    [first, second, wipe]: [&str; 3],
+) -> Result<String, String> {
+    let name = escape(name);
+    let legend = "FLIP error <span class=\"bar\"><i>0</i><b></b><i>1</i></span>".to_owned();
+    let hint = format!("{second}<span class=\"hint\" hidden> · drag across it to {wipe}</span>");
     // Single pixels of a tiny image are meant to be seen.
-    let frame = if view.fit.width < 200 { "frame tiny" } else { "frame" };
-    let (width, height) = (view.fit.width, view.fit.height);
-    let figure = |(uri, what, caption): (&str, &str, &str)| {
-        format!(
+    let frame = if after.width < 200 { "frame tiny" } else { "frame" };
+    let (width, height) = (after.width, after.height);
+    let figure = |(picture, what, caption): (&Picture, &str, String)| {
+        let uri = data_uri(&thinned(picture, LONGEST))?;
+        Ok(format!(
             "<figure><div class=\"{frame}\"><img src=\"{uri}\" width=\"{width}\" height=\"{height}\" \
              alt=\"{what} of view {name}\"></div><figcaption>{caption}</figcaption></figure>"
-        )
+        ))
     };
-    let triple = [(&*target, "target", "target"), (&*fit, "fit", hint), (&*error, "FLIP error", legend)];
-    let triple: String = triple.into_iter().map(figure).collect();
-    let (scores, terms) = (score_list(scores), terms(view)?);
-    Ok(format!(
-        "<article class=\"view\"><header><h3>{name}</h3>{scores}</header>\
-         <div class=\"triple\">{triple}</div>{terms}</article>"
-    ))
+    let panels = [(before, first, first.to_owned()), (after, second, hint), (error, "FLIP error", legend)];
+    let figures = panels.into_iter().map(figure).collect::<Result<Vec<_>, String>>()?;
+    Ok(format!("<div class=\"triple\">{}</div>", figures.concat()))
 }
 
 fn score_list(scores: &ViewSummary) -> String {

@@ -1,10 +1,11 @@
-//! `report.html`: one page that needs nothing else, in light and dark, with or without scripts.
+//! `report.html`: what a fit found, as one page.
 
 use std::fmt::Write as _;
 
 use rayon::prelude::*;
 
 use super::json::{Summary, ViewSummary};
+use super::page::{Page, escape, filled, tile};
 use super::pictures::Picture;
 use super::words::{count, counted, direction, ending, entangled, number, seconds, verdict};
 use super::{RunInfo, charts, figures, tables};
@@ -19,12 +20,6 @@ pub fn page(title: &str, run: &RunInfo, summary: &Summary, errors: &[Picture]) -
     let sections = sections.map(|((view, (_, scores)), error)| figures::view(view, scores, error));
     let views = sections.collect::<Result<Vec<_>, _>>()?.concat();
     let fill = |key: &str| match key {
-        "title" => escape(title),
-        "style" => include_str!("page.css").to_owned(),
-        "script" => include_str!("page.js").to_owned(),
-        "status" => status(summary.ending),
-        "verdict" => verdict(summary).iter().map(|s| escape(s)).collect::<Vec<_>>().join(" "),
-        "tiles" => tiles(summary),
         "warnings" => warnings(&summary.warnings),
         "views" => views.clone(),
         "parameters" => tables::parameters(summary),
@@ -34,37 +29,15 @@ pub fn page(title: &str, run: &RunInfo, summary: &Summary, errors: &[Picture]) -
         "provenance" => tables::provenance(summary),
         _ => String::new(),
     };
-    Ok(filled(include_str!("page.html"), fill))
-}
-
-/// `template` with each `{{key}}` replaced, in one pass: what is filled in is not looked at again.
-fn filled(template: &str, fill: impl Fn(&str) -> String) -> String {
-    let mut parts = template.split("{{");
-    let mut page = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let (key, text) = part.split_once("}}").unwrap_or(("", part));
-        page += &fill(key);
-        page += text;
-    }
-    page
-}
-
-/// `text` as HTML shows it, between tags and in attributes.
-pub(super) fn escape(text: &str) -> String {
-    let mut escaped = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => escaped.push_str("&amp;"),
-            '<' => escaped.push_str("&lt;"),
-            '>' => escaped.push_str("&gt;"),
-            '"' => escaped.push_str("&quot;"),
-            '\'' => escaped.push_str("&#39;"),
-            // Control characters are not allowed in HTML.
-            c if c.is_control() && !c.is_ascii_whitespace() => escaped.push('\u{fffd}'),
-            c => escaped.push(c),
-        }
-    }
-    escaped
+    let lead = verdict(summary).iter().map(|s| escape(s)).collect::<Vec<_>>().join(" ");
+    let page = Page {
+        kind: "fit report",
+        title,
+        lead: format!("{} {lead}", status(summary.ending)),
+        tiles: tiles(summary),
+        main: filled(include_str!("fit.html"), fill),
+    };
+    Ok(page.html())
 }
 
 fn status(end: Ending) -> String {
@@ -97,10 +70,7 @@ fn tiles(summary: &Summary) -> String {
         ("samples", count(summary.samples), format!("{} · {}", escape(&summary.engine), summary.solver)),
         ("time", seconds(total), format!("fit {}", seconds(summary.seconds.fit))),
     ];
-    let tile = |(name, value, note): &(&str, String, String)| {
-        format!("<div class=\"tile\"><span>{name}</span><b>{value}</b><small>{note}</small></div>")
-    };
-    tiles.iter().map(tile).collect()
+    tiles.iter().map(|(name, value, note)| tile(name, value, note)).collect()
 }
 
 fn warnings(warnings: &[String]) -> String {
@@ -143,20 +113,4 @@ fn identifiability(summary: &Summary) -> String {
         html.push_str("</div>");
     }
     html
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn templates_are_filled_once() {
-        let fill = |key: &str| if key == "a" { "{{b}}".to_owned() } else { "!".to_owned() };
-        assert_eq!(filled("x {{a}} y {{b}}", fill), "x {{b}} y !");
-    }
-
-    #[test]
-    fn escaping_leaves_nothing_that_html_reads() {
-        assert_eq!(escape("<a href=\"x\">'&\u{7}"), "&lt;a href=&quot;x&quot;&gt;&#39;&amp;\u{fffd}");
-    }
 }

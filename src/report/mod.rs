@@ -3,21 +3,26 @@
 //! - [`metrics`], [`flip`]: PSNR, SSIM and FLIP of a view
 //! - [`json`]: the file `report.json`
 //! - [`pictures`]: target | fit | error side by side
+//! - [`page`], [`plot`]: what all pages share: sortable tables, scatter plots, pictures that wipe
 //! - [`html`]: the page `report.html`, with its `figures`, `charts`, `tables` and `words`
 //!
 //! [`write_run`] leaves all of it in a run's folder, with an EXR of the terms for each view.
 
 mod charts;
-mod figures;
+pub mod figures;
 mod filter;
 pub mod flip;
 pub mod html;
 pub mod json;
 mod lettering;
 pub mod metrics;
+pub mod page;
 pub mod pictures;
+pub mod plot;
 mod tables;
 mod words;
+
+pub use words::{count, number, seconds};
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -278,14 +283,19 @@ fn is_file_stem(stem: &str) -> bool {
     !stem.is_empty() && stem.chars().all(is_safe)
 }
 
-/// A file name's stem for each view: safe characters alone, no two the same.
+/// A file name's stem for a view: safe characters alone.
+#[must_use]
+pub fn file_stem(view: &str) -> String {
+    // File names have room for 255 bytes, of which a letter may take four.
+    let stem: String = view.chars().take(50).map(|c| if is_safe(c) { c } else { '_' }).collect();
+    if stem.is_empty() { "view".to_owned() } else { stem }
+}
+
+/// A file name's stem for each view, no two the same.
 fn file_stems(views: &[ViewEvidence]) -> Vec<String> {
     let mut stems: Vec<String> = Vec::new();
     for view in views {
-        let safe = |c: char| if is_safe(c) { c } else { '_' };
-        // File names have room for 255 bytes, of which a letter may take four.
-        let base: String = view.name.chars().take(50).map(safe).collect();
-        let base = if base.is_empty() { "view".to_owned() } else { base };
+        let base = file_stem(&view.name);
         let numbered = (2..).map(|n| format!("{base}_{n}"));
         let taken = |stem: &String| stems.iter().any(|s| s.to_lowercase() == stem.to_lowercase());
         let stem = std::iter::once(base.clone()).chain(numbered).find(|stem| !taken(stem));

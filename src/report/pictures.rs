@@ -117,26 +117,33 @@ pub fn side_by_side(
 ) -> Picture {
     let panels =
         [Picture::of_image(target), Picture::of_image(fit), Picture::of_error(comparison, fit.width)];
+    let text = scores.map_or_else(
+        || "no pixel is fully covered".to_owned(),
+        |s| format!("PSNR {:.2} dB    SSIM {:.4}    FLIP {:.4}", s.psnr, s.ssim, s.flip),
+    );
+    strip(name, &panels, &["target", "fit", "FLIP error"].map(str::to_owned), &text)
+}
+
+/// Three pictures of one size in a row, the last an error in magma: a name and a remark above, captions
+/// and the error's colour bar below.
+#[must_use]
+pub fn strip(name: &str, panels: &[Picture; 3], captions: &[String; 3], remark: &str) -> Picture {
     // Tiny images are enlarged so that their pixels can be seen and their captions fit.
-    let factor = (224 / fit.width.max(1)).clamp(1, 64);
-    let (width, height) = (fit.width * factor, fit.height * factor);
+    let factor = (224 / panels[0].width.max(1)).clamp(1, 64);
+    let (width, height) = (panels[0].width * factor, panels[0].height * factor);
     let panel = width.max(224);
     let size = (panel as f32 / 40.0).clamp(9.0, 22.0);
     let (margin, line) = (size as usize + 4, 3 * size as usize);
     let mut sheet = Picture::filled(3 * panel + 4 * margin, height + 2 * line + margin, PAPER);
 
-    let text = scores.map_or_else(
-        || "no pixel is fully covered".to_owned(),
-        |s| format!("PSNR {:.2} dB    SSIM {:.4}    FLIP {:.4}", s.psnr, s.ssim, s.flip),
-    );
-    let text = Line::new(&text);
+    let text = Line::new(remark);
     let (top, right) = (margin, sheet.width - margin - text.width(size) as usize);
     let room = right.saturating_sub(3 * margin) as f32;
     sheet.write(&shortened(name, room, size), margin, top, size, INK);
     sheet.write(&text, right, top, size, FAINT);
 
     let (above, below) = (line + margin / 2, line + margin / 2 + height + margin / 2);
-    for (i, (picture, caption)) in panels.iter().zip(["target", "fit", "FLIP error"]).enumerate() {
+    for (i, (picture, caption)) in panels.iter().zip(captions).enumerate() {
         let x = margin + i * (panel + margin);
         sheet.paste(picture, x + (panel - width) / 2, above, factor);
         sheet.write(&Line::new(caption), x, below + size as usize / 2, size, INK);

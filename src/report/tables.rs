@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use super::charts::error_bar;
-use super::html::escape;
 use super::json::{Summary, UnknownSummary, Value};
+use super::page::escape;
 use super::words::{number, seconds, with_error};
 use crate::model::params::{Param, ParamInfo, Scale};
 use crate::render::tonemap::ToneMap;

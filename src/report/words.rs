@@ -4,7 +4,8 @@ use super::json::{Ordered, Summary};
 use crate::fit::outcome::Ending;
 
 /// `x` to `digits` significant digits: plain between 0.001 and 10^6, else times a power of ten.
-pub(super) fn number(x: f64, digits: usize) -> String {
+#[must_use]
+pub fn number(x: f64, digits: usize) -> String {
     if !x.is_finite() {
         return if x.is_nan() {
             "–"
@@ -48,7 +49,8 @@ pub(super) fn with_error(value: f64, error: f64) -> (String, String) {
 }
 
 /// Seconds, in the unit that reads best.
-pub(super) fn seconds(s: f64) -> String {
+#[must_use]
+pub fn seconds(s: f64) -> String {
     match s {
         _ if !s.is_finite() => "–".to_owned(),
         _ if s >= 120.0 => format!("{:.0} min {:02.0} s", (s / 60.0).floor(), (s % 60.0).floor()),
@@ -59,7 +61,8 @@ pub(super) fn seconds(s: f64) -> String {
 }
 
 /// A count with thin spaces between thousands, or `one` thing and so many `many`.
-pub(super) fn count(n: u64) -> String {
+#[must_use]
+pub fn count(n: u64) -> String {
     let digits = n.to_string();
     let parted =
         digits.chars().enumerate().map(|(i, c)| match i > 0 && (digits.len() - i).is_multiple_of(3) {

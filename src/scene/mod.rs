@@ -7,12 +7,13 @@
 //!   `settings` and `cameras`
 //! - [`map_fit`]: how whole maps are fitted
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
-//! - [`pose`]: the mesh, morphed and skinned
+//! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
 //! - [`error`]: what is refused, and what is mended with a warning
 //!
 //! [`Scene`] is what the later stages see: validated, in memory, and holding only what the enabled
 //! effects ask for.
 
+pub mod animation;
 mod cameras;
 pub mod error;
 mod file;
@@ -33,6 +34,7 @@ pub use file::suggestion;
 pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
+pub(crate) use settings::short;
 pub use settings::{interval, read_params};
 
 use std::path::PathBuf;

@@ -68,7 +68,7 @@ fn apply(source: &Source, table: &ParamsTable, params: &mut Params) -> Result<()
                 let (lower, upper) = info.range();
                 return Err(source.error(
                     value,
-                    format!("{} = {number} is out of bounds", info.name),
+                    format!("{} = {} is out of bounds", info.name, short(number)),
                     format!("Give a finite number in {}", interval(lower, upper)),
                 ));
             }
@@ -88,6 +88,12 @@ fn apply(source: &Source, table: &ParamsTable, params: &mut Params) -> Result<()
 fn param(source: &Source, name: &Spanned<String>) -> Result<Param, SceneError> {
     let all: Vec<_> = Param::all().map(|param| (param.name(), param)).collect();
     source.choose("parameter", name, &all)
+}
+
+/// A number as one would write it: 180, 1e300.
+pub(crate) fn short(number: f64) -> String {
+    let text = format!("{number:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
 /// "[0, inf)" and the like.
@@ -229,5 +235,9 @@ pub(super) fn number(
     if number.is_finite() && test(number) {
         return Ok(number);
     }
-    Err(source.error(spanned, format!("{name} = {number} is out of bounds"), format!("Give {wanted}")))
+    Err(source.error(
+        spanned,
+        format!("{name} = {} is out of bounds", short(number)),
+        format!("Give {wanted}"),
+    ))
 }

@@ -1,7 +1,22 @@
 //! Studies: what is measured about the model and the fits.
 //!
+//! - [`ablation`]: what each effect and term is worth, and what it costs
+//! - [`tradeoff`]: error against time for every approximation
 //! - [`stability`]: hard cases on every evaluator, and a random search for new ones
 //! - [`sweep`]: many jobs over scenes and settings, on this machine or under a scheduler
+//! - [`subject`]: a scene ready to be evaluated in one setting; [`reference`]: what images are compared with
+//! - [`significance`]: a change of the loss against its sampling error
+//! - [`timing`]: times that can be trusted; [`cost`]: the counts that stand beside them
 
+pub mod ablation;
+pub mod cost;
+mod error;
+pub mod reference;
+pub mod significance;
 pub mod stability;
+pub mod subject;
 pub mod sweep;
+pub mod timing;
+pub mod tradeoff;
+
+pub use error::StudyError;

@@ -13,7 +13,7 @@ use burn::tensor::{Tensor, TensorData};
 use super::inputs::{Input, Inputs, TrackedTensor};
 use super::stage::Stage;
 use super::{SharedDevice, TensorError};
-use crate::engine::cpu::Illumination;
+use crate::bake::Illumination;
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;

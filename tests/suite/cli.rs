@@ -1,7 +1,9 @@
 //! The program as its users meet it: every test here runs the binary.
 
+mod ablation;
+mod browser;
 mod built_in;
-mod desk;
+pub(crate) mod desk;
 mod exported;
 #[cfg(feature = "gpu")]
 mod graphics;
@@ -11,5 +13,8 @@ mod outputs;
 mod refusals;
 mod refused_files;
 mod runs;
+mod stability;
 mod stages;
+mod sweeps;
+mod tradeoffs;
 mod words;

@@ -20,9 +20,19 @@ fn the_page_of_parameters_holds_the_programs_table() {
 /// The project's pages.
 fn pages() -> Vec<PathBuf> {
     let mut pages = Vec::new();
-    for folder in
-        ["", "data", "docs", "experiments", "experiments/bench", "experiments/network", "experiments/race"]
-    {
+    for folder in [
+        "",
+        "data",
+        "docs",
+        "experiments",
+        "experiments/ablation",
+        "experiments/accuracy_vs_time",
+        "experiments/bench",
+        "experiments/network",
+        "experiments/race",
+        "experiments/scaling",
+        "experiments/stability",
+    ] {
         for entry in std::fs::read_dir(root().join(folder)).unwrap() {
             let path = entry.unwrap().path();
             if path.extension().is_some_and(|ending| ending == "md") {

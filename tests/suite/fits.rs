@@ -131,9 +131,9 @@ fn variable_projection_needs_the_fewest_passes() {
             }
         }
     }
-    let [varpro, lm, lbfgs, simplex] = passes;
+    let [varpro, lm, lbfgs, simplex, adam] = passes;
     println!(
-        "passes: varpro {varpro} and lm {lm} for 40 fits; lbfgs {lbfgs} and nelder-mead {simplex} for 3"
+        "passes: varpro {varpro} and lm {lm} for 40 fits; lbfgs {lbfgs}, nelder-mead {simplex} and adam {adam} for 3"
     );
     // With non-linear unknowns free both are Gauss-Newton near the answer; varpro saves where the
     // start's weights are far off.

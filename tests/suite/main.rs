@@ -22,6 +22,8 @@ mod refusals;
 mod reports;
 mod samples;
 mod scene_files;
+#[cfg(target_os = "linux")]
+mod scheduler;
 mod shader;
 #[cfg(feature = "burn")]
 mod tensors;

@@ -10,6 +10,7 @@ use skinfit::engine::lanes::Lanes;
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::{self, Setup};
+use skinfit::model::formats::{Declared, Emulated, Format, Half, to_fixed, to_half};
 use skinfit::model::fragment::{self, Fragment, Shading, decode_normal, unit_view};
 use skinfit::model::lights::Lights;
 use skinfit::model::params::{Param, Params};
@@ -196,6 +197,23 @@ const ORACLE_COLUMNS: [(&str, Param, Option<usize>); 10] = [
     ("haze", Param::HazeWeight, None),
 ];
 
+/// The parameters of a point that is given column by column, under the oracle's names.
+pub(crate) fn column_params(values: &Value) -> Params {
+    let mut params = Params::defaults(Form::Corrected);
+    for (name, param, channel) in ORACLE_COLUMNS {
+        let value = number(&values[name]).unwrap();
+        match channel {
+            None => params.set(param, value),
+            Some(c) => {
+                let mut rgb = params.rgb(param);
+                rgb[c] = value;
+                params.set_rgb(param, rgb);
+            }
+        }
+    }
+    params
+}
+
 // The model is inlined wherever it is called; here, where speed is nothing, once for each evaluator.
 
 #[inline(never)]
@@ -331,22 +349,7 @@ where
     let lights = lights::<R>(&cubes[0], &cubes[1], &cubes[2]);
     let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: ALL_TERMS };
     let g = &file["inputs"]["gbuffer"];
-    let point = |which: &str| {
-        let mut p = Params::defaults(Form::Corrected);
-        for (name, param, channel) in ORACLE_COLUMNS {
-            let value = number(&file["inputs"][which][name]).unwrap();
-            match channel {
-                None => p.set(param, value),
-                Some(c) => {
-                    let mut rgb = p.rgb(param);
-                    rgb[c] = value;
-                    p.set_rgb(param, rgb);
-                }
-            }
-        }
-        p
-    };
-    let (truth, start) = (point("params"), point("params_init"));
+    let [truth, start] = ["params", "params_init"].map(|which| column_params(&file["inputs"][which]));
     let (mut forward, mut at_start, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..16 {
         let v = |name: &str| three(&g[name][i]).map(|x| like.lit(x));
@@ -391,13 +394,61 @@ where
             "cubes" => {}
             // Tested where the baking and the meshes are.
             "latlong" | "prefilter" | "vertex" => {}
-            // Not yet built: texture-space diffusion, reduced number formats, and their study.
-            "diffusion" | "formats" | "study" => {}
+            // Number formats have a test of their own; texture-space diffusion is not yet built.
+            "formats" | "study" | "diffusion" => {}
             other => panic!("{name}: unknown kind of vector: {other}"),
         }
         *counts.entry(kind).or_default() += 1;
     }
     eprintln!("vectors: {counts:?}");
+}
+
+/// Fragments of form `listing` in a format that rounds, within what its roundings may do: `step` relative
+/// to the greatest channel, and `floor`.
+fn reduced<F: Format>(want: &str, step: f64, floor: f64) {
+    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
+    let vectors = Vectors::read(&folder);
+    let (mut compared, mut exact) = (0, 0);
+    for file in vectors.files.values().filter(|file| file["kind"] == "fragment") {
+        let expected: Vec<f64> = numbers(&file["expected"][want]);
+        let has_frame = file["name"] != "frag_09_tiny_frame";
+        // Of a frame of 1e-20 nothing is left in 16 bits: the oracle's numbers there are noise, it says.
+        if expected.is_empty() || !has_frame {
+            continue;
+        }
+        let cubes = ["diffuse", "spec", "hilite"].map(|which| vectors.cube::<f64>(file, which));
+        let lights = lights::<Emulated<F>>(&cubes[0], &cubes[1], &cubes[2]);
+        let setup = Setup { form: Form::Listing, silhouette: Silhouette::Vertex, effects: ALL_TERMS };
+        let f = fragment_at(setup.form, &file["inputs"], 0.0_f64).in_format(Emulated::<F>::new(0.0));
+        let got = evaluate::shade(setup, &lights, &f, &Params::defaults(Form::Listing)).map(f64::from);
+        let scale = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        for (c, (got, want)) in got.iter().zip(&expected).enumerate() {
+            let bound = step * scale + floor;
+            assert!((got - want).abs() <= bound, "{} {}[{c}]: {got}, not {want}", file["name"], F::NAME);
+            exact += usize::from(got == want);
+            compared += 1;
+        }
+    }
+    assert!(compared >= 40 && 2 * exact > compared, "{}: {exact} of {compared} are exact", F::NAME);
+}
+
+#[test]
+fn the_listing_holds_in_its_declared_types_and_in_binary16() {
+    // The hilite is attenuated before it is rounded, the sum has five roundings of half a step: 2 steps of 1/1024.
+    reduced::<Declared>("literal_fx12_rgba", 0.0, 2.0 / 1024.0);
+    // The sum is taken in another order: its handful of roundings, each half a unit of 2^-10 of what it rounds.
+    reduced::<Half>("literal_half_rgba", 3.0 / 1024.0, 1e-4);
+}
+
+#[test]
+fn number_formats_round_as_the_vectors_say() {
+    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
+    let vectors = Vectors::read(&folder);
+    let file = &vectors.files["number_formats.json"];
+    let x = numbers(&file["inputs"]["x"]);
+    let rounded = |format: fn(f64) -> f64| x.iter().map(|&x| format(x)).collect::<Vec<_>>();
+    assert_eq!(rounded(to_fixed), numbers(&file["expected"]["fx12"]));
+    assert_eq!(rounded(to_half), numbers(&file["expected"]["half"]));
 }
 
 #[test]

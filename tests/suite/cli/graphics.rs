@@ -147,3 +147,28 @@ fn what_the_engines_cannot_do_is_refused_before_a_file_is_written() {
     }
     assert!(!desk.path("a.png").exists());
 }
+
+#[test]
+fn an_ablation_times_the_renderer_where_it_is_asked_to() {
+    let desk = Desk::new();
+    if !adapter(&desk) {
+        return;
+    }
+    let ablate = |to: &str, when: &str| {
+        desk.run(&["ablate", "scene.toml", "-o", to, "--gpu", when, "--params", "truth.toml"]).done();
+        let results: Value = desk.json(&format!("{to}/results.json"));
+        let rows = results["rows"].as_array().unwrap().clone();
+        (
+            results["adapter"].clone(),
+            rows.iter().map(|row| row["gpu"]["seconds"]["median"].clone()).collect::<Vec<_>>(),
+        )
+    };
+    let (name, times) = ablate("timed", "always");
+    assert!(name.as_str().is_some_and(|name| !name.is_empty()));
+    assert!(
+        times.len() == 9 && times.iter().all(|time| time.as_f64().is_some_and(|time| time > 0.0)),
+        "{times:?}"
+    );
+    let (name, times) = ablate("untimed", "never");
+    assert!(name.is_null() && times.iter().all(Value::is_null), "{times:?}");
+}

@@ -5,7 +5,7 @@ use skinfit::model::compose::TermName;
 use skinfit::model::effects::Effect;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
-use skinfit::scene::load::Animation;
+use skinfit::scene::animation::Animation;
 
 use super::bench::*;
 

@@ -1,0 +1,73 @@
+//! `skinfit ablate`: what each effect and term is worth, and what it costs.
+
+use std::path::PathBuf;
+
+use super::run_folder::RunFolder;
+use super::scene::SceneArguments;
+use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings};
+use crate::study::ablation::{AblationOptions, GpuTiming, ablate, files};
+
+/// Leave each effect and term out in turn: what the images lose, and what is saved
+#[derive(clap::Args)]
+#[command(
+    after_help = super::with_exit_codes("Images are compared with the scene's targets or, where it names none, with the whole model. DIR gets report.html (open it in a browser), results.csv, results.json, and for each part and view a picture: reference, what is left, FLIP error.\n\nThe table on standard output:\n  change, t  of the mean loss, and over its standard error: 3 and more is beyond chance\n  CPU, GPU   time over the whole model's, the two taking turns\n  ops        operations a fragment in the renderer, as its planner counts them\n  B/sample   bytes of attributes and texels that a sample reads\n\nExamples:\n  skinfit ablate -o runs/parts                                     the built-in scene\n  skinfit ablate scene.toml -o runs/parts --refit                  what is left, fitted again\n  skinfit ablate scene.toml -o runs/parts --params runs/a/params.toml --pairs")
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The folder to write into; it is made if need be.
+    #[arg(short, long, value_name = "DIR")]
+    output: PathBuf,
+    /// Leave two parts out at a time, too.
+    #[arg(long)]
+    pairs: bool,
+    /// Fit the constants that are left again in each case: what can the others make up for?
+    #[arg(long)]
+    refit: bool,
+    /// Constants of an earlier fit [default: the whole model is fitted to the targets first; without targets, the
+    /// scene's start values].
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+    /// Time the renderer, too: `auto`, where there is a graphics adapter of hardware; `always`, on one of software
+    /// as well; or `never`.
+    #[arg(long, value_name = "WHEN", default_value = "auto", value_parser = ["auto", "always", "never"])]
+    gpu: String,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let gpu = match arguments.gpu.as_str() {
+        "always" => GpuTiming::Always,
+        "never" => GpuTiming::Never,
+        _ => GpuTiming::Auto,
+    };
+    if gpu != GpuTiming::Never {
+        quieten_graphics();
+    }
+    let mut folder = RunFolder::open(Some(&arguments.output), None)?;
+    let (path, _scratch) = arguments.scene.path()?;
+    // Every case looks for its bakes: without a cache of the user's, they are kept for as long as this takes.
+    let scratch = tempfile::tempdir()?;
+    let options = AblationOptions {
+        pairs: arguments.pairs,
+        refit: arguments.refit,
+        params: arguments.params.clone(),
+        cache: Some(arguments.scene.cache().unwrap_or_else(|| scratch.path().to_owned())),
+        gpu,
+    };
+    let ablation = ablate(&path, &options)?;
+    tell_warnings(&ablation.warnings);
+    folder.keep();
+    let written = files::write(folder.path(), &arguments.scene.name(&path), &ablation)?;
+    say(files::table(&ablation).trim_end())?;
+    say(&format!("wrote {} files to {}; open report.html there", written.len(), folder.path().display()))?;
+    let failed = ablation.unconverged();
+    if !failed.is_empty() {
+        tell(&format!(
+            "{}: the fit did not converge without: {}. Their rows are what it reached.",
+            folder.path().display(),
+            failed.join(", ")
+        ));
+        return Ok(Exit::Failed);
+    }
+    Ok(Exit::Done)
+}

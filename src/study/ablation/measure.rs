@@ -1,0 +1,171 @@
+//! The time of a case, taken in turns with the whole model's.
+
+use super::GpuTiming;
+use crate::engine::cpu::CpuEngine;
+use crate::engine::{Objective, Point};
+use crate::study::StudyError;
+use crate::study::subject::Subject;
+use crate::study::timing::{Rounds, Timed, interleaved, seconds_of};
+
+/// The whole model, ready to be timed beside a case.
+pub struct Clocks<'a> {
+    engine: CpuEngine,
+    point: Point,
+    gpu: gpu::Clock<'a>,
+    /// Why the renderer is not timed, where it should have been.
+    pub warning: Option<String>,
+}
+
+impl<'a> Clocks<'a> {
+    /// Of the whole model, and of its renderer `when` that is wished for.
+    ///
+    /// # Errors
+    /// When an adapter was wished for and there is none, or it fails.
+    pub fn new(whole: &'a Subject, point: &Point, when: GpuTiming) -> Result<Self, StudyError> {
+        let (gpu, warning) = match when {
+            GpuTiming::Never => (gpu::Clock::none(), None),
+            GpuTiming::Auto | GpuTiming::Always => gpu::Clock::open(whole, point, when == GpuTiming::Always)?,
+        };
+        Ok(Self { engine: whole.live_engine(), point: point.clone(), gpu, warning })
+    }
+
+    /// What the renderer is timed on.
+    #[must_use]
+    pub fn adapter(&self) -> Option<String> {
+        self.gpu.adapter()
+    }
+
+    /// A pass of the CPU engine over all of a case's samples, and a frame of the renderer: both beside the
+    /// whole model's.
+    ///
+    /// # Errors
+    /// When the adapter fails.
+    pub fn time(&self, case: &Subject, point: &Point) -> Result<(Timed, Option<Timed>), StudyError> {
+        let own = case.live_engine();
+        let mut whole_pass = || Ok::<f64, StudyError>(seconds_of(|| self.engine.loss(&self.point)));
+        let mut own_pass = || Ok(seconds_of(|| own.loss(point)));
+        let cpu = interleaved(Rounds::default(), &mut [&mut whole_pass, &mut own_pass])?;
+        Ok((cpu[1], self.gpu.time(case, point)?))
+    }
+}
+
+#[cfg(feature = "gpu")]
+mod gpu {
+    use crate::engine::Point;
+    use crate::gpu::upload::Content;
+    use crate::gpu::{Choice, Gpu, RenderOptions, Renderer};
+    use crate::model::params::Params;
+    use crate::render::antialias::Antialias;
+    use crate::shader::Budget;
+    use crate::study::StudyError;
+    use crate::study::subject::Subject;
+    use crate::study::timing::{Rounds, Spread, Timed, interleaved};
+
+    /// Frames between two turns.
+    const FRAMES: usize = 5;
+
+    /// The adapter, and the whole model on it.
+    pub(super) struct Clock<'a>(Option<Open<'a>>);
+
+    struct Open<'a> {
+        gpu: Gpu,
+        whole: &'a Subject,
+        params: Params,
+    }
+
+    impl<'a> Clock<'a> {
+        pub(super) fn none() -> Self {
+            Self(None)
+        }
+
+        /// Of the whole model, where there is an adapter of hardware, or of any kind if it is `wished` for; and
+        /// why it is not timed all the same.
+        pub(super) fn open(
+            whole: &'a Subject,
+            point: &Point,
+            wished: bool,
+        ) -> Result<(Self, Option<String>), StudyError> {
+            let gpu = match Gpu::open(&Choice::default()) {
+                Ok(gpu) if wished || !gpu.is_software() => gpu,
+                Err(error) if wished => return Err(error.into()),
+                _ => return Ok((Self(None), None)),
+            };
+            if !gpu.timestamps() {
+                let warning = format!("GPU time is not measured: {} has no timestamps.", gpu.name());
+                return Ok((Self(None), Some(warning)));
+            }
+            Ok((Self(Some(Open { gpu, whole, params: point.params })), None))
+        }
+
+        pub(super) fn adapter(&self) -> Option<String> {
+            let gpu = &self.0.as_ref()?.gpu;
+            let kind = if gpu.is_software() { " (software)" } else { "" };
+            Some(format!("{}{kind}", gpu.name()))
+        }
+
+        /// A frame of the first view beside the whole model's.
+        pub(super) fn time(&self, case: &Subject, point: &Point) -> Result<Option<Timed>, StudyError> {
+            let Some(open) = &self.0 else { return Ok(None) };
+            let mut whole = renderer(&open.gpu, open.whole, &open.params)?;
+            let mut own = renderer(&open.gpu, case, &point.params)?;
+            let camera = open.whole.prepared.scene.views[0].camera;
+            let frames = |renderer: &mut Renderer<'_>| -> Result<f64, StudyError> {
+                let times = renderer.frame_times(&camera, FRAMES)?;
+                Ok(1e-3 * Spread::of(&times).map_or(0.0, |spread| spread.median))
+            };
+            let mut jobs = [&mut whole, &mut own].map(|renderer| move || frames(renderer));
+            let [whole, own] = &mut jobs;
+            Ok(interleaved(Rounds::default(), &mut [whole, own])?.get(1).copied())
+        }
+    }
+
+    fn renderer<'a>(
+        gpu: &'a Gpu,
+        subject: &'a Subject,
+        params: &'a Params,
+    ) -> Result<Renderer<'a>, StudyError> {
+        let prepared = &subject.prepared;
+        let content = Content {
+            scene: &prepared.scene,
+            illumination: &prepared.illumination,
+            occlusion: prepared.occlusion.as_ref(),
+            params,
+        };
+        let antialias = Antialias::Grid(prepared.scene.quality.samples_per_axis);
+        let options = RenderOptions { antialias, budget: Budget::Exact, timed: true, animated: false };
+        Ok(Renderer::new(gpu, content, options)?)
+    }
+}
+
+#[cfg(not(feature = "gpu"))]
+mod gpu {
+    use std::marker::PhantomData;
+
+    use crate::engine::Point;
+    use crate::study::StudyError;
+    use crate::study::subject::Subject;
+    use crate::study::timing::Timed;
+
+    /// There is none.
+    pub(super) struct Clock<'a>(PhantomData<&'a ()>);
+
+    impl<'a> Clock<'a> {
+        pub(super) fn none() -> Self {
+            Self(PhantomData)
+        }
+        pub(super) fn open(
+            _: &'a Subject,
+            _: &Point,
+            wished: bool,
+        ) -> Result<(Self, Option<String>), StudyError> {
+            let why = "GPU time is not measured: this skinfit was built without its GPU renderer.";
+            Ok((Self::none(), wished.then(|| why.to_owned())))
+        }
+        pub(super) fn adapter(&self) -> Option<String> {
+            None
+        }
+        pub(super) fn time(&self, _: &Subject, _: &Point) -> Result<Option<Timed>, StudyError> {
+            Ok(None)
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! What a setting costs, in counts: they are the same on every machine, and stand beside the times.
+
+use serde::Serialize;
+
+use super::StudyError;
+use super::subject::Subject;
+use crate::model::effects::Effect;
+use crate::model::params::Params;
+use crate::prepare::Prepared;
+use crate::shader::{Budget, Facts, plan};
+
+/// A cube lookup reads 2 x 2 texels of four 32-bit channels.
+const LOOKUP_BYTES: usize = 4 * 4 * size_of::<f32>();
+
+/// What a setting costs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Counts {
+    /// Surface samples over all views.
+    pub samples: u64,
+    /// Bytes that a pass reads for a sample: its attributes, and the texels of its lookups.
+    pub bytes_a_sample: usize,
+    /// Operations a fragment in the renderer, as its planner counts them.
+    pub operations: f64,
+    /// What a renderer needs baked, by name.
+    pub bakes: Vec<String>,
+    /// Bytes of it.
+    pub baked_bytes: usize,
+}
+
+impl Counts {
+    /// Of a scene at `params`.
+    ///
+    /// # Errors
+    /// When the renderer has no shader for it.
+    pub fn new(subject: &Subject, params: &Params) -> Result<Self, StudyError> {
+        let scene = &subject.prepared.scene;
+        let planned = plan(&Facts::of_scene(scene, params, Budget::Exact, false))?;
+        let attributes =
+            subject.engine.views().first().map_or(0, |view| view.samples.surface.rows().stride());
+        let needs = scene.effects.needs(scene.silhouette);
+        let lookups = [needs.irradiance, scene.effects.has(Effect::SideSpecular), needs.dapple, needs.hilite];
+        let lookups = lookups.into_iter().filter(|&wanted| wanted).count();
+        let (bakes, baked_bytes) = bakes(&subject.prepared);
+        Ok(Self {
+            samples: subject.engine.samples(),
+            bytes_a_sample: attributes * size_of::<f32>() + lookups * LOOKUP_BYTES,
+            operations: planned.cost,
+            bakes,
+            baked_bytes,
+        })
+    }
+
+    /// What `other` need not have baked that this has.
+    #[must_use]
+    pub fn bakes_saved(&self, other: &Self) -> Vec<String> {
+        self.bakes.iter().filter(|name| !other.bakes.contains(name)).cloned().collect()
+    }
+}
+
+/// What was baked, and how many bytes it is.
+fn bakes(prepared: &Prepared) -> (Vec<String>, usize) {
+    let light = &prepared.illumination;
+    let (mut names, mut floats) = (Vec::new(), 0);
+    let mut cube = |name: &str, texels: usize| {
+        names.push(name.to_owned());
+        floats += 4 * texels;
+    };
+    if let Some(irradiance) = &light.irradiance {
+        cube("irradiance", irradiance.padded().len());
+    }
+    // A renderer needs one: the stack's, interpolated at the exponent.
+    if let Some(lobe) = light.lobes.as_ref().and_then(|lobes| lobes.cubes.first()) {
+        cube("specular", lobe.padded().len());
+    }
+    if let Some(hilite) = &light.hilite {
+        cube("hilite", hilite.padded().len());
+    }
+    if let Some(occlusion) = &prepared.occlusion {
+        names.push("occlusion".to_owned());
+        floats += occlusion.base.len() + occlusion.morphs.iter().map(Vec::len).sum::<usize>();
+    }
+    (names, floats * size_of::<f32>())
+}

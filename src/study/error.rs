@@ -1,0 +1,35 @@
+//! How a study may fail.
+
+use crate::fit::FitError;
+#[cfg(feature = "gpu")]
+use crate::gpu::GpuError;
+use crate::output::OutputError;
+use crate::prepare::PrepareError;
+use crate::render::files::ImageFileError;
+use crate::shader::PlanError;
+
+/// A study cannot be done.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "most variants are the stage's own error")]
+pub enum StudyError {
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// A fit, and the scene that it was of.
+    #[error("{scene}: {error}")]
+    Fit { scene: String, error: FitError },
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    #[cfg(feature = "gpu")]
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// An axis was named that the scene does not ask for.
+    #[error("--axis {axis}: {why}. Leave it out, or name a scene that does.")]
+    Idle { axis: &'static str, why: &'static str },
+    /// A goal that no setting meets.
+    #[error("no settings are {goal}: {best}. Allow more.")]
+    NoChoice { goal: String, best: String },
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    #[error(transparent)]
+    Image(#[from] ImageFileError),
+}

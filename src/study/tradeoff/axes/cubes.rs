@@ -1,0 +1,79 @@
+//! How many texels a cube's face needs.
+
+use super::quality::{Swept, bake_seconds};
+use crate::model::effects::{Effect, Effects, Needs};
+use crate::study::StudyError;
+use crate::study::tradeoff::axis::{Axis, Knob, Sweep};
+use crate::study::tradeoff::bench::Bench;
+
+/// The size of one kind of cube.
+pub(super) struct CubeSize {
+    name: &'static str,
+    title: &'static str,
+    knob: Knob,
+    /// The effect that asks for this cube and no other.
+    effect: Effect,
+    /// How its bakes are called.
+    bake: &'static str,
+    values: &'static [u32],
+    asked: fn(Needs) -> bool,
+}
+
+pub(super) const IRRADIANCE: CubeSize = CubeSize {
+    name: "irradiance",
+    title: "Texels a face of the irradiance cube",
+    knob: Knob::IrradianceSize,
+    effect: Effect::Diffuse,
+    bake: "irradiance",
+    values: &[4, 8, 16, 32, 64, 128],
+    asked: |needs| needs.irradiance,
+};
+
+pub(super) const SPECULAR: CubeSize = CubeSize {
+    name: "specular",
+    title: "Texels a face of the specular cube",
+    knob: Knob::LobeSize,
+    effect: Effect::SideSpecular,
+    bake: "lobe",
+    values: &[4, 8, 16, 32, 64, 128, 256],
+    asked: |needs| needs.lobes,
+};
+
+pub(super) const HILITE: CubeSize = CubeSize {
+    name: "hilite",
+    title: "Texels a face of the hilite cube",
+    knob: Knob::HiliteSize,
+    effect: Effect::Hilite,
+    bake: "hilite",
+    values: &[8, 16, 32, 64, 128, 256, 512],
+    asked: |needs| needs.hilite,
+};
+
+impl Axis for CubeSize {
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
+        let scene = &bench.prepared.scene;
+        let asked = (self.asked)(scene.effects.needs(scene.silhouette));
+        asked.then_some(()).ok_or("no effect looks this cube up")
+    }
+
+    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
+        let swept = Swept {
+            axis: self.name,
+            title: self.title,
+            method: "Images with the cube at each size, all else as the scene has it. Seconds are those of baking it, nothing cached."
+                .to_owned(),
+            knob: self.knob,
+            values: self.values,
+            count: ("KiB", &|size| 6.0 * f64::from((size + 2).pow(2)) * 16.0 / 1024.0),
+        };
+        swept.sweep(bench, &bench.point(), &|settings| {
+            let mut scene = bench.scene(settings);
+            scene.effects = Effects::of(&[self.effect]);
+            bake_seconds(bench, &scene, self.bake)
+        })
+    }
+}

@@ -1,0 +1,61 @@
+//! What coarser filtering of the cubes costs in accuracy.
+
+use super::format::images_in;
+use crate::model::formats::{Emulated, Format, HardwareFilter, NearestTexel};
+use crate::study::StudyError;
+use crate::study::reference::Difference;
+use crate::study::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
+use crate::study::tradeoff::bench::Bench;
+
+/// Filters of cube lookups.
+pub(super) struct Filters;
+
+impl Axis for Filters {
+    fn name(&self) -> &'static str {
+        "filter"
+    }
+
+    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
+        let scene = &bench.prepared.scene;
+        let asked = scene.effects.needs(scene.silhouette).environment();
+        asked.then_some(()).ok_or("no effect looks a cube up")
+    }
+
+    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
+        let evaluated = bench.evaluate(bench.settings())?;
+        let shader = evaluated.shader(&bench.point());
+        let exact = images_in(&evaluated, bench, |s, c, g| shader.shade_in(s, c, g, 0.0_f64));
+        let hardware = images_in(&evaluated, bench, |s, c, g| {
+            shader.shade_in(s, c, g, Emulated::<HardwareFilter>::new(0.0))
+        });
+        let nearest = images_in(&evaluated, bench, |s, c, g| {
+            shader.shade_in(s, c, g, Emulated::<NearestTexel>::new(0.0))
+        });
+        let setting = |name: &str, fetches: f64, images: &[crate::render::image::Image]| Setting {
+            name: name.to_owned(),
+            choose: None,
+            error: Difference::of_all(&exact, images),
+            cost: fetches,
+            time: None,
+            counts: vec![("fetches a lookup", fetches)],
+            reference: fetches == 4.0,
+            front: false,
+        };
+        let mut settings = vec![
+            setting(NearestTexel::NAME, 1.0, &nearest),
+            setting(HardwareFilter::NAME, 1.0, &hardware),
+            setting("exact", 4.0, &exact),
+        ];
+        mark_front(&mut settings);
+        Ok(Sweep {
+            axis: self.name(),
+            title: "Filter of the cubes",
+            method: "Lookups that take the nearest texel, that blend four by weights of 8 bits (as graphics hardware does, in one fetch), \
+                     and that blend four exactly (in the shader, four fetches)."
+                .to_owned(),
+            cost: "fetches",
+            settings,
+            traces: Vec::new(),
+        })
+    }
+}

@@ -1,0 +1,88 @@
+//! What a number format costs in accuracy.
+
+use crate::engine::Objective;
+use crate::model::formats::{Declared, Emulated, Fixed, Format, Half, Single};
+use crate::render::image::Image;
+use crate::study::StudyError;
+use crate::study::reference::Difference;
+use crate::study::timing::{Rounds, interleaved, seconds_of};
+use crate::study::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
+use crate::study::tradeoff::bench::{Bench, Evaluated};
+
+/// Number formats.
+pub(super) struct Formats;
+
+impl Axis for Formats {
+    fn name(&self) -> &'static str {
+        "format"
+    }
+
+    fn applies(&self, _: &Bench<'_>) -> Result<(), &'static str> {
+        Ok(())
+    }
+
+    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
+        let evaluated = bench.evaluate(bench.settings())?;
+        let point = bench.point();
+        let shader = evaluated.shader(&point);
+        let exact = images_in(&evaluated, bench, |samples, camera, gain| {
+            shader.shade_in(samples, camera, gain, 0.0_f64)
+        });
+        let in_format = |format: &str| -> Vec<Image> {
+            images_in(&evaluated, bench, |samples, camera, gain| match format {
+                Single::NAME => shader.shade_in(samples, camera, gain, Emulated::<Single>::new(0.0)),
+                Half::NAME => shader.shade_in(samples, camera, gain, Emulated::<Half>::new(0.0)),
+                Declared::NAME => shader.shade_in(samples, camera, gain, Emulated::<Declared>::new(0.0)),
+                _ => shader.shade_in(samples, camera, gain, Emulated::<Fixed>::new(0.0)),
+            })
+        };
+        let engine = evaluated.live_engine();
+        let mut wide = || {
+            Ok::<f64, StudyError>(seconds_of(|| {
+                images_in(&evaluated, bench, |s, c, g| shader.shade_in(s, c, g, 0.0_f64))
+            }))
+        };
+        let mut single = || Ok(seconds_of(|| engine.loss(&point)));
+        let timed = interleaved(Rounds::default(), &mut [&mut wide, &mut single])?;
+        let setting = |name: &str, bits: f64, images: &[Image]| Setting {
+            name: name.to_owned(),
+            choose: None,
+            error: Difference::of_all(&exact, images),
+            cost: bits,
+            time: None,
+            counts: vec![("bits", bits)],
+            reference: false,
+            front: false,
+        };
+        let mut settings = vec![
+            setting(Fixed::NAME, 12.0, &in_format(Fixed::NAME)),
+            // Half textures and normals, fixed light.
+            setting(Declared::NAME, 14.0, &in_format(Declared::NAME)),
+            setting(Half::NAME, 16.0, &in_format(Half::NAME)),
+            Setting { time: Some(timed[1]), ..setting(Single::NAME, 32.0, &in_format(Single::NAME)) },
+            Setting { time: Some(timed[0]), reference: true, ..setting("f64", 64.0, &exact) },
+        ];
+        mark_front(&mut settings);
+        Ok(Sweep {
+            axis: self.name(),
+            title: "Number format",
+            method: "Every operation rounded to the format; `as listed` rounds only what listing 3-4 declares half (textures, the normal) \
+                     and fixed (light; 12 bits from -2 to 2), which is 14 bits on the whole. Formats below f32 are emulated, so they have \
+                     no time; that of f64 is of scalar code, that of f32 of the engine's SIMD lanes, a pass over all views."
+                .to_owned(),
+            cost: "bits",
+            settings,
+            traces: Vec::new(),
+        })
+    }
+}
+
+/// Each view through `shade`.
+pub(super) fn images_in(
+    evaluated: &Evaluated,
+    bench: &Bench<'_>,
+    shade: impl Fn(&crate::samples::ViewSamples, &crate::scene::view::Camera, f64) -> Image,
+) -> Vec<Image> {
+    let views = evaluated.samples.iter().zip(&evaluated.scene.views).zip(&bench.prepared.gains);
+    views.map(|((samples, view), &gain)| shade(samples, &view.camera, gain)).collect()
+}

@@ -1,0 +1,32 @@
+//! The axes, in the order of documentation.
+
+mod cubes;
+mod filter;
+mod format;
+mod lobes;
+mod pixels;
+mod quality;
+mod rays;
+mod samples;
+mod silhouette;
+mod solver;
+
+use super::axis::Axis;
+
+/// Every axis.
+#[must_use]
+pub fn all() -> Vec<&'static dyn Axis> {
+    vec![
+        &format::Formats,
+        &silhouette::Silhouettes,
+        &cubes::IRRADIANCE,
+        &cubes::SPECULAR,
+        &cubes::HILITE,
+        &filter::Filters,
+        &lobes::Density,
+        &rays::Rays,
+        &samples::Samples,
+        &pixels::Pixels,
+        &solver::Solvers,
+    ]
+}

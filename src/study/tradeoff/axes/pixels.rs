@@ -1,0 +1,50 @@
+//! How many pixels a fit needs.
+
+use super::solver::Fits;
+use crate::fit::SolverKind;
+use crate::study::StudyError;
+use crate::study::tradeoff::axis::{Axis, Sweep};
+use crate::study::tradeoff::bench::Bench;
+
+/// Pixels used in a fit: every n-th block of them, or a coarse fit first and finer ones from there.
+pub(super) struct Pixels;
+
+/// Every how many-th block is read; several: one fit after another.
+const STRIDES: [&[usize]; 9] = [&[128], &[64], &[32], &[16], &[8], &[4], &[2], &[16, 1], &[1]];
+
+impl Axis for Pixels {
+    fn name(&self) -> &'static str {
+        "pixels"
+    }
+
+    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
+        let targets = bench.prepared.scene.views.iter().any(|view| view.target.is_some());
+        targets.then_some(()).ok_or("no view names a target to fit to")
+    }
+
+    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
+        let fits = Fits::new(bench)?;
+        let name = |strides: &[usize]| {
+            let part = |stride: &usize| if *stride == 1 { "all".to_owned() } else { format!("1/{stride}") };
+            strides.iter().map(part).collect::<Vec<_>>().join(", then ")
+        };
+        // A scene of few pixels has few blocks to leave out.
+        let runs: Vec<_> = STRIDES
+            .into_iter()
+            .filter(|strides| strides.iter().all(|&stride| stride == 1 || fits.blocks() / stride >= 8))
+            .map(|strides| (name(strides), strides.to_vec(), SolverKind::Varpro))
+            .collect();
+        let settings = fits.measure(&runs, runs.len() - 1)?.0;
+        Ok(Sweep {
+            axis: self.name(),
+            title: "Pixels used in a fit",
+            method: "A fit to every n-th block of pixels (128 of them), from the scene's start values; and one to a sixteenth whose answer is \
+                     where a fit to all pixels starts. The error is how different the images of the fitted constants are from those fitted \
+                     to all pixels. Seconds are those of the fit."
+                .to_owned(),
+            cost: "seconds",
+            settings,
+            traces: Vec::new(),
+        })
+    }
+}

@@ -1,0 +1,142 @@
+//! How fast the solvers find the answer.
+
+use std::cell::RefCell;
+
+use crate::engine::Point;
+use crate::engine::cpu::CpuEngine;
+use crate::fit::outcome::Outcome;
+use crate::fit::{self, FitOptions, SolverKind};
+use crate::study::StudyError;
+use crate::study::reference::Difference;
+use crate::study::subject::Subject;
+use crate::study::timing::{Job, Rounds, interleaved};
+use crate::study::tradeoff::axis::{Axis, Setting, Sweep, Trace, mark_front};
+use crate::study::tradeoff::bench::Bench;
+
+/// The solvers.
+pub(super) struct Solvers;
+
+/// A solver that has not ended by then is stopped; the best of them take some ten iterations.
+const MOST_ITERATIONS: u64 = 300;
+
+impl Axis for Solvers {
+    fn name(&self) -> &'static str {
+        "solver"
+    }
+
+    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
+        super::pixels::Pixels.applies(bench)
+    }
+
+    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
+        let fits = Fits::new(bench)?;
+        let runs: Vec<_> =
+            SolverKind::ALL.into_iter().map(|kind| (kind.name().to_owned(), vec![1], kind)).collect();
+        let (settings, outcomes) = fits.measure(&runs, 0)?;
+        let trace = |(run, outcome): (&(String, Vec<usize>, SolverKind), &Outcome)| Trace {
+            name: run.0.clone(),
+            points: outcome.history.iter().map(|i| (i.evaluations, i.seconds, i.loss)).collect(),
+        };
+        Ok(Sweep {
+            axis: self.name(),
+            title: "Solver",
+            method: format!(
+                "Each solver from the scene's start values on all pixels, {MOST_ITERATIONS} iterations at most. The error is how different \
+                 the images of its constants are from those of variable projection. Seconds are those of the fit; the curve shows the loss \
+                 after so many passes over the samples."
+            ),
+            cost: "seconds",
+            settings,
+            traces: runs.iter().zip(&outcomes).map(trace).collect(),
+        })
+    }
+}
+
+/// Fits of a scene's constants, from the same start in different ways.
+pub(super) struct Fits {
+    subject: Subject,
+}
+
+/// What a fit is called, on every how many-th block of pixels it reads (one fit after another), and its solver.
+type Run = (String, Vec<usize>, SolverKind);
+
+impl Fits {
+    pub(super) fn new(bench: &Bench<'_>) -> Result<Self, StudyError> {
+        Ok(Self { subject: Subject::new(bench.path, &bench.fit_options(), None, &|_| {})? })
+    }
+
+    pub(super) fn blocks(&self) -> usize {
+        self.subject.engine.blocks()
+    }
+
+    /// Each run's setting, beside that of run `reference`, and how it ended.
+    pub(super) fn measure(
+        &self,
+        runs: &[Run],
+        reference: usize,
+    ) -> Result<(Vec<Setting>, Vec<Outcome>), StudyError> {
+        let outcomes: Vec<RefCell<Option<(Outcome, u64)>>> =
+            runs.iter().map(|_| RefCell::new(None)).collect();
+        let mut works: Vec<Box<dyn FnMut() -> Result<f64, StudyError> + '_>> = Vec::new();
+        for (run, slot) in runs.iter().zip(&outcomes) {
+            works.push(Box::new(move || {
+                let (outcome, seconds, passes) = self.fit(run)?;
+                *slot.borrow_mut() = Some((outcome, passes));
+                Ok(seconds)
+            }));
+        }
+        let mut jobs: Vec<Job<'_, StudyError>> =
+            works.iter_mut().map(|job| &mut **job as Job<'_, StudyError>).collect();
+        // The slowest take minutes of passes; the others are taken several times.
+        let timed = interleaved(Rounds { warm_up: 0, least: 1, most: 3, seconds: 4.0 }, &mut jobs)?;
+        drop(jobs);
+        drop(works);
+        let outcomes: Vec<(Outcome, u64)> = outcomes.into_iter().filter_map(RefCell::into_inner).collect();
+        let images = |point: &Point| self.subject.images(point);
+        let best = images(&outcomes[reference].0.end);
+        let setting = |(i, (outcome, passes)): (usize, &(Outcome, u64))| Setting {
+            name: runs[i].0.clone(),
+            choose: None,
+            error: Difference::of_all(&best, &images(&outcome.end)),
+            cost: timed[i].seconds.median,
+            time: Some(timed[i]),
+            counts: vec![("passes", *passes as f64), ("loss", outcome.loss_end)],
+            reference: i == reference,
+            front: false,
+        };
+        let mut settings: Vec<Setting> = outcomes.iter().enumerate().map(setting).collect();
+        mark_front(&mut settings);
+        Ok((settings, outcomes.into_iter().map(|(outcome, _)| outcome).collect()))
+    }
+
+    /// One run: its last outcome, the seconds and passes of all its fits.
+    fn fit(&self, (_, strides, solver): &Run) -> Result<(Outcome, f64, u64), StudyError> {
+        let scene = &self.subject.prepared.scene;
+        let mut start = self.subject.prepared.start();
+        let (mut seconds, mut passes, mut last) = (0.0, 0, None);
+        // Terms that earlier fits kept would be a present.
+        let mut engine = CpuEngine::new(
+            self.subject.prepared.setup(),
+            self.subject.prepared.illumination.clone(),
+            self.subject.engine.views().to_vec(),
+            scene.fit.loss,
+            self.subject.prepared.unknowns(),
+        );
+        for &stride in strides {
+            engine.set_stride(stride);
+            let options = FitOptions {
+                solver: *solver,
+                max_iterations: Some(MOST_ITERATIONS),
+                ..FitOptions::default()
+            };
+            let outcome = fit::fit(&engine, &start, &options, &mut |_| {})
+                .map_err(|error| StudyError::Fit { scene: scene.path.display().to_string(), error })?;
+            seconds += outcome.seconds;
+            passes += outcome.evaluations;
+            start = outcome.end.clone();
+            last = Some(outcome);
+        }
+        let outcome = last.map_or_else(|| self.subject.fit(&FitOptions::default()), Ok)?;
+        Ok((outcome, seconds, passes))
+    }
+}

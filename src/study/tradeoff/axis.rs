@@ -1,0 +1,165 @@
+//! One approximation, swept from its cheapest setting to the one that the others are measured against.
+
+use serde::Serialize;
+
+use super::bench::Bench;
+use crate::model::effects::Silhouette;
+use crate::scene::Quality;
+use crate::study::StudyError;
+use crate::study::reference::Difference;
+use crate::study::timing::Timed;
+
+/// An approximation.
+pub trait Axis: Sync {
+    /// Its name on the command line.
+    fn name(&self) -> &'static str;
+    /// Whether the scene asks for it at all; else why not, without a full stop.
+    ///
+    /// # Errors
+    /// The reason.
+    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str>;
+    /// Measure each setting.
+    ///
+    /// # Errors
+    /// When a stage fails.
+    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError>;
+}
+
+/// What was measured along an axis.
+#[derive(Clone, Debug, Serialize)]
+pub struct Sweep {
+    /// The axis' name.
+    pub axis: &'static str,
+    /// What is asked, as a heading.
+    pub title: &'static str,
+    /// How it was measured: what the error is of, and what the cost.
+    pub method: String,
+    /// What `cost` counts: `seconds` of something, or another unit.
+    pub cost: &'static str,
+    /// The settings; one is the reference.
+    pub settings: Vec<Setting>,
+    /// Curves beside the settings: a loss along each solver's way.
+    pub traces: Vec<Trace>,
+}
+
+/// One setting of an axis.
+#[derive(Clone, Debug, Serialize)]
+pub struct Setting {
+    /// What it is called.
+    pub name: String,
+    /// What it sets in a scene file, where it can be set there.
+    #[serde(skip)]
+    pub choose: Option<Choose>,
+    /// How far its images are from the reference's.
+    pub error: Difference,
+    /// What it costs, in the sweep's unit.
+    pub cost: f64,
+    /// The time behind it, with its spread, where the cost is a time.
+    pub time: Option<Timed>,
+    /// Counts beside it: a name and a number.
+    pub counts: Vec<(&'static str, f64)>,
+    /// Whether the others are measured against it.
+    pub reference: bool,
+    /// Whether no other setting is both as cheap and as accurate.
+    pub front: bool,
+}
+
+/// A curve.
+#[derive(Clone, Debug, Serialize)]
+pub struct Trace {
+    /// What it is of.
+    pub name: String,
+    /// Passes over the samples, seconds, and the loss there.
+    pub points: Vec<(u64, f64, f64)>,
+}
+
+/// What a setting puts into a scene file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Choose {
+    /// A number of the `[quality]` table.
+    Quality(Knob, u32),
+    /// `[model] silhouette`.
+    Silhouette(Silhouette),
+}
+
+/// A key of the `[quality]` table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "named as the keys")]
+pub enum Knob {
+    SamplesPerAxis,
+    IrradianceSize,
+    LobeSize,
+    HiliteSize,
+    LobesPerOctave,
+    OcclusionRays,
+}
+
+impl Knob {
+    /// Its key.
+    #[must_use]
+    pub const fn key(self) -> &'static str {
+        match self {
+            Self::SamplesPerAxis => "samples_per_axis",
+            Self::IrradianceSize => "irradiance_size",
+            Self::LobeSize => "lobe_size",
+            Self::HiliteSize => "hilite_size",
+            Self::LobesPerOctave => "lobes_per_octave",
+            Self::OcclusionRays => "occlusion_rays",
+        }
+    }
+
+    /// Its place in the table.
+    pub const fn of(self, quality: &mut Quality) -> &mut u32 {
+        match self {
+            Self::SamplesPerAxis => &mut quality.samples_per_axis,
+            Self::IrradianceSize => &mut quality.irradiance_size,
+            Self::LobeSize => &mut quality.lobe_size,
+            Self::HiliteSize => &mut quality.hilite_size,
+            Self::LobesPerOctave => &mut quality.lobes_per_octave,
+            Self::OcclusionRays => &mut quality.occlusion_rays,
+        }
+    }
+}
+
+/// Mark the settings that no other one beats in both cost and error.
+pub fn mark_front(settings: &mut [Setting]) {
+    let of: Vec<(f64, f64)> = settings.iter().map(|s| (s.cost, s.error.relative)).collect();
+    for (i, setting) in settings.iter_mut().enumerate() {
+        let (cost, error) = of[i];
+        let beats = |&(j, &(c, e)): &(usize, &(f64, f64))| {
+            let as_good = c <= cost && e <= error;
+            as_good && (c < cost || e < error || j < i)
+        };
+        setting.front = !of.iter().enumerate().any(|other| beats(&other));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn setting(cost: f64, relative: f64) -> Setting {
+        Setting {
+            name: String::new(),
+            choose: None,
+            error: Difference { relative, ..Difference::default() },
+            cost,
+            time: None,
+            counts: Vec::new(),
+            reference: false,
+            front: false,
+        }
+    }
+
+    #[test]
+    fn the_front_holds_what_nothing_beats() {
+        let mut settings: Vec<Setting> =
+            [(1.0, 0.5), (2.0, 0.6), (2.0, 0.1), (3.0, 0.1), (9.0, 0.0), (9.0, 0.0)]
+                .map(|(c, e)| setting(c, e))
+                .into();
+        mark_front(&mut settings);
+        let front: Vec<bool> = settings.iter().map(|s| s.front).collect();
+        // Of two that are equal, the first.
+        assert_eq!(front, [true, false, true, false, true, false]);
+    }
+}

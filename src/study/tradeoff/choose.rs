@@ -1,0 +1,176 @@
+//! The reverse of a sweep: the cheapest settings within an error, or the most accurate within a time.
+//!
+//! Along each axis of the scene file one setting is taken. Errors of different approximations are independent
+//! enough that their squares add; seconds add. Whether they do is then measured: the scene with all settings
+//! together is compared with the scene at every axis' reference. If it is off by more than was asked for, less
+//! is asked of the sum, and other settings are taken.
+
+use serde::Serialize;
+
+use super::axis::{Choose, Setting, Sweep};
+use super::bench::{Bench, Settings};
+use crate::study::StudyError;
+use crate::study::reference::Difference;
+
+/// What is looked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// An error of the images, relative to their root mean square, at the least cost.
+    Within(f64),
+    /// Seconds of baking, tracing and a pass, with the least error.
+    Seconds(f64),
+}
+
+/// Settings that meet the goal.
+#[derive(Clone, Debug, Serialize)]
+pub struct Choice {
+    /// What was asked for, in words.
+    pub goal: String,
+    /// The setting along each axis.
+    pub settings: Vec<(&'static str, String)>,
+    /// What a scene file must say.
+    #[serde(skip)]
+    pub keys: Vec<Choose>,
+    /// The error of all settings together, measured.
+    pub error: Difference,
+    /// The error that the sum of squares foretold.
+    pub foretold: f64,
+    /// The seconds of all axes together.
+    pub seconds: f64,
+    /// The seconds of every axis' reference.
+    pub reference_seconds: f64,
+}
+
+/// How often less is asked of the sum of squares.
+const ATTEMPTS: usize = 24;
+/// By how much less each time.
+const TIGHTER: f64 = 0.8;
+
+/// Choose a setting along each axis, and measure them together.
+///
+/// # Errors
+/// When nothing meets the goal, or a stage fails.
+pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Choice, StudyError> {
+    let axes: Vec<Vec<&Setting>> = sweeps.iter().map(candidates).filter(|axis| !axis.is_empty()).collect();
+    let names: Vec<&'static str> =
+        sweeps.iter().filter(|sweep| !candidates(sweep).is_empty()).map(|sweep| sweep.axis).collect();
+    if axes.is_empty() {
+        let best = "none of the axes that were swept can be set in a scene file".to_owned();
+        return Err(StudyError::NoChoice { goal: words(goal), best });
+    }
+    let references: Vec<&Setting> = sweeps.iter().flat_map(reference).collect();
+    let exact = bench.evaluate(settings(bench, &references))?.images(&bench.point());
+    let mut asked = match goal {
+        Goal::Within(error) => error,
+        Goal::Seconds(_) => f64::INFINITY,
+    };
+    for _ in 0..ATTEMPTS {
+        let found = match goal {
+            Goal::Within(_) => best(&axes, &|_, error| error <= asked, &|seconds, error| (seconds, error)),
+            Goal::Seconds(most) => {
+                best(&axes, &|seconds, _| seconds <= most, &|seconds, error| (error, seconds))
+            }
+        };
+        let Some(found) = found else { break };
+        let error =
+            Difference::of_all(&exact, &bench.evaluate(settings(bench, &found))?.images(&bench.point()));
+        let (seconds, foretold) = sums(&found);
+        if matches!(goal, Goal::Within(most) if error.relative > most) {
+            asked *= TIGHTER;
+            continue;
+        }
+        return Ok(Choice {
+            goal: words(goal),
+            settings: names.iter().copied().zip(found.iter().map(|setting| setting.name.clone())).collect(),
+            keys: found.iter().filter_map(|setting| setting.choose).collect(),
+            error,
+            foretold,
+            seconds,
+            reference_seconds: sums(&references).0,
+        });
+    }
+    let least =
+        axes.iter().map(|axis| axis.iter().map(|s| seconds_of(s)).fold(f64::INFINITY, f64::min)).sum::<f64>();
+    let best = match goal {
+        Goal::Within(_) => {
+            "no combination of the settings that were swept comes that near to the reference".to_owned()
+        }
+        Goal::Seconds(_) => format!("the cheapest take {least:.3} s"),
+    };
+    Err(StudyError::NoChoice { goal: words(goal), best })
+}
+
+fn words(goal: Goal) -> String {
+    match goal {
+        Goal::Within(error) => format!("within {:.4}%", 100.0 * error),
+        Goal::Seconds(seconds) => format!("within {:.1} ms", 1e3 * seconds),
+    }
+}
+
+/// The settings of an axis that a scene file can have; only those on the front are worth choosing, and the
+/// reference is always there.
+fn candidates(sweep: &Sweep) -> Vec<&Setting> {
+    sweep.settings.iter().filter(|s| s.choose.is_some() && (s.front || s.reference)).collect()
+}
+
+fn reference(sweep: &Sweep) -> Option<&Setting> {
+    sweep.settings.iter().find(|setting| setting.reference && setting.choose.is_some())
+}
+
+/// The scene's own settings with these in their place.
+fn settings(bench: &Bench<'_>, chosen: &[&Setting]) -> Settings {
+    let mut settings = bench.settings();
+    for choose in chosen.iter().filter_map(|setting| setting.choose) {
+        match choose {
+            Choose::Quality(knob, value) => *knob.of(&mut settings.quality) = value,
+            Choose::Silhouette(silhouette) => settings.silhouette = silhouette,
+        }
+    }
+    settings
+}
+
+/// The seconds of a setting, where its cost is a time; operations of a shader take none of it.
+fn seconds_of(setting: &Setting) -> f64 {
+    setting.time.map_or(0.0, |time| time.seconds.median)
+}
+
+/// Seconds, and the root of the sum of squared errors.
+fn sums(settings: &[&Setting]) -> (f64, f64) {
+    let seconds = settings.iter().map(|setting| seconds_of(setting)).sum();
+    (seconds, settings.iter().map(|setting| setting.error.relative.powi(2)).sum::<f64>().sqrt())
+}
+
+/// The combination that is `allowed` and first by `order`: axis by axis, keeping only what nothing beats in
+/// both seconds and error.
+fn best<'a>(
+    axes: &[Vec<&'a Setting>],
+    allowed: &dyn Fn(f64, f64) -> bool,
+    order: &dyn Fn(f64, f64) -> (f64, f64),
+) -> Option<Vec<&'a Setting>> {
+    let mut kept: Vec<Vec<&Setting>> = vec![Vec::new()];
+    for axis in axes {
+        let longer = kept.iter().flat_map(|chosen| {
+            axis.iter().map(move |setting| chosen.iter().copied().chain([*setting]).collect::<Vec<_>>())
+        });
+        let mut longer: Vec<(f64, f64, Vec<&Setting>)> =
+            longer.map(|chosen| (sums(&chosen).0, sums(&chosen).1, chosen)).collect();
+        // By seconds, then error: what follows must be more accurate to be kept.
+        longer.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let mut least = f64::INFINITY;
+        longer.retain(|(_, error, _)| {
+            let better = *error < least;
+            least = least.min(*error);
+            better
+        });
+        kept = longer.into_iter().map(|(_, _, chosen)| chosen).collect();
+    }
+    let key = |chosen: &Vec<&Setting>| {
+        let (seconds, error) = sums(chosen);
+        order(seconds, error)
+    };
+    let allowed = kept.into_iter().filter(|chosen| {
+        let (seconds, error) = sums(chosen);
+        allowed(seconds, error)
+    });
+    allowed.min_by(|a, b| key(a).partial_cmp(&key(b)).unwrap_or(std::cmp::Ordering::Equal))
+}

@@ -1,0 +1,244 @@
+//! The page of a tradeoff.
+
+use std::fmt::Write as _;
+
+use super::Tradeoff;
+use super::axis::{Setting, Sweep};
+use super::choose::Choice;
+use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
+use crate::report::plot::{Dot, Plot};
+use crate::report::{number, seconds};
+
+/// Errors of so much of the image's root mean square are told of each axis.
+const TOLD: [f64; 2] = [0.01, 0.001];
+
+/// `report.html` of a tradeoff of the scene of that name.
+#[must_use]
+pub fn page(scene: &str, tradeoff: &Tradeoff) -> String {
+    let mut main = String::new();
+    for warning in &tradeoff.warnings {
+        let _ = write!(main, "<p class=\"quiet\">{}</p>", escape(warning));
+    }
+    if let Some(choice) = &tradeoff.choice {
+        main += &section("choice", &format!("Settings {}", choice.goal), &chosen(choice));
+    }
+    main += &section("summary", "The cheapest setting of each axis", &summary(&tradeoff.sweeps));
+    for sweep in &tradeoff.sweeps {
+        main += &section(sweep.axis, sweep.title, &axis(sweep));
+    }
+    main += &section("method", "How it was measured", &method(scene));
+    let lead = "Each approximation swept by itself, all else as the scene has it. The error is the root mean square difference of the \
+                images in linear radiance, relative to the reference's own root mean square, over all views; the cost is beside it."
+        .to_owned();
+    Page { kind: "tradeoff", title: scene, lead, tiles: tiles(tradeoff), main }.html()
+}
+
+fn tiles(tradeoff: &Tradeoff) -> String {
+    let settings: usize = tradeoff.sweeps.iter().map(|sweep| sweep.settings.len()).sum();
+    let front: usize =
+        tradeoff.sweeps.iter().flat_map(|sweep| &sweep.settings).filter(|setting| setting.front).count();
+    let tiles = [
+        ("axes", tradeoff.sweeps.len().to_string()),
+        ("settings", settings.to_string()),
+        ("on a front", front.to_string()),
+    ];
+    let mut html: String = tiles.iter().map(|(name, value)| tile(name, value, "")).collect();
+    if let Some(choice) = &tradeoff.choice {
+        html +=
+            &tile("error", &format!("{}%", number(100.0 * choice.error.relative, 3)), &escape(&choice.goal));
+        html += &tile(
+            "time",
+            &seconds(choice.seconds),
+            &format!("reference {}", seconds(choice.reference_seconds)),
+        );
+    }
+    html
+}
+
+fn chosen(choice: &Choice) -> String {
+    let rows: Vec<(String, String)> =
+        choice.settings.iter().map(|(axis, name)| ((*axis).to_owned(), name.clone())).collect();
+    format!(
+        "<p>All together they were measured to be {}% off the reference of every axis (their errors' squares summed to {}%), and take {} \
+         beside the reference's {}. The scene file beside this page has them.</p>{}",
+        number(100.0 * choice.error.relative, 3),
+        number(100.0 * choice.foretold, 3),
+        seconds(choice.seconds),
+        seconds(choice.reference_seconds),
+        facts(&rows)
+    )
+}
+
+/// The cost of a setting in words.
+fn cost(sweep: &Sweep, setting: &Setting) -> String {
+    if sweep.cost == "seconds" {
+        seconds(setting.cost)
+    } else {
+        format!("{} {}", number(setting.cost, 3), sweep.cost)
+    }
+}
+
+/// For each axis the cheapest setting within some errors, and its reference.
+fn summary(sweeps: &[Sweep]) -> String {
+    let headings: Vec<String> = TOLD.iter().map(|error| format!("within {}%.", 100.0 * error)).collect();
+    let mut columns = vec![("axis", "what is swept")];
+    columns
+        .extend(headings.iter().map(|heading| (heading.as_str(), "the cheapest setting with such an error")));
+    columns.push(("reference.", "what errors are measured against"));
+    let mut table = Table::new(&columns);
+    for sweep in sweeps {
+        let within = |error: f64| {
+            let near = sweep.settings.iter().filter(|setting| setting.error.relative <= error);
+            near.min_by(|a, b| a.cost.total_cmp(&b.cost))
+        };
+        let cell = |setting: Option<&Setting>| {
+            setting.map_or_else(Cell::none, |s| Cell::text(&format!("{} ({})", s.name, cost(sweep, s))))
+        };
+        let mut cells = vec![Cell::text(sweep.title)];
+        cells.extend(TOLD.iter().map(|&error| cell(within(error))));
+        cells.push(cell(sweep.settings.iter().find(|setting| setting.reference)));
+        table.row("", &cells);
+    }
+    table.html("cheapest")
+}
+
+fn axis(sweep: &Sweep) -> String {
+    let counts: Vec<&str> =
+        sweep.settings.first().map(|s| s.counts.iter().map(|(name, _)| *name).collect()).unwrap_or_default();
+    let cost_heading = if sweep.cost == "seconds" { "seconds" } else { sweep.cost };
+    let mut columns = vec![
+        ("setting", "of the approximation"),
+        ("error, %", "root mean square difference over the reference's root mean square"),
+        ("PSNR, dB", "mean of the views"),
+        ("FLIP", "mean of the views"),
+        (cost_heading, "what it costs"),
+    ];
+    if sweep.cost != "seconds" {
+        columns.push(("time", "of a pass, where it was measured"));
+    }
+    columns.extend(counts.iter().map(|name| (*name, "a count: the same on every machine")));
+    columns.push(("front.", "whether nothing is both as cheap and as accurate"));
+    let mut table = Table::new(&columns);
+    for setting in &sweep.settings {
+        let score = |x: Option<f64>, digits: usize| {
+            x.map_or_else(Cell::none, |x| Cell::value(format!("{x:.digits$}"), x))
+        };
+        let time = setting.time.map_or_else(Cell::none, |time| {
+            let half = 0.5 * (time.seconds.upper - time.seconds.lower);
+            let spread = if time.rounds > 1 {
+                format!(" <span class=\"pm inline\">± {}</span>", seconds(half))
+            } else {
+                String::new()
+            };
+            Cell::value(format!("{}{spread}", seconds(time.seconds.median)), time.seconds.median)
+        });
+        let mut cells = vec![
+            Cell::text(&setting.name),
+            Cell::value(number(100.0 * setting.error.relative, 3), setting.error.relative),
+            score(setting.error.psnr, 2),
+            score(setting.error.flip, 5),
+        ];
+        if sweep.cost == "seconds" {
+            cells.push(time);
+        } else {
+            cells.push(Cell::value(number(setting.cost, 3), setting.cost));
+            cells.push(time);
+        }
+        cells.extend(setting.counts.iter().map(|&(_, n)| Cell::value(number(n, 4), n)));
+        let mark = match (setting.reference, setting.front) {
+            (true, _) => "reference",
+            (_, true) => "front",
+            _ => "",
+        };
+        cells.push(Cell::text(mark));
+        table.row(if setting.reference { "reference" } else { "" }, &cells);
+    }
+    let plot = plot(sweep);
+    let traces = if sweep.traces.is_empty() { String::new() } else { traces(sweep) };
+    format!(
+        "<p class=\"quiet\">{}</p>{}{}{traces}{}",
+        escape(&sweep.method),
+        plot.svg(),
+        plot.legend(),
+        table.html(&format!("axis-{}", sweep.axis))
+    )
+}
+
+/// Error against cost.
+#[must_use]
+pub fn plot(sweep: &Sweep) -> Plot<'_> {
+    let dot = |setting: &Setting| Dot {
+        x: setting.cost,
+        y: 100.0 * setting.error.relative,
+        label: setting.name.clone(),
+        title: format!(
+            "{}: {}% off, {}",
+            setting.name,
+            number(100.0 * setting.error.relative, 3),
+            cost(sweep, setting)
+        ),
+        series: 0,
+        front: setting.front,
+    };
+    Plot {
+        x: sweep.cost,
+        y: "error, %",
+        log_x: true,
+        dots: sweep.settings.iter().map(dot).collect(),
+        series: Vec::new(),
+        joined: true,
+    }
+}
+
+/// How far above the best loss each run was after so many passes.
+fn traces(sweep: &Sweep) -> String {
+    let all = || sweep.traces.iter().flat_map(|trace| &trace.points);
+    let best = all().map(|point| point.2).fold(f64::INFINITY, f64::min);
+    let mut dots = Vec::new();
+    for (series, trace) in sweep.traces.iter().enumerate() {
+        // Beyond some dots a curve is as clear.
+        let every = trace.points.len().div_ceil(60).max(1);
+        for (i, (passes, took, loss)) in trace.points.iter().enumerate() {
+            if i % every == 0 || i + 1 == trace.points.len() {
+                dots.push(Dot {
+                    x: *passes as f64,
+                    y: (loss - best).max(0.0),
+                    label: if i + 1 == trace.points.len() { trace.name.clone() } else { String::new() },
+                    title: format!(
+                        "{}: loss {} after {passes} passes, {}",
+                        trace.name,
+                        number(*loss, 5),
+                        seconds(*took)
+                    ),
+                    series,
+                    front: true,
+                });
+            }
+        }
+    }
+    let plot = Plot {
+        x: "passes over the samples",
+        y: "loss above the best",
+        log_x: true,
+        dots,
+        series: sweep.traces.iter().map(|trace| trace.name.clone()).collect(),
+        joined: false,
+    };
+    format!("<h3>The loss on the way</h3>{}{}", plot.svg(), plot.legend())
+}
+
+fn method(scene: &str) -> String {
+    let rows = [
+        ("software", format!("skinfit {}", env!("CARGO_PKG_VERSION"))),
+        ("scene", scene.to_owned()),
+        ("threads", rayon::current_num_threads().to_string()),
+        ("instructions", crate::simd::instructions()),
+    ]
+    .map(|(name, text)| (name.to_owned(), text));
+    format!(
+        "<p>Times are medians of rounds in which all settings of an axis take turns, with half the distance of their quartiles; a bake or a trace of more than half a second is run once. Counts \
+         stand beside them, as they are the same on every machine. Filled dots are on the front: nothing is both as cheap and as \
+         accurate; the dashed line joins them. Dots on the line marked 0 have no error at all.</p>{}",
+        facts(&rows)
+    )
+}

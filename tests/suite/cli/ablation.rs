@@ -1,0 +1,140 @@
+//! `skinfit ablate`: what it measures where the answer is known.
+
+use std::collections::BTreeMap;
+
+use serde_json::Value;
+
+use super::desk::Desk;
+
+/// The scene without its targets.
+fn without_targets(desk: &Desk) {
+    for view in ["front", "side"] {
+        desk.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
+    }
+}
+
+/// The rows of `results.json` by what is left out.
+fn rows(desk: &Desk, folder: &str) -> BTreeMap<String, Value> {
+    let name = |row: &Value| {
+        let parts = row["left_out"].as_array().unwrap().iter().map(|part| part.as_str().unwrap());
+        parts.collect::<Vec<_>>().join("+")
+    };
+    let file = desk.json(&format!("{folder}/results.json"));
+    file["rows"].as_array().unwrap().iter().map(|row| (name(row), row.clone())).collect()
+}
+
+fn loss(row: &Value) -> f64 {
+    row["loss"].as_f64().unwrap()
+}
+
+#[test]
+fn what_contributes_nothing_is_missed_by_nothing_at_all() {
+    let desk = Desk::new();
+    without_targets(&desk);
+    desk.edit("hilite = 0.7", "hilite = 0.0");
+    let ran = desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]).done();
+    let rows = rows(&desk, "parts");
+    // The whole, seven effects, and the one term that is no effect.
+    assert_eq!(rows.len(), 9, "{ran:?}");
+    for unmissed in ["", "hilite"] {
+        let row = &rows[unmissed];
+        assert_eq!((loss(row), row["change"]["loss"].as_f64()), (0.0, Some(0.0)), "{unmissed}");
+        for view in row["views"].as_array().unwrap() {
+            assert_eq!(view["linear_rms"].as_f64(), Some(0.0));
+            assert_eq!((view["psnr"].as_f64(), view["flip"].as_f64()), (Some(200.0), Some(0.0)));
+        }
+    }
+    for missed in ["diffuse", "base_weight", "rim", "side_specular", "reflection", "occlusion", "normal_map"]
+    {
+        assert!(loss(&rows[missed]) > 0.0, "{missed}");
+    }
+    // Without the effect its cube is not baked, and less is read and computed.
+    let counts = |name: &str| rows[name]["counts"].clone();
+    let (whole, without) = (counts(""), counts("hilite"));
+    let bakes = |counts: &Value| counts["bakes"].as_array().unwrap().len();
+    assert_eq!(bakes(&whole), bakes(&without) + 1);
+    for count in ["bytes_a_sample", "operations", "baked_bytes"] {
+        assert!(whole[count].as_f64() > without[count].as_f64(), "{count}");
+    }
+    assert!(ran.out.contains("\nhilite") && ran.out.contains("  hilite\n"), "{ran:?}");
+}
+
+#[test]
+fn fitting_again_never_makes_it_worse_and_pairs_are_all_there() {
+    let desk = Desk::new();
+    let options = ["ablate", "scene.toml", "--gpu", "never", "--pairs", "-o"];
+    desk.run(&[&options[..], &["held"]].concat()).done();
+    desk.run(&[&options[..], &["again", "--refit"]].concat());
+    let (held, again) = (rows(&desk, "held"), rows(&desk, "again"));
+    // 8 parts: 28 pairs, less diffuse with its two terms.
+    assert_eq!((held.len(), again.len()), (1 + 8 + 26, 1 + 8 + 26));
+    for (name, row) in &held {
+        // Both begin from one fit of the whole model; f32 sums of a fit and f64 images differ by 1e-7.
+        let (held, again) = (loss(row), loss(&again[name]));
+        assert!(again <= held * (1.0 + 1e-4) + 1e-9, "{name}: {again} > {held}");
+    }
+    // The targets are the model's own.
+    assert!(loss(&held[""]) < 1e-9 && loss(&held["rim"]) > 1e-3);
+    assert!(held["rim"]["change"]["t"].as_f64().unwrap() > 3.0);
+    // What is missing is no longer among the constants.
+    let names = |row: &Value| -> Vec<String> {
+        row["constants"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap().to_owned()).collect()
+    };
+    assert!(names(&again[""]).contains(&"hilite".to_owned()));
+    assert!(!names(&again["hilite"]).contains(&"hilite".to_owned()));
+    assert!(!names(&again["base_weight+hilite"]).contains(&"base_weight".to_owned()));
+    // A line a case for all views and for each, and a picture for each part and view.
+    assert_eq!(desk.text("held/results.csv").lines().count(), 1 + 35 * 3);
+    let pictures = desk.files().into_keys().filter(|path| {
+        path.to_string_lossy().contains("held/") && path.extension().is_some_and(|e| e == "png")
+    });
+    assert_eq!(pictures.count(), 8 * 2);
+}
+
+#[test]
+fn numbers_do_not_depend_on_threads_and_constants_may_be_given() {
+    let desk = Desk::new();
+    let measured = |folder: &str, threads: &str| {
+        let options =
+            ["ablate", "scene.toml", "--params", "truth.toml", "--gpu", "never", "--threads", threads, "-o"];
+        desk.run(&[&options[..], &[folder]].concat()).done();
+        let without_times = |mut row: Value| {
+            row["cpu"].take();
+            row
+        };
+        rows(&desk, folder).into_iter().map(|(name, row)| (name, without_times(row))).collect::<Vec<_>>()
+    };
+    assert_eq!(measured("one", "1"), measured("two", "2"));
+    // The constants that the targets were rendered with leave nothing but rounding.
+    assert!(loss(&rows(&desk, "one")[""]) < 1e-9);
+}
+
+#[test]
+fn a_scene_of_one_effect_is_black_without_it() {
+    let desk = Desk::new();
+    without_targets(&desk);
+    desk.edit(
+        "[\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"side_specular\", \"hilite\", \"reflection\"]",
+        "[\"diffuse\"]",
+    );
+    desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]);
+    let rows = rows(&desk, "parts");
+    assert_eq!(rows.keys().collect::<Vec<_>>(), ["", "diffuse"]);
+    let relative = rows["diffuse"]["views"][0]["relative_rms"].as_f64().unwrap();
+    // The difference is the image itself.
+    assert_eq!(relative, 1.0);
+}
+
+#[test]
+fn what_is_refused_leaves_no_folder() {
+    let desk = Desk::new();
+    let before = desk.files();
+    desk.run(&["ablate", "none.toml", "-o", "parts"]).refused(&["none.toml: there is no such file"]);
+    desk.run(&["ablate", "scene.toml", "-o", "parts", "--params", "none.toml"]).refused(&["none.toml"]);
+    desk.write("file", b"in the way");
+    desk.run(&["ablate", "scene.toml", "-o", "file"]).refused(&["file: cannot be written"]);
+    desk.remove("file");
+    assert!(desk.files() == before, "something was left");
+    // The folder must be named.
+    assert_eq!(desk.run(&["ablate", "scene.toml"]).code, Some(2));
+}

@@ -1,0 +1,178 @@
+//! `skinfit tradeoff`: what it measures where the answer is known, and settings that keep their promise.
+
+use serde_json::Value;
+
+use super::desk::Desk;
+
+/// The settings of an axis in `results.json`.
+fn settings(desk: &Desk, folder: &str, axis: &str) -> Vec<Value> {
+    let file = desk.json(&format!("{folder}/results.json"));
+    let axes = file["axes"].as_array().unwrap();
+    let found = axes.iter().find(|sweep| sweep["axis"] == axis).unwrap_or_else(|| panic!("no axis {axis}"));
+    found["settings"].as_array().unwrap().clone()
+}
+
+fn error(setting: &Value) -> f64 {
+    setting["error"]["relative"].as_f64().unwrap()
+}
+
+fn named<'a>(settings: &'a [Value], name: &str) -> &'a Value {
+    settings.iter().find(|s| s["name"].as_str().unwrap().starts_with(name)).unwrap()
+}
+
+#[test]
+fn every_axis_has_a_reference_without_error_and_a_front() {
+    let desk = Desk::new();
+    desk.run(&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"]).done();
+    let axes = [
+        "format",
+        "silhouette",
+        "irradiance",
+        "specular",
+        "hilite",
+        "filter",
+        "lobes",
+        "rays",
+        "samples",
+        "pixels",
+        "solver",
+    ];
+    for axis in axes {
+        let settings = settings(&desk, "cost", axis);
+        let references: Vec<&Value> = settings.iter().filter(|s| s["reference"] == true).collect();
+        assert_eq!(references.len(), 1, "{axis}");
+        assert_eq!(error(references[0]), 0.0, "{axis}");
+        let others = settings.iter().filter(|s| s["reference"] == false);
+        // A solver or a fit to fewer pixels may find the same answer to the bit.
+        assert!(others.clone().any(|s| error(s) > 0.0) || axis == "pixels", "{axis}: {settings:?}");
+        assert!(settings.iter().any(|s| s["front"] == true), "{axis}");
+        // Nothing on the front is beaten.
+        for s in settings.iter().filter(|s| s["front"] == true) {
+            let cost = |s: &Value| s["cost"].as_f64().unwrap();
+            assert!(!settings.iter().any(|o| cost(o) < cost(s) && error(o) < error(s)), "{axis}: {s}");
+        }
+        assert!(desk.text(&format!("cost/{axis}.svg")).starts_with("<svg"));
+    }
+    let lines = desk.text("cost/results.csv").lines().count();
+    let all: usize = axes.iter().map(|axis| settings(&desk, "cost", axis).len()).sum();
+    assert_eq!(lines, 1 + all);
+}
+
+#[test]
+fn errors_fall_as_they_must() {
+    let desk = Desk::new();
+    let axes = ["--axis", "format", "--axis", "silhouette", "--axis", "filter", "--axis", "rays"];
+    desk.run(&[&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"][..], &axes].concat())
+        .done();
+    // Each format has more bits than the one before; binary32 rounds to 6e-8 and is off by some ten roundings.
+    let formats = settings(&desk, "cost", "format");
+    let errors: Vec<f64> =
+        ["fixed12", "as listed", "f16", "f32", "f64"].map(|name| error(named(&formats, name))).into();
+    assert!(errors.windows(2).all(|pair| pair[0] > pair[1]), "{errors:?}");
+    assert!(errors[3] < 2e-6 && errors[2] < 5e-3 && errors[2] > 1e-5, "{errors:?}");
+    let filters = settings(&desk, "cost", "filter");
+    assert!(error(named(&filters, "nearest")) > 10.0 * error(named(&filters, "8-bit")), "{filters:?}");
+    // Cutting a mesh finer quarters the sag of its cosines each time; the ball's silhouettes leave a wide margin.
+    let vertex: Vec<f64> = settings(&desk, "cost", "silhouette")
+        .iter()
+        .filter(|s| s["name"].as_str().unwrap().starts_with("vertex"))
+        .map(error)
+        .collect();
+    assert!(vertex.len() == 3 && vertex[0] > 2.0 * vertex[1] && vertex[1] > 2.0 * vertex[2], "{vertex:?}");
+    // Sixteen times the rays: the error falls by four for random ones, and more for these.
+    let rays = settings(&desk, "cost", "rays");
+    let exact = |name: &str| error(rays.iter().find(|s| s["name"] == name).unwrap());
+    assert!(exact("16") > 3.0 * exact("256"), "{rays:?}");
+}
+
+#[test]
+fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
+    let desk = Desk::new();
+    let axes = ["--axis", "irradiance", "--axis", "specular", "--axis", "hilite", "--axis", "rays"];
+    let run = |to: &str, goal: &[&str]| {
+        desk.run(&[&["tradeoff", "scene.toml", "--params", "truth.toml", "-o", to][..], &axes, goal].concat())
+    };
+    let ran = run("near", &["--within", "1%"]).done();
+    assert!(ran.out.contains("within 1.0000%: irradiance"), "{ran:?}");
+    let choice = desk.json("near/results.json")["choice"].clone();
+    assert!(choice["error"]["relative"].as_f64().unwrap() <= 0.01, "{choice}");
+    // The scene file has the settings, and is a scene: its image is as near to that of the references.
+    let table: toml::Table = desk.text("near/scene.toml").parse().unwrap();
+    let text = |name: &str| {
+        choice["settings"].as_array().unwrap().iter().find(|s| s[0] == name).unwrap()[1]
+            .as_str()
+            .unwrap()
+            .to_owned()
+    };
+    let quality = |key: &str| table["quality"][key].as_integer().unwrap().to_string();
+    assert_eq!(quality("occlusion_rays"), text("rays"));
+    assert_eq!(quality("lobe_size"), text("specular"));
+    let mut best = table.clone();
+    let references =
+        [("irradiance_size", 128), ("lobe_size", 256), ("hilite_size", 512), ("occlusion_rays", 1024)];
+    for (key, value) in references {
+        best["quality"].as_table_mut().unwrap().insert(key.to_owned(), value.into());
+    }
+    desk.write("best.toml", best.to_string().as_bytes());
+    let image = |scene: &str, to: &str| {
+        desk.run(&[
+            "render",
+            scene,
+            "--engine",
+            "cpu",
+            "--params",
+            "truth.toml",
+            "--view",
+            "front",
+            "-o",
+            to,
+        ])
+        .done();
+        crate::fixtures::read_exr(&desk.path(to)).rgb(["R", "G", "B"])
+    };
+    let (near, best) = (image("near/scene.toml", "near.exr"), image("best.toml", "best.exr"));
+    let sum = |f: &dyn Fn(usize, usize) -> f32| -> f64 {
+        (0..best.len())
+            .flat_map(|i| (0..3).map(move |c| (i, c)))
+            .map(|(i, c)| f64::from(f(i, c)).powi(2))
+            .sum()
+    };
+    let relative = (sum(&|i, c| near[i][c] - best[i][c]) / sum(&|i, c| best[i][c])).sqrt();
+    // One view of two: its share of the error may be the greater one.
+    assert!(relative <= 0.015, "{relative}");
+    // More is allowed for less; and what nothing meets is refused.
+    run("far", &["--within", "20%"]).done();
+    let seconds = |to: &str| desk.json(&format!("{to}/results.json"))["choice"]["settings"].to_string();
+    assert_ne!(seconds("far"), seconds("near"));
+    run("none", &["--budget", "0.000001ms"]).refused(&["no settings are within 0.0 ms", "the cheapest take"]);
+    assert!(!desk.path("none").exists());
+    run("soon", &["--budget", "60s"]).done();
+    assert_eq!(desk.json("soon/results.json")["choice"]["error"]["relative"].as_f64(), Some(0.0));
+}
+
+#[test]
+fn what_makes_no_sense_is_refused() {
+    let desk = Desk::new();
+    let before = desk.files();
+    let run = |more: &[&str]| desk.run(&[&["tradeoff", "scene.toml", "-o", "cost"], more].concat());
+    for (more, words) in [
+        (&["--axis", "rayz"][..], "Did you mean `rays`?"),
+        (&["--within", "0.5"], "such as 0.5%"),
+        (&["--within", "-1%"], "such as 0.5%"),
+        (&["--within", "NaN%"], "such as 0.5%"),
+        (&["--budget", "20"], "such as 20ms"),
+        (&["--budget", "0s"], "such as 20ms"),
+        (&["--budget", "1s", "--within", "1%"], "cannot be used with"),
+    ] {
+        let ran = run(more);
+        assert_eq!(ran.code, Some(2), "{more:?}: {ran:?}");
+        assert!(ran.err.contains(words), "{more:?}: {ran:?}");
+    }
+    for view in ["front", "side"] {
+        desk.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
+    }
+    run(&["--axis", "solver"]).refused(&["--axis solver: no view names a target"]);
+    run(&["--axis", "format", "--within", "1%"]).refused(&["none of the axes that were swept can be set"]);
+    desk.write("scene.toml", &before[&desk.path("scene.toml")]);
+    assert!(desk.files() == before, "something was left");
+}
