@@ -16,10 +16,10 @@ pub(super) struct Changes<'a> {
     pub(super) loss: Option<&'a str>,
     /// The start values, instead of the file's.
     pub(super) start: Option<Start<'a>>,
-    /// Settings, instead of the file's.
-    pub(super) settings: &'a [Choose],
     /// Fitted maps, instead of the file's: key in `[maps]` and path.
     pub(super) maps: &'a [(&'static str, String)],
+    /// Settings, instead of the file's.
+    pub(super) settings: &'a [Choose],
 }
 
 /// Start values that a fit used.

@@ -1,11 +1,6 @@
 //! `skinfit fit --maps`: whole maps beside the constants, and the evidence of what that gained.
 
-use std::path::Path;
-
-use super::{Refusal, say};
-use crate::engine::view::ObservedView;
-use crate::prepare::Prepared;
-use crate::report::metrics::Scores;
+use super::Refusal;
 
 /// How to build the program so that it fits maps.
 const BUILD: &str = "cargo build --release --features burn";
@@ -23,74 +18,51 @@ pub(super) struct MapArguments {
     hold_out: Option<String>,
 }
 
-/// A view before and after.
-pub(super) struct Gained {
-    name: String,
-    held_out: bool,
-    before: Option<Scores>,
-    after: Option<Scores>,
-}
-
-/// What a fit of maps found.
-pub(super) struct MapsFound {
-    gained: Vec<Gained>,
-    #[cfg(feature = "burn")]
-    pictures: Vec<burn::Pictures>,
-    #[cfg(feature = "burn")]
-    history: Vec<crate::maps::fit::MapStep>,
-    #[cfg(feature = "burn")]
-    adapter: String,
-}
-
 impl MapArguments {
     /// Refuse maps in a program that was built without them.
     pub(super) fn check(&self) -> Result<(), Refusal> {
-        if cfg!(feature = "burn") || self.maps.is_empty() {
+        if cfg!(feature = "burn") || (self.maps.is_empty() && self.hold_out.is_none()) {
             return Ok(());
         }
         Err(Refusal::new(format!(
             "--maps: this program was built without the fit of maps. Build it with `{BUILD}`, or leave --maps out."
         )))
     }
-
-    /// Fit the maps that are asked for: samples, cubes and free columns are then those of the fitted maps, and a view
-    /// that was held out is gone.
-    #[cfg(not(feature = "burn"))]
-    #[allow(clippy::unused_self, reason = "as where maps are fitted")]
-    pub(super) fn fit(
-        &self,
-        _: &mut Prepared,
-        observed: Vec<ObservedView>,
-        _: Option<&str>,
-    ) -> Result<(Vec<ObservedView>, Option<MapsFound>), Refusal> {
-        Ok((observed, None))
-    }
 }
 
-impl MapsFound {
-    /// Write the maps, their changes, and `maps.json`; tell of them, unless `quiet`. Returns the maps that a scene file
-    /// can name: key in `[maps]` and path.
-    #[cfg_attr(not(feature = "burn"), allow(clippy::unnecessary_wraps, reason = "as where maps are fitted"))]
-    pub(super) fn conclude(&self, run: &Path, quiet: bool) -> Result<Vec<(&'static str, String)>, Refusal> {
-        #[cfg(feature = "burn")]
-        let files = self.write(run)?;
-        #[cfg(not(feature = "burn"))]
-        let (files, _) = (Vec::new(), run);
-        if !quiet {
-            self.tell()?;
+/// What stands in where the program is built without the fit of maps.
+#[cfg(not(feature = "burn"))]
+mod absent {
+    use std::path::Path;
+
+    use super::{MapArguments, Refusal};
+    use crate::engine::view::ObservedView;
+    use crate::prepare::Prepared;
+
+    /// Nothing finds any.
+    pub(in crate::cli) enum MapsFound {}
+
+    impl MapArguments {
+        /// The views as they are: [`MapArguments::check`] has refused to fit maps.
+        #[allow(clippy::unused_self, clippy::unnecessary_wraps, reason = "as where maps are fitted")]
+        pub(in crate::cli) fn fit(
+            &self,
+            _: &mut Prepared,
+            observed: Vec<ObservedView>,
+            _: Option<&str>,
+        ) -> Result<(Vec<ObservedView>, Option<MapsFound>), Refusal> {
+            Ok((observed, None))
         }
-        Ok(files)
     }
 
-    /// How well each view is met, before and after.
-    fn tell(&self) -> Result<(), Refusal> {
-        for Gained { name, held_out, before, after } in &self.gained {
-            if let (Some(before), Some(after)) = (before, after) {
-                let held = if *held_out { " (held out)" } else { "" };
-                say(&format!("{name:>22} {:>7.2} dB -> {:.2} dB{held}", before.psnr, after.psnr))?;
-            }
+    impl MapsFound {
+        pub(in crate::cli) fn conclude(
+            &self,
+            _: &Path,
+            _: bool,
+        ) -> Result<Vec<(&'static str, String)>, Refusal> {
+            match *self {}
         }
-        Ok(())
     }
 }
 
@@ -98,25 +70,46 @@ impl MapsFound {
 mod burn {
     use serde_json::{Value, json};
 
+    use std::path::Path;
+
     use super::super::fit::compared;
-    use super::*;
+    use super::super::{Refusal, say};
+    use super::MapArguments;
+    use crate::engine::view::ObservedView;
     use crate::gpu::Choice;
-    use crate::maps::fit::columns_beside;
+    use crate::maps::fit::{MapStep, columns_beside};
     use crate::maps::pictures::{change, picture};
     use crate::maps::problem::read;
     use crate::maps::{FittedMaps, Grid, Layer, MapError, MapTask, fit_maps};
     use crate::output;
+    use crate::prepare::Prepared;
     use crate::progress;
     use crate::render::files::{ImageOptions, write_exr, write_png, write_png_bytes};
     use crate::render::image::Image;
     use crate::render::shade::Shader;
-    use crate::report::metrics::Comparison;
+    use crate::report::metrics::{Comparison, Scores};
     use crate::scene::MapKind;
     use crate::scene::view::View;
     use crate::tensor::SharedDevice;
 
+    /// What a fit of maps found.
+    pub(in crate::cli) struct MapsFound {
+        gained: Vec<Gained>,
+        pictures: Vec<Pictures>,
+        history: Vec<MapStep>,
+        adapter: String,
+    }
+
+    /// A view before and after.
+    struct Gained {
+        name: String,
+        held_out: bool,
+        before: Option<Scores>,
+        after: Option<Scores>,
+    }
+
     /// A map before and after.
-    pub(in crate::cli) struct Pictures {
+    struct Pictures {
         name: &'static str,
         grid: Grid,
         initial: Image,
@@ -126,6 +119,8 @@ mod burn {
     }
 
     impl MapArguments {
+        /// Fit the maps that are asked for: samples, cubes and free columns are then those of the fitted maps, and
+        /// a view that was held out is gone.
         pub(in crate::cli) fn fit(
             &self,
             prepared: &mut Prepared,
@@ -272,7 +267,32 @@ mod burn {
     }
 
     impl MapsFound {
-        pub(super) fn write(&self, run: &Path) -> Result<Vec<(&'static str, String)>, Refusal> {
+        /// Write the maps, their changes, and `maps.json`; tell of them, unless `quiet`. Returns the maps that a
+        /// scene file can name: key in `[maps]` and path.
+        pub(in crate::cli) fn conclude(
+            &self,
+            run: &Path,
+            quiet: bool,
+        ) -> Result<Vec<(&'static str, String)>, Refusal> {
+            let files = self.write(run)?;
+            if !quiet {
+                self.tell()?;
+            }
+            Ok(files)
+        }
+
+        /// How well each view is met, before and after.
+        fn tell(&self) -> Result<(), Refusal> {
+            for Gained { name, held_out, before, after } in &self.gained {
+                if let (Some(before), Some(after)) = (before, after) {
+                    let held = if *held_out { " (held out)" } else { "" };
+                    say(&format!("{name:>22} {:>7.2} dB -> {:.2} dB{held}", before.psnr, after.psnr))?;
+                }
+            }
+            Ok(())
+        }
+
+        fn write(&self, run: &Path) -> Result<Vec<(&'static str, String)>, Refusal> {
             let folder = std::path::absolute(run.join("maps"))
                 .map_err(|error| output::OutputError::new(run, &error))?;
             std::fs::create_dir_all(&folder).map_err(|error| output::OutputError::new(&folder, &error))?;

@@ -108,7 +108,7 @@ impl Layer {
         Ok(())
     }
 
-    /// What the priors say against `texels`: [1].
+    /// What the priors say against `texels`: \[1\].
     ///
     /// # Errors
     /// When the device does not take it.

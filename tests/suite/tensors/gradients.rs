@@ -1,8 +1,7 @@
 //! The shading operation beside the CPU model in f64, and its adjoint beside finite differences of that.
 
 use burn::tensor::{Tensor, TensorData};
-use skinfit::bake::Illumination;
-use skinfit::bake::LobeStack;
+use skinfit::bake::{Illumination, LobeStack};
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::{Setup, shade};
