@@ -40,6 +40,7 @@ pub(super) struct Chosen<'g> {
 }
 
 /// An engine over the views of a scene.
+#[allow(clippy::large_enum_variant, reason = "there is one of them")]
 pub(super) enum FitEngine<'g> {
     /// On the CPU.
     Cpu(CpuEngine),

@@ -83,6 +83,9 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
     }
 }
 
+/// Fields of a stored sample, with their WGSL types.
+pub type Fields = Vec<(&'static str, &'static str)>;
+
 /// What is kept of a stored sample's terms, with WGSL types.
 pub const TERMS: [(&str, &str); 8] = [
     ("diffuse_term", "vec3f"),
@@ -97,7 +100,7 @@ pub const TERMS: [(&str, &str); 8] = [
 
 /// The fields of a stored sample, or of its terms, that a scene's effects ask for.
 #[must_use]
-pub fn sample_fields(facts: &Facts) -> Vec<(&'static str, &'static str)> {
+pub fn sample_fields(facts: &Facts) -> Fields {
     let needs = facts.needs();
     let bumped_silhouette = facts.holds("bumped_silhouette") == Some(true);
     let of_terms = facts.source == Source::Terms;
@@ -127,7 +130,7 @@ pub fn sample_fields(facts: &Facts) -> Vec<(&'static str, &'static str)> {
 ///
 /// # Errors
 /// When no rules yield them.
-pub fn plan_terms(facts: &Facts) -> Result<(Plan, Vec<(&'static str, &'static str)>), PlanError> {
+pub fn plan_terms(facts: &Facts) -> Result<(Plan, Fields), PlanError> {
     let facts = Facts { source: Source::Samples, ..*facts };
     let given: Vec<&'static str> = sample_fields(&facts).iter().map(|(name, _)| *name).collect();
     let terms = sample_fields(&Facts { source: Source::Terms, ..facts });

@@ -20,7 +20,7 @@ pub(super) struct Images {
 }
 
 impl Images {
-    pub(super) fn new(gpu: &Gpu, fused: Fused, parts: &Parts) -> Result<Self, GpuError> {
+    pub(super) fn new(gpu: &Gpu, fused: &Fused, parts: &Parts) -> Result<Self, GpuError> {
         let (inputs, layout) = (Inputs::new(gpu, &fused.plan), part_layout(gpu));
         let pipeline = pipeline(gpu, "forward pass", &fused.image_module(), &[&inputs.layout, &layout]);
         let channels = fused.channels();

@@ -260,7 +260,7 @@ impl<'g> GpuEngine<'g> {
         self.keep(point, &mut device)?;
         let OnDevice { parts, lights, images, .. } = &mut *device;
         if images.as_ref().is_none_or(|(of, _)| *of != turned) {
-            *images = Some((turned, Images::new(self.gpu, self.fused(turned)?, parts)?));
+            *images = Some((turned, Images::new(self.gpu, &self.fused(turned)?, parts)?));
         }
         let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
         lights.set(self.gpu, &point.params, &mut images.inputs)?;

@@ -190,7 +190,7 @@ impl Writer<'_> {
             match self.tangent(*argument) {
                 Some(moved) => given.push(moved),
                 None if tangent.of_all && is_float(&inner) => {
-                    given.push(format!("{}()", self.type_text(&inner)?))
+                    given.push(format!("{}()", self.type_text(&inner)?));
                 }
                 None => {}
             }

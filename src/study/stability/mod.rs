@@ -96,8 +96,12 @@ impl Study {
         let given = Circumstances { lights: &self.lights, pixels: self.pixels };
         for demand in &DEMANDS {
             let verdict =
-                |evaluator: &Box<dyn Evaluator>| Some(demanded((demand.check)(evaluator.engine()?, &given)));
-            report.add((demand.name, demand.hard), 1, evaluators.iter().map(verdict).collect());
+                |evaluator: &dyn Evaluator| Some(demanded((demand.check)(evaluator.engine()?, &given)));
+            report.add(
+                (demand.name, demand.hard),
+                1,
+                evaluators.iter().map(|evaluator| verdict(&**evaluator)).collect(),
+            );
             step(1);
         }
         for case in &self.kept {
@@ -130,10 +134,10 @@ impl Study {
         holds: &[hard::Holds],
     ) -> Vec<Option<Verdict>> {
         let reference = Reference::new(&self.lights, batch, FEW);
-        let check = |evaluator: &Box<dyn Evaluator>| {
-            Some(check_against(&**evaluator, &self.lights, batch, holds, &reference))
+        let check = |evaluator: &dyn Evaluator| {
+            Some(check_against(evaluator, &self.lights, batch, holds, &reference))
         };
-        evaluators.iter().map(check).collect()
+        evaluators.iter().map(|evaluator| check(&**evaluator)).collect()
     }
 }
 
