@@ -17,6 +17,8 @@
 //! - [`report`]: metrics, pictures and pages that show how good a fit is.
 //! - [`study`]: what is measured about the model and the fits.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
+//! - `tensor`: the model on burn's tensors, differentiable (feature `burn`).
+//! - `maps`: fits of whole maps (feature `burn`).
 //! - [`export`]: constants and shaders as text for other engines.
 //! - [`study`]: what is measured about the model and the fits.
 //! - [`cli`]: the command line.
@@ -32,6 +34,8 @@ pub mod export;
 pub mod fit;
 #[cfg(feature = "gpu")]
 pub mod gpu;
+#[cfg(feature = "burn")]
+pub mod maps;
 pub mod model;
 pub mod output;
 pub mod prepare;
@@ -43,3 +47,5 @@ pub mod scene;
 pub mod shader;
 pub mod simd;
 pub mod study;
+#[cfg(feature = "burn")]
+pub mod tensor;

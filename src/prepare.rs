@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::bake::{self, BakeError, BakeStats, VertexOcclusion};
-use crate::engine::cpu::{CpuEngine, Illumination};
+use crate::bake::{self, BakeError, BakeStats, Illumination, VertexOcclusion};
+use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
 use crate::fit::params_file::{ParamsFile, ParamsFileError};
@@ -157,8 +157,7 @@ impl Prepared {
         let (bake, baked) = bake::bake(&self.scene, &pose, exponents, cache)?;
         self.warnings.extend(baked.warnings.iter().cloned());
         self.baked = baked;
-        self.illumination =
-            Illumination { irradiance: bake.irradiance, lobes: bake.lobes, hilite: bake.hilite };
+        self.illumination = bake.illumination;
         self.occlusion = bake.occlusion;
         self.seconds.bake += start.elapsed().as_secs_f64();
         Ok(())

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use serde::Deserialize;
-use skinfit::bake::LobeStack;
-use skinfit::engine::cpu::Illumination;
+use skinfit::bake::{Illumination, LobeStack};
 use skinfit::engine::view::ObservedView;
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::Form;

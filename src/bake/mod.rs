@@ -33,14 +33,21 @@ pub use lobes::LobeStack;
 /// Everything that was baked for a scene.
 #[derive(Clone, Debug, Default)]
 pub struct Bake {
+    /// The environment's light.
+    pub illumination: Illumination,
+    /// Ambient occlusion of each vertex.
+    pub occlusion: Option<VertexOcclusion>,
+}
+
+/// The environment's light: the cubes that the enabled effects ask for.
+#[derive(Clone, Debug, Default)]
+pub struct Illumination {
     /// E_d: the cosine-weighted mean of the incoming light (alpha: its luminance, unused).
     pub irradiance: Option<Cube<f32>>,
     /// E_s for a stack of exponents.
     pub lobes: Option<LobeStack>,
     /// E_h: the environment, lightly filtered for its resolution (alpha: its luminance, unused).
     pub hilite: Option<Cube<f32>>,
-    /// Ambient occlusion of each vertex.
-    pub occlusion: Option<VertexOcclusion>,
 }
 
 /// The open share of the hemisphere, 1 = unoccluded.
@@ -178,17 +185,17 @@ pub fn bake(
         let quality = &scene.quality;
         if needs.irradiance {
             let size = quality.irradiance_size as usize;
-            bake.irradiance = Some(cubes.lobe(&mut baker, "irradiance".to_owned(), size, 1.0));
+            bake.illumination.irradiance = Some(cubes.lobe(&mut baker, "irradiance".to_owned(), size, 1.0));
         }
         if needs.lobes {
             let exponents = lobes::knots(&exponents, quality.lobes_per_octave);
             let size = quality.lobe_size as usize;
             let cube = |&e: &f64| cubes.lobe(&mut baker, format!("lobe {e:.4}"), size, e);
             let stack = exponents.iter().map(cube).collect();
-            bake.lobes = Some(LobeStack { exponents, cubes: stack });
+            bake.illumination.lobes = Some(LobeStack { exponents, cubes: stack });
         }
         if needs.hilite {
-            bake.hilite = Some(cubes.hilite(&mut baker, quality.hilite_size as usize));
+            bake.illumination.hilite = Some(cubes.hilite(&mut baker, quality.hilite_size as usize));
         }
     }
     if needs.occlusion {

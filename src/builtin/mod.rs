@@ -5,7 +5,7 @@
 //!
 //! - `noise`, `sdf`: gradient noise; signed distances and their blends
 //! - `head`, `face`, `ear`, `bust`: the anatomy, as one signed distance
-//! - `surface`: the mesh on it
+//! - `grid`, `surface`: the mesh on it
 //! - `charts`, `unwrap`, `atlas`, `texels`, `tangents`: the atlas: seams, charts, packing, texels
 //! - `expressions`, `rig`: morph targets; bones, weights and the nod
 //! - `landmarks`, `paint`, `relief`: the skin maps
@@ -21,6 +21,7 @@ mod ear;
 mod expressions;
 mod face;
 mod glb;
+mod grid;
 mod head;
 mod landmarks;
 mod noise;
@@ -90,7 +91,7 @@ pub fn version() -> &'static str {
 }
 
 /// Every file that has a part in the scene.
-const SOURCES: [&str; 21] = [
+const SOURCES: [&str; 22] = [
     include_str!("atlas.rs"),
     include_str!("bust.rs"),
     include_str!("charts.rs"),
@@ -98,6 +99,7 @@ const SOURCES: [&str; 21] = [
     include_str!("expressions.rs"),
     include_str!("face.rs"),
     include_str!("glb.rs"),
+    include_str!("grid.rs"),
     include_str!("head.rs"),
     include_str!("landmarks.rs"),
     include_str!("mod.rs"),

@@ -7,6 +7,7 @@ use std::time::Instant;
 
 use super::fit_engine::{Chosen, FitEngine, FitEngineArguments};
 use super::fitted_scene::{Changes, Start};
+use super::maps::MapArguments;
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings};
@@ -27,7 +28,7 @@ use crate::scene::{Loss, Scene};
 /// Fit a scene's free parameters to its target images
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1")
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -60,6 +61,8 @@ pub(super) struct Arguments {
     #[arg(long, help_heading = "Solver")]
     resume: bool,
     #[command(flatten)]
+    maps: MapArguments,
+    #[command(flatten)]
     engine: FitEngineArguments,
     /// Print report.json on standard output, and nothing else there.
     #[arg(long)]
@@ -67,6 +70,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    arguments.maps.check()?;
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
@@ -85,10 +89,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let solving = Solving::of(arguments, folder.path())?;
     let observed = prepared.observed()?;
     tell_warnings(&prepared.warnings);
+    let (observed, maps) = arguments.maps.fit(&mut prepared, observed, arguments.engine.adapter())?;
     arguments.engine.with_engine(&prepared, observed, |chosen| {
         let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine)?;
         folder.keep();
-        conclude(arguments, solving, &folder, &path, &prepared, chosen, &outcome)
+        let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
+        let fitted = Fitted { path: &path, maps: &maps.unwrap_or_default() };
+        conclude(arguments, solving, &folder, fitted, &prepared, chosen, &outcome)
     })
 }
 
@@ -118,12 +125,19 @@ impl Solving {
 /// What a fit goes on from, in its run folder.
 const STATE: &str = "state.json";
 
+/// The scene file that was fitted, and the files of fitted maps: key in `[maps]` and path.
+#[derive(Clone, Copy)]
+struct Fitted<'a> {
+    path: &'a Path,
+    maps: &'a [(&'static str, String)],
+}
+
 /// Leave the run folder's files, and tell how it ended.
 fn conclude(
     arguments: &Arguments,
     solving: Solving,
     folder: &RunFolder,
-    path: &Path,
+    Fitted { path, maps }: Fitted<'_>,
     prepared: &Prepared,
     chosen: &Chosen<'_>,
     outcome: &Outcome,
@@ -135,7 +149,7 @@ fn conclude(
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
-    folder.write_scene(path, changes(arguments, prepared))?;
+    folder.write_scene(path, Changes { maps, ..changes(arguments, prepared) })?;
     params_file(prepared, outcome).write(&folder.path().join("params.toml"), path, Some(outcome))?;
     let run = RunInfo { seconds, ..run_info(arguments, solving, path, prepared, engine, views) };
     let report = report::write_run(folder.path(), &run, outcome)?;
@@ -283,7 +297,7 @@ fn evidence(prepared: &Prepared, engine: &FitEngine<'_>, outcome: &Outcome) -> V
 }
 
 /// The target as an image, and how much of each pixel is compared.
-fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
+pub(super) fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
     let mut target = Image::new(fit.width, fit.height);
     let Some(source) = &view.target else { return (target, fit.alpha.clone()) };
     target.rgb.clone_from(&source.rgb);

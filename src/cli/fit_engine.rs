@@ -111,6 +111,11 @@ impl FitEngineArguments {
         self.engine != "cpu"
     }
 
+    /// Part of the adapter's name, where one is named.
+    pub(super) fn adapter(&self) -> Option<&str> {
+        self.adapter.as_deref()
+    }
+
     /// Call `then` with the engine that was asked for, over the scene's views.
     pub(super) fn with_engine<T>(
         &self,
@@ -246,7 +251,7 @@ mod gpu {
         }
 
         fn open(&self) -> Result<Gpu, GpuError> {
-            Gpu::open(&Choice { name: self.adapter.clone(), max_side: None })
+            Gpu::open(&Choice { name: self.adapter.clone(), ..Choice::default() })
         }
 
         fn engine_on<'g>(

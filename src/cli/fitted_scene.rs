@@ -16,6 +16,8 @@ pub(super) struct Changes<'a> {
     pub(super) loss: Option<&'a str>,
     /// The start values, instead of the file's.
     pub(super) start: Option<Start<'a>>,
+    /// Fitted maps, instead of the file's: key in `[maps]` and path.
+    pub(super) maps: &'a [(&'static str, String)],
     /// Settings, instead of the file's.
     pub(super) settings: &'a [Choose],
 }
@@ -55,6 +57,11 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
             views.for_each(|view| make_absolute(view, &keys, folder));
         }
         _ => {}
+    }
+    if !changes.maps.is_empty()
+        && let Some(maps) = section(scene.as_table_mut(), "maps")
+    {
+        changes.maps.iter().for_each(|(key, path)| set(maps, key, path.as_str().into()));
     }
     if let Some(loss) = changes.loss
         && let Some(fit) = section(scene.as_table_mut(), "fit")

@@ -116,7 +116,7 @@ mod graphics {
     /// Every adapter; and the name of the one that is used and why, or why none is.
     pub(super) fn adapters(wanted: Option<&str>) -> (Vec<Adapter>, Result<(String, String), String>) {
         let adapters: Vec<Adapter> = adapter::adapters().iter().map(describe).collect();
-        let choice = Choice { name: wanted.map(str::to_owned), max_side: None };
+        let choice = Choice { name: wanted.map(str::to_owned), ..Choice::default() };
         let chosen = adapter::choose(&choice).map_err(|error| error.to_string()).map(|chosen| {
             let info = chosen.get_info();
             let why = if wanted.is_some() {

@@ -4,6 +4,7 @@
 //!   `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
+//! - `maps`: fits of whole maps, where the program is built with them
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
 mod ablate;
@@ -14,6 +15,7 @@ mod fit;
 mod fit_engine;
 mod fitted_scene;
 mod info;
+mod maps;
 mod params;
 mod render;
 mod run_folder;

@@ -1,6 +1,8 @@
 //! `skinfit stability`: hard cases on every evaluator, and a random search for new ones.
 
 use std::path::PathBuf;
+#[cfg(feature = "gpu")]
+use std::rc::Rc;
 
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, say, tell, tell_warnings};
@@ -8,10 +10,13 @@ use crate::output;
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::progress;
 use crate::scene::{LoadOptions, Scene};
+use crate::study::stability::evaluate::Evaluator;
 use crate::study::stability::lights::LightBox;
 #[cfg(feature = "gpu")]
 use crate::study::stability::objectives::{EngineEvaluator, OnAdapter};
 use crate::study::stability::scene::{batches, sweepable};
+#[cfg(feature = "gpu")]
+use crate::study::stability::shader::{Adapter, Rules};
 use crate::study::stability::{Study, evaluators, kept};
 
 /// Try hard cases on every evaluator, and search for new ones
@@ -37,9 +42,12 @@ pub(super) struct Arguments {
     /// Pixels of the case that sums over many.
     #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     pixels: u64,
+    /// Leave out what runs on a graphics adapter: the shader rules and the GPU engine.
+    #[arg(long)]
+    no_gpu: bool,
     /// Part of a graphics adapter's name, in any case [default: $WGPU_ADAPTER_NAME, or the fastest].
     #[cfg(feature = "gpu")]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", conflicts_with = "no_gpu")]
     adapter: Option<String>,
 }
 
@@ -73,29 +81,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
 }
 
 fn study_and_tell(arguments: &Arguments, study: &Study) -> Result<Exit, Refusal> {
-    #[allow(unused_mut, reason = "without the feature there is nothing to add")]
-    let (mut evaluators, mut missing) = (evaluators(), Vec::new());
-    #[cfg(feature = "gpu")]
-    let choice = crate::gpu::Choice { name: arguments.adapter.clone(), ..crate::gpu::Choice::default() };
-    #[cfg(feature = "gpu")]
-    match crate::gpu::Gpu::open(&choice) {
-        Ok(gpu) => {
-            say(&format!("on the adapter {}", gpu.name()))?;
-            let gpu = std::rc::Rc::new(gpu);
-            evaluators.push(Box::new(crate::study::stability::shader::Rules(std::rc::Rc::clone(&gpu))));
-            evaluators.push(Box::new(EngineEvaluator(OnAdapter(gpu))));
-        }
-        Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => return Err(error.into()),
-        Err(error) => missing.push(format!("SHADER RULES AND GPU ENGINE WERE NOT TRIED: {error}")),
-    }
-    #[cfg(not(feature = "gpu"))]
-    missing.push(
-        "SHADER RULES AND GPU ENGINE WERE NOT TRIED: skinfit was built without the feature gpu.".to_owned(),
-    );
+    let mut evaluators = evaluators();
+    let missing = add_gpu(arguments, &mut evaluators)?;
     let bar = progress::bar("cases", study.steps() as u64);
     let mut report = study.run(&evaluators, &mut |done| bar.set_position(done as u64));
     bar.finish_and_clear();
-    report.missing = missing;
+    report.missing = missing.into_iter().collect();
     say(report.text().trim_end())?;
     report.missing.iter().for_each(|words| tell(words));
     if let Some(folder) = &arguments.output {
@@ -111,4 +102,35 @@ fn study_and_tell(arguments: &Arguments, study: &Study) -> Result<Exit, Refusal>
         tell(failure);
     }
     Ok(if failures.is_empty() { Exit::Done } else { Exit::Failed })
+}
+
+/// Add what runs on a graphics adapter; what is to be said, loudly, where it does not.
+fn add_gpu(
+    arguments: &Arguments,
+    evaluators: &mut Vec<Box<dyn Evaluator>>,
+) -> Result<Option<String>, Refusal> {
+    let without = |why: &str| Ok(Some(format!("SHADER RULES AND GPU ENGINE WERE NOT TRIED: {why}")));
+    if arguments.no_gpu {
+        return without("--no-gpu leaves them out.");
+    }
+    #[cfg(not(feature = "gpu"))]
+    {
+        let _ = evaluators;
+        without("skinfit was built without the feature gpu.")
+    }
+    #[cfg(feature = "gpu")]
+    {
+        let choice = crate::gpu::Choice { name: arguments.adapter.clone(), ..crate::gpu::Choice::default() };
+        match Adapter::open(choice) {
+            Ok(adapter) => {
+                say(&format!("adapter: {}\n", adapter.name()))?;
+                let adapter = Rc::new(adapter);
+                evaluators.push(Box::new(Rules(Rc::clone(&adapter))));
+                evaluators.push(Box::new(EngineEvaluator(OnAdapter(adapter))));
+                Ok(None)
+            }
+            Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => Err(error.into()),
+            Err(error) => without(&error.to_string()),
+        }
+    }
 }

@@ -23,6 +23,9 @@ pub mod view;
 
 use crate::model::params::{Column, Params};
 
+/// Groups of a block of pixels: a coarse pass reads every so-many-th block.
+pub const BLOCK: usize = 16;
+
 /// What one pass over the samples yields for a list of free columns at one point.
 ///
 /// With residuals r_i (each weighted, over pixels and channels) the sums are over all i; `jtj` is
@@ -71,9 +74,8 @@ pub trait Objective: Sync {
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>);
 }
 
-/// [`Objective::rounding`] of an engine that computes in f32 and reads every `stride`-th block of so many groups
-/// of each view.
-fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, block: usize, stride: usize) -> f64 {
+/// [`Objective::rounding`] of an engine that computes in f32 and reads every `stride`-th block of each view.
+fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: usize) -> f64 {
     use rayon::prelude::*;
     // Half a unit in the last place of an f32, as a share of the number.
     const SHARE: f64 = 1.0 / (1 << 24) as f64;
@@ -81,9 +83,9 @@ fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, block: usize
     const BLOCKS: usize = 512;
     let power = |view: &view::ObservedView| {
         let groups = view.samples.groups();
-        let read: Vec<usize> = (0..groups.div_ceil(block)).step_by(stride).collect();
+        let read: Vec<usize> = (0..groups.div_ceil(BLOCK)).step_by(stride).collect();
         let sums = read.par_chunks(BLOCKS).map(|blocks| {
-            let groups = blocks.iter().flat_map(|b| b * block..groups.min((b + 1) * block));
+            let groups = blocks.iter().flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK));
             view.power(groups, loss)
         });
         sums.collect::<Vec<f64>>().iter().sum::<f64>()

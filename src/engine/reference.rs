@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::residual::weighted_residual;
 use super::view::ObservedView;
 use super::{NormalEquations, Objective, Point, Unknown};
-use crate::engine::cpu::Illumination;
+use crate::bake::Illumination;
 use crate::model::cube::Cube;
 use crate::model::evaluate::{Setup, derivative, shade};
 use crate::model::fragment::Fragment;

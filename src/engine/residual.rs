@@ -71,9 +71,13 @@ pub fn weighted_residual<R: Real>(
             let value = rounded * inverse;
             let reweight = half * inverse / size.max(corner);
             let scale = (weight * reweight).sqrt();
-            // d/dm (|r| / D) = sign(r) / D - |r| sign(m) / D^2, as a multiple of the reweight.
-            let sign = R::select(model.ge(zero), one, -one);
-            let slope = r - sign * value * size.max(corner);
+            // d/dm (|r| / D) = sign(r) / D - |r| sign(m) / D^2, as a multiple of the reweight. Where both have a
+            // sign, 1 - |r| / D is written as what is left of D, for a bright model would cancel in it.
+            let with_sign = |x: R| R::select(model.ge(zero), x, -x);
+            let one_side = R::select((model * target).ge(zero), model.abs().min(target.abs()), zero);
+            let left = (one_side + one_side + model.lit(SMAPE_FLOOR)) * inverse;
+            let beyond = r * R::select(with_sign(r).ge(zero), left, one + size * inverse);
+            let slope = R::select(corner.ge(size), r - with_sign(value * corner), beyond);
             Weighted { loss: weight * value, scale, residual: scale * slope }
         }
     }

@@ -9,7 +9,7 @@
 //! - `drive`: the executor, watched
 //! - [`state`]: interrupted fits, resumed
 //! - [`starts`]: where the other starts of a multi-start fit begin
-//! - [`statistics`]: standard errors, correlations, and what is undetermined
+//! - [`statistics`]: standard errors and correlations; `null_space`: what is undetermined
 //! - [`outcome`]: what a fit yields
 //! - [`params_file`]: what was fitted, as `params.toml`
 
@@ -22,6 +22,7 @@ mod drive;
 pub mod linearisation;
 pub mod lm;
 pub mod memory;
+mod null_space;
 pub mod options;
 pub mod outcome;
 pub mod params_file;

@@ -14,6 +14,9 @@ pub struct Choice {
     pub name: Option<String>,
     /// A limit on the sides of textures, below the adapter's own; larger images are drawn in tiles.
     pub max_side: Option<u32>,
+    /// Every feature and limit that the adapter has, and not only what rendering uses: what a library of
+    /// tensors expects of a device that it shares.
+    pub everything: bool,
 }
 
 /// Every adapter, the one that is taken by default first.

@@ -3,8 +3,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 
 use wgpu::{
-    AdapterInfo, Buffer, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType, Features,
-    Limits, MemoryHints, PollType, Queue,
+    Adapter, AdapterInfo, Buffer, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType,
+    Features, Limits, MemoryHints, PollType, Queue,
 };
 
 use super::adapter::{Choice, WELCOME, choose};
@@ -15,6 +15,8 @@ use super::error::GpuError;
 pub struct Gpu {
     pub(crate) device: Device,
     pub(crate) queue: Queue,
+    #[cfg(feature = "burn")]
+    pub(crate) adapter: Adapter,
     info: AdapterInfo,
     /// The first thing that went wrong; errors after it are its consequences.
     fault: Arc<Mutex<Option<GpuError>>>,
@@ -28,12 +30,10 @@ impl Gpu {
     pub fn open(choice: &Choice) -> Result<Self, GpuError> {
         let adapter = choose(choice)?;
         let info = adapter.get_info();
-        let welcome = WELCOME.iter().fold(Features::empty(), |all, (feature, ..)| all | *feature);
-        let features = adapter.features() & welcome;
         let descriptor = DeviceDescriptor {
             label: Some("skinfit"),
-            required_features: features,
-            required_limits: limits(&adapter.limits(), choice.max_side),
+            required_features: features(&adapter, choice.everything),
+            required_limits: limits(&adapter.limits(), choice),
             // One scene and its targets: blocks for many small resources would stay empty.
             memory_hints: MemoryHints::MemoryUsage,
             ..DeviceDescriptor::default()
@@ -41,13 +41,21 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
             GpuError::NoDevice { adapter: info.name.clone(), reason: sentence(&error.to_string()) }
         })?;
-        let gpu = Self { device, queue, info, fault: Arc::default() };
+        let gpu = Self {
+            device,
+            queue,
+            #[cfg(feature = "burn")]
+            adapter,
+            info,
+            fault: Arc::default(),
+        };
         gpu.listen();
         Ok(gpu)
     }
 
-    /// Keep the first error, instead of wgpu's panic.
-    fn listen(&self) {
+    /// Keep the first error, instead of wgpu's panic. A library that shares the device may have put its own
+    /// listeners in their place.
+    pub(crate) fn listen(&self) {
         let (fault, adapter) = (self.fault.clone(), self.info.name.clone());
         self.device.on_uncaptured_error(Arc::new(move |error| {
             let adapter = adapter.clone();
@@ -81,7 +89,7 @@ impl Gpu {
     }
 
     /// A buffer that holds `contents`. (wgpu's own helper panics where the device is lost.)
-    pub(super) fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
+    pub(crate) fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
         let buffer = self.device.create_buffer(&BufferDescriptor {
             label: Some(label),
             size: contents.len() as u64,
@@ -90,6 +98,51 @@ impl Gpu {
         });
         self.queue.write_buffer(&buffer, 0, contents);
         buffer
+    }
+
+    /// A buffer that shaders read `contents` from.
+    ///
+    /// # Errors
+    /// When it is larger than a binding may be, or the device does not take it.
+    #[cfg(feature = "burn")]
+    pub(crate) fn storage(&self, what: &str, contents: &[u8]) -> Result<Buffer, GpuError> {
+        self.check_binding(what, contents.len() as u64)?;
+        let made = self.buffer(what, contents, BufferUsages::STORAGE);
+        self.check()?;
+        Ok(made)
+    }
+
+    /// A buffer of so many bytes for shaders to write and read; they are 0 at first.
+    ///
+    /// # Errors
+    /// When it is larger than a binding may be, or the device has no room for it.
+    #[cfg(feature = "burn")]
+    pub(crate) fn scratch(&self, what: &str, bytes: u64) -> Result<Buffer, GpuError> {
+        self.check_binding(what, bytes)?;
+        let made = self.device.create_buffer(&BufferDescriptor {
+            label: Some(what),
+            size: bytes,
+            usage: BufferUsages::STORAGE | BufferUsages::COPY_SRC | BufferUsages::COPY_DST,
+            mapped_at_creation: false,
+        });
+        self.check()?;
+        Ok(made)
+    }
+
+    #[cfg(feature = "burn")]
+    fn check_binding(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
+        let limits = self.device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes <= limit {
+            return Ok(());
+        }
+        Err(GpuError::BufferSize { adapter: self.name().to_owned(), what: what.to_owned(), bytes, limit })
+    }
+
+    /// Keep what went wrong where nothing can be returned, for [`check`](Self::check) to tell.
+    #[cfg(feature = "burn")]
+    pub(crate) fn fail(&self, error: GpuError) {
+        keep(&self.fault, error);
     }
 
     /// Wait until all submitted work is done.
@@ -136,6 +189,18 @@ impl Gpu {
         self.device.features().contains(Features::TIMESTAMP_QUERY)
     }
 
+    /// How many storage buffers a shader may have.
+    #[must_use]
+    pub fn storage_buffers(&self) -> u32 {
+        self.device.limits().max_storage_buffers_per_shader_stage
+    }
+
+    /// Write into a buffer, before whatever is submitted next.
+    pub fn write(&self, buffer: &Buffer, offset: u64, contents: &[u8]) {
+        self.queue.write_buffer(buffer, offset, contents);
+        self.queue.submit([]);
+    }
+
     /// The longest side of a texture.
     #[must_use]
     pub fn max_side(&self) -> u32 {
@@ -143,11 +208,24 @@ impl Gpu {
     }
 }
 
-/// WebGPU's defaults, but sizes as large as the adapter has them.
-fn limits(adapter: &Limits, max_side: Option<u32>) -> Limits {
+/// What rendering uses of the adapter's features, or everything but what is experimental (it may not be asked
+/// for without `unsafe`) and mapped device memory (wgpu warns of its cost).
+fn features(adapter: &Adapter, everything: bool) -> Features {
+    if everything {
+        return adapter.features() - Features::all_experimental_mask() - Features::MAPPABLE_PRIMARY_BUFFERS;
+    }
+    adapter.features() & WELCOME.iter().fold(Features::empty(), |all, (feature, ..)| all | *feature)
+}
+
+/// WebGPU's defaults, but sizes as large as the adapter has them; or all as large.
+fn limits(adapter: &Limits, choice: &Choice) -> Limits {
     let side = adapter.max_texture_dimension_2d;
+    let side = choice.max_side.unwrap_or(side).min(side);
+    if choice.everything {
+        return Limits { max_texture_dimension_2d: side, ..adapter.clone() };
+    }
     Limits {
-        max_texture_dimension_2d: max_side.unwrap_or(side).min(side),
+        max_texture_dimension_2d: side,
         max_buffer_size: adapter.max_buffer_size,
         max_storage_buffer_binding_size: adapter.max_storage_buffer_binding_size,
         ..Limits::default().or_worse_values_from(adapter)

@@ -54,7 +54,7 @@ pub struct CubePoint<R: Real> {
     face: R,
     s: R,
     t: R,
-    /// 1 / the major axis' length.
+    /// 1 / the major axis' length, at most 1e6.
     inverse_major: R,
     x_major: R::Mask,
     y_major: R::Mask,
@@ -88,7 +88,8 @@ impl<R: Real> CubePoint<R> {
             face: face + R::select(positive, zero, one),
             s: (s * inverse_major).mul_add(half, half),
             t: (t * inverse_major).mul_add(half, half),
-            inverse_major,
+            // A shorter direction turns no faster, or squares of derivatives would overflow an f32.
+            inverse_major: inverse_major.min(one.lit(1e6)),
             ..point
         }
     }
@@ -238,30 +239,41 @@ impl<T: Channel> Cube<T> {
                 }
             }
         }
-        let side = size + 2;
-        let mut padded = Vec::with_capacity(6 * side * side);
-        for face in 0..6 {
-            for row in 0..side {
-                for column in 0..side {
-                    padded.push(faces[neighbour(face, column, row, size)]);
-                }
+        let texel = |sources: Sources| match sources {
+            Sources::One(a) => faces[a],
+            Sources::Corner([a, b, c]) => {
+                std::array::from_fn(|i| T::mean3(faces[a][i], faces[b][i], faces[c][i]))
             }
-        }
-        let mut cube = Self { size, padded };
-        for face in 0..6 {
-            for (row, inner_row) in [(0, 1), (size + 1, size)] {
-                for (column, inner_column) in [(0, 1), (size + 1, size)] {
-                    let at = |c, r| cube.padded[cube.index(face, c, r)];
-                    let (a, b, c) =
-                        (at(inner_column, inner_row), at(column, inner_row), at(inner_column, row));
-                    let corner = std::array::from_fn(|i| T::mean3(a[i], b[i], c[i]));
-                    let index = cube.index(face, column, row);
-                    cube.padded[index] = corner;
-                }
-            }
-        }
-        cube
+        };
+        Self { size, padded: padding(size).map(texel).collect() }
     }
+}
+
+/// What a texel of a padded cube shows: texels without a border, by `(face * size + row) * size + column`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sources {
+    /// A texel.
+    One(usize),
+    /// The mean of the three that meet at a corner.
+    Corner([usize; 3]),
+}
+
+/// What each texel of a padded cube shows, in their order.
+pub fn padding(size: usize) -> impl Iterator<Item = Sources> {
+    let side = size + 2;
+    let inner = move |i: usize| i.clamp(1, size);
+    (0..6 * side * side).map(move |i| {
+        let (face, row, column) = (i / (side * side), i / side % side, i % side);
+        if row == inner(row) || column == inner(column) {
+            return Sources::One(neighbour(face, column, row, size));
+        }
+        let (inner_row, inner_column) = (inner(row), inner(column));
+        Sources::Corner([
+            neighbour(face, inner_column, inner_row, size),
+            neighbour(face, column, inner_row, size),
+            neighbour(face, inner_column, row, size),
+        ])
+    })
 }
 
 /// The texel that the padded texel (column, row) of `face` shows: its own, or a neighbour's where

@@ -53,14 +53,14 @@ pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V
     (scale(d[2], n), scale_add(d[0], t, scale(d[1], b)))
 }
 
-/// Base and bump as a sample holds them: where no base is left the side that faces the eye counts, and a
-/// bump that is not finite counts nothing (MODEL 7).
+/// Base and bump as a sample holds them: where no base is left (below 1e-37 it is noise) the side that faces
+/// the eye counts, and a bump that is not finite counts nothing (MODEL 7).
 #[inline(always)]
 pub fn guarded<R: Real>(base: V3<R>, bump: V3<R>, view: V3<R>) -> (V3<R>, V3<R>) {
     let zero = view[0].lit(0.0);
     let size = |v: V3<R>| v[0].abs() + v[1].abs() + v[2].abs();
     let (base_size, bump_size) = (size(base), size(bump));
-    let there = R::and(base_size.is_finite(), zero.lt(base_size));
+    let there = R::and(base_size.is_finite(), base_size.ge(zero.lit(1e-37)));
     let base = select::<R>(there, base, [-view[0], -view[1], -view[2]]);
     (base, select::<R>(bump_size.is_finite(), bump, [zero; 3]))
 }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::image::Image;
-use crate::engine::cpu::Illumination;
+use crate::bake::Illumination;
 use crate::model::compose::TermName;
 use crate::model::cube::Cube;
 use crate::model::effects::Effect;

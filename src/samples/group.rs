@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::surface::Surface;
-use super::trace::Hits;
+use super::trace::{Hit, Hits};
 use super::{LANES, SurfaceRecords, ViewSamples};
 
 /// The fewest groups that one task fills.
@@ -11,12 +11,7 @@ const CHUNK: usize = 64;
 
 /// Pack the hits of a view of `width` pixels with `per_pixel` samples a pixel.
 pub(super) fn pack(hits: &Hits, surface: &Surface<'_>, width: u32, per_pixel: u32) -> ViewSamples {
-    let mut order: Vec<u32> = (0..hits.pixels.len() as u32).collect();
-    // Full pixels first; among equals, along a Z-order curve, so that a group is a small tile.
-    order.par_sort_unstable_by_key(|&i| {
-        let (pixel, range) = &hits.pixels[i as usize];
-        (std::cmp::Reverse(range.len()), z_order(pixel % width, pixel / width))
-    });
+    let order = order(hits, width);
     let mut samples = ViewSamples { group_start: vec![0], ..Default::default() };
     for group in order.chunks(LANES) {
         for lane in 0..LANES {
@@ -33,6 +28,38 @@ pub(super) fn pack(hits: &Hits, surface: &Surface<'_>, width: u32, per_pixel: u3
     samples
 }
 
+/// The hit that each sample slot of the packed view shows.
+pub(super) fn slots(hits: &Hits, width: u32) -> Vec<Hit> {
+    let mut slots = Vec::new();
+    for group in order(hits, width).chunks(LANES) {
+        let records = hits.pixels[group[0] as usize].1.len();
+        for record in 0..records {
+            slots.extend((0..LANES).map(|lane| hits.hits[hit(hits, group, lane, record).0]));
+        }
+    }
+    slots
+}
+
+/// The pixels in the order in which they are packed: full ones first; among equals, along a Z-order curve, so that
+/// a group is a small tile.
+fn order(hits: &Hits, width: u32) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..hits.pixels.len() as u32).collect();
+    order.par_sort_unstable_by_key(|&i| {
+        let (pixel, range) = &hits.pixels[i as usize];
+        (std::cmp::Reverse(range.len()), z_order(pixel % width, pixel / width))
+    });
+    order
+}
+
+/// The index of the hit at a slot of a group, and its share of the pixel. Lanes beyond the last pixel repeat the
+/// first, without a share; so do missing samples.
+fn hit(hits: &Hits, group: &[u32], lane: usize, record: usize) -> (usize, f32) {
+    let (_, range) = &hits.pixels[group[if lane < group.len() { lane } else { 0 }] as usize];
+    let real = lane < group.len() && record < range.len();
+    let hit = range.start as usize + if record < range.len() { record } else { 0 };
+    (hit, if real { 1.0 / range.len() as f32 } else { 0.0 })
+}
+
 /// Fill each group's records.
 fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], into: &mut SurfaceRecords) {
     let (places, stride) = (*into.places(), into.rows().stride());
@@ -46,12 +73,8 @@ fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], 
     let parts = parts.into_par_iter().with_min_len(CHUNK);
     parts.zip(order.par_chunks(LANES)).for_each(|(rows, group)| {
         for lane in 0..LANES {
-            // Lanes beyond the last pixel repeat the first, without weight; so do missing samples.
-            let (_, range) = &hits.pixels[group[if lane < group.len() { lane } else { 0 }] as usize];
             for (record, rows) in rows.chunks_exact_mut(stride).enumerate() {
-                let real = lane < group.len() && record < range.len();
-                let hit = range.start as usize + if record < range.len() { record } else { 0 };
-                let weight = if real { 1.0 / range.len() as f32 } else { 0.0 };
+                let (hit, weight) = hit(hits, group, lane, record);
                 places.put(rows, lane, &surface.at(hits.hits[hit]), weight);
             }
         }

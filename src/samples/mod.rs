@@ -30,6 +30,7 @@ use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
 pub use surface_records::SurfaceRecords;
 pub use targets::TargetRows;
+pub use trace::Hit;
 
 /// Pixels in a group: the widest vector of 32-bit floats on today's processors.
 pub const LANES: usize = 16;
@@ -205,4 +206,11 @@ pub fn sample_view(
     let hits = trace::trace(rays, posed, camera, n);
     let surface = surface::Surface::new(scene, posed, occlusion, camera.eye());
     group::pack(&hits, &surface, camera.width, n * n)
+}
+
+/// The point of the mesh that each sample slot of [`sample_view`] shows, traced anew; padding repeats others.
+#[must_use]
+pub fn sample_hits(scene: &Scene, posed: &PosedMesh, rays: &RayMesh, camera: &Camera) -> Vec<Hit> {
+    let n = scene.quality.samples_per_axis.max(1);
+    group::slots(&trace::trace(rays, posed, camera, n), camera.width)
 }

@@ -74,8 +74,7 @@ impl<'a> Surface<'a> {
     /// The surface at `hit`.
     pub(super) fn at(&self, hit: Hit) -> Fragment<f32> {
         let corners = self.mesh.triangles[hit.triangle as usize].map(|i| i as usize);
-        let [u, v] = hit.barycentric;
-        let weights = [1.0 - u - v, u, v];
+        let weights = hit.weights();
         let vector = |of: &[Vec3]| -> Vec3 { (0..3).map(|i| weights[i] * of[corners[i]]).sum() };
         let scalar = |of: &[f32]| -> f32 { (0..3).map(|i| weights[i] * of[corners[i]]).sum() };
 
@@ -87,11 +86,7 @@ impl<'a> Surface<'a> {
         let interpolated = vector(&self.mesh.normals);
         let (normal, _) = normalize_or(interpolated.to_array(), (-exact_view).to_array());
         let normal = Vec3::from(normal);
-        let uv = if self.mesh.uvs.is_empty() {
-            Vec2::ZERO
-        } else {
-            (0..3).map(|i| weights[i] * self.mesh.uvs[corners[i]]).sum()
-        };
+        let uv = hit.uv(self.mesh);
         let (base, bump) = if self.bitangents.is_empty() {
             (if self.form == Form::Listing { interpolated } else { normal }, Vec3::ZERO)
         } else {

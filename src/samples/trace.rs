@@ -1,6 +1,6 @@
 //! Primary rays: which point of the mesh each stratified sample of each pixel sees.
 
-use glam::{DVec3, Vec3A};
+use glam::{DVec3, Vec2, Vec3A};
 use rayon::prelude::*;
 
 use crate::bake::rays::RayMesh;
@@ -8,10 +8,31 @@ use crate::scene::mesh::PosedMesh;
 use crate::scene::view::Camera;
 
 /// A point of the mesh: a triangle, and the weights of its second and third vertex.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Hit {
-    pub(super) triangle: u32,
-    pub(super) barycentric: [f32; 2],
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// The triangle.
+    pub triangle: u32,
+    /// The weights of its second and third vertex.
+    pub barycentric: [f32; 2],
+}
+
+impl Hit {
+    /// The weights of the three vertices.
+    #[must_use]
+    pub fn weights(&self) -> [f32; 3] {
+        let [u, v] = self.barycentric;
+        [1.0 - u - v, u, v]
+    }
+
+    /// The texture coordinates there; 0 where the mesh has none.
+    #[must_use]
+    pub fn uv(&self, mesh: &PosedMesh) -> Vec2 {
+        if mesh.uvs.is_empty() {
+            return Vec2::ZERO;
+        }
+        let corners = mesh.triangles[self.triangle as usize];
+        self.weights().into_iter().zip(corners).map(|(weight, i)| weight * mesh.uvs[i as usize]).sum()
+    }
 }
 
 /// What a view sees: the pixels that show the mesh, and their hits.

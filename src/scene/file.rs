@@ -95,6 +95,38 @@ pub(super) struct FitTable {
     pub loss: Option<Spanned<String>>,
     #[serde(default)]
     pub gains: bool,
+    #[serde(default)]
+    pub maps: MapFitTable,
+}
+
+/// `[fit.maps]`
+#[derive(Clone, Debug, Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MapFitTable {
+    pub rounds: Option<Spanned<i64>>,
+    pub steps: Option<Spanned<i64>>,
+    pub solver: Option<Spanned<String>>,
+    pub rate: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub color: MapPriorTable,
+    #[serde(default)]
+    pub specular: MapPriorTable,
+    #[serde(default)]
+    pub attenuator: MapPriorTable,
+    #[serde(default)]
+    pub occlusion: MapPriorTable,
+    #[serde(default)]
+    pub environment: MapPriorTable,
+}
+
+/// `[fit.maps.color]` and the others
+#[derive(Clone, Debug, Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct MapPriorTable {
+    pub smoothness: Option<Spanned<f64>>,
+    pub closeness: Option<Spanned<f64>>,
+    pub lower: Option<Spanned<f64>>,
+    pub upper: Option<Spanned<f64>>,
 }
 
 /// `[quality]`

@@ -15,23 +15,31 @@ impl<const C: usize> Map<C> {
     /// The bilinear value at texture coordinates (u, v); the image repeats in both directions.
     #[must_use]
     pub fn sample(&self, u: f32, v: f32) -> [f32; C] {
-        // In f64, as 24 bits leave too few for the fraction in a map of thousands of texels.
-        let at = |u: f32, size: usize| {
-            let x = f64::from(u - u.floor()) * size as f64 - 0.5;
-            let low = x.floor();
-            let wrap = |i: f64| (i as i64).rem_euclid(size as i64) as usize;
-            (wrap(low), wrap(low + 1.0), (x - low) as f32)
-        };
-        let (x0, x1, fx) = at(u, self.width);
-        let (y0, y1, fy) = at(v, self.height);
-        let texel = |x: usize, y: usize| self.texels[y * self.width + x];
-        let (a, b, c, d) = (texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1));
+        let ([a, b, c, d], [fx, fy]) = corners(self.width, self.height, u, v);
+        let [a, b, c, d] = [a, b, c, d].map(|i| self.texels[i]);
         std::array::from_fn(|i| {
             let top = a[i] * (1.0 - fx) + b[i] * fx;
             let bottom = c[i] * (1.0 - fx) + d[i] * fx;
             top * (1.0 - fy) + bottom * fy
         })
     }
+}
+
+/// The four texels around texture coordinates (u, v) of an image that repeats in both directions (left and right
+/// above, then below; by `row * width + column`), and the place among them, in [0, 1] to the right and down.
+#[must_use]
+pub fn corners(width: usize, height: usize, u: f32, v: f32) -> ([usize; 4], [f32; 2]) {
+    // In f64, as 24 bits leave too few for the fraction in a map of thousands of texels.
+    let at = |u: f32, size: usize| {
+        let x = f64::from(u - u.floor()) * size as f64 - 0.5;
+        let low = x.floor();
+        let wrap = |i: f64| (i as i64).rem_euclid(size as i64) as usize;
+        (wrap(low), wrap(low + 1.0), (x - low) as f32)
+    };
+    let (x0, x1, fx) = at(u, width);
+    let (y0, y1, fy) = at(v, height);
+    let texel = |x: usize, y: usize| y * width + x;
+    ([texel(x0, y0), texel(x1, y0), texel(x0, y1), texel(x1, y1)], [fx, fy])
 }
 
 /// The maps that the enabled effects ask for; a map that the scene leaves out has its neutral value.

@@ -5,19 +5,22 @@
 //! - [`maps`]: texture maps and the panorama
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings` and `cameras`
+//! - [`map_fit`]: how whole maps are fitted
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
-//! - [`pose`]: the mesh, morphed and skinned
+//! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
 //! - [`error`]: what is refused, and what is mended with a warning
 //!
 //! [`Scene`] is what the later stages see: validated, in memory, and holding only what the enabled
 //! effects ask for.
 
+pub mod animation;
 mod cameras;
 pub mod error;
 mod file;
 mod gltf;
 pub mod images;
 pub mod load;
+pub mod map_fit;
 pub mod maps;
 pub mod mesh;
 mod normals;
@@ -30,6 +33,8 @@ pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
+pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
+pub(crate) use settings::short;
 pub use settings::{interval, read_params};
 
 use std::path::PathBuf;
@@ -76,6 +81,8 @@ pub struct FitSettings {
     pub loss: Loss,
     /// Whether each view has a gain of its own (the first view's is held at 1).
     pub free_gains: bool,
+    /// How whole maps are fitted, when they are asked for.
+    pub maps: MapSettings,
 }
 
 /// What a fit minimises, over the residual r = model - target of each pixel and channel.

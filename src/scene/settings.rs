@@ -6,7 +6,7 @@ use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
 use super::file::{FitTable, ModelTable, ParamsTable, QualityTable, Source};
-use super::{FitSettings, Loss, Quality};
+use super::{FitSettings, Loss, Quality, map_fit};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::params::{Column, Param, Params};
 
@@ -68,7 +68,7 @@ fn apply(source: &Source, table: &ParamsTable, params: &mut Params) -> Result<()
                 let (lower, upper) = info.range();
                 return Err(source.error(
                     value,
-                    format!("{} = {number} is out of bounds", info.name),
+                    format!("{} = {} is out of bounds", info.name, short(number)),
                     format!("Give a finite number in {}", interval(lower, upper)),
                 ));
             }
@@ -88,6 +88,12 @@ fn apply(source: &Source, table: &ParamsTable, params: &mut Params) -> Result<()
 fn param(source: &Source, name: &Spanned<String>) -> Result<Param, SceneError> {
     let all: Vec<_> = Param::all().map(|param| (param.name(), param)).collect();
     source.choose("parameter", name, &all)
+}
+
+/// A number as one would write it: 180, 1e300.
+pub(crate) fn short(number: f64) -> String {
+    let text = format!("{number:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
 /// "[0, inf)" and the like.
@@ -178,20 +184,14 @@ pub(super) fn fit(
         Some(name) => source.choose("loss", name, &Loss::ALL.map(|loss| (loss.name(), loss)))?,
         None => Loss::default(),
     };
-    Ok(FitSettings { free: columns.collect(), loss, free_gains: table.gains })
+    let maps = map_fit::settings(source, &table.maps)?;
+    Ok(FitSettings { free: columns.collect(), loss, free_gains: table.gains, maps })
 }
 
 /// The `[quality]` table over the defaults.
 pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, SceneError> {
-    let pick = |value: &Option<Spanned<i64>>, name: &str, least: i64, most: i64, default: u32| match value {
-        None => Ok(default),
-        Some(number) => u32::try_from(*number.get_ref())
-            .ok()
-            .filter(|&n| (least..=most).contains(&i64::from(n)))
-            .ok_or_else(|| {
-                let what = format!("{name} = {} is out of bounds", number.get_ref());
-                source.error(number, what, format!("Give a whole number in [{least}, {most}]"))
-            }),
+    let pick = |value: &Option<Spanned<i64>>, name: &str, least: i64, most: i64, default: u32| {
+        whole(source, value.as_ref(), name, [least, most], default)
     };
     let default = Quality::default();
     Ok(Quality {
@@ -202,6 +202,23 @@ pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, 
         lobes_per_octave: pick(&table.lobes_per_octave, "lobes_per_octave", 1, 8, default.lobes_per_octave)?,
         occlusion_rays: pick(&table.occlusion_rays, "occlusion_rays", 1, 1 << 16, default.occlusion_rays)?,
     })
+}
+
+/// A whole number within bounds, or `default` when it is not given.
+pub(super) fn whole(
+    source: &Source,
+    value: Option<&Spanned<i64>>,
+    name: &str,
+    [least, most]: [i64; 2],
+    default: u32,
+) -> Result<u32, SceneError> {
+    let Some(number) = value else { return Ok(default) };
+    u32::try_from(*number.get_ref()).ok().filter(|&n| (least..=most).contains(&i64::from(n))).ok_or_else(
+        || {
+            let what = format!("{name} = {} is out of bounds", number.get_ref());
+            source.error(number, what, format!("Give a whole number in [{least}, {most}]"))
+        },
+    )
 }
 
 /// A number that must be finite and satisfy `test`, or `default` when it is not given.
@@ -218,5 +235,9 @@ pub(super) fn number(
     if number.is_finite() && test(number) {
         return Ok(number);
     }
-    Err(source.error(spanned, format!("{name} = {number} is out of bounds"), format!("Give {wanted}")))
+    Err(source.error(
+        spanned,
+        format!("{name} = {} is out of bounds", short(number)),
+        format!("Give {wanted}"),
+    ))
 }

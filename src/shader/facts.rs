@@ -26,7 +26,7 @@ pub enum Source {
     Raster,
     /// Stored samples: what `model::fragment::Fragment` holds, read in a compute shader.
     Samples,
-    /// Stored terms: what `model::fragment::Terms` holds, and S.x. That is all that shading reads where
+    /// Stored terms: what `model::terms::Terms` holds, and S.x. That is all that shading reads where
     /// nothing changes that needs a lookup.
     Terms,
 }

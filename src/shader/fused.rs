@@ -13,13 +13,13 @@ use std::fmt::Write as _;
 
 use super::emit::{Plan, hazy, parts, plan, plan_terms, sample_fields};
 use super::facts::{Budget, Facts, MapFacts, Source};
-use super::module::uniform;
+use super::module::{sample_struct, uniform};
 use super::quantity::Constant;
 use super::rule::Stage;
 use super::search::components;
 use super::tangent::chain::{Chain, Seed};
-use crate::engine::Unknown;
 use crate::engine::residual::{HUBER_THRESHOLD, RELATIVE_FLOOR, SMAPE_CORNER, SMAPE_FLOOR};
+use crate::engine::{BLOCK, Unknown};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param};
 use crate::samples::LANES;
@@ -31,7 +31,7 @@ pub const WORKGROUP: u32 = 128;
 /// Numbers that a sum is left in for the CPU.
 pub const PARTS: usize = 16;
 /// Pixels of a block: a coarse pass reads every so-many-th.
-pub const BLOCK: u32 = 128;
+const BLOCK_PIXELS: usize = BLOCK * LANES;
 /// Sums that a thread keeps: they and the columns should fit 255 registers.
 const MOST_SUMS: usize = 112;
 
@@ -270,13 +270,10 @@ impl Fused {
         if tangents {
             wgsl.push_str(&self.chain.functions);
         }
-        wgsl.push_str("\nstruct Sample {\n");
-        for (name, kind) in self.fields() {
-            let _ = writeln!(wgsl, "    {name}: {kind},");
-        }
+        wgsl.push_str(&sample_struct(&self.fields()));
         let _ = write!(
             wgsl,
-            "}}\n\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Every so-many-th block is read.\n    stride: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
+            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Every so-many-th block is read.\n    stride: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
              @group(1) @binding(0) var<uniform> part: Part;\n\
              @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
              @group(1) @binding(2) var<storage, read> group_start: array<u32>;\n\
@@ -302,7 +299,7 @@ impl Fused {
         let _ = write!(
             wgsl,
             "    let step = {WORKGROUP}u * workgroups.x;\n    for (var i = {WORKGROUP}u * workgroup.x + thread; i < part.read; i += step) {{\n\
-             \x20       let slot = (i / {BLOCK}u) * {BLOCK}u * part.stride + i % {BLOCK}u;\n\
+             \x20       let slot = (i / {BLOCK_PIXELS}u) * {BLOCK_PIXELS}u * part.stride + i % {BLOCK_PIXELS}u;\n\
              \x20       if (slot >= part.slots) {{\n            continue;\n        }}\n"
         );
         wgsl
@@ -450,13 +447,10 @@ pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), S
     let (plan, wanted) = plan_terms(&facts).map_err(|error| error.to_string())?;
     let fields = sample_fields(&Facts { source: Source::Samples, ..facts });
     let mut wgsl = plan.declarations(true);
-    wgsl.push_str("\nstruct Sample {\n");
-    for (name, kind) in &fields {
-        let _ = writeln!(wgsl, "    {name}: {kind},");
-    }
+    wgsl.push_str(&sample_struct(&fields));
     let _ = write!(
         wgsl,
-        "}}\n\n@group(1) @binding(0) var<uniform> count: vec4u;\n\
+        "\n@group(1) @binding(0) var<uniform> count: vec4u;\n\
          @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
          @group(1) @binding(2) var<storage, read_write> terms: array<f32>;\n\n\
          @compute @workgroup_size({WORKGROUP})\nfn cs_main(\n    @builtin(global_invocation_id) id: vec3u,\n    @builtin(num_workgroups) workgroups: vec3u,\n) {{\n\

@@ -15,6 +15,8 @@
 //!
 //! Nothing that the [`Plan`] does not name is uploaded, bound or compiled.
 
+#[cfg(feature = "burn")]
+pub mod adjoint;
 pub mod emit;
 pub mod facts;
 #[cfg(feature = "gpu")]

@@ -85,11 +85,8 @@ impl Plan {
 
     pub(super) fn sample_module(&self, parts: &[&str]) -> String {
         let mut wgsl = self.declarations(true);
-        wgsl.push_str("\nstruct Sample {\n");
-        for (name, kind) in sample_fields(&self.facts) {
-            let _ = writeln!(wgsl, "    {name}: {kind},");
-        }
-        wgsl.push_str("}\n\n// Radiance, and the haze in alpha.\nfn shade(at: Sample) -> vec4f {\n");
+        wgsl.push_str(&sample_struct(&sample_fields(&self.facts)));
+        wgsl.push_str("\n// Radiance, and the haze in alpha.\nfn shade(at: Sample) -> vec4f {\n");
         wgsl.push_str(&self.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
         let haze = if hazy(&self.facts) { "haze" } else { "0.0" };
         let _ = write!(wgsl, "    return vec4f({}, {haze});\n}}\n", sum(parts));
@@ -169,6 +166,20 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
         | Constant::KeyByElevation
         | Constant::MorphWeights => None,
     }
+}
+
+/// The declaration of a stored sample.
+pub(super) fn sample_struct(fields: &[(&str, &str)]) -> String {
+    let mut wgsl = String::from("\nstruct Sample {\n");
+    for (name, kind) in fields {
+        let _ = writeln!(wgsl, "    {name}: {kind},");
+    }
+    if fields.is_empty() {
+        // WGSL knows no empty structures.
+        wgsl.push_str("    nothing: f32,\n");
+    }
+    wgsl.push_str("}\n");
+    wgsl
 }
 
 fn sum(parts: &[&str]) -> String {

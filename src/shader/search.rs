@@ -26,7 +26,7 @@ const COST_STEPS: f64 = 16.0;
 const ERROR_STEPS: f64 = 1e9;
 
 /// A quantity that nothing gives.
-#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
 pub enum PlanError {
     /// No set of rules yields it within the budget.
     #[error(

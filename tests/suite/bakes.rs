@@ -376,8 +376,12 @@ fn turning_an_effect_off_removes_what_only_it_asked_for() {
     };
     let (all, stats) = run(Effects::SURFACE);
     assert_eq!(names(&stats), ["irradiance", "lobe 32.0000", "hilite", "occlusion"]);
+    let light = &all.illumination;
     assert!(
-        all.irradiance.is_some() && all.lobes.is_some() && all.hilite.is_some() && all.occlusion.is_some()
+        light.irradiance.is_some()
+            && light.lobes.is_some()
+            && light.hilite.is_some()
+            && all.occlusion.is_some()
     );
     let without = |effect: Effect| run(Effects::SURFACE.without(effect));
     assert_eq!(names(&without(Effect::Diffuse).1), ["lobe 32.0000", "hilite", "occlusion"]);
@@ -386,9 +390,11 @@ fn turning_an_effect_off_removes_what_only_it_asked_for() {
     let neither = Effects::SURFACE.without(Effect::SideSpecular).without(Effect::Reflection);
     assert_eq!(names(&run(neither).1), ["irradiance", "hilite", "occlusion"]);
     let (nothing, stats) = run(Effects::of(&[Effect::KeyLight]));
-    assert!(names(&stats).is_empty() && nothing.irradiance.is_none() && nothing.occlusion.is_none());
+    assert!(
+        names(&stats).is_empty() && nothing.illumination.irradiance.is_none() && nothing.occlusion.is_none()
+    );
     let scene = small_scene();
-    let stack = bake(&scene, &triangle, 1.0..=2048.0, None).unwrap().0.lobes.unwrap();
+    let stack = bake(&scene, &triangle, 1.0..=2048.0, None).unwrap().0.illumination.lobes.unwrap();
     assert_eq!(stack.exponents.len(), 12);
 }
 
@@ -401,10 +407,10 @@ fn a_second_bake_comes_from_the_cache_and_a_damaged_file_is_made_anew() {
     assert!(stats.rows.iter().all(|row| !row.cached));
     let (second, stats) = run(&scene);
     assert!(stats.rows.len() == 4 && stats.rows.iter().all(|row| row.cached));
-    assert_eq!(first.irradiance, second.irradiance);
-    assert_eq!(first.hilite, second.hilite);
+    assert_eq!(first.illumination.irradiance, second.illumination.irradiance);
+    assert_eq!(first.illumination.hilite, second.illumination.hilite);
     assert_eq!(first.occlusion, second.occlusion);
-    assert_eq!(first.lobes.as_ref().unwrap().cubes, second.lobes.unwrap().cubes);
+    assert_eq!(first.illumination.lobes.as_ref().unwrap().cubes, second.illumination.lobes.unwrap().cubes);
 
     for file in std::fs::read_dir(folder.path()).unwrap() {
         let path = file.unwrap().path();
@@ -414,7 +420,7 @@ fn a_second_bake_comes_from_the_cache_and_a_damaged_file_is_made_anew() {
     let (third, stats) = run(&scene);
     assert!(stats.warnings.len() == 4 && stats.rows.iter().all(|row| !row.cached));
     assert!(stats.warnings.iter().all(|w| w.contains("baking anew")), "{:?}", stats.warnings);
-    assert_eq!(first.irradiance, third.irradiance);
+    assert_eq!(first.illumination.irradiance, third.illumination.irradiance);
     assert!(run(&scene).1.rows.iter().all(|row| row.cached));
 
     // Each input that matters makes other bakes.
@@ -434,7 +440,7 @@ fn a_cache_that_cannot_be_written_is_a_warning_and_a_missing_environment_an_erro
     std::fs::write(&file, b"in the way").unwrap();
     let mut scene = small_scene();
     let (baked, stats) = bake(&scene, &triangle, 32.0..=32.0, Some(&file.join("cache"))).unwrap();
-    assert!(baked.irradiance.is_some());
+    assert!(baked.illumination.irradiance.is_some());
     assert!(!stats.warnings.is_empty());
     scene.quality.lobe_size = 0;
     let error = bake(&scene, &triangle, 32.0..=32.0, None).unwrap_err().to_string();

@@ -3,15 +3,18 @@
 mod ablation;
 mod browser;
 mod built_in;
-mod desk;
+pub(crate) mod desk;
 mod exported;
 #[cfg(feature = "gpu")]
 mod graphics;
 mod interrupted;
+mod maps;
 mod outputs;
 mod refusals;
 mod refused_files;
 mod runs;
+mod stability;
 mod stages;
+mod sweeps;
 mod tradeoffs;
 mod words;

@@ -28,7 +28,10 @@ fn pages() -> Vec<PathBuf> {
         "experiments/ablation",
         "experiments/accuracy_vs_time",
         "experiments/bench",
+        "experiments/network",
         "experiments/race",
+        "experiments/scaling",
+        "experiments/stability",
     ] {
         for entry in std::fs::read_dir(root().join(folder)).unwrap() {
             let path = entry.unwrap().path();

@@ -2,8 +2,8 @@
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
-use skinfit::bake::LobeStack;
-use skinfit::engine::cpu::{CpuEngine, Illumination};
+use skinfit::bake::{Illumination, LobeStack};
+use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::reference::Reference;
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};

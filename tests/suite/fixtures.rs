@@ -13,7 +13,7 @@ use skinfit::model::params::Params;
 use skinfit::scene::maps::{Environment, Map, Maps};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
 use skinfit::scene::view::{Camera, View};
-use skinfit::scene::{FitSettings, Loss, Quality, Scene};
+use skinfit::scene::{FitSettings, Loss, MapSettings, Quality, Scene};
 
 /// The named planes of an EXR file, and its width and height.
 pub(crate) struct Planes {
@@ -181,7 +181,12 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         effects,
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),
-        fit: FitSettings { free: Vec::new(), loss: Loss::L2, free_gains: false },
+        fit: FitSettings {
+            free: Vec::new(),
+            loss: Loss::L2,
+            free_gains: false,
+            maps: MapSettings::default(),
+        },
         quality: Quality::default(),
     }
 }

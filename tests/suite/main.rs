@@ -22,5 +22,9 @@ mod refusals;
 mod reports;
 mod samples;
 mod scene_files;
+#[cfg(target_os = "linux")]
+mod scheduler;
 mod shader;
+#[cfg(feature = "burn")]
+mod tensors;
 mod vectors;

@@ -288,6 +288,8 @@ fn the_page_is_well_formed_and_asks_for_nothing_from_outside() {
     }
     // Two views of three pictures and five terms each.
     assert_eq!(page.matches("<img src=\"data:image/png;base64,").count(), 2 * (3 + 5));
+    // Against passes and against seconds, from where the fit began.
+    assert_eq!(page.matches("<title>start: loss ").count(), 2);
 }
 
 #[test]

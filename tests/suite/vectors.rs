@@ -197,6 +197,23 @@ const ORACLE_COLUMNS: [(&str, Param, Option<usize>); 10] = [
     ("haze", Param::HazeWeight, None),
 ];
 
+/// The parameters of a point that is given column by column, under the oracle's names.
+pub(crate) fn column_params(values: &Value) -> Params {
+    let mut params = Params::defaults(Form::Corrected);
+    for (name, param, channel) in ORACLE_COLUMNS {
+        let value = number(&values[name]).unwrap();
+        match channel {
+            None => params.set(param, value),
+            Some(c) => {
+                let mut rgb = params.rgb(param);
+                rgb[c] = value;
+                params.set_rgb(param, rgb);
+            }
+        }
+    }
+    params
+}
+
 // The model is inlined wherever it is called; here, where speed is nothing, once for each evaluator.
 
 #[inline(never)]
@@ -332,22 +349,7 @@ where
     let lights = lights::<R>(&cubes[0], &cubes[1], &cubes[2]);
     let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: ALL_TERMS };
     let g = &file["inputs"]["gbuffer"];
-    let point = |which: &str| {
-        let mut p = Params::defaults(Form::Corrected);
-        for (name, param, channel) in ORACLE_COLUMNS {
-            let value = number(&file["inputs"][which][name]).unwrap();
-            match channel {
-                None => p.set(param, value),
-                Some(c) => {
-                    let mut rgb = p.rgb(param);
-                    rgb[c] = value;
-                    p.set_rgb(param, rgb);
-                }
-            }
-        }
-        p
-    };
-    let (truth, start) = (point("params"), point("params_init"));
+    let [truth, start] = ["params", "params_init"].map(|which| column_params(&file["inputs"][which]));
     let (mut forward, mut at_start, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..16 {
         let v = |name: &str| three(&g[name][i]).map(|x| like.lit(x));

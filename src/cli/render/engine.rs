@@ -84,7 +84,7 @@ mod gpu {
     impl EngineArguments {
         /// The adapter's device; none where `auto` finds no adapter that works, which it says.
         pub(super) fn open(&self) -> Result<Option<Gpu>, Refusal> {
-            let choice = Choice { name: self.adapter.clone(), max_side: None };
+            let choice = Choice { name: self.adapter.clone(), ..Choice::default() };
             match Gpu::open(&choice) {
                 Ok(gpu) => Ok(Some(gpu)),
                 Err(error) if self.engine == "gpu" || self.adapter.is_some() => Err(error.into()),

@@ -20,7 +20,7 @@ use crate::render::files::{ImageOptions, write_exr_layers, write_image};
 use crate::render::image::{MAX_PIXELS, MAX_SIDE};
 use crate::render::tonemap::{Operator, ToneMap};
 use crate::samples;
-use crate::scene::load::Animation;
+use crate::scene::animation::Animation;
 use frames::Frame;
 use painter::Painter;
 

@@ -27,9 +27,8 @@ use super::plan::Plan;
 use super::records::Records;
 use super::view::ObservedView;
 use super::{NormalEquations, Objective, Point, Unknown};
-use crate::bake::LobeStack;
+use crate::bake::Illumination;
 use crate::model::compose::Weights;
-use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
@@ -38,17 +37,6 @@ use crate::samples::rows::Row;
 use crate::scene::Loss;
 use crate::simd::Simd;
 use crate::with_simd;
-
-/// The lights of a scene: the cubes that the enabled effects ask for.
-#[derive(Clone, Debug, Default)]
-pub struct Illumination {
-    /// E_d.
-    pub irradiance: Option<Cube<f32>>,
-    /// E_s over its exponents.
-    pub lobes: Option<LobeStack>,
-    /// E_h.
-    pub hilite: Option<Cube<f32>>,
-}
 
 /// Loss, gradient and normal equations on the CPU.
 #[derive(Debug)]
@@ -268,7 +256,7 @@ impl Objective for CpuEngine {
     }
 
     fn rounding(&self) -> f64 {
-        super::rounding(&self.views, self.loss, BLOCK, self.stride)
+        super::rounding(&self.views, self.loss, self.stride)
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

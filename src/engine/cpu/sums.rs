@@ -1,6 +1,8 @@
 //! The sums of a chunk of blocks, and of chunks in a fixed order.
 
 use crate::engine::gram::{Columns, add_gram, add_last};
+// What the scratch holds at once: it should stay in the nearest caches.
+pub(super) use crate::engine::BLOCK;
 use crate::engine::kernel::Kernel;
 use crate::engine::lanes::Lanes;
 use crate::engine::plan::{ChannelPlan, Plan, WINDOW};
@@ -8,8 +10,6 @@ use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
-/// Groups in a block: what the scratch holds at once (it should stay in the nearest caches).
-pub(super) const BLOCK: usize = 16;
 /// Blocks in a chunk: one unit of work, and 64 terms a lane.
 pub(super) const CHUNK: usize = 4;
 

@@ -6,7 +6,7 @@ use wgpu::{
 };
 
 use super::pipeline::{UNIFORM, Uniform, layout};
-use crate::engine::cpu::Illumination;
+use crate::bake::Illumination;
 use crate::gpu::constants::model_block;
 use crate::gpu::{Gpu, GpuError, texels, upload};
 use crate::model::cube::Cube;

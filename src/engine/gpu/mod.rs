@@ -23,15 +23,14 @@ use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
 use self::program::Program;
 use self::terms::{HELD, replace_samples};
-use super::cpu::Illumination;
 use super::view::ObservedView;
-use super::{NormalEquations, Objective, Point, Unknown};
+use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
+use crate::bake::Illumination;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
-use crate::samples::LANES;
 use crate::scene::Loss;
-use crate::shader::fused::{BLOCK, ColumnOf, Fitted, Fused, Layout, Sum, Wish};
+use crate::shader::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -155,7 +154,7 @@ impl<'g> GpuEngine<'g> {
     /// How many blocks of pixels there are in all views.
     #[must_use]
     pub fn blocks(&self) -> usize {
-        self.views.iter().map(|view| (view.samples.groups() * LANES).div_ceil(BLOCK as usize)).sum()
+        self.views.iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
     }
 
     /// Why no pass can be made any more, if so.
@@ -344,7 +343,7 @@ impl Objective for GpuEngine<'_> {
     }
 
     fn rounding(&self) -> f64 {
-        super::rounding(self.views, self.loss, BLOCK as usize / LANES, self.stride)
+        super::rounding(self.views, self.loss, self.stride)
     }
 
     fn fault(&self) -> Option<String> {

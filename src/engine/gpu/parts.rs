@@ -5,15 +5,14 @@ use std::ops::Range;
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::Memory;
+use crate::engine::BLOCK;
 use crate::engine::view::ObservedView;
 use crate::gpu::{Gpu, GpuError};
 use crate::samples::LANES;
 use crate::samples::rows::{Row, Rows};
 use crate::samples::surface_records::Places;
-use crate::shader::fused::{BLOCK, WORKGROUP};
+use crate::shader::fused::WORKGROUP;
 
-/// Groups of a block of pixels; parts are cut between blocks.
-const BLOCK_GROUPS: usize = BLOCK as usize / LANES;
 /// Pixels that a thread shades, about: fewer leave processors idle, more leave sums long.
 const PIXELS_A_THREAD: usize = 4;
 /// Most workgroups of a part: enough for the largest adapters.
@@ -166,7 +165,7 @@ impl Parts {
         let mut total = (0.0, 0);
         for part in &mut self.parts {
             let read = part.blocks.iter().step_by(stride);
-            part.read = (read.len() * BLOCK as usize) as u32;
+            part.read = (read.len() * BLOCK * LANES) as u32;
             for &(weight, count) in read {
                 total.0 += weight;
                 total.1 += count;
@@ -333,7 +332,7 @@ fn cut(view: &ObservedView, limit: u64) -> Vec<Range<usize>> {
     let bytes = |range: &Range<usize>| (size_of::<Row>() * rows * records(view, range).len()) as u64;
     let (mut ranges, mut start, mut end) = (Vec::new(), 0, 0);
     while end < groups {
-        let next = groups.min(end + BLOCK_GROUPS);
+        let next = groups.min(end + BLOCK);
         if bytes(&(start..next)) > limit && end > start {
             ranges.push(start..end);
             start = end;
@@ -353,8 +352,8 @@ fn records(view: &ObservedView, groups: &Range<usize>) -> Range<usize> {
 
 /// Weight and count of each block of pixels.
 fn blocks(view: &ObservedView, groups: &Range<usize>) -> Vec<(f64, u64)> {
-    let block = |first: usize| view.weight_and_count(first..groups.end.min(first + BLOCK_GROUPS));
-    groups.clone().step_by(BLOCK_GROUPS).map(block).collect()
+    let block = |first: usize| view.weight_and_count(first..groups.end.min(first + BLOCK));
+    groups.clone().step_by(BLOCK).map(block).collect()
 }
 
 /// The bytes of a range of records.

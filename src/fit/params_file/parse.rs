@@ -9,7 +9,7 @@ use super::ParamsFile;
 use crate::engine::Unknown;
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Param, Params};
-use crate::scene::Loss;
+use crate::scene::{Loss, short};
 
 /// What is wrong, and where in the text.
 pub(super) struct Problem {
@@ -109,7 +109,7 @@ fn read_rgb(param: Param, value: &Spanned<DeValue<'_>>) -> Result<[f64; 3], Prob
             return Ok(number);
         }
         let (name, (low, high)) = (info.name, info.range());
-        problem(value.span(), format!("{name} = {number} is outside its bounds {low} to {high}."))
+        problem(value.span(), format!("{name} = {} is outside its bounds {low} to {high}.", short(number)))
     };
     match value.get_ref() {
         DeValue::Array(channels) if info.rgb && channels.len() == 3 => {

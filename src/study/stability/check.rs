@@ -10,7 +10,8 @@ use crate::model::params::Param;
 /// How an evaluator did: the worst of what it was asked.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Verdict {
-    /// The greatest deviation from f64, as a share of the number itself (of its summands, or 1e-18).
+    /// The greatest deviation from f64, as a share of the number (of what rounding makes of it, where that is
+    /// more).
     pub deviation: f64,
     /// The greatest share of what is allowed that a deviation took up.
     pub share: f64,
@@ -43,7 +44,7 @@ impl Verdict {
             Some(format!("{} is {got}; in f64 {want:e}", what()))
         } else {
             let off = (got - want).abs();
-            self.deviation = self.deviation.max(off / size.abs().max(want.abs()).max(1e-18));
+            self.deviation = self.deviation.max(off / size.abs().max(want.abs()).max(allowed).max(1e-18));
             self.share = self.share.max(if off == 0.0 { 0.0 } else { off / allowed.max(f64::MIN_POSITIVE) });
             (off > allowed).then(|| {
                 format!("{} is {got:e} instead of {want:e}; rounding explains {allowed:.1e}", what())
@@ -190,12 +191,13 @@ fn held(hold: Holds, answer: &Answer, reference: &Reference, slack: f64) -> Verd
                 }
             }
         }
-        Holds::Alike => {
-            for (at, (value, reference)) in values.iter().zip(fragments).enumerate().skip(1) {
+        Holds::Alike(count) => {
+            for (at, (value, reference)) in values.iter().zip(fragments).enumerate() {
+                let first = at / count * count;
                 for c in 0..4 {
-                    let both = reference.value_tolerance[c] + fragments[0].value_tolerance[c];
-                    let size = values[0].iter().fold(0.0_f64, |most, x| most.max(x.abs()));
-                    let number = Number { got: value[c], want: values[0][c], allowed: slack * both, size };
+                    let both = reference.value_tolerance[c] + fragments[first].value_tolerance[c];
+                    let (size, want) = (reference.value_size[c], values[first][c]);
+                    let number = Number { got: value[c], want, allowed: slack * both, size };
                     verdict.note(number, Some(at), || format!("{} beside its like", CHANNELS[c]));
                 }
             }

@@ -15,8 +15,8 @@ pub enum Holds {
     Zero,
     /// No colour depends on this parameter: the derivative is 0 to the bit.
     Flat(Param),
-    /// Every fragment has the first one's colour.
-    Alike,
+    /// Of each so many fragments, all have the first one's colour.
+    Alike(usize),
 }
 
 /// A named case of fragments.
@@ -159,7 +159,7 @@ fn normals() -> Vec<HardCase> {
             "(1/2, 1/2, 1/2) is no direction: the smooth normal, and nothing of the map",
             setting(),
             vec![FLAT, texel([0.5; 3])],
-            &[Holds::Alike, Holds::Flat(Param::NormalStrength)],
+            &[Holds::Alike(2), Holds::Flat(Param::NormalStrength)],
         ));
         all.push(case(
             "texel that is not finite",
@@ -173,14 +173,14 @@ fn normals() -> Vec<HardCase> {
                 texel([nan, nan, nan]),
                 texel([-inf, inf, nan]),
             ],
-            &[Holds::Alike, Holds::Flat(Param::NormalStrength)],
+            &[Holds::Alike(6), Holds::Flat(Param::NormalStrength)],
         ));
         all.push(case(
             "no tangent frame",
             "N, T and B of no length: -V stands in",
             setting(),
             vec![FACING, bare, FragmentInputs { normal: [-0.0; 3], texel: [0.75, 0.25, 0.75], ..bare }],
-            &[Holds::Alike],
+            &[Holds::Alike(3)],
         ));
         all.push(case(
             "nearly no tangent frame",
@@ -205,7 +205,7 @@ fn normals() -> Vec<HardCase> {
             FragmentInputs { texel: [0.5, 0.5, 1.0], ..FLAT },
             FragmentInputs { texel: [1.0, 0.5, 1.0], tangent: [0.0, 0.0, -1.0], ..FLAT },
         ],
-        &[Holds::Alike, Holds::Flat(Param::NormalStrength)],
+        &[Holds::Alike(2), Holds::Flat(Param::NormalStrength)],
     ));
     all.push(case(
         "normal that all but cancels",
@@ -227,7 +227,7 @@ fn normals() -> Vec<HardCase> {
             FragmentInputs { view: [0.0; 3], ..FACING },
             FragmentInputs { view: [-0.0; 3], ..FACING },
         ],
-        &[Holds::Alike],
+        &[Holds::Alike(3)],
     ));
     for silhouette in Silhouette::ALL {
         all.push(case(
@@ -265,19 +265,16 @@ fn lookups() -> Vec<HardCase> {
                 s.lights = light;
                 s.params.set(Param::EnvironmentRotation, 0.0);
             });
-            for around in directions {
-                all.push(case(name, hard, setting, around.map(towards).to_vec(), &[]));
-            }
+            all.push(case(name, hard, setting, directions.into_iter().flatten().map(towards).collect(), &[]));
         }
         // Seen by the diffuse term alone, so that both sides must show the same light.
-        for around in edges().into_iter().chain(corners()) {
-            let mut setting = only(&[Effect::Diffuse, Effect::NormalMap]);
-            setting.lights = light;
-            setting.params.set(Param::EnvironmentRotation, 0.0);
-            let name = "both sides of an edge";
-            let hard = "a step of one last place across an edge or a corner shows no seam";
-            all.push(case(name, hard, setting, around.map(towards).to_vec(), &[Holds::Alike]));
-        }
+        let mut setting = only(&[Effect::Diffuse, Effect::NormalMap]);
+        setting.lights = light;
+        setting.params.set(Param::EnvironmentRotation, 0.0);
+        let around = edges().into_iter().chain(corners()).flatten();
+        let name = "both sides of an edge";
+        let hard = "a step of one last place across an edge or a corner shows no seam";
+        all.push(case(name, hard, setting, around.map(towards).collect(), &[Holds::Alike(3)]));
     }
     // Between texel (1, 1) of face +Z, which is dark, and its bright right neighbour: the border lies at s = 0.
     let mut halfway = only(&[Effect::Diffuse, Effect::NormalMap]);

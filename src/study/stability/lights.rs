@@ -1,7 +1,7 @@
 //! Lights to look up: an ordinary one, a glaring one, darkness, and a scene's own.
 
+use crate::bake::Illumination;
 use crate::bake::LobeStack;
-use crate::engine::cpu::Illumination;
 use crate::model::cube::{Cube, texel_direction};
 
 /// Which light.

@@ -84,27 +84,26 @@ impl Study {
         };
         for case in hard::cases() {
             let verdicts = self.verdicts(evaluators, &case.batch, &case.holds);
-            report.add(case.name, case.hard, verdicts);
+            report.add((case.name, case.hard), case.batch.fragments.len(), verdicts);
             step(1);
         }
         for frame in hard::frames() {
             let verdicts =
                 evaluators.iter().map(|evaluator| check_frame(&**evaluator, frame.vertex)).collect();
-            report.add(frame.name, "any unit frame, the same on every evaluator", verdicts);
+            report.add((frame.name, "any unit frame, the same on every evaluator"), 1, verdicts);
             step(1);
         }
         let given = Circumstances { lights: &self.lights, pixels: self.pixels };
         for demand in &DEMANDS {
-            let verdict = |evaluator: &Box<dyn Evaluator>| {
-                let met = (demand.check)(evaluator.engine()?, &given);
-                Some(demanded(met))
-            };
-            report.add(demand.name, demand.hard, evaluators.iter().map(verdict).collect());
+            let verdict =
+                |evaluator: &Box<dyn Evaluator>| Some(demanded((demand.check)(evaluator.engine()?, &given)));
+            report.add((demand.name, demand.hard), 1, evaluators.iter().map(verdict).collect());
             step(1);
         }
         for case in &self.kept {
             let verdicts = self.verdicts(evaluators, &case.batch, &[]);
-            report.add(&format!("kept: {}", case.name), "found by a search", verdicts);
+            let name = format!("kept: {}", case.name);
+            report.add((&name, "found by a search"), case.batch.fragments.len(), verdicts);
             step(1);
         }
         let mut swept = Hunt::new(evaluators.len());

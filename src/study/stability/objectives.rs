@@ -3,11 +3,14 @@
 use super::case::{Batch, EVERYTHING, FragmentInputs, Setting};
 use super::evaluate::{Answer, Evaluator, Sums, TARGET};
 use super::lights::LightBox;
-use crate::engine::cpu::{CpuEngine, Illumination};
+use crate::bake::Illumination;
+use crate::engine::cpu::CpuEngine;
 #[cfg(feature = "gpu")]
 use crate::engine::gpu::{GpuEngine, Memory, Task};
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Unknown};
+#[cfg(feature = "gpu")]
+use crate::gpu::Gpu;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
 use crate::samples::rows::{Row, Rows};
@@ -86,11 +89,11 @@ impl EngineFactory for Cpu {
 
 /// The GPU engine on an adapter.
 #[cfg(feature = "gpu")]
-pub struct OnAdapter(pub std::rc::Rc<crate::gpu::Gpu>);
+pub struct OnAdapter(pub std::rc::Rc<super::shader::Adapter>);
 
 #[cfg(feature = "gpu")]
 impl OnAdapter {
-    fn engine<'a>(&'a self, inputs: &'a EngineInputs, point: &Point) -> Result<GpuEngine<'a>, String> {
+    fn engine<'a>(gpu: &'a Gpu, inputs: &'a EngineInputs, point: &Point) -> Result<GpuEngine<'a>, String> {
         let EngineInputs { setup, illumination, views, loss, unknowns } = inputs;
         let task = Task {
             setup: *setup,
@@ -99,7 +102,7 @@ impl OnAdapter {
             loss: *loss,
             unknowns: unknowns.clone(),
         };
-        GpuEngine::new(&self.0, task, point, Memory::default()).map_err(|error| error.to_string())
+        GpuEngine::new(gpu, task, point, Memory::default()).map_err(|error| error.to_string())
     }
 }
 
@@ -118,12 +121,17 @@ impl EngineFactory for OnAdapter {
         point: &Point,
         then: &mut dyn FnMut(&dyn Objective),
     ) -> Result<(), String> {
-        let engine = self.engine(inputs, point)?;
-        then(&engine);
-        engine.device_fault().map_or(Ok(()), |error| Err(error.to_string()))
+        self.0.run(|gpu| {
+            let engine = Self::engine(gpu, inputs, point)?;
+            then(&engine);
+            engine.device_fault().map_or(Ok(()), |error| Err(error.to_string()))
+        })
     }
     fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
-        self.engine(inputs, point)?.image(0, point).map_err(|error| error.to_string())
+        self.0.run(|gpu| {
+            let engine = Self::engine(gpu, inputs, point)?;
+            engine.image(0, point).map_err(|error| error.to_string())
+        })
     }
 }
 

@@ -15,8 +15,9 @@ use crate::scene::Loss;
 /// Fragments in a batch.
 pub const BATCH: usize = 256;
 
-/// Weights are at most this, and albedo at most a hundredth of it: with texels of 65504 and a normal that
-/// turns as steeply as it may, squares of derivatives stay below f32's 3.4e38.
+/// Weights are at most this; albedo, texels of normals and lengths of vectors are at most a hundredth of it:
+/// with lights of 65504 and a normal that turns as steeply as it may, squares of derivatives stay below f32's
+/// 3.4e38.
 const LARGEST: f64 = 1e3;
 
 /// Batch `index` of a search: the same for the same seed, whatever came before it.
@@ -103,7 +104,7 @@ fn unit(rng: &mut StdRng) -> [f64; 3] {
 /// Onto an axis, an edge or a corner of the cube, or a last place beside it.
 fn special(rng: &mut StdRng) -> [f64; 3] {
     let free = single(rng.random_range(-1.0..=1.0));
-    let near = [0.0, -0.0, 1.0, -1.0, single(1.0 + 1.2e-7), single(1.0 - 6e-8), 1e-40, free];
+    let near = [0.0, -0.0, 1.0, -1.0, single(1.0 + 1.2e-7), single(1.0 - 6e-8), single(1e-40), free];
     std::array::from_fn(|_| one_of(rng, &near))
 }
 
@@ -112,7 +113,7 @@ fn vector(rng: &mut StdRng, beside: [f64; 3]) -> [f64; 3] {
     match rng.random_range(0..16) {
         0 => [0.0; 3],
         1 => {
-            let length = 10_f64.powf(rng.random_range(-42.0..=3.0));
+            let length = 10_f64.powf(rng.random_range(-42.0..=1.0));
             unit(rng).map(|x| single(x * length))
         }
         2 | 3 => special(rng),
@@ -136,7 +137,7 @@ fn texel(rng: &mut StdRng) -> [f64; 3] {
             std::array::from_fn(|_| one_of(rng, &odd))
         }
         2 => std::array::from_fn(|_| single(0.5 + magnitude(rng, -9.0, -1.0))),
-        3 => std::array::from_fn(|_| magnitude(rng, -40.0, 4.0)),
+        3 => std::array::from_fn(|_| magnitude(rng, -40.0, 1.0)),
         4 => [0.5, 0.5, 1.0],
         _ => [
             single(rng.random_range(0.0..=1.0)),

@@ -18,6 +18,7 @@ use crate::engine::residual::{Weighted, weighted_residual};
 use crate::model::effects::Silhouette;
 use crate::model::fragment::{Fragment, Shading};
 use crate::model::params::{Param, Params};
+use crate::model::vector::dot;
 
 /// By how much each number is moved, as a share of itself (of the largest component of its vector): eight
 /// roundings of 2^-24 either way, as many as lie one behind the other between an input and what a lookup or
@@ -27,6 +28,9 @@ const RADIUS: f64 = 8.0 / (1 << 24) as f64;
 const ROUNDED: f64 = 1.0 / (1 << 23) as f64;
 /// A component below the smallest normal f32 may be flushed to 0 (WGSL permits it).
 const FLUSHED: f64 = 1.2e-38;
+/// What the greatest change among random moves is multiplied with: the worst roundings are rarely among them,
+/// and those of several steps add up.
+const SPREAD: f64 = 4.0;
 /// What roundings of sums add, as a share of the summands: some fifty of 2^-24, of either sign.
 const SUMMED: f64 = 5e-6;
 /// Nothing below is told apart from 0: products of two factors above it do not vanish in an f32.
@@ -218,7 +222,7 @@ fn one(
         let (moved, params) = (moved(inputs, rng), moved_params(&setting.params, rng));
         let cubes = &others[number % others.len()];
         let (other, other_slopes, _) = evaluate(cubes, &moved, &params, Some(&mut *rng));
-        let widen = |tolerance: &mut f64, a: f64, b: f64| *tolerance = tolerance.max(2.0 * (a - b).abs());
+        let widen = |tolerance: &mut f64, a: f64, b: f64| *tolerance = tolerance.max(SPREAD * (a - b).abs());
         for c in 0..4 {
             widen(&mut value_tolerance[c], other[c], value[c]);
             value_size[c] = value_size[c].max(other[c].abs());
@@ -228,7 +232,7 @@ fn one(
             }
         }
         let mut difference = Contribution::of(setting, &other, &other_slopes);
-        difference.combine(&contribution, |a, b| *a = 2.0 * (*a - b).abs());
+        difference.combine(&contribution, |a, b| *a = SPREAD * (*a - b).abs());
         contribution_tolerance.combine(&difference, |a, b| *a = a.max(b));
     }
     FragmentReference {
@@ -256,8 +260,8 @@ fn round_shading(
         v.iter_mut().for_each(|x| *x += RADIUS * size * step(&mut *rng));
     };
     let length = size(std::array::from_fn(|i| f.base[i] + strength * f.bump[i]));
-    // Beyond that the model itself cuts the derivative off.
-    let turning = (size(f.bump) / length.max(f64::MIN_POSITIVE)).min(1e6);
+    // At 1e6 the model itself cuts the derivative off.
+    let turning = (size(f.bump) / length.max(f64::MIN_POSITIVE)).min(1e6 / RADIUS);
     let n = size(s.n);
     round(&mut s.n, n);
     let reflection = size(s.reflection).max(2.0 * n);
@@ -268,10 +272,14 @@ fn round_shading(
     }
     // Where it is given (not found from n) its own roundings are among the inputs'.
     if at == Silhouette::Bumped {
-        s.silhouette = (s.silhouette + RADIUS * step(rng)).max(0.0);
-        if s.silhouette_tangent != 0.0 {
+        let turned = dot(s.n_tangent, f.view);
+        if s.silhouette < RADIUS {
+            // In an f32 |n.V| may be 1 already, or not yet.
+            s.silhouette_tangent = turned * step(rng);
+        } else if s.silhouette_tangent != 0.0 {
             s.silhouette_tangent += RADIUS * turning * step(rng);
         }
+        s.silhouette = (s.silhouette + RADIUS * step(rng)).max(0.0);
     }
 }
 
@@ -288,7 +296,8 @@ fn moved(inputs: &FragmentInputs, rng: &mut StdRng) -> FragmentInputs {
     }
     let FragmentInputs { occlusion, silhouette, dapple, albedo, specular, attenuator, .. } = &mut moved;
     for x in [occlusion, silhouette, dapple, specular, attenuator].into_iter().chain(albedo) {
-        *x += RADIUS * *x * step(rng);
+        let flushed = if *x == 0.0 { 0.0 } else { FLUSHED };
+        *x += (RADIUS * x.abs() + flushed) * step(rng);
     }
     moved
 }

@@ -55,10 +55,10 @@ impl Report {
         }
     }
 
-    /// Take note of a case; those of one name become one row.
-    pub fn add(&mut self, name: &str, hard: &str, verdicts: Vec<Option<Verdict>>) {
-        for (count, verdict) in self.hard.iter_mut().zip(&verdicts) {
-            *count += usize::from(verdict.is_some());
+    /// Take note of a case of so many fragments; those of one name become one row.
+    pub fn add(&mut self, (name, hard): (&str, &str), count: usize, verdicts: Vec<Option<Verdict>>) {
+        for (sum, verdict) in self.hard.iter_mut().zip(&verdicts) {
+            *sum += if verdict.is_some() { count } else { 0 };
         }
         match self.rows.iter_mut().find(|row| row.name == name) {
             None => self.rows.push(CaseRow { name: name.to_owned(), hard: hard.to_owned(), verdicts }),

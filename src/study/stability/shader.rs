@@ -1,25 +1,66 @@
 //! The renderer's rules as an evaluator: planned for a batch's setting, run on a graphics adapter.
 
+use std::cell::RefCell;
 use std::rc::Rc;
 
 use super::case::{Batch, EVERYTHING, FragmentInputs, VertexInputs};
 use super::evaluate::{Answer, Evaluator, Frame, Rgba};
 use super::lights::LightBox;
-use crate::engine::cpu::Illumination;
-use crate::gpu::Gpu;
+use crate::bake::Illumination;
 use crate::gpu::probe::{constants, evaluate};
 use crate::gpu::upload::Content;
+use crate::gpu::{Choice, Gpu, GpuError};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::scene::{FitSettings, Loss, Quality, Scene, maps, mesh};
+use crate::scene::{FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;
 use crate::shader::probe::Probe;
 use crate::shader::rule::Stage;
 
+/// An adapter whose device is opened anew when it was lost: software drivers do lose one now and then, and
+/// the case at hand is then not to blame. A case that loses it twice is.
+pub struct Adapter {
+    choice: Choice,
+    device: RefCell<Rc<Gpu>>,
+}
+
+impl Adapter {
+    /// An adapter's device.
+    ///
+    /// # Errors
+    /// When there is no such adapter.
+    pub fn open(choice: Choice) -> Result<Self, GpuError> {
+        let gpu = Gpu::open(&choice)?;
+        Ok(Self { choice, device: RefCell::new(Rc::new(gpu)) })
+    }
+
+    /// Do some work on the device.
+    ///
+    /// # Errors
+    /// Those of the work, in words.
+    pub fn run<T>(&self, mut work: impl FnMut(&Gpu) -> Result<T, String>) -> Result<T, String> {
+        let gpu = Rc::clone(&self.device.borrow());
+        match work(&gpu) {
+            Err(_) if matches!(gpu.check(), Err(GpuError::Lost { .. })) => {
+                let gpu = Rc::new(Gpu::open(&self.choice).map_err(|error| error.to_string())?);
+                *self.device.borrow_mut() = Rc::clone(&gpu);
+                work(&gpu)
+            }
+            done => done,
+        }
+    }
+
+    /// The adapter's name.
+    #[must_use]
+    pub fn name(&self) -> String {
+        self.device.borrow().name().to_owned()
+    }
+}
+
 /// The exact rules of the renderer.
-pub struct Rules(pub Rc<Gpu>);
+pub struct Rules(pub Rc<Adapter>);
 
 /// What a fragment gives: as a rasteriser interpolates it, and texels as they are read.
 const GIVEN: [(&str, &str); 12] = [
@@ -56,7 +97,8 @@ impl Rules {
     ) -> Result<Vec<f32>, String> {
         let scene = scene();
         let content = Content { scene: &scene, illumination: lights, occlusion: None, params };
-        evaluate(&self.0, probe, content, &constants(probe, params), given).map_err(|error| error.to_string())
+        let block = constants(probe, params);
+        self.0.run(|gpu| evaluate(gpu, probe, content, &block, given).map_err(|error| error.to_string()))
     }
 }
 
@@ -148,7 +190,12 @@ fn scene() -> Scene {
         effects: Effects::default(),
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),
-        fit: FitSettings { free: Vec::new(), loss: Loss::L2, free_gains: false },
+        fit: FitSettings {
+            free: Vec::new(),
+            loss: Loss::L2,
+            free_gains: false,
+            maps: MapSettings::default(),
+        },
         quality: Quality::default(),
     }
 }

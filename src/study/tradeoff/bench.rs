@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::bake;
+use crate::bake::{self, Illumination};
 use crate::engine::Point;
-use crate::engine::cpu::{CpuEngine, Illumination};
+use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
@@ -111,9 +111,7 @@ impl<'a> Bench<'a> {
         let posed = scene.mesh.pose();
         let samples =
             samples::sample_views(&scene, &posed, bake.occlusion.as_ref()).map_err(PrepareError::from)?;
-        let illumination =
-            Illumination { irradiance: bake.irradiance, lobes: bake.lobes, hilite: bake.hilite };
-        Ok(Evaluated { scene, illumination, samples })
+        Ok(Evaluated { scene, illumination: bake.illumination, samples })
     }
 }
 

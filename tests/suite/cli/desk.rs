@@ -13,7 +13,7 @@ use skinfit::render::files::{Image, ImageOptions, write_exr};
 use tempfile::TempDir;
 
 /// The scene file. Cubes are small and rays few: a run takes some hundredths of a second.
-pub(super) const SCENE: &str = r#"# a comment
+pub(crate) const SCENE: &str = r#"# a comment
 [mesh]
 file = "mesh.glb"
 [maps]
@@ -55,7 +55,7 @@ occlusion_rays = 32
 "#;
 
 /// The parameters that the targets are rendered with.
-pub(super) const TRUTH: &str = r#"form = "corrected"
+pub(crate) const TRUTH: &str = r#"form = "corrected"
 [params]
 base_weight = 0.8
 rim_weight = 0.9
@@ -68,22 +68,22 @@ specular_lobe = 12.0
 "#;
 
 /// A folder with the scene, and one for its bakes.
-pub(super) struct Desk {
+pub(crate) struct Desk {
     folder: TempDir,
     cache: TempDir,
 }
 
 /// What the program said, and how it ended.
 #[derive(Debug)]
-pub(super) struct Ran {
-    pub(super) code: Option<i32>,
-    pub(super) out: String,
-    pub(super) err: String,
+pub(crate) struct Ran {
+    pub(crate) code: Option<i32>,
+    pub(crate) out: String,
+    pub(crate) err: String,
 }
 
 impl Desk {
     /// The scene with its targets, which the program itself renders once for all tests.
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         static TARGETS: OnceLock<Vec<(String, Vec<u8>)>> = OnceLock::new();
         let desk = Self::without_targets();
         let targets = TARGETS.get_or_init(|| {
@@ -118,41 +118,41 @@ impl Desk {
         desk
     }
 
-    pub(super) fn path(&self, name: &str) -> PathBuf {
+    pub(crate) fn path(&self, name: &str) -> PathBuf {
         self.folder.path().join(name)
     }
 
-    pub(super) fn read(&self, name: &str) -> Vec<u8> {
+    pub(crate) fn read(&self, name: &str) -> Vec<u8> {
         std::fs::read(self.path(name)).unwrap_or_else(|e| panic!("{name}: {e}"))
     }
 
-    pub(super) fn text(&self, name: &str) -> String {
+    pub(crate) fn text(&self, name: &str) -> String {
         String::from_utf8(self.read(name)).unwrap()
     }
 
-    pub(super) fn json(&self, name: &str) -> Value {
+    pub(crate) fn json(&self, name: &str) -> Value {
         serde_json::from_slice(&self.read(name)).unwrap()
     }
 
-    pub(super) fn write(&self, name: &str, bytes: &[u8]) {
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) {
         let path = self.path(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
         std::fs::write(path, bytes).unwrap();
     }
 
-    pub(super) fn remove(&self, name: &str) {
+    pub(crate) fn remove(&self, name: &str) {
         std::fs::remove_file(self.path(name)).unwrap();
     }
 
     /// The scene with the first `from` replaced by `to`.
-    pub(super) fn edit(&self, from: &str, to: &str) {
+    pub(crate) fn edit(&self, from: &str, to: &str) {
         let text = self.text("scene.toml");
         assert!(text.contains(from), "{from} is not in the scene");
         self.write("scene.toml", text.replacen(from, to, 1).as_bytes());
     }
 
     /// An EXR that [`render::files`](skinfit::render::files) would refuse to write may hold NaN.
-    pub(super) fn write_exr(
+    pub(crate) fn write_exr(
         &self,
         name: &str,
         width: usize,
@@ -173,7 +173,7 @@ impl Desk {
     }
 
     /// An image of one grey with full coverage.
-    pub(super) fn write_grey(&self, name: &str, width: usize, height: usize) {
+    pub(crate) fn write_grey(&self, name: &str, width: usize, height: usize) {
         let mut image = Image::new(width, height);
         image.rgb.fill([0.5; 3]);
         image.alpha.fill(1.0);
@@ -181,40 +181,40 @@ impl Desk {
     }
 
     /// Every file below the folder, with its content.
-    pub(super) fn files(&self) -> BTreeMap<PathBuf, Vec<u8>> {
+    pub(crate) fn files(&self) -> BTreeMap<PathBuf, Vec<u8>> {
         files(self.folder.path())
     }
 
-    pub(super) fn cache(&self) -> &Path {
+    pub(crate) fn cache(&self) -> &Path {
         self.cache.path()
     }
 
     /// The program on `arguments`, in the scene's folder.
-    pub(super) fn command(&self, arguments: &[&str]) -> Command {
+    pub(crate) fn command(&self, arguments: &[&str]) -> Command {
         let mut command = program(self.cache.path());
         command.args(arguments).current_dir(self.folder.path());
         command
     }
 
-    pub(super) fn run(&self, arguments: &[&str]) -> Ran {
+    pub(crate) fn run(&self, arguments: &[&str]) -> Ran {
         Ran::of(&mut self.command(arguments))
     }
 
     /// Fit the scene into `run`.
-    pub(super) fn fit(&self, run: &str, more: &[&str]) -> Ran {
+    pub(crate) fn fit(&self, run: &str, more: &[&str]) -> Ran {
         self.run(&[&["fit", "scene.toml", "-o", run], more].concat())
     }
 }
 
 /// The program, with its bakes in `cache`.
-pub(super) fn program(cache: &Path) -> Command {
+pub(crate) fn program(cache: &Path) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_skinfit"));
     command.env("SKINFIT_CACHE", cache).stdin(Stdio::null());
     command
 }
 
 impl Ran {
-    pub(super) fn of(command: &mut Command) -> Self {
+    pub(crate) fn of(command: &mut Command) -> Self {
         let output = command.output().unwrap();
         let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
         let ran = Self { code: output.status.code(), out: text(output.stdout), err: text(output.stderr) };
@@ -223,13 +223,13 @@ impl Ran {
     }
 
     /// Ended well, and without a warning.
-    pub(super) fn done(self) -> Self {
+    pub(crate) fn done(self) -> Self {
         assert_eq!((self.code, self.err.as_str()), (Some(0), ""), "{self:?}");
         self
     }
 
     /// Refused in one paragraph that holds all of `words`.
-    pub(super) fn refused(self, words: &[&str]) -> Self {
+    pub(crate) fn refused(self, words: &[&str]) -> Self {
         assert_eq!(self.code, Some(2), "{self:?}");
         assert_eq!(self.out, "", "{self:?}");
         assert!(self.err.starts_with("skinfit: ") && self.err.ends_with(".\n"), "{self:?}");
@@ -243,7 +243,7 @@ impl Ran {
 }
 
 /// Every file below `folder`, with its content; folders as well, as nothing.
-pub(super) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     for entry in std::fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
@@ -286,7 +286,7 @@ fn ball() -> (Vec<[f32; 3]>, Vec<[f32; 2]>) {
 
 /// The ball as a .glb, its JSON and its bytes tampered with by `change`. Accessors: 0 positions,
 /// 1 texture coordinates, 2 indices, 3 joints, 4 weights (the latter two unused).
-pub(super) fn mesh(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
+pub(crate) fn mesh(change: impl Fn(&mut Value, &mut Vec<u8>)) -> Vec<u8> {
     let (positions, uvs) = ball();
     let count = positions.len();
     let mut indices: Vec<u16> = Vec::new();

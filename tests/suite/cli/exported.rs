@@ -45,6 +45,23 @@ fn a_fits_constants_are_exported_with_their_provenance() {
 }
 
 #[test]
+fn constants_for_another_scenes_effects_are_exported_with_a_word_of_it() {
+    let desk = Desk::new();
+    desk.fit("run", &[]).done();
+    desk.write(
+        "other.toml",
+        desk.text("scene.toml").replace("\"hilite\", \"reflection\"", "\"hilite\"").as_bytes(),
+    );
+    let export = |scene: &str| desk.run(&["export", "run/params.toml", "--to", "c", "--scene", scene]);
+    assert_eq!(export("scene.toml").done().err, "");
+    let ran = export("other.toml");
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    for words in ["run/params.toml: was fitted with the effects", "but other.toml has", "--scene"] {
+        assert!(ran.err.contains(words), "{ran:?}");
+    }
+}
+
+#[test]
 fn exports_that_cannot_be() {
     let nothing = |_: &Desk| {};
     let alone = |desk: &Desk| desk.write("p/params.toml", b"form = \"corrected\"\n[params]\nhilite = 0.5\n");

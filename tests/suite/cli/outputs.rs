@@ -20,7 +20,7 @@ fn paths_that_cannot_be_written() {
             &["file/a.png: cannot be written"],
         ),
         (&["bake", "scene.toml", "-o", "file/baked"], &["file/baked/irradiance.exr: cannot be written"]),
-        (&["demo", "file"], &["file/", ": cannot be written"]),
+        (&["demo", "file"], &["file: is a file", "Name another place"]),
         (&["render", "scene.toml", "-o", "a.tiff"], &["a.tiff: ", ".exr or .png"]),
         (&["render", "scene.toml", "-o", "a"], &["a: ", ".exr or .png"]),
         (&["render", "scene.toml", "-o", "a.png", "--layers"], &["a.png: a PNG holds no layers", ".exr"]),

@@ -7,9 +7,22 @@ use super::desk::Desk;
 #[test]
 fn every_help_page_holds_an_example_that_is_understood() {
     let desk = Desk::new();
-    for command in
-        ["", "fit", "ablate", "tradeoff", "render", "bake", "demo", "params", "shader", "export", "info"]
-    {
+    for command in [
+        "",
+        "fit",
+        "ablate",
+        "tradeoff",
+        "render",
+        "bake",
+        "demo",
+        "params",
+        "shader",
+        "export",
+        "info",
+        "stability",
+        "sweep",
+        "collect",
+    ] {
         let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
         let help = desk.run(&arguments).done().out;
         let examples: Vec<&str> = help.lines().filter(|line| line.starts_with("  skinfit ")).collect();
@@ -89,6 +102,7 @@ fn words_that_the_command_line_does_not_know() {
             "unknown effect `difuse`. Did you mean `diffuse`?",
         ),
         (&["render", "scene.toml", "-o", "a.png", "--effects", ","], "names no effect"),
+        (&["render", "scene.toml", "-o", "a.png", "--effects", "rim,rim"], "rim is listed twice"),
         (&["render", "scene.toml", "-o", "a.png", "--exposure", "nan"], "give stops in [-64, 64]"),
         (
             &["render", "scene.toml", "-o", "a.png", "--tone", "filmic"],

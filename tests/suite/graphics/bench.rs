@@ -49,7 +49,7 @@ pub(super) fn everything() -> Effects {
     Effect::ALL.into_iter().collect()
 }
 
-fn cache() -> PathBuf {
+pub(super) fn cache() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics")
 }
 

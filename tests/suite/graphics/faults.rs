@@ -7,7 +7,7 @@ use super::bench::*;
 #[test]
 fn an_adapter_that_is_not_there_is_refused_with_those_that_are() {
     let Some(gpu) = gpu() else { return };
-    let error = Gpu::open(&Choice { name: Some("Voodoo 2".to_owned()), max_side: None }).unwrap_err();
+    let error = Gpu::open(&Choice { name: Some("Voodoo 2".to_owned()), ..Choice::default() }).unwrap_err();
     let words = error.to_string();
     assert!(matches!(error, GpuError::NoSuchAdapter { .. }), "{words}");
     assert!(words.contains("Voodoo 2") && words.contains(gpu.name()), "{words}");
@@ -15,7 +15,7 @@ fn an_adapter_that_is_not_there_is_refused_with_those_that_are() {
 
 #[test]
 fn an_image_or_a_map_beyond_the_adapters_limit_is_refused_and_the_device_goes_on() {
-    let Some(small) = open(&Choice { max_side: Some(512), name: None }) else { return };
+    let Some(small) = open(&Choice { max_side: Some(512), ..Choice::default() }) else { return };
     let mut prepared = prepared(&built_in(), SURFACE, 16);
     // The built-in maps are larger than that.
     let Err(GpuError::TextureSize { limit: 512, what, .. }) =

@@ -5,14 +5,15 @@ use skinfit::model::compose::TermName;
 use skinfit::model::effects::Effect;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
-use skinfit::scene::load::Animation;
+use skinfit::scene::animation::Animation;
 
 use super::bench::*;
 
 #[test]
 fn an_image_in_tiles_is_the_image_in_one() {
     // 3300 samples across in targets of 2046: two tiles, the second narrower.
-    let (Some(gpu), Some(small)) = (gpu(), open(&Choice { max_side: Some(2048), name: None })) else {
+    let (Some(gpu), Some(small)) = (gpu(), open(&Choice { max_side: Some(2048), ..Choice::default() }))
+    else {
         return;
     };
     for effects in [SURFACE, everything()] {

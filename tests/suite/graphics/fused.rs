@@ -1,18 +1,22 @@
 //! The fit engine on the adapter against the plain f64 model, and beside the CPU's.
 
+use std::path::Path;
+
 use skinfit::engine::gpu::{GpuEngine, Memory, Task};
 use skinfit::engine::reference::Reference;
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
+use skinfit::fit::{FitOptions, fit};
 use skinfit::gpu::{Choice, Gpu};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Column, Param};
+use skinfit::prepare::{PrepareOptions, Prepared};
 use skinfit::samples::rows::Rows;
 use skinfit::scene::Loss;
 use skinfit::scene::view::Clip;
 
-use super::bench::{gpu, open};
+use super::bench::{built_in, cache, gpu, open};
 use crate::engine::{
     EVERYTHING, all_unknowns, assert_equal, engine as cpu, illumination, names, params, view,
 };
@@ -239,9 +243,9 @@ fn a_lost_device_ends_a_fit_with_its_reason_and_keeps_the_state() {
     let engine = engine(&gpu, FULL, &views, Loss::L2, &unknowns, &point);
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state.json");
-    let mut options = skinfit::fit::FitOptions { state: Some(state.clone()), ..Default::default() };
+    let mut options = FitOptions { state: Some(state.clone()), ..Default::default() };
     let mut lost = 0;
-    let error = skinfit::fit::fit(&engine, &point, &options, &mut |iteration| {
+    let error = fit(&engine, &point, &options, &mut |iteration| {
         if iteration.iteration == 1 {
             gpu.close();
             lost += 1;
@@ -253,9 +257,7 @@ fn a_lost_device_ends_a_fit_with_its_reason_and_keeps_the_state() {
     assert!(error.to_string().contains("device was lost"), "{error}");
     // What was found before it stands, and another engine goes on from there.
     options.resume = Some(state);
-    let outcome =
-        skinfit::fit::fit(&cpu(FULL, &views, Loss::L2, &unknowns, true), &point, &options, &mut |_| {})
-            .unwrap();
+    let outcome = fit(&cpu(FULL, &views, Loss::L2, &unknowns, true), &point, &options, &mut |_| {}).unwrap();
     assert!(outcome.loss_end < outcome.loss_start);
 }
 
@@ -301,5 +303,53 @@ fn images_equal_the_cpu_engines() {
                 }
             }
         }
+    }
+}
+
+/// Fit a scene on both engines from its start.
+fn fit_on_both(gpu: &Gpu, scene: &Path) {
+    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
+    let mut prepared = Prepared::new(scene, &options).unwrap();
+    let observed = prepared.observed().unwrap();
+    let task = Task {
+        setup: prepared.setup(),
+        illumination: prepared.illumination.clone(),
+        views: &observed,
+        loss: prepared.scene.fit.loss,
+        unknowns: prepared.unknowns(),
+    };
+    let start = prepared.start();
+    let ours = GpuEngine::new(gpu, task, &start, Memory::default()).unwrap();
+    let theirs = prepared.engine_over(observed.clone());
+    let [ours, theirs] = [&ours as &dyn Objective, &theirs]
+        .map(|engine| fit(engine, &start, &FitOptions::default(), &mut |_| {}).unwrap());
+    let what = scene.display();
+    // Both stop where a step promises nothing; their sums differ by roundings of f32, some 1e-7, which the
+    // loss of noise-free targets consists of.
+    let floor = 1e-12;
+    let off = (ours.loss_end - theirs.loss_end).abs();
+    assert!(off <= 1e-6 * theirs.loss_end + floor, "{what}: loss {} {}", ours.loss_end, theirs.loss_end);
+    for (a, b) in ours.unknowns.iter().zip(&theirs.unknowns) {
+        // Of what the images determine; the rest may stand anywhere.
+        if a.identifiable && b.identifiable {
+            let off = (a.value - b.value).abs();
+            assert!(
+                off <= 1e-4 * b.value.abs().max(1e-2),
+                "{what}: {} {} {}",
+                a.unknown.name(),
+                a.value,
+                b.value
+            );
+        }
+    }
+}
+
+#[test]
+fn fits_of_built_in_and_shared_scenes_end_where_the_cpu_engines_do() {
+    let Some(gpu) = gpu() else { return };
+    fit_on_both(gpu, &built_in());
+    let Some(folder) = crate::common::data() else { return };
+    for scene in ["lps_forest", "lps_sunrise"] {
+        fit_on_both(gpu, &folder.join(scene).join("scene.toml"));
     }
 }

@@ -16,4 +16,5 @@ mod faults;
 mod frames;
 mod fused;
 mod parity;
+mod stability;
 mod vectors;

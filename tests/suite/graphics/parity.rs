@@ -171,7 +171,7 @@ fn pose(prepared: &mut Prepared) {
         morph.weight = weight;
     }
     if prepared.scene.effects.has(Effect::Skin) {
-        let animation = skinfit::scene::load::Animation::open(&prepared.scene).unwrap().unwrap();
+        let animation = skinfit::scene::animation::Animation::open(&prepared.scene).unwrap().unwrap();
         let (first, last) = animation.seconds;
         prepared.scene.mesh.bones = animation.mesh(0.4 * first + 0.6 * last).unwrap().bones;
     }

@@ -2,8 +2,8 @@
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use serde_json::Value;
+use skinfit::bake::Illumination;
 use skinfit::bake::{LobeStack, VertexOcclusion};
-use skinfit::engine::cpu::Illumination;
 use skinfit::gpu::Gpu;
 use skinfit::gpu::probe::evaluate;
 use skinfit::gpu::upload::Content;
@@ -19,7 +19,7 @@ use skinfit::shader::{Constant, Facts};
 use super::bench;
 use crate::common;
 use crate::fixtures::bare_scene;
-use crate::vectors::{Vectors, number, numbers, params, three};
+use crate::vectors::{Vectors, column_params, number, numbers, params, three};
 
 const EFFECTS: Effects = Effects::SURFACE.with(Effect::Haze);
 
@@ -187,21 +187,7 @@ fn bench(gpu: &Gpu, vectors: &Vectors, file: &Value) {
     ];
     let probe =
         Probe::new(&facts(Form::Corrected, Silhouette::Bumped), Stage::Fragment, &given, &PARTS).unwrap();
-    let truth = &file["inputs"]["params"];
-    let scalar = |name: &str| number(&truth[name]).unwrap();
-    let mut params = Params::defaults(Form::Corrected);
-    params.set_rgb(Param::RimWeight, ["r", "g", "b"].map(|c| scalar(&format!("rim_weight_{c}"))));
-    for (name, param) in [
-        ("rim_exponent", Param::RimExponent),
-        ("hilite", Param::Hilite),
-        ("reflection", Param::Reflection),
-        ("occlusion", Param::Occlusion),
-        ("side_spec", Param::SideSpecular),
-        ("bump", Param::NormalStrength),
-        ("haze", Param::HazeWeight),
-    ] {
-        params.set(param, scalar(name));
-    }
+    let params = column_params(&file["inputs"]["params"]);
     let g = &file["inputs"]["gbuffer"];
     let mut items = Vec::new();
     for i in 0..16 {

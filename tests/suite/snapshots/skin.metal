@@ -44,7 +44,7 @@ struct Skinfit {
     sampler map_sampler;
     sampler cube_sampler;
 
-    // Whether no component is NaN or infinite: by the bits, as WGSL lets compilers assume that there is none.
+    // Whether no component is NaN or infinite, asked in a way that compilers do not assume away.
     bool is_finite(float3 v) {
         uint3 bits = as_type<uint3>(v) & uint3(0x7f800000u);
         return bits.x != 0x7f800000u && bits.y != 0x7f800000u && bits.z != 0x7f800000u;
@@ -112,7 +112,7 @@ struct Skinfit {
     // The part of the shading normal that the normal map's strength leaves alone.
     float3 base_of_texel(float3 decoded, float3 vertex_normal, float3 view) {
         float3 base = decoded.z * vertex_normal;
-        return (is_zero(base) || !is_finite(base) ? -view : base);
+        return (abs(base.x) + abs(base.y) + abs(base.z) < 1e-37 || !is_finite(base) ? -view : base);
     }
 
     // The smooth normal N of unit length; +Z where it vanishes, whatever the eye sees. That needs no V, and
@@ -145,15 +145,20 @@ struct Skinfit {
         return (positive ? power : (rim_exponent > 0.0 ? 0.0 : 1.0));
     }
 
-    // hilite occ rim a E_h(V): back light that shines past the rim (MODEL 3).
-    float3 back_light(float3 hilite_light, float attenuator, float occ, float rim, float3 hilite) {
-        return hilite * (occ * rim * attenuator) * hilite_light;
+    // hilite: a E_h(V) (MODEL 3).
+    float3 attenuated_hilite(float attenuator, float3 hilite_light) {
+        return attenuator * hilite_light;
     }
 
     // n = normalize(TBN decode(t, normal_strength)) (MODEL 3); without a direction the smooth normal, and
     // without that -V (MODEL 7).
     float3 bumped_normal(float3 base, float3 bump, float3 normal, float3 view, float normal_strength) {
         return normalize_or(base + normal_strength * bump, normalize_or(normal, -view));
+    }
+
+    // hilite occ rim a E_h(V): back light that shines past the rim (MODEL 3).
+    float3 back_light(float3 hilite_term, float occ, float rim, float3 hilite) {
+        return hilite * (occ * rim) * hilite_term;
     }
 
     // R = V - 2 n (n.V) (MODEL 3, corrected form).
@@ -171,9 +176,9 @@ struct Skinfit {
         return specular_cube.sample(cube_sampler, n_in_environment, level(0.0)).rgb;
     }
 
-    // diffuse (base_weight + rim_weight rim) (MODEL 3).
-    float3 diffuse_light(float3 albedo, float3 irradiance, float occ, float rim, float3 base_weight, float3 rim_weight) {
-        return albedo * irradiance * (occ * (base_weight + rim * rim_weight));
+    // diffuse: albedo E_d(n), before occlusion and weights (MODEL 3).
+    float3 albedo_times_irradiance(float3 albedo, float3 irradiance) {
+        return albedo * irradiance;
     }
 
     // E_s(R), the mirrored environment; filtered by the hardware.
@@ -181,14 +186,29 @@ struct Skinfit {
         return specular_cube.sample(cube_sampler, reflected_in_environment, level(0.0)).rgba;
     }
 
-    // side_specular s E_s(n) (MODEL 3).
-    float3 side_specular_light(float specular, float3 side_light, float3 side_specular) {
-        return specular * side_specular * side_light;
+    // side: s E_s(n) (MODEL 3).
+    float3 side_specular_term(float specular, float3 side_light) {
+        return specular * side_light;
+    }
+
+    // diffuse (base_weight + rim_weight rim) (MODEL 3).
+    float3 diffuse_light(float3 diffuse_term, float occ, float rim, float3 base_weight, float3 rim_weight) {
+        return diffuse_term * (occ * (base_weight + rim * rim_weight));
+    }
+
+    // reflection: dapple E_s(R).rgb (MODEL 3).
+    float3 dappled_mirror(float dapple, float4 mirror_light) {
+        return dapple * mirror_light.rgb;
+    }
+
+    // side_specular side (MODEL 3).
+    float3 side_specular_light(float3 side_term, float3 side_specular) {
+        return side_specular * side_term;
     }
 
     // reflection dapple E_s(R).rgb (MODEL 3).
-    float3 mirrored_light(float4 mirror_light, float dapple, float3 reflection) {
-        return dapple * reflection * mirror_light.rgb;
+    float3 mirrored_light(float3 mirror_term, float3 reflection) {
+        return reflection * mirror_term;
     }
 
     // What the vertex stage hands over: world space, interpolated.
@@ -220,17 +240,21 @@ struct Skinfit {
         float3 bump = bump_of_texel(decoded, at.vertex_tangent, at.vertex_bitangent);
         float3 hilite_light = hilite_light_from_cube(view_in_environment);
         float rim = rim_power(silhouette, RIM_EXPONENT);
-        float3 hilite_part = back_light(hilite_light, attenuator, occ, rim, HILITE);
+        float3 hilite_term = attenuated_hilite(attenuator, hilite_light);
         float3 n = bumped_normal(base, bump, normal, view, NORMAL_STRENGTH);
+        float3 hilite_part = back_light(hilite_term, occ, rim, HILITE);
         float3 n_in_environment = n;
         float3 reflected = mirror_direction(n, view);
         float3 reflected_in_environment = reflected;
         float3 irradiance = irradiance_from_cube(n_in_environment);
         float3 side_light = side_light_from_cube(n_in_environment);
-        float3 diffuse_part = diffuse_light(albedo, irradiance, occ, rim, BASE_WEIGHT, RIM_WEIGHT);
+        float3 diffuse_term = albedo_times_irradiance(albedo, irradiance);
         float4 mirror_light = mirror_light_from_cube(reflected_in_environment);
-        float3 side_part = side_specular_light(specular, side_light, SIDE_SPECULAR);
-        float3 mirror_part = mirrored_light(mirror_light, dapple, REFLECTION);
+        float3 side_term = side_specular_term(specular, side_light);
+        float3 diffuse_part = diffuse_light(diffuse_term, occ, rim, BASE_WEIGHT, RIM_WEIGHT);
+        float3 mirror_term = dappled_mirror(dapple, mirror_light);
+        float3 side_part = side_specular_light(side_term, SIDE_SPECULAR);
+        float3 mirror_part = mirrored_light(mirror_term, REFLECTION);
         return float4(diffuse_part + side_part + hilite_part + mirror_part, 1.0);
     }
 };

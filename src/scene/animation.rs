@@ -1,0 +1,145 @@
+//! How the mesh of a scene is to be posed: morph weights, time, what the effects want of it.
+
+use std::path::Path;
+
+use toml::Spanned;
+
+use super::Scene;
+use super::error::{SceneError, Warnings, warn};
+use super::file::{SceneFile, Source};
+use super::gltf::{Ask, Document, Tangents, Uvs};
+use super::mesh::Mesh;
+use super::settings::number;
+use crate::model::effects::{Effect, Effects, Form, Needs};
+
+/// The mesh of a scene through its animation 0.
+pub struct Animation {
+    document: Document,
+    ask: Ask,
+    /// Seconds from its first key to its last.
+    pub seconds: (f64, f64),
+}
+
+impl Animation {
+    /// The animation of the scene at `path`, read with `effects`; `None` when the mesh file has none.
+    ///
+    /// # Errors
+    /// When the files have changed for the worse since the scene was read.
+    pub fn open(scene: &Scene) -> Result<Option<Self>, SceneError> {
+        let source = Source::read(&scene.path)?;
+        let file: SceneFile = source.parse()?;
+        let pose = Pose::check(&source, &file)?;
+        let folder = scene.path.parent().unwrap_or(Path::new(""));
+        let document = Document::open(&folder.join(&file.mesh.file))?;
+        let needs = scene.effects.needs(scene.silhouette);
+        let ask = ask(&file, scene.form, scene.effects, needs, &pose);
+        let seconds = document.animation_seconds()?;
+        Ok(seconds.map(|seconds| Self { document, ask, seconds }))
+    }
+
+    /// The mesh at `time` seconds.
+    ///
+    /// # Errors
+    /// When the animation does not fit the mesh.
+    pub fn mesh(&self, time: f64) -> Result<Mesh, SceneError> {
+        // What is mended was told when the scene was read.
+        self.document.mesh(&Ask { time: Some(time), ..self.ask.clone() }, &mut Warnings::new())
+    }
+}
+
+/// How the mesh is to be posed.
+pub(super) struct Pose {
+    morph_weights: Option<Vec<f32>>,
+    time: Option<f64>,
+}
+
+impl Pose {
+    pub(super) fn check(source: &Source, file: &SceneFile) -> Result<Self, SceneError> {
+        let weights = file.mesh.morph_weights.as_ref();
+        // Beyond f32's range a position would not be finite.
+        let bad = |weights: &Spanned<Vec<f64>>| {
+            weights.get_ref().iter().copied().find(|w| w.is_nan() || w.abs() > 1e6)
+        };
+        if let Some((spanned, weight)) = weights.and_then(|w| bad(w).map(|weight| (w, weight))) {
+            let what = format!("morph_weights holds {weight}");
+            return Err(source.error(spanned, what, "Give finite weights, mostly in [0, 1]"));
+        }
+        let finite = |_| true;
+        Ok(Self {
+            morph_weights: weights.map(|w| w.get_ref().iter().map(|&w| w as f32).collect()),
+            time: match &file.mesh.time {
+                Some(time) => Some(number(source, Some(time), 0.0, "time", "finite seconds", finite)?),
+                None => None,
+            },
+        })
+    }
+
+    pub(super) fn at(self, time: Option<f64>) -> Self {
+        Self { time: time.or(self.time), ..self }
+    }
+
+    pub(super) fn effects(
+        &self,
+        wanted: Option<Effects>,
+        document: &Document,
+    ) -> Result<Effects, SceneError> {
+        let add = |effects: Effects, on: bool, effect| if on { effects.with(effect) } else { effects };
+        let (morphs, skins) = document.carries()?;
+        let effects = match wanted {
+            Some(effects) => effects,
+            None => add(add(Effects::SURFACE, morphs, Effect::Morph), skins, Effect::Skin),
+        };
+        let effects = add(effects, self.morph_weights.is_some(), Effect::Morph);
+        Ok(add(effects, self.time.is_some(), Effect::Skin))
+    }
+}
+
+/// What the effects want of the mesh.
+pub(super) fn ask(file: &SceneFile, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
+    let maps = &file.maps;
+    let looked_up = needs.color_map && maps.color.is_some()
+        || needs.normal_map && maps.normal.is_some()
+        || needs.specular_map && maps.specular.is_some()
+        || needs.attenuator_map && maps.attenuator.is_some();
+    let uvs = match (needs.maps(), looked_up) {
+        (false, _) => Uvs::None,
+        (true, false) => Uvs::Optional,
+        (true, true) => Uvs::Required,
+    };
+    let tangents = match (needs.tangents, maps.normal.is_some()) {
+        (false, _) => Tangents::None,
+        (true, true) => Tangents::Exact,
+        // Decoded, a missing normal map is N itself; read as printed it leans along T and B.
+        (true, false) if form == Form::Listing => Tangents::Exact,
+        (true, false) => Tangents::AnyFrame,
+    };
+    Ask {
+        uvs,
+        tangents,
+        morphs: effects.has(Effect::Morph),
+        morph_weights: pose.morph_weights.clone(),
+        bones: effects.has(Effect::Skin),
+        time: pose.time.filter(|_| effects.has_any(&[Effect::Morph, Effect::Skin])),
+    }
+}
+
+/// Say so when an effect finds nothing in the mesh, or the mesh is made for one that is off.
+pub(super) fn idle_effects(
+    document: &Document,
+    effects: Effects,
+    mesh: &Mesh,
+    warnings: &mut Warnings,
+) -> Result<(), SceneError> {
+    let (_, skins) = document.carries()?;
+    let path = document.path();
+    if effects.has(Effect::Morph) && mesh.morphs.is_empty() {
+        warn(warnings, path, "has no morph targets: the effect `morph` does nothing");
+    }
+    if effects.has(Effect::Skin) && !skins && !document.animated() {
+        warn(warnings, path, "has no skin and no animation: the effect `skin` does nothing");
+    }
+    if skins && !effects.has(Effect::Skin) && document.skin_displaces()? {
+        warn(warnings, path, "has a skin, but the effect `skin` is off: its mesh stands where its node does");
+    }
+    Ok(())
+}

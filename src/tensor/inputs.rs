@@ -1,0 +1,81 @@
+//! What the shading operation takes: a tensor for each thing that may move.
+
+use burn::backend::wgpu::{CubeBackend, CubeTensor};
+use burn::backend::{Autodiff, tensor::FloatTensor};
+use burn::tensor::Tensor;
+
+use super::TensorError;
+use super::buffer::{plain, tracked};
+
+pub use crate::shader::adjoint::Input;
+
+/// What the shading operation takes, on the shared device. What the enabled effects do not read is not looked at, and
+/// may have any shape.
+///
+/// Samples stand in the order of the views' [`ViewSamples`](crate::samples::ViewSamples), one view after the other:
+/// `record * 16 + lane`. There are N of them, padding among them.
+#[derive(Clone, Debug)]
+pub struct Inputs {
+    /// The free columns of the model's parameters, in the operation's order: \[K\].
+    pub columns: Tensor<1>,
+    /// Albedo, linear Rec.709: \[N, 3\].
+    pub albedo: Tensor<2>,
+    /// Specular map s: \[N, 1\].
+    pub specular: Tensor<2>,
+    /// Attenuator map a: \[N, 1\].
+    pub attenuator: Tensor<2>,
+    /// Open share of the hemisphere, S.x: \[N, 1\].
+    pub open: Tensor<2>,
+    /// The normal map's x T + y B in the world, which `normal_strength` scales: \[N, 3\].
+    pub bump: Tensor<2>,
+    /// E_d with a border of one texel ([`padding`](crate::model::cube::padding)): \[6 (size + 2)^2, 4\], RGBA.
+    pub irradiance: Tensor<2>,
+    /// E_s, likewise.
+    pub lobe: Tensor<2>,
+    /// E_h, likewise.
+    pub hilite: Tensor<2>,
+}
+
+/// A tensor of the tracked backend.
+pub(super) type TrackedTensor = FloatTensor<Autodiff<CubeBackend>>;
+
+impl Inputs {
+    /// Whether any of them is tracked.
+    pub(super) fn is_tracked(&self) -> bool {
+        let Self { columns, albedo, specular, attenuator, open, bump, irradiance, lobe, hilite } = self;
+        let matrices = [albedo, specular, attenuator, open, bump, irradiance, lobe, hilite];
+        columns.is_autodiff() || matrices.into_iter().any(Tensor::is_autodiff)
+    }
+
+    /// Their primitives in the order of [`Input::ALL`], cut from any graph.
+    pub(super) fn plain(self) -> Result<[CubeTensor; 9], TensorError> {
+        let name = |input: Input| input.name();
+        Ok([
+            plain(name(Input::Columns), self.columns)?,
+            plain(name(Input::Albedo), self.albedo)?,
+            plain(name(Input::Specular), self.specular)?,
+            plain(name(Input::Attenuator), self.attenuator)?,
+            plain(name(Input::Open), self.open)?,
+            plain(name(Input::Bump), self.bump)?,
+            plain(name(Input::Irradiance), self.irradiance)?,
+            plain(name(Input::Lobe), self.lobe)?,
+            plain(name(Input::Hilite), self.hilite)?,
+        ])
+    }
+
+    /// Their primitives in the order of [`Input::ALL`], with their places in the graph.
+    pub(super) fn tracked(self) -> Result<[TrackedTensor; 9], TensorError> {
+        let name = |input: Input| input.name();
+        Ok([
+            tracked(name(Input::Columns), self.columns)?,
+            tracked(name(Input::Albedo), self.albedo)?,
+            tracked(name(Input::Specular), self.specular)?,
+            tracked(name(Input::Attenuator), self.attenuator)?,
+            tracked(name(Input::Open), self.open)?,
+            tracked(name(Input::Bump), self.bump)?,
+            tracked(name(Input::Irradiance), self.irradiance)?,
+            tracked(name(Input::Lobe), self.lobe)?,
+            tracked(name(Input::Hilite), self.hilite)?,
+        ])
+    }
+}

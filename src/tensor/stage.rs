@@ -1,0 +1,450 @@
+//! The shading operation on the device: what stays there, and the passes forwards and backwards.
+
+use std::collections::HashMap;
+use std::sync::{Mutex, PoisonError};
+
+use burn::backend::Shape;
+use burn::backend::wgpu::CubeTensor;
+use wgpu::{
+    BindingResource, Buffer, BufferUsages, CommandEncoder, CommandEncoderDescriptor, ComputePipeline,
+    Extent3d, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
+    TextureViewDescriptor, TextureViewDimension,
+};
+
+use super::buffer::{TensorBuffer, check_shape, lend};
+use super::inputs::Input;
+use super::scatter::Scattering;
+use super::shade::{Scatter, Shaded};
+use super::{SharedDevice, TensorError, pass};
+use crate::gpu::{Gpu, GpuError};
+use crate::model::cube::Cube;
+use crate::model::fragment::Fragment;
+use crate::model::params::Param;
+use crate::samples::ViewSamples;
+use crate::shader::adjoint::{Adjoint, Binding, Module};
+
+/// The operation's part on the device.
+#[derive(Debug)]
+pub(super) struct Stage {
+    pub(super) shared: SharedDevice,
+    pub(super) adjoint: Adjoint,
+    pub(super) slots: usize,
+    pub(super) samples: usize,
+    part: Buffer,
+    fixed: Buffer,
+    group_start: Buffer,
+    constants: Option<Constants>,
+    /// The cubes' faces, in the order of irradiance, lobe and hilite.
+    faces: [Option<Faces>; 3],
+    fill_faces: ComputePipeline,
+    forward: Compiled,
+    /// By what is wanted.
+    backward: Mutex<HashMap<Vec<Input>, Compiled>>,
+    scattering: Scattering,
+    sum: ComputePipeline,
+}
+
+/// The block of constants, and the pass that fills it.
+#[derive(Debug)]
+struct Constants {
+    pipeline: ComputePipeline,
+    values: Buffer,
+    filled: Buffer,
+    block: Buffer,
+}
+
+/// A cube that shaders read.
+#[derive(Clone, Debug)]
+struct Faces {
+    size: usize,
+    view: TextureView,
+    /// Of the same texels, to be written.
+    storage: TextureView,
+}
+
+#[derive(Clone, Debug)]
+struct Compiled {
+    pipeline: ComputePipeline,
+    bindings: Vec<Binding>,
+}
+
+const CUBES: [Input; 3] = [Input::Irradiance, Input::Lobe, Input::Hilite];
+
+/// Where an input stands in [`Input::ALL`].
+const fn at(input: Input) -> usize {
+    input as usize
+}
+
+impl Stage {
+    pub(super) fn new(
+        shared: &SharedDevice,
+        shaded: &Shaded<'_>,
+        cubes: [Option<&Cube<f32>>; 3],
+        views: &[&ViewSamples],
+        scatter: Scatter,
+    ) -> Result<Self, TensorError> {
+        let gpu = shared.gpu();
+        let turned = shaded.params.scalar(Param::EnvironmentRotation) != 0.0;
+        let adjoint = Adjoint::new(shaded.setup, shaded.columns, turned)?;
+        let slots = views.iter().map(|view| view.pixel.len()).sum();
+        let samples = views.iter().map(|view| view.surface.slots()).sum();
+        let mut faces = [None, None, None];
+        for (i, cube) in cubes.into_iter().enumerate() {
+            if let Some(cube) = cube.filter(|_| adjoint.reads(CUBES[i])) {
+                faces[i] = Some(Faces::new(gpu, cube.size())?);
+            }
+        }
+        let module = |name: &str, wgsl: &str| -> Result<ComputePipeline, GpuError> {
+            pass::pipeline(gpu, &pass::module(gpu, name, wgsl)?, "cs_main")
+        };
+        Ok(Self {
+            part: gpu.buffer(
+                "part",
+                bytemuck::cast_slice(&[slots as u32, samples as u32]),
+                BufferUsages::UNIFORM,
+            ),
+            fixed: gpu.storage("samples", bytemuck::cast_slice(&fixed_planes(&adjoint, views)))?,
+            group_start: gpu.storage("groups", bytemuck::cast_slice(&group_starts(views)))?,
+            constants: Constants::new(gpu, &adjoint, shaded)?,
+            faces,
+            fill_faces: module("faces", include_str!("faces.wgsl"))?,
+            forward: Compiled::new(gpu, &adjoint.forward())?,
+            backward: Mutex::default(),
+            scattering: Scattering::new(gpu, scatter)?,
+            sum: module("sum", include_str!("sum.wgsl"))?,
+            shared: shared.clone(),
+            adjoint,
+            slots,
+            samples,
+        })
+    }
+
+    /// The shape of an input's tensor.
+    pub(super) fn shape(&self, input: Input) -> Shape {
+        match (input.width(), CUBES.iter().position(|&cube| cube == input)) {
+            (Some(width), _) => Shape::new([self.samples, width]),
+            (_, Some(i)) => Shape::new([self.faces[i].as_ref().map_or(0, Faces::texels), 4]),
+            _ => Shape::new([self.adjoint.columns.len()]),
+        }
+    }
+
+    /// The image of those inputs.
+    pub(super) fn forward(&self, inputs: &[CubeTensor; 9]) -> Result<CubeTensor, TensorError> {
+        let (lent, mut made) = self.lend(inputs, None, &[Shape::new([self.slots, 4])])?;
+        let image = made.remove(0);
+        let mut encoder = self.encoder("shade");
+        self.fill(&mut encoder, &lent);
+        let resource = |binding: Binding| match binding {
+            Binding::Image => image.binding(),
+            other => self.resource(other, &lent),
+        };
+        self.dispatch(&mut encoder, &self.forward, &resource);
+        self.submit(encoder)?;
+        Ok(image.into_tensor())
+    }
+
+    /// What each of `wanted` gets of an adjoint of the image, in their order.
+    pub(super) fn backward(
+        &self,
+        inputs: &[CubeTensor; 9],
+        adjoint: CubeTensor,
+        wanted: &[Input],
+    ) -> Result<Vec<CubeTensor>, TensorError> {
+        check_shape("the image's adjoint", &adjoint, &[self.slots, 4])?;
+        let shapes: Vec<Shape> = wanted.iter().map(|&input| self.shape(input)).collect();
+        let (lent, made) = self.lend(inputs, Some(adjoint), &shapes)?;
+        let mut encoder = self.encoder("adjoint of shading");
+        self.fill(&mut encoder, &lent);
+        for part in self.parts(wanted)? {
+            let compiled = self.compiled(&part)?;
+            let mut scratch = HashMap::new();
+            for &binding in &compiled.bindings {
+                let numbers = match binding {
+                    Binding::PartialSums => {
+                        pass::workgroup_count(self.slots as u64) as usize * self.adjoint.columns.len()
+                    }
+                    Binding::LightAdjoint(_) => 4 * self.samples,
+                    Binding::LightPlace(_) => 3 * self.samples,
+                    _ => continue,
+                };
+                scratch.insert(binding, self.room(numbers)?);
+            }
+            let gradient = |input: Input| &made[wanted.iter().position(|&w| w == input).unwrap_or(0)];
+            let resource = |binding: Binding| match binding {
+                Binding::Gradient(input) => gradient(input).binding(),
+                other => {
+                    scratch.get(&other).map_or_else(|| self.resource(other, &lent), Buffer::as_entire_binding)
+                }
+            };
+            self.dispatch(&mut encoder, &compiled, &resource);
+            if part.contains(&Input::Columns) {
+                self.add_up(&mut encoder, &scratch[&Binding::PartialSums], gradient(Input::Columns))?;
+            }
+            for &cube in part.iter().filter(|input| input.faces().is_some()) {
+                let size =
+                    self.faces[at(cube) - at(Input::Irradiance)].as_ref().map_or(0, |faces| faces.size);
+                let lookups = self.adjoint.lookups(cube);
+                let lights: Vec<[&Buffer; 2]> = lookups
+                    .iter()
+                    .map(|(i, _)| [&scratch[&Binding::LightAdjoint(*i)], &scratch[&Binding::LightPlace(*i)]])
+                    .collect();
+                self.scattering.encode(
+                    self.shared.gpu(),
+                    &mut encoder,
+                    &lights,
+                    self.samples,
+                    size,
+                    gradient(cube),
+                )?;
+            }
+        }
+        self.submit(encoder)?;
+        Ok(made.into_iter().map(TensorBuffer::into_tensor).collect())
+    }
+
+    /// The inputs' buffers by their place (the image's adjoint last), and room for results.
+    #[allow(clippy::type_complexity, reason = "the two lists of `lend`, the first by place")]
+    fn lend(
+        &self,
+        inputs: &[CubeTensor; 9],
+        adjoint: Option<CubeTensor>,
+        results: &[Shape],
+    ) -> Result<(HashMap<usize, TensorBuffer>, Vec<TensorBuffer>), TensorError> {
+        let mut places = Vec::new();
+        let mut tensors = Vec::new();
+        for input in Input::ALL.into_iter().filter(|&input| self.adjoint.reads(input)) {
+            let shape: Vec<usize> = self.shape(input).iter().copied().collect();
+            check_shape(input.name(), &inputs[at(input)], &shape)?;
+            places.push(at(input));
+            tensors.push((input.name(), inputs[at(input)].clone()));
+        }
+        if let Some(adjoint) = adjoint {
+            places.push(Input::ALL.len());
+            tensors.push(("the image's adjoint", adjoint));
+        }
+        if tensors.is_empty() {
+            // Burn's device is known by a tensor on it.
+            places.push(usize::MAX);
+            tensors.push(("columns", inputs[0].clone()));
+        }
+        let (lent, made) = lend(self.shared.gpu(), tensors, results)?;
+        Ok((places.into_iter().zip(lent).collect(), made))
+    }
+
+    fn encoder(&self, label: &str) -> CommandEncoder {
+        self.shared.gpu().device.create_command_encoder(&CommandEncoderDescriptor { label: Some(label) })
+    }
+
+    fn submit(&self, encoder: CommandEncoder) -> Result<(), GpuError> {
+        let gpu = self.shared.gpu();
+        gpu.queue.submit([encoder.finish()]);
+        gpu.check()
+    }
+
+    /// Room for so many numbers, for one submission.
+    fn room(&self, numbers: usize) -> Result<Buffer, GpuError> {
+        let gpu = self.shared.gpu();
+        gpu.scratch("what is kept for the backward pass", 4 * numbers.max(1) as u64)
+    }
+
+    /// Take constants and cubes from the tensors to where shaders read them.
+    fn fill(&self, encoder: &mut CommandEncoder, lent: &HashMap<usize, TensorBuffer>) {
+        let gpu = self.shared.gpu();
+        if let Some(constants) = &self.constants {
+            let mut resources =
+                vec![(1, constants.values.as_entire_binding()), (2, constants.filled.as_entire_binding())];
+            resources.extend(
+                lent.get(&at(Input::Columns))
+                    .filter(|_| !self.adjoint.columns.is_empty())
+                    .map(|columns| (0, columns.binding())),
+            );
+            pass::dispatch(gpu, encoder, &constants.pipeline, &[resources], 1);
+            encoder.copy_buffer_to_buffer(&constants.filled, 0, &constants.block, 0, constants.block.size());
+        }
+        for (faces, cube) in self.faces.iter().zip(CUBES) {
+            if let (Some(faces), Some(texels)) = (faces, lent.get(&at(cube))) {
+                let resources =
+                    vec![(0, texels.binding()), (1, BindingResource::TextureView(&faces.storage))];
+                pass::dispatch(gpu, encoder, &self.fill_faces, &[resources], faces.texels() as u64);
+            }
+        }
+    }
+
+    /// What is bound, but for what a pass writes.
+    fn resource<'a>(
+        &'a self,
+        binding: Binding,
+        lent: &'a HashMap<usize, TensorBuffer>,
+    ) -> BindingResource<'a> {
+        match binding {
+            Binding::Fixed => self.fixed.as_entire_binding(),
+            Binding::GroupStart => self.group_start.as_entire_binding(),
+            Binding::Given(input) => lent[&at(input)].binding(),
+            Binding::ImageAdjoint => lent[&Input::ALL.len()].binding(),
+            _ => self.part.as_entire_binding(),
+        }
+    }
+
+    fn dispatch<'a>(
+        &'a self,
+        encoder: &mut CommandEncoder,
+        compiled: &Compiled,
+        resource: &dyn Fn(Binding) -> BindingResource<'a>,
+    ) {
+        let mut planned: Vec<(u32, BindingResource<'a>)> = Vec::new();
+        planned.extend(self.constants.as_ref().map(|constants| (0, constants.block.as_entire_binding())));
+        for (i, read) in self.adjoint.plan.resources.iter().enumerate() {
+            let faces = CUBES
+                .iter()
+                .position(|cube| cube.faces() == Some(*read))
+                .and_then(|k| self.faces[k].as_ref());
+            planned.extend(faces.map(|faces| (1 + i as u32, BindingResource::TextureView(&faces.view))));
+        }
+        let bound =
+            compiled.bindings.iter().enumerate().map(|(i, &binding)| (i as u32, resource(binding))).collect();
+        pass::dispatch(self.shared.gpu(), encoder, &compiled.pipeline, &[planned, bound], self.slots as u64);
+    }
+
+    /// What is wanted, in parts that a shader has bindings enough for.
+    fn parts(&self, wanted: &[Input]) -> Result<Vec<Vec<Input>>, TensorError> {
+        let limit = self.shared.gpu().device.limits().max_storage_buffers_per_shader_stage as usize;
+        // All of them but the uniform one.
+        let takes = |part: &[Input]| Ok::<_, TensorError>(self.adjoint.backward(part)?.bindings.len() - 1);
+        let mut parts: Vec<Vec<Input>> = Vec::new();
+        for &input in wanted {
+            match parts.last_mut() {
+                Some(last) if takes(&[last.as_slice(), &[input]].concat())? <= limit => last.push(input),
+                _ => parts.push(vec![input]),
+            }
+        }
+        Ok(parts)
+    }
+
+    fn compiled(&self, wanted: &[Input]) -> Result<Compiled, TensorError> {
+        let mut known = self.backward.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(compiled) = known.get(wanted) {
+            return Ok(compiled.clone());
+        }
+        let compiled = Compiled::new(self.shared.gpu(), &self.adjoint.backward(wanted)?)?;
+        known.insert(wanted.to_vec(), compiled.clone());
+        Ok(compiled)
+    }
+
+    /// The sums of all workgroups' rows, in a fixed tree.
+    fn add_up(
+        &self,
+        encoder: &mut CommandEncoder,
+        partial: &Buffer,
+        result: &TensorBuffer,
+    ) -> Result<(), GpuError> {
+        let gpu = self.shared.gpu();
+        let columns = self.adjoint.columns.len();
+        let mut rows = pass::workgroup_count(self.slots as u64) as usize;
+        let mut given = partial.clone();
+        loop {
+            let left = rows.div_ceil(64);
+            let sums = self.room(left * columns)?;
+            let size = [rows as u32, columns as u32];
+            let size = gpu.buffer("size", bytemuck::cast_slice(&size), BufferUsages::UNIFORM);
+            let last = left == 1;
+            let output = if last { result.binding() } else { sums.as_entire_binding() };
+            let resources = vec![(0, size.as_entire_binding()), (1, given.as_entire_binding()), (2, output)];
+            pass::dispatch(gpu, encoder, &self.sum, &[resources], (64 * left * columns) as u64);
+            if last {
+                return Ok(());
+            }
+            (rows, given) = (left, sums);
+        }
+    }
+}
+
+impl Compiled {
+    fn new(gpu: &Gpu, module: &Module) -> Result<Self, GpuError> {
+        let pipeline = pass::pipeline(gpu, &pass::module(gpu, "shade", &module.wgsl)?, "cs_main")?;
+        Ok(Self { pipeline, bindings: module.bindings.clone() })
+    }
+}
+
+impl Constants {
+    fn new(gpu: &Gpu, adjoint: &Adjoint, shaded: &Shaded<'_>) -> Result<Option<Self>, GpuError> {
+        if adjoint.plan.constants.is_empty() {
+            return Ok(None);
+        }
+        let module = pass::module(gpu, "constants", &adjoint.constants())?;
+        let values: Vec<f32> = Param::all()
+            .flat_map(|param| shaded.params.rgb(param).into_iter().chain([0.0]))
+            .map(|value| value as f32)
+            .collect();
+        let bytes = 16 * adjoint.plan.constants.len();
+        let block = |usage| gpu.buffer("constants", &vec![0; bytes], usage);
+        Ok(Some(Self {
+            pipeline: pass::pipeline(gpu, &module, "cs_main")?,
+            values: gpu.storage("parameters", bytemuck::cast_slice(&values))?,
+            filled: block(BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            block: block(BufferUsages::UNIFORM),
+        }))
+    }
+}
+
+impl Faces {
+    fn new(gpu: &Gpu, size: usize) -> Result<Self, GpuError> {
+        let side = size as u32 + 2;
+        let texture = gpu.device.create_texture(&TextureDescriptor {
+            label: Some("faces"),
+            size: Extent3d { width: side, height: side, depth_or_array_layers: 6 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format: TextureFormat::Rgba32Float,
+            usage: TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING,
+            view_formats: &[],
+        });
+        gpu.check()?;
+        let view = |usage| {
+            texture.create_view(&TextureViewDescriptor {
+                dimension: Some(TextureViewDimension::D2Array),
+                usage: Some(usage),
+                ..TextureViewDescriptor::default()
+            })
+        };
+        Ok(Self {
+            size,
+            view: view(TextureUsages::TEXTURE_BINDING),
+            storage: view(TextureUsages::STORAGE_BINDING),
+        })
+    }
+
+    fn texels(&self) -> usize {
+        6 * (self.size + 2) * (self.size + 2)
+    }
+}
+
+/// What is no tensor of each sample, plane by plane; the share last.
+fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32> {
+    let slots = || views.iter().flat_map(|view| (0..view.surface.slots()).map(|slot| (&view.surface, slot)));
+    let mut numbers = Vec::new();
+    for (name, width) in adjoint.fixed() {
+        let number = |fragment: Fragment<f32>, c: usize| match name {
+            "base" => fragment.base[c],
+            "view" => fragment.view[c],
+            "normal" => fragment.normal[c],
+            "silhouette" => fragment.silhouette,
+            _ => fragment.dapple,
+        };
+        for c in 0..width {
+            numbers.extend(slots().map(|(surface, slot)| number(surface.fragment(slot), c)));
+        }
+    }
+    numbers.extend(slots().map(|(surface, slot)| surface.weight(slot)));
+    numbers
+}
+
+/// Where each group's records start, the views one after the other.
+fn group_starts(views: &[&ViewSamples]) -> Vec<u32> {
+    let mut starts = vec![0];
+    for view in views {
+        let base = starts.last().copied().unwrap_or(0);
+        starts.extend(view.group_start.iter().skip(1).map(|end| base + end));
+    }
+    starts
+}

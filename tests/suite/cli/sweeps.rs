@@ -1,0 +1,129 @@
+//! Plans, their jobs, and what is collected of them.
+
+use super::desk::{Desk, Ran};
+
+const PLAN: &str = "command = \"fit\"\nscene = \"scene.toml\"\nresults = \"out\"\n[[axis]]\nkey = \"fit.loss\"\n\
+    values = [\"l2\", \"huber\"]\n[[axis]]\nkey = \"model.effects\"\nvalues = [[\"diffuse\", \"rim\"], [\"diffuse\"]]\n";
+
+fn desk() -> Desk {
+    let desk = Desk::new();
+    desk.edit(", \"specular_lobe\"]", "]");
+    desk.write("plan.toml", PLAN.as_bytes());
+    desk
+}
+
+fn collect(desk: &Desk, output: &str) -> Ran {
+    desk.run(&["collect", "plan.toml", "-o", output])
+}
+
+/// The names of the result files.
+fn results(desk: &Desk) -> Vec<String> {
+    let entries = std::fs::read_dir(desk.path("out")).into_iter().flatten().flatten();
+    let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(".json")).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn each_listed_command_runs_its_job_from_anywhere_and_any_order_gives_the_same_table() {
+    let (forward, backward) = (desk(), desk());
+    forward.run(&["sweep", "plan.toml"]).done();
+    let ran = forward.run(&["sweep", "plan.toml"]).done();
+    assert!(ran.out.contains("4 jobs, 4 done before, 0 now, 0 failed; results in out"), "{ran:?}");
+    let list = backward.run(&["sweep", "plan.toml", "--list"]).done().out;
+    for line in list.lines().rev() {
+        let elsewhere = tempfile::tempdir().unwrap();
+        let mut shell = std::process::Command::new("sh");
+        shell.args(["-c", line]).current_dir(elsewhere.path()).env("SKINFIT_CACHE", backward.cache());
+        Ran::of(&mut shell).done();
+    }
+    for name in ["all.csv", "all.json"] {
+        collect(&forward, name).done();
+        collect(&backward, name).done();
+        assert_eq!(forward.text(name), backward.text(name));
+    }
+    let table = forward.text("all.csv");
+    let header = table.lines().next().unwrap();
+    assert!(header.starts_with("job,fit.loss,model.effects,ending,"), "{header}");
+    assert!(header.contains("loss_end") && header.contains("rmse") && header.contains("value.base_weight"));
+    assert_eq!(table.lines().count(), 5);
+    // Without the rim the fit is worse.
+    let all = forward.json("all.json");
+    let rmse = |job: usize| all["jobs"][job]["figures"]["rmse"].as_f64().unwrap();
+    assert!(rmse(1) > rmse(0) && rmse(0) > 0.0, "{} {}", rmse(0), rmse(1));
+    // A job's scene stands there for whoever wants to look at its fit.
+    let scene = format!("out/scenes/{}", results(&forward)[0].replace("job-", "").replace(".json", ".toml"));
+    assert_eq!(forward.run(&["fit", &scene, "-o", "again", "--engine", "cpu"]).code, Some(0));
+    let again = forward.json("again/report.json")["loss"]["end"].as_f64().unwrap();
+    let loss = all["jobs"][0]["figures"]["loss_end"].as_f64().unwrap();
+    assert_eq!(again, loss);
+}
+
+#[test]
+fn a_folder_is_collected_as_its_plan_is_and_workers_give_the_same() {
+    let desk = desk();
+    desk.run(&["sweep", "plan.toml", "--workers", "2"]).done();
+    collect(&desk, "plan.csv").done();
+    desk.run(&["collect", "out", "-o", "folder.csv"]).done();
+    assert_eq!(desk.text("plan.csv"), desk.text("folder.csv"));
+}
+
+#[test]
+fn a_job_that_is_done_is_left_alone_and_one_whose_result_is_damaged_is_done_again() {
+    let desk = desk();
+    desk.run(&["sweep", "plan.toml", "--run", "2"]).done();
+    let [name] = &results(&desk)[..] else { panic!("{:?}", results(&desk)) };
+    let path = format!("out/{name}");
+    assert!(name.starts_with("job-0002-"), "{name}");
+    let first = desk.read(&path);
+    let ran = desk.run(&["sweep", "plan.toml", "--run", "2"]).done();
+    assert!(ran.out.ends_with("done before\n") && desk.read(&path) == first, "{ran:?}");
+    desk.write(&path, &first[..first.len() / 2]);
+    let ran = collect(&desk, "some.csv");
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.err.contains("plan.toml: jobs without a result: 0, 1, 2, 3."), "{ran:?}");
+    let identity = name.replace("job-", "").replace(".json", "");
+    desk.run(&["sweep", "plan.toml", "--run", &identity]).done();
+    let figures =
+        |bytes: &[u8]| serde_json::from_slice::<serde_json::Value>(bytes).unwrap()["figures"].clone();
+    assert_eq!(figures(&desk.read(&path)), figures(&first));
+    // Another scene is another job.
+    desk.edit("hilite = 0.7", "hilite = 0.6");
+    desk.run(&["sweep", "plan.toml", "--run", "2"]).done();
+    assert_eq!(results(&desk).len(), 2);
+    desk.run(&["collect", "out", "-o", "x.csv"])
+        .refused(&["out: holds two results of job 2", "Name the plan"]);
+}
+
+#[test]
+fn a_job_that_fails_is_named_and_tried_again() {
+    let desk = desk();
+    desk.remove("targets/front.exr");
+    let ran = desk.run(&["sweep", "plan.toml"]);
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    assert!(ran.err.contains("targets/front.exr: there is no such file"), "{ran:?}");
+    assert!(ran.out.contains("0 now, 4 failed"), "{ran:?}");
+    let ran = collect(&desk, "none.csv");
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.err.contains("plan.toml: job 3 failed: "), "{ran:?}");
+    desk.write("targets/front.exr", &Desk::new().read("targets/front.exr"));
+    desk.run(&["sweep", "plan.toml"]).done();
+    collect(&desk, "all.csv").done();
+}
+
+#[test]
+fn plans_and_tables_that_make_no_sense_are_refused() {
+    let desk = desk();
+    let plan = |from: &str, to: &str| {
+        desk.write("plan.toml", PLAN.replacen(from, to, 1).as_bytes());
+        desk.run(&["sweep", "plan.toml", "--list"])
+    };
+    plan("\"fit\"", "\"fits\"").refused(&["plan.toml: line 1: unknown command `fits`. Did you mean `fit`?"]);
+    plan("fit.loss", "fit.los").refused(&["plan.toml: job 0: fit.los = \"l2\": unknown key `los`"]);
+    plan("\"scene.toml\"", "\"none.toml\"").refused(&["none.toml", "cannot be read"]);
+    desk.write("plan.toml", PLAN.as_bytes());
+    desk.run(&["sweep", "plan.toml", "--run", "4"]).refused(&["there is no job `4`", "0 to 3"]);
+    collect(&desk, "all.txt").refused(&["all.txt: a table is .csv or .json"]);
+    assert!(!desk.path("out").exists());
+}

@@ -1,0 +1,13 @@
+//! The model on burn's tensors, beside the CPU model in f64.
+//!
+//! - `bench`: the shared device, and numbers to try
+//! - `device`: one device, no copies
+//! - `matrices`: fixed linear maps
+//! - `maps`: fits of whole maps
+//! - `gradients`: the shading operation and its adjoint
+
+mod bench;
+mod device;
+mod gradients;
+mod maps;
+mod matrices;
