@@ -5,7 +5,7 @@
 //!   to columns), `gram` (columns to products) and [`residual`] (the losses)
 //! - [`lanes`]: sixteen f32 lanes as one number of the model; `corners`: their lookups in cubes
 //! - [`gpu`]: the same on a graphics adapter (feature `gpu`)
-//! - [`reference`]: the same in f64, plainly: what both are held against
+//! - [`mod@reference`]: the same in f64, plainly: what both are held against
 //! - [`view`]: samples beside what was observed; `records`: the same as the kernel reads them
 
 mod corners;

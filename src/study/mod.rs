@@ -4,7 +4,7 @@
 //! - [`tradeoff`]: error against time for every approximation
 //! - [`stability`]: hard cases on every evaluator, and a random search for new ones
 //! - [`sweep`]: many jobs over scenes and settings, on this machine or under a scheduler
-//! - [`subject`]: a scene ready to be evaluated in one setting; [`reference`]: what images are compared with
+//! - [`subject`]: a scene ready to be evaluated in one setting; [`mod@reference`]: what images are compared with
 //! - [`significance`]: a change of the loss against its sampling error
 //! - [`timing`]: times that can be trusted; [`cost`]: the counts that stand beside them
 

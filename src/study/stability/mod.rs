@@ -5,7 +5,7 @@
 //! - [`random`]: random cases; [`scene`]: a scene's own samples; [`kept`]: cases kept in files
 //! - [`evaluate`]: what an evaluator is, and the model as one; [`objectives`]: engines; `shader`: the
 //!   renderer's rules
-//! - [`reference`]: the model in f64, and how far rounding may move it
+//! - [`mod@reference`]: the model in f64, and how far rounding may move it
 //! - [`check`]: an answer held against the reference; [`search`]: the search, and failures made simple
 //! - [`report`]: what came of it
 //!

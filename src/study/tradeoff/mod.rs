@@ -1,8 +1,8 @@
 //! Tradeoffs: error against time for every approximation that the tool has.
 //!
 //! - [`axis`]: what an approximation's sweep is; [`axes`]: each of them, a file each
-//! - [`bench`]: a scene at other settings: baked, sampled, shaded
-//! - [`choose`]: the cheapest settings within an error, or the best within a time
+//! - [`mod@bench`]: a scene at other settings: baked, sampled, shaded
+//! - [`mod@choose`]: the cheapest settings within an error, or the best within a time
 //! - [`files`]: the table, `results.csv`, `results.json`, plots; [`page`]: `report.html`
 
 pub mod axes;

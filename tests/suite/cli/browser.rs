@@ -128,10 +128,19 @@ fn assert_sorted(column: &Value, which: &str, at: &str) {
     } else {
         let words: Vec<String> =
             cells.iter().map(|cell| cell["text"].as_str().unwrap().to_lowercase()).collect();
-        // The browser's alphabet passes over blanks and signs.
-        let letters = |word: &String| word.chars().filter(|c| c.is_alphanumeric()).collect::<String>();
-        let firsts: Vec<Option<char>> = words.iter().map(|word| letters(word).chars().next()).collect();
-        assert!(firsts.windows(2).all(|p| if down { p[0] >= p[1] } else { p[0] <= p[1] }), "{at}: {words:?}");
+        // Numbers that begin a word come by their size, then letters; the browser passes over blanks and signs.
+        let key = |word: &String| -> (bool, u64) {
+            let letters: String = word.chars().filter(|c| c.is_alphanumeric()).collect();
+            let number: String = word.chars().take_while(char::is_ascii_digit).collect();
+            number.parse().map_or_else(
+                |_| (true, letters.chars().next().map_or(0, u64::from)),
+                |number| (false, number),
+            )
+        };
+        let keys: Vec<(bool, u64)> = words.iter().map(key).collect();
+        // A value that is not there is a dash, which has neither.
+        let keys: Vec<(bool, u64)> = keys.into_iter().filter(|key| *key != (true, 0)).collect();
+        assert!(keys.windows(2).all(|p| if down { p[0] >= p[1] } else { p[0] <= p[1] }), "{at}: {words:?}");
     }
 }
 
