@@ -95,13 +95,9 @@ impl Study {
         }
         let given = Circumstances { lights: &self.lights, pixels: self.pixels };
         for demand in &DEMANDS {
-            let verdict =
-                |evaluator: &dyn Evaluator| Some(demanded((demand.check)(evaluator.engine()?, &given)));
-            report.add(
-                (demand.name, demand.hard),
-                1,
-                evaluators.iter().map(|evaluator| verdict(&**evaluator)).collect(),
-            );
+            let engines = evaluators.iter().map(|evaluator| evaluator.engine());
+            let check = |engine| demanded((demand.check)(engine, &given));
+            report.add((demand.name, demand.hard), 1, engines.map(|engine| engine.map(check)).collect());
             step(1);
         }
         for case in &self.kept {
@@ -134,10 +130,9 @@ impl Study {
         holds: &[hard::Holds],
     ) -> Vec<Option<Verdict>> {
         let reference = Reference::new(&self.lights, batch, FEW);
-        let check = |evaluator: &dyn Evaluator| {
-            Some(check_against(evaluator, &self.lights, batch, holds, &reference))
-        };
-        evaluators.iter().map(|evaluator| check(&**evaluator)).collect()
+        let check =
+            |evaluator: &dyn Evaluator| check_against(evaluator, &self.lights, batch, holds, &reference);
+        evaluators.iter().map(|evaluator| Some(check(&**evaluator))).collect()
     }
 }
 
