@@ -193,7 +193,7 @@ mod tests {
                     1.0 - 1.0 / (3.0 + i as f64) * if param == Param::SpecularLobe { 0.0 } else { 1.0 },
                 );
             }
-            params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e20]);
+            params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e8]);
             let gains = vec![("front \"left\"".to_owned(), 0.7), ("b\nc\u{7f}\u{1}".to_owned(), 1.0 / 3.0)];
             let effects = Some(Effects::SURFACE);
             let file = ParamsFile { form, effects, loss: Some(Loss::Huber), params, gains };

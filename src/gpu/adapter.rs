@@ -22,8 +22,11 @@ pub struct Choice {
 /// Every adapter, the one that is taken by default first.
 #[must_use]
 pub fn adapters() -> Vec<Adapter> {
-    let instance = Instance::new(InstanceDescriptor::new_without_display_handle_from_env());
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::all()));
+    // Another crate may have OpenGL compiled in, which cannot draw into 32-bit targets.
+    let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
+    descriptor.backends &= Backends::PRIMARY;
+    let instance = Instance::new(descriptor);
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
     adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
     adapters
 }

@@ -1,6 +1,8 @@
 //! The device, and what went wrong there.
 
+use std::sync::mpsc::{Receiver, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use wgpu::{
     Adapter, AdapterInfo, Buffer, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType,
@@ -9,6 +11,12 @@ use wgpu::{
 
 use super::adapter::{Choice, WELCOME, choose};
 use super::error::GpuError;
+
+/// How long a card is asked without a pause.
+const EAGER: Duration = Duration::from_millis(2);
+/// Pauses between questions: a sixteenth of the wait so far, within these.
+const SHORTEST_SLEEP: Duration = Duration::from_micros(20);
+const LONGEST_SLEEP: Duration = Duration::from_millis(2);
 
 /// An adapter's device, open for work.
 #[derive(Debug)]
@@ -147,9 +155,36 @@ impl Gpu {
 
     /// Wait until all submitted work is done.
     pub(crate) fn wait(&self) -> Result<(), GpuError> {
-        let waited = self.device.poll(PollType::wait_indefinitely());
-        self.check()?;
-        waited.map(|_| ()).map_err(|error| self.lost(&error.to_string()))
+        let (send, told) = std::sync::mpsc::channel();
+        self.queue.on_submitted_work_done(move || {
+            // The receiver may have given up.
+            let _ = send.send(());
+        });
+        self.until(&told)
+    }
+
+    /// Wait for the word of something that the device does. The device is asked again and again: a card answers
+    /// sooner than the system would wake a thread that sleeps in the driver, threads that share a device take
+    /// one another's word, and Mesa's software driver loses its device when several threads wait in it.
+    pub(crate) fn until<T>(&self, told: &Receiver<T>) -> Result<T, GpuError> {
+        let start = Instant::now();
+        loop {
+            let polled = self.device.poll(PollType::Poll);
+            match told.try_recv() {
+                Ok(word) => {
+                    self.check()?;
+                    return Ok(word);
+                }
+                Err(TryRecvError::Disconnected) => return Err(self.lost("what was computed never came back")),
+                Err(TryRecvError::Empty) => self.check()?,
+            }
+            polled.map_err(|error| self.lost(&error.to_string()))?;
+            let waited = start.elapsed();
+            // A program on the CPU needs the core.
+            if self.is_software() || waited > EAGER {
+                std::thread::sleep((waited / 16).clamp(SHORTEST_SLEEP, LONGEST_SLEEP));
+            }
+        }
     }
 
     /// That the device does not answer, in the driver's words.

@@ -1,11 +1,9 @@
 //! Images from the device.
 
-use std::time::{Duration, Instant};
-
 use exr::prelude::f16;
 use wgpu::{
     Buffer, BufferDescriptor, BufferSlice, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder,
-    Extent3d, MapMode, PollType, TexelCopyBufferInfo, TexelCopyBufferLayout, TextureView,
+    Extent3d, MapMode, TexelCopyBufferInfo, TexelCopyBufferLayout, TextureView,
 };
 
 use super::device::Gpu;
@@ -75,36 +73,14 @@ impl Copy {
     }
 }
 
-/// How long a mapping that the device has finished may take to be told of.
-const TOLD: Duration = Duration::from_secs(60);
-
-/// How long the device is asked again and again before the thread sleeps.
-const ASKED: Duration = Duration::from_millis(2);
-
 /// Wait until a buffer's content can be read.
 pub(crate) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
-    let (send, received) = std::sync::mpsc::channel();
+    let (send, told) = std::sync::mpsc::channel();
     slice.map_async(MapMode::Read, move |result| {
         // The receiver may have given up.
         let _ = send.send(result);
     });
-    // A card answers sooner than the system wakes a thread that sleeps; a program on the CPU needs the core.
-    let start = Instant::now();
-    while !gpu.is_software() && start.elapsed() < ASKED {
-        if let Ok(answer) = received.try_recv() {
-            gpu.check()?;
-            return answer.map_err(|error| gpu.lost(&error.to_string()));
-        }
-        let _ = gpu.device.poll(PollType::Poll);
-    }
-    gpu.wait()?;
-    // Where threads share the device, another one's poll may have taken the word of this mapping, and tell of
-    // it only after this one's has returned.
-    match received.recv_timeout(TOLD) {
-        Ok(Ok(())) => Ok(()),
-        Ok(Err(error)) => Err(gpu.lost(&error.to_string())),
-        Err(_) => Err(gpu.lost("what was computed never came back")),
-    }
+    gpu.until(&told)?.map_err(|error| gpu.lost(&error.to_string()))
 }
 
 /// Run the encoder's commands, and read the floats that they leave in `buffer`.

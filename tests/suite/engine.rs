@@ -234,7 +234,9 @@ fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
         let engine = engine(setup, &views, loss, &unknowns, true);
         assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
         let (value, gradient) = engine.gradient(&point);
-        assert_eq!(value, engine.loss(&point), "{}", loss.name());
+        // The same sum by two kernels, which need not contract the same multiplications and additions: some
+        // roundings of f32 a residual, of either sign.
+        assert!((value / engine.loss(&point) - 1.0).abs() < 1e-6, "{}", loss.name());
         for (k, g) in gradient.iter().enumerate() {
             let want = 2.0 * plain.jtr[k] / plain.weight;
             let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;

@@ -17,7 +17,12 @@ fn a_fit_finds_the_truth_and_leaves_every_file_of_a_run() {
     let loss = report["loss"]["end"].as_f64().unwrap();
     let last = ran.out.lines().last().unwrap();
     assert_eq!(last, format!("runs/a: final loss {loss:.6e}"));
-    assert_eq!(ran.out.lines().count(), 8 + 2, "a line a parameter, how it ended, and where: {}", ran.out);
+    assert_eq!(
+        ran.out.lines().count(),
+        8 + 3,
+        "a line a parameter, how it ended, on what, and where: {}",
+        ran.out
+    );
 
     let mut names: Vec<String> = std::fs::read_dir(desk.path("runs/a"))
         .unwrap()
@@ -229,7 +234,7 @@ fn a_fit_of_nothing_says_that_nothing_was_free() {
     let free = text.lines().find(|line| line.starts_with("free = ")).unwrap();
     desk.edit(free, "free = []");
     let ran = desk.fit("run", &[]).done();
-    assert_eq!(ran.out.lines().count(), 2, "{ran:?}");
+    assert_eq!(ran.out.lines().count(), 3, "{ran:?}");
     let page = desk.text("run/report.html");
     assert!(page.contains("Nothing was free: ") && page.contains("Nothing was free, so "));
     assert!(!page.contains("determine every") && !page.contains("Every direction"));
