@@ -164,8 +164,8 @@ impl Gpu {
     }
 
     /// Wait for the word of something that the device does. The device is asked again and again: a card answers
-    /// sooner than the system would wake a thread that sleeps in the driver, threads that share a device take
-    /// one another's word, and Mesa's software driver loses its device when several threads wait in it.
+    /// sooner than the system would wake a thread that sleeps in the driver, and threads that share a device take
+    /// one another's word.
     pub(crate) fn until<T>(&self, told: &Receiver<T>) -> Result<T, GpuError> {
         let start = Instant::now();
         loop {

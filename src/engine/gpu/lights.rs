@@ -82,7 +82,7 @@ impl DeviceLights {
 pub(super) struct Inputs {
     plan: Plan,
     pub(super) layout: BindGroupLayout,
-    constants: Option<Uniform>,
+    constants: Uniform,
     /// The cubes' version that is bound.
     bound: Option<(u64, BindGroup)>,
 }
@@ -94,10 +94,10 @@ impl Inputs {
             view_dimension: TextureViewDimension::D2Array,
             multisampled: false,
         };
-        let has_constants = !plan.constants.is_empty();
         let cubes = (1..=plan.resources.len() as u32).map(|binding| (binding, faces));
-        let kinds: Vec<_> = has_constants.then_some((0, UNIFORM)).into_iter().chain(cubes).collect();
-        let constants = has_constants.then(|| Uniform::new(gpu, "constants", 16 * plan.constants.len()));
+        // Always there, so that no group is empty.
+        let kinds: Vec<_> = std::iter::once((0, UNIFORM)).chain(cubes).collect();
+        let constants = Uniform::new(gpu, "constants", 16 * plan.constants.len());
         Self { plan: plan.clone(), layout: layout(gpu, "lights", &kinds), constants, bound: None }
     }
 
@@ -107,16 +107,12 @@ impl Inputs {
     }
 
     fn bind(&mut self, gpu: &Gpu, lights: &DeviceLights, block: &[f32]) -> Result<(), GpuError> {
-        if let Some(constants) = &self.constants {
-            constants.write(gpu, bytemuck::cast_slice(block));
-        }
+        self.constants.write(gpu, bytemuck::cast_slice(block));
         if self.bound.as_ref().is_some_and(|(version, _)| *version == lights.version) {
             return Ok(());
         }
-        let mut entries = Vec::new();
-        if let Some(constants) = &self.constants {
-            entries.push(BindGroupEntry { binding: 0, resource: constants.buffer().as_entire_binding() });
-        }
+        let mut entries =
+            vec![BindGroupEntry { binding: 0, resource: self.constants.buffer().as_entire_binding() }];
         for (binding, &resource) in (1..).zip(&self.plan.resources) {
             let resource = BindingResource::TextureView(lights.view(gpu, resource)?);
             entries.push(BindGroupEntry { binding, resource });

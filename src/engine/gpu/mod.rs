@@ -27,6 +27,7 @@ use super::view::ObservedView;
 use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
 use crate::gpu::{Gpu, GpuError};
+use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::scene::Loss;
@@ -94,6 +95,10 @@ impl<'g> GpuEngine<'g> {
     /// When the device does not take it.
     pub fn new(gpu: &'g Gpu, task: Task<'g>, start: &Point, memory: Memory) -> Result<Self, GpuError> {
         let Task { setup, illumination, views, loss, unknowns } = task;
+        // Mesa's software driver loses its device over a pass that looks nothing up and weighs nothing.
+        if TermName::of(setup.effects).is_empty() && !setup.effects.needs(setup.silhouette).haze {
+            return Err(GpuError::Plan("none of the enabled effects shows anything.".to_owned()));
+        }
         let alpha = views.iter().any(ObservedView::compares_alpha);
         let traits = Traits::of(gpu, views)?;
         let mut engine = Self {
