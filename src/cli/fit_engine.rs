@@ -179,8 +179,8 @@ mod gpu {
     use crate::engine::gpu::{GpuEngine, Memory, Task};
     use crate::gpu::{Choice, Gpu, GpuError};
 
-    /// Samples from which `auto` takes a graphics card, for each thread of the CPU: opening a device and
-    /// compiling take about 0.6 s, the ten passes of a fit 30 ns a sample and thread each.
+    /// Samples from which `auto` takes a graphics card, for each thread of the CPU. A rule of thumb: 0.6 s for
+    /// opening a device and compiling, ten passes at 30 ns a sample and thread.
     const WORTH_A_THREAD: usize = 2_000_000;
 
     impl FitEngineArguments {
