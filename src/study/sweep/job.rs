@@ -4,8 +4,10 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use super::plan::{Command, Job};
-use super::result::Figures;
+use super::command::Command;
+use super::plan::Job;
+use super::result::{Figures, Findings, number};
+use super::studies;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::{Objective as _, Unknown};
 use crate::fit::outcome::Outcome;
@@ -13,6 +15,7 @@ use crate::fit::{FitError, FitOptions, SolverKind, fit};
 use crate::prepare::{PrepareError, PrepareOptions, Prepared};
 use crate::scene::Loss;
 use crate::scene::error::SceneError;
+use crate::study::StudyError;
 use crate::study::stability::lights::LightBox;
 use crate::study::stability::scene::{batches, sweepable};
 use crate::study::stability::{Study, evaluators, kept};
@@ -27,16 +30,35 @@ pub enum JobError {
     Fit(#[from] FitError),
     #[error(transparent)]
     Scene(#[from] SceneError),
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error("a folder for bakes cannot be made: {0}. Make room, or name one with --cache.")]
+    Scratch(#[from] std::io::Error),
 }
 
-/// Run a job on its scene file. The figures are the same for any number of threads.
+/// What a job reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    /// Its scene file.
+    pub scene: &'a Path,
+    /// A fit's constants, where it is given some.
+    pub constants: Option<&'a Path>,
+    /// Where bakes are kept.
+    pub cache: Option<&'a Path>,
+}
+
+/// Run a job. The figures, but for those that are times, are the same for any number of threads.
 ///
 /// # Errors
 /// When a stage refuses its input.
-pub fn run(command: Command, job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
-    match command {
-        Command::Fit => run_fit(job, scene, cache),
-        Command::Stability => run_stability(job, scene, cache),
+pub fn run(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobError> {
+    let Inputs { scene, cache, .. } = inputs;
+    let whole = |figures| Findings { figures, rows: Vec::new() };
+    match job.command {
+        Command::Fit => run_fit(job, scene, cache).map(whole),
+        Command::Ablate => studies::ablation(job, inputs),
+        Command::Tradeoff => studies::tradeoffs(job, inputs),
+        Command::Stability => run_stability(job, scene, cache).map(whole),
     }
 }
 
@@ -74,15 +96,15 @@ fn fit_figures<'a>(outcome: &Outcome, rmse: f64, view: impl Fn(usize) -> &'a str
             Unknown::Gain(index) => format!("gain.{}", view(index)),
             Unknown::Param(column) => column.name(),
         };
-        figures.insert(format!("value.{name}"), number(unknown.value));
-        figures.insert(format!("error.{name}"), unknown.std_error.map_or(Value::Null, number));
+        add_constant(&mut figures, &name, unknown.value, unknown.std_error);
     }
     figures
 }
 
-/// A number; one that is not finite is null.
-fn number(x: f64) -> Value {
-    Value::from(x)
+/// A constant's value and its standard error.
+pub(super) fn add_constant(figures: &mut Figures, name: &str, value: f64, std_error: Option<f64>) {
+    figures.insert(format!("value.{name}"), number(value));
+    figures.insert(format!("error.{name}"), std_error.map_or(Value::Null, number));
 }
 
 fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {

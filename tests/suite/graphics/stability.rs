@@ -39,7 +39,7 @@ fn hard_cases_stay_finite_and_agree_on_the_adapter() {
         let verdict = check_frame(&rules, frame.vertex).unwrap();
         assert_eq!(verdict.failure, None, "{}", frame.name);
     }
-    for index in 0..5 {
+    for index in 0..12 {
         let random = batch(11, index, 64);
         for evaluator in [&rules as &dyn Evaluator, &engine] {
             let verdict = check(evaluator, &lights, &random, &[]);
