@@ -169,7 +169,7 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
 }
 
 /// The declaration of a stored sample.
-pub(super) fn sample_struct(fields: &[(&str, &str)]) -> String {
+pub(crate) fn sample_struct(fields: &[(&str, &str)]) -> String {
     let mut wgsl = String::from("\nstruct Sample {\n");
     for (name, kind) in fields {
         let _ = writeln!(wgsl, "    {name}: {kind},");
@@ -187,7 +187,7 @@ fn sum(parts: &[&str]) -> String {
 }
 
 /// A member of the uniform block as a value of the type that a rule's parameter has.
-pub(super) fn uniform(constant: Constant, kind: &str) -> String {
+pub(crate) fn uniform(constant: Constant, kind: &str) -> String {
     let swizzle = match kind {
         "f32" => ".x",
         "vec2f" => ".xy",

@@ -2,13 +2,13 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeline};
 
+use super::fused::Fused;
 use super::lights::Inputs;
 use super::parts::{PART_BYTES, Parts};
 use super::pipeline::{Uniform, bind, buffer, encoder, part_layout, pipeline};
 use crate::engine::view::ObservedView;
 use crate::gpu::readback::read_floats;
 use crate::gpu::{Gpu, GpuError};
-use crate::shader::fused::Fused;
 
 /// The forward pass and its images, a buffer a part.
 pub(super) struct Images {

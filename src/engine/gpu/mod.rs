@@ -1,6 +1,7 @@
-//! The GPU engine: the fused pass ([`crate::shader::fused`]) over samples on a graphics adapter.
+//! The GPU engine: the fused pass ([`fused`]) over samples on a graphics adapter.
 //!
 //! - [`GpuEngine`]: the objective; what it is made of and how sums become normal equations
+//! - [`fused`]: the text of that pass
 //! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
 //!   memory allowed is uploaded anew in each pass
 //! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
@@ -8,6 +9,7 @@
 //! - `program`: the shaders of a wish, and one run of them; `images`: the forward pass
 //! - `pipeline`: what both make pipelines and bindings with
 
+pub mod fused;
 mod images;
 mod lights;
 mod parts;
@@ -18,6 +20,7 @@ mod terms;
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
 use self::images::Images;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
@@ -31,7 +34,6 @@ use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::scene::Loss;
-use crate::shader::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -364,9 +366,6 @@ impl Objective for GpuEngine<'_> {
     }
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        let sums = self.pass(point, Wish::Gradient);
-        // The loss is a mean of rho, and J^T r sums d rho / 2.
-        let factor = if sums.weight > 0.0 { 2.0 / sums.weight } else { 0.0 };
-        (sums.loss, sums.jtr.iter().map(|x| factor * x).collect())
+        self.pass(point, Wish::Gradient).loss_and_gradient()
     }
 }
