@@ -11,9 +11,10 @@ use super::{Exit, Refusal, say, tell};
 use crate::output;
 use crate::progress;
 use crate::study::sweep::collect::Collection;
-use crate::study::sweep::job::{self, Inputs};
-use crate::study::sweep::plan::{Job, Plan};
+use crate::study::sweep::job::Job;
+use crate::study::sweep::plan::Plan;
 use crate::study::sweep::result::{Findings, JobResult, Status, settings};
+use crate::study::sweep::run::{self, Inputs};
 
 /// Run the jobs of a plan: many scenes and settings, here or on many machines
 #[derive(clap::Args)]
@@ -109,8 +110,7 @@ pub(super) fn run_collect(arguments: &CollectArguments) -> Result<Exit, Refusal>
         let identities: Vec<String> = all.into_iter().map(|ready| ready.identity).collect();
         Collection::of(&plan.results, &identities)
     };
-    let collection =
-        if arguments.seconds { collection.with_times() } else { collection.without_times() };
+    let collection = if arguments.seconds { collection.with_times() } else { collection.without_times() };
     let text = match arguments.output.extension().and_then(|ending| ending.to_str()) {
         Some("csv") => collection.csv(),
         Some("json") => collection.json().map_err(|error| Refusal::new(error.to_string()))?,
@@ -189,9 +189,8 @@ fn run_one(plan: &Plan, ready: &Ready<'_>, bakes: &BakeArguments, tells: bool) -
     output::write(&scene, ready.scene_text.as_bytes())?;
     let clock = Instant::now();
     let cache = bakes.cache();
-    let inputs =
-        Inputs { scene: &scene, constants: ready.constants.as_deref(), cache: cache.as_deref() };
-    let (status, Findings { figures, rows }) = match job::run(ready.job, inputs) {
+    let inputs = Inputs { scene: &scene, constants: ready.constants.as_deref(), cache: cache.as_deref() };
+    let (status, Findings { figures, rows }) = match run::run(ready.job, inputs) {
         Ok(found) => (Status::Done, found),
         Err(error) => (Status::Failed(error.to_string()), Findings::default()),
     };

@@ -110,8 +110,11 @@ impl Collection {
     #[must_use]
     pub fn csv(&self) -> String {
         let settings: BTreeSet<&String> = self.done.values().flat_map(|job| job.settings.keys()).collect();
-        let figures: BTreeSet<&String> =
-            self.done.values().flat_map(|job| job.figures.keys().chain(job.rows.iter().flatten().map(|f| f.0))).collect();
+        let figures: BTreeSet<&String> = self
+            .done
+            .values()
+            .flat_map(|job| job.figures.keys().chain(job.rows.iter().flatten().map(|f| f.0)))
+            .collect();
         // What a row is of stands before its figures.
         let (labels, figures): (Vec<_>, Vec<_>) =
             figures.into_iter().partition(|name| LABELS.contains(&name.as_str()));
@@ -125,7 +128,8 @@ impl Collection {
             for row in if job.rows.is_empty() { &none[..] } else { &job.rows } {
                 let _ = write!(text, "{index}");
                 let columns = settings.iter().map(|key| job.settings.get(*key));
-                let found = labels.iter().chain(&figures).map(|key| row.get(*key).or_else(|| job.figures.get(*key)));
+                let found =
+                    labels.iter().chain(&figures).map(|key| row.get(*key).or_else(|| job.figures.get(*key)));
                 for value in columns.chain(found) {
                     let _ = write!(text, ",{}", value.map_or_else(String::new, word));
                 }
@@ -235,7 +239,10 @@ mod tests {
         );
         assert_eq!(collection.clone().without_times().csv(), wanted);
         let timed = collection.with_times().csv();
-        assert!(timed.starts_with("job,effects,left_out,error,loss,reference,seconds.job,seconds.pass\n"), "{timed}");
+        assert!(
+            timed.starts_with("job,effects,left_out,error,loss,reference,seconds.job,seconds.pass\n"),
+            "{timed}"
+        );
         assert!(timed.ends_with(",rim,,0.75,targets,1.0,0.25\n"), "{timed}");
     }
 

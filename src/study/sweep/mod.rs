@@ -3,7 +3,7 @@
 //! - [`plan`]: the plan file: what each job runs, and with which settings
 //! - [`command`]: what can be run, and which settings that takes
 //! - [`scene_text`]: a scene file's text with some of its keys set
-//! - [`job`]: one job, from its scene to its figures; `studies`: those of ablations and tradeoffs
+//! - [`job`]: what a job is; [`run`]: from its scene to its figures; `studies`: those of ablations and tradeoffs
 //! - [`result`]: the one file that a job leaves
 //! - [`collect`]: every job's figures in one table
 //!
@@ -16,5 +16,6 @@ pub mod command;
 pub mod job;
 pub mod plan;
 pub mod result;
+pub mod run;
 pub mod scene_text;
 mod studies;

@@ -6,6 +6,7 @@ use serde::Deserialize;
 use toml::{Spanned, Table, Value};
 
 use super::command::{Command, check_setting};
+use super::job::{Job, Setting, combine, flattened};
 use super::scene_text::with_key;
 use crate::scene::error::SceneError;
 use crate::scene::{Source, check_text};
@@ -31,20 +32,6 @@ struct File {
 struct AxisTable {
     key: Spanned<String>,
     values: Spanned<Vec<Value>>,
-}
-
-/// A key with its value.
-pub type Setting = (String, Value);
-
-/// One job of a plan.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Job {
-    /// Its number, from 0.
-    pub index: usize,
-    /// What it runs.
-    pub command: Command,
-    /// Its settings in the plan's order: axes, then what is listed; what is the same for all comes last.
-    pub settings: Vec<Setting>,
 }
 
 /// A plan that was read and checked.
@@ -102,7 +89,9 @@ impl Plan {
             let what = format!("more than {MOST} jobs");
             return Err(SceneError::new(path, what, "Give the axes fewer values, or make several plans"));
         }
-        let jobs = combine(&file.axis, &lists)
+        let axes: Vec<(&str, &[Value])> =
+            file.axis.iter().map(|axis| (axis.key.get_ref().as_str(), &axis.values.get_ref()[..])).collect();
+        let jobs = combine(&axes, &lists)
             .into_iter()
             .enumerate()
             .map(|(index, own)| Job::new(index, command, own, &common))
@@ -177,89 +166,11 @@ impl File {
     fn commands(&self, own: Command) -> Vec<Command> {
         let axes = self.axis.iter().filter(|axis| axis.key.get_ref() == "command");
         let named = axes.flat_map(|axis| axis.values.get_ref());
-        let named = named.chain(self.job.iter().filter_map(|job| job.get_ref().get("command")));
+        let tables = self.job.iter().chain(&self.settings);
+        let named = named.chain(tables.filter_map(|table| table.get_ref().get("command")));
         let named = named.filter_map(|value| Command::from_name(value.as_str()?));
         std::iter::once(own).chain(named).collect()
     }
-}
-
-impl Job {
-    /// A job with its own settings and what is said for all; what its command does not take of that is not for
-    /// it.
-    ///
-    /// # Errors
-    /// In words, when a setting of its own is none of its command's.
-    fn new(
-        index: usize,
-        command: Command,
-        mut settings: Vec<Setting>,
-        common: &[Setting],
-    ) -> Result<Self, String> {
-        let named = |settings: &[Setting]| {
-            let (_, value) = settings.iter().find(|(key, _)| key == "command")?;
-            Command::from_name(value.as_str()?)
-        };
-        let command = named(&settings).or_else(|| named(common)).unwrap_or(command);
-        if let Some((key, _)) = settings.iter().find(|(key, _)| !command.takes(key)) {
-            return Err(format!("job {index}: `{key}` is no setting of `{}`", command.name()));
-        }
-        // What a job says itself goes before what is said for all.
-        let rest: Vec<Setting> = common
-            .iter()
-            .filter(|(key, _)| command.takes(key) && !settings.iter().any(|(own, _)| own == key))
-            .cloned()
-            .collect();
-        settings.extend(rest);
-        Ok(Self { index, command, settings })
-    }
-
-    /// The value of a setting.
-    #[must_use]
-    pub fn get(&self, key: &str) -> Option<&Value> {
-        self.settings.iter().find(|(name, _)| name == key).map(|(_, value)| value)
-    }
-
-    /// A whole number among the settings.
-    #[must_use]
-    pub fn whole(&self, key: &str) -> Option<u64> {
-        self.get(key).and_then(Value::as_integer).and_then(|value| u64::try_from(value).ok())
-    }
-
-    /// Whether a setting is there and true.
-    #[must_use]
-    pub fn is_set(&self, key: &str) -> bool {
-        self.get(key).and_then(Value::as_bool).unwrap_or(false)
-    }
-
-    /// Its number, and a hash of what it computes from the texts of its scene and of its constants, if it is
-    /// given some: `0003-1f2e3d4c`.
-    #[must_use]
-    pub fn identity(&self, scene: &str, constants: Option<&str>) -> String {
-        let mut hash = blake3::Hasher::new();
-        for part in [env!("CARGO_PKG_VERSION"), self.command.name(), scene].into_iter().chain(constants) {
-            hash.update(part.as_bytes()).update(&[0]);
-        }
-        for (key, value) in &self.settings {
-            hash.update(format!("{key}={value}").as_bytes()).update(&[0]);
-        }
-        format!("{:04}-{}", self.index, &hash.finalize().to_hex()[..8])
-    }
-}
-
-/// Every combination of what is listed with the axes, the last one fastest.
-fn combine(axes: &[AxisTable], lists: &[Vec<Setting>]) -> Vec<Vec<Setting>> {
-    let mut all: Vec<Vec<Setting>> = lists.to_vec();
-    for axis in axes {
-        let with = |settings: &Vec<Setting>| {
-            let settings = settings.clone();
-            let set = move |value: &Value| {
-                settings.iter().cloned().chain([(axis.key.get_ref().clone(), value.clone())]).collect()
-            };
-            axis.values.get_ref().iter().map(set).collect::<Vec<Vec<Setting>>>()
-        };
-        all = all.iter().flat_map(with).collect();
-    }
-    all
 }
 
 /// The settings of a table, each checked; tables within stand for dotted keys.
@@ -268,22 +179,11 @@ fn checked(
     commands: &[Command],
     table: &Spanned<Table>,
 ) -> Result<Vec<Setting>, SceneError> {
-    let mut settings = Vec::new();
-    flatten("", table.get_ref(), &mut settings);
+    let settings = flattened(table.get_ref());
     for (key, value) in &settings {
         check_setting(commands, key, value).map_err(|(what, remedy)| source.error(table, what, remedy))?;
     }
     Ok(settings)
-}
-
-fn flatten(prefix: &str, table: &Table, into: &mut Vec<Setting>) {
-    for (key, value) in table {
-        let key = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
-        match value {
-            Value::Table(inner) => flatten(&key, inner, into),
-            value => into.push((key, value.clone())),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::plan::Job;
+use super::job::Job;
 use crate::output::{self, OutputError};
 
 /// Numbers and words, by name.

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
-use super::job::{Inputs, JobError, add_constant};
-use super::plan::Job;
+use super::job::Job;
 use super::result::{Figures, Findings, number};
+use super::run::{Inputs, JobError, add_constant};
 use crate::study::ablation::{self, AblationOptions, GpuTiming, ablate};
 use crate::study::timing::Timed;
 use crate::study::tradeoff::axis::{Setting, Sweep};

@@ -129,7 +129,10 @@ fn studies_are_jobs_too_and_their_table_has_a_row_a_case_of_the_command_s_own_fi
     let options = ["--params", "truth.toml", "--axis", "filter", "--axis", "irradiance"];
     desk.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()).done();
     let cost = desk.json("cost/results.json");
-    let wanted: Vec<f64> = cost["axes"].as_array().unwrap().iter()
+    let wanted: Vec<f64> = cost["axes"]
+        .as_array()
+        .unwrap()
+        .iter()
         .flat_map(|axis| axis["settings"].as_array().unwrap().clone())
         .map(|setting| setting["error"]["relative"].as_f64().unwrap())
         .collect();
@@ -151,7 +154,8 @@ fn studies_are_jobs_too_and_their_table_has_a_row_a_case_of_the_command_s_own_fi
     let ran = collect(&desk, "some.csv");
     assert!(ran.code == Some(1) && ran.err.contains("jobs without a result: 1."), "{ran:?}");
     desk.remove("truth.toml");
-    desk.run(&["sweep", "plan.toml", "--list"]).refused(&["truth.toml: the constants of job 1 cannot be read"]);
+    desk.run(&["sweep", "plan.toml", "--list"])
+        .refused(&["truth.toml: the constants of job 1 cannot be read"]);
 }
 
 #[test]

@@ -170,7 +170,8 @@ impl Surface {
     /// Edges from a vertex that may move, the shortest first.
     fn edges(&self, mesh: &PosedMesh) -> Vec<(u32, u32)> {
         let place = |vertex: u32| mesh.positions[vertex as usize];
-        let both_ways = |t: &[u32; 3]| [(0, 1), (1, 0), (1, 2), (2, 1), (2, 0), (0, 2)].map(|(i, j)| (t[i], t[j]));
+        let both_ways =
+            |t: &[u32; 3]| [(0, 1), (1, 0), (1, 2), (2, 1), (2, 0), (0, 2)].map(|(i, j)| (t[i], t[j]));
         let mut edges: Vec<(f32, u32, u32)> = (mesh.triangles.iter().flat_map(both_ways))
             .filter(|&(from, _)| self.free[self.corner(from) as usize])
             .map(|(from, to)| (place(from).distance_squared(place(to)), from, to))
@@ -221,16 +222,8 @@ mod tests {
     fn ball() -> PosedMesh {
         let [x, y, z] = [Vec3::X, Vec3::Y, Vec3::Z];
         let positions = vec![x, -x, y, -y, z, -z];
-        let triangles = vec![
-            [0, 2, 4],
-            [2, 1, 4],
-            [1, 3, 4],
-            [3, 0, 4],
-            [2, 0, 5],
-            [1, 2, 5],
-            [3, 1, 5],
-            [0, 3, 5],
-        ];
+        let triangles =
+            vec![[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]];
         let mesh = PosedMesh { normals: positions.clone(), positions, triangles, ..PosedMesh::default() };
         let mut ball = Remeshed { mesh, open: None };
         for _ in 0..4 {
