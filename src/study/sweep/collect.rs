@@ -116,8 +116,9 @@ impl Collection {
             .flat_map(|job| job.figures.keys().chain(job.rows.iter().flatten().map(|f| f.0)))
             .collect();
         // What a row is of stands before its figures.
-        let (labels, figures): (Vec<_>, Vec<_>) =
+        let (mut labels, figures): (Vec<_>, Vec<_>) =
             figures.into_iter().partition(|name| LABELS.contains(&name.as_str()));
+        labels.sort_by_key(|name| LABELS.iter().position(|label| label == name));
         let mut text = "job".to_owned();
         for key in settings.iter().chain(&labels).chain(&figures) {
             let _ = write!(text, ",{}", cell(key));
