@@ -58,19 +58,20 @@ impl Remeshed {
         Self { mesh, open }
     }
 
-    /// A quarter of the triangles: the shortest edges are pulled together, round after round. Vertices that stay
-    /// are as they were. `None` where seams and borders, which stay too, leave more than half of them.
+    /// A quarter of the triangles, with edges of twice the length: the shortest edges are pulled together, round after
+    /// round. Vertices that stay are as they were. `None` where seams and borders, which stay too, leave too many of
+    /// the edges as they are.
     pub(super) fn coarser(&self) -> Option<Self> {
-        let before = self.mesh.triangles.len();
-        let mut mesh = self.mesh.clone();
+        let target = self.mesh.triangles.len() / 4;
+        let mut coarse = Self { mesh: self.mesh.clone(), open: self.open.clone() };
         loop {
-            let count = mesh.triangles.len();
-            mesh.triangles = pulled_together(&mesh, before / 4);
-            if mesh.triangles.len() <= before / 4 || mesh.triangles.len() == count {
+            let count = coarse.mesh.triangles.len();
+            coarse.mesh.triangles = pulled_together(&coarse.mesh, target);
+            if coarse.mesh.triangles.len() <= target || coarse.mesh.triangles.len() == count {
                 break;
             }
         }
-        (mesh.triangles.len() <= before / 2).then(|| Self { mesh, open: self.open.clone() })
+        (coarse.edge() > LONGER * self.edge()).then_some(coarse)
     }
 
     /// The scene with this mesh and these settings, sampled.
@@ -99,6 +100,8 @@ impl Remeshed {
     }
 }
 
+/// By how much edges must have become longer, of twice as long, for a mesh to count as the coarser one.
+const LONGER: f64 = 1.5;
 /// By how much a triangle may turn when an edge is pulled together: the least cosine.
 const LEAST_COSINE: f32 = 0.3;
 
