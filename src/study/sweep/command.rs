@@ -77,8 +77,12 @@ fn of_scene(key: &str) -> bool {
 /// The two, in words.
 pub fn check_setting(commands: &[Command], key: &str, value: &Value) -> Result<(), (String, String)> {
     if !commands.iter().any(|command| command.takes(key)) {
-        let options = commands.iter().flat_map(|command| command.options());
-        let known: Vec<&str> = options.chain(&TABLES).copied().collect();
+        let mut known: Vec<&str> = Vec::new();
+        for key in commands.iter().flat_map(|command| command.options()).chain(&TABLES) {
+            if !known.contains(key) {
+                known.push(key);
+            }
+        }
         let remedy = suggestion(key.split('.').next().unwrap_or_default(), &known);
         let what = format!("unknown setting `{key}`");
         return Err((what, format!("{remedy} (those of scenes with their key, as fit.loss)")));

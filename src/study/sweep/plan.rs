@@ -63,10 +63,6 @@ impl Plan {
             name.push("-results");
             PathBuf::from(name)
         });
-        let mut common = Vec::new();
-        if let Some(settings) = &file.settings {
-            common = checked(&source, &commands, settings)?;
-        }
         let mut lists = Vec::new();
         for job in &file.job {
             lists.push(checked(&source, &commands, job)?);
@@ -82,6 +78,10 @@ impl Plan {
                 check_setting(&commands, axis.key.get_ref(), value)
                     .map_err(|(what, remedy)| source.error(&axis.key, what, remedy))?;
             }
+        }
+        let mut common = Vec::new();
+        if let Some(settings) = &file.settings {
+            common = checked(&source, &commands, settings)?;
         }
         let count =
             file.axis.iter().try_fold(lists.len(), |n, axis| n.checked_mul(axis.values.get_ref().len()));

@@ -102,7 +102,8 @@ impl Remeshed {
 
 /// By how much edges must have become longer, of twice as long, for a mesh to count as the coarser one.
 const LONGER: f64 = 1.5;
-/// By how much a triangle may turn when an edge is pulled together: the least cosine.
+/// By how much a triangle may turn when an edge is pulled together, and away from its vertices' normals: the least
+/// cosine.
 const LEAST_COSINE: f32 = 0.3;
 
 /// The triangles after one round: edges from the shortest on, no two of them neighbours, as long as more than
@@ -199,6 +200,9 @@ impl Surface {
             let [a, b, c] = triangle.map(|vertex| mesh.positions[vertex as usize]);
             (b - a).cross(c - a).normalize_or_zero()
         };
+        let faced = |triangle: [u32; 3]| -> Vec3 {
+            triangle.map(|vertex| mesh.normals[vertex as usize]).into_iter().sum::<Vec3>().normalize_or_zero()
+        };
         let mut moved = Vec::new();
         for &at in &self.around[self.corner(from) as usize] {
             let old = mesh.triangles[at];
@@ -207,7 +211,8 @@ impl Surface {
                 continue;
             }
             let new = old.map(|vertex| if vertex == from { to } else { vertex });
-            if across(old).dot(across(new)) < LEAST_COSINE {
+            // Neither all at once nor round after round.
+            if across(new).dot(across(old)).min(across(new).dot(faced(new))) < LEAST_COSINE {
                 return None;
             }
             moved.push((at, Some(new)));
