@@ -152,7 +152,7 @@ fn studies_are_jobs_too_and_their_table_has_a_row_a_case_of_the_command_s_own_fi
     let truth = desk.text("truth.toml");
     desk.write("truth.toml", format!("{truth}\n").as_bytes());
     let ran = collect(&desk, "some.csv");
-    assert!(ran.code == Some(1) && ran.err.contains("jobs without a result: 1."), "{ran:?}");
+    assert!(ran.code == Some(1) && ran.err.contains("jobs without a result, by number: 1."), "{ran:?}");
     desk.remove("truth.toml");
     desk.run(&["sweep", "plan.toml", "--list"])
         .refused(&["truth.toml: the constants of job 1 cannot be read"]);
