@@ -1,5 +1,7 @@
 //! What evaluates the passes of a fit, and how it is chosen.
 
+use std::borrow::Cow;
+
 use super::{Refusal, tell};
 use crate::engine::Objective;
 use crate::engine::cpu::CpuEngine;
@@ -20,6 +22,10 @@ pub(super) struct FitEngineArguments {
     /// that opening it pays off.
     #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = ["auto", "cpu", "gpu"])]
     engine: String,
+    /// What makes the GPU engine's samples of the surface: the CPU, which traces rays and uploads what they hit,
+    /// or the GPU, whose rasteriser draws them where they are read.
+    #[arg(long, value_name = "ENGINE", default_value = "cpu", value_parser = ["cpu", "gpu"])]
+    samples: String,
     /// Part of the name of the graphics adapter to use [default: $WGPU_ADAPTER_NAME, or the fastest kind].
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -76,6 +82,43 @@ impl FitEngine<'_> {
         }
     }
 
+    /// The views with what their samples show, wherever those were made.
+    pub(super) fn surfaced_views(&self) -> Result<Cow<'_, [ObservedView]>, Refusal> {
+        #[cfg(feature = "gpu")]
+        if let Self::Gpu(engine) = self
+            && let Some((made, _)) = engine.device_samples()
+        {
+            let mut views = engine.views().to_vec();
+            for (index, view) in views.iter_mut().enumerate() {
+                view.samples.surface = made.read(index, &view.samples)?;
+            }
+            return Ok(Cow::Owned(views));
+        }
+        Ok(Cow::Borrowed(self.views()))
+    }
+
+    /// How many samples there are.
+    pub(super) fn samples(&self) -> usize {
+        #[cfg(feature = "gpu")]
+        if let Self::Gpu(engine) = self
+            && let Some((made, _)) = engine.device_samples()
+        {
+            return made.count();
+        }
+        self.views().iter().map(|view| view.samples.count()).sum()
+    }
+
+    /// The seconds that making the samples on the adapter took, where it made them.
+    pub(super) fn own_sample_seconds(&self) -> Option<f64> {
+        match self {
+            Self::Cpu(_) => None,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(engine) => engine.device_samples().map(|(_, seconds)| seconds),
+            #[cfg(not(feature = "gpu"))]
+            Self::Gpu(never, _) => match *never {},
+        }
+    }
+
     /// `cpu` or `gpu`.
     pub(super) const fn name(&self) -> &'static str {
         match self {
@@ -94,8 +137,11 @@ impl FitEngine<'_> {
             #[cfg(feature = "gpu")]
             Self::Gpu(engine) => {
                 let (resident, streamed) = engine.bytes();
+                let own = engine.device_samples().is_some();
+                let samples = if own { "made by the adapter" } else { "made by the CPU and uploaded" };
                 vec![
                     ("adapter".to_owned(), engine.adapter().to_owned()),
+                    ("samples".to_owned(), samples.to_owned()),
                     ("bytes on the device".to_owned(), resident.to_string()),
                     ("bytes uploaded a pass".to_owned(), streamed.to_string()),
                 ]
@@ -112,18 +158,41 @@ impl FitEngineArguments {
         self.engine != "cpu"
     }
 
+    /// Whether the adapter makes the samples: then nobody else has to.
+    pub(super) fn makes_samples(&self) -> bool {
+        self.samples == "gpu"
+    }
+
+    /// Refuse what cannot be together; `maps`: whether whole maps are fitted, too.
+    pub(super) fn check_samples(&self, maps: bool) -> Result<(), Refusal> {
+        if self.makes_samples() && self.engine == "cpu" {
+            return Err(Refusal::new(
+                "--samples gpu leaves the samples on the adapter, where --engine cpu cannot read them. Leave one of \
+                 the two out.",
+            ));
+        }
+        if self.makes_samples() && maps {
+            return Err(Refusal::new(
+                "--samples gpu makes no samples that --maps could use. Leave one of the two out.",
+            ));
+        }
+        Ok(())
+    }
+
     /// Part of the adapter's name, where one is named.
     pub(super) fn adapter(&self) -> Option<&str> {
         self.adapter.as_deref()
     }
 
-    /// Call `then` with the engine that was asked for, over the scene's views.
+    /// Call `then` with the engine that was asked for, over the scene's views; without any, over samples that the
+    /// adapter makes.
     pub(super) fn with_engine<T>(
         &self,
         prepared: &Prepared,
-        observed: Vec<ObservedView>,
+        observed: Option<Vec<ObservedView>>,
         then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
+        let Some(observed) = observed else { return self.with_own_samples(prepared, then) };
         let (gpu, why) = self.wants_gpu(&observed);
         if gpu {
             return self.with_gpu(prepared, observed, why, then);
@@ -150,10 +219,11 @@ impl FitEngineArguments {
         }
         let (objective, point) = (engine.objective(), prepared.start());
         let bar = progress::spinner("verify");
+        let views = engine.surfaced_views()?;
         let reference = Reference::new(
             prepared.setup(),
             &prepared.illumination,
-            engine.views(),
+            &views,
             prepared.scene.fit.loss,
             objective.unknowns(),
         );
@@ -176,7 +246,8 @@ impl FitEngineArguments {
 #[cfg(feature = "gpu")]
 mod gpu {
     use super::{Chosen, FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, tell};
-    use crate::engine::gpu::{GpuEngine, Memory, Task};
+    use crate::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory, Task};
+    use crate::gpu::upload::Content;
     use crate::gpu::{Choice, Gpu, GpuError};
 
     /// Samples from which `auto` takes a graphics card, for each thread of the CPU. A rule of thumb: 0.6 s for
@@ -251,6 +322,46 @@ mod gpu {
             }
         }
 
+        /// Call `then` with an engine over samples that the adapter makes; where they have no room on it, over the
+        /// CPU's, as many of which stay as may.
+        pub(super) fn with_own_samples<T>(
+            &self,
+            prepared: &Prepared,
+            then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
+        ) -> Result<T, Refusal> {
+            let gpu = self.open()?;
+            let content = Content {
+                scene: &prepared.scene,
+                illumination: &prepared.illumination,
+                occlusion: prepared.occlusion.as_ref(),
+                params: &prepared.scene.params,
+            };
+            let resident = self.device_memory.map(|megabytes| megabytes * 1_000_000);
+            let error = match DeviceSamples::new(&gpu, content) {
+                Ok((made, groups)) => {
+                    let observed = prepared.observed_with(groups)?;
+                    let (task, memory) = (task(prepared, &observed), Memory { part: None, resident });
+                    match GpuEngine::over_device_samples(&made, task, &prepared.start(), memory) {
+                        Ok(engine) => {
+                            let engine = FitEngine::Gpu(engine);
+                            self.check(prepared, &engine)?;
+                            return then(&Chosen { engine, why: None });
+                        }
+                        Err(error) => error,
+                    }
+                }
+                Err(DeviceSampleError::Gpu(error)) => error,
+                Err(error) => return Err(error.into()),
+            };
+            if !matches!(error, GpuError::OutOfMemory { .. } | GpuError::SamplesStay { .. }) {
+                return Err(error.into());
+            }
+            drop(gpu);
+            tell(&format!("{error} The CPU makes the samples."));
+            let observed = prepared.observed_with(prepared.traced()?)?;
+            self.with_gpu(prepared, observed, None, then)
+        }
+
         fn open(&self) -> Result<Gpu, GpuError> {
             Gpu::open(&Choice { name: self.adapter.clone(), ..Choice::default() })
         }
@@ -262,14 +373,18 @@ mod gpu {
             observed: &'g [ObservedView],
             resident: Option<u64>,
         ) -> Result<GpuEngine<'g>, GpuError> {
-            let task = Task {
-                setup: prepared.setup(),
-                illumination: prepared.illumination.clone(),
-                views: observed,
-                loss: prepared.scene.fit.loss,
-                unknowns: prepared.unknowns(),
-            };
-            GpuEngine::new(gpu, task, &prepared.start(), Memory { part: None, resident })
+            let memory = Memory { part: None, resident };
+            GpuEngine::new(gpu, task(prepared, observed), &prepared.start(), memory)
+        }
+    }
+
+    fn task<'v>(prepared: &Prepared, observed: &'v [ObservedView]) -> Task<'v> {
+        Task {
+            setup: prepared.setup(),
+            illumination: prepared.illumination.clone(),
+            views: observed,
+            loss: prepared.scene.fit.loss,
+            unknowns: prepared.unknowns(),
         }
     }
 
@@ -295,10 +410,22 @@ mod gpu {
             _why: Option<String>,
             _then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
         ) -> Result<T, Refusal> {
-            Err(Refusal::new(
-                "this skinfit was built without its GPU engine. Build it with the feature `gpu` (a default one), or \
-                 fit with --engine cpu.",
-            ))
+            Err(without())
         }
+
+        pub(super) fn with_own_samples<T>(
+            &self,
+            _prepared: &Prepared,
+            _then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
+        ) -> Result<T, Refusal> {
+            Err(without())
+        }
+    }
+
+    fn without() -> Refusal {
+        Refusal::new(
+            "this skinfit was built without its GPU engine. Build it with the feature `gpu` (a default one), or fit \
+             with --engine cpu.",
+        )
     }
 }
