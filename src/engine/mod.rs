@@ -46,6 +46,15 @@ pub struct NormalEquations {
     pub jtj: Vec<f64>,
 }
 
+impl NormalEquations {
+    /// The loss and its gradient: the loss is a mean of rho, and J^T r sums d rho / 2.
+    #[must_use]
+    pub fn loss_and_gradient(&self) -> (f64, Vec<f64>) {
+        let factor = if self.weight > 0.0 { 2.0 / self.weight } else { 0.0 };
+        (self.loss, self.jtr.iter().map(|x| factor * x).collect())
+    }
+}
+
 /// Something that can be fitted: the solvers see no more of an engine than this.
 pub trait Objective: Sync {
     /// The unknowns, in the order of every vector below: parameters' columns, then gains.

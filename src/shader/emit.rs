@@ -140,12 +140,12 @@ pub fn plan_terms(facts: &Facts) -> Result<(Plan, Fields), PlanError> {
 }
 
 /// Whether the haze goes to alpha.
-pub(super) fn hazy(facts: &Facts) -> bool {
+pub(crate) fn hazy(facts: &Facts) -> bool {
     facts.needs().haze && facts.output.is_none()
 }
 
 /// The parts that add up to the output.
-pub(super) fn parts(facts: &Facts) -> Vec<&'static str> {
+pub(crate) fn parts(facts: &Facts) -> Vec<&'static str> {
     let has = |effect| facts.setup.effects.has(effect);
     let (diffuse, rim) = (has(Effect::Diffuse), has(Effect::Rim));
     let all = match facts.output {
@@ -168,7 +168,7 @@ pub(super) fn parts(facts: &Facts) -> Vec<&'static str> {
 
 impl Plan {
     /// Search for the rules, and list what they read; the module is left empty.
-    pub(super) fn search(
+    pub(crate) fn search(
         facts: &Facts,
         vertex_goals: &[&'static str],
         goals: &[&'static str],
@@ -237,7 +237,7 @@ impl Plan {
 
     /// Declarations that every module shares: extensions, constants, resources, functions. The block of
     /// uniform constants is left out where they stand in the text.
-    pub(super) fn declarations(&self, uniform: bool) -> String {
+    pub(crate) fn declarations(&self, uniform: bool) -> String {
         let mut wgsl = String::new();
         if self.uses_f16() {
             wgsl.push_str("enable f16;\n\n");
@@ -308,7 +308,7 @@ impl Plan {
 
     /// The calls of a stage's rules, one a line; `constant` and `leaf` write what is there without a rule,
     /// by its name and WGSL type.
-    pub(super) fn calls(
+    pub(crate) fn calls(
         &self,
         stage: Stage,
         constant: impl Fn(Constant, &str) -> String,

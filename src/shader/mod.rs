@@ -11,20 +11,12 @@
 //!   fragments, for stored samples, or as a function for other engines
 //! - [`probe`]: its rules one by one, for given numbers
 //! - [`tangent`]: the rules' derivatives, made from their own text
-//! - [`geometry`]: the vertex stage with a fragment stage that leaves what is stored of samples
-//! - [`fused`]: a plan over stored samples, its loss and its normal equations in one compute pass
 //!
 //! Nothing that the [`Plan`] does not name is uploaded, bound or compiled.
 
-#[cfg(feature = "burn")]
-pub mod adjoint;
 pub mod emit;
 pub mod facts;
-#[cfg(feature = "gpu")]
-pub mod fused;
-#[cfg(feature = "gpu")]
-pub mod geometry;
-mod module;
+pub(crate) mod module;
 pub mod probe;
 pub mod quantity;
 pub mod rule;

@@ -11,7 +11,7 @@ use crate::model::params::{Param, Params};
 
 impl Plan {
     /// Declarations, and the vertex stage; its position has these attributes.
-    pub(super) fn vertex_module(&self, position: &str) -> String {
+    pub(crate) fn vertex_module(&self, position: &str) -> String {
         let mut wgsl = self.declarations(true);
         wgsl.push_str("\nstruct Vertex {\n    @builtin(vertex_index) vertex_index: u32,\n");
         for (i, attribute) in self.attributes.iter().enumerate() {
@@ -175,7 +175,7 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
 }
 
 /// The declaration of a stored sample.
-pub(super) fn sample_struct(fields: &[(&str, &str)]) -> String {
+pub(crate) fn sample_struct(fields: &[(&str, &str)]) -> String {
     let mut wgsl = String::from("\nstruct Sample {\n");
     for (name, kind) in fields {
         let _ = writeln!(wgsl, "    {name}: {kind},");
@@ -193,7 +193,7 @@ fn sum(parts: &[&str]) -> String {
 }
 
 /// A member of the uniform block as a value of the type that a rule's parameter has.
-pub(super) fn uniform(constant: Constant, kind: &str) -> String {
+pub(crate) fn uniform(constant: Constant, kind: &str) -> String {
     let swizzle = match kind {
         "f32" => ".x",
         "vec2f" => ".xy",

@@ -106,7 +106,7 @@ fn is_input(quantity: &str) -> bool {
 }
 
 /// How many numbers a WGSL type holds.
-pub(super) fn components(wgsl: &str) -> usize {
+pub(crate) fn components(wgsl: &str) -> usize {
     match wgsl {
         "vec2f" => 2,
         "vec3f" => 3,

@@ -4,9 +4,11 @@
 //! - [`buffer`]: tensors as ranges of wgpu buffers, both ways without a copy
 //! - [`shade`]: the model as an operation; [`inputs`]: what it takes; `stage`: its passes; `scatter`: what lookups of
 //!   a cube gained, added to its texels
+//! - [`adjoint`]: the text of those passes: the image of stored samples, and its vector-Jacobian product
 //! - [`footprint`]: the linear maps of a scene: texels, vertices, cube borders
 //! - [`sparse`]: fixed linear maps, forwards and transposed: how maps are sampled, and how pixels are averaged
 
+pub mod adjoint;
 pub mod buffer;
 pub mod device;
 pub mod footprint;
@@ -28,7 +30,7 @@ use burn::backend::{FloatDType, Shape};
 use burn_cubecl::CubeDevice;
 
 use crate::gpu::{Gpu, GpuError};
-use crate::shader::adjoint::AdjointError;
+use crate::tensor::adjoint::AdjointError;
 
 /// A tensor operation that cannot be done.
 #[derive(Clone, Debug, thiserror::Error)]

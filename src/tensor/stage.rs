@@ -21,7 +21,7 @@ use crate::model::cube::Cube;
 use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::samples::ViewSamples;
-use crate::shader::adjoint::{Adjoint, Binding, Module};
+use crate::tensor::adjoint::{Adjoint, Binding, Module};
 
 /// The operation's part on the device.
 #[derive(Debug)]

@@ -105,10 +105,10 @@ fn shaders_of_every_effect_set_form_and_silhouette_validate_in_every_kind_of_sce
 #[test]
 fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
     use skinfit::engine::Unknown;
+    use skinfit::engine::gpu::fused::{Fitted, Fused, Layout, Wish, gather_module, terms_module};
     use skinfit::model::params::{Column, Param};
     use skinfit::samples::surface_records::Places;
     use skinfit::scene::Loss;
-    use skinfit::shader::fused::{Fitted, Fused, Layout, Wish, gather_module, terms_module};
     let places = Places { base: Some(0), view: Some(3), ..Places::default() };
     let check = |wgsl: &str| {
         let module = naga::front::wgsl::parse_str(wgsl)

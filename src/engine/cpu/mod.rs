@@ -268,9 +268,6 @@ impl Objective for CpuEngine {
     }
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        let sums = self.pass(point, Wish::Gradient);
-        // The loss is a mean of rho, and J^T r sums d rho / 2.
-        let factor = if sums.weight > 0.0 { 2.0 / sums.weight } else { 0.0 };
-        (sums.loss, sums.jtr.iter().map(|x| factor * x).collect())
+        self.pass(point, Wish::Gradient).loss_and_gradient()
     }
 }

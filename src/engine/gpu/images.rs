@@ -2,13 +2,14 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeline};
 
+use super::fused::Fused;
 use super::lights::Inputs;
 use super::parts::{PART_BYTES, Parts};
 use super::pipeline::{Uniform, bind, buffer, encoder, part_layout, pipeline};
 use crate::engine::view::ObservedView;
 use crate::gpu::readback::read_floats;
+use crate::gpu::timing::Timer;
 use crate::gpu::{Gpu, GpuError};
-use crate::shader::fused::Fused;
 
 /// The forward pass and its images, a buffer a part.
 pub(super) struct Images {
@@ -38,13 +39,14 @@ impl Images {
         Ok(Self { inputs, pipeline, channels, parts })
     }
 
-    /// Shade every part; nothing is waited for.
+    /// Shade every part; nothing is waited for. A part's time goes to a timer of its own, where they are wanted.
     pub(super) fn run(
         &self,
         gpu: &Gpu,
         parts: &Parts,
         views: &[ObservedView],
         gains: &[f64],
+        mut timers: Option<&mut Vec<Timer>>,
     ) -> Result<(), GpuError> {
         let Some(lights) = self.inputs.bound() else { return gpu.check() };
         for (part, (block, _, bindings)) in parts.parts.iter().zip(&self.parts) {
@@ -55,14 +57,23 @@ impl Images {
             }
             block.write(gpu, &parts.block(views, part, gain, 0));
             let mut commands = encoder(gpu);
+            let mut timer = timers.is_some().then(|| Timer::new(gpu));
             {
-                let mut pass = commands.begin_compute_pass(&ComputePassDescriptor::default());
+                let timestamp_writes = timer.as_mut().and_then(|timer| timer.around_compute("shade"));
+                let mut pass =
+                    commands.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
                 pass.set_pipeline(&self.pipeline);
                 pass.set_bind_group(0, lights, &[]);
                 pass.set_bind_group(1, bindings, &[]);
                 pass.dispatch_workgroups(Parts::most_workgroups(part), 1, 1);
             }
+            if let Some(timer) = &timer {
+                timer.finish(&mut commands);
+            }
             gpu.queue.submit([commands.finish()]);
+            if let Some(timers) = &mut timers {
+                timers.extend(timer);
+            }
         }
         gpu.check()
     }

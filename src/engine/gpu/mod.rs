@@ -1,6 +1,7 @@
-//! The GPU engine: the fused pass ([`crate::shader::fused`]) over samples on a graphics adapter.
+//! The GPU engine: the fused pass ([`fused`]) over samples on a graphics adapter.
 //!
 //! - [`GpuEngine`]: the objective; what it is made of and how sums become normal equations
+//! - [`fused`]: the text of that pass
 //! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
 //!   memory allowed is uploaded anew in each pass
 //! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
@@ -9,6 +10,7 @@
 //! - `program`: the shaders of a wish, and one run of them; `images`: the forward pass
 //! - `pipeline`: what both make pipelines and bindings with
 
+pub mod fused;
 mod images;
 mod lights;
 mod parts;
@@ -21,6 +23,7 @@ use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
+use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
 use self::images::Images;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
@@ -30,12 +33,12 @@ use self::terms::{HELD, replace_samples};
 use super::view::ObservedView;
 use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
+use crate::gpu::timing::Timer;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::scene::Loss;
-use crate::shader::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -297,6 +300,31 @@ impl<'g> GpuEngine<'g> {
         self.with_images(point, |_, _| self.gpu.wait())
     }
 
+    /// GPU milliseconds of each of so many forward passes over all views, one right after another with nothing read
+    /// back. Empty where the adapter has no timestamps.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn shade_times(&self, point: &Point, passes: usize) -> Result<Vec<f64>, GpuError> {
+        if !self.gpu.timestamps() {
+            return Ok(Vec::new());
+        }
+        let timers = self.with_images(point, |images, parts| {
+            let mut passed = Vec::with_capacity(passes);
+            for _ in 0..passes {
+                let mut timers = Vec::new();
+                images.run(self.gpu, parts, self.views, &point.gains, Some(&mut timers))?;
+                passed.push(timers);
+            }
+            Ok(passed)
+        })?;
+        let milliseconds = |mut timer: Timer| {
+            timer.collect(self.gpu)?;
+            Ok(timer.times.iter().map(|time| time.milliseconds).sum::<f64>())
+        };
+        timers.into_iter().map(|timers| timers.into_iter().map(milliseconds).sum()).collect()
+    }
+
     fn with_images<T>(
         &self,
         point: &Point,
@@ -311,7 +339,7 @@ impl<'g> GpuEngine<'g> {
         }
         let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
         lights.set(self.gpu, &point.params, &mut images.inputs)?;
-        images.run(self.gpu, parts, self.views, &point.gains)?;
+        images.run(self.gpu, parts, self.views, &point.gains, None)?;
         then(images, parts)
     }
 
@@ -406,9 +434,6 @@ impl Objective for GpuEngine<'_> {
     }
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        let sums = self.pass(point, Wish::Gradient);
-        // The loss is a mean of rho, and J^T r sums d rho / 2.
-        let factor = if sums.weight > 0.0 { 2.0 / sums.weight } else { 0.0 };
-        (sums.loss, sums.jtr.iter().map(|x| factor * x).collect())
+        self.pass(point, Wish::Gradient).loss_and_gradient()
     }
 }

@@ -5,6 +5,7 @@ use std::ops::Range;
 use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::Memory;
+use super::fused::WORKGROUP;
 use super::samples::DeviceSamples;
 use crate::engine::BLOCK;
 use crate::engine::view::ObservedView;
@@ -12,7 +13,6 @@ use crate::gpu::{Gpu, GpuError};
 use crate::samples::LANES;
 use crate::samples::rows::{Row, Rows};
 use crate::samples::surface_records::Places;
-use crate::shader::fused::WORKGROUP;
 
 /// Pixels that a thread shades, about: fewer leave processors idle, more leave sums long.
 const PIXELS_A_THREAD: usize = 4;

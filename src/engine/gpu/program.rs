@@ -2,13 +2,13 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
+use super::fused::{ColumnOf, Fused, PARTS, Slab, Sum, Wish, gather_module};
 use super::lights::Inputs;
 use super::parts::{PART_BYTES, Part, Parts};
 use super::pipeline::{READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, part_layout, pipeline};
 use crate::engine::view::ObservedView;
 use crate::gpu::readback::map;
 use crate::gpu::{Gpu, GpuError};
-use crate::shader::fused::{ColumnOf, Fused, PARTS, Slab, Sum, Wish, gather_module};
 
 /// The shaders of a wish.
 pub(super) struct Program {

@@ -2,13 +2,13 @@
 
 use wgpu::{BufferUsages, ComputePassDescriptor};
 
+use super::fused::{Fitted, Layout, WORKGROUP, terms_module};
 use super::lights::{DeviceLights, Inputs};
 use super::parts::Parts;
 use super::pipeline::{READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, pipeline};
 use crate::engine::view::ObservedView;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::params::{Param, Params};
-use crate::shader::fused::{Fitted, Layout, WORKGROUP, terms_module};
 
 /// The parameters that terms are made with.
 pub(super) const HELD: [Param; 5] = [

@@ -6,11 +6,11 @@ use wgpu::{
     PipelineCompilationOptions, ShaderModuleDescriptor, ShaderSource,
 };
 
+use super::draw::WORKGROUP;
 use super::surfaces::Surfaces;
 use crate::gpu::device::Gpu;
 use crate::gpu::error::GpuError;
 use crate::gpu::readback::read_words;
-use crate::shader::geometry::WORKGROUP;
 
 /// Threads of a workgroup of `coverage.wgsl`.
 const COVERAGE_THREADS: u32 = 64;

@@ -1,6 +1,7 @@
 //! The geometry pass: what is stored of each sample of a view, drawn instead of shaded.
 //!
 //! - [`Geometry`]: a scene's mesh and maps on the device, and the passes over them
+//! - `draw`: the text of its shaders
 //! - `surfaces`: what a tile of the image is drawn into
 //! - `compute`: the two compute shaders behind the rasteriser: `Coverage` packs a bit a sample, `Gather` takes what
 //!   was drawn to records of sixteen pixels ([`crate::samples`])
@@ -11,6 +12,7 @@
 //! through the host.
 
 mod compute;
+mod draw;
 mod surfaces;
 
 use std::ops::Range;
@@ -19,6 +21,7 @@ use rayon::prelude::*;
 use wgpu::{Buffer, BufferUsages, CommandEncoder, CommandEncoderDescriptor};
 
 use self::compute::{Coverage, Gather};
+use self::draw::{ELSEWHERE, draws, outline};
 use self::surfaces::Surfaces;
 use super::constants::Values;
 use super::device::Gpu;
@@ -29,7 +32,6 @@ use super::upload::{Content, Uploads};
 use crate::samples::covered::{Covered, SampleMask};
 use crate::samples::surface_records::Places;
 use crate::scene::view::Camera;
-use crate::shader::geometry::{ELSEWHERE, draws, outline};
 use crate::shader::{Budget, Facts};
 
 /// The most samples of a tile: 36 bytes each are 300 MB.

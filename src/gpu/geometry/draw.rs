@@ -1,4 +1,4 @@
-//! The geometry pass: the mesh through the planned vertex stage, and a fragment stage that leaves what is stored
+//! The text of the geometry pass: the planned vertex stage, and a planned fragment stage that leaves what is stored
 //! of a sample instead of colour.
 //!
 //! An adapter draws into 32 bytes a sample at once, by WebGPU's defaults: two targets of four numbers. What a
@@ -7,28 +7,27 @@
 
 use std::fmt::Write as _;
 
-use super::emit::{Plan, SAMPLE};
-use super::facts::{Facts, Source};
-use super::module::uniform;
-use super::rule::Stage;
-use super::search::PlanError;
 use crate::samples::LANES;
 use crate::samples::surface_records::Places;
+use crate::shader::emit::SAMPLE;
+use crate::shader::module::uniform;
+use crate::shader::rule::Stage;
+use crate::shader::{Facts, Plan, PlanError, Source};
 
 /// Numbers of a target's texel.
-pub const CHANNELS: usize = 4;
+const CHANNELS: usize = 4;
 /// Numbers that a draw leaves of a sample.
 const MOST_NUMBERS: usize = 2 * CHANNELS;
 /// Threads of a workgroup of [`Draw::gather`].
-pub const WORKGROUP: u32 = 128;
+pub(super) const WORKGROUP: u32 = 128;
 /// In the place of a sample's texel: it is not in these targets.
-pub const ELSEWHERE: u32 = u32::MAX;
+pub(super) const ELSEWHERE: u32 = u32::MAX;
 
 /// One draw of the mesh, and what it leaves.
 #[derive(Clone, Debug)]
-pub struct Draw {
+pub(super) struct Draw {
     /// The rules; the module's entry points are `vs_main` and `fs_main`.
-    pub plan: Plan,
+    pub(super) plan: Plan,
     fields: Vec<Field>,
 }
 
@@ -48,7 +47,7 @@ struct Field {
 ///
 /// # Errors
 /// When no rules yield a position.
-pub fn outline(facts: &Facts) -> Result<Plan, PlanError> {
+pub(super) fn outline(facts: &Facts) -> Result<Plan, PlanError> {
     let plan = Plan::search(&raster(facts), &["clip"], &[], &[])?;
     Ok(Plan { wgsl: plan.vertex_module("@invariant "), ..plan })
 }
@@ -57,7 +56,7 @@ pub fn outline(facts: &Facts) -> Result<Plan, PlanError> {
 ///
 /// # Errors
 /// When no rules yield one of them.
-pub fn draws(facts: &Facts, places: &Places) -> Result<Vec<Draw>, PlanError> {
+pub(super) fn draws(facts: &Facts, places: &Places) -> Result<Vec<Draw>, PlanError> {
     let facts = raster(facts);
     let mut sets: Vec<Vec<Field>> = Vec::new();
     for (name, row, size) in places.fields() {
@@ -101,8 +100,7 @@ impl Draw {
     }
 
     /// Targets of four numbers that it draws into.
-    #[must_use]
-    pub fn targets(&self) -> usize {
+        pub(super) fn targets(&self) -> usize {
         self.fields.iter().map(|field| field.size).sum::<usize>().div_ceil(CHANNELS)
     }
 
@@ -111,8 +109,7 @@ impl Draw {
     ///
     /// Bindings of group 0: the count of slots and the targets' width (`vec4u`); for each slot its texel (row by
     /// row, or [`ELSEWHERE`]) and the bits of its share; the records; the targets.
-    #[must_use]
-    pub fn gather(&self, rows: usize, share: Option<usize>) -> String {
+        pub(super) fn gather(&self, rows: usize, share: Option<usize>) -> String {
         let mut wgsl = String::from(
             "@group(0) @binding(0) var<uniform> counts: vec4u;\n\
              @group(0) @binding(1) var<storage, read> sources: array<vec2u>;\n\

@@ -1,0 +1,197 @@
+//! The text of a pass: declarations, a pixel's samples, residuals, columns, sums.
+
+use std::fmt::Write as _;
+
+use super::layout::{fields_read, number};
+use super::reduce::{REDUCE, reduction};
+use super::{BLOCK_PIXELS, ColumnOf, Fused, Sum, WORKGROUP};
+use crate::engine::residual::{HUBER_THRESHOLD, RELATIVE_FLOOR, SMAPE_CORNER, SMAPE_FLOOR};
+use crate::samples::LANES;
+use crate::scene::Loss;
+use crate::shader::emit::{hazy, parts};
+use crate::shader::module::{sample_struct, uniform};
+use crate::shader::rule::Stage;
+
+impl Fused {
+    /// The shader of the forward pass: the image, plane by plane, in the place of the sums.
+    #[must_use]
+    pub fn image_module(&self) -> String {
+        let mut wgsl = self.declarations(false);
+        wgsl.push_str(&self.head(&[]));
+        wgsl.push_str("        var shown = vec4f();\n");
+        wgsl.push_str(&self.samples(&[]));
+        for c in 0..self.channels() {
+            let _ =
+                writeln!(wgsl, "        partial_sums[{c}u * part.slots + slot] = part.gain * shown[{c}];");
+        }
+        wgsl.push_str("    }\n}\n");
+        wgsl
+    }
+
+    pub(super) fn module(&self, sums: &[Sum]) -> String {
+        let needed = |i: usize| sums.iter().any(|s| matches!(s, Sum::Product(a, b) if *a == i || *b == i));
+        let columns: Vec<usize> = (0..self.columns.len()).filter(|&i| needed(i)).collect();
+        let mut seeds: Vec<usize> = columns.iter().filter_map(|&i| self.columns[i].seed).collect();
+        seeds.dedup();
+        let mut wgsl = self.declarations(!seeds.is_empty());
+        wgsl.push_str(&self.head(sums));
+        for seed in &seeds {
+            let _ = writeln!(wgsl, "        var d{seed} = vec4f();");
+        }
+        wgsl.push_str("        var shown = vec4f();\n");
+        wgsl.push_str(&self.samples(&seeds));
+        wgsl.push_str(&self.residuals());
+        wgsl.push_str(&self.weighted_columns(&columns));
+        for (s, sum) in sums.iter().enumerate() {
+            let term = match *sum {
+                Sum::Loss => "loss".to_owned(),
+                Sum::Product(i, j) => self.product(i, j),
+            };
+            let _ = writeln!(wgsl, "        sum{s} += {term};");
+        }
+        wgsl.push_str("    }\n");
+        wgsl.push_str(&reduction(sums.len()));
+        wgsl
+    }
+
+    /// Everything outside the entry point, with or without the tangents' functions.
+    fn declarations(&self, tangents: bool) -> String {
+        let mut wgsl = self.plan.declarations(true);
+        if tangents {
+            wgsl.push_str(&self.chain.functions);
+        }
+        wgsl.push_str(&sample_struct(&self.fields()));
+        let _ = write!(
+            wgsl,
+            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Every so-many-th block is read.\n    stride: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
+             @group(1) @binding(0) var<uniform> part: Part;\n\
+             @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
+             @group(1) @binding(2) var<storage, read> group_start: array<u32>;\n\
+             @group(1) @binding(3) var<storage, read> targets: array<f32>;\n\
+             @group(1) @binding(4) var<storage, read_write> partial_sums: array<f32>;\n\n\
+             const RELATIVE_FLOOR = {RELATIVE_FLOOR:?}f;\nconst HUBER_THRESHOLD = {HUBER_THRESHOLD:?}f;\n\
+             const SMAPE_FLOOR = {SMAPE_FLOOR:?}f;\nconst SMAPE_CORNER = {SMAPE_CORNER:?}f;\n\n"
+        );
+        wgsl.push_str(loss_function(self.fitted.loss));
+        wgsl.push('\n');
+        wgsl.push_str(REDUCE);
+        wgsl
+    }
+
+    /// The entry point up to a pixel's samples.
+    fn head(&self, sums: &[Sum]) -> String {
+        let mut wgsl = format!(
+            "\n@compute @workgroup_size({WORKGROUP})\nfn cs_main(\n    @builtin(local_invocation_index) thread: u32,\n    @builtin(workgroup_id) workgroup: vec3u,\n    @builtin(num_workgroups) workgroups: vec3u,\n) {{\n"
+        );
+        for s in 0..sums.len() {
+            let _ = writeln!(wgsl, "    var sum{s} = 0.0;");
+        }
+        let _ = write!(
+            wgsl,
+            "    let step = {WORKGROUP}u * workgroups.x;\n    for (var i = {WORKGROUP}u * workgroup.x + thread; i < part.read; i += step) {{\n\
+             \x20       let slot = (i / {BLOCK_PIXELS}u) * {BLOCK_PIXELS}u * part.stride + i % {BLOCK_PIXELS}u;\n\
+             \x20       if (slot >= part.slots) {{\n            continue;\n        }}\n"
+        );
+        wgsl
+    }
+
+    /// The value and the seeds' tangents of a pixel: over its samples.
+    fn samples(&self, seeds: &[usize]) -> String {
+        let mut wgsl = String::new();
+        let _ = writeln!(wgsl, "        let group = slot / {LANES}u;\n        let lane = slot % {LANES}u;");
+        if self.fitted.several {
+            wgsl.push_str("        for (var record = group_start[group]; record < group_start[group + 1u]; record++) {\n");
+        } else {
+            wgsl.push_str("        {\n        let record = group;\n");
+        }
+        let _ = writeln!(wgsl, "        let s = record * {}u + lane;", self.fitted.layout.rows * LANES);
+        let share = self.fitted.layout.share.map_or_else(|| "1.0".to_owned(), number);
+        let _ = writeln!(wgsl, "        let share = {share};\n        var at: Sample;");
+        wgsl.push_str(&fields_read(&self.fitted.layout, &self.fields()));
+        wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
+        let parts = parts(&self.plan.facts);
+        let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
+        let haze = if hazy(&self.plan.facts) { "haze" } else { "0.0" };
+        let _ = writeln!(wgsl, "    shown += share * vec4f({radiance}, {haze});");
+        for &seed in seeds {
+            let radiance = self.chain.radiance[seed].as_deref().unwrap_or("vec3f()");
+            let haze = self.chain.haze[seed].as_deref().unwrap_or("0.0");
+            let _ = writeln!(wgsl, "    d{seed} += share * vec4f({radiance}, {haze});");
+        }
+        wgsl.push_str("        }\n");
+        wgsl
+    }
+
+    /// Residuals and their weights, channel by channel.
+    fn residuals(&self) -> String {
+        let channels = self.channels();
+        let mut wgsl = String::new();
+        let weight = if self.fitted.weighted {
+            format!("targets[{channels}u * part.slots + slot]")
+        } else {
+            "1.0".to_owned()
+        };
+        let _ = writeln!(
+            wgsl,
+            "        let weight = {weight};\n        var loss = 0.0;\n        var scale = vec4f();\n        var residual = vec4f();"
+        );
+        for c in 0..channels {
+            let _ = writeln!(
+                wgsl,
+                "        {{\n            let observed = targets[{}u * group + {}u + lane];",
+                channels * LANES,
+                c * LANES
+            );
+            let _ = writeln!(wgsl, "            let value = part.gain * shown[{c}];");
+            let counted = if self.fitted.clipped {
+                // A clipped target only says "at least" or "at most" (MODEL 7).
+                wgsl.push_str("            let beyond = (observed <= part.clip_low && value <= observed) || (observed >= part.clip_high && value >= observed);\n");
+                "select(weight, 0.0, beyond)"
+            } else {
+                "weight"
+            };
+            let _ = writeln!(
+                wgsl,
+                "            let weighed = weighted_residual(value, observed, {counted});\n            loss += weighed.x;\n            scale[{c}] = weighed.y;\n            residual[{c}] = weighed.z;\n        }}"
+            );
+        }
+        wgsl
+    }
+
+    fn weighted_columns(&self, columns: &[usize]) -> String {
+        let mut wgsl = String::new();
+        for &i in columns {
+            let ColumnOf { seed, channel, .. } = self.columns[i];
+            let whole = seed.map_or_else(|| "shown".to_owned(), |seed| format!("part.gain * d{seed}"));
+            let _ = match channel {
+                None => writeln!(wgsl, "        let c{i} = scale * ({whole});"),
+                Some(c) => writeln!(wgsl, "        let c{i} = scale[{c}] * ({whole})[{c}];"),
+            };
+        }
+        wgsl
+    }
+
+    /// The product of two columns, over the channels.
+    fn product(&self, i: usize, j: usize) -> String {
+        let k = self.columns.len();
+        let side = |i: usize| {
+            if i == k { ("residual".to_owned(), None) } else { (format!("c{i}"), self.columns[i].channel) }
+        };
+        match (side(i), side(j)) {
+            ((a, None), (b, None)) if self.fitted.alpha => format!("dot({a}, {b})"),
+            ((a, None), (b, None)) => format!("dot({a}.xyz, {b}.xyz)"),
+            ((a, Some(_)), (b, Some(_))) => format!("{a} * {b}"),
+            ((a, Some(c)), (b, None)) | ((b, None), (a, Some(c))) => format!("{a} * {b}[{c}]"),
+        }
+    }
+}
+
+const fn loss_function(loss: Loss) -> &'static str {
+    match loss {
+        Loss::L2 => include_str!("loss/l2.wgsl"),
+        Loss::RelativeL2 => include_str!("loss/relative_l2.wgsl"),
+        Loss::Huber => include_str!("loss/huber.wgsl"),
+        Loss::Smape => include_str!("loss/smape.wgsl"),
+    }
+}
