@@ -184,7 +184,8 @@ fn a_fit_over_the_adapters_own_samples_says_so_and_ends_where_the_others_do() {
         return;
     }
     let fit = |run: &str, more: &[&str]| {
-        let ran = desk.run(&[&["fit", "scene.toml", "-o", run, "--verify"], more].concat()).done();
+        let ran = desk.run(&[&["fit", "scene.toml", "-o", run, "--verify"], more].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
         (ran, desk.json(&format!("{run}/report.json")))
     };
     let (cpu, uploaded) = fit("cpu", &["--engine", "gpu"]);

@@ -96,13 +96,17 @@ fn drawn(gpu: &Gpu, prepared: &Prepared) -> ViewSamples {
 fn compare(name: &str, gpu: &Gpu, prepared: &Prepared) {
     let (want, got) = (traced(prepared), drawn(gpu, prepared));
     assert_eq!(got.surface.places(), want.surface.places(), "{name}");
-    let (ours, theirs) = (by_pixel(&got), by_pixel(&want));
-    let full = (prepared.scene.quality.samples_per_axis.pow(2)) as usize;
-    let (mut outline, mut uncovered) = (0, ours.keys().filter(|pixel| !theirs.contains_key(pixel)).count());
+    let (ours, want_pixels) = (by_pixel(&got), by_pixel(&want));
+    let full = prepared.scene.quality.samples_per_axis.pow(2) as usize;
+    let width = prepared.scene.views[0].camera.width;
+    // Pixels are on the outline where a sample of theirs or a neighbour shows no mesh.
+    let beside = |pixel: u32| [pixel + 1, pixel.wrapping_sub(1), pixel + width, pixel.wrapping_sub(width)];
+    let (mut outline, mut uncovered) = (0, ours.keys().filter(|pixel| !want_pixels.contains_key(pixel)).count());
     let mut pairs = Vec::new();
-    for (pixel, theirs) in &theirs {
+    for (pixel, theirs) in &want_pixels {
         let ours = ours.get(pixel).map_or(&[][..], Vec::as_slice);
-        outline += usize::from(theirs.len() < full);
+        let open = theirs.len() < full || beside(*pixel).iter().any(|other| !want_pixels.contains_key(other));
+        outline += usize::from(open);
         if ours.len() == theirs.len() {
             pairs.extend(ours.iter().copied().zip(theirs.iter().copied()));
         } else {
@@ -110,7 +114,7 @@ fn compare(name: &str, gpu: &Gpu, prepared: &Prepared) {
         }
     }
     println!("{name}: {} samples, {outline} outline pixels, {uncovered} covered otherwise", pairs.len());
-    assert!(pairs.len() > 5000, "{name}");
+    assert!(pairs.len() > 3000, "{name}");
     assert!(uncovered as f64 <= UNCOVERED * outline as f64, "{name}: {uncovered} of {outline}");
     for &(i, j) in &pairs {
         assert_eq!(got.surface.weight(i), want.surface.weight(j), "{name}");
@@ -258,13 +262,15 @@ fn fit_both_ways(gpu: &Gpu, scene: &Path) {
     for (a, b) in ours.unknowns.iter().zip(&theirs.unknowns) {
         println!("  {}: {} {} +- {:?}", a.unknown.name(), a.value, b.value, b.std_error);
     }
-    // The few samples that lie on other triangles at creases and outlines see other normals, by a tenth: some 1e-4
-    // of the samples, of which noise-free targets' loss consists.
+    // Where one part of the mesh hides another, a sample in some thousands sees the one instead of the other, as a
+    // rasteriser snaps corners to 1/256 of a sample. A quarter of a pixel that is off by a third of its radiance, in
+    // a pixel of a thousand: 1e-5 of the squares, which is what is left of targets without noise.
     let off = (ours.loss_end - theirs.loss_end).abs();
-    assert!(off <= 1e-4 * theirs.loss_end + 1e-6 * theirs.loss_start, "{what}");
+    assert!(off <= 1e-4 * theirs.loss_end + 3e-5 * theirs.loss_start, "{what}");
     for (a, b) in ours.unknowns.iter().zip(&theirs.unknowns).filter(|(a, b)| a.identifiable && b.identifiable) {
-        // A parameter that the images hardly determine may follow those samples by a share of its standard error.
-        let most = (1e-4 * b.value.abs().max(1e-2)).max(0.1 * b.std_error.unwrap_or(0.0));
+        // The parameters follow those samples by a share of the standard error that they leave.
+        let error = a.std_error.unwrap_or(0.0).max(b.std_error.unwrap_or(0.0));
+        let most = (1e-4 * b.value.abs().max(1e-2)).max(0.1 * error);
         assert!((a.value - b.value).abs() <= most, "{what}: {}: {} {}", a.unknown.name(), a.value, b.value);
     }
 }
