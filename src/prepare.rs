@@ -226,8 +226,9 @@ impl Prepared {
         let has_target: Vec<bool> = self.scene.views.iter().map(|view| view.target.is_some()).collect();
         let without = self.scene.views.iter().filter(|view| view.target.is_none());
         let path = self.scene.path.display();
-        let warning =
-            |view: &View| format!("{path}: view \"{}\" has no target and takes no part in the fit.", view.name);
+        let warning = |view: &View| {
+            format!("{path}: view \"{}\" has no target and takes no part in the fit.", view.name)
+        };
         self.warnings.extend(without.map(warning));
         retain(&mut self.scene.views, &has_target);
         retain(&mut self.gains, &has_target);

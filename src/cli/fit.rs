@@ -84,8 +84,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         ..PrepareOptions::default()
     };
     let own = arguments.engine.makes_samples();
-    let mut prepared =
-        if own { Prepared::baked(&path, &options) } else { Prepared::new(&path, &options) }?;
+    let mut prepared = if own { Prepared::baked(&path, &options) } else { Prepared::new(&path, &options) }?;
     if let Some(loss) = &arguments.loss {
         prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
     }

@@ -84,11 +84,7 @@ pub(crate) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
 }
 
 /// Run the encoder's commands, and read the floats that they leave in `buffer`.
-pub(crate) fn read_floats(
-    gpu: &Gpu,
-    encoder: CommandEncoder,
-    buffer: &Buffer,
-) -> Result<Vec<f32>, GpuError> {
+pub(crate) fn read_floats(gpu: &Gpu, encoder: CommandEncoder, buffer: &Buffer) -> Result<Vec<f32>, GpuError> {
     read(gpu, encoder, buffer, f32::from_le_bytes)
 }
 

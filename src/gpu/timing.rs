@@ -1,8 +1,8 @@
 //! GPU time by pass, from the adapter's timestamps.
 
 use wgpu::{
-    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassTimestampWrites, QUERY_SIZE, QuerySet, QuerySetDescriptor,
-    QueryType, RenderPassTimestampWrites,
+    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassTimestampWrites, QUERY_SIZE, QuerySet,
+    QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
 };
 
 use super::device::Gpu;

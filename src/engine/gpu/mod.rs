@@ -160,7 +160,8 @@ impl<'g> GpuEngine<'g> {
         };
         let start_of_parts = Instant::now();
         let parts = Parts::new(gpu, views, &engine.traits, memory, made)?;
-        engine.made_seconds = made.map_or(0.0, |made| made.seconds() + start_of_parts.elapsed().as_secs_f64());
+        engine.made_seconds =
+            made.map_or(0.0, |made| made.seconds() + start_of_parts.elapsed().as_secs_f64());
         let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if HELD.contains(&c.param));
         engine.keeps = !engine.unknowns.iter().any(moves) && parts.all_resident();
         engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
@@ -300,26 +301,39 @@ impl<'g> GpuEngine<'g> {
         self.with_images(point, |_, _| self.gpu.wait())
     }
 
-    /// GPU milliseconds of each of so many forward passes over all views, one right after another with nothing read
-    /// back. Empty where the adapter has no timestamps.
+    /// Milliseconds of each of so many forward passes over all views with nothing read back. On the GPU's clock, one
+    /// right after another; a program on the CPU stamps a compute pass before its threads have run it, so there it is
+    /// the host's clock, around each. Empty where a card has no timestamps.
     ///
     /// # Errors
     /// When the device fails.
     pub fn shade_times(&self, point: &Point, passes: usize) -> Result<Vec<f64>, GpuError> {
-        if !self.gpu.timestamps() {
+        let (gpu, gains) = (self.gpu, point.gains.as_slice());
+        if !gpu.timestamps() && !gpu.is_software() {
             return Ok(Vec::new());
         }
+        if gpu.is_software() {
+            return self.with_images(point, |images, parts| {
+                gpu.wait()?;
+                let timed = || {
+                    let start = Instant::now();
+                    images.run(gpu, parts, self.views, gains, None)?;
+                    gpu.wait()?;
+                    Ok(1e3 * start.elapsed().as_secs_f64())
+                };
+                (0..passes).map(|_| timed()).collect()
+            });
+        }
         let timers = self.with_images(point, |images, parts| {
-            let mut passed = Vec::with_capacity(passes);
-            for _ in 0..passes {
+            let timed = || {
                 let mut timers = Vec::new();
-                images.run(self.gpu, parts, self.views, &point.gains, Some(&mut timers))?;
-                passed.push(timers);
-            }
-            Ok(passed)
+                images.run(gpu, parts, self.views, gains, Some(&mut timers))?;
+                Ok(timers)
+            };
+            (0..passes).map(|_| timed()).collect::<Result<Vec<Vec<Timer>>, GpuError>>()
         })?;
         let milliseconds = |mut timer: Timer| {
-            timer.collect(self.gpu)?;
+            timer.collect(gpu)?;
             Ok(timer.times.iter().map(|time| time.milliseconds).sum::<f64>())
         };
         timers.into_iter().map(|timers| timers.into_iter().map(milliseconds).sum()).collect()

@@ -89,7 +89,10 @@ impl<'a> DeviceSamples<'a> {
     pub(super) fn fill(&self, parts: &[Part]) -> Result<(), GpuError> {
         for (index, (camera, covered)) in self.views.iter().enumerate() {
             let of_view = parts.iter().filter(|part| part.view == index);
-            let wanted = |part: &'_ Part| Wanted { groups: part.groups.clone(), records: part.buffers.samples.clone() };
+            let wanted = |part: &'_ Part| Wanted {
+                groups: part.groups.clone(),
+                records: part.buffers.samples.clone(),
+            };
             let wanted: Vec<Wanted> = of_view.map(wanted).collect();
             self.geometry.fill(camera, covered, &wanted)?;
         }

@@ -81,7 +81,8 @@ impl Draw {
         let goals: Vec<&'static str> = fields.iter().map(|field| quantity(field.name, facts)).collect();
         let plan = Plan::search(facts, &["clip"], &goals, &[])?;
         let mut wgsl = plan.vertex_module("@invariant ");
-        let numbers: Vec<String> = fields.iter().zip(&goals).flat_map(|(field, goal)| parts(field, goal)).collect();
+        let numbers: Vec<String> =
+            fields.iter().zip(&goals).flat_map(|(field, goal)| parts(field, goal)).collect();
         let texels: Vec<String> = numbers
             .chunks(CHANNELS)
             .map(|texel| {
@@ -100,7 +101,7 @@ impl Draw {
     }
 
     /// Targets of four numbers that it draws into.
-        pub(super) fn targets(&self) -> usize {
+    pub(super) fn targets(&self) -> usize {
         self.fields.iter().map(|field| field.size).sum::<usize>().div_ceil(CHANNELS)
     }
 
@@ -109,7 +110,7 @@ impl Draw {
     ///
     /// Bindings of group 0: the count of slots and the targets' width (`vec4u`); for each slot its texel (row by
     /// row, or [`ELSEWHERE`]) and the bits of its share; the records; the targets.
-        pub(super) fn gather(&self, rows: usize, share: Option<usize>) -> String {
+    pub(super) fn gather(&self, rows: usize, share: Option<usize>) -> String {
         let mut wgsl = String::from(
             "@group(0) @binding(0) var<uniform> counts: vec4u;\n\
              @group(0) @binding(1) var<storage, read> sources: array<vec2u>;\n\

@@ -76,7 +76,8 @@ impl<'a> Geometry<'a> {
         let mut draws = Vec::with_capacity(planned.len());
         for (i, draw) in planned.into_iter().enumerate() {
             // One of the draws brings the samples' shares.
-            let gather = Gather::new(gpu, &draw.gather(rows, places.weight.filter(|_| i == 0)), draw.targets());
+            let gather =
+                Gather::new(gpu, &draw.gather(rows, places.weight.filter(|_| i == 0)), draw.targets());
             let formats = surfaces::formats(draw.targets());
             draws.push((Program::new(gpu, draw.plan, &mut uploads, &formats, 1)?, gather));
         }
@@ -106,12 +107,7 @@ impl<'a> Geometry<'a> {
     }
 
     /// Fill records of what `camera` sees.
-    pub(crate) fn fill(
-        &self,
-        camera: &Camera,
-        covered: &Covered,
-        wanted: &[Wanted],
-    ) -> Result<(), GpuError> {
+    pub(crate) fn fill(&self, camera: &Camera, covered: &Covered, wanted: &[Wanted]) -> Result<(), GpuError> {
         let axis = covered.axis();
         let tiles = self.tiles(camera, axis);
         let targets = self.draws.iter().map(|(_, gather)| gather.targets()).max().unwrap_or_default();

@@ -38,7 +38,11 @@ impl Surfaces {
         let texture = |label, format| {
             let texture = gpu.device.create_texture(&TextureDescriptor {
                 label: Some(label),
-                size: Extent3d { width: axis * tile.width, height: axis * tile.height, depth_or_array_layers: 1 },
+                size: Extent3d {
+                    width: axis * tile.width,
+                    height: axis * tile.height,
+                    depth_or_array_layers: 1,
+                },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: TextureDimension::D2,

@@ -207,5 +207,10 @@ fn a_fit_over_the_adapters_own_samples_says_so_and_ends_where_the_others_do() {
     assert!(left(&uploaded) < 1e-6 && left(&streamed) < 1e-6, "{uploaded} {streamed}");
     assert!(left(&own) < 1e-3, "{own}");
     let samples = |report: &Value| report["samples"].as_f64().unwrap();
-    assert!((samples(&own) / samples(&uploaded) - 1.0).abs() < 0.01, "{} {}", samples(&own), samples(&uploaded));
+    assert!(
+        (samples(&own) / samples(&uploaded) - 1.0).abs() < 0.01,
+        "{} {}",
+        samples(&own),
+        samples(&uploaded)
+    );
 }

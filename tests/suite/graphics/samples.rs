@@ -101,7 +101,8 @@ fn compare(name: &str, gpu: &Gpu, prepared: &Prepared) {
     let width = prepared.scene.views[0].camera.width;
     // Pixels are on the outline where a sample of theirs or a neighbour shows no mesh.
     let beside = |pixel: u32| [pixel + 1, pixel.wrapping_sub(1), pixel + width, pixel.wrapping_sub(width)];
-    let (mut outline, mut uncovered) = (0, ours.keys().filter(|pixel| !want_pixels.contains_key(pixel)).count());
+    let (mut outline, mut uncovered) =
+        (0, ours.keys().filter(|pixel| !want_pixels.contains_key(pixel)).count());
     let mut pairs = Vec::new();
     for (pixel, theirs) in &want_pixels {
         let ours = ours.get(pixel).map_or(&[][..], Vec::as_slice);
@@ -165,7 +166,8 @@ fn every_field_holds_what_the_rays_hit() {
     compare("one sample a pixel", gpu, &still);
     // Without a normal map, the base is the whole normal: unit, or as interpolated.
     for form in Form::ALL {
-        let plain = read_as(prepared(&built_in(), Effects::of(&[Effect::Diffuse]), SIZE), form, Silhouette::Fragment);
+        let plain =
+            read_as(prepared(&built_in(), Effects::of(&[Effect::Diffuse]), SIZE), form, Silhouette::Fragment);
         compare(&format!("diffuse alone, {}", form.name()), gpu, &plain);
     }
 }
@@ -192,7 +194,8 @@ fn observed(prepared: &Prepared, groups: Vec<ViewSamples>) -> Vec<ObservedView> 
     let view = |samples: ViewSamples| {
         let mut target = Rows::new(3, samples.groups());
         for (row, slot) in (0..3).flat_map(|row| (0..LANES * samples.groups()).map(move |slot| (row, slot))) {
-            target.record_mut(slot / LANES)[row][slot % LANES] = 0.2 + 0.1 * ((slot * 7 + row * 3) % 5) as f32;
+            target.record_mut(slot / LANES)[row][slot % LANES] =
+                0.2 + 0.1 * ((slot * 7 + row * 3) % 5) as f32;
         }
         ObservedView { samples, target, ..ObservedView::default() }
     };
@@ -237,8 +240,8 @@ fn passes_over_them_equal_the_plain_model_in_parts_and_when_terms_are_kept() {
     }
 }
 
-/// Fit a scene over both kinds of samples.
-fn fit_both_ways(gpu: &Gpu, scene: &Path) {
+/// Fit a scene over both kinds of samples; parameters may differ by that share of their value.
+fn fit_both_ways(gpu: &Gpu, scene: &Path, share: f64) {
     let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
     let mut prepared = Prepared::baked(scene, &options).unwrap();
     prepared.keep_targets().unwrap();
@@ -258,29 +261,34 @@ fn fit_both_ways(gpu: &Gpu, scene: &Path) {
     let [ours, theirs] =
         [&ours, &theirs].map(|engine| fit(engine, &start, &FitOptions::default(), &mut |_| {}).unwrap());
     let what = scene.display();
-    println!("{what}: {} from {}; {} from {}", ours.loss_end, ours.loss_start, theirs.loss_end, theirs.loss_start);
-    for (a, b) in ours.unknowns.iter().zip(&theirs.unknowns) {
-        println!("  {}: {} {} +- {:?}", a.unknown.name(), a.value, b.value, b.std_error);
-    }
-    // Where one part of the mesh hides another, a sample in some thousands sees the one instead of the other, as a
-    // rasteriser snaps corners to 1/256 of a sample. A quarter of a pixel that is off by a third of its radiance, in
-    // a pixel of a thousand: 1e-5 of the squares, which is what is left of targets without noise.
+    println!("{what}: loss {} {} from {}", ours.loss_end, theirs.loss_end, theirs.loss_start);
+    // Where one part of the mesh hides another, a sample in some thousands sees the one instead of the other: a
+    // quarter of a pixel that is off by a third of its radiance, in a pixel of a thousand, are 1e-5 of the squares.
+    // That is all the loss that is left of targets without noise.
     let off = (ours.loss_end - theirs.loss_end).abs();
     assert!(off <= 1e-4 * theirs.loss_end + 3e-5 * theirs.loss_start, "{what}");
-    for (a, b) in ours.unknowns.iter().zip(&theirs.unknowns).filter(|(a, b)| a.identifiable && b.identifiable) {
-        // The parameters follow those samples by a share of the standard error that they leave.
+    for (a, b) in ours.unknowns.iter().zip(&theirs.unknowns).filter(|(a, b)| a.identifiable && b.identifiable)
+    {
         let error = a.std_error.unwrap_or(0.0).max(b.std_error.unwrap_or(0.0));
-        let most = (1e-4 * b.value.abs().max(1e-2)).max(0.1 * error);
-        assert!((a.value - b.value).abs() <= most, "{what}: {}: {} {}", a.unknown.name(), a.value, b.value);
+        let (off, most) = ((a.value - b.value).abs(), (share * b.value.abs().max(1e-2)).max(0.05 * error));
+        println!("  {}: {} {}, {:.1e} of {most:.1e}", a.unknown.name(), a.value, b.value, off);
+        assert!(off <= most, "{what}: {}", a.unknown.name());
     }
 }
 
 #[test]
 fn fits_over_them_end_where_those_over_the_cpus_do() {
     let Some(gpu) = gpu() else { return };
-    fit_both_ways(gpu, &built_in());
+    // The targets are the CPU's samples, without noise. What other samples see in the place of a few is an error of
+    // the regressors, and not of the targets: it draws the rim's and hilite's constants, which live where the mesh
+    // hides itself, towards 0 by its share of their squares, some 1/256 of the samples there; standard errors do not
+    // know of it.
+    fit_both_ways(gpu, &built_in(), 1e-3);
     let Some(folder) = crate::common::data() else { return };
-    fit_both_ways(gpu, &folder.join("lps_forest/scene.toml"));
+    // Targets that the model does not meet: what samples differ by is lost beside that.
+    for scene in ["lps_forest", "lps_sunrise"] {
+        fit_both_ways(gpu, &folder.join(scene).join("scene.toml"), 1e-4);
+    }
 }
 
 #[test]
