@@ -10,6 +10,12 @@ use crate::engine::view::ObservedView;
 use crate::gpu::readback::map;
 use crate::gpu::{Gpu, GpuError};
 
+/// Sums from which a thread's registers are so many that three workgroups share a processor of an H200 (it has
+/// 132), and the most workgroups then: two times three for each processor. With eight for each, as of shorter
+/// lists, a pass takes a tenth longer.
+const MANY_SUMS: usize = 48;
+const FEWER_WORKGROUPS: u32 = 792;
+
 /// The shaders of a wish.
 pub(super) struct Program {
     fused: Fused,
@@ -117,7 +123,8 @@ impl Program {
 
     fn encode(&self, gpu: &Gpu, encoder: &mut CommandEncoder, run: &Run, part: &Part) {
         let (slab, pipeline) = &self.slabs[run.slab];
-        let workgroups = Parts::workgroups(part);
+        let most = if slab.sums.len() < MANY_SUMS { u32::MAX } else { FEWER_WORKGROUPS };
+        let workgroups = Parts::workgroups(part).min(most);
         let counts = [workgroups, run.first_sum, run.first_result as u32, 0];
         run.counts.write(gpu, bytemuck::cast_slice(&counts));
         let Some(lights) = self.inputs.bound() else { return };

@@ -1,4 +1,7 @@
-//! The shading operation on the device: what stays there, and the passes forwards and backwards.
+//! The shading operation on the device: the passes forwards and backwards; `resident`: what stays there from one to
+//! the next.
+
+mod resident;
 
 use std::collections::HashMap;
 use std::sync::{Mutex, PoisonError};
@@ -7,10 +10,9 @@ use burn::backend::Shape;
 use burn::backend::wgpu::CubeTensor;
 use wgpu::{
     BindingResource, Buffer, BufferUsages, CommandEncoder, CommandEncoderDescriptor, ComputePipeline,
-    Extent3d, TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureView,
-    TextureViewDescriptor, TextureViewDimension,
 };
 
+use self::resident::{Constants, Faces, fixed_planes, group_starts};
 use super::buffer::{TensorBuffer, check_shape, lend};
 use super::inputs::Input;
 use super::scatter::Scattering;
@@ -18,7 +20,6 @@ use super::shade::{Scatter, Shaded};
 use super::{SharedDevice, TensorError, pass};
 use crate::gpu::{Gpu, GpuError};
 use crate::model::cube::Cube;
-use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::samples::ViewSamples;
 use crate::tensor::adjoint::{Adjoint, Binding, Module};
@@ -42,24 +43,6 @@ pub(super) struct Stage {
     backward: Mutex<HashMap<Vec<Input>, Compiled>>,
     scattering: Scattering,
     sum: ComputePipeline,
-}
-
-/// The block of constants, and the pass that fills it.
-#[derive(Debug)]
-struct Constants {
-    pipeline: ComputePipeline,
-    values: Buffer,
-    filled: Buffer,
-    block: Buffer,
-}
-
-/// A cube that shaders read.
-#[derive(Clone, Debug)]
-struct Faces {
-    size: usize,
-    view: TextureView,
-    /// Of the same texels, to be written.
-    storage: TextureView,
 }
 
 #[derive(Clone, Debug)]
@@ -107,11 +90,11 @@ impl Stage {
             group_start: gpu.storage("groups", bytemuck::cast_slice(&group_starts(views)))?,
             constants: Constants::new(gpu, &adjoint, shaded)?,
             faces,
-            fill_faces: module("faces", include_str!("faces.wgsl"))?,
+            fill_faces: module("faces", include_str!("../faces.wgsl"))?,
             forward: Compiled::new(gpu, &adjoint.forward())?,
             backward: Mutex::default(),
             scattering: Scattering::new(gpu, scatter)?,
-            sum: module("sum", include_str!("sum.wgsl"))?,
+            sum: module("sum", include_str!("../sum.wgsl"))?,
             shared: shared.clone(),
             adjoint,
             slots,
@@ -251,21 +234,15 @@ impl Stage {
     fn fill(&self, encoder: &mut CommandEncoder, lent: &HashMap<usize, TensorBuffer>) {
         let gpu = self.shared.gpu();
         if let Some(constants) = &self.constants {
-            let mut resources =
-                vec![(1, constants.values.as_entire_binding()), (2, constants.filled.as_entire_binding())];
-            resources.extend(
-                lent.get(&at(Input::Columns))
-                    .filter(|_| !self.adjoint.columns.is_empty())
-                    .map(|columns| (0, columns.binding())),
+            constants.fill(
+                gpu,
+                encoder,
+                lent.get(&at(Input::Columns)).filter(|_| !self.adjoint.columns.is_empty()),
             );
-            pass::dispatch(gpu, encoder, &constants.pipeline, &[resources], 1);
-            encoder.copy_buffer_to_buffer(&constants.filled, 0, &constants.block, 0, constants.block.size());
         }
         for (faces, cube) in self.faces.iter().zip(CUBES) {
             if let (Some(faces), Some(texels)) = (faces, lent.get(&at(cube))) {
-                let resources =
-                    vec![(0, texels.binding()), (1, BindingResource::TextureView(&faces.storage))];
-                pass::dispatch(gpu, encoder, &self.fill_faces, &[resources], faces.texels() as u64);
+                faces.fill(gpu, encoder, &self.fill_faces, texels);
             }
         }
     }
@@ -363,88 +340,4 @@ impl Compiled {
         let pipeline = pass::pipeline(gpu, &pass::module(gpu, "shade", &module.wgsl)?, "cs_main")?;
         Ok(Self { pipeline, bindings: module.bindings.clone() })
     }
-}
-
-impl Constants {
-    fn new(gpu: &Gpu, adjoint: &Adjoint, shaded: &Shaded<'_>) -> Result<Option<Self>, GpuError> {
-        if adjoint.plan.constants.is_empty() {
-            return Ok(None);
-        }
-        let module = pass::module(gpu, "constants", &adjoint.constants())?;
-        let values: Vec<f32> = Param::all()
-            .flat_map(|param| shaded.params.rgb(param).into_iter().chain([0.0]))
-            .map(|value| value as f32)
-            .collect();
-        let bytes = 16 * adjoint.plan.constants.len();
-        let block = |usage| gpu.buffer("constants", &vec![0; bytes], usage);
-        Ok(Some(Self {
-            pipeline: pass::pipeline(gpu, &module, "cs_main")?,
-            values: gpu.storage("parameters", bytemuck::cast_slice(&values))?,
-            filled: block(BufferUsages::STORAGE | BufferUsages::COPY_SRC),
-            block: block(BufferUsages::UNIFORM),
-        }))
-    }
-}
-
-impl Faces {
-    fn new(gpu: &Gpu, size: usize) -> Result<Self, GpuError> {
-        let side = size as u32 + 2;
-        let texture = gpu.device.create_texture(&TextureDescriptor {
-            label: Some("faces"),
-            size: Extent3d { width: side, height: side, depth_or_array_layers: 6 },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: TextureDimension::D2,
-            format: TextureFormat::Rgba32Float,
-            usage: TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING,
-            view_formats: &[],
-        });
-        gpu.check()?;
-        let view = |usage| {
-            texture.create_view(&TextureViewDescriptor {
-                dimension: Some(TextureViewDimension::D2Array),
-                usage: Some(usage),
-                ..TextureViewDescriptor::default()
-            })
-        };
-        Ok(Self {
-            size,
-            view: view(TextureUsages::TEXTURE_BINDING),
-            storage: view(TextureUsages::STORAGE_BINDING),
-        })
-    }
-
-    fn texels(&self) -> usize {
-        6 * (self.size + 2) * (self.size + 2)
-    }
-}
-
-/// What is no tensor of each sample, plane by plane; the share last.
-fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32> {
-    let slots = || views.iter().flat_map(|view| (0..view.surface.slots()).map(|slot| (&view.surface, slot)));
-    let mut numbers = Vec::new();
-    for (name, width) in adjoint.fixed() {
-        let number = |fragment: Fragment<f32>, c: usize| match name {
-            "base" => fragment.base[c],
-            "view" => fragment.view[c],
-            "normal" => fragment.normal[c],
-            "silhouette" => fragment.silhouette,
-            _ => fragment.dapple,
-        };
-        for c in 0..width {
-            numbers.extend(slots().map(|(surface, slot)| number(surface.fragment(slot), c)));
-        }
-    }
-    numbers.extend(slots().map(|(surface, slot)| surface.weight(slot)));
-    numbers
-}
-
-/// Where each group's records start, the views one after the other.
-fn group_starts(views: &[&ViewSamples]) -> Vec<u32> {
-    let mut starts = vec![0];
-    for view in views {
-        let base = starts.last().copied().unwrap_or(0);
-        starts.extend(view.group_start.iter().skip(1).map(|end| base + end));
-    }
-    starts
 }

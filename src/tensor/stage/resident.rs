@@ -1,0 +1,137 @@
+//! What stays on the device from pass to pass: constants, cubes, and what is no tensor of each sample.
+
+use wgpu::{
+    BindingResource, Buffer, BufferUsages, CommandEncoder, ComputePipeline, Extent3d, TextureDescriptor,
+    TextureDimension, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
+};
+
+use crate::gpu::{Gpu, GpuError};
+use crate::model::fragment::Fragment;
+use crate::model::params::Param;
+use crate::samples::ViewSamples;
+use crate::tensor::adjoint::Adjoint;
+use crate::tensor::buffer::TensorBuffer;
+use crate::tensor::pass;
+use crate::tensor::shade::Shaded;
+
+/// The block of constants, and the pass that fills it.
+#[derive(Debug)]
+pub(super) struct Constants {
+    pipeline: ComputePipeline,
+    values: Buffer,
+    filled: Buffer,
+    pub(super) block: Buffer,
+}
+
+/// A cube that shaders read.
+#[derive(Clone, Debug)]
+pub(super) struct Faces {
+    pub(super) size: usize,
+    pub(super) view: TextureView,
+    /// Of the same texels, to be written.
+    storage: TextureView,
+}
+
+impl Constants {
+    pub(super) fn new(gpu: &Gpu, adjoint: &Adjoint, shaded: &Shaded<'_>) -> Result<Option<Self>, GpuError> {
+        if adjoint.plan.constants.is_empty() {
+            return Ok(None);
+        }
+        let module = pass::module(gpu, "constants", &adjoint.constants())?;
+        let values: Vec<f32> = Param::all()
+            .flat_map(|param| shaded.params.rgb(param).into_iter().chain([0.0]))
+            .map(|value| value as f32)
+            .collect();
+        let bytes = 16 * adjoint.plan.constants.len();
+        let block = |usage| gpu.buffer("constants", &vec![0; bytes], usage);
+        Ok(Some(Self {
+            pipeline: pass::pipeline(gpu, &module, "cs_main")?,
+            values: gpu.storage("parameters", bytemuck::cast_slice(&values))?,
+            filled: block(BufferUsages::STORAGE | BufferUsages::COPY_SRC),
+            block: block(BufferUsages::UNIFORM),
+        }))
+    }
+
+    /// Take the free columns from their tensor, and all else from the parameters, to the block.
+    pub(super) fn fill(&self, gpu: &Gpu, encoder: &mut CommandEncoder, columns: Option<&TensorBuffer>) {
+        let mut resources = vec![(1, self.values.as_entire_binding()), (2, self.filled.as_entire_binding())];
+        resources.extend(columns.map(|columns| (0, columns.binding())));
+        pass::dispatch(gpu, encoder, &self.pipeline, &[resources], 1);
+        encoder.copy_buffer_to_buffer(&self.filled, 0, &self.block, 0, self.block.size());
+    }
+}
+
+impl Faces {
+    pub(super) fn new(gpu: &Gpu, size: usize) -> Result<Self, GpuError> {
+        let side = size as u32 + 2;
+        let texture = gpu.device.create_texture(&TextureDescriptor {
+            label: Some("faces"),
+            size: Extent3d { width: side, height: side, depth_or_array_layers: 6 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: TextureDimension::D2,
+            format: TextureFormat::Rgba32Float,
+            usage: TextureUsages::TEXTURE_BINDING | TextureUsages::STORAGE_BINDING,
+            view_formats: &[],
+        });
+        gpu.check()?;
+        let view = |usage| {
+            texture.create_view(&TextureViewDescriptor {
+                dimension: Some(TextureViewDimension::D2Array),
+                usage: Some(usage),
+                ..TextureViewDescriptor::default()
+            })
+        };
+        Ok(Self {
+            size,
+            view: view(TextureUsages::TEXTURE_BINDING),
+            storage: view(TextureUsages::STORAGE_BINDING),
+        })
+    }
+
+    /// Take the texels from their tensor to where shaders read them.
+    pub(super) fn fill(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut CommandEncoder,
+        pipeline: &ComputePipeline,
+        texels: &TensorBuffer,
+    ) {
+        let resources = vec![(0, texels.binding()), (1, BindingResource::TextureView(&self.storage))];
+        pass::dispatch(gpu, encoder, pipeline, &[resources], self.texels() as u64);
+    }
+
+    pub(super) fn texels(&self) -> usize {
+        6 * (self.size + 2) * (self.size + 2)
+    }
+}
+
+/// What is no tensor of each sample, plane by plane; the share last.
+pub(super) fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32> {
+    let slots = || views.iter().flat_map(|view| (0..view.surface.slots()).map(|slot| (&view.surface, slot)));
+    let mut numbers = Vec::new();
+    for (name, width) in adjoint.fixed() {
+        let number = |fragment: Fragment<f32>, c: usize| match name {
+            "base" => fragment.base[c],
+            "view" => fragment.view[c],
+            "normal" => fragment.normal[c],
+            "silhouette" => fragment.silhouette,
+            _ => fragment.dapple,
+        };
+        for c in 0..width {
+            numbers.extend(slots().map(|(surface, slot)| number(surface.fragment(slot), c)));
+        }
+    }
+    numbers.extend(slots().map(|(surface, slot)| surface.weight(slot)));
+    numbers
+}
+
+/// Where each group's records start, the views one after the other.
+pub(super) fn group_starts(views: &[&ViewSamples]) -> Vec<u32> {
+    let mut starts = vec![0];
+    for view in views {
+        let base = starts.last().copied().unwrap_or(0);
+        starts.extend(view.group_start.iter().skip(1).map(|end| base + end));
+    }
+    starts
+}
