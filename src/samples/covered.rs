@@ -83,15 +83,15 @@ impl Covered {
     pub fn new(scene: &Scene, camera: &Camera, mask: &SampleMask) -> (Self, ViewSamples) {
         let axis = scene.quality.samples_per_axis.max(1);
         let rows = (0..camera.height).into_par_iter().map(|y| row(mask, camera.width, axis, y));
-        let rows: Vec<(Vec<(u32, u32)>, Vec<u16>)> = rows.collect();
+        let rows: Vec<Row> = rows.collect();
         let (mut pixels, mut places) = (Vec::new(), Vec::new());
-        for (row, of_row) in rows {
+        for row in rows {
             let mut start = places.len() as u32;
-            for (pixel, count) in row {
+            for (pixel, count) in row.pixels {
                 pixels.push((pixel, start..start + count));
                 start += count;
             }
-            places.extend(of_row);
+            places.extend(row.places);
         }
         let order = order(&pixels, camera.width);
         let mut samples = groups(&pixels, &order, axis * axis);
@@ -128,9 +128,18 @@ impl Covered {
     }
 }
 
-/// The pixels of a row with how many of their samples are set, and which.
-fn row(mask: &SampleMask, width: u32, axis: u32, y: u32) -> (Vec<(u32, u32)>, Vec<u16>) {
-    let (mut pixels, mut places) = (Vec::new(), Vec::new());
+/// A row of pixels that show the mesh.
+#[derive(Default)]
+struct Row {
+    /// For each, its index in the image and how many samples it has.
+    pixels: Vec<(u32, u32)>,
+    /// For each of their samples, which of the pixel's it is.
+    places: Vec<u16>,
+}
+
+/// The pixels of row `y` of which samples are set.
+fn row(mask: &SampleMask, width: u32, axis: u32, y: u32) -> Row {
+    let Row { mut pixels, mut places } = Row::default();
     for x in 0..width {
         let before = places.len();
         let set = |place: &u32| mask.is_set(x * axis + place % axis, y * axis + place / axis);
@@ -139,7 +148,7 @@ fn row(mask: &SampleMask, width: u32, axis: u32, y: u32) -> (Vec<(u32, u32)>, Ve
             pixels.push((y * width + x, (places.len() - before) as u32));
         }
     }
-    (pixels, places)
+    Row { pixels, places }
 }
 
 #[cfg(test)]
