@@ -140,7 +140,9 @@ fn measure(
     let mut renderer = Renderer::with_shader(gpu, content, render, change)?;
     let (made, groups) = DeviceSamples::new(gpu, content)?;
     let views = groups.into_iter().map(|samples| {
-        let target = Rows::new(3, samples.groups());
+        // With alpha where the image has the haze there.
+        let hazy = effects.needs(prepared.scene.silhouette).haze;
+        let target = Rows::new(if hazy { 4 } else { 3 }, samples.groups());
         ObservedView { samples, target, ..ObservedView::default() }
     });
     let views: Vec<ObservedView> = views.collect();
