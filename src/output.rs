@@ -39,6 +39,12 @@ pub fn write_with<E: ToString>(
     fill: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> Result<(), E>,
 ) -> Result<(), OutputError> {
     let error = |reason: String| OutputError::new(path, &reason);
+    // Through links, so that what they lead to is replaced and not they; what is not there yet is no link.
+    let resolved = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let path = resolved.as_path();
+    if path.is_dir() {
+        return Err(error("a folder stands there".to_owned()));
+    }
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -116,6 +122,21 @@ mod tests {
         write(&pipe, b"passed on").unwrap();
         assert_eq!(reader.join().unwrap(), b"passed on");
         assert!(std::fs::metadata(&pipe).unwrap().file_type().is_fifo());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_is_followed_and_a_folder_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let [file, link, to_folder] = ["file", "link", "to_folder"].map(|name| folder.path().join(name));
+        write(&file, b"old").unwrap();
+        std::os::unix::fs::symlink(&file, &link).unwrap();
+        std::os::unix::fs::symlink(folder.path(), &to_folder).unwrap();
+        write(&link, b"new").unwrap();
+        assert_eq!(std::fs::read(&file).unwrap(), b"new");
+        assert!(std::fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert!(write(&to_folder, b"new").unwrap_err().to_string().contains("a folder stands there"));
+        assert!(std::fs::symlink_metadata(&to_folder).unwrap().is_symlink());
     }
 
     #[test]

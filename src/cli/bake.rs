@@ -96,16 +96,18 @@ fn write_cube(folder: &Path, name: &str, cube: &Cube<f32>) -> Result<(), Refusal
     Ok(())
 }
 
+/// A column for each morph target that has a weight; the others are not baked.
 fn occlusion_csv(occlusion: &VertexOcclusion) -> String {
     let mut text = "vertex,open".to_owned();
-    for morph in 0..occlusion.morphs.len() {
+    let baked = || occlusion.morphs.iter().enumerate().filter(|(_, set)| !set.is_empty());
+    for (morph, _) in baked() {
         let _ = write!(text, ",morph_{morph}");
     }
     text.push('\n');
     for (vertex, open) in occlusion.base.iter().enumerate() {
         let _ = write!(text, "{vertex},{open}");
-        for morph in &occlusion.morphs {
-            let _ = write!(text, ",{}", morph[vertex]);
+        for (_, set) in baked() {
+            let _ = write!(text, ",{}", set[vertex]);
         }
         text.push('\n');
     }

@@ -121,7 +121,10 @@ pub(super) fn run_collect(arguments: &CollectArguments) -> Result<Exit, Refusal>
     }
     if !collection.missing.is_empty() {
         let missing: Vec<String> = collection.missing.iter().map(ToString::to_string).collect();
-        tell(&format!("{path}: jobs without a result: {}. Run them with skinfit sweep.", missing.join(", ")));
+        tell(&format!(
+            "{path}: jobs without a result, by number: {}. Run them with skinfit sweep.",
+            missing.join(", ")
+        ));
     }
     Ok(if collection.complete() { Exit::Done } else { Exit::Failed })
 }

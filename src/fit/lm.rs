@@ -41,6 +41,9 @@ const MOST_DAMPING: f64 = 1e16;
 /// it (a tenth of the passes where outliers are left in, half with the loss `smape`).
 const MOST_STRETCH: f64 = 4.0;
 const NEAR: f64 = 0.9;
+/// Where elimination says that less than this share of a measured loss is left, that is a difference of sums
+/// that agree in all their digits: what is left must be measured.
+const LEFT: f64 = 1e-7;
 /// Linear unknowns that moved by more than this leave the Jacobian stale.
 const STALE: f64 = 0.01;
 /// Once, a step from a stale Jacobian may raise the eliminated loss by this factor, though not above the
@@ -79,6 +82,7 @@ impl<'a> LevenbergMarquardt<'a> {
             rejected: 0,
             forgiven: false,
             idle: 0,
+            renewed: None,
             first_loss: first.loss,
             ending: None,
             base: first.clone(),
@@ -168,11 +172,18 @@ impl<'a> LevenbergMarquardt<'a> {
         step
     }
 
+    /// Whether the base's loss is known from rounding alone; not when measuring it did not change that.
+    fn is_rounding(&self) -> bool {
+        let memory = &self.memory;
+        memory.base.loss < LEFT * memory.measured
+            && memory.renewed.is_none_or(|before| memory.measured < 0.1 * before)
+    }
+
     /// Whether the base is the answer; if so, the last undamped step is taken on trust.
     fn settle(&mut self) -> bool {
         let memory = &self.memory;
         let nonlinear = self.coordinates.unknowns().iter().any(|u| !u.linear());
-        if nonlinear && memory.moved > STALE {
+        if (nonlinear && memory.moved > STALE) || self.is_rounding() {
             return false;
         }
         let step = self.step(0.0);
@@ -303,12 +314,20 @@ impl Solver<&Passes<'_>, LmState> for LevenbergMarquardt<'_> {
         problem: &mut Problem<&Passes<'_>>,
         state: LmState,
     ) -> Result<(LmState, Option<KV>), Error> {
-        // Before a step rejected twice is blamed on its length once more, a stale Jacobian is renewed in place.
-        let stale = self.memory.rejected > 1 && self.memory.moved > STALE;
+        // What elimination left is measured where it is rounding. And before a step rejected twice is blamed on its length once more, a stale Jacobian is renewed in place.
+        let rounding = self.is_rounding();
+        if rounding {
+            self.memory.renewed = Some(self.memory.measured);
+        }
+        let stale = rounding || (self.memory.rejected > 1 && self.memory.moved > STALE);
         let step = if stale { vec![0.0; self.memory.base.len()] } else { self.damped_step() };
         let at = self.coordinates.moved(&self.memory.base.at, &step);
         let trial = problem.problem("passes", |passes| Ok(passes.linearise(&at)))?;
         let promised = self.promised(&step);
+        if rounding && trial.is_finite() {
+            // An extreme start says nothing of what gains are worth.
+            self.memory.first_loss = self.memory.first_loss.min(trial.loss);
+        }
         let taken = if stale && trial.is_finite() { self.renew(trial) } else { self.judge(&step, trial) };
         let ending =
             if taken { self.settle().then_some(Ending::Converged) } else { self.exhausted(promised) };

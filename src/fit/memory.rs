@@ -29,7 +29,10 @@ pub struct Memory {
     pub(super) forgiven: bool,
     /// Steps taken in a row whose gain was within rounding.
     pub(super) idle: u32,
-    /// The loss at the start.
+    /// The loss that was measured when the model was last made anew because elimination left nothing of it but
+    /// rounding.
+    pub(super) renewed: Option<f64>,
+    /// The loss at the start; of a start that was nothing but an extreme number, after it.
     pub(super) first_loss: f64,
     /// How it ended, when it did.
     pub ending: Option<Ending>,

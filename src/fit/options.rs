@@ -143,8 +143,8 @@ pub enum FitError {
     Empty,
     /// The start is no place to begin at.
     #[error(
-        "the {what} at the start is {value}, which is not a finite number. Check the start values and the \
-         targets for extreme numbers."
+        "the {what} at the start is {value}, which is not a finite number. Check the start values, the \
+         targets, the environment (its intensity too) and the maps for extreme numbers."
     )]
     NotFinite {
         /// The loss or its derivative, named.

@@ -13,7 +13,7 @@ pub enum GpuError {
     /// There is nothing to render on.
     #[error(
         "no graphics adapter was found: no Vulkan, Metal or DirectX 12 driver answers. {SOFTWARE_DRIVER}; \
-         or render with --engine cpu."
+         or take --engine cpu."
     )]
     NoAdapter,
     /// There are adapters, but not that one.
@@ -28,7 +28,7 @@ pub enum GpuError {
     },
     /// The adapter gives no device.
     #[error(
-        "adapter {adapter}: it gives no device: {reason}. Update its driver, choose another adapter with --adapter, or render with --engine cpu."
+        "adapter {adapter}: it gives no device: {reason}. Update its driver, choose another adapter with --adapter, or take --engine cpu."
     )]
     NoDevice {
         /// The adapter.
@@ -38,7 +38,7 @@ pub enum GpuError {
     },
     /// A texture's side is beyond the adapter's limit.
     #[error(
-        "adapter {adapter}: the {what} has {width} x {height} texels, but a side may have {limit} at most there. {remedy}, or render with --engine cpu."
+        "adapter {adapter}: the {what} has {width} x {height} texels, but a side may have {limit} at most there. {remedy}, or take --engine cpu."
     )]
     TextureSize {
         /// The adapter.
@@ -56,7 +56,7 @@ pub enum GpuError {
     },
     /// A buffer is beyond the adapter's limit.
     #[error(
-        "adapter {adapter}: the {what} takes {bytes} bytes, but a buffer may have {limit} at most there. Use a smaller mesh or fewer morph targets, choose another adapter with --adapter, or render with --engine cpu."
+        "adapter {adapter}: the {what} takes {bytes} bytes, but a buffer may have {limit} at most there. Use a smaller mesh or fewer morph targets, choose another adapter with --adapter, or take --engine cpu."
     )]
     BufferSize {
         /// The adapter.
@@ -70,7 +70,7 @@ pub enum GpuError {
     },
     /// The device has no memory left.
     #[error(
-        "adapter {adapter}: out of memory. Use a smaller image (--size), fewer samples (--antialias) or smaller maps, or render with --engine cpu."
+        "adapter {adapter}: out of memory. Use a smaller image (--size), fewer samples (--antialias) or smaller maps, or take --engine cpu."
     )]
     OutOfMemory {
         /// The adapter.
@@ -90,7 +90,7 @@ pub enum GpuError {
     },
     /// The device is gone.
     #[error(
-        "adapter {adapter}: the device was lost: {reason}. Its driver was reset or taken away: try again, choose another adapter with --adapter, or render with --engine cpu."
+        "adapter {adapter}: the device was lost: {reason}. Its driver was reset or taken away: try again, choose another adapter with --adapter, or take --engine cpu."
     )]
     Lost {
         /// The adapter.
@@ -100,7 +100,7 @@ pub enum GpuError {
     },
     /// The driver refuses what it was given.
     #[error(
-        "adapter {adapter}: its driver refuses the work: {reason}. This is a fault of skinfit or of the driver: please report it, and render with --engine cpu meanwhile."
+        "adapter {adapter}: its driver refuses the work: {reason}. This is a fault of skinfit or of the driver: please report it, and take --engine cpu meanwhile."
     )]
     Refused {
         /// The adapter.

@@ -239,3 +239,31 @@ impl TermName {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::effects::Form;
+
+    #[test]
+    fn the_terms_add_up_to_the_result() {
+        let terms = Terms {
+            diffuse: [0.31, 0.52, 0.73],
+            side: [0.11, 0.23, 0.37],
+            hilite: [1.9, 0.7, 0.4],
+            mirror: [2.3, 1.1, 0.6],
+            haze: 0.3,
+            key: [0.4, -0.2, 0.1],
+            silhouette: 0.6,
+        };
+        let effects = Effects::SURFACE.with(Effect::KeyLight);
+        let mut params = Params::defaults(Form::Corrected);
+        params.set(Param::Occlusion, 0.7);
+        let composition = Composition::new(terms, 0.4, Weights::new(&params, effects, 0.0));
+        for c in 0..3 {
+            let sum: f64 = composition.each_term(c).iter().map(|(_, value)| value).sum();
+            // A few roundings of f64.
+            assert!((sum - composition.result(c)).abs() < 1e-15, "{c}: {sum} {}", composition.result(c));
+        }
+    }
+}

@@ -5,8 +5,12 @@ use std::path::{Path, PathBuf};
 /// The folder `name` of the shared material beside the project (`../shared/<name>`), or wherever
 /// the environment variable `variable` says; `None`, said on standard error, when it is not there.
 pub(crate) fn shared(name: &str, variable: &str) -> Option<PathBuf> {
-    let folder = std::env::var_os(variable)
-        .map_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(name), PathBuf::from);
+    let given = std::env::var_os(variable).map(PathBuf::from);
+    if let Some(folder) = given {
+        assert!(folder.is_dir(), "{variable} is set to {}, which is not there", folder.display());
+        return Some(folder);
+    }
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared").join(name);
     if folder.is_dir() {
         return Some(folder);
     }

@@ -271,7 +271,7 @@ fn a_sweep_under_slurm_loses_a_node_and_still_gives_what_a_local_one_gives() {
     assert!(before < 12, "it was over before the node was killed");
     let after = desk.run(&["collect", "plan.toml", "-o", "half.csv"]);
     assert_eq!(after.code, Some(1), "{after:?}");
-    assert!(after.err.contains("plan.toml: jobs without a result: "), "{after:?}");
+    assert!(after.err.contains("plan.toml: jobs without a result, by number: "), "{after:?}");
     // It comes back, as a machine does that was started again; its job is queued again by itself.
     slurm.start_node(1);
     poll(&format!("every result; {}", slurm.logs()), || (results(&desk) == 12).then_some(()));

@@ -250,6 +250,11 @@ impl Builder<'_> {
         }
         if let Some(weights) = &self.ask.morph_weights {
             let (given, morphs) = (weights.len(), &mut self.mesh.morphs);
+            if count == 0 {
+                return Err(
+                    document.error("has nothing in its scene: the mesh is empty", "Export the mesh with it")
+                );
+            }
             if given != morphs.len() {
                 let names: Vec<&str> = morphs.iter().map(|morph| morph.name.as_str()).collect();
                 return Err(document.error(

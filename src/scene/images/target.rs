@@ -3,8 +3,12 @@
 use std::path::Path;
 
 use super::{Image, read, srgb_decode};
+use crate::model::params::LARGEST;
 use crate::scene::error::{SceneError, Warnings, warn};
 use crate::scene::view::{Clip, Target};
+
+/// The largest number of a target: what is matched to it, and the squares of errors, stay in the range of f32.
+const BRIGHTEST: f32 = LARGEST as f32;
 
 /// A target of `size`: linear radiance, premultiplied by coverage.
 ///
@@ -23,6 +27,17 @@ pub(in crate::scene) fn target(
         Clip { low: at(0.5), high: at(f64::from(code) - 0.5) }
     });
     image.decode_srgb();
+    if let Some(i) = image.rgb.iter().position(|rgb| rgb.iter().any(|x| x.abs() > BRIGHTEST)) {
+        let (x, y) = (i % size.0 as usize, i / size.0 as usize);
+        return Err(SceneError::new(
+            path,
+            format!(
+                "has {:?} at pixel ({x}, {y}): errors beyond {BRIGHTEST:e} have no square in 32 bits",
+                image.rgb[i]
+            ),
+            "Scale the target, and the environment's intensity with it",
+        ));
+    }
     let alpha = image.alpha.take().map(|alpha| clamp(alpha, "coverage", path, warnings));
     if let (Some(_), Some(alpha)) = (image.code, &alpha) {
         for (rgb, a) in image.rgb.iter_mut().zip(alpha) {
@@ -40,7 +55,7 @@ fn read_mask(path: &Path, size: (u32, u32), warnings: &mut Warnings) -> Result<V
     if mask.iter().all(|&weight| weight == 0.0) {
         return Err(SceneError::new(
             path,
-            "is an empty mask: every pixel is 0, so nothing would be compared",
+            "is an empty mask: no pixel is above 0, so nothing would be compared",
             "Paint white what counts, or leave the mask out",
         ));
     }

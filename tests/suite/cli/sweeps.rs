@@ -82,7 +82,7 @@ fn a_job_that_is_done_is_left_alone_and_one_whose_result_is_damaged_is_done_agai
     desk.write(&path, &first[..first.len() / 2]);
     let ran = collect(&desk, "some.csv");
     assert_eq!(ran.code, Some(1));
-    assert!(ran.err.contains("plan.toml: jobs without a result: 0, 1, 2, 3."), "{ran:?}");
+    assert!(ran.err.contains("plan.toml: jobs without a result, by number: 0, 1, 2, 3."), "{ran:?}");
     let identity = name.replace("job-", "").replace(".json", "");
     desk.run(&["sweep", "plan.toml", "--run", &identity]).done();
     let figures =
