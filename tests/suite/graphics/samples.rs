@@ -237,6 +237,9 @@ fn passes_over_them_equal_the_plain_model_in_parts_and_when_terms_are_kept() {
             let (got, want) = (engine.normal_equations(&point), plain.normal_equations(&point));
             assert_equal(&got, &want, &names(unknowns), &what);
         }
+        let times = engine.shade_times(&point, 3).unwrap();
+        assert_eq!(times.len(), if gpu.timestamps() || gpu.is_software() { 3 } else { 0 });
+        assert!(times.iter().all(|&milliseconds| milliseconds > 0.0), "{times:?}");
     }
 }
 
