@@ -208,17 +208,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 /// A sphere that fills the image, with waves for maps: a sample a pixel.
 fn sphere() -> ViewSamples {
-    let asked = Asked {
-        bump: true,
-        albedo: true,
-        occlusion: true,
-        silhouette: true,
-        dapple: true,
-        specular: true,
-        attenuator: true,
-        weight: true,
-        ..Asked::default()
-    };
+    let asked = Asked { normal: false, ..Asked::EVERYTHING };
     let groups = SIZE * SIZE / LANES;
     let mut samples = ViewSamples {
         group_start: (0..=groups as u32).collect(),

@@ -11,14 +11,15 @@ use super::{Exit, Refusal, say, tell};
 use crate::output;
 use crate::progress;
 use crate::study::sweep::collect::Collection;
-use crate::study::sweep::job;
-use crate::study::sweep::plan::{Job, Plan};
-use crate::study::sweep::result::{Figures, JobResult, Status, settings};
+use crate::study::sweep::job::Job;
+use crate::study::sweep::plan::Plan;
+use crate::study::sweep::result::{Findings, JobResult, Status, settings};
+use crate::study::sweep::run::{self, Inputs};
 
 /// Run the jobs of a plan: many scenes and settings, here or on many machines
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("A plan is a TOML file:\n\n  command = \"fit\"                      # or \"stability\"\n  scene = \"scene.toml\"                 # left out: the built-in scene\n  [settings]                           # for every job\n  solver = \"varpro\"\n  [[axis]]                             # every combination of the axes\n  key = \"fit.loss\"                     # a scene file's key, or scene, solver, seed ...\n  values = [\"l2\", \"huber\"]\n\nEach job leaves one file in the plan's folder of results (results = \"...\", by default beside the plan). A job that has left one is not run again.\n\nExamples:\n  skinfit sweep plan.toml               run what is not done yet\n  skinfit sweep plan.toml --list        a command a job, for a scheduler (docs/sweeps.md)\n  skinfit sweep plan.toml --run 3       one job\n\nskinfit collect merges the results.")
+    after_help = super::with_exit_codes("A plan is a TOML file:\n\n  command = \"fit\"                      # or \"ablate\", \"tradeoff\", \"stability\"\n  scene = \"scene.toml\"                 # left out: the built-in scene\n  [settings]                           # for every job\n  solver = \"varpro\"\n  [[axis]]                             # every combination of the axes\n  key = \"fit.loss\"                     # a scene file's key, or scene, command, solver ...\n  values = [\"l2\", \"huber\"]\n\nEach job leaves one file in the plan's folder of results (results = \"...\", by default beside the plan). A job that has left one is not run again.\n\nExamples:\n  skinfit sweep plan.toml               run what is not done yet\n  skinfit sweep plan.toml --list        a command a job, for a scheduler (docs/sweeps.md)\n  skinfit sweep plan.toml --run 3       one job\n\nskinfit collect merges the results.")
 )]
 pub(super) struct SweepArguments {
     /// The plan file.
@@ -39,7 +40,7 @@ pub(super) struct SweepArguments {
 /// Merge the results of a plan's jobs into one table
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The table is the same whatever order the jobs were done in. Jobs that are missing or failed are named; then the exit code is 1, and the table holds the others.\n\nExamples:\n  skinfit collect plan.toml -o all.csv\n  skinfit collect plan-results -o all.json")
+    after_help = super::with_exit_codes("The table is the same whatever order the jobs were done in. Ablations and tradeoffs have a row for each part left out, each setting. Jobs that are missing or failed are named; then the exit code is 1, and the table holds the others.\n\nExamples:\n  skinfit collect plan.toml -o all.csv\n  skinfit collect plan-results -o all.json")
 )]
 pub(super) struct CollectArguments {
     /// The plan file, or the folder of its results.
@@ -47,6 +48,9 @@ pub(super) struct CollectArguments {
     /// The table: .csv or .json.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
+    /// With the seconds that were measured: another table each time, unlike one without.
+    #[arg(long)]
+    seconds: bool,
     #[command(flatten)]
     bakes: BakeArguments,
 }
@@ -56,6 +60,7 @@ struct Ready<'a> {
     job: &'a Job,
     identity: String,
     scene_text: String,
+    constants: Option<PathBuf>,
 }
 
 pub(super) fn run(arguments: &SweepArguments) -> Result<Exit, Refusal> {
@@ -105,6 +110,7 @@ pub(super) fn run_collect(arguments: &CollectArguments) -> Result<Exit, Refusal>
         let identities: Vec<String> = all.into_iter().map(|ready| ready.identity).collect();
         Collection::of(&plan.results, &identities)
     };
+    let collection = if arguments.seconds { collection.with_times() } else { collection.without_times() };
     let text = match arguments.output.extension().and_then(|ending| ending.to_str()) {
         Some("csv") => collection.csv(),
         Some("json") => collection.json().map_err(|error| Refusal::new(error.to_string()))?,
@@ -150,8 +156,21 @@ fn ready<'a>(plan: &Plan, job: &'a Job, bakes: &BakeArguments) -> Result<Ready<'
     let folder = absolute.parent().unwrap_or(Path::new("/"));
     let absolute =
         as_fitted(&text, folder, Changes::default()).map_err(|error| refused(error.message().to_owned()))?;
+    let constants = plan.constants(job);
+    let read = |path: &PathBuf| {
+        std::fs::read_to_string(path).map_err(|error| {
+            Refusal::new(format!(
+                "{}: the constants of job {} cannot be read: {error}. Correct `params` in {}.",
+                path.display(),
+                job.index,
+                plan.path.display()
+            ))
+        })
+    };
+    let constants_text = constants.as_ref().map(read).transpose()?;
     // Where the scene stands is nothing that the job computes.
-    Ok(Ready { job, identity: job.identity(plan.command, &text), scene_text: absolute })
+    let identity = job.identity(&text, constants_text.as_deref());
+    Ok(Ready { job, identity, scene_text: absolute, constants })
 }
 
 fn is_done(plan: &Plan, identity: &str) -> bool {
@@ -172,18 +191,20 @@ fn run_one(plan: &Plan, ready: &Ready<'_>, bakes: &BakeArguments, tells: bool) -
     let scene = plan.results.join("scenes").join(format!("{identity}.toml"));
     output::write(&scene, ready.scene_text.as_bytes())?;
     let clock = Instant::now();
-    let outcome = job::run(plan.command, ready.job, &scene, bakes.cache().as_deref());
-    let (status, figures) = match outcome {
-        Ok(figures) => (Status::Done, figures),
-        Err(error) => (Status::Failed(error.to_string()), Figures::new()),
+    let cache = bakes.cache();
+    let inputs = Inputs { scene: &scene, constants: ready.constants.as_deref(), cache: cache.as_deref() };
+    let (status, Findings { figures, rows }) = match run::run(ready.job, inputs) {
+        Ok(found) => (Status::Done, found),
+        Err(error) => (Status::Failed(error.to_string()), Findings::default()),
     };
     let result = JobResult {
         job: ready.job.index,
         identity: identity.clone(),
-        command: plan.command.name().to_owned(),
+        command: ready.job.command.name().to_owned(),
         status,
         settings: settings(ready.job),
         figures,
+        rows,
         seconds: clock.elapsed().as_secs_f64(),
     };
     result.write(&plan.results)?;

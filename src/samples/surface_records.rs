@@ -35,6 +35,21 @@ pub struct Asked {
     pub weight: bool,
 }
 
+impl Asked {
+    /// Every number.
+    pub const EVERYTHING: Self = Self {
+        bump: true,
+        normal: true,
+        albedo: true,
+        occlusion: true,
+        silhouette: true,
+        dapple: true,
+        specular: true,
+        attenuator: true,
+        weight: true,
+    };
+}
+
 /// Where a record's numbers stand: of a vector, the first of its three rows. `None` where no enabled
 /// effect asks for them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -37,7 +37,7 @@ pub(crate) fn view(groups: usize, seed: u64) -> ObservedView {
     let records = |group: usize| 1 + group % 3;
     let count = (0..groups).map(records).sum();
     let mut samples = ViewSamples { group_start: vec![0], ..ViewSamples::default() };
-    samples.surface = SurfaceRecords::new(EVERY_NUMBER, count);
+    samples.surface = SurfaceRecords::new(Asked::EVERYTHING, count);
     let (mut target, mut weight) = (Rows::new(4, groups), vec![Row::ZERO; groups]);
     for group in 0..groups {
         let (first, records) = (samples.group_start[group] as usize, records(group));
@@ -59,18 +59,6 @@ pub(crate) fn view(groups: usize, seed: u64) -> ObservedView {
     }
     ObservedView { samples, target, weight, clip: None }
 }
-
-const EVERY_NUMBER: Asked = Asked {
-    bump: true,
-    normal: true,
-    albedo: true,
-    occlusion: true,
-    silhouette: true,
-    dapple: true,
-    specular: true,
-    attenuator: true,
-    weight: true,
-};
 
 fn fragment(rng: &mut StdRng) -> Fragment<f32> {
     let single = |v: [f64; 3]| v.map(|x| x as f32);

@@ -2,7 +2,8 @@
 //!
 //! - [`case`]: what is left out
 //! - [`measure`]: the time of a case beside the whole model's
-//! - [`files`]: the table, `results.csv`, `results.json`, pictures; [`page`]: `report.html`
+//! - [`files`]: the table, `results.csv`, `results.json`, pictures; [`page`]: `report.html`, [`mod@pairs`]
+//!   in it
 //!
 //! Images are compared with the scene's targets, or with the whole model where there are none.
 
@@ -10,6 +11,7 @@ pub mod case;
 pub mod files;
 pub mod measure;
 pub mod page;
+pub mod pairs;
 
 use std::path::{Path, PathBuf};
 
@@ -189,7 +191,8 @@ pub fn ablate(scene: &Path, options: &AblationOptions) -> Result<Ablation, Study
         let (subject, evaluated) = study.evaluate(case, whole.prepared.scene.effects)?;
         // A mesh that the scene poses stays posed.
         if subject.prepared.scene.effects != evaluated.case.effects(whole.prepared.scene.effects) {
-            held.push(evaluated.case.name());
+            // A pair says nothing new.
+            held.extend((evaluated.case.left_out.len() == 1).then(|| evaluated.case.name()));
             continue;
         }
         rows.push(evaluated.row(&subject, &clocks, &before)?);

@@ -23,6 +23,9 @@ pub fn page(scene: &str, ablation: &Ablation) -> Result<String, String> {
     let mut main = warnings(&ablation.warnings);
     main += &section("summary", "What each part is worth, and what it costs", &summary(ablation, full));
     main += &section("tradeoff", "Worth against cost", &tradeoff(ablation, full, cases));
+    if let Some(table) = super::pairs::table(ablation) {
+        main += &section("pairs", "Which parts stand in for each other", &table);
+    }
     let views = format!("<details><summary>Errors of each view</summary>{}</details>", views(ablation));
     main += &section("views", "View by view", &views);
     if ablation.refitted {

@@ -186,7 +186,7 @@ pub fn view(setup: Setup, fragments: &[FragmentInputs], target: [f32; 4]) -> Obs
     let groups = fragments.len().div_ceil(LANES);
     let mut samples = ViewSamples {
         group_start: (0..=groups as u32).collect(),
-        surface: SurfaceRecords::new(EVERY_NUMBER, groups),
+        surface: SurfaceRecords::new(Asked::EVERYTHING, groups),
         ..ViewSamples::default()
     };
     let mut weight = vec![Row::ZERO; groups];
@@ -202,18 +202,6 @@ pub fn view(setup: Setup, fragments: &[FragmentInputs], target: [f32; 4]) -> Obs
     }
     ObservedView { samples, target: targets(&target, groups), weight, clip: None }
 }
-
-const EVERY_NUMBER: Asked = Asked {
-    bump: true,
-    normal: true,
-    albedo: true,
-    occlusion: true,
-    silhouette: true,
-    dapple: true,
-    specular: true,
-    attenuator: true,
-    weight: true,
-};
 
 /// The same target for each pixel of so many groups: three or four channels.
 #[must_use]

@@ -38,7 +38,9 @@ const TINY: f64 = 1e-18;
 /// How often each fragment is moved: first, and again where that was too few to be sure.
 pub const FEW: usize = 6;
 /// See [`FEW`]: near a corner of the function there are many sides to fall on.
-pub const MANY: usize = 200;
+pub const MANY: usize = 400;
+/// How many times all texels are rounded at most.
+const MOST_CUBES: usize = 24;
 
 /// Entries of the packed upper triangle of J^T J.
 pub const PAIRS: usize = Param::COUNT * (Param::COUNT + 1) / 2;
@@ -132,8 +134,12 @@ impl Reference {
         let exponent = setting.params.scalar(Param::SpecularLobe);
         let cubes = WideCubes::<f64>::new(lights.of(setting.lights), exponent);
         let mut rng = StdRng::seed_from_u64(0);
-        let mut rounded = || cubes.changed(|x| x * (1.0 + ROUNDED * step(&mut rng)));
-        let others = [rounded(), rounded(), rounded()];
+        let mut rounded = || {
+            let mut texels = Moves::new(&mut rng, 0);
+            cubes.changed(|x| x * (1.0 + ROUNDED * texels.step()))
+        };
+        // With few of them the worst rounding of a difference of texels may not be among them.
+        let others: Vec<_> = (0..(moves / 2).clamp(3, MOST_CUBES)).map(|_| rounded()).collect();
         // The same moves for each, so that a fragment fares alike alone and among others.
         let each = |inputs| one(setting, (&cubes, &others), inputs, moves, &mut StdRng::seed_from_u64(1));
         Self { fragments: batch.fragments.par_iter().map(each).collect() }
@@ -184,11 +190,11 @@ fn one(
 ) -> FragmentReference {
     let setup = setting.setup;
     let evaluate =
-        |cubes: &WideCubes<f64>, inputs: &FragmentInputs, params: &Params, rng: Option<&mut StdRng>| {
+        |cubes: &WideCubes<f64>, inputs: &FragmentInputs, params: &Params, moves: Option<&mut Moves<'_>>| {
             let f = inputs.fragment(setup, 0.0_f64);
             let mut s = shading_at(setup, &f, params);
-            if let Some(rng) = rng {
-                round_shading(&mut s, &f, (setup.silhouette, params.scalar(Param::NormalStrength)), rng);
+            if let Some(moves) = moves {
+                round_shading(&mut s, &f, (setup.silhouette, params.scalar(Param::NormalStrength)), moves);
             }
             let (composition, slopes) =
                 shade_with_slopes(setup, &cubes.lights(setup, params), &f, &s, params);
@@ -219,9 +225,12 @@ fn one(
     let mut contribution_tolerance = Contribution::NOTHING;
     let (mut value_size, mut slope_size) = (value.map(f64::abs), slopes.map(|slope| slope.map(f64::abs)));
     for number in 0..moves {
-        let (moved, params) = (moved(inputs, rng), moved_params(&setting.params, rng));
+        let mut moves = Moves::new(rng, number);
+        let (moved, params) = (moved(inputs, &mut moves), moved_params(&setting.params, &mut moves));
         let cubes = &others[number % others.len()];
-        let (other, other_slopes, _) = evaluate(cubes, &moved, &params, Some(&mut *rng));
+        let (other, other_slopes, _) = evaluate(cubes, &moved, &params, Some(&mut moves));
+        // SMAPE turns where the model changes its sign: one that is nothing to an f32 may have either.
+        let other = other.map(|x| x + TINY * moves.step());
         let widen = |tolerance: &mut f64, a: f64, b: f64| *tolerance = tolerance.max(SPREAD * (a - b).abs());
         for c in 0..4 {
             widen(&mut value_tolerance[c], other[c], value[c]);
@@ -253,11 +262,11 @@ fn round_shading(
     s: &mut Shading<f64>,
     f: &Fragment<f64>,
     (at, strength): (Silhouette, f64),
-    rng: &mut StdRng,
+    moves: &mut Moves<'_>,
 ) {
     let size = |v: [f64; 3]| v.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
     let mut round = |v: &mut [f64; 3], size: f64| {
-        v.iter_mut().for_each(|x| *x += RADIUS * size * step(&mut *rng));
+        v.iter_mut().for_each(|x| *x += RADIUS * size * moves.step());
     };
     let length = size(std::array::from_fn(|i| f.base[i] + strength * f.bump[i]));
     // At 1e6 the model itself cuts the derivative off.
@@ -275,15 +284,15 @@ fn round_shading(
         let turned = dot(s.n_tangent, f.view);
         if s.silhouette < RADIUS {
             // In an f32 |n.V| may be 1 already, or not yet.
-            s.silhouette_tangent = turned * step(rng);
+            s.silhouette_tangent = turned * moves.step();
         } else if s.silhouette_tangent != 0.0 {
-            s.silhouette_tangent += RADIUS * turning * step(rng);
+            s.silhouette_tangent += RADIUS * turning * moves.step();
         }
-        s.silhouette = (s.silhouette + RADIUS * step(rng)).max(0.0);
+        s.silhouette = (s.silhouette + RADIUS * moves.step()).max(0.0);
     }
 }
 
-fn moved(inputs: &FragmentInputs, rng: &mut StdRng) -> FragmentInputs {
+fn moved(inputs: &FragmentInputs, moves: &mut Moves<'_>) -> FragmentInputs {
     let mut moved = *inputs;
     for vector in
         [&mut moved.texel, &mut moved.tangent, &mut moved.bitangent, &mut moved.normal, &mut moved.view]
@@ -291,31 +300,46 @@ fn moved(inputs: &FragmentInputs, rng: &mut StdRng) -> FragmentInputs {
         let size = vector.iter().fold(0.0_f64, |most, x| most.max(x.abs()));
         // A vector of nothing but zeros stays: every evaluator sees that.
         if size > 0.0 && size.is_finite() {
-            vector.iter_mut().for_each(|x| *x += (RADIUS * size + FLUSHED) * step(rng));
+            vector.iter_mut().for_each(|x| *x += (RADIUS * size + FLUSHED) * moves.step());
         }
     }
     let FragmentInputs { occlusion, silhouette, dapple, albedo, specular, attenuator, .. } = &mut moved;
     for x in [occlusion, silhouette, dapple, specular, attenuator].into_iter().chain(albedo) {
         let flushed = if *x == 0.0 { 0.0 } else { FLUSHED };
-        *x += (RADIUS * x.abs() + flushed) * step(rng);
+        *x += (RADIUS * x.abs() + flushed) * moves.step();
     }
     moved
 }
 
 /// The parameters that evaluators round to f32; angles they turn into sines and cosines in f64.
-fn moved_params(params: &Params, rng: &mut StdRng) -> Params {
+fn moved_params(params: &Params, moves: &mut Moves<'_>) -> Params {
     let mut moved = *params;
     for param in Param::all() {
         let fixed = [Param::SpecularLobe, Param::EnvironmentRotation, Param::KeyAzimuth, Param::KeyElevation];
         if !fixed.contains(&param) {
-            let factor = 1.0 + RADIUS * step(rng);
+            let factor = 1.0 + RADIUS * moves.step();
             moved.set_rgb(param, params.rgb(param).map(|x| x * factor));
         }
     }
     moved
 }
 
-/// -1, 0 or 1: on the edge of what is allowed, more is moved than inside.
-fn step(rng: &mut StdRng) -> f64 {
-    f64::from(rng.random_range(-1_i32..=1))
+/// How numbers are moved, and how far at most, as a share of what is allowed.
+struct Moves<'a> {
+    rng: &'a mut StdRng,
+    reach: f64,
+}
+
+impl<'a> Moves<'a> {
+    /// Move `number`: the first few on the edge of what is allowed, as most is moved there; then every other one
+    /// somewhere inside, where a sum that cancels on the edge may not.
+    fn new(rng: &'a mut StdRng, number: usize) -> Self {
+        let reach = if number < FEW || number.is_multiple_of(2) { 1.0 } else { rng.random_range(0.0..1.0) };
+        Self { rng, reach }
+    }
+
+    /// Down, not at all, or up.
+    fn step(&mut self) -> f64 {
+        self.reach * f64::from(self.rng.random_range(-1_i32..=1))
+    }
 }

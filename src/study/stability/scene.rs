@@ -2,7 +2,9 @@
 
 use super::case::{Batch, FragmentInputs, Setting};
 use super::lights::LightKind;
+use crate::model::compose::TermName;
 use crate::model::effects::{Effect, Effects, Form};
+use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::prepare::Prepared;
@@ -18,7 +20,7 @@ const FAR: f64 = 1e3;
 pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
     let fragments: Vec<FragmentInputs> =
         prepared.samples.iter().flat_map(|view| fragments(view, prepared.scene.form)).collect();
-    let setup = crate::model::evaluate::Setup { effects, ..prepared.setup() };
+    let setup = Setup { effects, ..prepared.setup() };
     let loss = prepared.scene.fit.loss;
     let own = Setting { setup, params: prepared.scene.params, lights: LightKind::Scene, loss };
     let mut settings = vec![own];
@@ -37,7 +39,11 @@ pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
     }
     for effect in effects.iter() {
         for effects in [Effects::of(&[effect]), effects.without(effect)] {
-            settings.push(Setting { setup: crate::model::evaluate::Setup { effects, ..setup }, ..own });
+            // What shows nothing alone (the rim, occlusion) is refused where shaders are planned.
+            let shows = !TermName::of(effects).is_empty() || effects.needs(setup.silhouette).haze;
+            if shows {
+                settings.push(Setting { setup: Setup { effects, ..setup }, ..own });
+            }
         }
     }
     settings.into_iter().map(|setting| Batch { setting, fragments: fragments.clone() }).collect()

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 
-use super::result::{JobResult, Status};
+use super::result::{Figures, JobResult, Status, is_time, number};
 use crate::scene::error::SceneError;
 
 /// The results that there are, and what is missing.
@@ -87,25 +87,55 @@ impl Collection {
         self.missing.is_empty() && self.failed.is_empty()
     }
 
-    /// A row a finished job: its number, settings and figures.
+    /// The same without times, which are others each time.
+    #[must_use]
+    pub fn without_times(mut self) -> Self {
+        for result in self.done.values_mut() {
+            result.figures.retain(|name, _| !is_time(name));
+            result.rows.iter_mut().for_each(|row| row.retain(|name, _| !is_time(name)));
+        }
+        self
+    }
+
+    /// The same with the seconds that each job took among its figures.
+    #[must_use]
+    pub fn with_times(mut self) -> Self {
+        for result in self.done.values_mut() {
+            result.figures.insert("seconds.job".to_owned(), number(result.seconds));
+        }
+        self
+    }
+
+    /// A row a finished job, or a case of it: its number, settings and figures. What a row has not is empty.
     #[must_use]
     pub fn csv(&self) -> String {
-        let keys = |of: fn(&JobResult) -> &BTreeMap<String, Value>| -> BTreeSet<&String> {
-            self.done.values().flat_map(|result| of(result).keys()).collect()
-        };
-        let (settings, figures) = (keys(|result| &result.settings), keys(|result| &result.figures));
+        let settings: BTreeSet<&String> = self.done.values().flat_map(|job| job.settings.keys()).collect();
+        let figures: BTreeSet<&String> = self
+            .done
+            .values()
+            .flat_map(|job| job.figures.keys().chain(job.rows.iter().flatten().map(|f| f.0)))
+            .collect();
+        // What a row is of stands before its figures.
+        let (mut labels, figures): (Vec<_>, Vec<_>) =
+            figures.into_iter().partition(|name| LABELS.contains(&name.as_str()));
+        labels.sort_by_key(|name| LABELS.iter().position(|label| label == name));
         let mut text = "job".to_owned();
-        for key in settings.iter().chain(&figures) {
+        for key in settings.iter().chain(&labels).chain(&figures) {
             let _ = write!(text, ",{}", cell(key));
         }
         text.push('\n');
-        for (index, result) in &self.done {
-            let _ = write!(text, "{index}");
-            let columns = settings.iter().map(|key| result.settings.get(*key));
-            for value in columns.chain(figures.iter().map(|key| result.figures.get(*key))) {
-                let _ = write!(text, ",{}", value.map_or_else(String::new, word));
+        for (index, job) in &self.done {
+            let none = [Figures::new()];
+            for row in if job.rows.is_empty() { &none[..] } else { &job.rows } {
+                let _ = write!(text, "{index}");
+                let columns = settings.iter().map(|key| job.settings.get(*key));
+                let found =
+                    labels.iter().chain(&figures).map(|key| row.get(*key).or_else(|| job.figures.get(*key)));
+                for value in columns.chain(found) {
+                    let _ = write!(text, ",{}", value.map_or_else(String::new, word));
+                }
+                text.push('\n');
             }
-            text.push('\n');
         }
         text
     }
@@ -119,8 +149,10 @@ impl Collection {
             json!({
                 "job": result.job,
                 "identity": result.identity,
+                "command": result.command,
                 "settings": result.settings,
                 "figures": result.figures,
+                "rows": result.rows,
             })
         };
         let failed = |(job, reason): (&usize, &String)| json!({"job": job, "reason": reason});
@@ -132,6 +164,9 @@ impl Collection {
         serde_json::to_string_pretty(&all).map(|text| text + "\n")
     }
 }
+
+/// Figures that say what a row is of.
+const LABELS: [&str; 3] = ["left_out", "axis", "setting"];
 
 /// A value as a cell.
 fn word(value: &Value) -> String {
@@ -163,6 +198,7 @@ mod tests {
             status,
             settings: BTreeMap::from([("effects".to_owned(), json!(["rim", "diffuse"]))]),
             figures: BTreeMap::from([("loss".to_owned(), json!(0.5)), ("error".to_owned(), Value::Null)]),
+            rows: Vec::new(),
             seconds: job as f64,
         }
     }
@@ -181,6 +217,34 @@ mod tests {
         assert_eq!(collect([0, 1, 2]), collect([2, 0, 1]));
         let (csv, _) = collect([1, 0, 2]);
         assert_eq!(csv.lines().nth(2), Some("1,\"[\"\"rim\"\",\"\"diffuse\"\"]\",,0.5"));
+    }
+
+    #[test]
+    fn jobs_of_different_kinds_share_a_table_and_times_are_there_on_request() {
+        let mut ablation = result(1, Status::Done);
+        ablation.figures = BTreeMap::from([("reference".to_owned(), json!("targets"))]);
+        let row = |name: &str, loss: f64| {
+            Figures::from([
+                ("left_out".to_owned(), json!(name)),
+                ("loss".to_owned(), json!(loss)),
+                ("seconds.pass".to_owned(), json!(0.25)),
+            ])
+        };
+        ablation.rows = vec![row("nothing", 0.5), row("rim", 0.75)];
+        let done = BTreeMap::from([(0, result(0, Status::Done)), (1, ablation)]);
+        let collection = Collection { done, ..Collection::default() };
+        let effects = "\"[\"\"rim\"\",\"\"diffuse\"\"]\"";
+        let wanted = format!(
+            "job,effects,left_out,error,loss,reference\n0,{effects},,,0.5,\n1,{effects},nothing,,0.5,targets\n\
+             1,{effects},rim,,0.75,targets\n"
+        );
+        assert_eq!(collection.clone().without_times().csv(), wanted);
+        let timed = collection.with_times().csv();
+        assert!(
+            timed.starts_with("job,effects,left_out,error,loss,reference,seconds.job,seconds.pass\n"),
+            "{timed}"
+        );
+        assert!(timed.ends_with(",rim,,0.75,targets,1.0,0.25\n"), "{timed}");
     }
 
     #[test]

@@ -1,118 +1,115 @@
-//! One job, from its scene to its figures.
+//! What a job is: its number, what it runs, its settings.
 
-use std::path::Path;
+use toml::{Table, Value};
 
-use serde_json::Value;
+use super::command::Command;
 
-use super::plan::{Command, Job};
-use super::result::Figures;
-use crate::engine::cpu::CpuEngine;
-use crate::engine::{Objective as _, Unknown};
-use crate::fit::outcome::Outcome;
-use crate::fit::{FitError, FitOptions, SolverKind, fit};
-use crate::prepare::{PrepareError, PrepareOptions, Prepared};
-use crate::scene::Loss;
-use crate::scene::error::SceneError;
-use crate::study::stability::lights::LightBox;
-use crate::study::stability::scene::{batches, sweepable};
-use crate::study::stability::{Study, evaluators, kept};
+/// A key with its value.
+pub type Setting = (String, Value);
 
-/// A job could not be done.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant is the stage's own error")]
-pub enum JobError {
-    #[error(transparent)]
-    Prepare(#[from] PrepareError),
-    #[error(transparent)]
-    Fit(#[from] FitError),
-    #[error(transparent)]
-    Scene(#[from] SceneError),
+/// One job of a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Job {
+    /// Its number, from 0.
+    pub index: usize,
+    /// What it runs.
+    pub command: Command,
+    /// Its settings in the plan's order: axes, then what is listed; what is the same for all comes last.
+    pub settings: Vec<Setting>,
 }
 
-/// Run a job on its scene file. The figures are the same for any number of threads.
-///
-/// # Errors
-/// When a stage refuses its input.
-pub fn run(command: Command, job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
-    match command {
-        Command::Fit => run_fit(job, scene, cache),
-        Command::Stability => run_stability(job, scene, cache),
-    }
-}
-
-fn run_fit(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
-    let options = PrepareOptions { fit: true, cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(scene, &options)?;
-    let engine = prepared.engine()?;
-    let solver = job.get("solver").and_then(toml::Value::as_str).and_then(SolverKind::from_name);
-    let options = FitOptions {
-        solver: solver.unwrap_or_default(),
-        max_iterations: job.whole("max_iterations"),
-        starts: job.whole("starts").and_then(|n| u32::try_from(n).ok()).unwrap_or(1),
-        seed: job.whole("seed").unwrap_or(0),
-        ..FitOptions::default()
-    };
-    let outcome = fit(&engine, &prepared.start(), &options, &mut |_| {})?;
-    let (setup, light) = (prepared.setup(), prepared.illumination.clone());
-    let squares = CpuEngine::new(setup, light, engine.views().to_vec(), Loss::L2, Vec::new());
-    let view = |index: usize| prepared.scene.views.get(index).map_or("?", |view| &view.name);
-    Ok(fit_figures(&outcome, squares.loss(&outcome.end).sqrt(), view))
-}
-
-fn fit_figures<'a>(outcome: &Outcome, rmse: f64, view: impl Fn(usize) -> &'a str) -> Figures {
-    let mut figures = Figures::from([
-        ("ending".to_owned(), outcome.ending.words().into()),
-        ("evaluations".to_owned(), outcome.evaluations.into()),
-        ("iterations".to_owned(), outcome.iterations.into()),
-        ("loss_end".to_owned(), number(outcome.loss_end)),
-        ("loss_start".to_owned(), number(outcome.loss_start)),
-        // Whatever was minimised: the root of the mean squared difference of linear radiance.
-        ("rmse".to_owned(), number(rmse)),
-    ]);
-    for unknown in &outcome.unknowns {
-        let name = match unknown.unknown {
-            Unknown::Gain(index) => format!("gain.{}", view(index)),
-            Unknown::Param(column) => column.name(),
+impl Job {
+    /// A job with its own settings and what is said for all; what its command does not take of that is not for
+    /// it.
+    ///
+    /// # Errors
+    /// In words, when a setting of its own is none of its command's.
+    pub(super) fn new(
+        index: usize,
+        command: Command,
+        mut settings: Vec<Setting>,
+        common: &[Setting],
+    ) -> Result<Self, String> {
+        let named = |settings: &[Setting]| {
+            let (_, value) = settings.iter().find(|(key, _)| key == "command")?;
+            Command::from_name(value.as_str()?)
         };
-        figures.insert(format!("value.{name}"), number(unknown.value));
-        figures.insert(format!("error.{name}"), unknown.std_error.map_or(Value::Null, number));
+        let command = named(&settings).or_else(|| named(common)).unwrap_or(command);
+        if let Some((key, _)) = settings.iter().find(|(key, _)| !command.takes(key)) {
+            return Err(format!("job {index}: `{key}` is no setting of `{}`", command.name()));
+        }
+        // What a job says itself goes before what is said for all.
+        let rest: Vec<Setting> = common
+            .iter()
+            .filter(|(key, _)| command.takes(key) && !settings.iter().any(|(own, _)| own == key))
+            .cloned()
+            .collect();
+        settings.extend(rest);
+        Ok(Self { index, command, settings })
     }
-    figures
+
+    /// The value of a setting.
+    #[must_use]
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        self.settings.iter().find(|(name, _)| name == key).map(|(_, value)| value)
+    }
+
+    /// A whole number among the settings.
+    #[must_use]
+    pub fn whole(&self, key: &str) -> Option<u64> {
+        self.get(key).and_then(Value::as_integer).and_then(|value| u64::try_from(value).ok())
+    }
+
+    /// Whether a setting is there and true.
+    #[must_use]
+    pub fn is_set(&self, key: &str) -> bool {
+        self.get(key).and_then(Value::as_bool).unwrap_or(false)
+    }
+
+    /// Its number, and a hash of what it computes from the texts of its scene and of its constants, if it is
+    /// given some: `0003-1f2e3d4c`.
+    #[must_use]
+    pub fn identity(&self, scene: &str, constants: Option<&str>) -> String {
+        let mut hash = blake3::Hasher::new();
+        for part in [env!("CARGO_PKG_VERSION"), self.command.name(), scene].into_iter().chain(constants) {
+            hash.update(part.as_bytes()).update(&[0]);
+        }
+        for (key, value) in &self.settings {
+            hash.update(format!("{key}={value}").as_bytes()).update(&[0]);
+        }
+        format!("{:04}-{}", self.index, &hash.finalize().to_hex()[..8])
+    }
 }
 
-/// A number; one that is not finite is null.
-fn number(x: f64) -> Value {
-    Value::from(x)
+/// Every combination of what is listed with the axes (a key and its values each), the last one fastest.
+pub(super) fn combine(axes: &[(&str, &[Value])], lists: &[Vec<Setting>]) -> Vec<Vec<Setting>> {
+    let mut all: Vec<Vec<Setting>> = lists.to_vec();
+    for (key, values) in axes {
+        let with = |settings: &Vec<Setting>| {
+            let settings = settings.clone();
+            let set = move |value: &Value| {
+                settings.iter().cloned().chain([((*key).to_owned(), value.clone())]).collect()
+            };
+            values.iter().map(set).collect::<Vec<Vec<Setting>>>()
+        };
+        all = all.iter().flat_map(with).collect();
+    }
+    all
 }
 
-fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
-    let options = PrepareOptions { cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(scene, &options)?;
-    let effects = sweepable(prepared.scene.effects, prepared.scene.environment.is_some());
-    if effects != prepared.scene.effects {
-        prepared = Prepared::new(scene, &PrepareOptions { effects: Some(effects), ..options })?;
+/// The settings of a table; tables within stand for dotted keys.
+pub(super) fn flattened(table: &Table) -> Vec<Setting> {
+    let mut settings = Vec::new();
+    flatten("", table, &mut settings);
+    settings
+}
+
+fn flatten(prefix: &str, table: &Table, into: &mut Vec<Setting>) {
+    for (key, value) in table {
+        let key = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+        match value {
+            Value::Table(inner) => flatten(&key, inner, into),
+            value => into.push((key, value.clone())),
+        }
     }
-    let whole =
-        |key: &str, default: u64| usize::try_from(job.whole(key).unwrap_or(default)).unwrap_or(usize::MAX);
-    let study = Study {
-        swept: batches(&prepared, effects),
-        lights: LightBox::new(Some(prepared.illumination)),
-        kept: kept::built_in()?,
-        seed: job.whole("seed").unwrap_or(0),
-        cases: whole("cases", 10_000),
-        pixels: whole("pixels", 10_000_000),
-    };
-    // The evaluators that every machine has.
-    let report = study.run(&evaluators(), &mut |_| {});
-    let mut figures = Figures::from([
-        ("failures".to_owned(), report.failures().join("; ").into()),
-        ("new_cases".to_owned(), report.found.len().into()),
-    ]);
-    for (index, name) in report.evaluators.iter().enumerate() {
-        let tally = &report.random[index];
-        figures.insert(format!("tried.{name}"), tally.tried.into());
-        figures.insert(format!("failed.{name}"), tally.failed.into());
-        figures.insert(format!("deviation.{name}"), number(tally.worst.deviation));
-    }
-    Ok(figures)
 }

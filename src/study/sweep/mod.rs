@@ -1,8 +1,9 @@
 //! Many jobs over scenes and settings, on this machine or under a scheduler.
 //!
 //! - [`plan`]: the plan file: what each job runs, and with which settings
+//! - [`command`]: what can be run, and which settings that takes
 //! - [`scene_text`]: a scene file's text with some of its keys set
-//! - [`job`]: one job, from its scene to its figures
+//! - [`job`]: what a job is; [`run`]: from its scene to its figures; `studies`: those of ablations and tradeoffs
 //! - [`result`]: the one file that a job leaves
 //! - [`collect`]: every job's figures in one table
 //!
@@ -11,7 +12,10 @@
 //! be started twice, in any order, on any machine that sees the plan's folder.
 
 pub mod collect;
+pub mod command;
 pub mod job;
 pub mod plan;
 pub mod result;
+pub mod run;
 pub mod scene_text;
+mod studies;

@@ -5,44 +5,11 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use toml::{Spanned, Table, Value};
 
+use super::command::{Command, check_setting};
+use super::job::{Job, Setting, combine, flattened};
 use super::scene_text::with_key;
-use crate::fit::SolverKind;
 use crate::scene::error::SceneError;
-use crate::scene::{Source, check_text, suggestion};
-
-/// What jobs run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Command {
-    /// A fit.
-    Fit,
-    /// A study of stability.
-    Stability,
-}
-
-impl Command {
-    const ALL: [(&'static str, Self); 2] = [("fit", Self::Fit), ("stability", Self::Stability)];
-
-    /// The name in plans and results.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Fit => "fit",
-            Self::Stability => "stability",
-        }
-    }
-
-    /// The keys of settings that are the command's, not the scene's.
-    #[must_use]
-    pub const fn options(self) -> &'static [&'static str] {
-        match self {
-            Self::Fit => &["scene", "solver", "starts", "seed", "max_iterations"],
-            Self::Stability => &["scene", "seed", "cases", "pixels"],
-        }
-    }
-}
-
-/// The scene file's tables that settings may reach into.
-const TABLES: [&str; 7] = ["mesh", "maps", "environment", "model", "view", "fit", "quality"];
+use crate::scene::{Source, check_text};
 
 /// Most jobs of a plan.
 const MOST: usize = 1_000_000;
@@ -67,25 +34,11 @@ struct AxisTable {
     values: Spanned<Vec<Value>>,
 }
 
-/// A key with its value.
-pub type Setting = (String, Value);
-
-/// One job of a plan.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Job {
-    /// Its number, from 0.
-    pub index: usize,
-    /// Its settings in the plan's order: axes, then what is listed; what is the same for all comes last.
-    pub settings: Vec<Setting>,
-}
-
 /// A plan that was read and checked.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// The plan file.
     pub path: PathBuf,
-    /// What jobs run.
-    pub command: Command,
     /// Where results go.
     pub results: PathBuf,
     /// The scene of jobs that name none; `None`: the built-in one.
@@ -103,19 +56,16 @@ impl Plan {
         let source = Source::read(path)?;
         let file: File = source.parse()?;
         let command = source.choose("command", &file.command, &Command::ALL)?;
+        let commands = file.commands(command);
         let folder = path.parent().unwrap_or(Path::new(""));
         let results = file.results.unwrap_or_else(|| {
             let mut name = path.file_stem().unwrap_or_default().to_owned();
             name.push("-results");
             PathBuf::from(name)
         });
-        let mut common = Vec::new();
-        if let Some(settings) = &file.settings {
-            common = checked(&source, command, settings)?;
-        }
         let mut lists = Vec::new();
         for job in &file.job {
-            lists.push(checked(&source, command, job)?);
+            lists.push(checked(&source, &commands, job)?);
         }
         if lists.is_empty() {
             lists.push(Vec::new());
@@ -125,9 +75,13 @@ impl Plan {
                 return Err(source.error(&axis.values, "an axis without values", "Give it at least one"));
             }
             for value in axis.values.get_ref() {
-                check_setting(command, axis.key.get_ref(), value)
+                check_setting(&commands, axis.key.get_ref(), value)
                     .map_err(|(what, remedy)| source.error(&axis.key, what, remedy))?;
             }
+        }
+        let mut common = Vec::new();
+        if let Some(settings) = &file.settings {
+            common = checked(&source, &commands, settings)?;
         }
         let count =
             file.axis.iter().try_fold(lists.len(), |n, axis| n.checked_mul(axis.values.get_ref().len()));
@@ -135,10 +89,16 @@ impl Plan {
             let what = format!("more than {MOST} jobs");
             return Err(SceneError::new(path, what, "Give the axes fewer values, or make several plans"));
         }
-        let jobs = combine(&file.axis, &lists, &common);
+        let axes: Vec<(&str, &[Value])> =
+            file.axis.iter().map(|axis| (axis.key.get_ref().as_str(), &axis.values.get_ref()[..])).collect();
+        let jobs = combine(&axes, &lists)
+            .into_iter()
+            .enumerate()
+            .map(|(index, own)| Job::new(index, command, own, &common))
+            .collect::<Result<_, _>>()
+            .map_err(|what| SceneError::new(path, what, "Move it to the jobs that it is meant for"))?;
         Ok(Self {
             path: path.to_owned(),
-            command,
             results: folder.join(results),
             scene: file.scene.map(|scene| folder.join(scene)),
             jobs,
@@ -148,10 +108,18 @@ impl Plan {
     /// The scene file of a job; `None` for the built-in scene.
     #[must_use]
     pub fn scene(&self, job: &Job) -> Option<PathBuf> {
-        match job.get("scene").and_then(Value::as_str) {
-            Some(scene) => Some(self.path.parent().unwrap_or(Path::new("")).join(scene)),
-            None => self.scene.clone(),
-        }
+        self.file(job, "scene").or_else(|| self.scene.clone())
+    }
+
+    /// The constants of a job, where it takes them from a fit.
+    #[must_use]
+    pub fn constants(&self, job: &Job) -> Option<PathBuf> {
+        self.file(job, "params")
+    }
+
+    fn file(&self, job: &Job, key: &str) -> Option<PathBuf> {
+        let path = job.get(key).and_then(Value::as_str)?;
+        Some(self.path.parent().unwrap_or(Path::new("")).join(path))
     }
 
     /// The text of a job's scene file, from that of the scene that it names: the scene's keys among its
@@ -162,7 +130,7 @@ impl Plan {
     pub fn scene_text(&self, job: &Job, scene: &Path, text: &str) -> Result<String, SceneError> {
         let mut text = text.to_owned();
         for (key, value) in job.settings.iter().rev() {
-            if self.command.options().contains(&key.as_str()) {
+            if job.command.options().contains(&key.as_str()) {
                 continue;
             }
             let refuse = |what: String| {
@@ -193,109 +161,29 @@ impl Plan {
     }
 }
 
-impl Job {
-    /// The value of a setting.
-    #[must_use]
-    pub fn get(&self, key: &str) -> Option<&Value> {
-        self.settings.iter().find(|(name, _)| name == key).map(|(_, value)| value)
+impl File {
+    /// What jobs may run: the plan's command, and those that axes and jobs name.
+    fn commands(&self, own: Command) -> Vec<Command> {
+        let axes = self.axis.iter().filter(|axis| axis.key.get_ref() == "command");
+        let named = axes.flat_map(|axis| axis.values.get_ref());
+        let tables = self.job.iter().chain(&self.settings);
+        let named = named.chain(tables.filter_map(|table| table.get_ref().get("command")));
+        let named = named.filter_map(|value| Command::from_name(value.as_str()?));
+        std::iter::once(own).chain(named).collect()
     }
-
-    /// A whole number among the settings.
-    #[must_use]
-    pub fn whole(&self, key: &str) -> Option<u64> {
-        self.get(key).and_then(Value::as_integer).and_then(|value| u64::try_from(value).ok())
-    }
-
-    /// Its number, and a hash of what it computes: `0003-1f2e3d4c`.
-    #[must_use]
-    pub fn identity(&self, command: Command, scene_text: &str) -> String {
-        let mut hash = blake3::Hasher::new();
-        for part in [env!("CARGO_PKG_VERSION"), command.name(), scene_text] {
-            hash.update(part.as_bytes()).update(&[0]);
-        }
-        for (key, value) in &self.settings {
-            hash.update(format!("{key}={value}").as_bytes()).update(&[0]);
-        }
-        format!("{:04}-{}", self.index, &hash.finalize().to_hex()[..8])
-    }
-}
-
-/// Every combination, the last axis fastest.
-fn combine(axes: &[AxisTable], lists: &[Vec<Setting>], common: &[Setting]) -> Vec<Job> {
-    let mut all: Vec<Vec<Setting>> = lists.to_vec();
-    for axis in axes {
-        let with = |settings: &Vec<Setting>| {
-            let settings = settings.clone();
-            let set = move |value: &Value| {
-                settings.iter().cloned().chain([(axis.key.get_ref().clone(), value.clone())]).collect()
-            };
-            axis.values.get_ref().iter().map(set).collect::<Vec<Vec<Setting>>>()
-        };
-        all = all.iter().flat_map(with).collect();
-    }
-    let job = |(index, mut settings): (usize, Vec<Setting>)| {
-        // What a job says itself goes before what is said for all.
-        let rest = common.iter().filter(|(key, _)| !settings.iter().any(|(own, _)| own == key)).cloned();
-        let rest: Vec<Setting> = rest.collect();
-        settings.extend(rest);
-        Job { index, settings }
-    };
-    all.into_iter().enumerate().map(job).collect()
 }
 
 /// The settings of a table, each checked; tables within stand for dotted keys.
-fn checked(source: &Source, command: Command, table: &Spanned<Table>) -> Result<Vec<Setting>, SceneError> {
-    let mut settings = Vec::new();
-    flatten("", table.get_ref(), &mut settings);
+fn checked(
+    source: &Source,
+    commands: &[Command],
+    table: &Spanned<Table>,
+) -> Result<Vec<Setting>, SceneError> {
+    let settings = flattened(table.get_ref());
     for (key, value) in &settings {
-        check_setting(command, key, value).map_err(|(what, remedy)| source.error(table, what, remedy))?;
+        check_setting(commands, key, value).map_err(|(what, remedy)| source.error(table, what, remedy))?;
     }
     Ok(settings)
-}
-
-fn flatten(prefix: &str, table: &Table, into: &mut Vec<Setting>) {
-    for (key, value) in table {
-        let key = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
-        match value {
-            Value::Table(inner) => flatten(&key, inner, into),
-            value => into.push((key, value.clone())),
-        }
-    }
-}
-
-/// What is wrong with a setting, and what to do.
-fn check_setting(command: Command, key: &str, value: &Value) -> Result<(), (String, String)> {
-    let first = key.split('.').next().unwrap_or_default();
-    let options = command.options();
-    if !options.contains(&key) {
-        return if TABLES.contains(&first) && key.contains('.') {
-            Ok(())
-        } else {
-            let known: Vec<&str> = options.iter().chain(&TABLES).copied().collect();
-            let remedy = suggestion(first, &known);
-            Err((
-                format!("unknown setting `{key}`"),
-                format!("{remedy} (those of scenes with their key, as fit.loss)"),
-            ))
-        };
-    }
-    let wrong = |kind: &str| Err((format!("{key} = {value}"), format!("Give {kind}")));
-    match key {
-        "scene" if value.as_str().is_none() => wrong("the path of a scene file, in quotes"),
-        "scene" => Ok(()),
-        "solver" if value.as_str().and_then(SolverKind::from_name).is_none() => {
-            let known = SolverKind::ALL.map(SolverKind::name);
-            Err((format!("unknown solver {value}"), suggestion(value.as_str().unwrap_or_default(), &known)))
-        }
-        "solver" => Ok(()),
-        "starts" | "max_iterations" | "pixels" if value.as_integer().is_none_or(|n| n < 1) => {
-            wrong("a whole number from 1 on")
-        }
-        _ if value.as_integer().is_none_or(|n| n < 0 || u32::try_from(n).is_err()) => {
-            wrong("a whole number from 0 on, of at most 32 bits")
-        }
-        _ => Ok(()),
-    }
 }
 
 #[cfg(test)]
@@ -339,12 +227,34 @@ mod tests {
     }
 
     #[test]
-    fn an_identity_is_of_settings_and_scene() {
+    fn an_identity_is_of_settings_scene_and_constants() {
         let plan = read(PLAN).unwrap();
-        let identity = |index: usize, text: &str| plan.jobs[index].identity(plan.command, text);
+        let identity = |index: usize, text: &str| plan.jobs[index].identity(text, None);
         assert_eq!(identity(1, "a"), identity(1, "a"));
         assert_ne!(identity(1, "a"), identity(1, "b"));
         assert_ne!(identity(1, "a")[4..], identity(2, "a")[4..]);
+        assert_ne!(identity(1, "a"), plan.jobs[1].identity("a", Some("")));
+    }
+
+    #[test]
+    fn jobs_of_several_commands_get_the_settings_that_are_theirs() {
+        let text = "command = \"ablate\"\n[settings]\nrefit = true\nseed = 3\n[[job]]\n[[job]]\ncommand = \"fit\"\n\
+            [[job]]\ncommand = \"tradeoff\"\naxes = [\"rays\"]\n";
+        let plan = read(text).unwrap();
+        let jobs: Vec<_> =
+            plan.jobs.iter().map(|j| (j.command, j.is_set("refit"), j.whole("seed"))).collect();
+        let wanted =
+            [(Command::Ablate, true, None), (Command::Fit, false, Some(3)), (Command::Tradeoff, false, None)];
+        assert_eq!(jobs, wanted);
+        let told = read(&text.replacen("axes", "cases", 1)).unwrap_err();
+        assert!(told.contains("unknown setting `cases`"), "{told}");
+        let told = read(&text.replacen("\"fit\"\n", "\"fit\"\npairs = true\n", 1)).unwrap_err();
+        let words = "job 1: `pairs` is no setting of `fit`. Move it to the jobs that it is meant for";
+        assert!(told.contains(words), "{told}");
+        let told = read(&text.replacen("rays", "rayz", 1)).unwrap_err();
+        assert!(told.contains("unknown axis \"rayz\". Did you mean `rays`?"), "{told}");
+        let told = read(&text.replacen("\"fit\"", "\"fitt\"", 1)).unwrap_err();
+        assert!(told.contains("unknown command \"fitt\". Did you mean `fit`?"), "{told}");
     }
 
     #[test]

@@ -6,11 +6,32 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::plan::Job;
+use super::job::Job;
 use crate::output::{self, OutputError};
 
-/// What a job found, by name.
+/// Numbers and words, by name.
 pub type Figures = BTreeMap<String, Value>;
+
+/// What a job found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    /// Of the job as a whole.
+    pub figures: Figures,
+    /// Of each of its cases, where it has several.
+    pub rows: Vec<Figures>,
+}
+
+/// Whether a figure is a time: another one each time, so that it is collected on request alone.
+#[must_use]
+pub fn is_time(name: &str) -> bool {
+    name == "seconds" || name.starts_with("seconds.")
+}
+
+/// A number; one that is not finite is null.
+#[must_use]
+pub fn number(x: f64) -> Value {
+    Value::from(x)
+}
 
 /// How a job ended.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,6 +59,9 @@ pub struct JobResult {
     pub settings: BTreeMap<String, Value>,
     /// What it found.
     pub figures: Figures,
+    /// What it found of each of its cases: the parts that were left out, the settings that were measured.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rows: Vec<Figures>,
     /// How long it took; no figure, as it is another one each time.
     pub seconds: f64,
 }

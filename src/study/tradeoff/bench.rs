@@ -82,15 +82,11 @@ impl<'a> Bench<'a> {
         self.prepared.start()
     }
 
-    /// How a fit's engine is asked for, of the scene as it stands.
+    /// How a fit's engine is asked for, of the scene as it stands and from its own start values: constants of an
+    /// earlier fit would be the answer already.
     #[must_use]
     pub fn fit_options(&self) -> PrepareOptions {
-        PrepareOptions {
-            fit: true,
-            params: self.params.map(Path::to_owned),
-            cache: self.cache.clone(),
-            ..PrepareOptions::default()
-        }
+        PrepareOptions { fit: true, cache: self.cache.clone(), ..PrepareOptions::default() }
     }
 
     /// The scene with these settings.

@@ -7,7 +7,7 @@ use super::axis::{Setting, Sweep};
 use super::choose::Choice;
 use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
 use crate::report::plot::{Dot, Plot};
-use crate::report::{number, seconds};
+use crate::report::{count, number, seconds};
 
 /// Errors of so much of the image's root mean square are told of each axis.
 const TOLD: [f64; 2] = [0.01, 0.001];
@@ -74,8 +74,21 @@ fn cost(sweep: &Sweep, setting: &Setting) -> String {
     if sweep.cost == "seconds" {
         seconds(setting.cost)
     } else {
-        format!("{} {}", number(setting.cost, 3), sweep.cost)
+        format!("{} {}", amount(setting.cost), sweep.cost)
     }
+}
+
+/// A count: without decimals where it is whole.
+fn amount(x: f64) -> String {
+    if x.fract() == 0.0 && (0.0..1e15).contains(&x) { count(x as u64) } else { number(x, 4) }
+}
+
+/// Words with `names` among them.
+fn with_code(words: &str) -> String {
+    let part = |(i, text): (usize, &str)| {
+        if i % 2 == 1 { format!("<code>{}</code>", escape(text)) } else { escape(text) }
+    };
+    words.split('`').enumerate().map(part).collect()
 }
 
 /// For each axis the cheapest setting within some errors, and its reference.
@@ -113,7 +126,8 @@ fn axis(sweep: &Sweep) -> String {
         ("FLIP", "mean of the views"),
         (cost_heading, "what it costs"),
     ];
-    if sweep.cost != "seconds" {
+    let timed = sweep.cost != "seconds" && sweep.settings.iter().any(|setting| setting.time.is_some());
+    if timed {
         columns.push(("time", "of a pass, where it was measured"));
     }
     columns.extend(counts.iter().map(|name| (*name, "a count: the same on every machine")));
@@ -139,12 +153,14 @@ fn axis(sweep: &Sweep) -> String {
             score(setting.error.flip, 5),
         ];
         if sweep.cost == "seconds" {
-            cells.push(time);
+            cells.push(time.clone());
         } else {
-            cells.push(Cell::value(number(setting.cost, 3), setting.cost));
+            cells.push(Cell::value(amount(setting.cost), setting.cost));
+        }
+        if timed {
             cells.push(time);
         }
-        cells.extend(setting.counts.iter().map(|&(_, n)| Cell::value(number(n, 4), n)));
+        cells.extend(setting.counts.iter().map(|&(_, n)| Cell::value(amount(n), n)));
         let mark = match (setting.reference, setting.front) {
             (true, _) => "reference",
             (_, true) => "front",
@@ -157,7 +173,7 @@ fn axis(sweep: &Sweep) -> String {
     let traces = if sweep.traces.is_empty() { String::new() } else { traces(sweep) };
     format!(
         "<p class=\"quiet\">{}</p>{}{}{traces}{}",
-        escape(&sweep.method),
+        with_code(&sweep.method),
         plot.svg(),
         plot.legend(),
         table.html(&format!("axis-{}", sweep.axis))

@@ -76,6 +76,18 @@ fn fitting_again_never_makes_it_worse_and_pairs_are_all_there() {
     // The targets are the model's own.
     assert!(loss(&held[""]) < 1e-9 && loss(&held["rim"]) > 1e-3);
     assert!(held["rim"]["change"]["t"].as_f64().unwrap() > 3.0);
+    // Nothing of the diffuse light is left without both base and rim: each makes up for some of the other.
+    let change = |row: &Value| row["change"]["loss"].as_f64().unwrap();
+    let ratio = change(&held["base_weight+rim"]) / (change(&held["base_weight"]) + change(&held["rim"]));
+    let page = desk.text("held/report.html");
+    let cells = page
+        .split("id=\"by-pair\"")
+        .nth(1)
+        .unwrap()
+        .split("<tr")
+        .find(|row| row.contains("base_weight + rim"));
+    let sorted = cells.unwrap().split("data-sort=\"").last().unwrap().split('"').next().unwrap();
+    assert!((sorted.parse::<f64>().unwrap() / ratio - 1.0).abs() < 1e-9 && ratio > 1.0, "{sorted} {ratio}");
     // What is missing is no longer among the constants.
     let names = |row: &Value| -> Vec<String> {
         row["constants"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap().to_owned()).collect()

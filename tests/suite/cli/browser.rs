@@ -8,6 +8,7 @@ use std::process::Command;
 use serde_json::Value;
 
 use super::desk::Desk;
+use super::tradeoffs::AXES;
 
 /// The browser; none, said loudly, where it is left out on purpose.
 fn browser() -> Option<&'static str> {
@@ -188,20 +189,7 @@ fn pages_work_in_a_browser() {
     let goal = ["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml", "--within", "1%"];
     desk.run(&goal).done();
     let cost = desk.path("cost/report.html");
-    let axes = [
-        "format",
-        "silhouette",
-        "irradiance",
-        "specular",
-        "hilite",
-        "filter",
-        "lobes",
-        "rays",
-        "samples",
-        "pixels",
-        "solver",
-    ];
-    let tables: Vec<String> = axes.iter().map(|axis| format!("axis-{axis}")).collect();
+    let tables: Vec<String> = AXES.iter().map(|axis| format!("axis-{axis}")).collect();
     let tables: Vec<&str> = std::iter::once("cheapest").chain(tables.iter().map(String::as_str)).collect();
     check(browser, &cost, &tables, false, true);
     let colours = screenshot(browser, &cost, "tradeoff_1100.png", 1100);

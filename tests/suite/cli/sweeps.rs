@@ -96,6 +96,68 @@ fn a_job_that_is_done_is_left_alone_and_one_whose_result_is_damaged_is_done_agai
         .refused(&["out: holds two results of job 2", "Name the plan"]);
 }
 
+/// An ablation, a sweep of two axes at a fit's constants, and a fit, in one plan.
+const STUDIES: &str = "command = \"ablate\"\nscene = \"scene.toml\"\nresults = \"out\"\n[settings]\nrefit = true\nsolver = \"lm\"\n\
+    [[job]]\n[[job]]\ncommand = \"tradeoff\"\naxes = [\"filter\", \"irradiance\"]\nparams = \"truth.toml\"\n[[job]]\ncommand = \"fit\"\n";
+
+#[test]
+fn studies_are_jobs_too_and_their_table_has_a_row_a_case_of_the_command_s_own_figures() {
+    let desk = desk();
+    desk.write("plan.toml", STUDIES.as_bytes());
+    let list = desk.run(&["sweep", "plan.toml", "--list"]).done().out;
+    assert_eq!(list.lines().count(), 3);
+    for line in list.lines().rev() {
+        let mut shell = std::process::Command::new("sh");
+        Ran::of(shell.args(["-c", line]).env("SKINFIT_CACHE", desk.cache())).done();
+    }
+    let first: Vec<_> = results(&desk).iter().map(|name| desk.read(&format!("out/{name}"))).collect();
+    let ran = desk.run(&["sweep", "plan.toml"]).done();
+    assert!(ran.out.contains("3 jobs, 3 done before, 0 now"), "{ran:?}");
+    let again: Vec<_> = results(&desk).iter().map(|name| desk.read(&format!("out/{name}"))).collect();
+    assert!(first == again && first.len() == 3);
+    collect(&desk, "all.json").done();
+    let all = desk.json("all.json");
+    let rows = |job: usize| all["jobs"][job]["rows"].as_array().unwrap().clone();
+    // What the commands themselves find on the same scene.
+    desk.run(&["ablate", "scene.toml", "-o", "parts", "--refit", "--gpu", "never"]);
+    let parts = desk.json("parts/results.json");
+    let wanted: Vec<f64> =
+        parts["rows"].as_array().unwrap().iter().map(|row| row["loss"].as_f64().unwrap()).collect();
+    let got: Vec<f64> = rows(0).iter().map(|row| row["loss"].as_f64().unwrap()).collect();
+    assert!(got == wanted && got.len() > 5, "{got:?} {wanted:?}");
+    assert_eq!((&rows(0)[0]["left_out"], &rows(0)[1]["left_out"]), (&"nothing".into(), &"diffuse".into()));
+    let options = ["--params", "truth.toml", "--axis", "filter", "--axis", "irradiance"];
+    desk.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()).done();
+    let cost = desk.json("cost/results.json");
+    let wanted: Vec<f64> = cost["axes"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .flat_map(|axis| axis["settings"].as_array().unwrap().clone())
+        .map(|setting| setting["error"]["relative"].as_f64().unwrap())
+        .collect();
+    let got: Vec<f64> = rows(1).iter().map(|row| row["relative_rms"].as_f64().unwrap()).collect();
+    assert!(got == wanted && got.len() > 5, "{got:?} {wanted:?}");
+    // One table of all; times are there when they are asked for.
+    collect(&desk, "all.csv").done();
+    let table = desk.text("all.csv");
+    let header = table.lines().next().unwrap();
+    let wanted = "job,axes,command,params,refit,solver,left_out,axis,setting,";
+    assert!(header.starts_with(wanted) && !header.contains("seconds"), "{header}");
+    assert_eq!(table.lines().count(), 1 + rows(0).len() + rows(1).len() + 1);
+    assert!(table.lines().last().unwrap().starts_with("2,,fit,,,lm,,,,"), "{table}");
+    desk.run(&["collect", "plan.toml", "-o", "times.csv", "--seconds"]).done();
+    assert!(desk.text("times.csv").lines().next().unwrap().contains(",seconds,seconds.job,seconds.lower,"));
+    // Other constants are another job.
+    let truth = desk.text("truth.toml");
+    desk.write("truth.toml", format!("{truth}\n").as_bytes());
+    let ran = collect(&desk, "some.csv");
+    assert!(ran.code == Some(1) && ran.err.contains("jobs without a result: 1."), "{ran:?}");
+    desk.remove("truth.toml");
+    desk.run(&["sweep", "plan.toml", "--list"])
+        .refused(&["truth.toml: the constants of job 1 cannot be read"]);
+}
+
 #[test]
 fn a_job_that_fails_is_named_and_tried_again() {
     let desk = desk();

@@ -4,6 +4,21 @@ use serde_json::Value;
 
 use super::desk::Desk;
 
+/// Every axis, in the order of documentation.
+pub(super) const AXES: [&str; 11] = [
+    "format",
+    "silhouette",
+    "irradiance",
+    "specular",
+    "hilite",
+    "filter",
+    "lobes",
+    "rays",
+    "samples",
+    "pixels",
+    "solver",
+];
+
 /// The settings of an axis in `results.json`.
 fn settings(desk: &Desk, folder: &str, axis: &str) -> Vec<Value> {
     let file = desk.json(&format!("{folder}/results.json"));
@@ -24,20 +39,7 @@ fn named<'a>(settings: &'a [Value], name: &str) -> &'a Value {
 fn every_axis_has_a_reference_without_error_and_a_front() {
     let desk = Desk::new();
     desk.run(&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"]).done();
-    let axes = [
-        "format",
-        "silhouette",
-        "irradiance",
-        "specular",
-        "hilite",
-        "filter",
-        "lobes",
-        "rays",
-        "samples",
-        "pixels",
-        "solver",
-    ];
-    for axis in axes {
+    for axis in AXES {
         let settings = settings(&desk, "cost", axis);
         let references: Vec<&Value> = settings.iter().filter(|s| s["reference"] == true).collect();
         assert_eq!(references.len(), 1, "{axis}");
@@ -54,7 +56,7 @@ fn every_axis_has_a_reference_without_error_and_a_front() {
         assert!(desk.text(&format!("cost/{axis}.svg")).starts_with("<svg"));
     }
     let lines = desk.text("cost/results.csv").lines().count();
-    let all: usize = axes.iter().map(|axis| settings(&desk, "cost", axis).len()).sum();
+    let all: usize = AXES.iter().map(|axis| settings(&desk, "cost", axis).len()).sum();
     assert_eq!(lines, 1 + all);
 }
 
@@ -72,13 +74,15 @@ fn errors_fall_as_they_must() {
     assert!(errors[3] < 2e-6 && errors[2] < 5e-3 && errors[2] > 1e-5, "{errors:?}");
     let filters = settings(&desk, "cost", "filter");
     assert!(error(named(&filters, "nearest")) > 10.0 * error(named(&filters, "8-bit")), "{filters:?}");
-    // Cutting a mesh finer quarters the sag of its cosines each time; the ball's silhouettes leave a wide margin.
+    // Cutting a mesh finer quarters the sag of its cosines each time, making it coarser four-folds it; the ball's
+    // silhouettes leave a wide margin.
     let vertex: Vec<f64> = settings(&desk, "cost", "silhouette")
         .iter()
         .filter(|s| s["name"].as_str().unwrap().starts_with("vertex"))
         .map(error)
         .collect();
-    assert!(vertex.len() == 3 && vertex[0] > 2.0 * vertex[1] && vertex[1] > 2.0 * vertex[2], "{vertex:?}");
+    assert!(vertex.len() > 3, "{vertex:?}");
+    assert!(vertex.windows(2).all(|pair| pair[0] > 1.5 * pair[1]), "{vertex:?}");
     // Sixteen times the rays: the error falls by four for random ones, and more for these.
     let rays = settings(&desk, "cost", "rays");
     let exact = |name: &str| error(rays.iter().find(|s| s["name"] == name).unwrap());

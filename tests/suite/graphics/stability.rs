@@ -6,6 +6,7 @@ use skinfit::gpu::Choice;
 use skinfit::study::stability::check::{check, check_frame};
 use skinfit::study::stability::evaluate::Evaluator;
 use skinfit::study::stability::hard::{cases, frames};
+use skinfit::study::stability::kept::built_in;
 use skinfit::study::stability::lights::LightBox;
 use skinfit::study::stability::objectives::{EngineEvaluator, OnAdapter};
 use skinfit::study::stability::random::batch;
@@ -39,7 +40,13 @@ fn hard_cases_stay_finite_and_agree_on_the_adapter() {
         let verdict = check_frame(&rules, frame.vertex).unwrap();
         assert_eq!(verdict.failure, None, "{}", frame.name);
     }
-    for index in 0..5 {
+    for kept in built_in().unwrap() {
+        for evaluator in [&rules as &dyn Evaluator, &engine] {
+            let verdict = check(evaluator, &lights, &kept.batch, &[]);
+            assert_eq!(verdict.failure, None, "{}: {}", evaluator.name(), kept.name);
+        }
+    }
+    for index in 0..8 {
         let random = batch(11, index, 64);
         for evaluator in [&rules as &dyn Evaluator, &engine] {
             let verdict = check(evaluator, &lights, &random, &[]);

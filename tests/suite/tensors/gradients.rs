@@ -19,18 +19,6 @@ const SIZES: [usize; 3] = [3, 4, 6];
 const GROUPS: usize = 3;
 const N: usize = (1 + 2 + 4) * LANES;
 
-const EVERYTHING: Asked = Asked {
-    bump: true,
-    normal: true,
-    albedo: true,
-    occlusion: true,
-    silhouette: true,
-    dapple: true,
-    specular: true,
-    attenuator: true,
-    weight: true,
-};
-
 /// Everything that the operation takes, in f64: by the order of [`Input::ALL`], cubes without their borders.
 type Numbers = [Vec<f64>; 9];
 
@@ -54,7 +42,7 @@ impl Case {
             group_start: group_start.clone(),
             pixel: (0..(GROUPS * LANES) as u32).collect(),
             coverage: vec![1.0; GROUPS * LANES],
-            surface: SurfaceRecords::new(EVERYTHING, N / LANES),
+            surface: SurfaceRecords::new(Asked::EVERYTHING, N / LANES),
         };
         for group in 0..GROUPS {
             let records = group_start[group] as usize..group_start[group + 1] as usize;

@@ -50,7 +50,7 @@ impl Axis for Formats {
             error: Difference::of_all(&exact, images),
             cost: bits,
             time: None,
-            counts: vec![("bits", bits)],
+            counts: Vec::new(),
             reference: false,
             front: false,
         };

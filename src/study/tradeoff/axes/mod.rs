@@ -7,6 +7,7 @@ mod lobes;
 mod pixels;
 mod quality;
 mod rays;
+mod remeshed;
 mod samples;
 mod silhouette;
 mod solver;

@@ -1,0 +1,140 @@
+//! One job, from its scene to its figures.
+
+use std::path::Path;
+
+use serde_json::Value;
+
+use super::command::Command;
+use super::job::Job;
+use super::result::{Figures, Findings, number};
+use super::studies;
+use crate::engine::cpu::CpuEngine;
+use crate::engine::{Objective as _, Unknown};
+use crate::fit::outcome::Outcome;
+use crate::fit::{FitError, FitOptions, SolverKind, fit};
+use crate::prepare::{PrepareError, PrepareOptions, Prepared};
+use crate::scene::Loss;
+use crate::scene::error::SceneError;
+use crate::study::StudyError;
+use crate::study::stability::lights::LightBox;
+use crate::study::stability::scene::{batches, sweepable};
+use crate::study::stability::{Study, evaluators, kept};
+
+/// A job could not be done.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant is the stage's own error")]
+pub enum JobError {
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Study(#[from] StudyError),
+    #[error("a folder for bakes cannot be made: {0}. Make room, or name one with --cache.")]
+    Scratch(#[from] std::io::Error),
+}
+
+/// What a job reads.
+#[derive(Clone, Copy, Debug)]
+pub struct Inputs<'a> {
+    /// Its scene file.
+    pub scene: &'a Path,
+    /// A fit's constants, where it is given some.
+    pub constants: Option<&'a Path>,
+    /// Where bakes are kept.
+    pub cache: Option<&'a Path>,
+}
+
+/// Run a job. The figures, but for those that are times, are the same for any number of threads.
+///
+/// # Errors
+/// When a stage refuses its input.
+pub fn run(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobError> {
+    let Inputs { scene, cache, .. } = inputs;
+    let whole = |figures| Findings { figures, rows: Vec::new() };
+    match job.command {
+        Command::Fit => run_fit(job, scene, cache).map(whole),
+        Command::Ablate => studies::ablation(job, inputs),
+        Command::Tradeoff => studies::tradeoffs(job, inputs),
+        Command::Stability => run_stability(job, scene, cache).map(whole),
+    }
+}
+
+fn run_fit(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
+    let options = PrepareOptions { fit: true, cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
+    let mut prepared = Prepared::new(scene, &options)?;
+    let engine = prepared.engine()?;
+    let solver = job.get("solver").and_then(toml::Value::as_str).and_then(SolverKind::from_name);
+    let options = FitOptions {
+        solver: solver.unwrap_or_default(),
+        max_iterations: job.whole("max_iterations"),
+        starts: job.whole("starts").and_then(|n| u32::try_from(n).ok()).unwrap_or(1),
+        seed: job.whole("seed").unwrap_or(0),
+        ..FitOptions::default()
+    };
+    let outcome = fit(&engine, &prepared.start(), &options, &mut |_| {})?;
+    let (setup, light) = (prepared.setup(), prepared.illumination.clone());
+    let squares = CpuEngine::new(setup, light, engine.views().to_vec(), Loss::L2, Vec::new());
+    let view = |index: usize| prepared.scene.views.get(index).map_or("?", |view| &view.name);
+    Ok(fit_figures(&outcome, squares.loss(&outcome.end).sqrt(), view))
+}
+
+fn fit_figures<'a>(outcome: &Outcome, rmse: f64, view: impl Fn(usize) -> &'a str) -> Figures {
+    let mut figures = Figures::from([
+        ("ending".to_owned(), outcome.ending.words().into()),
+        ("evaluations".to_owned(), outcome.evaluations.into()),
+        ("iterations".to_owned(), outcome.iterations.into()),
+        ("loss_end".to_owned(), number(outcome.loss_end)),
+        ("loss_start".to_owned(), number(outcome.loss_start)),
+        // Whatever was minimised: the root of the mean squared difference of linear radiance.
+        ("rmse".to_owned(), number(rmse)),
+    ]);
+    for unknown in &outcome.unknowns {
+        let name = match unknown.unknown {
+            Unknown::Gain(index) => format!("gain.{}", view(index)),
+            Unknown::Param(column) => column.name(),
+        };
+        add_constant(&mut figures, &name, unknown.value, unknown.std_error);
+    }
+    figures
+}
+
+/// A constant's value and its standard error.
+pub(super) fn add_constant(figures: &mut Figures, name: &str, value: f64, std_error: Option<f64>) {
+    figures.insert(format!("value.{name}"), number(value));
+    figures.insert(format!("error.{name}"), std_error.map_or(Value::Null, number));
+}
+
+fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
+    let options = PrepareOptions { cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
+    let mut prepared = Prepared::new(scene, &options)?;
+    let effects = sweepable(prepared.scene.effects, prepared.scene.environment.is_some());
+    if effects != prepared.scene.effects {
+        prepared = Prepared::new(scene, &PrepareOptions { effects: Some(effects), ..options })?;
+    }
+    let whole =
+        |key: &str, default: u64| usize::try_from(job.whole(key).unwrap_or(default)).unwrap_or(usize::MAX);
+    let study = Study {
+        swept: batches(&prepared, effects),
+        lights: LightBox::new(Some(prepared.illumination)),
+        kept: kept::built_in()?,
+        seed: job.whole("seed").unwrap_or(0),
+        cases: whole("cases", 10_000),
+        pixels: whole("pixels", 10_000_000),
+    };
+    // The evaluators that every machine has.
+    let report = study.run(&evaluators(), &mut |_| {});
+    let mut figures = Figures::from([
+        ("failures".to_owned(), report.failures().join("; ").into()),
+        ("new_cases".to_owned(), report.found.len().into()),
+    ]);
+    for (index, name) in report.evaluators.iter().enumerate() {
+        let tally = &report.random[index];
+        figures.insert(format!("tried.{name}"), tally.tried.into());
+        figures.insert(format!("failed.{name}"), tally.failed.into());
+        figures.insert(format!("deviation.{name}"), number(tally.worst.deviation));
+    }
+    Ok(figures)
+}

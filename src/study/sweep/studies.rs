@@ -1,0 +1,118 @@
+//! Ablations and tradeoffs as jobs: a row for each part that is left out, and for each setting that is measured.
+
+use std::path::PathBuf;
+
+use serde_json::Value;
+
+use super::job::Job;
+use super::result::{Figures, Findings, number};
+use super::run::{Inputs, JobError, add_constant};
+use crate::study::ablation::{self, AblationOptions, GpuTiming, ablate};
+use crate::study::timing::Timed;
+use crate::study::tradeoff::axis::{Setting, Sweep};
+use crate::study::tradeoff::{TradeoffOptions, tradeoff};
+
+/// Bakes are asked for again and again: without a cache of the user's they are kept as long as the job runs.
+fn cache(inputs: &Inputs<'_>) -> Result<(PathBuf, Option<tempfile::TempDir>), JobError> {
+    if let Some(cache) = inputs.cache {
+        return Ok((cache.to_owned(), None));
+    }
+    let scratch = tempfile::tempdir()?;
+    Ok((scratch.path().to_owned(), Some(scratch)))
+}
+
+/// An ablation; the renderer is not timed, as not every machine has an adapter.
+pub(super) fn ablation(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobError> {
+    let (cache, _scratch) = cache(&inputs)?;
+    let options = AblationOptions {
+        pairs: job.is_set("pairs"),
+        refit: job.is_set("refit"),
+        params: inputs.constants.map(Into::into),
+        cache: Some(cache),
+        gpu: GpuTiming::Never,
+    };
+    let found = ablate(inputs.scene, &options)?;
+    let figures = Figures::from([("unconverged".to_owned(), found.unconverged().join("; ").into())]);
+    Ok(Findings { figures, rows: found.rows.iter().map(case).collect() })
+}
+
+fn case(row: &ablation::Row) -> Figures {
+    let mean = row.mean();
+    let mut figures = scores((mean.linear_rms, mean.relative_rms), [mean.psnr, mean.ssim, mean.flip]);
+    figures.extend(named([
+        ("left_out", row.left_out.name().into()),
+        ("loss", number(row.loss)),
+        ("loss_change", number(row.change.loss)),
+        ("loss_change_error", number(row.change.std_error)),
+        ("t", number(row.change.t)),
+        ("operations", number(row.counts.operations)),
+        ("bytes_a_sample", row.counts.bytes_a_sample.into()),
+        ("baked_bytes", row.counts.baked_bytes.into()),
+    ]));
+    for constant in &row.constants {
+        add_constant(&mut figures, &constant.name, constant.value, constant.std_error);
+    }
+    add_time(&mut figures, row.cpu);
+    figures
+}
+
+/// A tradeoff.
+pub(super) fn tradeoffs(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobError> {
+    let (cache, _scratch) = cache(&inputs)?;
+    let axes = job.get("axes").and_then(toml::Value::as_array).into_iter().flatten();
+    let options = TradeoffOptions {
+        axes: axes.filter_map(|axis| axis.as_str().map(str::to_owned)).collect(),
+        params: inputs.constants.map(Into::into),
+        cache: Some(cache),
+        goal: None,
+    };
+    let found = tradeoff(inputs.scene, &options)?;
+    let rows = found.sweeps.iter().flat_map(|sweep| sweep.settings.iter().map(|s| setting(sweep, s)));
+    Ok(Findings { figures: Figures::new(), rows: rows.collect() })
+}
+
+fn setting(sweep: &Sweep, setting: &Setting) -> Figures {
+    let error = &setting.error;
+    let mut figures = scores((error.linear, error.relative), [error.psnr, None, error.flip]);
+    figures.extend(named([
+        ("axis", sweep.axis.into()),
+        ("setting", setting.name.as_str().into()),
+        ("reference", setting.reference.into()),
+    ]));
+    // A cost in seconds is a time; so is what is on its front.
+    if setting.time.is_none() {
+        figures.extend(named([("cost", number(setting.cost)), ("cost_unit", sweep.cost.into())]));
+    }
+    for (name, count) in &setting.counts {
+        figures.insert(format!("count.{name}"), number(*count));
+    }
+    add_time(&mut figures, setting.time);
+    figures
+}
+
+fn named<const N: usize>(figures: [(&str, Value); N]) -> impl Iterator<Item = (String, Value)> {
+    figures.map(|(name, value)| (name.to_owned(), value)).into_iter()
+}
+
+fn scores((linear, relative): (f64, f64), [psnr, ssim, flip]: [Option<f64>; 3]) -> Figures {
+    let score = |x: Option<f64>| x.map_or(Value::Null, number);
+    named([
+        ("linear_rms", number(linear)),
+        ("relative_rms", number(relative)),
+        ("psnr_db", score(psnr)),
+        ("ssim", score(ssim)),
+        ("flip", score(flip)),
+    ])
+    .collect()
+}
+
+/// The median, its quartiles, and the ratio to the first row's.
+fn add_time(figures: &mut Figures, time: Option<Timed>) {
+    let Some(Timed { seconds, ratio, .. }) = time else { return };
+    figures.extend(named([
+        ("seconds", number(seconds.median)),
+        ("seconds.lower", number(seconds.lower)),
+        ("seconds.upper", number(seconds.upper)),
+        ("seconds.ratio", number(ratio.median)),
+    ]));
+}
