@@ -18,6 +18,7 @@ use crate::scene::Scene;
 use crate::scene::error::SceneError;
 use crate::scene::load::LoadOptions;
 use crate::scene::suggestion;
+use crate::scene::view::View;
 
 /// What a command asks of the stages.
 #[derive(Clone, Debug, Default)]
@@ -103,10 +104,17 @@ impl Prepared {
     pub fn new(path: &Path, options: &PrepareOptions) -> Result<Self, PrepareError> {
         let mut prepared = Self::baked(path, options)?;
         let start = Instant::now();
-        let posed = prepared.scene.mesh.pose();
-        prepared.samples = samples::sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref())?;
+        prepared.samples = prepared.traced()?;
         prepared.seconds.samples = start.elapsed().as_secs_f64();
         Ok(prepared)
+    }
+
+    /// The visible surface of each view, by rays.
+    ///
+    /// # Errors
+    /// When a view sees nothing of the mesh, or the mesh lacks what the effects ask for.
+    pub fn traced(&self) -> Result<Vec<ViewSamples>, SampleError> {
+        samples::sample_views(&self.scene, &self.scene.mesh.pose(), self.occlusion.as_ref())
     }
 
     /// Read and bake the scene at `path`; no surface is sampled.
@@ -205,33 +213,53 @@ impl Prepared {
     /// # Errors
     /// When no view has a target, or a target asks nothing.
     pub fn observed(&mut self) -> Result<Vec<ObservedView>, PrepareError> {
-        let views = std::mem::take(&mut self.scene.views);
+        self.keep_targets()?;
         let samples = std::mem::take(&mut self.samples);
-        let gains = std::mem::take(&mut self.gains);
-        let mut observed = Vec::new();
-        for ((view, samples), gain) in views.into_iter().zip(samples).zip(gains) {
-            let target = TargetRows::new(&view, &samples).map_err(|error| PrepareError::Target {
-                scene: self.scene.path.display().to_string(),
-                error,
-            })?;
-            match target {
-                Some(target) => {
-                    observed.push(observe(samples, target));
-                    self.scene.views.push(view);
-                    self.gains.push(gain);
-                }
-                None => self.warnings.push(format!(
-                    "{}: view \"{}\" has no target and takes no part in the fit.",
-                    self.scene.path.display(),
-                    view.name
-                )),
-            }
-        }
-        if observed.is_empty() {
+        self.observed_with(samples)
+    }
+
+    /// Drop the views that have no target from the scene, with a warning each.
+    ///
+    /// # Errors
+    /// When no view has one.
+    pub fn keep_targets(&mut self) -> Result<(), PrepareError> {
+        let has_target: Vec<bool> = self.scene.views.iter().map(|view| view.target.is_some()).collect();
+        let without = self.scene.views.iter().filter(|view| view.target.is_none());
+        let path = self.scene.path.display();
+        let warning = |view: &View| {
+            format!("{path}: view \"{}\" has no target and takes no part in the fit.", view.name)
+        };
+        self.warnings.extend(without.map(warning));
+        retain(&mut self.scene.views, &has_target);
+        retain(&mut self.gains, &has_target);
+        retain(&mut self.samples, &has_target);
+        if self.scene.views.is_empty() {
             return Err(PrepareError::NoTarget { scene: self.scene.path.display().to_string() });
+        }
+        Ok(())
+    }
+
+    /// The scene's views, all of which have a target, with these samples.
+    ///
+    /// # Errors
+    /// When a target asks nothing.
+    pub fn observed_with(&self, samples: Vec<ViewSamples>) -> Result<Vec<ObservedView>, PrepareError> {
+        let scene = || self.scene.path.display().to_string();
+        let mut observed = Vec::with_capacity(samples.len());
+        for (view, samples) in self.scene.views.iter().zip(samples) {
+            let target = TargetRows::new(view, &samples)
+                .map_err(|error| PrepareError::Target { scene: scene(), error })?
+                .ok_or_else(|| PrepareError::NoTarget { scene: scene() })?;
+            observed.push(observe(samples, target));
         }
         Ok(observed)
     }
+}
+
+/// Keep what is marked; a list that is empty stays so.
+fn retain<T>(list: &mut Vec<T>, kept: &[bool]) {
+    let mut kept = kept.iter();
+    list.retain(|_| kept.next().copied().unwrap_or(true));
 }
 
 fn observe(samples: ViewSamples, target: TargetRows) -> ObservedView {

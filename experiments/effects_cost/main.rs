@@ -5,11 +5,16 @@ use std::path::PathBuf;
 
 use clap::Parser;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
+use skinfit::engine::Unknown;
+use skinfit::engine::gpu::{DeviceSamples, GpuEngine, Memory, Task};
+use skinfit::engine::view::ObservedView;
 use skinfit::gpu::upload::Content;
-use skinfit::gpu::{Choice, Gpu, RenderOptions, Renderer};
+use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use skinfit::model::effects::{Effect, Effects};
+use skinfit::model::params::{Column, Param};
 use skinfit::prepare::{PrepareOptions, Prepared, Views};
 use skinfit::render::antialias::Antialias;
+use skinfit::samples::rows::Rows;
 use skinfit::scene::view::Camera;
 use skinfit::shader::{Budget, Plan};
 
@@ -47,8 +52,15 @@ struct Row {
     uploaded: u64,
     instructions: usize,
     operations: f64,
+    /// Of the frame: median and spread.
     milliseconds: Option<(f64, f64)>,
+    /// Of a compute pass over the stored samples of the same image, likewise; none where nothing is shown, or what
+    /// is drawn is not the effects' image.
+    compute: Option<(f64, f64)>,
 }
+
+/// Rounds in which frames and compute passes take turns.
+const ROUNDS: usize = 4;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments = Arguments::parse();
@@ -67,13 +79,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rows.push(measure(&arguments, &gpu, "the scene's effects", full, Plan::clone)?);
     rows.push(measure(&arguments, &gpu, "the same fetches alone", full, Plan::fetches_alone)?);
     let mut text = String::from(
-        "effects,rules,attributes,bindings,constants,uploaded bytes,SPIR-V instructions,planned operations,median ms,spread ms\n",
+        "effects,rules,attributes,bindings,constants,uploaded bytes,SPIR-V instructions,planned operations,median ms,spread ms,compute median ms,compute spread ms\n",
     );
     for row in &rows {
-        let time =
-            row.milliseconds.map_or(",".to_owned(), |(median, spread)| format!("{median:.4},{spread:.4}"));
+        let time = |times: Option<(f64, f64)>| {
+            times.map_or(",".to_owned(), |(median, spread)| format!("{median:.4},{spread:.4}"))
+        };
         text += &format!(
-            "{},{},{},{},{},{},{},{:.0},{time}\n",
+            "{},{},{},{},{},{},{},{:.0},{},{}\n",
             row.name,
             row.rules,
             row.attributes,
@@ -81,7 +94,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             row.constants,
             row.uploaded,
             row.instructions,
-            row.operations
+            row.operations,
+            time(row.milliseconds),
+            time(row.compute)
         );
     }
     skinfit::output::write(&arguments.output, text.as_bytes())?;
@@ -108,7 +123,12 @@ fn measure(
     effects: Effects,
     change: fn(&Plan) -> Plan,
 ) -> Result<Row, Box<dyn std::error::Error>> {
-    let prepared = Prepared::baked(&arguments.scene, &options(Some(effects)))?;
+    let mut prepared = Prepared::baked(&arguments.scene, &options(Some(effects)))?;
+    let camera =
+        Camera { width: arguments.width, height: arguments.height, ..prepared.scene.views[0].camera };
+    // As many samples as the renderer draws fragments.
+    prepared.scene.views[0].camera = camera;
+    prepared.scene.quality.samples_per_axis = 1;
     let content = Content {
         scene: &prepared.scene,
         illumination: &prepared.illumination,
@@ -118,12 +138,32 @@ fn measure(
     let budget = if arguments.exact { Budget::Exact } else { Budget::Paper };
     let render = RenderOptions { antialias: Antialias::Grid(1), budget, timed: true, animated: false };
     let mut renderer = Renderer::with_shader(gpu, content, render, change)?;
-    let camera =
-        Camera { width: arguments.width, height: arguments.height, ..prepared.scene.views[0].camera };
+    let (made, groups) = DeviceSamples::new(gpu, content)?;
+    let views = groups.into_iter().map(|samples| {
+        // With alpha where the image has the haze there.
+        let hazy = effects.needs(prepared.scene.silhouette).haze;
+        let target = Rows::new(if hazy { 4 } else { 3 }, samples.groups());
+        ObservedView { samples, target, ..ObservedView::default() }
+    });
+    let views: Vec<ObservedView> = views.collect();
+    let whole = renderer.plan().wgsl != renderer.plan().fetches_alone().wgsl;
+    let engine = if whole { over_samples(&made, &prepared, &views)? } else { None };
+    let start = prepared.start();
     // The first frames wake the adapter up.
     renderer.frame_times(&camera, arguments.frames)?;
-    let mut times = renderer.frame_times(&camera, arguments.frames)?;
-    times.sort_by(f64::total_cmp);
+    let (mut times, mut compute) = (Vec::new(), Vec::new());
+    for round in 0..=ROUNDS {
+        let frames = arguments.frames.div_ceil(ROUNDS);
+        let (drawn, computed) = (
+            renderer.frame_times(&camera, frames)?,
+            engine.as_ref().map_or(Ok(Vec::new()), |engine| engine.shade_times(&start, frames))?,
+        );
+        // Nor does the round count in which the compute pass is compiled.
+        if round > 0 {
+            times.extend(drawn);
+            compute.extend(computed);
+        }
+    }
     let plan = renderer.plan();
     Ok(Row {
         name: name.to_owned(),
@@ -134,10 +174,37 @@ fn measure(
         uploaded: renderer.uploaded_bytes(),
         instructions: instructions(plan)?,
         operations: plan.cost,
-        milliseconds: times
-            .get(times.len() / 2)
-            .map(|median| (*median, times[times.len() * 3 / 4] - times[times.len() / 4])),
+        milliseconds: median_and_spread(times),
+        compute: median_and_spread(compute),
     })
+}
+
+/// The fused engine over the samples of the image, its lookups live; `None` where the effects show nothing.
+fn over_samples<'g>(
+    made: &'g DeviceSamples<'g>,
+    prepared: &Prepared,
+    views: &'g [ObservedView],
+) -> Result<Option<GpuEngine<'g>>, GpuError> {
+    let task = Task {
+        setup: prepared.setup(),
+        illumination: prepared.illumination.clone(),
+        views,
+        loss: prepared.scene.fit.loss,
+        // What moves normals forbids to keep what they look up.
+        unknowns: vec![Unknown::Param(Column::tied(Param::NormalStrength))],
+    };
+    match GpuEngine::over_device_samples(made, task, &prepared.start(), Memory::default()) {
+        Ok(engine) => Ok(Some(engine)),
+        Err(GpuError::Plan(_)) => Ok(None),
+        Err(error) => Err(error),
+    }
+}
+
+/// The median and the distance of the quartiles; `None` of nothing.
+fn median_and_spread(mut times: Vec<f64>) -> Option<(f64, f64)> {
+    times.sort_by(f64::total_cmp);
+    let median = times.get(times.len() / 2)?;
+    Some((*median, times[times.len() * 3 / 4] - times[times.len() / 4]))
 }
 
 /// SPIR-V instructions in the functions of both stages, as naga writes them (nothing is optimised yet).

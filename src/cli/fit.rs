@@ -28,7 +28,7 @@ use crate::scene::{Loss, Scene};
 /// Fit a scene's free parameters to its target images
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -71,6 +71,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     arguments.maps.check()?;
+    arguments.engine.check_samples(arguments.maps.any())?;
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
@@ -82,14 +83,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         cache: arguments.scene.cache(),
         ..PrepareOptions::default()
     };
-    let mut prepared = Prepared::new(&path, &options)?;
+    let own = arguments.engine.makes_samples();
+    let mut prepared = if own { Prepared::baked(&path, &options) } else { Prepared::new(&path, &options) }?;
     if let Some(loss) = &arguments.loss {
         prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
     }
     let solving = Solving::of(arguments, folder.path())?;
-    let observed = prepared.observed()?;
+    let observed = if own { prepared.keep_targets().map(|()| None) } else { prepared.observed().map(Some) }?;
     tell_warnings(&prepared.warnings);
-    let (observed, maps) = arguments.maps.fit(&mut prepared, observed, arguments.engine.adapter())?;
+    let (observed, maps) = match observed {
+        Some(observed) => {
+            let adapter = arguments.engine.adapter();
+            let (observed, maps) = arguments.maps.fit(&mut prepared, observed, adapter)?;
+            (Some(observed), maps)
+        }
+        None => (None, None),
+    };
     arguments.engine.with_engine(&prepared, observed, |chosen| {
         let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine)?;
         folder.keep();
@@ -144,8 +153,9 @@ fn conclude(
 ) -> Result<Exit, Refusal> {
     let engine = &chosen.engine;
     let clock = Instant::now();
-    let views = evidence(prepared, engine, outcome);
+    let views = evidence(prepared, engine, outcome)?;
     let mut seconds = prepared.seconds;
+    seconds.samples = engine.own_sample_seconds().unwrap_or(seconds.samples);
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
@@ -157,6 +167,10 @@ fn conclude(
         say(report.json.trim_end())?;
     } else {
         tell_outcome(outcome, &prepared.scene.views)?;
+        if engine.name() == "gpu" {
+            let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
+            say(&format!("{} samples made by the {by} in {:.3} s", engine.samples(), seconds.samples))?;
+        }
         if let Some(why) = &chosen.why {
             say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
         }
@@ -270,10 +284,15 @@ fn fingerprint(prepared: &Prepared, engine: &FitEngine<'_>) -> String {
 }
 
 /// For each view the target, the fit and its terms.
-fn evidence(prepared: &Prepared, engine: &FitEngine<'_>, outcome: &Outcome) -> Vec<ViewEvidence> {
+fn evidence(
+    prepared: &Prepared,
+    engine: &FitEngine<'_>,
+    outcome: &Outcome,
+) -> Result<Vec<ViewEvidence>, Refusal> {
+    let observed = engine.surfaced_views()?;
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
     let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
-    let views = prepared.scene.views.iter().zip(engine.views()).enumerate();
+    let views = prepared.scene.views.iter().zip(observed.iter()).enumerate();
     let evidence = views
         .map(|(index, (view, observed))| {
             let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
@@ -293,7 +312,7 @@ fn evidence(prepared: &Prepared, engine: &FitEngine<'_>, outcome: &Outcome) -> V
         })
         .collect();
     bar.finish_and_clear();
-    evidence
+    Ok(evidence)
 }
 
 /// The target as an image, and how much of each pixel is compared.
@@ -330,7 +349,7 @@ fn run_info(
         scene,
         loss: prepared.scene.fit.loss,
         engine: engine.name().to_owned(),
-        samples: engine.views().iter().map(|view| view.samples.count() as u64).sum(),
+        samples: engine.samples() as u64,
         seconds: prepared.seconds,
         views,
         warnings: prepared.warnings.clone(),

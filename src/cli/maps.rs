@@ -19,6 +19,11 @@ pub(super) struct MapArguments {
 }
 
 impl MapArguments {
+    /// Whether maps are fitted.
+    pub(super) fn any(&self) -> bool {
+        !self.maps.is_empty()
+    }
+
     /// Refuse maps in a program that was built without them.
     pub(super) fn check(&self) -> Result<(), Refusal> {
         if cfg!(feature = "burn") || (self.maps.is_empty() && self.hold_out.is_none()) {

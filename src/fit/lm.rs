@@ -325,8 +325,9 @@ impl Solver<&Passes<'_>, LmState> for LevenbergMarquardt<'_> {
         let trial = problem.problem("passes", |passes| Ok(passes.linearise(&at)))?;
         let promised = self.promised(&step);
         if rounding && trial.is_finite() {
-            // An extreme start says nothing of what gains are worth.
+            // An extreme start says nothing of what gains are worth, nor of the unknowns' scales.
             self.memory.first_loss = self.memory.first_loss.min(trial.loss);
+            self.memory.scaling.fill(0.0);
         }
         let taken = if stale && trial.is_finite() { self.renew(trial) } else { self.judge(&step, trial) };
         let ending =

@@ -76,6 +76,18 @@ pub enum GpuError {
         /// The adapter.
         adapter: String,
     },
+    /// Samples that the adapter makes do not all stay on it.
+    #[error(
+        "adapter {adapter}: its samples take {bytes} bytes, but {most} may stay there. Those that the adapter makes have to stay: allow more (--device-memory), or have them made by the CPU (--samples cpu)."
+    )]
+    SamplesStay {
+        /// The adapter.
+        adapter: String,
+        /// Bytes of samples and targets.
+        bytes: u64,
+        /// The most that may stay.
+        most: u64,
+    },
     /// The device is gone.
     #[error(
         "adapter {adapter}: the device was lost: {reason}. Its driver was reset or taken away: try again, choose another adapter with --adapter, or take --engine cpu."

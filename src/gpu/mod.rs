@@ -8,6 +8,7 @@
 //! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
 //! - `program`: a plan as a pipeline
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
+//! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
 //! - `readback`: images from the device
 //! - [`probe`]: rules evaluated for given numbers
 //! - [`timing`]: GPU time by pass
@@ -22,6 +23,7 @@ pub(crate) mod constants;
 pub mod device;
 pub mod error;
 mod filter;
+pub(crate) mod geometry;
 pub mod probe;
 mod program;
 pub(crate) mod readback;

@@ -28,10 +28,13 @@ pub(super) struct Program {
     attributes: Vec<Buffer>,
     indices: Buffer,
     index_count: u32,
+    /// Targets that it draws into.
+    targets: usize,
 }
 
 impl Program {
-    /// The plan's pipeline for targets of those formats.
+    /// The plan's pipeline for targets of those formats; without any, for depth alone: the plan has no fragment
+    /// stage.
     pub(super) fn new(
         gpu: &Gpu,
         plan: Plan,
@@ -50,7 +53,13 @@ impl Program {
         gpu.check()?;
         let indices = uploads.indices().clone();
         let index_count = 3 * uploads.content().scene.mesh.triangles.len() as u32;
-        Ok(Self { plan, pipeline, bound, constants, attributes, indices, index_count })
+        let targets = formats.len();
+        Ok(Self { plan, pipeline, bound, constants, attributes, indices, index_count, targets })
+    }
+
+    /// Targets that it draws into, depth aside.
+    pub(super) const fn targets(&self) -> usize {
+        self.targets
     }
 
     /// Set the constants of what is drawn next; they hold for all that is submitted at once.
@@ -194,7 +203,7 @@ fn pipeline(
             bias: DepthBiasState::default(),
         }),
         multisample: MultisampleState { count: multisamples, ..MultisampleState::default() },
-        fragment: Some(FragmentState {
+        fragment: (!targets.is_empty()).then(|| FragmentState {
             module: &module,
             entry_point: Some("fs_main"),
             compilation_options: PipelineCompilationOptions::default(),

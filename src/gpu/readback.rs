@@ -84,11 +84,21 @@ pub(crate) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
 }
 
 /// Run the encoder's commands, and read the floats that they leave in `buffer`.
-pub(crate) fn read_floats(
+pub(crate) fn read_floats(gpu: &Gpu, encoder: CommandEncoder, buffer: &Buffer) -> Result<Vec<f32>, GpuError> {
+    read(gpu, encoder, buffer, f32::from_le_bytes)
+}
+
+/// Run the encoder's commands, and read the words that they leave in `buffer`.
+pub(super) fn read_words(gpu: &Gpu, encoder: CommandEncoder, buffer: &Buffer) -> Result<Vec<u32>, GpuError> {
+    read(gpu, encoder, buffer, u32::from_le_bytes)
+}
+
+fn read<T>(
     gpu: &Gpu,
     mut encoder: CommandEncoder,
     buffer: &Buffer,
-) -> Result<Vec<f32>, GpuError> {
+    number: fn([u8; 4]) -> T,
+) -> Result<Vec<T>, GpuError> {
     let copy = gpu.device.create_buffer(&BufferDescriptor {
         label: Some("readback"),
         size: buffer.size(),
@@ -101,5 +111,5 @@ pub(crate) fn read_floats(
     map(gpu, &slice)?;
     let view = slice.get_mapped_range().map_err(|error| gpu.lost(&error.to_string()))?;
     let bytes: &[u8] = &view;
-    Ok(bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect())
+    Ok(bytes.chunks_exact(4).map(|b| number([b[0], b[1], b[2], b[3]])).collect())
 }

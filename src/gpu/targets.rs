@@ -123,7 +123,7 @@ impl Targets {
             });
         }
         let n = key.antialias.grid();
-        let tiles = tiles(key.width, key.height, tile_sides(key.width, key.height, n, limit));
+        let tiles = tiles(key.width, key.height, tile_sides(key.width, key.height, n, limit, MOST_SAMPLES));
         let (width, height) = (n * tiles[0].width, n * tiles[0].height);
         let planes = |width, height, multisamples| planes(gpu, &key, width, height, multisamples);
         let multisamples = key.antialias.multisamples();
@@ -140,10 +140,10 @@ impl Targets {
     }
 }
 
-/// A tile's sides in pixels, of n x n samples each.
-fn tile_sides(width: u32, height: u32, n: u32, limit: u32) -> [u32; 2] {
+/// A tile's sides in pixels, of n x n samples each: no longer than `limit` samples, and `most` in all.
+pub(super) fn tile_sides(width: u32, height: u32, n: u32, limit: u32, most: u64) -> [u32; 2] {
     let mut sides = [width.min(limit / n).max(1), height.min(limit / n).max(1)];
-    while u64::from(sides[0] * n) * u64::from(sides[1] * n) > MOST_SAMPLES {
+    while u64::from(sides[0] * n) * u64::from(sides[1] * n) > most {
         let longer = usize::from(sides[1] > sides[0]);
         sides[longer] = sides[longer].div_ceil(2);
     }
@@ -151,7 +151,7 @@ fn tile_sides(width: u32, height: u32, n: u32, limit: u32) -> [u32; 2] {
 }
 
 /// Tiles of those sides; those at the right and lower border are narrower.
-fn tiles(width: u32, height: u32, [across, down]: [u32; 2]) -> Vec<Tile> {
+pub(super) fn tiles(width: u32, height: u32, [across, down]: [u32; 2]) -> Vec<Tile> {
     let rows = (0..height).step_by(down as usize);
     rows.flat_map(|y| {
         let columns = (0..width).step_by(across as usize);
@@ -201,7 +201,7 @@ mod tests {
         for (width, height, n, limit) in
             [(7, 5, 2, 6), (300, 10, 8, 64), (9000, 9000, 1, 16384), (1, 1, 8, 8)]
         {
-            let sides = tile_sides(width, height, n, limit);
+            let sides = tile_sides(width, height, n, limit, MOST_SAMPLES);
             assert!(sides.into_iter().all(|side| side * n <= limit));
             assert!(u64::from(sides[0] * n) * u64::from(sides[1] * n) <= MOST_SAMPLES);
             let mut seen = vec![0_u8; (width * height) as usize];

@@ -1,8 +1,8 @@
 //! GPU time by pass, from the adapter's timestamps.
 
 use wgpu::{
-    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, QUERY_SIZE, QuerySet, QuerySetDescriptor,
-    QueryType, RenderPassTimestampWrites,
+    Buffer, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassTimestampWrites, QUERY_SIZE, QuerySet,
+    QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
 };
 
 use super::device::Gpu;
@@ -22,16 +22,16 @@ pub struct PassTime {
 }
 
 /// Timestamps around the passes that are submitted at once.
-pub(super) struct Timer {
+pub(crate) struct Timer {
     /// Absent where the adapter has no timestamps.
     queries: Option<(QuerySet, Buffer, Buffer)>,
     passes: Vec<&'static str>,
     /// Sums over submissions.
-    pub(super) times: Vec<PassTime>,
+    pub(crate) times: Vec<PassTime>,
 }
 
 impl Timer {
-    pub(super) fn new(gpu: &Gpu) -> Self {
+    pub(crate) fn new(gpu: &Gpu) -> Self {
         let queries = gpu.timestamps().then(|| {
             let set = gpu.device.create_query_set(&QuerySetDescriptor {
                 label: Some("times"),
@@ -52,21 +52,37 @@ impl Timer {
 
     /// What a pass is to write; none where passes cannot be timed.
     pub(super) fn around(&mut self, pass: &'static str) -> Option<RenderPassTimestampWrites<'_>> {
+        let (query_set, first) = self.next(pass)?;
+        Some(RenderPassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        })
+    }
+
+    /// What a compute pass is to write, likewise.
+    pub(crate) fn around_compute(&mut self, pass: &'static str) -> Option<ComputePassTimestampWrites<'_>> {
+        let (query_set, first) = self.next(pass)?;
+        Some(ComputePassTimestampWrites {
+            query_set,
+            beginning_of_pass_write_index: Some(first),
+            end_of_pass_write_index: Some(first + 1),
+        })
+    }
+
+    /// The queries, and the first of the two that are a pass's.
+    fn next(&mut self, pass: &'static str) -> Option<(&QuerySet, u32)> {
         let (set, ..) = self.queries.as_ref()?;
         let first = 2 * self.passes.len() as u32;
         if first >= 2 * MOST_PASSES {
             return None;
         }
         self.passes.push(pass);
-        Some(RenderPassTimestampWrites {
-            query_set: set,
-            beginning_of_pass_write_index: Some(first),
-            end_of_pass_write_index: Some(first + 1),
-        })
+        Some((set, first))
     }
 
     /// After the last pass: have the times copied.
-    pub(super) fn finish(&self, encoder: &mut CommandEncoder) {
+    pub(crate) fn finish(&self, encoder: &mut CommandEncoder) {
         if let Some((set, resolved, read)) = &self.queries {
             let count = 2 * self.passes.len() as u32;
             encoder.resolve_query_set(set, 0..count, resolved, 0);
@@ -75,7 +91,7 @@ impl Timer {
     }
 
     /// After the submission: wait for the times, and add them up.
-    pub(super) fn collect(&mut self, gpu: &Gpu) -> Result<(), GpuError> {
+    pub(crate) fn collect(&mut self, gpu: &Gpu) -> Result<(), GpuError> {
         let passes = std::mem::take(&mut self.passes);
         let Some((_, _, read)) = &self.queries else { return Ok(()) };
         let slice = read.slice(..u64::from(2 * passes.len() as u32 * QUERY_SIZE));

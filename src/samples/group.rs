@@ -9,32 +9,41 @@ use super::{LANES, SurfaceRecords, ViewSamples};
 /// The fewest groups that one task fills.
 const CHUNK: usize = 64;
 
+/// The pixels that show the mesh, row by row: each one's index in the image, and where its hits start and end.
+pub(super) type Pixels = [(u32, std::ops::Range<u32>)];
+
 /// Pack the hits of a view of `width` pixels with `per_pixel` samples a pixel.
 pub(super) fn pack(hits: &Hits, surface: &Surface<'_>, width: u32, per_pixel: u32) -> ViewSamples {
-    let order = order(hits, width);
+    let order = order(&hits.pixels, width);
+    let mut samples = groups(&hits.pixels, &order, per_pixel);
+    samples.surface = SurfaceRecords::new(surface.asked(), samples.records());
+    fill(hits, surface, &order, &samples.group_start, &mut samples.surface);
+    samples
+}
+
+/// The groups of pixels in `order`; what their samples show is left empty.
+pub(super) fn groups(pixels: &Pixels, order: &[u32], per_pixel: u32) -> ViewSamples {
     let mut samples = ViewSamples { group_start: vec![0], ..Default::default() };
     for group in order.chunks(LANES) {
         for lane in 0..LANES {
-            let pixel = group.get(lane).map(|&i| &hits.pixels[i as usize]);
+            let pixel = group.get(lane).map(|&i| &pixels[i as usize]);
             samples.pixel.push(pixel.map_or(u32::MAX, |(index, _)| *index));
             samples.coverage.push(pixel.map_or(0.0, |(_, range)| range.len() as f32 / per_pixel as f32));
         }
         // The first pixel has the most samples.
-        let records = hits.pixels[group[0] as usize].1.len();
+        let records = pixels[group[0] as usize].1.len();
         samples.group_start.push((samples.records() + records) as u32);
     }
-    samples.surface = SurfaceRecords::new(surface.asked(), samples.records());
-    fill(hits, surface, &order, &samples.group_start, &mut samples.surface);
     samples
 }
 
 /// The hit that each sample slot of the packed view shows.
 pub(super) fn slots(hits: &Hits, width: u32) -> Vec<Hit> {
     let mut slots = Vec::new();
-    for group in order(hits, width).chunks(LANES) {
+    for group in order(&hits.pixels, width).chunks(LANES) {
         let records = hits.pixels[group[0] as usize].1.len();
         for record in 0..records {
-            slots.extend((0..LANES).map(|lane| hits.hits[hit(hits, group, lane, record).0]));
+            slots.extend((0..LANES).map(|lane| hits.hits[hit(&hits.pixels, group, lane, record).hit]));
         }
     }
     slots
@@ -42,22 +51,32 @@ pub(super) fn slots(hits: &Hits, width: u32) -> Vec<Hit> {
 
 /// The pixels in the order in which they are packed: full ones first; among equals, along a Z-order curve, so that
 /// a group is a small tile.
-fn order(hits: &Hits, width: u32) -> Vec<u32> {
-    let mut order: Vec<u32> = (0..hits.pixels.len() as u32).collect();
+pub(super) fn order(pixels: &Pixels, width: u32) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..pixels.len() as u32).collect();
     order.par_sort_unstable_by_key(|&i| {
-        let (pixel, range) = &hits.pixels[i as usize];
+        let (pixel, range) = &pixels[i as usize];
         (std::cmp::Reverse(range.len()), z_order(pixel % width, pixel / width))
     });
     order
 }
 
-/// The index of the hit at a slot of a group, and its share of the pixel. Lanes beyond the last pixel repeat the
-/// first, without a share; so do missing samples.
-fn hit(hits: &Hits, group: &[u32], lane: usize, record: usize) -> (usize, f32) {
-    let (_, range) = &hits.pixels[group[if lane < group.len() { lane } else { 0 }] as usize];
+/// What stands at a slot.
+pub(super) struct Slot {
+    /// The pixel's index in the image.
+    pub(super) pixel: u32,
+    /// The hit's index.
+    pub(super) hit: usize,
+    /// The sample's share of the pixel.
+    pub(super) share: f32,
+}
+
+/// What stands at a slot of a group. Lanes beyond the last pixel repeat the first, without a share; so do missing
+/// samples.
+pub(super) fn hit(pixels: &Pixels, group: &[u32], lane: usize, record: usize) -> Slot {
+    let (pixel, range) = &pixels[group[if lane < group.len() { lane } else { 0 }] as usize];
     let real = lane < group.len() && record < range.len();
     let hit = range.start as usize + if record < range.len() { record } else { 0 };
-    (hit, if real { 1.0 / range.len() as f32 } else { 0.0 })
+    Slot { pixel: *pixel, hit, share: if real { 1.0 / range.len() as f32 } else { 0.0 } }
 }
 
 /// Fill each group's records.
@@ -74,8 +93,8 @@ fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], 
     parts.zip(order.par_chunks(LANES)).for_each(|(rows, group)| {
         for lane in 0..LANES {
             for (record, rows) in rows.chunks_exact_mut(stride).enumerate() {
-                let (hit, weight) = hit(hits, group, lane, record);
-                places.put(rows, lane, &surface.at(hits.hits[hit]), weight);
+                let Slot { hit, share, .. } = hit(&hits.pixels, group, lane, record);
+                places.put(rows, lane, &surface.at(hits.hits[hit]), share);
             }
         }
     });

@@ -9,10 +9,12 @@
 //! - `trace`: primary rays, and what they hit
 //! - `surface`: frames, silhouette and maps at a hit
 //! - `group`: samples packed into groups
+//! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
 //! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
 
+pub mod covered;
 mod group;
 pub mod rows;
 mod surface;
@@ -206,6 +208,12 @@ pub fn sample_view(
     let hits = trace::trace(rays, posed, camera, n);
     let surface = surface::Surface::new(scene, posed, occlusion, camera.eye());
     group::pack(&hits, &surface, camera.width, n * n)
+}
+
+/// So many records of what the effects of `scene` ask for, all zero.
+#[must_use]
+pub fn asked_records(scene: &Scene, count: usize) -> SurfaceRecords {
+    SurfaceRecords::new(surface::asked_of(scene), count)
 }
 
 /// The point of the mesh that each sample slot of [`sample_view`] shows, traced anew; padding repeats others.

@@ -71,6 +71,11 @@ impl Rows {
         &mut self.rows
     }
 
+    /// Set every number, as far as there are some: row after row of each record.
+    pub fn fill(&mut self, numbers: &[f32]) {
+        self.rows.iter_mut().zip(numbers.as_chunks::<LANES>().0).for_each(|(row, numbers)| row.0 = *numbers);
+    }
+
     /// A record's rows.
     #[inline(always)]
     #[must_use]

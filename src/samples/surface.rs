@@ -15,6 +15,33 @@ use crate::scene::mesh::PosedMesh;
 /// A decoded z that is positive is at least this, so that the normal never vanishes.
 const LEAST_Z: f32 = 1e-6;
 
+/// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads its neutral
+/// value, which it does not decode.
+fn bumped(scene: &Scene) -> bool {
+    let normal_map = scene.effects.needs(scene.silhouette).normal_map;
+    normal_map && (scene.maps.normal.is_some() || scene.form == Form::Listing)
+}
+
+/// What the effects of a scene read of each sample.
+pub(super) fn asked_of(scene: &Scene) -> Asked {
+    let bumped = bumped(scene) && !scene.mesh.tangents.is_empty();
+    asked(&scene.effects.needs(scene.silhouette), scene.silhouette, bumped)
+}
+
+fn asked(needs: &Needs, silhouette: Silhouette, bumped: bool) -> Asked {
+    Asked {
+        bump: bumped,
+        normal: needs.key_light,
+        albedo: needs.color_map,
+        occlusion: needs.occlusion,
+        silhouette: needs.rim && silhouette != Silhouette::Bumped,
+        dapple: needs.dapple,
+        specular: needs.specular_map,
+        attenuator: needs.attenuator_map,
+        weight: true,
+    }
+}
+
 /// The vertex stage of one view, ready to be read at any point.
 pub(super) struct Surface<'a> {
     mesh: &'a PosedMesh,
@@ -38,10 +65,7 @@ impl<'a> Surface<'a> {
         eye: DVec3,
     ) -> Self {
         let needs = scene.effects.needs(scene.silhouette);
-        // Of a missing map, the listing still reads its neutral value, which it does not decode.
-        let bumped = needs.normal_map
-            && !mesh.tangents.is_empty()
-            && (scene.maps.normal.is_some() || scene.form == Form::Listing);
+        let bumped = bumped(scene) && !mesh.tangents.is_empty();
         let bitangent = |(n, t): (&Vec3, &glam::Vec4)| t.w * n.cross(t.truncate()).normalize_or_zero();
         let bitangents = if bumped {
             mesh.normals.par_iter().zip(&mesh.tangents).map(bitangent).collect()
@@ -57,18 +81,7 @@ impl<'a> Surface<'a> {
 
     /// What the effects read of each sample.
     pub(super) fn asked(&self) -> Asked {
-        let needs = &self.needs;
-        Asked {
-            bump: !self.bitangents.is_empty(),
-            normal: needs.key_light,
-            albedo: needs.color_map,
-            occlusion: needs.occlusion,
-            silhouette: needs.rim && self.silhouette != Silhouette::Bumped,
-            dapple: needs.dapple,
-            specular: needs.specular_map,
-            attenuator: needs.attenuator_map,
-            weight: true,
-        }
+        asked(&self.needs, self.silhouette, !self.bitangents.is_empty())
     }
 
     /// The surface at `hit`.

@@ -95,6 +95,23 @@ impl Places {
         (places, rows)
     }
 
+    /// The fields that are kept: name in the planner's words, first row, and how many rows.
+    pub fn fields(&self) -> impl Iterator<Item = (&'static str, usize, usize)> {
+        let fields = [
+            ("base", self.base, 3),
+            ("bump", self.bump, 3),
+            ("normal", self.normal, 3),
+            ("view", self.view, 3),
+            ("open", self.occlusion, 1),
+            ("silhouette", self.silhouette, 1),
+            ("dapple", self.dapple, 1),
+            ("albedo", self.albedo, 3),
+            ("specular", self.specular, 1),
+            ("attenuator", self.attenuator, 1),
+        ];
+        fields.into_iter().filter_map(|(name, place, rows)| Some((name, place?, rows)))
+    }
+
     fn vectors(&self, f: &Fragment<f32>) -> [(Option<usize>, [f32; 3]); 5] {
         [
             (self.base, f.base),

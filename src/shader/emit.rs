@@ -168,7 +168,7 @@ pub(crate) fn parts(facts: &Facts) -> Vec<&'static str> {
 
 impl Plan {
     /// Search for the rules, and list what they read; the module is left empty.
-    pub(super) fn search(
+    pub(crate) fn search(
         facts: &Facts,
         vertex_goals: &[&'static str],
         goals: &[&'static str],

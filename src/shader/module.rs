@@ -10,13 +10,14 @@ use crate::model::lights::KeyLight;
 use crate::model::params::{Param, Params};
 
 impl Plan {
-    pub(super) fn raster_module(&self, parts: &[&str]) -> String {
+    /// Declarations, and the vertex stage; its position has these attributes.
+    pub(crate) fn vertex_module(&self, position: &str) -> String {
         let mut wgsl = self.declarations(true);
         wgsl.push_str("\nstruct Vertex {\n    @builtin(vertex_index) vertex_index: u32,\n");
         for (i, attribute) in self.attributes.iter().enumerate() {
             let _ = writeln!(wgsl, "    @location({i}) {}: {},", attribute.name(), attribute.wgsl());
         }
-        wgsl.push_str("}\n\nstruct Varyings {\n    @builtin(position) clip: vec4f,\n");
+        let _ = write!(wgsl, "}}\n\nstruct Varyings {{\n    {position}@builtin(position) clip: vec4f,\n");
         for (i, (name, kind)) in self.varyings.iter().enumerate() {
             let _ = writeln!(wgsl, "    @location({i}) {name}: {kind},");
         }
@@ -24,6 +25,11 @@ impl Plan {
         wgsl.push_str(&self.calls(Stage::Vertex, uniform, |name| format!("vertex.{name}")));
         let varyings: String = self.varyings.iter().map(|(name, _)| format!(", {name}")).collect();
         let _ = write!(wgsl, "    return Varyings(clip{varyings});\n}}\n");
+        wgsl
+    }
+
+    pub(super) fn raster_module(&self, parts: &[&str]) -> String {
+        let mut wgsl = self.vertex_module("");
         if hazy(&self.facts) {
             wgsl.push_str(
                 "\nstruct Fragment {\n    @location(0) color: vec4f,\n    @location(1) coverage: f32,\n}\n",

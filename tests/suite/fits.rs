@@ -301,6 +301,20 @@ fn sums_of_single_precision_are_fitted_to_their_rounding() {
     }
 }
 
+/// From there the sums agree in all their digits before and after the weights are solved for.
+#[test]
+fn an_extreme_start_of_a_weight_ends_where_others_do() {
+    let mut image = Image::new(400, &truth());
+    image.single_precision = true;
+    for start in [1e4, 1e6, 1e9] {
+        let outcome = run(&image, &point(&[(Param::Hilite, start)]), SolverKind::Varpro);
+        assert_eq!(outcome.ending, Ending::Converged, "{start:e}");
+        // As from any start: 6e-8 of each value, times a condition of some 100.
+        let off = error(&outcome, &truth());
+        assert!(off < 1e-5, "{start:e}: {off:e}");
+    }
+}
+
 #[test]
 fn many_starts_leave_a_local_minimum() {
     let unknowns = [Param::BaseWeight, Param::EnvironmentRotation].map(tied);

@@ -4,9 +4,11 @@
 //! - [`fused`]: the text of that pass
 //! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
 //!   memory allowed is uploaded anew in each pass
+//! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
 //! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
 //! - `lights`: the cubes and the uniform block, as shaders are given them
-//! - `program`: the shaders of a wish, and one run of them; `images`: the forward pass
+//! - `program`: the shaders of a wish, and one run of them
+//! - `images`: the forward pass: images, and how long they take
 //! - `pipeline`: what both make pipelines and bindings with
 
 pub mod fused;
@@ -15,16 +17,19 @@ mod lights;
 mod parts;
 mod pipeline;
 mod program;
+mod samples;
 mod terms;
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 
 use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
 use self::images::Images;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
 use self::program::Program;
+pub use self::samples::{DeviceSampleError, DeviceSamples};
 use self::terms::{HELD, replace_samples};
 use super::view::ObservedView;
 use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
@@ -62,6 +67,10 @@ pub struct Task<'v> {
 /// Loss, gradient and normal equations on a graphics adapter.
 pub struct GpuEngine<'g> {
     gpu: &'g Gpu,
+    /// What makes the samples, where they are not uploaded.
+    made: Option<&'g DeviceSamples<'g>>,
+    /// What making them took.
+    made_seconds: f64,
     setup: Setup,
     views: &'g [ObservedView],
     loss: Loss,
@@ -96,6 +105,30 @@ impl<'g> GpuEngine<'g> {
     /// # Errors
     /// When the device does not take it.
     pub fn new(gpu: &'g Gpu, task: Task<'g>, start: &Point, memory: Memory) -> Result<Self, GpuError> {
+        Self::build(gpu, None, task, start, memory)
+    }
+
+    /// As [`Self::new`], over samples that the adapter makes: the task's views hold the groups that came with them,
+    /// in their order, and no surface. All of them stay on the device.
+    ///
+    /// # Errors
+    /// When the device does not take it, or may not keep as much.
+    pub fn over_device_samples(
+        samples: &'g DeviceSamples<'g>,
+        task: Task<'g>,
+        start: &Point,
+        memory: Memory,
+    ) -> Result<Self, GpuError> {
+        Self::build(samples.gpu(), Some(samples), task, start, memory)
+    }
+
+    fn build(
+        gpu: &'g Gpu,
+        made: Option<&'g DeviceSamples<'g>>,
+        task: Task<'g>,
+        start: &Point,
+        memory: Memory,
+    ) -> Result<Self, GpuError> {
         let Task { setup, illumination, views, loss, unknowns } = task;
         // Mesa's software driver loses its device over a pass that looks nothing up and weighs nothing.
         if TermName::of(setup.effects).is_empty() && !setup.effects.needs(setup.silhouette).haze {
@@ -105,6 +138,8 @@ impl<'g> GpuEngine<'g> {
         let traits = Traits::of(gpu, views)?;
         let mut engine = Self {
             gpu,
+            made,
+            made_seconds: 0.0,
             setup,
             loss,
             unknowns,
@@ -123,7 +158,10 @@ impl<'g> GpuEngine<'g> {
             fault: Mutex::new(None),
             views,
         };
-        let parts = Parts::new(gpu, views, &engine.traits, memory)?;
+        let start_of_parts = Instant::now();
+        let parts = Parts::new(gpu, views, &engine.traits, memory, made)?;
+        engine.made_seconds =
+            made.map_or(0.0, |made| made.seconds() + start_of_parts.elapsed().as_secs_f64());
         let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if HELD.contains(&c.param));
         engine.keeps = !engine.unknowns.iter().any(moves) && parts.all_resident();
         engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
@@ -150,6 +188,12 @@ impl<'g> GpuEngine<'g> {
     #[must_use]
     pub fn bytes(&self) -> (u64, u64) {
         self.lock().parts.bytes()
+    }
+
+    /// What made the samples where they were not uploaded, and the seconds that it took.
+    #[must_use]
+    pub fn device_samples(&self) -> Option<(&'g DeviceSamples<'g>, f64)> {
+        Some((self.made?, self.made_seconds))
     }
 
     /// The adapter's name.
@@ -211,7 +255,7 @@ impl<'g> GpuEngine<'g> {
         }
         let OnDevice { parts, lights, programs, images, terms } = device;
         if terms.take().is_some() {
-            parts.reload(self.gpu, self.views)?;
+            parts.reload(self.gpu, self.views, self.made)?;
         }
         // Their bindings are to the buffers before.
         programs.clear();
@@ -238,41 +282,6 @@ impl<'g> GpuEngine<'g> {
         lights.set(self.gpu, &point.params, &mut program.inputs)?;
         let sums = program.run(self.gpu, parts, self.views, &point.gains)?;
         Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
-    }
-
-    /// The image of view `index` at `point`, as the CPU engine's: for each pixel slot the mean over its
-    /// samples, colour and (where the haze is compared) alpha, times the view's gain.
-    ///
-    /// # Errors
-    /// When the device fails.
-    pub fn image(&self, index: usize, point: &Point) -> Result<Vec<Vec<f32>>, GpuError> {
-        self.with_images(point, |images, parts| images.read(self.gpu, parts, index))
-    }
-
-    /// Shade every view and wait for it; the images stay on the device. To be timed.
-    ///
-    /// # Errors
-    /// When the device fails.
-    pub fn shade(&self, point: &Point) -> Result<(), GpuError> {
-        self.with_images(point, |_, _| self.gpu.wait())
-    }
-
-    fn with_images<T>(
-        &self,
-        point: &Point,
-        then: impl FnOnce(&Images, &Parts) -> Result<T, GpuError>,
-    ) -> Result<T, GpuError> {
-        let turned = self.turned(point);
-        let mut device = self.lock();
-        self.keep(point, &mut device)?;
-        let OnDevice { parts, lights, images, .. } = &mut *device;
-        if images.as_ref().is_none_or(|(of, _)| *of != turned) {
-            *images = Some((turned, Images::new(self.gpu, &self.fused(turned)?, parts)?));
-        }
-        let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
-        lights.set(self.gpu, &point.params, &mut images.inputs)?;
-        images.run(self.gpu, parts, self.views, &point.gains)?;
-        then(images, parts)
     }
 
     /// A pass as normal equations; after a fault, numbers that no solver takes.

@@ -6,6 +6,7 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::Memory;
 use super::fused::WORKGROUP;
+use super::samples::DeviceSamples;
 use crate::engine::BLOCK;
 use crate::engine::view::ObservedView;
 use crate::gpu::{Gpu, GpuError};
@@ -65,7 +66,7 @@ impl Traits {
 /// One part of a view.
 pub(super) struct Part {
     pub(super) view: usize,
-    groups: Range<usize>,
+    pub(super) groups: Range<usize>,
     /// Whether its buffers are its own.
     resident: bool,
     pub(super) buffers: PartBuffers,
@@ -92,16 +93,24 @@ pub(super) struct Parts {
 }
 
 impl Parts {
+    /// The parts of `views`; their samples are `made` on the device, or else uploaded.
     pub(super) fn new(
         gpu: &Gpu,
         views: &[ObservedView],
         traits: &Traits,
         memory: Memory,
+        made: Option<&DeviceSamples<'_>>,
     ) -> Result<Self, GpuError> {
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let limit = memory.part.map_or(limit, |part| part.min(limit));
         let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1 };
+        if let (Some(_), Some(most)) = (made, memory.resident) {
+            let bytes = views.iter().map(|view| parts.size(view, &(0..view.samples.groups())).total()).sum();
+            if bytes > most {
+                return Err(GpuError::SamplesStay { adapter: gpu.name().to_owned(), bytes, most });
+            }
+        }
         let (mut used, mut shared) = (0, None);
         for (index, view) in views.iter().enumerate() {
             for groups in cut(view, limit) {
@@ -128,7 +137,7 @@ impl Parts {
                     groups,
                 };
                 if resident {
-                    parts.upload(gpu, view, &part)?;
+                    parts.upload(gpu, view, &part, made.is_none())?;
                 }
                 parts.parts.push(part);
             }
@@ -140,6 +149,9 @@ impl Parts {
                 .iter_mut()
                 .filter(|part| !part.resident)
                 .for_each(|part| part.buffers = buffers.clone());
+        }
+        if let Some(made) = made {
+            made.fill(&parts.parts)?;
         }
         gpu.check()?;
         Ok(parts)
@@ -179,15 +191,20 @@ impl Parts {
         self.parts.iter().all(|part| part.resident)
     }
 
-    /// Upload every part's samples anew.
-    pub(super) fn reload(&mut self, gpu: &Gpu, views: &[ObservedView]) -> Result<(), GpuError> {
+    /// Upload every part's samples anew, or have them made anew.
+    pub(super) fn reload(
+        &mut self,
+        gpu: &Gpu,
+        views: &[ObservedView],
+        made: Option<&DeviceSamples<'_>>,
+    ) -> Result<(), GpuError> {
         for index in 0..self.parts.len() {
             let part = &self.parts[index];
             let size = self.size(&views[part.view], &part.groups);
             self.parts[index].buffers = PartBuffers::new(gpu, size)?;
-            self.upload(gpu, &views[self.parts[index].view], &self.parts[index])?;
+            self.upload(gpu, &views[self.parts[index].view], &self.parts[index], made.is_none())?;
         }
-        Ok(())
+        made.map_or(Ok(()), |made| made.fill(&self.parts))
     }
 
     /// Samples of a part, padding included.
@@ -235,7 +252,7 @@ impl Parts {
 
     /// Upload a part that does not stay on the device.
     pub(super) fn stream(&self, gpu: &Gpu, views: &[ObservedView], part: &Part) -> Result<(), GpuError> {
-        self.upload(gpu, &views[part.view], part)
+        self.upload(gpu, &views[part.view], part, true)
     }
 
     /// Whether each pass uploads the part.
@@ -252,10 +269,19 @@ impl Parts {
         }
     }
 
-    fn upload(&self, gpu: &Gpu, view: &ObservedView, part: &Part) -> Result<(), GpuError> {
+    /// Upload what a part's buffers hold, with or without its samples.
+    fn upload(
+        &self,
+        gpu: &Gpu,
+        view: &ObservedView,
+        part: &Part,
+        with_samples: bool,
+    ) -> Result<(), GpuError> {
         let PartBuffers { samples, group_start, targets } = &part.buffers;
         let records = records(view, &part.groups);
-        gpu.queue.write_buffer(samples, 0, bytes_of(view.samples.surface.rows(), &records));
+        if with_samples {
+            gpu.queue.write_buffer(samples, 0, bytes_of(view.samples.surface.rows(), &records));
+        }
         let starts: Vec<u32> = view.samples.group_start[part.groups.start..=part.groups.end]
             .iter()
             .map(|&start| start - records.start as u32)

@@ -25,6 +25,18 @@ pub(crate) fn kept() -> &'static Path {
     })
 }
 
+#[test]
+fn a_bake_tells_of_the_morph_targets_that_have_a_weight() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = kept().join(builtin::version()).join("scene.toml");
+    let mut command = program(kept());
+    Ran::of(command.arg("bake").arg(scene).args(["-o", "baked"]).current_dir(folder.path())).done();
+    let table = std::fs::read_to_string(folder.path().join("baked/occlusion.csv")).unwrap();
+    let mut lines = table.lines();
+    assert_eq!(lines.next(), Some("vertex,open,morph_0,morph_2"));
+    assert!(lines.all(|line| line.split(',').count() == 4));
+}
+
 /// Each free parameter's fitted values and standard errors, beside its true values.
 fn against_truth(report: &Value) -> Vec<(String, [f64; 3])> {
     let mut rows = Vec::new();

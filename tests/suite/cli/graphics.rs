@@ -172,3 +172,45 @@ fn an_ablation_times_the_renderer_where_it_is_asked_to() {
     let (name, times) = ablate("untimed", "never");
     assert!(name.is_null() && times.iter().all(Value::is_null), "{times:?}");
 }
+
+#[test]
+fn a_fit_over_the_adapters_own_samples_says_so_and_ends_where_the_others_do() {
+    let desk = Desk::new();
+    let refused = |arguments: &[&str], words: &[&str]| {
+        desk.run(&[&["fit", "scene.toml", "--samples", "gpu"], arguments].concat()).refused(words);
+    };
+    refused(&["--engine", "cpu"], &["--samples gpu", "--engine cpu"]);
+    if !adapter(&desk) {
+        return;
+    }
+    let fit = |run: &str, more: &[&str]| {
+        let ran = desk.run(&[&["fit", "scene.toml", "-o", run, "--verify"], more].concat());
+        assert_eq!(ran.code, Some(0), "{ran:?}");
+        (ran, desk.json(&format!("{run}/report.json")))
+    };
+    let (cpu, uploaded) = fit("cpu", &["--engine", "gpu"]);
+    assert!(cpu.out.contains("samples made by the CPU in"), "{}", cpu.out);
+    let (gpu, own) = fit("gpu", &["--samples", "gpu"]);
+    assert!(gpu.out.contains("samples made by the GPU in"), "{}", gpu.out);
+    assert!(gpu.err.contains("verified against the model in f64"), "{}", gpu.err);
+    // Where they may not stay, the CPU makes them after all.
+    let (little, streamed) = fit("little", &["--samples", "gpu", "--device-memory", "0"]);
+    assert!(little.err.contains("The CPU makes the samples."), "{}", little.err);
+    assert!(little.out.contains("samples made by the CPU in"), "{}", little.out);
+    // The targets are the CPU's own images: what is left are samples at outlines, a few in a hundred of these small
+    // images' pixels.
+    let left = |report: &Value| {
+        let loss = |key: &str| report["loss"][key].as_f64().unwrap();
+        loss("end") / loss("start")
+    };
+    println!("left: {} uploaded, {} streamed, {} own", left(&uploaded), left(&streamed), left(&own));
+    assert!(left(&uploaded) < 1e-6 && left(&streamed) < 1e-6, "{uploaded} {streamed}");
+    assert!(left(&own) < 1e-3, "{own}");
+    let samples = |report: &Value| report["samples"].as_f64().unwrap();
+    assert!(
+        (samples(&own) / samples(&uploaded) - 1.0).abs() < 0.01,
+        "{} {}",
+        samples(&own),
+        samples(&uploaded)
+    );
+}

@@ -7,6 +7,7 @@
 //! - `faults`: what is refused, and lost devices
 //! - `vectors`: the conformance vectors through the shader rules
 //! - `fused`: the fit engine on the adapter against the plain f64 model
+//! - `samples`: samples that the adapter makes, beside the CPU's
 //! - `exported`: exported GLSL in place of the renderer's own
 
 mod accuracy;
@@ -16,5 +17,6 @@ mod faults;
 mod frames;
 mod fused;
 mod parity;
+mod samples;
 mod stability;
 mod vectors;

@@ -155,7 +155,7 @@ fn shared_meshes_that_move_show_the_same_on_both_engines() {
 }
 
 /// Put the camera where it shows the mesh whole.
-fn stand_back(prepared: &mut Prepared) {
+pub(super) fn stand_back(prepared: &mut Prepared) {
     let positions = prepared.scene.mesh.pose().positions;
     let low = positions.iter().copied().reduce(Vec3::min).unwrap();
     let high = positions.iter().copied().reduce(Vec3::max).unwrap();
@@ -165,7 +165,7 @@ fn stand_back(prepared: &mut Prepared) {
 }
 
 /// Morph weights of all signs, and the bones of the middle of the animation.
-fn pose(prepared: &mut Prepared) {
+pub(super) fn pose(prepared: &mut Prepared) {
     let weights = [0.8, 0.0, -0.3, 0.5, 1.1];
     for (morph, weight) in prepared.scene.mesh.morphs.iter_mut().zip(weights) {
         morph.weight = weight;
@@ -178,7 +178,7 @@ fn pose(prepared: &mut Prepared) {
 }
 
 /// Parameters away from their defaults, channels apart.
-fn turn(prepared: &mut Prepared) {
+pub(super) fn turn(prepared: &mut Prepared) {
     use skinfit::model::params::Param;
     let params = &mut prepared.scene.params;
     params.set_rgb(Param::BaseWeight, [0.9, 1.0, 1.1]);

@@ -26,19 +26,7 @@ impl Layout {
     /// Of samples as the CPU stores them.
     #[must_use]
     pub fn of_samples(places: &Places, rows: usize) -> Self {
-        let fields = [
-            ("base", places.base),
-            ("bump", places.bump),
-            ("normal", places.normal),
-            ("view", places.view),
-            ("open", places.occlusion),
-            ("silhouette", places.silhouette),
-            ("dapple", places.dapple),
-            ("albedo", places.albedo),
-            ("specular", places.specular),
-            ("attenuator", places.attenuator),
-        ];
-        let fields = fields.into_iter().filter_map(|(name, place)| Some((name, place?))).collect();
+        let fields = places.fields().map(|(name, row, _)| (name, row)).collect();
         Self { source: Source::Samples, fields, share: places.weight, rows }
     }
 

@@ -1,4 +1,11 @@
-//! What evaluates the passes of a fit, and how it is chosen.
+//! What evaluates the passes of a fit, and how it is chosen; `gpu` and `absent`: with the GPU engine, and without.
+
+#[cfg(not(feature = "gpu"))]
+mod absent;
+#[cfg(feature = "gpu")]
+mod gpu;
+
+use std::borrow::Cow;
 
 use super::{Refusal, tell};
 use crate::engine::Objective;
@@ -20,6 +27,10 @@ pub(super) struct FitEngineArguments {
     /// that opening it pays off.
     #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = ["auto", "cpu", "gpu"])]
     engine: String,
+    /// What makes the GPU engine's samples of the surface: the CPU, which traces rays and uploads what they hit,
+    /// or the GPU, whose rasteriser draws them where they are read.
+    #[arg(long, value_name = "ENGINE", default_value = "cpu", value_parser = ["cpu", "gpu"])]
+    samples: String,
     /// Part of the name of the graphics adapter to use [default: $WGPU_ADAPTER_NAME, or the fastest kind].
     #[arg(long, value_name = "NAME")]
     adapter: Option<String>,
@@ -76,6 +87,43 @@ impl FitEngine<'_> {
         }
     }
 
+    /// The views with what their samples show, wherever those were made.
+    pub(super) fn surfaced_views(&self) -> Result<Cow<'_, [ObservedView]>, Refusal> {
+        #[cfg(feature = "gpu")]
+        if let Self::Gpu(engine) = self
+            && let Some((made, _)) = engine.device_samples()
+        {
+            let mut views = engine.views().to_vec();
+            for (index, view) in views.iter_mut().enumerate() {
+                view.samples.surface = made.read(index, &view.samples)?;
+            }
+            return Ok(Cow::Owned(views));
+        }
+        Ok(Cow::Borrowed(self.views()))
+    }
+
+    /// How many samples there are.
+    pub(super) fn samples(&self) -> usize {
+        #[cfg(feature = "gpu")]
+        if let Self::Gpu(engine) = self
+            && let Some((made, _)) = engine.device_samples()
+        {
+            return made.count();
+        }
+        self.views().iter().map(|view| view.samples.count()).sum()
+    }
+
+    /// The seconds that making the samples on the adapter took, where it made them.
+    pub(super) fn own_sample_seconds(&self) -> Option<f64> {
+        match self {
+            Self::Cpu(_) => None,
+            #[cfg(feature = "gpu")]
+            Self::Gpu(engine) => engine.device_samples().map(|(_, seconds)| seconds),
+            #[cfg(not(feature = "gpu"))]
+            Self::Gpu(never, _) => match *never {},
+        }
+    }
+
     /// `cpu` or `gpu`.
     pub(super) const fn name(&self) -> &'static str {
         match self {
@@ -94,8 +142,11 @@ impl FitEngine<'_> {
             #[cfg(feature = "gpu")]
             Self::Gpu(engine) => {
                 let (resident, streamed) = engine.bytes();
+                let own = engine.device_samples().is_some();
+                let samples = if own { "made by the adapter" } else { "made by the CPU and uploaded" };
                 vec![
                     ("adapter".to_owned(), engine.adapter().to_owned()),
+                    ("samples".to_owned(), samples.to_owned()),
                     ("bytes on the device".to_owned(), resident.to_string()),
                     ("bytes uploaded a pass".to_owned(), streamed.to_string()),
                 ]
@@ -112,18 +163,41 @@ impl FitEngineArguments {
         self.engine != "cpu"
     }
 
+    /// Whether the adapter makes the samples: then nobody else has to.
+    pub(super) fn makes_samples(&self) -> bool {
+        self.samples == "gpu"
+    }
+
+    /// Refuse what cannot be together; `maps`: whether whole maps are fitted, too.
+    pub(super) fn check_samples(&self, maps: bool) -> Result<(), Refusal> {
+        if self.makes_samples() && self.engine == "cpu" {
+            return Err(Refusal::new(
+                "--samples gpu leaves the samples on the adapter, where --engine cpu cannot read them. Leave one of \
+                 the two out.",
+            ));
+        }
+        if self.makes_samples() && maps {
+            return Err(Refusal::new(
+                "--samples gpu makes no samples that --maps could use. Leave one of the two out.",
+            ));
+        }
+        Ok(())
+    }
+
     /// Part of the adapter's name, where one is named.
     pub(super) fn adapter(&self) -> Option<&str> {
         self.adapter.as_deref()
     }
 
-    /// Call `then` with the engine that was asked for, over the scene's views.
+    /// Call `then` with the engine that was asked for, over the scene's views; without any, over samples that the
+    /// adapter makes.
     pub(super) fn with_engine<T>(
         &self,
         prepared: &Prepared,
-        observed: Vec<ObservedView>,
+        observed: Option<Vec<ObservedView>>,
         then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
+        let Some(observed) = observed else { return self.with_own_samples(prepared, then) };
         let (gpu, why) = self.wants_gpu(&observed);
         if gpu {
             return self.with_gpu(prepared, observed, why, then);
@@ -150,10 +224,11 @@ impl FitEngineArguments {
         }
         let (objective, point) = (engine.objective(), prepared.start());
         let bar = progress::spinner("verify");
+        let views = engine.surfaced_views()?;
         let reference = Reference::new(
             prepared.setup(),
             &prepared.illumination,
-            engine.views(),
+            &views,
             prepared.scene.fit.loss,
             objective.unknowns(),
         );
@@ -170,135 +245,5 @@ impl FitEngineArguments {
              may compute wrongly: fit with --engine cpu, and please report it.",
             prepared.scene.path.display()
         )))
-    }
-}
-
-#[cfg(feature = "gpu")]
-mod gpu {
-    use super::{Chosen, FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, tell};
-    use crate::engine::gpu::{GpuEngine, Memory, Task};
-    use crate::gpu::{Choice, Gpu, GpuError};
-
-    /// Samples from which `auto` takes a graphics card, for each thread of the CPU. A rule of thumb: 0.6 s for
-    /// opening a device and compiling, ten passes at 30 ns a sample and thread.
-    const WORTH_A_THREAD: usize = 2_000_000;
-
-    impl FitEngineArguments {
-        /// Whether the GPU is to be tried, and where `auto` decides, why.
-        pub(super) fn wants_gpu(&self, observed: &[ObservedView]) -> (bool, Option<String>) {
-            match self.engine.as_str() {
-                "cpu" => (false, None),
-                "gpu" => (true, None),
-                _ if self.adapter.is_some() => (true, None),
-                _ => {
-                    let samples: usize = observed.iter().map(|view| view.samples.count()).sum();
-                    let threads = rayon::current_num_threads();
-                    let enough = WORTH_A_THREAD * threads;
-                    let words = if samples < enough { "fewer than the" } else { "more than the" };
-                    let why = format!(
-                        "{samples} samples are {words} {enough} from which opening a graphics card pays off \
-                         ({threads} threads)"
-                    );
-                    (samples >= enough, Some(why))
-                }
-            }
-        }
-
-        pub(super) fn with_gpu<T>(
-            &self,
-            prepared: &Prepared,
-            observed: Vec<ObservedView>,
-            why: Option<String>,
-            then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
-        ) -> Result<T, Refusal> {
-            let must = why.is_none();
-            let gpu = match self.open() {
-                Ok(gpu) if must || !gpu.is_software() => gpu,
-                Ok(gpu) => {
-                    let why = why.map(|why| format!("{why}, but {} is a program on the CPU", gpu.name()));
-                    return self.on_cpu(prepared, observed, why, then);
-                }
-                Err(error) if must => return Err(error.into()),
-                Err(error) => {
-                    tell(&format!("{error} The CPU engine makes the passes."));
-                    let why = why.map(|why| format!("{why}, but none could be opened"));
-                    return self.on_cpu(prepared, observed, why, then);
-                }
-            };
-            let mut gpu = gpu;
-            let mut resident = self.device_memory.map(|megabytes| megabytes * 1_000_000);
-            loop {
-                match self.engine_on(&gpu, prepared, &observed, resident) {
-                    Ok(engine) => {
-                        let engine = FitEngine::Gpu(engine);
-                        self.check(prepared, &engine)?;
-                        return then(&Chosen { engine, why });
-                    }
-                    // A device that ran out of memory is not to be trusted any more; half as much may fit.
-                    Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
-                        let all: u64 = observed.iter().map(bytes).sum();
-                        let most = resident.map_or(all, |most| most.min(all)) / 2;
-                        resident = Some(if most < 16_000_000 { 0 } else { most });
-                        tell(&format!(
-                            "{}: out of memory; trying again with {} MB of samples on it.",
-                            gpu.name(),
-                            resident.unwrap_or_default() / 1_000_000
-                        ));
-                        gpu = self.open()?;
-                    }
-                    Err(error) => return Err(error.into()),
-                }
-            }
-        }
-
-        fn open(&self) -> Result<Gpu, GpuError> {
-            Gpu::open(&Choice { name: self.adapter.clone(), ..Choice::default() })
-        }
-
-        fn engine_on<'g>(
-            &self,
-            gpu: &'g Gpu,
-            prepared: &Prepared,
-            observed: &'g [ObservedView],
-            resident: Option<u64>,
-        ) -> Result<GpuEngine<'g>, GpuError> {
-            let task = Task {
-                setup: prepared.setup(),
-                illumination: prepared.illumination.clone(),
-                views: observed,
-                loss: prepared.scene.fit.loss,
-                unknowns: prepared.unknowns(),
-            };
-            GpuEngine::new(gpu, task, &prepared.start(), Memory { part: None, resident })
-        }
-    }
-
-    fn bytes(view: &ObservedView) -> u64 {
-        size_of_val(view.samples.surface.rows().all()) as u64
-    }
-}
-
-#[cfg(not(feature = "gpu"))]
-mod gpu {
-    use super::{Chosen, FitEngineArguments, ObservedView, Prepared, Refusal};
-
-    impl FitEngineArguments {
-        pub(super) fn wants_gpu(&self, _observed: &[ObservedView]) -> (bool, Option<String>) {
-            let asked = self.engine == "gpu" || self.adapter.is_some() || self.device_memory.is_some();
-            (asked, (!asked).then(|| "this skinfit was built without its GPU engine".to_owned()))
-        }
-
-        pub(super) fn with_gpu<T>(
-            &self,
-            _prepared: &Prepared,
-            _observed: Vec<ObservedView>,
-            _why: Option<String>,
-            _then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
-        ) -> Result<T, Refusal> {
-            Err(Refusal::new(
-                "this skinfit was built without its GPU engine. Build it with the feature `gpu` (a default one), or \
-                 fit with --engine cpu.",
-            ))
-        }
     }
 }
