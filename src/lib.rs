@@ -15,7 +15,6 @@
 //! - [`prepare`]: the stages up to the samples, run once and timed.
 //! - [`demo`]: the built-in scene as files, its targets rendered.
 //! - [`report`]: metrics, pictures and pages that show how good a fit is.
-//! - [`study`]: what is measured about the model and the fits.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
 //! - `tensor`: the model on burn's tensors, differentiable (feature `burn`).
 //! - `maps`: fits of whole maps (feature `burn`).

@@ -30,8 +30,8 @@ pub(super) struct Arguments {
     /// The folder for stability.json and new_cases.toml; without it only the tables are printed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
-    /// Random cases.
-    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    /// Random cases. A thousand take a minute or two; on a graphics adapter that is a program on the CPU, some more.
+    #[arg(long, value_name = "N", default_value_t = 1_000)]
     cases: usize,
     /// What the random cases are drawn from.
     #[arg(long, default_value_t = 0)]
@@ -40,7 +40,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     replay: Option<PathBuf>,
     /// Pixels of the case that sums over many.
-    #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
+    #[arg(long, value_name = "N", default_value_t = 1_000_000, value_parser = clap::value_parser!(u64).range(1..=100_000_000))]
     pixels: u64,
     /// Leave out what runs on a graphics adapter: the shader rules and the GPU engine.
     #[arg(long)]

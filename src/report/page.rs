@@ -3,6 +3,8 @@
 
 use std::fmt::Write as _;
 
+use super::metrics::PSNR_OF_EQUALS;
+
 /// A page: its head, a row of tiles, and sections.
 #[derive(Clone, Debug, Default)]
 pub struct Page<'a> {
@@ -89,6 +91,21 @@ impl Cell {
     #[must_use]
     pub fn value(html: impl Into<String>, value: f64) -> Self {
         Self { html: html.into(), sort: value.is_finite().then_some(value) }
+    }
+
+    /// A score with so many digits, where it is known.
+    #[must_use]
+    pub fn score(score: Option<f64>, digits: usize) -> Self {
+        score.map_or_else(Self::none, |x| Self::value(format!("{x:.digits$}"), x))
+    }
+
+    /// A PSNR in dB, where it is known; of equal images it has no end.
+    #[must_use]
+    pub fn psnr(psnr: Option<f64>) -> Self {
+        match psnr {
+            Some(x) if x >= PSNR_OF_EQUALS => Self::value("equal", x),
+            other => Self::score(other, 2),
+        }
     }
 
     /// A number that is not known.

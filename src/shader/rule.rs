@@ -103,8 +103,11 @@ impl Rule {
     #[must_use]
     pub fn refusal(&self, facts: &Facts) -> Option<String> {
         if let Some(condition) = self.when.iter().find(|c| facts.holds(c) != Some(true)) {
-            let words = condition.strip_prefix('!');
-            return Some(words.map_or_else(|| format!("not {condition}"), ToOwned::to_owned));
+            let (only, fact) = condition.strip_prefix('!').map_or(("only", *condition), |fact| ("not", fact));
+            return Some(format!(
+                "{only} with {}",
+                fact.strip_prefix("has_").unwrap_or(fact).replace('_', " ")
+            ));
         }
         if self.error == Error::Fixed(0.0) {
             return None;

@@ -294,7 +294,7 @@ impl Evaluated {
         };
         Ok(Row {
             loss: mean_loss(&maps),
-            change: Change { rounding: rounding(subject, before), ..change(before, &maps) },
+            change: change_of(subject, before, &maps),
             views: names.zip(self.errors.iter().zip(&self.images)).map(view).collect(),
             counts: Counts::new(subject, &self.point.params)?,
             cpu: Some(cpu),
@@ -304,6 +304,16 @@ impl Evaluated {
             left_out: self.case,
         })
     }
+}
+
+/// How the loss changes. Where the whole model leaves nothing but rounding, there is no misfit that a change could be
+/// mistaken for: rounding is its error.
+fn change_of(subject: &Subject, before: &[LossMap], after: &[LossMap]) -> Change {
+    let (found, rounding) = (change(before, after), rounding(subject, before));
+    if rounding > 0.0 && mean_loss(before) <= rounding {
+        return Change { std_error: rounding, t: found.loss / rounding, rounding, ..found };
+    }
+    Change { rounding, ..found }
 }
 
 /// What roundings may do to the mean loss, of either of two fits and in either direction.

@@ -136,9 +136,6 @@ fn summary(ablation: &Ablation, full: &Row) -> String {
 
 fn cells(row: &Row, full: &Row) -> Vec<Cell> {
     let mean = row.mean();
-    let score = |x: Option<f64>, digits: usize| {
-        x.map_or_else(Cell::none, |x| Cell::value(format!("{x:.digits$}"), x))
-    };
     let saved = |own: f64, whole: f64| {
         let percent = if whole > 0.0 { 100.0 * (1.0 - own / whole) } else { 0.0 };
         Cell::value(signed(percent, 1), percent)
@@ -177,9 +174,9 @@ fn cells(row: &Row, full: &Row) -> Vec<Cell> {
         change,
         t,
         Cell::value(number(100.0 * mean.relative_rms, 3), mean.relative_rms),
-        score(mean.psnr, 2),
-        score(mean.ssim, 4),
-        score(mean.flip, 4),
+        Cell::psnr(mean.psnr),
+        Cell::score(mean.ssim, 4),
+        Cell::score(mean.flip, 4),
         time(row.cpu),
         time(row.gpu),
         saved(row.counts.operations, full.counts.operations),
@@ -250,9 +247,6 @@ fn views(ablation: &Ablation) -> String {
     for row in &ablation.rows {
         let class = if row.left_out.left_out.is_empty() { "reference" } else { "" };
         for view in &row.views {
-            let score = |x: Option<f64>, digits: usize| {
-                x.map_or_else(Cell::none, |x| Cell::value(format!("{x:.digits$}"), x))
-            };
             table.row(
                 class,
                 &[
@@ -261,9 +255,9 @@ fn views(ablation: &Ablation) -> String {
                     Cell::value(number(view.loss, 4), view.loss),
                     Cell::value(number(view.linear_rms, 3), view.linear_rms),
                     Cell::value(number(100.0 * view.relative_rms, 3), view.relative_rms),
-                    score(view.psnr, 2),
-                    score(view.ssim, 4),
-                    score(view.flip, 4),
+                    Cell::psnr(view.psnr),
+                    Cell::score(view.ssim, 4),
+                    Cell::score(view.flip, 4),
                 ],
             );
         }

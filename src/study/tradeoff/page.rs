@@ -134,9 +134,6 @@ fn axis(sweep: &Sweep) -> String {
     columns.push(("front.", "whether nothing is both as cheap and as accurate"));
     let mut table = Table::new(&columns);
     for setting in &sweep.settings {
-        let score = |x: Option<f64>, digits: usize| {
-            x.map_or_else(Cell::none, |x| Cell::value(format!("{x:.digits$}"), x))
-        };
         let time = setting.time.map_or_else(Cell::none, |time| {
             let half = 0.5 * (time.seconds.upper - time.seconds.lower);
             // What was run once has no spread to tell of.
@@ -149,8 +146,8 @@ fn axis(sweep: &Sweep) -> String {
         let mut cells = vec![
             Cell::text(&setting.name),
             Cell::value(number(100.0 * setting.error.relative, 3), setting.error.relative),
-            score(setting.error.psnr, 2),
-            score(setting.error.flip, 5),
+            Cell::psnr(setting.error.psnr),
+            Cell::score(setting.error.flip, 5),
         ];
         if sweep.cost == "seconds" {
             cells.push(time.clone());
