@@ -44,6 +44,9 @@ const NEAR: f64 = 0.9;
 /// Where elimination says that less than this share of a measured loss is left, that is a difference of sums
 /// that agree in all their digits: what is left must be measured.
 const LEFT: f64 = 1e-7;
+/// That matters where the measured loss was so many times the mean square of the image that is the answer: weights are
+/// then off by some 1e-6 of themselves, times the condition of the normal equations.
+const EXTREME: f64 = 1e3;
 /// Linear unknowns that moved by more than this leave the Jacobian stale.
 const STALE: f64 = 0.01;
 /// Once, a step from a stale Jacobian may raise the eliminated loss by this factor, though not above the
@@ -172,11 +175,16 @@ impl<'a> LevenbergMarquardt<'a> {
         step
     }
 
-    /// Whether the base's loss is known from rounding alone; not when measuring it did not change that.
+    /// Whether an extreme start left of the base's loss and of its linear unknowns nothing but rounding; not when
+    /// measuring them anew did not change that.
     fn is_rounding(&self) -> bool {
-        let memory = &self.memory;
-        memory.base.loss < LEFT * memory.measured
-            && memory.renewed.is_none_or(|before| memory.measured < 0.1 * before)
+        let Memory { base, measured, renewed, .. } = &self.memory;
+        let unknowns = self.coordinates.unknowns().iter().zip(&base.at);
+        let weights: Vec<f64> = unknowns.map(|(u, &at)| if u.linear() { at } else { 0.0 }).collect();
+        let image = base.image_change(&weights) / base.weight;
+        base.loss < LEFT * measured
+            && *measured > EXTREME * image
+            && renewed.is_none_or(|before| *measured < 0.1 * before)
     }
 
     /// Whether the base is the answer; if so, the last undamped step is taken on trust.
@@ -231,13 +239,16 @@ impl<'a> LevenbergMarquardt<'a> {
         let forgiven = !self.memory.forgiven
             && self.memory.moved > STALE
             && new < self.memory.measured.min(FORGIVEN * old);
-        if ratio < 1e-4 && !forgiven {
+        // Where no loss can tell, the slope still does.
+        let nearer = promised <= rounding && self.nears(&trial);
+        if ratio < 1e-4 && !forgiven && !nearer {
             self.memory.stretch = 1.0;
             return self.reject(parabola.clamp(0.1, 0.5) * length);
         }
-        self.memory.forgiven |= ratio < 1e-4;
-        self.memory.idle = if (old - new).abs() <= rounding { self.memory.idle + 1 } else { 0 };
+        self.memory.forgiven |= ratio < 1e-4 && !nearer;
+        self.memory.idle = if (old - new).abs() <= rounding && !nearer { self.memory.idle + 1 } else { 0 };
         let damping = match ratio {
+            _ if nearer => self.memory.damping,
             r if r > 0.75 => self.memory.damping * 0.1 * (new / old).clamp(0.01, 1.0),
             r if r > 0.25 || forgiven => self.memory.damping,
             _ => (self.memory.damping * 4.0).max(1e-3),
@@ -248,6 +259,15 @@ impl<'a> LevenbergMarquardt<'a> {
         let stretch = if near { self.memory.stretch * parabola.clamp(0.5, 1.5) } else { 1.0 };
         self.memory.stretch = stretch.clamp(1.0, MOST_STRETCH);
         self.renew(trial)
+    }
+
+    /// Whether an undamped step promises less than half as much at `trial` as at the base.
+    fn nears(&self, trial: &Linearisation) -> bool {
+        let outlook = |model: &Linearisation| {
+            let (down, up) = self.coordinates.room(&model.at);
+            -model.change(&bounded::minimise(&model.hessian, &model.gradient, &down, &up))
+        };
+        outlook(&self.reduced(trial.clone()).0) < 0.5 * outlook(&self.memory.base)
     }
 
     /// Go on from `trial`.
