@@ -350,11 +350,11 @@ fn fit_on_both(gpu: &Gpu, scene: &Path) {
     let off = (ours.loss_end - theirs.loss_end).abs();
     assert!(off <= 1e-6 * theirs.loss_end + floor, "{what}: loss {} {}", ours.loss_end, theirs.loss_end);
     for (a, b) in ours.unknowns.iter().zip(&theirs.unknowns) {
-        // Of what the images determine; the rest may stand anywhere. What they hardly determine moves with the
-        // roundings of the sums, by a small share of its standard error.
+        // Of what the images determine; the rest may stand anywhere. A twentieth of a standard error changes the loss by
+        // 0.05^2 / residuals of itself, 5e-9 with the half million of these scenes: less than its sums' roundings.
         if a.identifiable && b.identifiable {
             let off = (a.value - b.value).abs();
-            let most = (1e-4 * b.value.abs().max(1e-2)).max(0.02 * b.std_error.unwrap_or(0.0));
+            let most = (1e-4 * b.value.abs().max(1e-2)).max(0.05 * b.std_error.unwrap_or(0.0));
             assert!(
                 off <= most,
                 "{what}: {} {} {}, std error {:?}",
