@@ -3,7 +3,6 @@
 mod ablation;
 mod browser;
 mod built_in;
-pub(crate) mod desk;
 mod exported;
 #[cfg(feature = "gpu")]
 mod graphics;
@@ -13,6 +12,7 @@ mod outputs;
 mod refusals;
 mod refused_files;
 mod runs;
+pub(crate) mod sandbox;
 mod stability;
 mod stages;
 mod sweeps;

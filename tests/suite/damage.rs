@@ -11,7 +11,7 @@ use proptest::test_runner::TestRunner;
 use serde_json::json;
 use skinfit::scene::{Scene, SceneError, Warning};
 
-use super::desk::{Desk, SCENE, base64, encode, exr_with, quad, quad_parts, skinned};
+use super::scene_folder::{SCENE, SceneFolder, base64, encode, exr_with, quad, quad_parts, skinned};
 
 /// What may happen to a file on its way.
 #[derive(Clone, Debug)]
@@ -139,7 +139,7 @@ fn check_outcome(outcome: Result<(Scene, Vec<Warning>), SceneError>) -> Result<(
 #[test]
 fn every_kind_of_file_is_read_when_it_is_whole() {
     use exr::prelude::{Blocks, Compression, LineOrder};
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     // Noise of 300 lines: a DWAB block of 256, and a last one of 44 that may be stored as it is.
     let noise = |c: usize, i: usize| {
         f32::from_bits(0x3f80_0000 | ((i * 3 + c).wrapping_mul(2_654_435_761) & 0x7f_ffff) as u32)
@@ -152,10 +152,10 @@ fn every_kind_of_file_is_read_when_it_is_whole() {
     let mut files = files();
     files.push(("env.exr", exr_with(3, 300, &["R", "G", "B", "id"], encoding, noise)));
     for (name, bytes) in files {
-        let whole = std::fs::read(desk.path(name)).unwrap();
-        desk.write(name, &bytes);
-        desk.load().unwrap_or_else(|error| panic!("{error}"));
-        desk.write(name, &whole);
+        let whole = std::fs::read(scene_folder.path(name)).unwrap();
+        scene_folder.write(name, &bytes);
+        scene_folder.load().unwrap_or_else(|error| panic!("{error}"));
+        scene_folder.write(name, &whole);
     }
 }
 
@@ -167,24 +167,24 @@ fn throw<S: Strategy>(cases: u32, values: &S, check: impl Fn(S::Value) -> Result
 
 #[test]
 fn no_scene_file_makes_the_reader_panic() {
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     throw(1000, &arbitrary_scene(), |text| {
-        desk.write("scene.toml", text.as_bytes());
-        check_outcome(desk.load())
+        scene_folder.write("scene.toml", text.as_bytes());
+        check_outcome(scene_folder.load())
     });
 }
 
 #[test]
 fn no_damage_to_any_file_makes_its_reader_panic() {
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     let files = files();
     let which = any::<prop::sample::Index>();
     throw(2500, &(which, prop::collection::vec(damage(), 1..3)), |(which, damages)| {
         let (name, bytes) = which.get(&files);
-        let whole = std::fs::read(desk.path(name)).unwrap();
-        desk.write(name, &damages.iter().fold(bytes.clone(), |bytes, damage| damage.apply(bytes)));
-        let outcome = desk.load();
-        desk.write(name, &whole);
+        let whole = std::fs::read(scene_folder.path(name)).unwrap();
+        scene_folder.write(name, &damages.iter().fold(bytes.clone(), |bytes, damage| damage.apply(bytes)));
+        let outcome = scene_folder.load();
+        scene_folder.write(name, &whole);
         check_outcome(outcome)
     });
 }

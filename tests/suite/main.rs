@@ -8,7 +8,6 @@ mod builtin;
 mod cli;
 mod common;
 mod damage;
-mod desk;
 mod documents;
 mod engine;
 mod exports;
@@ -22,6 +21,7 @@ mod refusals;
 mod reports;
 mod samples;
 mod scene_files;
+mod scene_folder;
 #[cfg(target_os = "linux")]
 mod scheduler;
 mod shader;

@@ -8,11 +8,11 @@ use image::{ImageFormat, Rgb, RgbImage};
 use serde_json::{Value, json};
 use skinfit::model::params::{Column, Param};
 
-use super::desk::{Desk, SCENE, encode, exr, png, quad, skinned, tampered};
+use super::scene_folder::{SCENE, SceneFolder, encode, exr, png, quad, skinned, tampered};
 
 #[test]
 fn refusals_of_scene_files_say_where_what_and_what_to_do() {
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     let view = &SCENE[SCENE.find("[[view]]").unwrap()..SCENE.find("[fit]").unwrap()];
     let camera = |row: &str| ("1,0,0,0, 0,1,0,0, 0,0,1,-2, 0,0,0,1", row.to_owned());
     let cases: Vec<(&str, String, &[&str])> = vec![
@@ -71,7 +71,7 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
     ];
     let mut failures = String::new();
     for (from, to, words) in &cases {
-        let message = match desk.edited(from, to) {
+        let message = match scene_folder.edited(from, to) {
             Ok(_) => "(it was read)".to_owned(),
             Err(error) => error.to_string(),
         };
@@ -80,13 +80,13 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         }
     }
     assert!(failures.is_empty(), "{failures}");
-    desk.write("scene.toml", &[0xff, 0xfe, 0x00]);
-    assert!(desk.load().unwrap_err().to_string().contains("UTF-8"));
+    scene_folder.write("scene.toml", &[0xff, 0xfe, 0x00]);
+    assert!(scene_folder.load().unwrap_err().to_string().contains("UTF-8"));
 }
 
 #[test]
 fn refusals_of_images_name_the_file_and_the_pixel() {
-    let mut whole = Desk::new();
+    let mut whole = SceneFolder::new();
     whole.write("whole.jpg", &encode(RgbImage::from_pixel(64, 64, Rgb([9, 200, 3])), ImageFormat::Jpeg));
     let jpeg = std::fs::read(whole.path("whole.jpg")).unwrap();
     let bomb = {
@@ -127,7 +127,7 @@ fn refusals_of_images_name_the_file_and_the_pixel() {
     ];
     let mut failures = String::new();
     for (name, bytes, words) in cases {
-        whole = Desk::new();
+        whole = SceneFolder::new();
         whole.write(name, &bytes);
         let message = match whole.edited("[fit]", "mask = \"mask.png\"\n[fit]") {
             Ok(_) => "(it was read)".to_owned(),
@@ -149,7 +149,7 @@ fn crc32(bytes: &[u8]) -> u32 {
 
 #[test]
 fn refusals_of_meshes_name_the_place() {
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     let primitive =
         |json: &mut Value, key: &str, value: Value| json["meshes"][0]["primitives"][0][key] = value;
     let nan = f32::NAN.to_le_bytes();
@@ -207,8 +207,8 @@ fn refusals_of_meshes_name_the_place() {
     ));
     let mut failures = String::new();
     for (bytes, words) in cases {
-        desk.write("quad.glb", &bytes);
-        let message = match desk.load() {
+        scene_folder.write("quad.glb", &bytes);
+        let message = match scene_folder.load() {
             Ok(_) => "(it was read)".to_owned(),
             Err(error) => error.to_string(),
         };
@@ -221,21 +221,21 @@ fn refusals_of_meshes_name_the_place() {
 
 #[test]
 fn what_can_be_mended_is_mended_with_a_warning() {
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     let warned = |words: &str| {
-        let (scene, warnings) = desk.load().unwrap();
+        let (scene, warnings) = scene_folder.load().unwrap();
         assert!(warnings.iter().any(|w| w.to_string().contains(words)), "{warnings:?} lacks {words}");
         scene
     };
-    desk.write("quad.glb", &skinned(|_, _| ()));
+    scene_folder.write("quad.glb", &skinned(|_, _| ()));
     let scene = warned("4 vertices have bone weights that do not sum to 1");
     assert_eq!(scene.mesh.weights[0], [1.0, 0.0, 0.0, 0.0]);
     assert_eq!(scene.mesh.pose().positions[0].to_array(), [-1.0, 2.0, 0.0]);
-    desk.write("quad.glb", &tampered(|_, bin| bin[244..246].copy_from_slice(&[1, 0])));
+    scene_folder.write("quad.glb", &tampered(|_, bin| bin[244..246].copy_from_slice(&[1, 0])));
     assert_eq!(warned("1 degenerate triangles").mesh.triangles.len(), 1);
-    desk.write("quad.glb", &tampered(|_, bin| bin[48..60].fill(0)));
+    scene_folder.write("quad.glb", &tampered(|_, bin| bin[48..60].fill(0)));
     assert_eq!(warned("1 vertices have normals without").mesh.normals[0].to_array(), [0.0, 0.0, 1.0]);
-    desk.write(
+    scene_folder.write(
         "quad.glb",
         &tampered(|json, _| {
             let points = json!({"attributes": {"POSITION": 0}, "mode": 0});
@@ -243,13 +243,13 @@ fn what_can_be_mended_is_mended_with_a_warning() {
         }),
     );
     warned("1 primitives are points or lines");
-    desk.write("quad.glb", &quad());
-    desk.write("env.exr", &exr(6, 4, &["R", "G", "B"], |_, i| if i == 3 { -1.0 } else { 65504.0 }));
+    scene_folder.write("quad.glb", &quad());
+    scene_folder.write("env.exr", &exr(6, 4, &["R", "G", "B"], |_, i| if i == 3 { -1.0 } else { 65504.0 }));
     let panorama = warned("1 texels have negative radiance").environment.unwrap().panorama;
     assert_eq!((panorama.texels[3], panorama.texels[4]), ([0.0; 3], [65504.0; 3]));
     warned("twice as wide as high");
-    desk.write("env.exr", &exr(8, 4, &["R", "G", "B"], |_, _| 1.0));
-    let (scene, warnings) = desk.edited("[fit]", "[fit]\nfree = [\"key_color\"]").unwrap();
+    scene_folder.write("env.exr", &exr(8, 4, &["R", "G", "B"], |_, _| 1.0));
+    let (scene, warnings) = scene_folder.edited("[fit]", "[fit]\nfree = [\"key_color\"]").unwrap();
     assert!(warnings[0].message.contains("key_color is free, but no enabled effect asks for it"));
     assert_eq!(scene.fit.free, [Column::tied(Param::KeyColor)]);
 }

@@ -9,12 +9,12 @@ use skinfit::model::params::{Column, Param};
 use skinfit::scene::{LoadOptions, Loss, Scene};
 
 use super::common;
-use super::desk::{Desk, base64, encode, exr, png, quad, quad_parts, tampered};
+use super::scene_folder::{SceneFolder, base64, encode, exr, png, quad, quad_parts, tampered};
 
 #[test]
 fn the_small_scene_is_read_as_it_stands() {
-    let desk = Desk::new();
-    let (scene, warnings) = desk.load().unwrap();
+    let scene_folder = SceneFolder::new();
+    let (scene, warnings) = scene_folder.load().unwrap();
     assert_eq!(warnings, []);
     assert_eq!((scene.form, scene.silhouette), (Form::Corrected, Silhouette::Fragment));
     assert_eq!(scene.effects, Effects::SURFACE);
@@ -35,8 +35,8 @@ fn the_small_scene_is_read_as_it_stands() {
 
 #[test]
 fn keys_of_a_scene_do_what_they_say() {
-    let desk = Desk::new();
-    let edit = |from: &str, to: &str| desk.edited(from, to).unwrap().0;
+    let scene_folder = SceneFolder::new();
+    let edit = |from: &str, to: &str| scene_folder.edited(from, to).unwrap().0;
     let flipped = edit("[maps]", "[maps]\nnormal_y = \"down\"").maps.normal.unwrap();
     assert_eq!(flipped.texels[0][1], 1.0 - (64.0_f64 / 255.0) as f32);
     let listing = edit("[model]", "[model]\nform = \"listing\"");
@@ -57,25 +57,26 @@ fn keys_of_a_scene_do_what_they_say() {
 
 #[test]
 fn only_what_the_effects_ask_for_is_read() {
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     for name in ["color.png", "normal.png", "data.png", "target.exr"] {
-        desk.write(name, b"nothing that could be read");
+        scene_folder.write(name, b"nothing that could be read");
     }
     let options =
         LoadOptions { effects: Some(Effects::of(&[Effect::Reflection])), targets: false, time: None };
-    let (scene, _) = Scene::load(&desk.path("scene.toml"), &options).unwrap();
+    let (scene, _) = Scene::load(&scene_folder.path("scene.toml"), &options).unwrap();
     assert!(scene.mesh.uvs.is_empty() && scene.mesh.tangents.is_empty() && scene.views[0].target.is_none());
-    std::fs::remove_file(desk.path("env.exr")).unwrap();
+    std::fs::remove_file(scene_folder.path("env.exr")).unwrap();
     let options = LoadOptions { effects: Some(Effects::of(&[Effect::KeyLight])), targets: false, time: None };
-    desk.write("color.png", &png(1, 1, [1, 2, 3]));
-    assert!(Scene::load(&desk.path("scene.toml"), &options).unwrap().0.environment.is_none());
+    scene_folder.write("color.png", &png(1, 1, [1, 2, 3]));
+    assert!(Scene::load(&scene_folder.path("scene.toml"), &options).unwrap().0.environment.is_none());
 }
 
 #[test]
 fn eight_bit_targets_are_decoded_premultiplied_and_known_to_clip() {
-    let desk = Desk::new();
-    desk.write("target.exr", &encode(RgbaImage::from_pixel(4, 4, Rgba([255, 10, 0, 51])), ImageFormat::Png));
-    let (scene, _) = desk.load().unwrap();
+    let scene_folder = SceneFolder::new();
+    scene_folder
+        .write("target.exr", &encode(RgbaImage::from_pixel(4, 4, Rgba([255, 10, 0, 51])), ImageFormat::Png));
+    let (scene, _) = scene_folder.load().unwrap();
     let target = scene.views[0].target.as_ref().unwrap();
     assert_eq!((target.rgb[0][0], target.alpha.as_ref().unwrap()[0]), (0.2, 0.2));
     let clip = target.clipped_at.unwrap();
@@ -86,28 +87,29 @@ fn eight_bit_targets_are_decoded_premultiplied_and_known_to_clip() {
 
 #[test]
 fn layers_crops_and_grey_images_are_found() {
-    let desk = Desk::new();
-    desk.write("env.exr", &exr(8, 4, &["depth.Z", "beauty.R", "beauty.G", "beauty.B"], |c, _| c as f32));
-    assert_eq!(desk.load().unwrap().0.environment.unwrap().panorama.texels[0], [1.0, 2.0, 3.0]);
-    desk.write("env.exr", &exr(8, 4, &["Y"], |_, i| i as f32));
-    assert_eq!(desk.load().unwrap().0.environment.unwrap().panorama.texels[9], [9.0; 3]);
+    let scene_folder = SceneFolder::new();
+    scene_folder
+        .write("env.exr", &exr(8, 4, &["depth.Z", "beauty.R", "beauty.G", "beauty.B"], |c, _| c as f32));
+    assert_eq!(scene_folder.load().unwrap().0.environment.unwrap().panorama.texels[0], [1.0, 2.0, 3.0]);
+    scene_folder.write("env.exr", &exr(8, 4, &["Y"], |_, i| i as f32));
+    assert_eq!(scene_folder.load().unwrap().0.environment.unwrap().panorama.texels[9], [9.0; 3]);
     let hdr =
         image::DynamicImage::ImageRgb32F(image::ImageBuffer::from_pixel(8, 4, Rgb([65504.0, 1.0, 0.5])));
-    desk.write("env.exr", &encode(hdr, ImageFormat::Hdr));
-    let texel = desk.load().unwrap().0.environment.unwrap().panorama.texels[0];
+    scene_folder.write("env.exr", &encode(hdr, ImageFormat::Hdr));
+    let texel = scene_folder.load().unwrap().0.environment.unwrap().panorama.texels[0];
     // RGBE keeps 8 bits of the largest channel: 1/256 of it at most.
     assert!((texel[0] - 65504.0).abs() <= 256.0, "{texel:?}");
     let deep = image::DynamicImage::ImageLuma16(image::ImageBuffer::from_pixel(4, 4, image::Luma([13107])));
-    desk.write("data.png", &encode(deep, ImageFormat::Png));
-    assert_eq!(desk.load().unwrap().0.maps.specular.unwrap().texels[0], [0.2]);
+    scene_folder.write("data.png", &encode(deep, ImageFormat::Png));
+    assert_eq!(scene_folder.load().unwrap().0.maps.specular.unwrap().texels[0], [0.2]);
 }
 
 #[test]
 fn dwab_panoramas_decode_to_what_another_program_made_of_them() {
     let Some(data) = common::data() else { return };
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     let read = |file: &Path| {
-        let (scene, warnings) = desk.edited("\"env.exr\"", &format!("{file:?}")).unwrap();
+        let (scene, warnings) = scene_folder.edited("\"env.exr\"", &format!("{file:?}")).unwrap();
         (scene.environment.unwrap().panorama, warnings)
     };
     let (fine, _) = read(&data.join("env/source_dwab/studio_blender_dwab_f32.exr"));
@@ -161,10 +163,10 @@ fn the_real_scenes_load_without_a_warning() {
 
 #[test]
 fn strips_fans_sparse_and_quantised_accessors_and_mirrored_nodes_are_read() {
-    let desk = Desk::new();
+    let scene_folder = SceneFolder::new();
     let mesh = |bytes: &[u8]| {
-        desk.write("quad.glb", bytes);
-        let (scene, warnings) = desk.load().unwrap();
+        scene_folder.write("quad.glb", bytes);
+        let (scene, warnings) = scene_folder.load().unwrap();
         assert_eq!(warnings, []);
         scene.mesh
     };
@@ -229,13 +231,13 @@ fn strips_fans_sparse_and_quantised_accessors_and_mirrored_nodes_are_read() {
 
 #[test]
 fn gltf_with_data_uris_and_files_beside_it_reads_as_the_glb_does() {
-    let desk = Desk::new();
-    let want = desk.load().unwrap().0.mesh;
+    let scene_folder = SceneFolder::new();
+    let want = scene_folder.load().unwrap().0.mesh;
     let (mut json, bin) = quad_parts();
-    desk.write("a b.bin", &bin);
+    scene_folder.write("a b.bin", &bin);
     for uri in ["a%20b.bin".to_owned(), format!("data:application/octet-stream;base64,{}", base64(&bin))] {
         json["buffers"][0]["uri"] = json!(uri);
-        desk.write("quad.glb", json.to_string().as_bytes());
-        assert_eq!(desk.load().unwrap().0.mesh, want, "{uri}");
+        scene_folder.write("quad.glb", json.to_string().as_bytes());
+        assert_eq!(scene_folder.load().unwrap().0.mesh, want, "{uri}");
     }
 }

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::cli::desk::{Desk, Ran};
+use crate::cli::sandbox::{Ran, Sandbox};
 
 /// Nothing here takes longer, even where all cores are busy.
 const PATIENCE: Duration = Duration::from_secs(240);
@@ -221,8 +221,8 @@ key = "seed"
 values = [1, 2]
 "#;
 
-fn results(desk: &Desk) -> usize {
-    let entries = std::fs::read_dir(desk.path("results")).into_iter().flatten().flatten();
+fn results(sandbox: &Sandbox) -> usize {
+    let entries = std::fs::read_dir(sandbox.path("results")).into_iter().flatten().flatten();
     entries.filter(|entry| entry.file_name().to_string_lossy().starts_with("job-")).count()
 }
 
@@ -230,71 +230,71 @@ fn results(desk: &Desk) -> usize {
 fn a_sweep_under_slurm_loses_a_node_and_still_gives_what_a_local_one_gives() {
     let Some(mut slurm) = Slurm::start() else { return };
     // The same sweep here, first.
-    let local = Desk::new();
+    let local = Sandbox::new();
     local.write("plan.toml", PLAN.as_bytes());
     local.run(&["sweep", "plan.toml"]).done();
     local.run(&["collect", "plan.toml", "-o", "all.csv"]).done();
 
-    let desk = Desk::new();
-    desk.write("plan.toml", PLAN.as_bytes());
-    let list = desk.run(&["sweep", "plan.toml", "--threads", "1", "--list"]).done().out;
+    let sandbox = Sandbox::new();
+    sandbox.write("plan.toml", PLAN.as_bytes());
+    let list = sandbox.run(&["sweep", "plan.toml", "--threads", "1", "--list"]).done().out;
     assert_eq!(list.lines().count(), 12);
-    desk.write("jobs.txt", list.as_bytes());
+    sandbox.write("jobs.txt", list.as_bytes());
     // Each array task takes its line, as docs/sweeps.md has it.
     let script = format!(
         "#!/bin/sh\necho \"$SLURM_ARRAY_TASK_ID $SLURMD_NODENAME\" >> started.txt\n\
          # However fast the machine, a job that just began is there to be lost.\nsleep 1\n\
          export SKINFIT_CACHE='{}'\neval \"$(sed -n \"$((SLURM_ARRAY_TASK_ID + 1))p\" jobs.txt)\"\n",
-        desk.cache().display()
+        sandbox.cache().display()
     );
-    desk.write("sweep.sh", script.as_bytes());
-    let folder = desk.path("");
+    sandbox.write("sweep.sh", script.as_bytes());
+    let folder = sandbox.path("");
     let folder = folder.to_str().unwrap();
     let submitted = slurm
         .command(
             "sbatch",
             &["--parsable", "--requeue", "--array=0-11", "--chdir", folder, "--output=task-%a.txt"],
         )
-        .arg(desk.path("sweep.sh"))
+        .arg(sandbox.path("sweep.sh"))
         .output()
         .unwrap();
     assert!(submitted.status.success(), "{submitted:?} {}", slurm.logs());
-    let started = || std::fs::read_to_string(desk.path("started.txt")).unwrap_or_default();
+    let started = || std::fs::read_to_string(sandbox.path("started.txt")).unwrap_or_default();
     let on_two = || started().lines().filter(|line| line.ends_with(" two")).count();
 
     // In the middle: something is done, and the second node is at work.
-    poll("both nodes at work", || (results(&desk) >= 2 && on_two() >= 1).then_some(()));
+    poll("both nodes at work", || (results(&sandbox) >= 2 && on_two() >= 1).then_some(()));
     let seen = on_two();
     poll("a job that just began on the second node", || (on_two() > seen).then_some(()));
-    let before = results(&desk);
+    let before = results(&sandbox);
     slurm.kill_node(1);
     assert!(before < 12, "it was over before the node was killed");
-    let after = desk.run(&["collect", "plan.toml", "-o", "half.csv"]);
+    let after = sandbox.run(&["collect", "plan.toml", "-o", "half.csv"]);
     assert_eq!(after.code, Some(1), "{after:?}");
     assert!(after.err.contains("plan.toml: jobs without a result, by number: "), "{after:?}");
     // It comes back, as a machine does that was started again; its job is queued again by itself.
     slurm.start_node(1);
-    poll(&format!("every result; {}", slurm.logs()), || (results(&desk) == 12).then_some(()));
+    poll(&format!("every result; {}", slurm.logs()), || (results(&sandbox) == 12).then_some(()));
     poll("an empty queue", || {
         let queue = slurm.command("squeue", &["-h"]).output().unwrap();
         queue.stdout.is_empty().then_some(())
     });
     let lines = started().lines().count();
     assert!(lines > 12, "no job was started twice, so none was lost with its node: {}", started());
-    collected(&desk).done();
-    assert_eq!(desk.text("all.csv"), local.text("all.csv"));
+    collected(&sandbox).done();
+    assert_eq!(sandbox.text("all.csv"), local.text("all.csv"));
     // Submitted once more, nothing is computed again.
-    let content = |desk: &Desk| skinfit_results(desk);
-    let kept = content(&desk);
-    desk.run(&["sweep", "plan.toml"]).done();
-    assert_eq!(content(&desk), kept);
+    let content = |sandbox: &Sandbox| skinfit_results(sandbox);
+    let kept = content(&sandbox);
+    sandbox.run(&["sweep", "plan.toml"]).done();
+    assert_eq!(content(&sandbox), kept);
 }
 
-fn collected(desk: &Desk) -> Ran {
-    desk.run(&["collect", "plan.toml", "-o", "all.csv"])
+fn collected(sandbox: &Sandbox) -> Ran {
+    sandbox.run(&["collect", "plan.toml", "-o", "all.csv"])
 }
 
 /// The result files' bytes, seconds and all.
-fn skinfit_results(desk: &Desk) -> Vec<(PathBuf, Vec<u8>)> {
-    desk.files().into_iter().filter(|(path, _)| path.to_string_lossy().contains("/results/job-")).collect()
+fn skinfit_results(sandbox: &Sandbox) -> Vec<(PathBuf, Vec<u8>)> {
+    sandbox.files().into_iter().filter(|(path, _)| path.to_string_lossy().contains("/results/job-")).collect()
 }

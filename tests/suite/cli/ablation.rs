@@ -4,22 +4,22 @@ use std::collections::BTreeMap;
 
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::sandbox::Sandbox;
 
 /// The scene without its targets.
-fn without_targets(desk: &Desk) {
+fn without_targets(sandbox: &Sandbox) {
     for view in ["front", "side"] {
-        desk.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
+        sandbox.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
     }
 }
 
 /// The rows of `results.json` by what is left out.
-fn rows(desk: &Desk, folder: &str) -> BTreeMap<String, Value> {
+fn rows(sandbox: &Sandbox, folder: &str) -> BTreeMap<String, Value> {
     let name = |row: &Value| {
         let parts = row["left_out"].as_array().unwrap().iter().map(|part| part.as_str().unwrap());
         parts.collect::<Vec<_>>().join("+")
     };
-    let file = desk.json(&format!("{folder}/results.json"));
+    let file = sandbox.json(&format!("{folder}/results.json"));
     file["rows"].as_array().unwrap().iter().map(|row| (name(row), row.clone())).collect()
 }
 
@@ -29,11 +29,11 @@ fn loss(row: &Value) -> f64 {
 
 #[test]
 fn what_contributes_nothing_is_missed_by_nothing_at_all() {
-    let desk = Desk::new();
-    without_targets(&desk);
-    desk.edit("hilite = 0.7", "hilite = 0.0");
-    let ran = desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]).done();
-    let rows = rows(&desk, "parts");
+    let sandbox = Sandbox::new();
+    without_targets(&sandbox);
+    sandbox.edit("hilite = 0.7", "hilite = 0.0");
+    let ran = sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]).done();
+    let rows = rows(&sandbox, "parts");
     // The whole, seven effects, and the one term that is no effect.
     assert_eq!(rows.len(), 9, "{ran:?}");
     for unmissed in ["", "hilite"] {
@@ -61,11 +61,11 @@ fn what_contributes_nothing_is_missed_by_nothing_at_all() {
 
 #[test]
 fn fitting_again_never_makes_it_worse_and_pairs_are_all_there() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let options = ["ablate", "scene.toml", "--gpu", "never", "--pairs", "-o"];
-    desk.run(&[&options[..], &["held"]].concat()).done();
-    desk.run(&[&options[..], &["again", "--refit"]].concat());
-    let (held, again) = (rows(&desk, "held"), rows(&desk, "again"));
+    sandbox.run(&[&options[..], &["held"]].concat()).done();
+    sandbox.run(&[&options[..], &["again", "--refit"]].concat());
+    let (held, again) = (rows(&sandbox, "held"), rows(&sandbox, "again"));
     // 8 parts: 28 pairs, less diffuse with its two terms.
     assert_eq!((held.len(), again.len()), (1 + 8 + 26, 1 + 8 + 26));
     for (name, row) in &held {
@@ -79,7 +79,7 @@ fn fitting_again_never_makes_it_worse_and_pairs_are_all_there() {
     // Nothing of the diffuse light is left without both base and rim: each makes up for some of the other.
     let change = |row: &Value| row["change"]["loss"].as_f64().unwrap();
     let ratio = change(&held["base_weight+rim"]) / (change(&held["base_weight"]) + change(&held["rim"]));
-    let page = desk.text("held/report.html");
+    let page = sandbox.text("held/report.html");
     let cells = page
         .split("id=\"by-pair\"")
         .nth(1)
@@ -96,8 +96,8 @@ fn fitting_again_never_makes_it_worse_and_pairs_are_all_there() {
     assert!(!names(&again["hilite"]).contains(&"hilite".to_owned()));
     assert!(!names(&again["base_weight+hilite"]).contains(&"base_weight".to_owned()));
     // A line a case for all views and for each, and a picture for each part and view.
-    assert_eq!(desk.text("held/results.csv").lines().count(), 1 + 35 * 3);
-    let pictures = desk.files().into_keys().filter(|path| {
+    assert_eq!(sandbox.text("held/results.csv").lines().count(), 1 + 35 * 3);
+    let pictures = sandbox.files().into_keys().filter(|path| {
         path.to_string_lossy().contains("held/") && path.extension().is_some_and(|e| e == "png")
     });
     assert_eq!(pictures.count(), 8 * 2);
@@ -105,32 +105,32 @@ fn fitting_again_never_makes_it_worse_and_pairs_are_all_there() {
 
 #[test]
 fn numbers_do_not_depend_on_threads_and_constants_may_be_given() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let measured = |folder: &str, threads: &str| {
         let options =
             ["ablate", "scene.toml", "--params", "truth.toml", "--gpu", "never", "--threads", threads, "-o"];
-        desk.run(&[&options[..], &[folder]].concat()).done();
+        sandbox.run(&[&options[..], &[folder]].concat()).done();
         let without_times = |mut row: Value| {
             row["cpu"].take();
             row
         };
-        rows(&desk, folder).into_iter().map(|(name, row)| (name, without_times(row))).collect::<Vec<_>>()
+        rows(&sandbox, folder).into_iter().map(|(name, row)| (name, without_times(row))).collect::<Vec<_>>()
     };
     assert_eq!(measured("one", "1"), measured("two", "2"));
     // The constants that the targets were rendered with leave nothing but rounding.
-    assert!(loss(&rows(&desk, "one")[""]) < 1e-9);
+    assert!(loss(&rows(&sandbox, "one")[""]) < 1e-9);
 }
 
 #[test]
 fn a_scene_of_one_effect_is_black_without_it() {
-    let desk = Desk::new();
-    without_targets(&desk);
-    desk.edit(
+    let sandbox = Sandbox::new();
+    without_targets(&sandbox);
+    sandbox.edit(
         "[\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"side_specular\", \"hilite\", \"reflection\"]",
         "[\"diffuse\"]",
     );
-    desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]);
-    let rows = rows(&desk, "parts");
+    sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]);
+    let rows = rows(&sandbox, "parts");
     assert_eq!(rows.keys().collect::<Vec<_>>(), ["", "diffuse"]);
     let relative = rows["diffuse"]["views"][0]["relative_rms"].as_f64().unwrap();
     // The difference is the image itself.
@@ -139,14 +139,14 @@ fn a_scene_of_one_effect_is_black_without_it() {
 
 #[test]
 fn what_is_refused_leaves_no_folder() {
-    let desk = Desk::new();
-    let before = desk.files();
-    desk.run(&["ablate", "none.toml", "-o", "parts"]).refused(&["none.toml: there is no such file"]);
-    desk.run(&["ablate", "scene.toml", "-o", "parts", "--params", "none.toml"]).refused(&["none.toml"]);
-    desk.write("file", b"in the way");
-    desk.run(&["ablate", "scene.toml", "-o", "file"]).refused(&["file: cannot be written"]);
-    desk.remove("file");
-    assert!(desk.files() == before, "something was left");
+    let sandbox = Sandbox::new();
+    let before = sandbox.files();
+    sandbox.run(&["ablate", "none.toml", "-o", "parts"]).refused(&["none.toml: there is no such file"]);
+    sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--params", "none.toml"]).refused(&["none.toml"]);
+    sandbox.write("file", b"in the way");
+    sandbox.run(&["ablate", "scene.toml", "-o", "file"]).refused(&["file: cannot be written"]);
+    sandbox.remove("file");
+    assert!(sandbox.files() == before, "something was left");
     // The folder must be named.
-    assert_eq!(desk.run(&["ablate", "scene.toml"]).code, Some(2));
+    assert_eq!(sandbox.run(&["ablate", "scene.toml"]).code, Some(2));
 }

@@ -7,7 +7,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::sandbox::Sandbox;
 use super::tradeoffs::AXES;
 
 /// The browser; none, said loudly, where it is left out on purpose.
@@ -183,20 +183,20 @@ fn check(browser: &str, page: &Path, tables: &[&str], pictures: bool, plots: boo
 #[test]
 fn pages_work_in_a_browser() {
     let Some(browser) = browser() else { return };
-    let desk = Desk::new();
-    desk.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never", "--refit"]);
-    desk.fit("run", &["--engine", "cpu"]).done();
+    let sandbox = Sandbox::new();
+    sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never", "--refit"]);
+    sandbox.fit("run", &["--engine", "cpu"]).done();
     let goal = ["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml", "--within", "1%"];
-    desk.run(&goal).done();
-    let cost = desk.path("cost/report.html");
+    sandbox.run(&goal).done();
+    let cost = sandbox.path("cost/report.html");
     let tables: Vec<String> = AXES.iter().map(|axis| format!("axis-{axis}")).collect();
     let tables: Vec<&str> = std::iter::once("cheapest").chain(tables.iter().map(String::as_str)).collect();
     check(browser, &cost, &tables, false, true);
     let colours = screenshot(browser, &cost, "tradeoff_1100.png", 1100);
     assert!(colours > 100, "{colours} colours");
-    let parts = desk.path("parts/report.html");
+    let parts = sandbox.path("parts/report.html");
     check(browser, &parts, &["cases", "by-view", "by-constant"], true, true);
-    check(browser, &desk.path("run/report.html"), &[], true, false);
+    check(browser, &sandbox.path("run/report.html"), &[], true, false);
     for width in [900, 1200] {
         // A page of text, plots and pictures has thousands of colours; an empty one has one.
         let colours = screenshot(browser, &parts, &format!("ablation_{width}.png"), width);
@@ -204,9 +204,9 @@ fn pages_work_in_a_browser() {
     }
     // Without scripts tables, plots and pictures stay. (The browser takes no screenshot with scripts off, so
     // they are taken out.)
-    let html = desk.text("parts/report.html");
+    let html = sandbox.text("parts/report.html");
     let (before, rest) = html.split_once("<script>").unwrap();
-    let bare = desk.path("parts/bare.html");
+    let bare = sandbox.path("parts/bare.html");
     std::fs::write(&bare, [before, rest.split_once("</script>").unwrap().1].concat()).unwrap();
     let colours = screenshot(browser, &bare, "ablation_without_scripts.png", 1100);
     assert!(colours > 300, "{colours} colours");

@@ -10,7 +10,7 @@ use skinfit::builtin;
 use skinfit::demo;
 use skinfit::render::files::{Image, ImageOptions, write_exr};
 
-use super::desk::{Ran, program};
+use super::sandbox::{Ran, program};
 use crate::fixtures::read_exr;
 
 /// A folder with the built-in scene and its bakes, made once for all tests of this run.

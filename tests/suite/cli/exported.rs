@@ -2,42 +2,42 @@
 
 use skinfit::export::Target;
 
-use super::desk::Desk;
 use super::refusals::{Case, check};
+use super::sandbox::Sandbox;
 
 #[test]
 fn a_scenes_shader_and_its_plan_are_printed_and_written() {
-    let desk = Desk::new();
-    let all = desk.run(&["shader", "scene.toml"]).done().out;
+    let sandbox = Sandbox::new();
+    let all = sandbox.run(&["shader", "scene.toml"]).done().out;
     assert!(all.contains("left out:") && all.contains("fn fs_main(") && all.contains("fn vs_main("));
-    let plan = desk.run(&["shader", "scene.toml", "--show", "plan"]).done().out;
+    let plan = sandbox.run(&["shader", "scene.toml", "--show", "plan"]).done().out;
     assert!(plan.starts_with(|c: char| c.is_ascii_digit()) && !plan.contains("fs_main"), "{plan}");
-    desk.run(&["shader", "scene.toml", "--show", "wgsl", "-o", "skin.wgsl"]).done();
-    naga::front::wgsl::parse_str(&desk.text("skin.wgsl")).unwrap();
+    sandbox.run(&["shader", "scene.toml", "--show", "wgsl", "-o", "skin.wgsl"]).done();
+    naga::front::wgsl::parse_str(&sandbox.text("skin.wgsl")).unwrap();
     // The hilite's cube is read by no other effect.
-    let less = desk.run(&["shader", "scene.toml", "--effects", "diffuse,rim"]).done().out;
+    let less = sandbox.run(&["shader", "scene.toml", "--effects", "diffuse,rim"]).done().out;
     assert!(all.contains("var hilite_faces") && !less.contains("var hilite_faces"));
 }
 
 #[test]
 fn a_fits_constants_are_exported_with_their_provenance() {
-    let desk = Desk::new();
-    desk.fit("run", &[]).done();
-    let value = desk.json("run/report.json")["params"]["rim_weight"]["value"].clone();
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    let value = sandbox.json("run/report.json")["params"]["rim_weight"]["value"].clone();
     for target in Target::ALL {
         let name = target.name();
-        let whole = desk.run(&["export", "run/params.toml", "--to", name, "--constants"]).done().out;
+        let whole = sandbox.run(&["export", "run/params.toml", "--to", name, "--constants"]).done().out;
         assert!(whole.contains("run/params.toml") && whole.contains("scene.toml"), "{whole}");
         assert!(whole.to_lowercase().contains("rim_weight"), "{whole}");
         if target.dialect().is_some() {
             let file = format!("skin.{name}");
-            desk.run(&["export", "run/params.toml", "--to", name, "-o", &file]).done();
-            let text = desk.text(&file);
+            sandbox.run(&["export", "run/params.toml", "--to", name, "-o", &file]).done();
+            let text = sandbox.text(&file);
             assert!(text.contains("skinfit_shade") && text.contains("Standard error of"), "{text}");
         }
     }
     // Data holds nothing but constants.
-    let json = desk.run(&["export", "run/params.toml", "--to", "json"]).done().out;
+    let json = sandbox.run(&["export", "run/params.toml", "--to", "json"]).done().out;
     let json: serde_json::Value = serde_json::from_str(&json).unwrap();
     let exported = &json["constants"]["rim_weight"];
     let red = |value: &serde_json::Value| value.as_f64().or_else(|| value[0].as_f64());
@@ -46,13 +46,13 @@ fn a_fits_constants_are_exported_with_their_provenance() {
 
 #[test]
 fn constants_for_another_scenes_effects_are_exported_with_a_word_of_it() {
-    let desk = Desk::new();
-    desk.fit("run", &[]).done();
-    desk.write(
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    sandbox.write(
         "other.toml",
-        desk.text("scene.toml").replace("\"hilite\", \"reflection\"", "\"hilite\"").as_bytes(),
+        sandbox.text("scene.toml").replace("\"hilite\", \"reflection\"", "\"hilite\"").as_bytes(),
     );
-    let export = |scene: &str| desk.run(&["export", "run/params.toml", "--to", "c", "--scene", scene]);
+    let export = |scene: &str| sandbox.run(&["export", "run/params.toml", "--to", "c", "--scene", scene]);
     assert_eq!(export("scene.toml").done().err, "");
     let ran = export("other.toml");
     assert_eq!(ran.code, Some(0), "{ran:?}");
@@ -63,9 +63,11 @@ fn constants_for_another_scenes_effects_are_exported_with_a_word_of_it() {
 
 #[test]
 fn exports_that_cannot_be() {
-    let nothing = |_: &Desk| {};
-    let alone = |desk: &Desk| desk.write("p/params.toml", b"form = \"corrected\"\n[params]\nhilite = 0.5\n");
-    let listing = |desk: &Desk| desk.write("p.toml", b"form = \"listing\"\n[params]\nhilite = 0.5\n");
+    let nothing = |_: &Sandbox| {};
+    let alone =
+        |sandbox: &Sandbox| sandbox.write("p/params.toml", b"form = \"corrected\"\n[params]\nhilite = 0.5\n");
+    let listing =
+        |sandbox: &Sandbox| sandbox.write("p.toml", b"form = \"listing\"\n[params]\nhilite = 0.5\n");
     let case = |what, arguments, spoil, words| Case { what, arguments, spoil, words };
     check(&[
         case(
@@ -91,9 +93,9 @@ fn exports_that_cannot_be() {
 
 #[test]
 fn words_that_are_no_target_and_no_accuracy_are_refused_with_those_that_are() {
-    let desk = Desk::new();
-    let ran = desk.run(&["export", "p.toml", "--to", "glls"]);
+    let sandbox = Sandbox::new();
+    let ran = sandbox.run(&["export", "p.toml", "--to", "glls"]);
     assert!(ran.code == Some(2) && ran.err.contains("Did you mean `glsl`?"), "{ran:?}");
-    let ran = desk.run(&["shader", "scene.toml", "--accuracy", "high"]);
+    let ran = sandbox.run(&["shader", "scene.toml", "--accuracy", "high"]);
     assert!(ran.code == Some(2) && ran.err.contains("exact") && ran.err.contains("paper"), "{ran:?}");
 }

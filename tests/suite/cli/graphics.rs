@@ -2,12 +2,12 @@
 
 use serde_json::Value;
 
-use super::desk::{Desk, Ran};
+use super::sandbox::{Ran, Sandbox};
 use crate::fixtures::read_exr;
 
 /// Whether there is an adapter; where there is none, `SKINFIT_NO_GPU_TESTS` must say that it is no mistake.
-fn adapter(desk: &Desk) -> bool {
-    let info: Value = serde_json::from_str(&desk.run(&["info", "--json"]).done().out).unwrap();
+fn adapter(sandbox: &Sandbox) -> bool {
+    let info: Value = serde_json::from_str(&sandbox.run(&["info", "--json"]).done().out).unwrap();
     if info["engine"] == "gpu" {
         return true;
     }
@@ -18,28 +18,28 @@ fn adapter(desk: &Desk) -> bool {
 }
 
 /// The program where no driver answers.
-fn without_adapter(desk: &Desk, arguments: &[&str]) -> Ran {
-    let mut command = desk.command(arguments);
+fn without_adapter(sandbox: &Sandbox, arguments: &[&str]) -> Ran {
+    let mut command = sandbox.command(arguments);
     for variable in ["VK_ICD_FILENAMES", "VK_DRIVER_FILES"] {
-        command.env(variable, desk.path("no_such_driver.json"));
+        command.env(variable, sandbox.path("no_such_driver.json"));
     }
     Ran::of(&mut command)
 }
 
 #[test]
 fn an_image_is_the_same_from_both_engines_and_says_where_it_was_drawn() {
-    let desk = Desk::new();
-    if !adapter(&desk) {
+    let sandbox = Sandbox::new();
+    if !adapter(&sandbox) {
         return;
     }
     let render = |engine: &str, output: &str| {
         let more = ["--engine", engine, "--params", "truth.toml", "--layers", "--size", "40x24"];
-        desk.run(&[&["render", "scene.toml", "-o", output], &more[..]].concat()).done().out
+        sandbox.run(&[&["render", "scene.toml", "-o", output], &more[..]].concat()).done().out
     };
     assert_eq!(render("cpu", "cpu.exr"), "wrote cpu.exr (view front; cpu)\n");
     assert!(render("gpu", "gpu.exr").starts_with("wrote gpu.exr (view front; gpu: "));
     assert!(render("auto", "auto.exr").starts_with("wrote auto.exr (view front; gpu: "));
-    let [cpu, gpu, auto] = ["cpu.exr", "gpu.exr", "auto.exr"].map(|name| read_exr(&desk.path(name)));
+    let [cpu, gpu, auto] = ["cpu.exr", "gpu.exr", "auto.exr"].map(|name| read_exr(&sandbox.path(name)));
     assert!(gpu.planes == auto.planes);
     assert_eq!((gpu.width, gpu.height), (40, 24));
     assert_eq!(cpu.planes.keys().collect::<Vec<_>>(), gpu.planes.keys().collect::<Vec<_>>());
@@ -55,34 +55,35 @@ fn an_image_is_the_same_from_both_engines_and_says_where_it_was_drawn() {
 
 #[test]
 fn a_sequence_is_numbered_and_its_first_frame_is_the_still() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     for engine in ["cpu", "auto"] {
-        if engine == "auto" && !adapter(&desk) {
+        if engine == "auto" && !adapter(&sandbox) {
             continue;
         }
         let render = |more: &[&str]| {
-            desk.run(&[&["render", "scene.toml", "--engine", engine, "--antialias", "1x1"], more].concat())
+            sandbox
+                .run(&[&["render", "scene.toml", "--engine", engine, "--antialias", "1x1"], more].concat())
                 .done()
                 .out
         };
         render(&["-o", "still.png"]);
         let out = render(&["-o", "turn/a.png", "--frames", "3"]);
         assert!(out.starts_with("wrote 3 frames, turn/a.0000.png to turn/a.0002.png (view front; "), "{out}");
-        assert_eq!(desk.read("turn/a.0000.png"), desk.read("still.png"), "{engine}");
-        assert_ne!(desk.read("turn/a.0001.png"), desk.read("turn/a.0002.png"), "{engine}");
-        assert!(!desk.path("turn/a.png").exists() && !desk.path("turn/a.0003.png").exists());
+        assert_eq!(sandbox.read("turn/a.0000.png"), sandbox.read("still.png"), "{engine}");
+        assert_ne!(sandbox.read("turn/a.0001.png"), sandbox.read("turn/a.0002.png"), "{engine}");
+        assert!(!sandbox.path("turn/a.png").exists() && !sandbox.path("turn/a.0003.png").exists());
     }
 }
 
 #[test]
 fn statistics_tell_what_a_frame_took() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let render = |engine: &str| {
         let more = ["--engine", engine, "--stats", "--accuracy", "paper", "-o", "a.png"];
-        desk.run(&[&["render", "scene.toml"], &more[..]].concat()).done().out
+        sandbox.run(&[&["render", "scene.toml"], &more[..]].concat()).done().out
     };
     assert!(render("cpu").contains("shading"));
-    if adapter(&desk) {
+    if adapter(&sandbox) {
         let out = render("gpu");
         for word in ["uploaded", "MiB", "bindings", "vertex buffers", "rest_position"] {
             assert!(out.contains(word), "{word}: {out}");
@@ -92,11 +93,11 @@ fn statistics_tell_what_a_frame_took() {
 
 #[test]
 fn adapters_are_told_with_what_will_be_used_and_why() {
-    let desk = Desk::new();
-    let text = desk.run(&["info"]).done().out;
+    let sandbox = Sandbox::new();
+    let text = sandbox.run(&["info"]).done().out;
     assert!(text.contains("render uses: the ") && text.contains("CPU: "), "{text}");
-    if adapter(&desk) {
-        let info: Value = serde_json::from_str(&desk.run(&["info", "--json"]).done().out).unwrap();
+    if adapter(&sandbox) {
+        let info: Value = serde_json::from_str(&sandbox.run(&["info", "--json"]).done().out).unwrap();
         let first = &info["adapters"][0];
         assert_eq!(info["adapter"], first["name"]);
         assert!(first["max_texture_side"].as_u64().unwrap() >= 2048, "{info:#}");
@@ -106,23 +107,23 @@ fn adapters_are_told_with_what_will_be_used_and_why() {
 
 #[test]
 fn without_an_adapter_the_cpu_engine_renders_and_says_which_package_brings_one() {
-    let desk = Desk::new();
-    let ran = without_adapter(&desk, &["render", "scene.toml", "-o", "a.png"]);
+    let sandbox = Sandbox::new();
+    let ran = without_adapter(&sandbox, &["render", "scene.toml", "-o", "a.png"]);
     assert_eq!((ran.code, ran.out.as_str()), (Some(0), "wrote a.png (view front; cpu)\n"), "{ran:?}");
     let package = if cfg!(target_os = "linux") { "mesa-vulkan-drivers" } else { "driver" };
     assert!(ran.err.contains("no graphics adapter") && ran.err.contains(package), "{ran:?}");
     assert_eq!(ran.err.lines().count(), 1, "{ran:?}");
     let arguments = ["render", "scene.toml", "--engine", "gpu", "-o", "b.png"];
-    without_adapter(&desk, &arguments).refused(&["no graphics adapter", package, "--engine cpu"]);
-    assert!(!desk.path("b.png").exists());
-    let info = without_adapter(&desk, &["info"]).done().out;
+    without_adapter(&sandbox, &arguments).refused(&["no graphics adapter", package, "--engine cpu"]);
+    assert!(!sandbox.path("b.png").exists());
+    let info = without_adapter(&sandbox, &["info"]).done().out;
     assert!(info.contains("the CPU engine") && info.contains(package), "{info}");
 }
 
 #[test]
 fn what_the_engines_cannot_do_is_refused_before_a_file_is_written() {
-    let desk = Desk::new();
-    let gpu = adapter(&desk);
+    let sandbox = Sandbox::new();
+    let gpu = adapter(&sandbox);
     for (more, words) in [
         (&["--size", "40"][..], &["1920x1080"][..]),
         (&["--size", "0x40"], &["1 to 32768 pixels"]),
@@ -132,12 +133,12 @@ fn what_the_engines_cannot_do_is_refused_before_a_file_is_written() {
         (&["--frames", "0"], &["0 is not in 1..=100000"]),
         (&["--animate"], &["--frames"]),
     ] {
-        let ran = desk.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat());
+        let ran = sandbox.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat());
         assert_eq!(ran.code, Some(2), "{ran:?}");
         assert!(words.iter().all(|word| ran.err.contains(word)), "{ran:?}");
     }
     let refused = |more: &[&str], words: &[&str]| {
-        desk.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat()).refused(words);
+        sandbox.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat()).refused(words);
     };
     refused(&["--engine", "cpu", "--antialias", "msaa4"], &["msaa4", "2x2"]);
     refused(&["--engine", "cpu", "--frames", "2", "--animate"], &["no animation", "--animate"]);
@@ -145,18 +146,18 @@ fn what_the_engines_cannot_do_is_refused_before_a_file_is_written() {
         refused(&["--engine", "gpu", "--adapter", "Voodoo"], &["Voodoo", "There is: "]);
         refused(&["--engine", "gpu", "--size", "32768x16"], &["a side may have", "--size"]);
     }
-    assert!(!desk.path("a.png").exists());
+    assert!(!sandbox.path("a.png").exists());
 }
 
 #[test]
 fn an_ablation_times_the_renderer_where_it_is_asked_to() {
-    let desk = Desk::new();
-    if !adapter(&desk) {
+    let sandbox = Sandbox::new();
+    if !adapter(&sandbox) {
         return;
     }
     let ablate = |to: &str, when: &str| {
-        desk.run(&["ablate", "scene.toml", "-o", to, "--gpu", when, "--params", "truth.toml"]).done();
-        let results: Value = desk.json(&format!("{to}/results.json"));
+        sandbox.run(&["ablate", "scene.toml", "-o", to, "--gpu", when, "--params", "truth.toml"]).done();
+        let results: Value = sandbox.json(&format!("{to}/results.json"));
         let rows = results["rows"].as_array().unwrap().clone();
         (
             results["adapter"].clone(),
@@ -175,18 +176,18 @@ fn an_ablation_times_the_renderer_where_it_is_asked_to() {
 
 #[test]
 fn a_fit_over_the_adapters_own_samples_says_so_and_ends_where_the_others_do() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let refused = |arguments: &[&str], words: &[&str]| {
-        desk.run(&[&["fit", "scene.toml", "--samples", "gpu"], arguments].concat()).refused(words);
+        sandbox.run(&[&["fit", "scene.toml", "--samples", "gpu"], arguments].concat()).refused(words);
     };
     refused(&["--engine", "cpu"], &["--samples gpu", "--engine cpu"]);
-    if !adapter(&desk) {
+    if !adapter(&sandbox) {
         return;
     }
     let fit = |run: &str, more: &[&str]| {
-        let ran = desk.run(&[&["fit", "scene.toml", "-o", run, "--verify"], more].concat());
+        let ran = sandbox.run(&[&["fit", "scene.toml", "-o", run, "--verify"], more].concat());
         assert_eq!(ran.code, Some(0), "{ran:?}");
-        (ran, desk.json(&format!("{run}/report.json")))
+        (ran, sandbox.json(&format!("{run}/report.json")))
     };
     let (cpu, uploaded) = fit("cpu", &["--engine", "gpu"]);
     assert!(cpu.out.contains("samples made by the CPU in"), "{}", cpu.out);

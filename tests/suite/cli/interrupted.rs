@@ -3,7 +3,7 @@
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::desk::{Desk, Ran};
+use super::sandbox::{Ran, Sandbox};
 
 /// Enough starts to last for seconds.
 const LONG: [&str; 6] = ["--solver", "lm", "--starts", "300", "--seed", "7"];
@@ -19,12 +19,12 @@ impl Drop for Running {
 }
 
 /// A long fit into `run`, once its state is there.
-fn long_fit(desk: &Desk, more: &[&str]) -> Running {
+fn long_fit(sandbox: &Sandbox, more: &[&str]) -> Running {
     let arguments = [&["fit", "scene.toml", "-o", "run"], &LONG[..], more].concat();
-    let mut command = desk.command(&arguments);
+    let mut command = sandbox.command(&arguments);
     let mut child = Running(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
     let since = Instant::now();
-    while !desk.path("run/state.json").exists() {
+    while !sandbox.path("run/state.json").exists() {
         assert!(child.0.try_wait().unwrap().is_none(), "it ended before it began");
         assert!(since.elapsed() < Duration::from_secs(60), "no state after a minute");
         std::thread::sleep(Duration::from_millis(2));
@@ -44,82 +44,84 @@ fn finish(mut child: Running) -> Ran {
 
 #[test]
 fn a_fit_that_ran_out_goes_on_to_the_same_end() {
-    let desk = Desk::new();
-    desk.fit("whole", &[]).done();
-    let ran = desk.fit("run", &["--max-iterations", "1"]);
+    let sandbox = Sandbox::new();
+    sandbox.fit("whole", &[]).done();
+    let ran = sandbox.fit("run", &["--max-iterations", "1"]);
     assert_eq!(ran.code, Some(1), "{ran:?}");
     assert!(
         ran.err.contains("run: the fit ran out after 1 iteration") && ran.err.contains("--resume"),
         "{ran:?}"
     );
     assert!(ran.out.contains("ran out of iterations after 1 iteration and"), "{ran:?}");
-    assert_eq!(desk.json("run/report.json")["ending"], "ran-out");
+    assert_eq!(sandbox.json("run/report.json")["ending"], "ran-out");
     // As if it had taken its time.
-    let mut state = desk.json("run/state.json");
+    let mut state = sandbox.json("run/state.json");
     state["seconds"] = 1000.0.into();
-    desk.write("run/state.json", state.to_string().as_bytes());
-    desk.fit("run", &["--resume"]).done();
-    let seconds = desk.json("run/report.json")["seconds"]["fit"].as_f64().unwrap();
+    sandbox.write("run/state.json", state.to_string().as_bytes());
+    sandbox.fit("run", &["--resume"]).done();
+    let seconds = sandbox.json("run/report.json")["seconds"]["fit"].as_f64().unwrap();
     assert!((1000.0..2000.0).contains(&seconds), "not the time of both processes together: {seconds}");
-    assert_eq!(desk.text("run/params.toml"), desk.text("whole/params.toml"));
+    assert_eq!(sandbox.text("run/params.toml"), sandbox.text("whole/params.toml"));
 }
 
 #[cfg(unix)]
 #[test]
 fn an_interrupted_fit_keeps_its_state_and_goes_on_to_the_same_end() {
-    let desk = Desk::new();
-    desk.run(&[&["fit", "scene.toml", "-o", "whole"], &LONG[..]].concat()).done();
-    let child = long_fit(&desk, &[]);
+    let sandbox = Sandbox::new();
+    sandbox.run(&[&["fit", "scene.toml", "-o", "whole"], &LONG[..]].concat()).done();
+    let child = long_fit(&sandbox, &[]);
     let pid = child.0.id().to_string();
     assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
     let ran = finish(child);
     assert_eq!(ran.code, Some(1), "{ran:?}");
     assert!(ran.err.contains("run: the fit was interrupted") && ran.err.contains("--resume"), "{ran:?}");
     assert!(ran.out.lines().last().unwrap().starts_with("run: final loss "), "{ran:?}");
-    assert_eq!(desk.json("run/report.json")["ending"], "interrupted");
+    assert_eq!(sandbox.json("run/report.json")["ending"], "interrupted");
     // Solver, starts and seed are remembered.
-    desk.run(&["fit", "scene.toml", "-o", "run", "--resume"]).done();
-    assert_eq!(desk.text("run/params.toml"), desk.text("whole/params.toml"));
-    let evaluations = |run: &str| desk.json(&format!("{run}/report.json"))["evaluations"].clone();
+    sandbox.run(&["fit", "scene.toml", "-o", "run", "--resume"]).done();
+    assert_eq!(sandbox.text("run/params.toml"), sandbox.text("whole/params.toml"));
+    let evaluations = |run: &str| sandbox.json(&format!("{run}/report.json"))["evaluations"].clone();
     assert_eq!(evaluations("run"), evaluations("whole"));
 }
 
 #[test]
 fn two_runs_into_one_folder_are_one_too_many() {
-    let desk = Desk::new();
-    let first = long_fit(&desk, &[]);
-    desk.fit("run", &[]).refused(&["run: another run is writing to this folder", "choose another with -o"]);
+    let sandbox = Sandbox::new();
+    let first = long_fit(&sandbox, &[]);
+    sandbox
+        .fit("run", &[])
+        .refused(&["run: another run is writing to this folder", "choose another with -o"]);
     assert_eq!(finish(first).code, Some(0));
-    desk.fit("run", &[]).done();
+    sandbox.fit("run", &[]).done();
 }
 
 #[test]
 fn states_that_cannot_be_gone_on_from() {
-    let desk = Desk::new();
-    let resume = |words: &[&str]| desk.fit("run", &["--resume"]).refused(words);
+    let sandbox = Sandbox::new();
+    let resume = |words: &[&str]| sandbox.fit("run", &["--resume"]).refused(words);
     resume(&["run/state.json: the state of the interrupted fit cannot be read", "without --resume"]);
-    assert!(!desk.path("run").exists(), "a refused run left its folder");
+    assert!(!sandbox.path("run").exists(), "a refused run left its folder");
 
-    desk.fit("run", &["--max-iterations", "1"]);
-    let state = desk.read("run/state.json");
-    let report = desk.read("run/report.json");
+    sandbox.fit("run", &["--max-iterations", "1"]);
+    let state = sandbox.read("run/state.json");
+    let report = sandbox.read("run/report.json");
     for (what, bytes) in
         [("empty", &b""[..]), ("half", &state[..state.len() / 2]), ("another kind", b"{\"a\": 1}")]
     {
         eprintln!("{what}");
-        desk.write("run/state.json", bytes);
+        sandbox.write("run/state.json", bytes);
         resume(&["run/state.json: this is not a state that a fit has left", "without --resume"]);
-        assert_eq!(desk.read("run/state.json"), bytes, "{what}");
+        assert_eq!(sandbox.read("run/state.json"), bytes, "{what}");
     }
-    desk.write("run/state.json", &state);
+    sandbox.write("run/state.json", &state);
     let other = |arguments: &[&str], words: &[&str]| {
         let words = [&["run/state.json: this state belongs to another fit"], words].concat();
-        desk.fit("run", &[&["--resume"], arguments].concat()).refused(&words);
+        sandbox.fit("run", &[&["--resume"], arguments].concat()).refused(&words);
     };
     other(&["--solver", "lm"], &["its solver differs (varpro; now lm)"]);
     other(&["--seed", "1"], &["its seed differs (0; now 1)"]);
     other(&["--params", "truth.toml"], &["its start differs"]);
-    desk.write_grey("targets/side.exr", 32, 24);
+    sandbox.write_grey("targets/side.exr", 32, 24);
     other(&[], &["its scene differs"]);
-    assert!(desk.read("run/state.json") == state && desk.read("run/report.json") == report);
+    assert!(sandbox.read("run/state.json") == state && sandbox.read("run/report.json") == report);
 }

@@ -1,13 +1,13 @@
 //! Output that cannot be written: exit code 2, and nothing half-written.
 
-use super::desk::{Desk, Ran};
+use super::sandbox::{Ran, Sandbox};
 
 #[test]
 fn paths_that_cannot_be_written() {
-    let desk = Desk::new();
-    desk.write("file", b"in the way");
-    desk.run(&["bake", "scene.toml", "-o", "warm"]).done();
-    let before = desk.files();
+    let sandbox = Sandbox::new();
+    sandbox.write("file", b"in the way");
+    sandbox.run(&["bake", "scene.toml", "-o", "warm"]).done();
+    let before = sandbox.files();
     let rows: &[(&[&str], &[&str])] = &[
         (&["fit", "scene.toml", "-o", "file"], &["file: cannot be written", "Choose a folder"]),
         (&["fit", "scene.toml", "-o", "file/run"], &["file/run: cannot be written", "Choose a folder"]),
@@ -26,8 +26,8 @@ fn paths_that_cannot_be_written() {
         (&["render", "scene.toml", "-o", "a.png", "--layers"], &["a.png: a PNG holds no layers", ".exr"]),
     ];
     for (arguments, words) in rows {
-        desk.run(arguments).refused(words);
-        assert!(desk.files() == before, "{arguments:?}: something changed");
+        sandbox.run(arguments).refused(words);
+        assert!(sandbox.files() == before, "{arguments:?}: something changed");
     }
 }
 
@@ -35,11 +35,12 @@ fn paths_that_cannot_be_written() {
 #[cfg(target_os = "linux")]
 #[test]
 fn places_where_nothing_can_be_made() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     for place in ["/dev/full/run", "/proc/run"] {
-        desk.fit(place, &[]).refused(&[&format!("{place}: cannot be written"), "Choose a folder"]);
+        sandbox.fit(place, &[]).refused(&[&format!("{place}: cannot be written"), "Choose a folder"]);
         let image = format!("{place}/a.exr");
-        desk.run(&["render", "--engine", "cpu", "scene.toml", "-o", &image])
+        sandbox
+            .run(&["render", "--engine", "cpu", "scene.toml", "-o", &image])
             .refused(&[&format!("{image}: cannot be written")]);
     }
 }
@@ -48,47 +49,47 @@ fn places_where_nothing_can_be_made() {
 #[cfg(target_os = "linux")]
 #[test]
 fn a_disk_that_fills_up_leaves_no_halves() {
-    let desk = Desk::new();
-    desk.fit("run", &[]).done();
-    let before = desk.files();
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    let before = sandbox.files();
     // 512-byte blocks; without the signal, which would end the program before it can say so.
     let limited = |arguments: &str| {
         let program = env!("CARGO_BIN_EXE_skinfit");
         let script = format!("trap '' XFSZ; ulimit -f 4; exec '{program}' {arguments}");
         let mut command = std::process::Command::new("sh");
-        command.args(["-c", &script]).current_dir(desk.path("")).env("SKINFIT_CACHE", desk.cache());
+        command.args(["-c", &script]).current_dir(sandbox.path("")).env("SKINFIT_CACHE", sandbox.cache());
         Ran::of(&mut command)
     };
     limited("render --engine cpu scene.toml --layers -o new.exr")
         .refused(&["new.exr: cannot be written", "has room"]);
     limited("render --engine cpu scene.toml -o targets/front.exr")
         .refused(&["targets/front.exr: cannot be written"]);
-    assert!(desk.files() == before);
+    assert!(sandbox.files() == before);
     limited("fit scene.toml -o run").refused(&["run/", ": cannot be written", "has room"]);
-    let after = desk.files();
+    let after = sandbox.files();
     assert!(before.keys().eq(after.keys()), "files were left");
     for (path, bytes) in &after {
         // What was written again is whole: here, the same.
         let same = before[path] == *bytes || path.ends_with("run/state.json");
         assert!(same, "{} is not what it was", path.display());
     }
-    serde_json::from_slice::<serde_json::Value>(&desk.read("run/state.json")).unwrap();
+    serde_json::from_slice::<serde_json::Value>(&sandbox.read("run/state.json")).unwrap();
 }
 
 #[cfg(target_os = "linux")]
 #[test]
 fn standard_output_on_a_full_disk_is_said() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let full = || std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
     for arguments in [&["params"][..], &["fit", "scene.toml", "-o", "run", "--json"]] {
-        let ran = Ran::of(desk.command(arguments).stdout(full()));
+        let ran = Ran::of(sandbox.command(arguments).stdout(full()));
         ran.refused(&["standard output cannot be written"]);
     }
 }
 
 #[test]
 fn a_reader_that_goes_away_is_no_failure() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     for arguments in [
         &["params"][..],
         &["params", "--format", "json"],
@@ -100,16 +101,16 @@ fn a_reader_that_goes_away_is_no_failure() {
     ] {
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let ran = Ran::of(desk.command(arguments).stdout(writer));
+        let ran = Ran::of(sandbox.command(arguments).stdout(writer));
         assert_eq!((ran.code, ran.err.as_str()), (Some(0), ""), "{arguments:?}");
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let ran = Ran::of(desk.command(arguments).stderr(writer));
+        let ran = Ran::of(sandbox.command(arguments).stderr(writer));
         assert_eq!(ran.code, Some(0), "{arguments:?}");
         // Refusals whom nobody hears are refusals still.
         let (reader, writer) = std::io::pipe().unwrap();
         drop(reader);
-        let ran = Ran::of(desk.command(&["fit", "nowhere.toml"]).stderr(writer));
+        let ran = Ran::of(sandbox.command(&["fit", "nowhere.toml"]).stderr(writer));
         assert_eq!(ran.code, Some(2));
     }
 }

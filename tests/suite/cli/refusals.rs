@@ -1,13 +1,13 @@
 //! Bad input, one case a row: exit code 2, one paragraph that names file, place, fault and remedy, and
 //! nothing left behind.
 
-use super::desk::{Desk, Ran};
+use super::sandbox::{Ran, Sandbox};
 
 /// What is done to the scene's folder, and what the refusal must say.
 pub(super) struct Case<'a> {
     pub(super) what: &'a str,
     pub(super) arguments: &'a [&'a str],
-    pub(super) spoil: &'a dyn Fn(&Desk),
+    pub(super) spoil: &'a dyn Fn(&Sandbox),
     pub(super) words: &'a [&'a str],
 }
 
@@ -15,13 +15,13 @@ pub(super) const FIT: &[&str] = &["fit", "scene.toml", "-o", "deep/run"];
 
 pub(super) fn check(cases: &[Case<'_>]) {
     for case in cases {
-        let desk = Desk::new();
-        (case.spoil)(&desk);
-        let before = desk.files();
+        let sandbox = Sandbox::new();
+        (case.spoil)(&sandbox);
+        let before = sandbox.files();
         eprintln!("{}:", case.what);
-        let Ran { err, .. } = desk.run(case.arguments).refused(case.words);
+        let Ran { err, .. } = sandbox.run(case.arguments).refused(case.words);
         eprintln!("    {}", err.trim_end());
-        let after = desk.files();
+        let after = sandbox.files();
         let (before, after): (Vec<_>, Vec<_>) = (before.keys().collect(), after.keys().collect());
         assert_eq!(before, after, "{}: files were left", case.what);
     }
@@ -31,7 +31,7 @@ pub(super) fn check(cases: &[Case<'_>]) {
 fn check_edits(edits: &[(&str, &str, &str, &[&str])]) {
     for &(what, from, to, words) in edits {
         let words = [&["scene.toml: line "], words].concat();
-        check(&[Case { what, arguments: FIT, spoil: &|desk| desk.edit(from, to), words: &words }]);
+        check(&[Case { what, arguments: FIT, spoil: &|sandbox| sandbox.edit(from, to), words: &words }]);
     }
 }
 
@@ -117,7 +117,7 @@ fn cameras_that_are_none() {
         ("two of one name", "name = \"side\"", "name = \"front\"", &["two views are named `front`"]),
         ("a name for no file", "name = \"side\"", "name = \"../side\"", &["cannot be part of a file name"]),
     ]);
-    let away = |desk: &Desk| desk.edit("0,0,1,-4", "0,0,1,4");
+    let away = |sandbox: &Sandbox| sandbox.edit("0,0,1,-4", "0,0,1,4");
     check(&[Case {
         what: "sees nothing",
         arguments: FIT,

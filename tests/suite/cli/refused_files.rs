@@ -2,22 +2,22 @@
 
 use serde_json::json;
 
-use super::desk::{Desk, mesh};
 use super::refusals::{Case, FIT, check};
+use super::sandbox::{Sandbox, mesh};
 
 #[test]
 fn images_that_cannot_be_used() {
     let case = |what, spoil, words| Case { what, arguments: FIT, spoil, words };
-    let half = |desk: &Desk, name: &str| {
-        let bytes = desk.read(name);
-        desk.write(name, &bytes[..bytes.len() / 2]);
+    let half = |sandbox: &Sandbox, name: &str| {
+        let bytes = sandbox.read(name);
+        sandbox.write(name, &bytes[..bytes.len() / 2]);
     };
     let holds = |value: f32, x: usize, y: usize| {
         move |i: usize, j: usize| if (i, j) == (x, y) { [0.5, value, 0.5] } else { [0.5; 3] }
     };
-    let mask = |desk: &Desk, value: f32| {
-        desk.write_exr("mask.exr", 32, 32, |_, _| [value; 3]);
-        desk.edit("target = \"targets/front.exr\"", "target = \"targets/front.exr\"\nmask = \"mask.exr\"");
+    let mask = |sandbox: &Sandbox, value: f32| {
+        sandbox.write_exr("mask.exr", 32, 32, |_, _| [value; 3]);
+        sandbox.edit("target = \"targets/front.exr\"", "target = \"targets/front.exr\"\nmask = \"mask.exr\"");
     };
     check(&[
         case(
@@ -71,7 +71,7 @@ fn images_that_cannot_be_used() {
 fn meshes_that_cannot_be_used() {
     let write = |change: &dyn Fn(&mut serde_json::Value, &mut Vec<u8>)| {
         let bytes = mesh(change);
-        move |desk: &Desk| desk.write("mesh.glb", &bytes)
+        move |sandbox: &Sandbox| sandbox.write("mesh.glb", &bytes)
     };
     let number =
         |at: usize, value: f32| write(&move |_, bin| bin[at..at + 4].copy_from_slice(&value.to_le_bytes()));
@@ -86,9 +86,9 @@ fn meshes_that_cannot_be_used() {
         let joints = json["bufferViews"][3]["byteOffset"].as_u64().unwrap() as usize;
         bin[joints + 4 * 5] = 9;
     });
-    let with_skin = |desk: &Desk| {
-        skinned(desk);
-        desk.edit("[\"diffuse\"", "[\"skin\", \"diffuse\"");
+    let with_skin = |sandbox: &Sandbox| {
+        skinned(sandbox);
+        sandbox.edit("[\"diffuse\"", "[\"skin\", \"diffuse\"");
     };
     let case = |what, spoil, words| Case { what, arguments: FIT, spoil, words };
     check(&[
@@ -175,7 +175,9 @@ fn parameter_files_that_cannot_be_used() {
     ];
     for &(what, text, words) in rows {
         for arguments in [RENDER, START] {
-            let spoil = |desk: &Desk| text.into_iter().for_each(|text| desk.write("p.toml", text.as_bytes()));
+            let spoil = |sandbox: &Sandbox| {
+                text.into_iter().for_each(|text| sandbox.write("p.toml", text.as_bytes()))
+            };
             check(&[Case { what, arguments, spoil: &spoil, words }]);
         }
     }

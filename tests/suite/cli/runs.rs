@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::desk::{Desk, TRUTH};
+use super::sandbox::{Sandbox, TRUTH};
 use crate::fixtures::read_exr;
 
 /// The fitted values are the truth within this share of it: targets are f32, and varpro stops when
@@ -11,9 +11,9 @@ const SHARE: f64 = 1e-4;
 
 #[test]
 fn a_fit_finds_the_truth_and_leaves_every_file_of_a_run() {
-    let desk = Desk::new();
-    let ran = desk.fit("runs/a", &[]).done();
-    let report = desk.json("runs/a/report.json");
+    let sandbox = Sandbox::new();
+    let ran = sandbox.fit("runs/a", &[]).done();
+    let report = sandbox.json("runs/a/report.json");
     let loss = report["loss"]["end"].as_f64().unwrap();
     let last = ran.out.lines().last().unwrap();
     assert_eq!(last, format!("runs/a: final loss {loss:.6e}"));
@@ -24,7 +24,7 @@ fn a_fit_finds_the_truth_and_leaves_every_file_of_a_run() {
         ran.out
     );
 
-    let mut names: Vec<String> = std::fs::read_dir(desk.path("runs/a"))
+    let mut names: Vec<String> = std::fs::read_dir(sandbox.path("runs/a"))
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
         .collect();
@@ -36,11 +36,11 @@ fn a_fit_finds_the_truth_and_leaves_every_file_of_a_run() {
     assert_eq!(names, expected);
     check_report(&report);
     // Three images of 32 pixels, at least.
-    let picture = image::open(desk.path("runs/a/front.png")).unwrap();
+    let picture = image::open(sandbox.path("runs/a/front.png")).unwrap();
     assert!(picture.width() > 96 && picture.height() > 32, "{} x {}", picture.width(), picture.height());
-    assert!(desk.text("runs/a/report.html").starts_with("<!DOCTYPE html>"));
+    assert!(sandbox.text("runs/a/report.html").starts_with("<!DOCTYPE html>"));
 
-    let fitted: toml::Table = desk.text("runs/a/params.toml").parse().unwrap();
+    let fitted: toml::Table = sandbox.text("runs/a/params.toml").parse().unwrap();
     let truth: toml::Table = TRUTH.parse().unwrap();
     for (name, truth) in truth["params"].as_table().unwrap() {
         let (value, truth) = (fitted["params"][name].as_float().unwrap(), truth.as_float().unwrap());
@@ -82,41 +82,41 @@ fn check_report(report: &Value) {
 
 #[test]
 fn with_json_the_report_is_all_that_is_printed() {
-    let desk = Desk::new();
-    let ran = desk.fit("run", &["--json"]).done();
-    assert_eq!(ran.out, desk.text("run/report.json").trim_end().to_owned() + "\n");
+    let sandbox = Sandbox::new();
+    let ran = sandbox.fit("run", &["--json"]).done();
+    assert_eq!(ran.out, sandbox.text("run/report.json").trim_end().to_owned() + "\n");
     let report: Value = serde_json::from_str(&ran.out).unwrap();
     check_report(&report);
 }
 
 #[test]
 fn the_run_folders_scene_and_parameters_render_the_fits_picture() {
-    let desk = Desk::new();
-    desk.fit("run", &["--max-iterations", "2"]);
-    let rendered = desk.path("again.exr");
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &["--max-iterations", "2"]);
+    let rendered = sandbox.path("again.exr");
     let arguments = ["--params", "run/params.toml", "--view", "side", "-o", "again.exr"];
     // Under another name, so that every path must be absolute.
-    std::fs::create_dir(desk.path("elsewhere")).unwrap();
-    std::fs::copy(desk.path("run/scene.toml"), desk.path("elsewhere/s.toml")).unwrap();
-    desk.run(&[&["render", "elsewhere/s.toml", "--engine", "cpu"], &arguments[..]].concat()).done();
-    let (again, fitted) = (read_exr(&rendered), read_exr(&desk.path("run/side_terms.exr")));
+    std::fs::create_dir(sandbox.path("elsewhere")).unwrap();
+    std::fs::copy(sandbox.path("run/scene.toml"), sandbox.path("elsewhere/s.toml")).unwrap();
+    sandbox.run(&[&["render", "elsewhere/s.toml", "--engine", "cpu"], &arguments[..]].concat()).done();
+    let (again, fitted) = (read_exr(&rendered), read_exr(&sandbox.path("run/side_terms.exr")));
     for name in ["R", "G", "B", "A"] {
         for (again, fitted) in again.planes[name].iter().zip(&fitted.planes[name]) {
             // Only the cubes around the exponent are baked for a picture: a few roundings of f32.
             assert!((again - fitted).abs() <= 1e-5 * (1.0 + fitted.abs()), "{name}: {again} is not {fitted}");
         }
     }
-    assert!(desk.text("run/scene.toml").starts_with("# a comment\n"));
+    assert!(sandbox.text("run/scene.toml").starts_with("# a comment\n"));
 }
 
 #[test]
 fn a_fit_that_starts_at_the_answer_stays_there() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     // Held at a wrong value, so that a loss is left and not rounding alone.
-    desk.edit("\"rim_exponent\", ", "");
-    desk.fit("a", &[]).done();
-    desk.fit("b", &["--params", "a/params.toml"]).done();
-    let (a, b) = (desk.json("a/report.json"), desk.json("b/report.json"));
+    sandbox.edit("\"rim_exponent\", ", "");
+    sandbox.fit("a", &[]).done();
+    sandbox.fit("b", &["--params", "a/params.toml"]).done();
+    let (a, b) = (sandbox.json("a/report.json"), sandbox.json("b/report.json"));
     let loss = |report: &Value, end: &str| report["loss"][end].as_f64().unwrap();
     assert!(loss(&a, "end") > 1e-4 * loss(&a, "start"), "{a:#}");
     for end in ["start", "end"] {
@@ -128,23 +128,23 @@ fn a_fit_that_starts_at_the_answer_stays_there() {
 
 #[test]
 fn the_loss_on_the_command_line_is_in_the_run_folders_scene() {
-    let desk = Desk::new();
-    desk.fit("run", &["--loss", "huber"]).done();
-    let scene: toml::Table = desk.text("run/scene.toml").parse().unwrap();
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &["--loss", "huber"]).done();
+    let scene: toml::Table = sandbox.text("run/scene.toml").parse().unwrap();
     assert_eq!(scene["fit"]["loss"].as_str(), Some("huber"));
-    assert_eq!(desk.json("run/report.json")["loss_name"], "huber");
-    let first = desk.text("run/params.toml");
-    desk.run(&["fit", "run/scene.toml", "-o", "again"]).done();
+    assert_eq!(sandbox.json("run/report.json")["loss_name"], "huber");
+    let first = sandbox.text("run/params.toml");
+    sandbox.run(&["fit", "run/scene.toml", "-o", "again"]).done();
     let values = |text: &str| text.lines().skip(2).map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(values(&first), values(&desk.text("again/params.toml")));
+    assert_eq!(values(&first), values(&sandbox.text("again/params.toml")));
 }
 
 #[test]
 fn parameters_with_three_values_are_fitted_in_each_channel() {
-    let desk = Desk::new();
-    desk.write("p.toml", b"[params]\nhilite = [0.4, 0.5, 0.6]\n");
-    desk.fit("run", &["--params", "p.toml"]).done();
-    let values = desk.json("run/report.json")["params"]["hilite"]["value"].clone();
+    let sandbox = Sandbox::new();
+    sandbox.write("p.toml", b"[params]\nhilite = [0.4, 0.5, 0.6]\n");
+    sandbox.fit("run", &["--params", "p.toml"]).done();
+    let values = sandbox.json("run/report.json")["params"]["hilite"]["value"].clone();
     for value in values.as_array().unwrap() {
         assert!((value.as_f64().unwrap() - 0.5).abs() < SHARE * 0.5, "{values}");
     }
@@ -152,14 +152,14 @@ fn parameters_with_three_values_are_fitted_in_each_channel() {
 
 #[test]
 fn every_solver_fits_and_gains_are_found() {
-    let desk = Desk::new();
-    desk.edit("[fit]", "[fit]\ngains = true");
+    let sandbox = Sandbox::new();
+    sandbox.edit("[fit]", "[fit]\ngains = true");
     for solver in ["varpro", "lm", "lbfgs"] {
-        let ran = desk.fit(solver, &["--solver", solver]);
+        let ran = sandbox.fit(solver, &["--solver", solver]);
         assert_ne!(ran.code, Some(2), "{ran:?}");
-        let report = desk.json(&format!("{solver}/report.json"));
+        let report = sandbox.json(&format!("{solver}/report.json"));
         assert_eq!(report["solver"], solver);
-        let fitted: toml::Table = desk.text(&format!("{solver}/params.toml")).parse().unwrap();
+        let fitted: toml::Table = sandbox.text(&format!("{solver}/params.toml")).parse().unwrap();
         let gain = fitted["gains"]["side"].as_float().unwrap();
         assert!((gain - 1.0).abs() < 1e-2, "{solver}: {gain}");
     }
@@ -167,35 +167,35 @@ fn every_solver_fits_and_gains_are_found() {
 
 #[test]
 fn the_number_of_threads_changes_nothing() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let values = |threads: &str| {
         let run = format!("run{threads}");
-        desk.fit(&run, &["--threads", threads, "--no-cache"]).done();
-        let mut report = desk.json(&format!("{run}/report.json"));
+        sandbox.fit(&run, &["--threads", threads, "--no-cache"]).done();
+        let mut report = sandbox.json(&format!("{run}/report.json"));
         report["seconds"].take();
         report["provenance"]["threads"].take();
         for iteration in report["history"].as_array_mut().unwrap() {
             iteration["seconds"].take();
         }
-        (report, desk.text(&format!("{run}/params.toml")), desk.read(&format!("{run}/front.png")))
+        (report, sandbox.text(&format!("{run}/params.toml")), sandbox.read(&format!("{run}/front.png")))
     };
     assert!(values("1") == values("2"));
 }
 
 #[test]
 fn pictures_of_views_that_are_gone_are_removed_and_nothing_else() {
-    let desk = Desk::new();
-    desk.fit("run", &[]).done();
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
     // Not skinfit's, though they are called as if they were.
-    desk.write("run/notes.png", b"mine");
-    desk.write("run/mine_terms.exr", b"mine");
-    desk.write("kept.png", b"mine");
+    sandbox.write("run/notes.png", b"mine");
+    sandbox.write("run/mine_terms.exr", b"mine");
+    sandbox.write("kept.png", b"mine");
     // A report that names what is not the folder's own is not believed.
-    let mut report = desk.json("run/report.json");
+    let mut report = sandbox.json("run/report.json");
     report["files"].as_array_mut().unwrap().push("../kept.png".into());
-    desk.write("run/report.json", report.to_string().as_bytes());
-    desk.edit("name = \"side\"", "name = \"left\"");
-    desk.fit("run", &[]).done();
+    sandbox.write("run/report.json", report.to_string().as_bytes());
+    sandbox.edit("name = \"side\"", "name = \"left\"");
+    sandbox.fit("run", &[]).done();
     for (name, there) in [
         ("run/side.png", false),
         ("run/side_terms.exr", false),
@@ -206,36 +206,37 @@ fn pictures_of_views_that_are_gone_are_removed_and_nothing_else() {
         ("run/mine_terms.exr", true),
         ("kept.png", true),
     ] {
-        assert_eq!(desk.path(name).exists(), there, "{name}");
+        assert_eq!(sandbox.path(name).exists(), there, "{name}");
     }
 }
 
 #[test]
 fn the_start_values_on_the_command_line_are_in_the_run_folders_scene() {
-    let desk = Desk::new();
-    desk.write("p.toml", b"[params]\nrim_exponent = 3.5\nhilite = [0.4, 0.5, 0.6]\nnormal_strength = 0.9\n");
-    desk.fit("run", &["--params", "p.toml"]).done();
-    let scene: toml::Table = desk.text("run/scene.toml").parse().unwrap();
+    let sandbox = Sandbox::new();
+    sandbox
+        .write("p.toml", b"[params]\nrim_exponent = 3.5\nhilite = [0.4, 0.5, 0.6]\nnormal_strength = 0.9\n");
+    sandbox.fit("run", &["--params", "p.toml"]).done();
+    let scene: toml::Table = sandbox.text("run/scene.toml").parse().unwrap();
     let start = &scene["model"]["params"];
     assert_eq!(
         (start["rim_exponent"].as_float(), start["normal_strength"].as_float()),
         (Some(3.5), Some(0.9))
     );
     // So the same fit can be made again from the run folder alone, to the bit.
-    desk.run(&["fit", "run/scene.toml", "-o", "again"]).done();
+    sandbox.run(&["fit", "run/scene.toml", "-o", "again"]).done();
     let values = |text: &str| text.lines().skip(2).map(str::to_owned).collect::<Vec<_>>();
-    assert_eq!(values(&desk.text("run/params.toml")), values(&desk.text("again/params.toml")));
+    assert_eq!(values(&sandbox.text("run/params.toml")), values(&sandbox.text("again/params.toml")));
 }
 
 #[test]
 fn a_fit_of_nothing_says_that_nothing_was_free() {
-    let desk = Desk::new();
-    let text = desk.text("scene.toml");
+    let sandbox = Sandbox::new();
+    let text = sandbox.text("scene.toml");
     let free = text.lines().find(|line| line.starts_with("free = ")).unwrap();
-    desk.edit(free, "free = []");
-    let ran = desk.fit("run", &[]).done();
+    sandbox.edit(free, "free = []");
+    let ran = sandbox.fit("run", &[]).done();
     assert_eq!(ran.out.lines().count(), 3, "{ran:?}");
-    let page = desk.text("run/report.html");
+    let page = sandbox.text("run/report.html");
     assert!(page.contains("Nothing was free: ") && page.contains("Nothing was free, so "));
     assert!(!page.contains("determine every") && !page.contains("Every direction"));
 }
@@ -243,12 +244,12 @@ fn a_fit_of_nothing_says_that_nothing_was_free() {
 /// Fit what a targets' `truth` says, with `effects` more, from the defaults; every value that it gives
 /// must be found.
 fn recovers(effects: &str, truth: &str) {
-    let desk = Desk::new();
-    desk.edit("\"reflection\"]", &format!("\"reflection\"{effects}]"));
-    desk.write("truth.toml", truth.as_bytes());
+    let sandbox = Sandbox::new();
+    sandbox.edit("\"reflection\"]", &format!("\"reflection\"{effects}]"));
+    sandbox.write("truth.toml", truth.as_bytes());
     for view in ["front", "side"] {
         let path = format!("targets/{view}.exr");
-        desk.run(&["render", "scene.toml", "--params", "truth.toml", "--view", view, "-o", &path]).done();
+        sandbox.run(&["render", "scene.toml", "--params", "truth.toml", "--view", view, "-o", &path]).done();
     }
     let truth: toml::Table = truth.parse().unwrap();
     let truth = truth["params"].as_table().unwrap();
@@ -256,11 +257,11 @@ fn recovers(effects: &str, truth: &str) {
         |names: Vec<&String>| names.iter().map(|name| format!("{name:?}")).collect::<Vec<_>>().join(", ");
     let free = quoted(truth.keys().collect());
     let coloured = quoted(truth.iter().filter(|(_, value)| value.is_array()).map(|(name, _)| name).collect());
-    let text = desk.text("scene.toml");
+    let text = sandbox.text("scene.toml");
     let line = text.lines().find(|line| line.starts_with("free = ")).unwrap();
-    desk.edit(line, &format!("free = [{free}]\nper_channel = [{coloured}]"));
-    desk.fit("run", &[]).done();
-    let report = desk.json("run/report.json");
+    sandbox.edit(line, &format!("free = [{free}]\nper_channel = [{coloured}]"));
+    sandbox.fit("run", &[]).done();
+    let report = sandbox.json("run/report.json");
     for (name, truth) in truth {
         let found = &report["params"][name]["value"];
         for c in 0..3 {

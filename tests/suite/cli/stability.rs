@@ -1,41 +1,43 @@
 //! Studies of stability.
 
-use super::desk::{Desk, Ran};
+use super::sandbox::{Ran, Sandbox};
 
 /// Enough to try everything, and no more.
 const SHORT: [&str; 7] = ["--no-gpu", "--cases", "300", "--pixels", "1000", "-o", "stable"];
 
-fn study(desk: &Desk, more: &[&str]) -> Ran {
-    desk.run(&[&["stability", "scene.toml"], &SHORT[..], more].concat())
+fn study(sandbox: &Sandbox, more: &[&str]) -> Ran {
+    sandbox.run(&[&["stability", "scene.toml"], &SHORT[..], more].concat())
 }
 
 #[test]
 fn a_scene_is_studied_on_every_evaluator_and_the_same_seed_gives_the_same() {
-    let desk = Desk::new();
-    let ran = study(&desk, &["--seed", "3"]);
+    let sandbox = Sandbox::new();
+    let ran = study(&sandbox, &["--seed", "3"]);
     assert_eq!(ran.code, Some(0), "{ran:?}");
     for word in ["facing", "65504 beside 0", "many pixels", "random search", "model f32: "] {
         assert!(ran.out.contains(word), "{word}: {ran:?}");
     }
     assert!(ran.err.contains("WERE NOT TRIED"), "{ran:?}");
-    let report = desk.json("stable/stability.json");
+    let report = sandbox.json("stable/stability.json");
     for engine in report["engines"].as_array().unwrap() {
         assert_eq!(engine["random"]["tried"], 300);
         assert!(engine["hard"].as_u64().unwrap() > 100 && engine["scene"]["tried"].as_u64().unwrap() > 1000);
     }
-    let first = desk.read("stable/stability.json");
-    study(&desk, &["--seed", "3"]);
-    assert!(desk.read("stable/stability.json") == first, "the same seed gave something else");
-    study(&desk, &["--seed", "4"]);
-    assert!(desk.read("stable/stability.json") != first);
+    let first = sandbox.read("stable/stability.json");
+    study(&sandbox, &["--seed", "3"]);
+    assert!(sandbox.read("stable/stability.json") == first, "the same seed gave something else");
+    study(&sandbox, &["--seed", "4"]);
+    assert!(sandbox.read("stable/stability.json") != first);
 }
 
 #[test]
 fn cases_of_a_file_are_tried_again_and_other_files_are_refused() {
-    let desk = Desk::new();
-    desk.write("other.toml", b"[[case]]\nnames = \"x\"\n");
-    desk.run(&["stability", "scene.toml", "--replay", "other.toml"])
+    let sandbox = Sandbox::new();
+    sandbox.write("other.toml", b"[[case]]\nnames = \"x\"\n");
+    sandbox
+        .run(&["stability", "scene.toml", "--replay", "other.toml"])
         .refused(&["other.toml: line 2: unknown key `names`. Did you mean `name`?"]);
-    desk.run(&["stability", "scene.toml", "--replay", "none.toml"])
+    sandbox
+        .run(&["stability", "scene.toml", "--replay", "none.toml"])
         .refused(&["none.toml: there is no such file"]);
 }

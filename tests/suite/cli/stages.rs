@@ -2,71 +2,72 @@
 
 use std::collections::BTreeSet;
 
-use super::desk::{Desk, files};
+use super::sandbox::{Sandbox, files};
 use crate::fixtures::read_exr;
 
 const ALL: [&str; 7] = ["diffuse", "normal_map", "occlusion", "rim", "side_specular", "hilite", "reflection"];
 
 #[test]
 fn a_second_run_bakes_nothing_again() {
-    let desk = Desk::new();
-    let bake = |to: &str| desk.run(&["bake", "scene.toml", "-o", to]);
+    let sandbox = Sandbox::new();
+    let bake = |to: &str| sandbox.run(&["bake", "scene.toml", "-o", to]);
     let first = bake("a").done();
     assert!(first.out.contains("occlusion  baked") && !first.out.contains("kept"), "{first:?}");
     let second = bake("b").done();
     assert!(second.out.contains("occlusion  kept") && !second.out.contains("  baked"), "{second:?}");
-    let contents = |folder: &str| files(&desk.path(folder)).into_values().collect::<Vec<_>>();
+    let contents = |folder: &str| files(&sandbox.path(folder)).into_values().collect::<Vec<_>>();
     assert!(contents("a") == contents("b"));
     // What a fit baked serves a picture too.
-    desk.fit("run", &[]).done();
-    let kept = files(desk.cache());
-    desk.run(&["render", "--engine", "cpu", "scene.toml", "--params", "run/params.toml", "-o", "a.png"])
+    sandbox.fit("run", &[]).done();
+    let kept = files(sandbox.cache());
+    sandbox
+        .run(&["render", "--engine", "cpu", "scene.toml", "--params", "run/params.toml", "-o", "a.png"])
         .done();
-    assert!(files(desk.cache()) == kept, "a picture baked anew");
+    assert!(files(sandbox.cache()) == kept, "a picture baked anew");
 }
 
 #[test]
 fn a_damaged_cache_is_noticed_and_made_anew() {
-    let desk = Desk::new();
-    desk.fit("a", &[]).done();
-    let kept = files(desk.cache());
+    let sandbox = Sandbox::new();
+    sandbox.fit("a", &[]).done();
+    let kept = files(sandbox.cache());
     for (path, bytes) in &kept {
         let mut damaged = bytes.clone();
         let last = damaged.len() - 1;
         damaged[last] ^= 1;
         std::fs::write(path, &damaged).unwrap();
     }
-    let ran = desk.fit("b", &[]);
+    let ran = sandbox.fit("b", &[]);
     assert_eq!(ran.code, Some(0), "{ran:?}");
     assert_eq!(ran.err.matches("baking anew").count(), kept.len(), "{ran:?}");
-    assert_eq!(desk.text("a/params.toml"), desk.text("b/params.toml"));
-    assert!(files(desk.cache()) == kept);
-    desk.fit("c", &[]).done();
+    assert_eq!(sandbox.text("a/params.toml"), sandbox.text("b/params.toml"));
+    assert!(files(sandbox.cache()) == kept);
+    sandbox.fit("c", &[]).done();
 }
 
 #[test]
 fn a_cache_that_cannot_be_written_costs_a_warning_alone() {
-    let desk = Desk::new();
-    desk.write("file", b"");
-    let ran = desk.fit("run", &["--cache", "file/cache"]);
+    let sandbox = Sandbox::new();
+    sandbox.write("file", b"");
+    let ran = sandbox.fit("run", &["--cache", "file/cache"]);
     assert_eq!(ran.code, Some(0), "{ran:?}");
     assert_eq!(ran.err.lines().count(), 1, "{ran:?}");
     assert!(ran.err.contains("warning: file/cache/") && ran.err.contains("not kept"), "{ran:?}");
-    let kept = files(desk.cache());
-    desk.fit("run", &["--no-cache"]).done();
-    assert!(files(desk.cache()) == kept, "--no-cache kept something");
+    let kept = files(sandbox.cache());
+    sandbox.fit("run", &["--no-cache"]).done();
+    assert!(files(sandbox.cache()) == kept, "--no-cache kept something");
 }
 
 /// The names that `bake` writes for a list of effects, without their endings.
-fn baked(desk: &Desk, effects: &str) -> BTreeSet<String> {
+fn baked(sandbox: &Sandbox, effects: &str) -> BTreeSet<String> {
     let folder = format!("baked_{}", effects.replace(',', "_"));
-    let ran = desk.run(&["bake", "scene.toml", "--effects", effects, "-o", &folder]);
+    let ran = sandbox.run(&["bake", "scene.toml", "--effects", effects, "-o", &folder]);
     assert_eq!(ran.code, Some(0), "{ran:?}");
-    if !desk.path(&folder).is_dir() {
+    if !sandbox.path(&folder).is_dir() {
         assert!(ran.err.contains("ask for no bake"), "{ran:?}");
         return BTreeSet::new();
     }
-    let names = std::fs::read_dir(desk.path(&folder)).unwrap();
+    let names = std::fs::read_dir(sandbox.path(&folder)).unwrap();
     names
         .map(|entry| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned())
         .map(|name| if name.starts_with("lobe_") { "lobe".to_owned() } else { name })
@@ -75,7 +76,7 @@ fn baked(desk: &Desk, effects: &str) -> BTreeSet<String> {
 
 #[test]
 fn an_effect_that_is_off_is_not_baked() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     // The scene's own would be refused; none of these asks for them.
     for (effects, bakes) in [
         (ALL.join(",").as_str(), &["irradiance", "lobe", "hilite", "occlusion"][..]),
@@ -90,14 +91,14 @@ fn an_effect_that_is_off_is_not_baked() {
         ("key_light,normal_map", &[]),
     ] {
         let bakes: BTreeSet<String> = bakes.iter().map(|&name| name.to_owned()).collect();
-        assert_eq!(baked(&desk, effects), bakes, "{effects}");
+        assert_eq!(baked(&sandbox, effects), bakes, "{effects}");
     }
 }
 
 #[test]
 fn an_effect_that_is_off_does_not_ask_for_its_files() {
-    let render = |desk: &Desk, effects: &str| {
-        desk.run(&["render", "--engine", "cpu", "scene.toml", "--effects", effects, "-o", "a.exr"])
+    let render = |sandbox: &Sandbox, effects: &str| {
+        sandbox.run(&["render", "--engine", "cpu", "scene.toml", "--effects", effects, "-o", "a.exr"])
     };
     let rows = [
         ("specular.png", "occlusion,diffuse", "side_specular"),
@@ -107,19 +108,19 @@ fn an_effect_that_is_off_does_not_ask_for_its_files() {
         ("env.exr", "key_light,normal_map", "diffuse"),
     ];
     for (file, without, with) in rows {
-        let desk = Desk::new();
-        desk.remove(file);
-        render(&desk, without).done();
-        render(&desk, with).refused(&[&format!("{file}: there is no such file")]);
+        let sandbox = Sandbox::new();
+        sandbox.remove(file);
+        render(&sandbox, without).done();
+        render(&sandbox, with).refused(&[&format!("{file}: there is no such file")]);
     }
 }
 
 #[test]
 fn the_layers_of_a_rendered_image_add_up_to_the_whole() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let render = ["render", "scene.toml", "--engine", "cpu", "--params", "truth.toml", "--layers"];
-    desk.run(&[&render[..], &["-o", "a.exr"]].concat()).done();
-    let image = read_exr(&desk.path("a.exr"));
+    sandbox.run(&[&render[..], &["-o", "a.exr"]].concat()).done();
+    let image = read_exr(&sandbox.path("a.exr"));
     for channel in ["R", "G", "B"] {
         let layers: Vec<&Vec<f32>> = (image.planes.iter())
             .filter(|(name, _)| name.ends_with(&format!(".{channel}")))
@@ -138,19 +139,19 @@ fn the_layers_of_a_rendered_image_add_up_to_the_whole() {
 
 #[test]
 fn an_image_is_rendered_in_every_kind_and_says_where_it_comes_from() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     for (output, more) in [
         ("new/folder/a.exr", &[][..]),
         ("a.PNG", &["--tone", "aces", "--exposure", "-1.5"]),
         ("b.png", &["--tone", "reinhard", "--view", "side"]),
     ] {
         let ran =
-            desk.run(&[&["render", "scene.toml", "-o", output, "--engine", "cpu"], more].concat()).done();
+            sandbox.run(&[&["render", "scene.toml", "-o", output, "--engine", "cpu"], more].concat()).done();
         let view = if more.contains(&"side") { "side" } else { "front" };
         assert_eq!(ran.out, format!("wrote {output} (view {view}; cpu)\n"));
     }
-    let text = String::from_utf8_lossy(&desk.read("new/folder/a.exr")).into_owned();
+    let text = String::from_utf8_lossy(&sandbox.read("new/folder/a.exr")).into_owned();
     assert!(text.contains("skinfit 0") && text.contains("scene.toml") && text.contains("hilite = 0.7"));
-    let (a, b) = (image::open(desk.path("a.PNG")).unwrap(), image::open(desk.path("b.png")).unwrap());
+    let (a, b) = (image::open(sandbox.path("a.PNG")).unwrap(), image::open(sandbox.path("b.png")).unwrap());
     assert_eq!((a.width(), a.height(), b.width(), b.height()), (32, 32, 32, 24));
 }

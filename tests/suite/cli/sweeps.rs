@@ -1,24 +1,24 @@
 //! Plans, their jobs, and what is collected of them.
 
-use super::desk::{Desk, Ran};
+use super::sandbox::{Ran, Sandbox};
 
 const PLAN: &str = "command = \"fit\"\nscene = \"scene.toml\"\nresults = \"out\"\n[[axis]]\nkey = \"fit.loss\"\n\
     values = [\"l2\", \"huber\"]\n[[axis]]\nkey = \"model.effects\"\nvalues = [[\"diffuse\", \"rim\"], [\"diffuse\"]]\n";
 
-fn desk() -> Desk {
-    let desk = Desk::new();
-    desk.edit(", \"specular_lobe\"]", "]");
-    desk.write("plan.toml", PLAN.as_bytes());
-    desk
+fn sandbox() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.edit(", \"specular_lobe\"]", "]");
+    sandbox.write("plan.toml", PLAN.as_bytes());
+    sandbox
 }
 
-fn collect(desk: &Desk, output: &str) -> Ran {
-    desk.run(&["collect", "plan.toml", "-o", output])
+fn collect(sandbox: &Sandbox, output: &str) -> Ran {
+    sandbox.run(&["collect", "plan.toml", "-o", output])
 }
 
 /// The names of the result files.
-fn results(desk: &Desk) -> Vec<String> {
-    let entries = std::fs::read_dir(desk.path("out")).into_iter().flatten().flatten();
+fn results(sandbox: &Sandbox) -> Vec<String> {
+    let entries = std::fs::read_dir(sandbox.path("out")).into_iter().flatten().flatten();
     let names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
     let mut names: Vec<String> = names.filter(|name| name.ends_with(".json")).collect();
     names.sort();
@@ -27,7 +27,7 @@ fn results(desk: &Desk) -> Vec<String> {
 
 #[test]
 fn each_listed_command_runs_its_job_from_anywhere_and_any_order_gives_the_same_table() {
-    let (forward, backward) = (desk(), desk());
+    let (forward, backward) = (sandbox(), sandbox());
     forward.run(&["sweep", "plan.toml"]).done();
     let ran = forward.run(&["sweep", "plan.toml"]).done();
     assert!(ran.out.contains("4 jobs, 4 done before, 0 now, 0 failed; results in out"), "{ran:?}");
@@ -62,37 +62,38 @@ fn each_listed_command_runs_its_job_from_anywhere_and_any_order_gives_the_same_t
 
 #[test]
 fn a_folder_is_collected_as_its_plan_is_and_workers_give_the_same() {
-    let desk = desk();
-    desk.run(&["sweep", "plan.toml", "--workers", "2"]).done();
-    collect(&desk, "plan.csv").done();
-    desk.run(&["collect", "out", "-o", "folder.csv"]).done();
-    assert_eq!(desk.text("plan.csv"), desk.text("folder.csv"));
+    let sandbox = sandbox();
+    sandbox.run(&["sweep", "plan.toml", "--workers", "2"]).done();
+    collect(&sandbox, "plan.csv").done();
+    sandbox.run(&["collect", "out", "-o", "folder.csv"]).done();
+    assert_eq!(sandbox.text("plan.csv"), sandbox.text("folder.csv"));
 }
 
 #[test]
 fn a_job_that_is_done_is_left_alone_and_one_whose_result_is_damaged_is_done_again() {
-    let desk = desk();
-    desk.run(&["sweep", "plan.toml", "--run", "2"]).done();
-    let [name] = &results(&desk)[..] else { panic!("{:?}", results(&desk)) };
+    let sandbox = sandbox();
+    sandbox.run(&["sweep", "plan.toml", "--run", "2"]).done();
+    let [name] = &results(&sandbox)[..] else { panic!("{:?}", results(&sandbox)) };
     let path = format!("out/{name}");
     assert!(name.starts_with("job-0002-"), "{name}");
-    let first = desk.read(&path);
-    let ran = desk.run(&["sweep", "plan.toml", "--run", "2"]).done();
-    assert!(ran.out.ends_with("done before\n") && desk.read(&path) == first, "{ran:?}");
-    desk.write(&path, &first[..first.len() / 2]);
-    let ran = collect(&desk, "some.csv");
+    let first = sandbox.read(&path);
+    let ran = sandbox.run(&["sweep", "plan.toml", "--run", "2"]).done();
+    assert!(ran.out.ends_with("done before\n") && sandbox.read(&path) == first, "{ran:?}");
+    sandbox.write(&path, &first[..first.len() / 2]);
+    let ran = collect(&sandbox, "some.csv");
     assert_eq!(ran.code, Some(1));
     assert!(ran.err.contains("plan.toml: jobs without a result, by number: 0, 1, 2, 3."), "{ran:?}");
     let identity = name.replace("job-", "").replace(".json", "");
-    desk.run(&["sweep", "plan.toml", "--run", &identity]).done();
+    sandbox.run(&["sweep", "plan.toml", "--run", &identity]).done();
     let figures =
         |bytes: &[u8]| serde_json::from_slice::<serde_json::Value>(bytes).unwrap()["figures"].clone();
-    assert_eq!(figures(&desk.read(&path)), figures(&first));
+    assert_eq!(figures(&sandbox.read(&path)), figures(&first));
     // Another scene is another job.
-    desk.edit("hilite = 0.7", "hilite = 0.6");
-    desk.run(&["sweep", "plan.toml", "--run", "2"]).done();
-    assert_eq!(results(&desk).len(), 2);
-    desk.run(&["collect", "out", "-o", "x.csv"])
+    sandbox.edit("hilite = 0.7", "hilite = 0.6");
+    sandbox.run(&["sweep", "plan.toml", "--run", "2"]).done();
+    assert_eq!(results(&sandbox).len(), 2);
+    sandbox
+        .run(&["collect", "out", "-o", "x.csv"])
         .refused(&["out: holds two results of job 2", "Name the plan"]);
 }
 
@@ -102,33 +103,33 @@ const STUDIES: &str = "command = \"ablate\"\nscene = \"scene.toml\"\nresults = \
 
 #[test]
 fn studies_are_jobs_too_and_their_table_has_a_row_a_case_of_the_command_s_own_figures() {
-    let desk = desk();
-    desk.write("plan.toml", STUDIES.as_bytes());
-    let list = desk.run(&["sweep", "plan.toml", "--list"]).done().out;
+    let sandbox = sandbox();
+    sandbox.write("plan.toml", STUDIES.as_bytes());
+    let list = sandbox.run(&["sweep", "plan.toml", "--list"]).done().out;
     assert_eq!(list.lines().count(), 3);
     for line in list.lines().rev() {
         let mut shell = std::process::Command::new("sh");
-        Ran::of(shell.args(["-c", line]).env("SKINFIT_CACHE", desk.cache())).done();
+        Ran::of(shell.args(["-c", line]).env("SKINFIT_CACHE", sandbox.cache())).done();
     }
-    let first: Vec<_> = results(&desk).iter().map(|name| desk.read(&format!("out/{name}"))).collect();
-    let ran = desk.run(&["sweep", "plan.toml"]).done();
+    let first: Vec<_> = results(&sandbox).iter().map(|name| sandbox.read(&format!("out/{name}"))).collect();
+    let ran = sandbox.run(&["sweep", "plan.toml"]).done();
     assert!(ran.out.contains("3 jobs, 3 done before, 0 now"), "{ran:?}");
-    let again: Vec<_> = results(&desk).iter().map(|name| desk.read(&format!("out/{name}"))).collect();
+    let again: Vec<_> = results(&sandbox).iter().map(|name| sandbox.read(&format!("out/{name}"))).collect();
     assert!(first == again && first.len() == 3);
-    collect(&desk, "all.json").done();
-    let all = desk.json("all.json");
+    collect(&sandbox, "all.json").done();
+    let all = sandbox.json("all.json");
     let rows = |job: usize| all["jobs"][job]["rows"].as_array().unwrap().clone();
     // What the commands themselves find on the same scene.
-    desk.run(&["ablate", "scene.toml", "-o", "parts", "--refit", "--gpu", "never"]);
-    let parts = desk.json("parts/results.json");
+    sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--refit", "--gpu", "never"]);
+    let parts = sandbox.json("parts/results.json");
     let wanted: Vec<f64> =
         parts["rows"].as_array().unwrap().iter().map(|row| row["loss"].as_f64().unwrap()).collect();
     let got: Vec<f64> = rows(0).iter().map(|row| row["loss"].as_f64().unwrap()).collect();
     assert!(got == wanted && got.len() > 5, "{got:?} {wanted:?}");
     assert_eq!((&rows(0)[0]["left_out"], &rows(0)[1]["left_out"]), (&"nothing".into(), &"diffuse".into()));
     let options = ["--params", "truth.toml", "--axis", "filter", "--axis", "irradiance"];
-    desk.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()).done();
-    let cost = desk.json("cost/results.json");
+    sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()).done();
+    let cost = sandbox.json("cost/results.json");
     let wanted: Vec<f64> = cost["axes"]
         .as_array()
         .unwrap()
@@ -139,53 +140,56 @@ fn studies_are_jobs_too_and_their_table_has_a_row_a_case_of_the_command_s_own_fi
     let got: Vec<f64> = rows(1).iter().map(|row| row["relative_rms"].as_f64().unwrap()).collect();
     assert!(got == wanted && got.len() > 5, "{got:?} {wanted:?}");
     // One table of all; times are there when they are asked for.
-    collect(&desk, "all.csv").done();
-    let table = desk.text("all.csv");
+    collect(&sandbox, "all.csv").done();
+    let table = sandbox.text("all.csv");
     let header = table.lines().next().unwrap();
     let wanted = "job,axes,command,params,refit,solver,left_out,axis,setting,";
     assert!(header.starts_with(wanted) && !header.contains("seconds"), "{header}");
     assert_eq!(table.lines().count(), 1 + rows(0).len() + rows(1).len() + 1);
     assert!(table.lines().last().unwrap().starts_with("2,,fit,,,lm,,,,"), "{table}");
-    desk.run(&["collect", "plan.toml", "-o", "times.csv", "--seconds"]).done();
-    assert!(desk.text("times.csv").lines().next().unwrap().contains(",seconds,seconds.job,seconds.lower,"));
+    sandbox.run(&["collect", "plan.toml", "-o", "times.csv", "--seconds"]).done();
+    assert!(
+        sandbox.text("times.csv").lines().next().unwrap().contains(",seconds,seconds.job,seconds.lower,")
+    );
     // Other constants are another job.
-    let truth = desk.text("truth.toml");
-    desk.write("truth.toml", format!("{truth}\n").as_bytes());
-    let ran = collect(&desk, "some.csv");
+    let truth = sandbox.text("truth.toml");
+    sandbox.write("truth.toml", format!("{truth}\n").as_bytes());
+    let ran = collect(&sandbox, "some.csv");
     assert!(ran.code == Some(1) && ran.err.contains("jobs without a result, by number: 1."), "{ran:?}");
-    desk.remove("truth.toml");
-    desk.run(&["sweep", "plan.toml", "--list"])
+    sandbox.remove("truth.toml");
+    sandbox
+        .run(&["sweep", "plan.toml", "--list"])
         .refused(&["truth.toml: the constants of job 1 cannot be read"]);
 }
 
 #[test]
 fn a_job_that_fails_is_named_and_tried_again() {
-    let desk = desk();
-    desk.remove("targets/front.exr");
-    let ran = desk.run(&["sweep", "plan.toml"]);
+    let sandbox = sandbox();
+    sandbox.remove("targets/front.exr");
+    let ran = sandbox.run(&["sweep", "plan.toml"]);
     assert_eq!(ran.code, Some(1), "{ran:?}");
     assert!(ran.err.contains("targets/front.exr: there is no such file"), "{ran:?}");
     assert!(ran.out.contains("0 now, 4 failed"), "{ran:?}");
-    let ran = collect(&desk, "none.csv");
+    let ran = collect(&sandbox, "none.csv");
     assert_eq!(ran.code, Some(1));
     assert!(ran.err.contains("plan.toml: job 3 failed: "), "{ran:?}");
-    desk.write("targets/front.exr", &Desk::new().read("targets/front.exr"));
-    desk.run(&["sweep", "plan.toml"]).done();
-    collect(&desk, "all.csv").done();
+    sandbox.write("targets/front.exr", &Sandbox::new().read("targets/front.exr"));
+    sandbox.run(&["sweep", "plan.toml"]).done();
+    collect(&sandbox, "all.csv").done();
 }
 
 #[test]
 fn plans_and_tables_that_make_no_sense_are_refused() {
-    let desk = desk();
+    let sandbox = sandbox();
     let plan = |from: &str, to: &str| {
-        desk.write("plan.toml", PLAN.replacen(from, to, 1).as_bytes());
-        desk.run(&["sweep", "plan.toml", "--list"])
+        sandbox.write("plan.toml", PLAN.replacen(from, to, 1).as_bytes());
+        sandbox.run(&["sweep", "plan.toml", "--list"])
     };
     plan("\"fit\"", "\"fits\"").refused(&["plan.toml: line 1: unknown command `fits`. Did you mean `fit`?"]);
     plan("fit.loss", "fit.los").refused(&["plan.toml: job 0: fit.los = \"l2\": unknown key `los`"]);
     plan("\"scene.toml\"", "\"none.toml\"").refused(&["none.toml", "cannot be read"]);
-    desk.write("plan.toml", PLAN.as_bytes());
-    desk.run(&["sweep", "plan.toml", "--run", "4"]).refused(&["there is no job `4`", "0 to 3"]);
-    collect(&desk, "all.txt").refused(&["all.txt: a table is .csv or .json"]);
-    assert!(!desk.path("out").exists());
+    sandbox.write("plan.toml", PLAN.as_bytes());
+    sandbox.run(&["sweep", "plan.toml", "--run", "4"]).refused(&["there is no job `4`", "0 to 3"]);
+    collect(&sandbox, "all.txt").refused(&["all.txt: a table is .csv or .json"]);
+    assert!(!sandbox.path("out").exists());
 }

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::desk::Desk;
+use super::sandbox::Sandbox;
 
 /// Every axis, in the order of documentation.
 pub(super) const AXES: [&str; 11] = [
@@ -20,8 +20,8 @@ pub(super) const AXES: [&str; 11] = [
 ];
 
 /// The settings of an axis in `results.json`.
-fn settings(desk: &Desk, folder: &str, axis: &str) -> Vec<Value> {
-    let file = desk.json(&format!("{folder}/results.json"));
+fn settings(sandbox: &Sandbox, folder: &str, axis: &str) -> Vec<Value> {
+    let file = sandbox.json(&format!("{folder}/results.json"));
     let axes = file["axes"].as_array().unwrap();
     let found = axes.iter().find(|sweep| sweep["axis"] == axis).unwrap_or_else(|| panic!("no axis {axis}"));
     found["settings"].as_array().unwrap().clone()
@@ -37,10 +37,10 @@ fn named<'a>(settings: &'a [Value], name: &str) -> &'a Value {
 
 #[test]
 fn every_axis_has_a_reference_without_error_and_a_front() {
-    let desk = Desk::new();
-    desk.run(&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"]).done();
+    let sandbox = Sandbox::new();
+    sandbox.run(&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"]).done();
     for axis in AXES {
-        let settings = settings(&desk, "cost", axis);
+        let settings = settings(&sandbox, "cost", axis);
         let references: Vec<&Value> = settings.iter().filter(|s| s["reference"] == true).collect();
         assert_eq!(references.len(), 1, "{axis}");
         assert_eq!(error(references[0]), 0.0, "{axis}");
@@ -53,30 +53,31 @@ fn every_axis_has_a_reference_without_error_and_a_front() {
             let cost = |s: &Value| s["cost"].as_f64().unwrap();
             assert!(!settings.iter().any(|o| cost(o) < cost(s) && error(o) < error(s)), "{axis}: {s}");
         }
-        assert!(desk.text(&format!("cost/{axis}.svg")).starts_with("<svg"));
+        assert!(sandbox.text(&format!("cost/{axis}.svg")).starts_with("<svg"));
     }
-    let lines = desk.text("cost/results.csv").lines().count();
-    let all: usize = AXES.iter().map(|axis| settings(&desk, "cost", axis).len()).sum();
+    let lines = sandbox.text("cost/results.csv").lines().count();
+    let all: usize = AXES.iter().map(|axis| settings(&sandbox, "cost", axis).len()).sum();
     assert_eq!(lines, 1 + all);
 }
 
 #[test]
 fn errors_fall_as_they_must() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let axes = ["--axis", "format", "--axis", "silhouette", "--axis", "filter", "--axis", "rays"];
-    desk.run(&[&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"][..], &axes].concat())
+    sandbox
+        .run(&[&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"][..], &axes].concat())
         .done();
     // Each format has more bits than the one before; binary32 rounds to 6e-8 and is off by some ten roundings.
-    let formats = settings(&desk, "cost", "format");
+    let formats = settings(&sandbox, "cost", "format");
     let errors: Vec<f64> =
         ["fixed12", "as listed", "f16", "f32", "f64"].map(|name| error(named(&formats, name))).into();
     assert!(errors.windows(2).all(|pair| pair[0] > pair[1]), "{errors:?}");
     assert!(errors[3] < 2e-6 && errors[2] < 5e-3 && errors[2] > 1e-5, "{errors:?}");
-    let filters = settings(&desk, "cost", "filter");
+    let filters = settings(&sandbox, "cost", "filter");
     assert!(error(named(&filters, "nearest")) > 10.0 * error(named(&filters, "8-bit")), "{filters:?}");
     // Cutting a mesh finer quarters the sag of its cosines each time, making it coarser four-folds it; the ball's
     // silhouettes leave a wide margin.
-    let vertex: Vec<f64> = settings(&desk, "cost", "silhouette")
+    let vertex: Vec<f64> = settings(&sandbox, "cost", "silhouette")
         .iter()
         .filter(|s| s["name"].as_str().unwrap().starts_with("vertex"))
         .map(error)
@@ -84,24 +85,25 @@ fn errors_fall_as_they_must() {
     assert!(vertex.len() > 3, "{vertex:?}");
     assert!(vertex.windows(2).all(|pair| pair[0] > 1.5 * pair[1]), "{vertex:?}");
     // Sixteen times the rays: the error falls by four for random ones, and more for these.
-    let rays = settings(&desk, "cost", "rays");
+    let rays = settings(&sandbox, "cost", "rays");
     let exact = |name: &str| error(rays.iter().find(|s| s["name"] == name).unwrap());
     assert!(exact("16") > 3.0 * exact("256"), "{rays:?}");
 }
 
 #[test]
 fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     let axes = ["--axis", "irradiance", "--axis", "specular", "--axis", "hilite", "--axis", "rays"];
     let run = |to: &str, goal: &[&str]| {
-        desk.run(&[&["tradeoff", "scene.toml", "--params", "truth.toml", "-o", to][..], &axes, goal].concat())
+        sandbox
+            .run(&[&["tradeoff", "scene.toml", "--params", "truth.toml", "-o", to][..], &axes, goal].concat())
     };
     let ran = run("near", &["--within", "1%"]).done();
     assert!(ran.out.contains("within 1.0000%: irradiance"), "{ran:?}");
-    let choice = desk.json("near/results.json")["choice"].clone();
+    let choice = sandbox.json("near/results.json")["choice"].clone();
     assert!(choice["error"]["relative"].as_f64().unwrap() <= 0.01, "{choice}");
     // The scene file has the settings, and is a scene: its image is as near to that of the references.
-    let table: toml::Table = desk.text("near/scene.toml").parse().unwrap();
+    let table: toml::Table = sandbox.text("near/scene.toml").parse().unwrap();
     let text = |name: &str| {
         choice["settings"].as_array().unwrap().iter().find(|s| s[0] == name).unwrap()[1]
             .as_str()
@@ -117,22 +119,12 @@ fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
     for (key, value) in references {
         best["quality"].as_table_mut().unwrap().insert(key.to_owned(), value.into());
     }
-    desk.write("best.toml", best.to_string().as_bytes());
+    sandbox.write("best.toml", best.to_string().as_bytes());
     let image = |scene: &str, to: &str| {
-        desk.run(&[
-            "render",
-            scene,
-            "--engine",
-            "cpu",
-            "--params",
-            "truth.toml",
-            "--view",
-            "front",
-            "-o",
-            to,
-        ])
-        .done();
-        crate::fixtures::read_exr(&desk.path(to)).rgb(["R", "G", "B"])
+        sandbox
+            .run(&["render", scene, "--engine", "cpu", "--params", "truth.toml", "--view", "front", "-o", to])
+            .done();
+        crate::fixtures::read_exr(&sandbox.path(to)).rgb(["R", "G", "B"])
     };
     let (near, best) = (image("near/scene.toml", "near.exr"), image("best.toml", "best.exr"));
     let sum = |f: &dyn Fn(usize, usize) -> f32| -> f64 {
@@ -146,19 +138,19 @@ fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
     assert!(relative <= 0.015, "{relative}");
     // More is allowed for less; and what nothing meets is refused.
     run("far", &["--within", "20%"]).done();
-    let seconds = |to: &str| desk.json(&format!("{to}/results.json"))["choice"]["settings"].to_string();
+    let seconds = |to: &str| sandbox.json(&format!("{to}/results.json"))["choice"]["settings"].to_string();
     assert_ne!(seconds("far"), seconds("near"));
     run("none", &["--budget", "0.000001ms"]).refused(&["no settings are within 0.0 ms", "the cheapest take"]);
-    assert!(!desk.path("none").exists());
+    assert!(!sandbox.path("none").exists());
     run("soon", &["--budget", "60s"]).done();
-    assert_eq!(desk.json("soon/results.json")["choice"]["error"]["relative"].as_f64(), Some(0.0));
+    assert_eq!(sandbox.json("soon/results.json")["choice"]["error"]["relative"].as_f64(), Some(0.0));
 }
 
 #[test]
 fn what_makes_no_sense_is_refused() {
-    let desk = Desk::new();
-    let before = desk.files();
-    let run = |more: &[&str]| desk.run(&[&["tradeoff", "scene.toml", "-o", "cost"], more].concat());
+    let sandbox = Sandbox::new();
+    let before = sandbox.files();
+    let run = |more: &[&str]| sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"], more].concat());
     for (more, words) in [
         (&["--axis", "rayz"][..], "Did you mean `rays`?"),
         (&["--within", "0.5"], "such as 0.5%"),
@@ -173,10 +165,10 @@ fn what_makes_no_sense_is_refused() {
         assert!(ran.err.contains(words), "{more:?}: {ran:?}");
     }
     for view in ["front", "side"] {
-        desk.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
+        sandbox.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
     }
     run(&["--axis", "solver"]).refused(&["--axis solver: no view names a target"]);
     run(&["--axis", "format", "--within", "1%"]).refused(&["none of the axes that were swept can be set"]);
-    desk.write("scene.toml", &before[&desk.path("scene.toml")]);
-    assert!(desk.files() == before, "something was left");
+    sandbox.write("scene.toml", &before[&sandbox.path("scene.toml")]);
+    assert!(sandbox.files() == before, "something was left");
 }

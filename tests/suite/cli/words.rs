@@ -2,11 +2,11 @@
 
 use skinfit::model::params::{ParamInfo, TABLE};
 
-use super::desk::Desk;
+use super::sandbox::Sandbox;
 
 #[test]
 fn every_help_page_holds_an_example_that_is_understood() {
-    let desk = Desk::new();
+    let sandbox = Sandbox::new();
     for command in [
         "",
         "fit",
@@ -24,7 +24,7 @@ fn every_help_page_holds_an_example_that_is_understood() {
         "collect",
     ] {
         let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
-        let help = desk.run(&arguments).done().out;
+        let help = sandbox.run(&arguments).done().out;
         let examples: Vec<&str> = help.lines().filter(|line| line.starts_with("  skinfit ")).collect();
         assert!(!examples.is_empty(), "{command}: no example\n{help}");
         for example in &examples {
@@ -39,7 +39,7 @@ fn every_help_page_holds_an_example_that_is_understood() {
             "{command}: a line is too long\n{help}"
         );
     }
-    let version = desk.run(&["--version"]).done().out;
+    let version = sandbox.run(&["--version"]).done().out;
     assert_eq!(version, format!("skinfit {}\n", env!("CARGO_PKG_VERSION")));
 }
 
@@ -55,9 +55,9 @@ fn told(row: &ParamInfo) -> Vec<String> {
 
 #[test]
 fn the_parameter_table_is_whole_in_every_format() {
-    let desk = Desk::new();
-    let print = |format: &str| desk.run(&["params", "--format", format]).done().out;
-    assert_eq!(desk.run(&["params"]).done().out, print("text"));
+    let sandbox = Sandbox::new();
+    let print = |format: &str| sandbox.run(&["params", "--format", format]).done().out;
+    assert_eq!(sandbox.run(&["params"]).done().out, print("text"));
     let (text, markdown) = (print("text"), print("markdown"));
     assert_eq!(text.lines().count(), 1 + TABLE.len());
     assert_eq!(markdown.lines().count(), 2 + TABLE.len());
@@ -84,8 +84,8 @@ fn the_parameter_table_is_whole_in_every_format() {
 
 #[test]
 fn words_that_the_command_line_does_not_know() {
-    let desk = Desk::new();
-    let before = desk.files();
+    let sandbox = Sandbox::new();
+    let before = sandbox.files();
     let rows: &[(&[&str], &str)] = &[
         (&[], "Usage: skinfit"),
         (&["fitt"], "similar subcommand exists: 'fit'"),
@@ -117,9 +117,9 @@ fn words_that_the_command_line_does_not_know() {
         (&["params", "--format", "xml"], "possible values: text, markdown, json"),
     ];
     for (arguments, words) in rows {
-        let ran = desk.run(arguments);
+        let ran = sandbox.run(arguments);
         assert_eq!((ran.code, ran.out.as_str()), (Some(2), ""), "{arguments:?}: {ran:?}");
         assert!(ran.err.contains(words), "{arguments:?}: {words:?} is not said: {}", ran.err);
     }
-    assert!(desk.files() == before, "files were left");
+    assert!(sandbox.files() == before, "files were left");
 }

@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use skinfit::scene::{LoadOptions, Scene, SceneError, Warning};
 
 /// A folder with a small but complete scene in it.
-pub(crate) struct Desk {
+pub(crate) struct SceneFolder {
     folder: tempfile::TempDir,
 }
 
@@ -40,18 +40,18 @@ target = "target.exr"
 [quality]
 "#;
 
-impl Desk {
+impl SceneFolder {
     pub(crate) fn new() -> Self {
-        let desk = Self { folder: tempfile::tempdir().unwrap() };
-        desk.write("quad.glb", &quad());
-        desk.write("color.png", &png(4, 4, [200, 100, 0]));
-        desk.write("normal.png", &png(4, 4, [128, 64, 255]));
-        desk.write("data.png", &png(4, 4, [51, 0, 0]));
-        desk.write("mask.png", &png(4, 4, [255, 0, 0]));
-        desk.write("env.exr", &exr(8, 4, &["R", "G", "B"], |_, _| 0.5));
-        desk.write("target.exr", &exr(4, 4, &["R", "G", "B", "A"], |_, _| 0.25));
-        desk.write("scene.toml", SCENE.as_bytes());
-        desk
+        let scene_folder = Self { folder: tempfile::tempdir().unwrap() };
+        scene_folder.write("quad.glb", &quad());
+        scene_folder.write("color.png", &png(4, 4, [200, 100, 0]));
+        scene_folder.write("normal.png", &png(4, 4, [128, 64, 255]));
+        scene_folder.write("data.png", &png(4, 4, [51, 0, 0]));
+        scene_folder.write("mask.png", &png(4, 4, [255, 0, 0]));
+        scene_folder.write("env.exr", &exr(8, 4, &["R", "G", "B"], |_, _| 0.5));
+        scene_folder.write("target.exr", &exr(4, 4, &["R", "G", "B", "A"], |_, _| 0.25));
+        scene_folder.write("scene.toml", SCENE.as_bytes());
+        scene_folder
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {

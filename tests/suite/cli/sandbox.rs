@@ -68,7 +68,7 @@ specular_lobe = 12.0
 "#;
 
 /// A folder with the scene, and one for its bakes.
-pub(crate) struct Desk {
+pub(crate) struct Sandbox {
     folder: TempDir,
     cache: TempDir,
 }
@@ -81,41 +81,41 @@ pub(crate) struct Ran {
     pub(crate) err: String,
 }
 
-impl Desk {
+impl Sandbox {
     /// The scene with its targets, which the program itself renders once for all tests.
     pub(crate) fn new() -> Self {
         static TARGETS: OnceLock<Vec<(String, Vec<u8>)>> = OnceLock::new();
-        let desk = Self::without_targets();
+        let sandbox = Self::without_targets();
         let targets = TARGETS.get_or_init(|| {
-            let desk = Self::without_targets();
+            let sandbox = Self::without_targets();
             let render = |view: &str| {
                 let path = format!("targets/{view}.exr");
                 let render = ["render", "scene.toml", "--engine", "cpu", "--params", "truth.toml"];
-                desk.run(&[&render[..], &["--view", view, "-o", &path]].concat()).done();
-                (path.clone(), desk.read(&path))
+                sandbox.run(&[&render[..], &["--view", view, "-o", &path]].concat()).done();
+                (path.clone(), sandbox.read(&path))
             };
             vec![render("front"), render("side")]
         });
-        targets.iter().for_each(|(name, bytes)| desk.write(name, bytes));
-        desk
+        targets.iter().for_each(|(name, bytes)| sandbox.write(name, bytes));
+        sandbox
     }
 
     fn without_targets() -> Self {
-        let desk = Self { folder: tempfile::tempdir().unwrap(), cache: tempfile::tempdir().unwrap() };
-        desk.write("scene.toml", SCENE.as_bytes());
-        desk.write("truth.toml", TRUTH.as_bytes());
-        desk.write("mesh.glb", &mesh(|_, _| {}));
+        let sandbox = Self { folder: tempfile::tempdir().unwrap(), cache: tempfile::tempdir().unwrap() };
+        sandbox.write("scene.toml", SCENE.as_bytes());
+        sandbox.write("truth.toml", TRUTH.as_bytes());
+        sandbox.write("mesh.glb", &mesh(|_, _| {}));
         let wave = |x: u32, k: f32| 0.5 + 0.4 * (k * x as f32).sin();
-        desk.write("color.png", &png(|x, y| [0.8, wave(x, 0.7), wave(y, 1.1)]));
-        desk.write("normal.png", &png(|x, y| [0.4 + 0.2 * wave(x, 1.3), 0.4 + 0.2 * wave(y, 0.9), 0.97]));
-        desk.write("specular.png", &png(|x, y| [wave(x + y, 0.5); 3]));
-        desk.write("attenuator.png", &png(|x, y| [wave(x + 2 * y, 0.8); 3]));
+        sandbox.write("color.png", &png(|x, y| [0.8, wave(x, 0.7), wave(y, 1.1)]));
+        sandbox.write("normal.png", &png(|x, y| [0.4 + 0.2 * wave(x, 1.3), 0.4 + 0.2 * wave(y, 0.9), 0.97]));
+        sandbox.write("specular.png", &png(|x, y| [wave(x + y, 0.5); 3]));
+        sandbox.write("attenuator.png", &png(|x, y| [wave(x + 2 * y, 0.8); 3]));
         let sky = |x: usize, y: usize| {
             let sun = if (20..22).contains(&x) && (4..6).contains(&y) { 20.0 } else { 0.0 };
             [0.3 + sun + 0.02 * x as f32, 0.4 + 0.5 * sun, 1.0 - 0.05 * y as f32 + 0.2 * sun]
         };
-        desk.write_exr("env.exr", 32, 16, sky);
-        desk
+        sandbox.write_exr("env.exr", 32, 16, sky);
+        sandbox
     }
 
     pub(crate) fn path(&self, name: &str) -> PathBuf {
