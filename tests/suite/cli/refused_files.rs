@@ -176,7 +176,7 @@ fn parameter_files_that_cannot_be_used() {
     for &(what, text, words) in rows {
         for arguments in [RENDER, START] {
             let spoil = |sandbox: &Sandbox| {
-                text.into_iter().for_each(|text| sandbox.write("p.toml", text.as_bytes()))
+                text.into_iter().for_each(|text| sandbox.write("p.toml", text.as_bytes()));
             };
             check(&[Case { what, arguments, spoil: &spoil, words }]);
         }
