@@ -334,7 +334,8 @@ impl Solver<&Passes<'_>, LmState> for LevenbergMarquardt<'_> {
         problem: &mut Problem<&Passes<'_>>,
         state: LmState,
     ) -> Result<(LmState, Option<KV>), Error> {
-        // What elimination left is measured where it is rounding. And before a step rejected twice is blamed on its length once more, a stale Jacobian is renewed in place.
+        // What elimination left is measured where it is rounding. And before a step rejected twice is blamed on its
+        // length once more, a stale Jacobian is renewed in place.
         let rounding = self.is_rounding();
         if rounding {
             self.memory.renewed = Some(self.memory.measured);
