@@ -3,17 +3,15 @@
 use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
 
+use super::window::{Window, row};
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
-/// Columns within the scratch: of each group of pixels, `stride` rows, of which `count` from `first`
-/// on are meant. A group's rows stand together, so that they never compete for the same cache sets.
+/// Columns within the scratch: the rows that are meant of each group's window.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<'a> {
-    pub rows: &'a [Row],
-    pub stride: usize,
-    pub first: usize,
-    pub count: usize,
+    pub windows: &'a [Window],
+    pub rows: &'a [usize],
 }
 
 /// Add the upper triangle of the Gram matrix of the columns to `sums`, lane by lane.
@@ -30,7 +28,7 @@ pub(super) fn add_gram<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row])
 
 #[inline(always)]
 fn add_tiles<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
-    let count = columns.count;
+    let count = columns.rows.len();
     // Tiles of 4 x 4 columns: 16 products for 8 loads.
     let mut i = 0;
     while i < count {
@@ -58,14 +56,14 @@ fn add_tiles<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
 /// Add the products of each column with the last one to `sums` (entry i at i): J^T r and r^T r.
 #[inline(always)]
 pub(super) fn add_last<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
-    for group in columns.rows.chunks_exact(columns.stride) {
-        let group = &group[columns.first..][..columns.count];
-        let last = f32x16::load_array_ref(simd, &group[columns.count - 1]);
-        for (column, sum) in group.iter().zip(sums.iter_mut()) {
-            let product =
-                f32x16::load_array_ref(simd, column).mul_add(last, f32x16::load_array_ref(simd, sum));
-            product.store_array(sum);
+    let Some(&last) = columns.rows.last() else { return };
+    for (&column, sum) in columns.rows.iter().zip(sums) {
+        let mut products = f32x16::load_array_ref(simd, sum);
+        for window in columns.windows {
+            let factor = f32x16::load_array_ref(simd, row(window, last));
+            products = f32x16::load_array_ref(simd, row(window, column)).mul_add(factor, products);
         }
+        products.store_array(sum);
     }
 }
 
@@ -88,16 +86,17 @@ impl Tile<'_> {
         simd: S,
         sums: &mut [Row],
     ) {
-        let Self { columns: Columns { rows, stride, first, count }, i, j } = *self;
+        let Self { columns: Columns { windows, rows }, i, j } = *self;
+        let down: [usize; ROWS] = std::array::from_fn(|r| rows[i + r]);
+        let across: [usize; ACROSS] = std::array::from_fn(|k| rows[j + k]);
         let mut products = [[f32x16::splat(simd, 0.0); ACROSS]; ROWS];
-        for group in rows.chunks_exact(stride) {
-            let (down, across) = (&group[first + i..][..ROWS], &group[first + j..][..ACROSS]);
+        for window in windows {
             let mut b = [f32x16::splat(simd, 0.0); ACROSS];
             for k in 0..ACROSS {
-                b[k] = f32x16::load_array_ref(simd, &across[k]);
+                b[k] = f32x16::load_array_ref(simd, row(window, across[k]));
             }
             for r in 0..ROWS {
-                let a = f32x16::load_array_ref(simd, &down[r]);
+                let a = f32x16::load_array_ref(simd, row(window, down[r]));
                 let start = if DIAGONAL { r } else { 0 };
                 for k in start..ACROSS {
                     products[r][k] = a.mul_add(b[k], products[r][k]);
@@ -107,7 +106,7 @@ impl Tile<'_> {
         for r in 0..ROWS {
             let start = if DIAGONAL { r } else { 0 };
             for k in start..ACROSS {
-                let sum = &mut sums[pair(i + r, j + k, count)];
+                let sum = &mut sums[pair(i + r, j + k, rows.len())];
                 (f32x16::load_array_ref(simd, sum) + products[r][k]).store_array(sum);
             }
         }
@@ -123,24 +122,24 @@ mod tests {
 
     #[test]
     fn every_entry_equals_the_plain_product_for_any_number_of_columns() {
-        let groups = 3;
+        let number = |window: usize, place: usize, lane: usize| {
+            ((window * 911 + place * 37 + lane * 13) % 101) as f32 / 50.0 - 1.0
+        };
+        let windows: [Window; 3] = std::array::from_fn(|window| {
+            std::array::from_fn(|place| Row::of(std::array::from_fn(|lane| number(window, place, lane))))
+        });
         for count in 1..=14 {
-            let (stride, first) = (count + 3, 2);
-            let number = |i: usize| ((i * 37 % 101) as f32 - 50.0) / 50.0;
-            let rows: Vec<Row> = (0..groups * stride)
-                .map(|i| Row::of(std::array::from_fn(|lane| number(i * LANES + lane))))
-                .collect();
-            let columns = Columns { rows: &rows, stride, first, count };
+            // Every fourth row, so that a wrong place shows.
+            let rows: Vec<usize> = (0..count).map(|i| 4 * i + 2).collect();
+            let columns = Columns { windows: &windows, rows: &rows };
             let mut sums = vec![Row::ZERO; count * (count + 1) / 2];
             with_simd!(Level::new(), simd => add_gram(simd, columns, &mut sums));
             let mut last = vec![Row::ZERO; count];
             with_simd!(Level::new(), simd => add_last(simd, columns, &mut last));
             for i in 0..count {
                 for j in i..count {
-                    let at = |column: usize, k: usize| {
-                        f64::from(rows[k / LANES * stride + first + column][k % LANES])
-                    };
-                    let want: f64 = (0..groups * LANES).map(|k| at(i, k) * at(j, k)).sum();
+                    let at = |column: usize, k: usize| f64::from(number(k / LANES, rows[column], k % LANES));
+                    let want: f64 = (0..windows.len() * LANES).map(|k| at(i, k) * at(j, k)).sum();
                     let total = |sum: &Row| -> f64 { sum.iter().map(|&x| f64::from(x)).sum() };
                     let got = total(&sums[pair(i, j, count)]);
                     // 48 products of at most 1, each rounded to 6e-8.

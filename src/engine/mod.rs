@@ -2,7 +2,7 @@
 //!
 //! - [`Objective`]: all that the solvers see of an engine
 //! - [`cpu`]: the CPU engine; its parts are `plan` (what a pass computes), `kernel` (groups of pixels
-//!   to columns), `gram` (columns to products) and [`residual`] (the losses)
+//!   to columns), `window` (where these stand), `gram` (columns to products) and [`residual`] (the losses)
 //! - [`lanes`]: sixteen f32 lanes as one number of the model; `corners`: their lookups in cubes
 //! - [`gpu`]: the same on a graphics adapter (feature `gpu`)
 //! - [`mod@reference`]: the same in f64, plainly: what both are held against
@@ -20,6 +20,7 @@ mod records;
 pub mod reference;
 pub mod residual;
 pub mod view;
+mod window;
 
 use crate::model::params::{Column, Params};
 

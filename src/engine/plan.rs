@@ -1,36 +1,21 @@
 //! What a pass computes: worked out once from the effects and the unknowns, so that the kernel
 //! touches only enabled terms and only the columns of free parameters.
 
-use super::Unknown;
+use super::{Unknown, window};
 use crate::model::effects::{Effect, Silhouette};
 use crate::model::evaluate::Setup;
-use crate::model::params::{Channels, Column, Param};
+use crate::model::params::{Channels, Column, Param, TABLE};
 use crate::model::terms::{LookupParam, Wanted};
 
-/// Rows of a group's window in the scratch: the columns of all channels fit. Windows overlap: a group's
-/// own columns are fewer, and the next group writes later.
-pub(super) const WINDOW: usize = 64;
-/// The window's last row takes what nobody reads: writing it costs less than asking.
-const UNUSED: u8 = (WINDOW - 1) as u8;
-// Alpha: the haze's weight, three lookups, gain and residual; a colour: all but the haze's weight.
-const _: () = assert!(6 + 3 * (Param::COUNT + 1) < WINDOW);
-
-/// The columns of one output channel. The residual takes the place after the last column.
+/// The columns of one output channel.
 #[derive(Clone, Debug)]
 pub(super) struct ChannelPlan {
-    /// For each parameter of the table: the row of its column in a group's window; [`UNUSED`] when it
-    /// is held or does not move the channel.
-    pub places: [u8; Param::COUNT],
-    /// The row of the residual.
-    pub residual: u8,
+    /// The rows of the columns in a group's window, and after them the residual's.
+    pub rows: Vec<usize>,
     /// For each column: its unknown's index; `None` for the gain, whose unknown is the view's.
     pub unknowns: Vec<Option<usize>>,
-    /// The gain's column, when gains are free.
-    pub gain: Option<usize>,
     /// How many columns there are, the residual not counted.
     pub columns: usize,
-    /// Where the channel's columns start in the scratch.
-    pub start: usize,
 }
 
 impl ChannelPlan {
@@ -88,6 +73,10 @@ pub(super) struct Plan {
     pub setup: Setup,
     /// Three colours, and alpha when the haze is compared too.
     pub channels: Vec<ChannelPlan>,
+    /// Which parameters are free, in the order of the table.
+    pub free: [bool; Param::COUNT],
+    /// Whether each view's gain is free.
+    pub gains: bool,
     /// Terms that are looked up anew in each pass; the other enabled ones are kept.
     pub live: Wanted,
     /// Terms that some enabled effect asks for.
@@ -112,22 +101,18 @@ impl Plan {
         };
         let mut lookups: Vec<LookupParam> = Vec::new();
         let mut channels = Vec::new();
-        let mut start = 0;
+        let is_free = |param: Param| {
+            unknowns.iter().any(|u| matches!(u, Unknown::Param(column) if column.param == param))
+        };
+        let gains = unknowns.iter().any(|u| matches!(u, Unknown::Gain(_)));
         for c in 0..if compare_alpha { 4 } else { 3 } {
-            let mut channel = ChannelPlan {
-                places: [UNUSED; Param::COUNT],
-                residual: UNUSED,
-                unknowns: Vec::new(),
-                gain: None,
-                columns: 0,
-                start,
-            };
+            let mut channel = ChannelPlan { rows: Vec::new(), unknowns: Vec::new(), columns: 0 };
             for (index, unknown) in unknowns.iter().enumerate() {
                 let Unknown::Param(column) = unknown else { continue };
                 if !moves(column, c, enabled, setup) {
                     continue;
                 }
-                channel.places[column.param as usize] = (start + channel.unknowns.len()) as u8;
+                channel.rows.push(window::column(c, column.param));
                 channel.unknowns.push(Some(index));
                 if let Some(lookup) = LookupParam::from_param(column.param)
                     && !lookups.contains(&lookup)
@@ -135,19 +120,19 @@ impl Plan {
                     lookups.push(lookup);
                 }
             }
-            if unknowns.iter().any(|u| matches!(u, Unknown::Gain(_))) {
-                channel.gain = Some(channel.unknowns.len());
+            if gains {
+                channel.rows.push(window::gain(c));
                 channel.unknowns.push(None);
             }
             channel.columns = channel.unknowns.len();
-            channel.residual = (start + channel.columns) as u8;
-            start += channel.columns + 1;
+            channel.rows.push(window::residual(c));
             channels.push(channel);
         }
-        let free = |lookup: LookupParam| lookups.contains(&lookup) || !keep;
-        let (strength, turned) = (free(LookupParam::NormalStrength), free(LookupParam::EnvironmentRotation));
-        let lobe = free(LookupParam::SpecularLobe);
-        let key = strength || free(LookupParam::KeyAzimuth) || free(LookupParam::KeyElevation);
+        let moved = |lookup: LookupParam| lookups.contains(&lookup) || !keep;
+        let (strength, turned) =
+            (moved(LookupParam::NormalStrength), moved(LookupParam::EnvironmentRotation));
+        let lobe = moved(LookupParam::SpecularLobe);
+        let key = strength || moved(LookupParam::KeyAzimuth) || moved(LookupParam::KeyElevation);
         let live = Wanted {
             diffuse: enabled.diffuse && (strength || turned),
             side: enabled.side && (strength || turned || lobe),
@@ -160,12 +145,8 @@ impl Plan {
         let keep_silhouette = needs.rim && setup.silhouette == Silhouette::Bumped && !live_silhouette;
         let any_live = live != Wanted::NONE || live_silhouette;
         let kept = KeptPlan::new(enabled, live, compare_alpha, keep_silhouette, !any_live);
-        Self { setup, channels, live, enabled, any_live, kept, lookups }
-    }
-
-    /// Columns and residuals of all channels.
-    pub(super) fn all_columns(&self) -> usize {
-        self.channels.iter().map(|c| c.columns + 1).sum()
+        let free = TABLE.each_ref().map(|info| is_free(info.param));
+        Self { setup, channels, free, gains, live, enabled, any_live, kept, lookups }
     }
 }
 

@@ -73,10 +73,16 @@ impl<R: Real> Composition<R> {
     /// Of a fragment's terms and its open share `S.x`.
     #[inline(always)]
     pub fn new(terms: Terms<R>, open: R, weights: Weights<R>) -> Self {
+        let rim = rim(terms.silhouette, weights.rim_exponent);
+        Self::with_rim(terms, rim, open, weights)
+    }
+
+    /// As [`Self::new`], with the rim of `terms.silhouette` worked out elsewhere.
+    #[inline(always)]
+    pub fn with_rim(terms: Terms<R>, rim: Rim<R>, open: R, weights: Weights<R>) -> Self {
         let one = open.lit(1.0);
         let blocked = one - open;
         let occ = one - weights.occlusion * blocked;
-        let rim = rim(terms.silhouette, weights.rim_exponent);
         let (occ_rim, occ_rim_slope) = (occ * rim.value, occ * rim.by_exponent);
         Self { terms, blocked, occ, rim, occ_rim, occ_rim_slope, weights }
     }

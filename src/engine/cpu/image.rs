@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::{BLOCK, CHUNK, CpuEngine};
 use crate::engine::Point;
-use crate::engine::plan::WINDOW;
+use crate::engine::kernel::Rims;
+use crate::engine::window;
 use crate::model::params::Param;
 use crate::samples::LANES;
-use crate::samples::rows::Row;
 use crate::with_simd;
 
 impl CpuEngine {
@@ -30,15 +30,16 @@ impl CpuEngine {
         }
         let gain = point.gains.get(index).copied().unwrap_or(1.0);
         by_chunk.par_iter_mut().enumerate().for_each_init(
-            || [Row::ZERO; WINDOW],
-            |scratch, (chunk, outputs)| {
+            || (window::EMPTY, Rims::default()),
+            |(scratch, rims), (chunk, outputs)| {
                 with_simd!(self.level, simd => {
                     let kernel = self.kernel(simd, view, &kept.views[index], &point.params, lobe.as_deref(), gain);
                     for (k, group) in (chunk * BLOCK * CHUNK..groups.min((chunk + 1) * BLOCK * CHUNK)).enumerate() {
-                        kernel.group::<false>(group, scratch);
-                        for (c, channel) in self.plan.channels.iter().enumerate() {
-                            let row = &scratch[usize::from(channel.residual)];
-                            for (out, value) in outputs[c][k * LANES..][..LANES].iter_mut().zip(row.iter()) {
+                        kernel.begin(group..group + 1, rims);
+                        kernel.group::<false>(group, rims, scratch);
+                        for (c, output) in outputs.iter_mut().enumerate() {
+                            let row = window::row(scratch, window::residual(c));
+                            for (out, value) in output[k * LANES..][..LANES].iter_mut().zip(row.iter()) {
                                 *out = value * gain as f32;
                             }
                         }

@@ -3,9 +3,10 @@
 use crate::engine::gram::{Columns, add_gram, add_last};
 // What the scratch holds at once: it should stay in the nearest caches.
 pub(super) use crate::engine::BLOCK;
-use crate::engine::kernel::Kernel;
+use crate::engine::kernel::{Kernel, Rims};
 use crate::engine::lanes::Lanes;
-use crate::engine::plan::{ChannelPlan, Plan, WINDOW};
+use crate::engine::plan::{ChannelPlan, Plan};
+use crate::engine::window::{self, Window};
 use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::simd::Simd;
@@ -48,17 +49,15 @@ pub(super) fn pairwise(mut sums: Vec<Sums>) -> Sums {
 }
 
 pub(super) struct Scratch {
-    rows: Vec<Row>,
+    windows: Vec<Window>,
+    rims: Rims,
     sums: Vec<Row>,
 }
 
 impl Scratch {
     pub(super) fn new(plan: &Plan) -> Self {
         let pairs: usize = plan.channels.iter().map(ChannelPlan::pairs).sum();
-        Self {
-            rows: vec![Row::ZERO; plan.all_columns() * (BLOCK - 1) + WINDOW],
-            sums: vec![Row::ZERO; pairs],
-        }
+        Self { windows: vec![window::EMPTY; BLOCK], rims: Rims::default(), sums: vec![Row::ZERO; pairs] }
     }
 }
 
@@ -71,28 +70,28 @@ pub(super) fn chunk<S: Simd>(
     scratch: &mut Scratch,
 ) -> Sums {
     let simd = kernel.simd;
-    let Scratch { rows, sums } = scratch;
-    let stride = kernel.plan.all_columns();
+    let Scratch { windows, rims, sums } = scratch;
     sums.fill(Row::ZERO);
     let mut loss = Lanes::splat(simd, 0.0);
     let mut used = 0;
     for &block in blocks {
         let first = block * BLOCK;
         let length = groups.min(first + BLOCK) - first;
-        for k in 0..length {
-            let Some(rows) = rows[k * stride..].first_chunk_mut() else { break };
+        kernel.begin(first..first + length, rims);
+        let windows = &mut windows[..length];
+        for (group, window) in (first..).zip(windows.iter_mut()) {
             if wish == Wish::Loss {
-                kernel.group::<false>(first + k, rows);
-                loss = loss + kernel.weigh::<false>(first + k, rows);
+                kernel.group::<false>(group, rims, window);
+                loss = loss + kernel.weigh::<false>(group, window);
             } else {
-                kernel.group::<true>(first + k, rows);
-                loss = loss + kernel.weigh::<true>(first + k, rows);
+                kernel.group::<true>(group, rims, window);
+                loss = loss + kernel.weigh::<true>(group, window);
             }
         }
         used = 0;
         for channel in &kernel.plan.channels {
             let count = channel.columns + 1;
-            let columns = Columns { rows: &rows[..length * stride], stride, first: channel.start, count };
+            let columns = Columns { windows, rows: &channel.rows };
             match wish {
                 Wish::Loss => {}
                 Wish::Gradient => {
@@ -106,8 +105,24 @@ pub(super) fn chunk<S: Simd>(
             }
         }
     }
-    let fold = |lanes: &[f32; LANES]| lanes.iter().map(|&x| f64::from(x)).sum::<f64>();
-    let mut folded: Vec<f64> = sums[..used].iter().map(|row| fold(row)).collect();
+    let mut folded: Vec<f64> = Vec::with_capacity(used + 1);
+    for row in &sums[..used] {
+        folded.push(fold(row));
+    }
     folded.push(fold(&loss.to_array()));
     Sums(folded)
+}
+
+/// The sum of the lanes, as a tree: its halves are added side by side, and their order never changes.
+#[inline(always)]
+fn fold(lanes: &[f32; LANES]) -> f64 {
+    let mut sums = lanes.map(f64::from);
+    let mut width = LANES;
+    while width > 1 {
+        width /= 2;
+        for i in 0..width {
+            sums[i] += sums[i + width];
+        }
+    }
+    sums[0]
 }
