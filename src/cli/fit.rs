@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use super::fingerprint::fingerprint;
 use super::fit_engine::{Chosen, FitEngine, FitEngineArguments};
 use super::fitted_scene::{Changes, Start};
 use super::maps::MapArguments;
@@ -71,7 +72,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     arguments.maps.check()?;
-    arguments.engine.check_samples(arguments.maps.any())?;
+    arguments.engine.check(arguments.maps.any())?;
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
@@ -155,7 +156,7 @@ fn conclude(
     let clock = Instant::now();
     let views = evidence(prepared, engine, outcome)?;
     let mut seconds = prepared.seconds;
-    seconds.samples = engine.own_sample_seconds().unwrap_or(seconds.samples);
+    seconds.samples = chosen.sample_seconds().unwrap_or(seconds.samples);
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
@@ -171,7 +172,7 @@ fn conclude(
             let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
             say(&format!("{} samples made by the {by} in {:.3} s", engine.samples(), seconds.samples))?;
         }
-        if let Some(why) = &chosen.why {
+        if let Some(why) = &chosen.reasons.why {
             say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
         }
         say(&format!("{}: final loss {:.6e}", folder.path().display(), outcome.loss_end))?;
@@ -248,7 +249,7 @@ fn solve(
         max_iterations: arguments.max_iterations,
         starts: solving.starts,
         seed: solving.seed,
-        fingerprint: fingerprint(prepared, engine),
+        fingerprint: fingerprint(&prepared.scene, arguments.maps.words()),
         resume: arguments.resume.then(|| state.clone()),
         state: Some(state),
         interrupt: Some(interrupt),
@@ -268,19 +269,6 @@ fn solve(
         }
         error => Refusal::new(format!("{}: {error}", prepared.scene.path.display())),
     })
-}
-
-/// A hash of what a state belongs to: switches, loss, lights' sizes, and what was observed.
-fn fingerprint(prepared: &Prepared, engine: &FitEngine<'_>) -> String {
-    let mut hash = blake3::Hasher::new();
-    hash.update(format!("{:?} {:?}", prepared.setup(), prepared.scene.fit.loss).as_bytes());
-    for view in engine.views() {
-        for rows in [view.target.all(), &view.weight] {
-            hash.update(bytemuck::cast_slice(rows));
-        }
-        hash.update(bytemuck::cast_slice(&view.samples.coverage));
-    }
-    hash.finalize().to_hex()[..16].to_owned()
 }
 
 /// For each view the target, the fit and its terms.

@@ -110,6 +110,7 @@ impl Report {
 
 #[cfg(feature = "gpu")]
 mod graphics {
+    use super::super::graphics::Task;
     use super::{Adapter, Feature};
     use crate::gpu::adapter::{self, ADAPTER_VARIABLE, Choice, WELCOME, kind_in_words};
 
@@ -117,7 +118,7 @@ mod graphics {
     pub(super) fn adapters(wanted: Option<&str>) -> (Vec<Adapter>, Result<(String, String), String>) {
         let adapters: Vec<Adapter> = adapter::adapters().iter().map(describe).collect();
         let choice = Choice { name: wanted.map(str::to_owned), ..Choice::default() };
-        let chosen = adapter::choose(&choice).map_err(|error| error.to_string()).map(|chosen| {
+        let chosen = adapter::choose(&choice).map_err(|error| Task::Study.words(&error)).map(|chosen| {
             let info = chosen.get_info();
             let why = if wanted.is_some() {
                 "--adapter names it".to_owned()

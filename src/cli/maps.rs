@@ -1,6 +1,7 @@
 //! `skinfit fit --maps`: whole maps beside the constants, and the evidence of what that gained.
 
 use super::Refusal;
+use crate::scene::MapKind;
 
 /// How to build the program so that it fits maps.
 const BUILD: &str = "cargo build --release --features burn";
@@ -22,6 +23,14 @@ impl MapArguments {
     /// Whether maps are fitted.
     pub(super) fn any(&self) -> bool {
         !self.maps.is_empty()
+    }
+
+    /// The maps that are fitted and the view that is held out, in words; `None`: no maps.
+    pub(super) fn words(&self) -> Option<String> {
+        let named = |kind: &&str| self.maps.iter().any(|name| name == kind);
+        let kinds: Vec<&str> = MapKind::ALL.into_iter().map(MapKind::name).filter(named).collect();
+        let held_out = self.hold_out.as_ref().map(|view| format!(", view {view} held out"));
+        self.any().then(|| kinds.join(" ") + held_out.as_deref().unwrap_or_default())
     }
 
     /// Refuse maps in a program that was built without them.
@@ -78,6 +87,7 @@ mod burn {
     use std::path::Path;
 
     use super::super::fit::compared;
+    use super::super::graphics::tensor_words;
     use super::super::{Refusal, say};
     use super::MapArguments;
     use crate::engine::view::ObservedView;
@@ -139,7 +149,7 @@ mod burn {
             let kinds: Vec<MapKind> = MapKind::ALL.into_iter().filter(named).collect();
             let held_out = self.held_out(&prepared.scene.views, &prepared.scene.path)?;
             let choice = Choice { name: adapter.map(str::to_owned), ..Choice::default() };
-            let shared = SharedDevice::open(&choice)?;
+            let shared = SharedDevice::open(&choice).map_err(|error| Refusal::new(tensor_words(&error)))?;
             prepared.scene.fit.free = columns_beside(&kinds, &prepared.scene.fit.free);
             let posed = prepared.scene.mesh.pose();
             let weights: Vec<f32> = prepared.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
@@ -161,7 +171,11 @@ mod burn {
             });
             bar.finish_and_clear();
             let found = found.map_err(|error| {
-                let words = format!("{}: {error}", prepared.scene.path.display());
+                let what = match &error {
+                    MapError::Tensor(error) => tensor_words(error),
+                    error => error.to_string(),
+                };
+                let words = format!("{}: {what}", prepared.scene.path.display());
                 match error {
                     MapError::Tensor(_) | MapError::NotFinite { .. } => Refusal::failure(words),
                     MapError::Constants(_) | MapError::Unread { .. } => Refusal::new(words),

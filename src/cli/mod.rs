@@ -2,7 +2,8 @@
 //!
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `stability`,
 //!   `sweep`, `collect`: the commands
-//! - `fit_engine`: what evaluates the passes of a fit
+//! - `fit_engine`: what evaluates the passes of a fit; `fingerprint`: what its state belongs to
+//! - `graphics`: what to do about an adapter that cannot
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
@@ -11,9 +12,12 @@ mod ablate;
 mod bake;
 mod demo;
 mod export;
+mod fingerprint;
 mod fit;
 mod fit_engine;
 mod fitted_scene;
+#[cfg(feature = "gpu")]
+mod graphics;
 mod info;
 mod maps;
 mod params;

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 #[cfg(feature = "gpu")]
 use std::rc::Rc;
 
+#[cfg(feature = "gpu")]
+use super::graphics::Task;
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, say, tell, tell_warnings};
 use crate::output;
@@ -129,8 +131,8 @@ fn add_gpu(
                 evaluators.push(Box::new(EngineEvaluator(OnAdapter(adapter))));
                 Ok(None)
             }
-            Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => Err(error.into()),
-            Err(error) => without(&error.to_string()),
+            Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => Err(Task::Study.refusal(&error)),
+            Err(error) => without(&Task::Study.words(&error)),
         }
     }
 }

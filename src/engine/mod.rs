@@ -84,11 +84,12 @@ pub trait Objective: Sync {
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>);
 }
 
+/// Half a unit in the last place of an f32, as a share of the number.
+const HALF_UNIT: f64 = 1.0 / (1 << 24) as f64;
+
 /// [`Objective::rounding`] of an engine that computes in f32 and reads every `stride`-th block of each view.
 fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: usize) -> f64 {
     use rayon::prelude::*;
-    // Half a unit in the last place of an f32, as a share of the number.
-    const SHARE: f64 = 1.0 / (1 << 24) as f64;
     // A fixed number of blocks a sum, so that it does not depend on threads.
     const BLOCKS: usize = 512;
     let power = |view: &view::ObservedView| {
@@ -100,7 +101,7 @@ fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: usiz
         });
         sums.collect::<Vec<f64>>().iter().sum::<f64>()
     };
-    SHARE * SHARE * views.iter().map(power).sum::<f64>()
+    HALF_UNIT * HALF_UNIT * views.iter().map(power).sum::<f64>()
 }
 
 /// One unknown of a fit.

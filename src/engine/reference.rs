@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::residual::weighted_residual;
 use super::view::ObservedView;
-use super::{NormalEquations, Objective, Point, Unknown};
+use super::{HALF_UNIT, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
 use crate::model::cube::Cube;
 use crate::model::evaluate::{Setup, derivative, shade};
@@ -15,6 +15,10 @@ use crate::model::params::{Param, Params};
 use crate::model::vector::V3;
 use crate::samples::LANES;
 use crate::scene::Loss;
+
+/// Half units in the last place by which an engine's f32 value of a pixel may be off, of either sign: some ten
+/// operations' roundings, which are independent, lie within their root.
+const ROUNDINGS: f64 = 4.0;
 
 /// Pixels of a unit of work; a fixed number, so that sums do not depend on threads.
 const CHUNK: usize = 64 * LANES;
@@ -113,16 +117,54 @@ impl<'a> Reference<'a> {
         out
     }
 
-    /// The sums over some of a view's pixels; the loss is not yet divided by the weight.
+    /// The normal equations, and how far J^T J of an engine that computes in f32 may be from theirs because its
+    /// residuals round: relative to the diagonal entries that share row and column.
+    ///
+    /// A robust loss' reweight w(r) moves with the residual r = model - target, and r rounds as the model's value does,
+    /// however small it is. Where w moves by a share p of itself, an entry moves by the sum of p w J_a J_b, which is
+    /// at most the root of the same for aa times that for bb (Cauchy and Schwarz): so the greatest of the diagonal's
+    /// shares bounds all. J^T r, r^T r and the loss have no such term: w r and rho are as smooth in r as r^2 is.
+    #[must_use]
+    pub fn with_rounding(&self, point: &Point) -> (NormalEquations, f64) {
+        let (sums, moved) = self.all_sums(point);
+        let k = self.unknowns.len();
+        let shares = (0..k).map(|a| moved[a] / sums.jtj[a * k + a]).filter(|share| share.is_finite());
+        let most = shares.fold(0.0, f64::max);
+        (sums, most)
+    }
+
+    fn all_sums(&self, point: &Point) -> (NormalEquations, Vec<f64>) {
+        let cubes = self.cubes(point.params.scalar(Param::SpecularLobe));
+        let lights = self.lights(&cubes, &point.params);
+        let mut total = (empty(self.unknowns.len()), vec![0.0; self.unknowns.len()]);
+        for (index, view) in self.views.iter().enumerate() {
+            let slots = view.samples.groups() * LANES;
+            let chunks: Vec<(NormalEquations, Vec<f64>)> = (0..slots.div_ceil(CHUNK))
+                .into_par_iter()
+                .map(|chunk| self.sums(index, chunk * CHUNK..slots.min((chunk + 1) * CHUNK), &lights, point))
+                .collect();
+            for (chunk, moved) in &chunks {
+                add(&mut total.0, chunk);
+                total.1.iter_mut().zip(moved).for_each(|(a, b)| *a += b);
+            }
+        }
+        if total.0.weight > 0.0 {
+            total.0.loss /= total.0.weight;
+        }
+        total
+    }
+
+    /// The sums over some of a view's pixels, the loss not yet divided by the weight; and for each unknown by how much
+    /// its entry on the diagonal of J^T J may move with the residuals' roundings.
     fn sums(
         &self,
         view: usize,
         slots: std::ops::Range<usize>,
         lights: &Lights<'_, f64>,
         point: &Point,
-    ) -> NormalEquations {
+    ) -> (NormalEquations, Vec<f64>) {
         let (k, observed, gain) = (self.unknowns.len(), &self.views[view], point.gains[view]);
-        let mut sums = empty(k);
+        let (mut sums, mut moved) = (empty(k), vec![0.0; k]);
         for slot in slots {
             let pixel = self.pixel_in(lights, observed, slot, &point.params);
             let weight = f64::from(observed.pixel_weight(slot));
@@ -132,12 +174,17 @@ impl<'a> Reference<'a> {
                 if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(view)) {
                     row[g] = value;
                 }
-                let r = weighted_residual(self.loss, observed.clip, gain * value, target, weight);
+                let at = |model: f64| weighted_residual(self.loss, observed.clip, model, target, weight);
+                let (model, r) = (gain * value, at(gain * value));
+                let off = ROUNDINGS * HALF_UNIT * model.abs();
+                let by = |model: f64| (at(model).scale.powi(2) - r.scale.powi(2)).abs();
+                let reweighted = by(model + off).max(by(model - off));
                 sums.loss += r.loss;
                 sums.residual += r.residual * r.residual;
                 sums.weight += weight;
                 sums.count += u64::from(weight > 0.0);
                 for a in 0..k {
+                    moved[a] += reweighted * row[a] * row[a];
                     sums.jtr[a] += r.scale * row[a] * r.residual;
                     for b in 0..k {
                         sums.jtj[a * k + b] += r.scale * row[a] * r.scale * row[b];
@@ -145,7 +192,7 @@ impl<'a> Reference<'a> {
                 }
             }
         }
-        sums
+        (sums, moved)
     }
 }
 
@@ -155,21 +202,7 @@ impl Objective for Reference<'_> {
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {
-        let cubes = self.cubes(point.params.scalar(Param::SpecularLobe));
-        let lights = self.lights(&cubes, &point.params);
-        let mut total = empty(self.unknowns.len());
-        for (index, view) in self.views.iter().enumerate() {
-            let slots = view.samples.groups() * LANES;
-            let chunks: Vec<NormalEquations> = (0..slots.div_ceil(CHUNK))
-                .into_par_iter()
-                .map(|chunk| self.sums(index, chunk * CHUNK..slots.min((chunk + 1) * CHUNK), &lights, point))
-                .collect();
-            chunks.iter().for_each(|chunk| add(&mut total, chunk));
-        }
-        if total.weight > 0.0 {
-            total.loss /= total.weight;
-        }
-        total
+        self.all_sums(point).0
     }
 
     fn loss(&self, point: &Point) -> f64 {

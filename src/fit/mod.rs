@@ -7,7 +7,7 @@
 //! - [`transform`], [`unbounded`]: bounds and costs for `argmin`'s own solvers
 //! - `adam`: Adam, as one of `argmin`'s solvers
 //! - `drive`: the executor, watched
-//! - [`state`]: interrupted fits, resumed
+//! - [`state`]: interrupted fits, resumed; [`fingerprint`]: by fits of the same alone
 //! - [`starts`]: where the other starts of a multi-start fit begin
 //! - [`statistics`]: standard errors and correlations; `null_space`: what is undetermined
 //! - [`outcome`]: what a fit yields
@@ -19,6 +19,7 @@ mod adam;
 pub mod bounded;
 pub mod coordinates;
 mod drive;
+pub mod fingerprint;
 pub mod linearisation;
 pub mod lm;
 pub mod memory;

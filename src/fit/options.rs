@@ -6,6 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use serde::{Deserialize, Serialize};
 
+use super::fingerprint::Fingerprint;
 use super::linearisation::EngineFault;
 use super::state::StateError;
 
@@ -106,8 +107,8 @@ pub struct FitOptions {
     pub starts: u32,
     /// What the other starts are drawn from.
     pub seed: u64,
-    /// What identifies the objective (a hash of the scene): states of others are refused.
-    pub fingerprint: String,
+    /// What identifies the objective: states of others are refused.
+    pub fingerprint: Fingerprint,
     /// Where the state is kept, written about once a second and at the end.
     pub state: Option<PathBuf>,
     /// A state to go on from.
@@ -124,7 +125,7 @@ impl Default for FitOptions {
             tolerances: Tolerances::default(),
             starts: 1,
             seed: 0,
-            fingerprint: String::new(),
+            fingerprint: Fingerprint::default(),
             state: None,
             resume: None,
             interrupt: None,

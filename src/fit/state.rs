@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::fingerprint::{Difference, Fingerprint};
 use super::linearisation::Linearisation;
 use super::memory::Memory;
 use super::options::{FitOptions, SolverKind};
@@ -18,7 +19,7 @@ use crate::model::params::Param;
 use crate::output::{self, OutputError};
 
 /// The format's version.
-const FORMAT: u32 = 1;
+const FORMAT: u32 = 2;
 
 /// A state file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -45,13 +46,14 @@ pub enum StateError {
     /// It is another fit's.
     #[error(
         "{}: this state belongs to another fit: its {what} differs ({found}; now {expected}). Resume with the \
-         scene and options that the fit was started with, or start afresh without --resume.", path.display()
+         scene and options that the fit was started with, name another run folder, or start afresh without \
+         --resume.", path.display()
     )]
     Different {
         /// The file.
         path: PathBuf,
         /// What differs.
-        what: &'static str,
+        what: String,
         /// The state's.
         found: String,
         /// The present fit's.
@@ -135,7 +137,7 @@ impl Run {
 #[serde(deny_unknown_fields)]
 pub struct Saved {
     format: u32,
-    fingerprint: String,
+    fingerprint: Fingerprint,
     solver: SolverKind,
     unknowns: Vec<String>,
     start: Vec<f64>,
@@ -216,20 +218,23 @@ impl Saved {
             |e: std::io::Error| StateError::Unreadable { path: path.to_owned(), reason: e.to_string() };
         let corrupt = |reason: String| StateError::Corrupt { path: path.to_owned(), reason };
         let bytes = std::fs::read(path).map_err(unreadable)?;
+        if let Ok(Versioned { format }) = serde_json::from_slice(&bytes)
+            && format != FORMAT
+        {
+            return Err(different(path, "format", format.to_string(), FORMAT.to_string()));
+        }
         serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))
     }
 
     fn belongs_to(&self, now: &Self, path: &Path) -> Result<(), StateError> {
         let same = |what, found: String, expected: String| {
-            if found == expected {
-                return Ok(());
-            }
-            Err(StateError::Different { path: path.to_owned(), what, found, expected })
+            if found == expected { Ok(()) } else { Err(different(path, what, found, expected)) }
         };
-        same("format", self.format.to_string(), now.format.to_string())?;
         same("solver", self.solver.name().to_owned(), now.solver.name().to_owned())?;
         same("list of unknowns", self.unknowns.join(" "), now.unknowns.join(" "))?;
-        same("scene", self.fingerprint.clone(), now.fingerprint.clone())?;
+        if let Some(Difference { what, was, is }) = self.fingerprint.difference(&now.fingerprint) {
+            return Err(different(path, &what, was, is));
+        }
         if self.start != now.start {
             let (was, is) = first_difference(&self.start, &now.start);
             same("start", was, is)?;
@@ -246,6 +251,16 @@ impl Saved {
         let origin = Run::beginning(self.origin.clone());
         std::iter::once(&origin).chain(&self.runs).try_for_each(|run| run.check(k))
     }
+}
+
+/// A state of any version.
+#[derive(Deserialize)]
+struct Versioned {
+    format: u32,
+}
+
+fn different(path: &Path, what: &str, found: String, expected: String) -> StateError {
+    StateError::Different { path: path.to_owned(), what: what.to_owned(), found, expected }
 }
 
 /// The first of two points' values that differs, named.

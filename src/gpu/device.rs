@@ -144,7 +144,8 @@ impl Gpu {
         if bytes <= limit {
             return Ok(());
         }
-        Err(GpuError::BufferSize { adapter: self.name().to_owned(), what: what.to_owned(), bytes, limit })
+        let (adapter, what) = (self.name().to_owned(), what.to_owned());
+        Err(GpuError::BufferSize { adapter, what, bytes, limit, of: super::Oversized::Samples })
     }
 
     /// Keep what went wrong where nothing can be returned, for [`check`](Self::check) to tell.

@@ -1,4 +1,5 @@
-//! What the renderer refuses, and what a device can do to it.
+//! What the renderer refuses, and what a device can do to it. An error says what happened; what to do depends on the
+//! command, which knows what its options can help.
 
 /// The packages of a software Vulkan driver, by system.
 pub const SOFTWARE_DRIVER: &str = if cfg!(target_os = "linux") {
@@ -7,19 +8,29 @@ pub const SOFTWARE_DRIVER: &str = if cfg!(target_os = "linux") {
     "Install the graphics vendor's driver"
 };
 
+/// What is too large for an adapter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Oversized {
+    /// A map or a cube of the scene.
+    Map,
+    /// The image that is drawn.
+    Image,
+    /// The samples of one pixel.
+    Pixel,
+    /// Vertices, morph targets or bones.
+    Mesh,
+    /// Samples of views, or what is computed of them.
+    Samples,
+}
+
 /// The renderer could not do its work.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum GpuError {
     /// There is nothing to render on.
-    #[error(
-        "no graphics adapter was found: no Vulkan, Metal or DirectX 12 driver answers. {SOFTWARE_DRIVER}; \
-         or take --engine cpu."
-    )]
+    #[error("no graphics adapter was found: no Vulkan, Metal or DirectX 12 driver answers.")]
     NoAdapter,
     /// There are adapters, but not that one.
-    #[error(
-        "no graphics adapter's name contains `{wanted}`. There is: {found}. Name one of them with --adapter (or WGPU_ADAPTER_NAME), or leave it out."
-    )]
+    #[error("no graphics adapter's name contains `{wanted}`. There is: {found}.")]
     NoSuchAdapter {
         /// What was asked for.
         wanted: String,
@@ -27,9 +38,7 @@ pub enum GpuError {
         found: String,
     },
     /// The adapter gives no device.
-    #[error(
-        "adapter {adapter}: it gives no device: {reason}. Update its driver, choose another adapter with --adapter, or take --engine cpu."
-    )]
+    #[error("adapter {adapter}: it gives no device: {reason}.")]
     NoDevice {
         /// The adapter.
         adapter: String,
@@ -38,7 +47,7 @@ pub enum GpuError {
     },
     /// A texture's side is beyond the adapter's limit.
     #[error(
-        "adapter {adapter}: the {what} has {width} x {height} texels, but a side may have {limit} at most there. {remedy}, or take --engine cpu."
+        "adapter {adapter}: {what}: {width} x {height} texels, but a side may have {limit} at most there."
     )]
     TextureSize {
         /// The adapter.
@@ -51,13 +60,11 @@ pub enum GpuError {
         height: usize,
         /// The limit.
         limit: u32,
-        /// What to do.
-        remedy: &'static str,
+        /// What is too large.
+        of: Oversized,
     },
     /// A buffer is beyond the adapter's limit.
-    #[error(
-        "adapter {adapter}: the {what} takes {bytes} bytes, but a buffer may have {limit} at most there. Use a smaller mesh or fewer morph targets, choose another adapter with --adapter, or take --engine cpu."
-    )]
+    #[error("adapter {adapter}: {what}: {bytes} bytes, but a buffer may have {limit} at most there.")]
     BufferSize {
         /// The adapter.
         adapter: String,
@@ -67,18 +74,18 @@ pub enum GpuError {
         bytes: u64,
         /// The limit.
         limit: u64,
+        /// What is too large.
+        of: Oversized,
     },
     /// The device has no memory left.
-    #[error(
-        "adapter {adapter}: out of memory. Use a smaller image (--size), fewer samples (--antialias) or smaller maps, or take --engine cpu."
-    )]
+    #[error("adapter {adapter}: out of memory.")]
     OutOfMemory {
         /// The adapter.
         adapter: String,
     },
     /// Samples that the adapter makes do not all stay on it.
     #[error(
-        "adapter {adapter}: its samples take {bytes} bytes, but {most} may stay there. Those that the adapter makes have to stay: allow more (--device-memory), or have them made by the CPU (--samples cpu)."
+        "adapter {adapter}: its samples take {bytes} bytes, but {most} may stay there, and those that the adapter makes have to stay."
     )]
     SamplesStay {
         /// The adapter.
@@ -89,9 +96,7 @@ pub enum GpuError {
         most: u64,
     },
     /// The device is gone.
-    #[error(
-        "adapter {adapter}: the device was lost: {reason}. Its driver was reset or taken away: try again, choose another adapter with --adapter, or take --engine cpu."
-    )]
+    #[error("adapter {adapter}: the device was lost: {reason}.")]
     Lost {
         /// The adapter.
         adapter: String,
@@ -99,16 +104,17 @@ pub enum GpuError {
         reason: String,
     },
     /// The driver refuses what it was given.
-    #[error(
-        "adapter {adapter}: its driver refuses the work: {reason}. This is a fault of skinfit or of the driver: please report it, and take --engine cpu meanwhile."
-    )]
+    #[error("adapter {adapter}: its driver refuses the work: {reason}.")]
     Refused {
         /// The adapter.
         adapter: String,
         /// What was refused.
         reason: String,
     },
+    /// There is nothing to compute.
+    #[error("none of the enabled effects shows anything.")]
+    NothingShown,
     /// No shader yields the image within the accuracy.
-    #[error("{0} Give a larger --accuracy, or leave it out.")]
+    #[error("{0}")]
     Plan(String),
 }

@@ -37,5 +37,5 @@ mod vertices;
 
 pub use adapter::Choice;
 pub use device::Gpu;
-pub use error::GpuError;
+pub use error::{GpuError, Oversized};
 pub use renderer::{Frame, RenderOptions, Renderer};

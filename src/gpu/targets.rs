@@ -6,7 +6,7 @@ use wgpu::{
 };
 
 use super::device::Gpu;
-use super::error::GpuError;
+use super::error::{GpuError, Oversized};
 use crate::render::antialias::Antialias;
 
 /// The most samples of a tile: 256 MiB of 32-bit RGBA.
@@ -119,7 +119,7 @@ impl Targets {
                 width: key.width as usize,
                 height: key.height as usize,
                 limit,
-                remedy: "Give a smaller --size",
+                of: Oversized::Image,
             });
         }
         let n = key.antialias.grid();

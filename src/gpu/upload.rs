@@ -10,7 +10,7 @@ use wgpu::{
 };
 
 use super::device::Gpu;
-use super::error::GpuError;
+use super::error::{GpuError, Oversized};
 use super::texels::{self, Texels};
 use super::vertices;
 use crate::bake::Illumination;
@@ -174,7 +174,8 @@ fn check_size(gpu: &Gpu, what: &str, bytes: u64, limit: u64) -> Result<(), GpuEr
     if bytes <= limit {
         return Ok(());
     }
-    Err(GpuError::BufferSize { adapter: gpu.name().to_owned(), what: what.to_owned(), bytes, limit })
+    let (adapter, what) = (gpu.name().to_owned(), what.to_owned());
+    Err(GpuError::BufferSize { adapter, what, bytes, limit, of: Oversized::Mesh })
 }
 
 fn buffer(gpu: &Gpu, label: &str, contents: &[u8], usage: BufferUsages) -> Result<Buffer, GpuError> {
@@ -193,7 +194,7 @@ pub(crate) fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureV
             width: texels.width as usize,
             height: texels.height as usize,
             limit,
-            remedy: "Scale the map down",
+            of: Oversized::Map,
         });
     }
     let descriptor = TextureDescriptor {

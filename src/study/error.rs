@@ -20,7 +20,7 @@ pub enum StudyError {
     #[error(transparent)]
     Plan(#[from] PlanError),
     #[cfg(feature = "gpu")]
-    #[error(transparent)]
+    #[error("{0} Update its driver, or choose another adapter with WGPU_ADAPTER_NAME.")]
     Gpu(#[from] GpuError),
     /// An axis was named that the scene does not ask for.
     #[error("--axis {axis}: {why}. Leave it out, or name a scene that does.")]

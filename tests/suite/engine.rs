@@ -4,7 +4,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use skinfit::bake::{Illumination, LobeStack};
 use skinfit::engine::cpu::CpuEngine;
-use skinfit::engine::reference::Reference;
+use skinfit::engine::reference::{Reference, deviation};
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
 use skinfit::model::cube::{Cube, texel_direction};
@@ -231,6 +231,48 @@ fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
             // As in `assert_equal`.
             assert!((g - want).abs() <= 1e-5 * scale, "{} {}: {g} {want}", loss.name(), unknowns[k].name());
         }
+    }
+}
+
+#[test]
+fn what_roundings_may_do_to_a_robust_loss_is_known() {
+    // Residuals of a hundredth and less, many of them about SMAPE's corner.
+    let mut near = [view(60, 14)];
+    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: EVERYTHING };
+    let light = illumination();
+    let unknowns = [Param::BaseWeight, Param::RimWeight, Param::Hilite, Param::RimExponent]
+        .map(|param| Unknown::Param(Column::tied(param)));
+    let mut point = Point { params: params(), gains: vec![1.0] };
+    let image = engine(setup, &near, Loss::L2, &unknowns, true).image(0, &point);
+    let mut rng = StdRng::seed_from_u64(15);
+    for (channel, plane) in image.iter().enumerate() {
+        for (slot, value) in plane.iter().enumerate() {
+            let off = 10.0_f32.powf(rng.random_range(-6.0..-2.0)) * [-1.0, 1.0][slot % 2];
+            near[0].target.record_mut(slot / LANES)[channel][slot % LANES] = value + off;
+        }
+    }
+    for loss in Loss::ALL {
+        let plain = Reference::new(setup, &light, &near, loss, &unknowns);
+        let engine = engine(setup, &near, loss, &unknowns, true);
+        let (want, moved) = plain.with_rounding(&point);
+        let found = deviation(&engine.normal_equations(&point), &want, &unknowns);
+        println!("{}: {} off by {:.1e}, {moved:.1e} explained", loss.name(), found.what, found.size);
+        if matches!(loss, Loss::L2 | Loss::RelativeL2) {
+            assert_eq!(moved, 0.0, "{}", loss.name());
+            continue;
+        }
+        // The residuals themselves are as small as roundings here, so J^T r is not looked at.
+        let jtj =
+            |sums: NormalEquations| NormalEquations { loss: 1.0, residual: 1.0, jtr: vec![0.0; 4], ..sums };
+        let off = |sums: NormalEquations| deviation(&jtj(sums), &jtj(want.clone()), &unknowns).size;
+        let most = 1e-5 + moved;
+        assert!(off(engine.normal_equations(&point)) < most, "{}: {most:e}", loss.name());
+        // Residuals this small are squares to Huber's loss, whose weights stay; SMAPE's tell a hundredth more light.
+        let before = point.params.scalar(Param::BaseWeight);
+        point.params.set(Param::BaseWeight, 1.01 * before);
+        let told = off(engine.normal_equations(&point)) > most;
+        assert_eq!(told, loss == Loss::Smape, "{}: {most:e}", loss.name());
+        point.params.set(Param::BaseWeight, before);
     }
 }
 

@@ -1,6 +1,6 @@
 //! What stands in for the GPU engine in a program that was built without it.
 
-use super::{Chosen, FitEngineArguments, ObservedView, Prepared, Refusal};
+use super::{Chosen, FitEngineArguments, ObservedView, Prepared, Reasons, Refusal};
 
 impl FitEngineArguments {
     pub(super) fn wants_gpu(&self, _observed: &[ObservedView]) -> (bool, Option<String>) {
@@ -12,7 +12,7 @@ impl FitEngineArguments {
         &self,
         _prepared: &Prepared,
         _observed: Vec<ObservedView>,
-        _why: Option<String>,
+        _reasons: Reasons,
         _then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
         Err(without())

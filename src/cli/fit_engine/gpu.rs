@@ -1,6 +1,9 @@
 //! The GPU engine: when it is taken, and over whose samples.
 
-use super::{Chosen, FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, tell};
+use std::time::Instant;
+
+use super::super::graphics::Task as Doing;
+use super::{Chosen, FitEngine, FitEngineArguments, ObservedView, Prepared, Reasons, Refusal, tell};
 use crate::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory, Task};
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError};
@@ -34,31 +37,29 @@ impl FitEngineArguments {
         &self,
         prepared: &Prepared,
         observed: Vec<ObservedView>,
-        why: Option<String>,
+        reasons: Reasons,
         then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
-        let must = why.is_none();
-        let gpu = match self.open() {
+        let must = reasons.why.is_none();
+        let mut gpu = match self.open() {
             Ok(gpu) if must || !gpu.is_software() => gpu,
             Ok(gpu) => {
-                let why = why.map(|why| format!("{why}, but {} is a program on the CPU", gpu.name()));
-                return self.on_cpu(prepared, observed, why, then);
+                let reasons = reasons.but(&format!("{} is a program on the CPU", gpu.name()));
+                return self.on_cpu(prepared, observed, reasons, then);
             }
-            Err(error) if must => return Err(error.into()),
+            Err(error) if must => return Err(refused(&error)),
             Err(error) => {
                 tell(&format!("{error} The CPU engine makes the passes."));
-                let why = why.map(|why| format!("{why}, but none could be opened"));
-                return self.on_cpu(prepared, observed, why, then);
+                return self.on_cpu(prepared, observed, reasons.but("none could be opened"), then);
             }
         };
-        let mut gpu = gpu;
-        let mut resident = self.device_memory.map(|megabytes| megabytes * 1_000_000);
+        let mut resident = self.resident();
         loop {
             match self.engine_on(&gpu, prepared, &observed, resident) {
                 Ok(engine) => {
                     let engine = FitEngine::Gpu(engine);
-                    self.check(prepared, &engine)?;
-                    return then(&Chosen { engine, why });
+                    self.verify(prepared, &engine)?;
+                    return then(&Chosen { engine, reasons });
                 }
                 // A device that ran out of memory is not to be trusted any more; half as much may fit.
                 Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
@@ -70,9 +71,9 @@ impl FitEngineArguments {
                         gpu.name(),
                         resident.unwrap_or_default() / 1_000_000
                     ));
-                    gpu = self.open()?;
+                    gpu = self.open().map_err(|error| refused(&error))?;
                 }
-                Err(error) => return Err(error.into()),
+                Err(error) => return Err(refused(&error)),
             }
         }
     }
@@ -84,14 +85,14 @@ impl FitEngineArguments {
         prepared: &Prepared,
         then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
-        let gpu = self.open()?;
+        let gpu = self.open().map_err(|error| refused(&error))?;
         let content = Content {
             scene: &prepared.scene,
             illumination: &prepared.illumination,
             occlusion: prepared.occlusion.as_ref(),
             params: &prepared.scene.params,
         };
-        let resident = self.device_memory.map(|megabytes| megabytes * 1_000_000);
+        let resident = self.resident();
         let error = match DeviceSamples::new(&gpu, content) {
             Ok((made, groups)) => {
                 let observed = prepared.observed_with(groups)?;
@@ -99,8 +100,8 @@ impl FitEngineArguments {
                 match GpuEngine::over_device_samples(&made, task, &prepared.start(), memory) {
                     Ok(engine) => {
                         let engine = FitEngine::Gpu(engine);
-                        self.check(prepared, &engine)?;
-                        return then(&Chosen { engine, why: None });
+                        self.verify(prepared, &engine)?;
+                        return then(&Chosen { engine, reasons: Reasons::default() });
                     }
                     Err(error) => error,
                 }
@@ -109,12 +110,20 @@ impl FitEngineArguments {
             Err(error) => return Err(error.into()),
         };
         if !matches!(error, GpuError::OutOfMemory { .. } | GpuError::SamplesStay { .. }) {
-            return Err(error.into());
+            return Err(refused(&error));
         }
         drop(gpu);
         tell(&format!("{error} The CPU makes the samples."));
-        let observed = prepared.observed_with(prepared.traced()?)?;
-        self.with_gpu(prepared, observed, None, then)
+        let start = Instant::now();
+        let samples = prepared.traced()?;
+        let reasons = Reasons { traced_seconds: Some(start.elapsed().as_secs_f64()), ..Reasons::default() };
+        let observed = prepared.observed_with(samples)?;
+        self.with_gpu(prepared, observed, reasons, then)
+    }
+
+    /// Most bytes that stay on the adapter, where that is limited.
+    fn resident(&self) -> Option<u64> {
+        self.device_memory.map(|megabytes| megabytes.saturating_mul(1_000_000))
     }
 
     fn open(&self) -> Result<Gpu, GpuError> {
@@ -131,6 +140,10 @@ impl FitEngineArguments {
         let memory = Memory { part: None, resident };
         GpuEngine::new(gpu, task(prepared, observed), &prepared.start(), memory)
     }
+}
+
+fn refused(error: &GpuError) -> Refusal {
+    Doing::Fit.refusal(error)
 }
 
 fn task<'v>(prepared: &Prepared, observed: &'v [ObservedView]) -> Task<'v> {

@@ -77,6 +77,7 @@ impl EngineArguments {
 mod gpu {
     use super::super::painter::GpuPainter;
     use super::{Antialias, EngineArguments, Prepared, Refusal, Task};
+    use crate::cli::graphics::Task as Doing;
     use crate::cli::tell;
     use crate::gpu::error::SOFTWARE_DRIVER;
     use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
@@ -87,7 +88,9 @@ mod gpu {
             let choice = Choice { name: self.adapter.clone(), ..Choice::default() };
             match Gpu::open(&choice) {
                 Ok(gpu) => Ok(Some(gpu)),
-                Err(error) if self.engine == "gpu" || self.adapter.is_some() => Err(error.into()),
+                Err(error) if self.engine == "gpu" || self.adapter.is_some() => {
+                    Err(Doing::Render.refusal(&error))
+                }
                 Err(GpuError::NoAdapter) => {
                     tell(&format!(
                         "no graphics adapter was found: the CPU engine renders. {SOFTWARE_DRIVER}."
@@ -110,7 +113,7 @@ mod gpu {
         ) -> Result<GpuPainter<'a>, Refusal> {
             let Task { animated, timed } = task;
             let options = RenderOptions { antialias, budget: self.accuracy, timed, animated };
-            Ok(GpuPainter::new(gpu, prepared, options)?)
+            GpuPainter::new(gpu, prepared, options).map_err(|error| Doing::Render.refusal(&error))
         }
     }
 }

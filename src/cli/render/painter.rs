@@ -100,6 +100,7 @@ pub(super) use gpu::GpuPainter;
 #[cfg(feature = "gpu")]
 mod gpu {
     use super::{Camera, Mesh, Painter, Picture, Prepared, Refusal, TermName};
+    use crate::cli::graphics::Task;
     use crate::gpu::timing::PassTime;
     use crate::gpu::upload::Content;
     use crate::gpu::{Gpu, GpuError, RenderOptions, Renderer};
@@ -143,11 +144,12 @@ mod gpu {
         }
 
         fn paint(&mut self, camera: &Camera, gain: f64, layers: bool) -> Result<Picture, Refusal> {
-            let frame = self.renderer.render(camera, gain)?;
+            let refused = |error: GpuError| Task::Render.refusal(&error);
+            let frame = self.renderer.render(camera, gain).map_err(refused)?;
             self.times = frame.times;
             let wanted = if layers { self.terms.as_slice() } else { &[] };
             let term = |&name| Ok((name, self.renderer.render_term(name, camera, gain)?));
-            let layers = wanted.iter().map(term).collect::<Result<_, GpuError>>()?;
+            let layers = wanted.iter().map(term).collect::<Result<_, GpuError>>().map_err(refused)?;
             let warning = format!(
                 "{} pixels are brighter than 65504, the end of the 16-bit targets' range, and were cut there. \
                  Use --accuracy exact and no msaa4 to have them whole.",

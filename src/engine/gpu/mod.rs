@@ -132,7 +132,7 @@ impl<'g> GpuEngine<'g> {
         let Task { setup, illumination, views, loss, unknowns } = task;
         // Mesa's software driver loses its device over a pass that looks nothing up and weighs nothing.
         if TermName::of(setup.effects).is_empty() && !setup.effects.needs(setup.silhouette).haze {
-            return Err(GpuError::Plan("none of the enabled effects shows anything.".to_owned()));
+            return Err(GpuError::NothingShown);
         }
         let alpha = views.iter().any(ObservedView::compares_alpha);
         let traits = Traits::of(gpu, views)?;
@@ -184,10 +184,14 @@ impl<'g> GpuEngine<'g> {
         self.views
     }
 
-    /// Bytes of samples, targets and weights that stay on the device, and bytes that each pass uploads.
+    /// Bytes of the buffers that hold samples, targets and weights on the device, and bytes that each pass for the
+    /// normal equations uploads: once for each of its shaders.
     #[must_use]
     pub fn bytes(&self) -> (u64, u64) {
-        self.lock().parts.bytes()
+        let device = self.lock();
+        let (held, streamed) = device.parts.bytes();
+        let normal = device.programs.iter().find(|((wish, _), _)| *wish == Wish::Normal);
+        (held, streamed * normal.map_or(1, |(_, program)| program.shaders()))
     }
 
     /// What made the samples where they were not uploaded, and the seconds that it took.

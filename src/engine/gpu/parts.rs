@@ -69,6 +69,8 @@ pub(super) struct Part {
     pub(super) groups: Range<usize>,
     /// Whether its buffers are its own.
     resident: bool,
+    /// Bytes that an upload writes.
+    uploaded: u64,
     pub(super) buffers: PartBuffers,
     /// Weight and count of each block of pixels.
     blocks: Vec<(f64, u64)>,
@@ -131,6 +133,7 @@ impl Parts {
                 let part = Part {
                     view: index,
                     resident,
+                    uploaded: size.total(),
                     buffers,
                     blocks: blocks(view, &groups),
                     read: (groups.len() * LANES) as u32,
@@ -162,13 +165,16 @@ impl Parts {
         self.parts.iter().map(|part| part.view).collect()
     }
 
-    /// Bytes that stay on the device, and bytes that each pass uploads.
+    /// Bytes of the buffers on the device, and bytes that are uploaded to visit each part once.
     pub(super) fn bytes(&self) -> (u64, u64) {
         let bytes = |part: &Part| {
             part.buffers.samples.size() + part.buffers.group_start.size() + part.buffers.targets.size()
         };
-        let sum = |resident| self.parts.iter().filter(|p| p.resident == resident).map(bytes).sum();
-        (sum(true), sum(false))
+        let own: u64 = self.parts.iter().filter(|part| part.resident).map(bytes).sum();
+        let mut streamed = self.parts.iter().filter(|part| !part.resident);
+        let uploaded = streamed.clone().map(|part| part.uploaded).sum();
+        // All that are streamed take turns in the same buffers.
+        (own + streamed.next().map_or(0, bytes), uploaded)
     }
 
     /// Read every `stride`-th block; returns the weight of the pixels that are read, and how many count.

@@ -84,6 +84,11 @@ impl Program {
         Ok(Self { fused, slabs, gather, inputs, runs, results: results_buffer, readback })
     }
 
+    /// How many shaders a pass takes.
+    pub(super) fn shaders(&self) -> u64 {
+        self.slabs.len() as u64
+    }
+
     pub(super) fn columns(&self) -> &[ColumnOf] {
         &self.fused.columns
     }

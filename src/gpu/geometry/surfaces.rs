@@ -7,7 +7,7 @@ use wgpu::{
 };
 
 use crate::gpu::device::Gpu;
-use crate::gpu::error::GpuError;
+use crate::gpu::error::{GpuError, Oversized};
 use crate::gpu::targets::{DEPTH, Tile};
 
 /// The formats of so many targets.
@@ -32,7 +32,7 @@ impl Surfaces {
                 width: axis as usize,
                 height: axis as usize,
                 limit,
-                remedy: "Give a smaller samples_per_axis",
+                of: Oversized::Pixel,
             });
         }
         let texture = |label, format| {

@@ -198,6 +198,8 @@ fn a_fit_over_the_adapters_own_samples_says_so_and_ends_where_the_others_do() {
     let (little, streamed) = fit("little", &["--samples", "gpu", "--device-memory", "0"]);
     assert!(little.err.contains("The CPU makes the samples."), "{}", little.err);
     assert!(little.out.contains("samples made by the CPU in"), "{}", little.out);
+    let seconds = streamed["seconds"]["samples"].as_f64().unwrap();
+    assert!(seconds > 0.0, "tracing is not timed");
     // The targets are the CPU's own images: what is left are samples at outlines, a few in a hundred of these small
     // images' pixels.
     let left = |report: &Value| {
@@ -214,4 +216,81 @@ fn a_fit_over_the_adapters_own_samples_says_so_and_ends_where_the_others_do() {
         samples(&own),
         samples(&uploaded)
     );
+}
+
+#[test]
+fn a_fit_goes_on_where_another_engine_or_other_samples_left_it() {
+    let sandbox = Sandbox::new();
+    if !adapter(&sandbox) {
+        return;
+    }
+    let made: [&[&str]; 3] = [&["--engine", "cpu"], &["--engine", "gpu"], &["--samples", "gpu"]];
+    for (from, to) in [(0, 1), (1, 0), (2, 0), (1, 2)] {
+        let ran = sandbox.fit("run", &[made[from], &["--max-iterations", "1"]].concat());
+        assert_eq!(ran.code, Some(1), "{ran:?}");
+        let loss = |key: &str| sandbox.json("run/report.json")["loss"][key].as_f64().unwrap();
+        let before = loss("end");
+        let ran = sandbox.fit("run", &[made[to], &["--resume"]].concat());
+        assert_eq!(ran.code, Some(0), "{:?} {:?}: {ran:?}", made[from], made[to]);
+        assert!(loss("end") < before, "{:?} {:?}", made[from], made[to]);
+    }
+}
+
+#[cfg(feature = "burn")]
+#[test]
+fn a_fit_with_maps_is_not_gone_on_from_without_them() {
+    let sandbox = Sandbox::new();
+    if !adapter(&sandbox) {
+        return;
+    }
+    sandbox.edit("[quality]", "[fit.maps]\nrounds = 1\nsteps = 1\n[quality]");
+    let ran = sandbox.fit("run", &["--maps", "specular,color", "--max-iterations", "1"]);
+    assert!(ran.code.is_some_and(|code| code < 2), "{ran:?}");
+    let words =
+        ["this state belongs to another fit", "its list of fitted maps differs (color specular; now none)"];
+    sandbox.fit("run", &["--resume"]).refused(&words);
+}
+
+#[test]
+fn every_loss_is_verified_on_both_engines() {
+    let sandbox = Sandbox::new();
+    let gpu = adapter(&sandbox);
+    for engine in if gpu { &["cpu", "gpu"][..] } else { &["cpu"] } {
+        for loss in ["l2", "huber", "smape"] {
+            let ran = sandbox
+                .fit("run", &["--engine", engine, "--verify", "--loss", loss, "--max-iterations", "1"]);
+            assert!(ran.err.contains("verified against the model in f64"), "{engine} {loss}: {ran:?}");
+        }
+    }
+}
+
+#[test]
+fn options_of_an_adapter_are_refused_where_none_is_used() {
+    let sandbox = Sandbox::new();
+    for (option, value) in [("--adapter", "llvmpipe"), ("--device-memory", "10")] {
+        sandbox.fit("run", &["--engine", "cpu", option, value]).refused(&[option, "--engine cpu"]);
+    }
+    if !adapter(&sandbox) {
+        return;
+    }
+    // More than any number of bytes is as much as there is.
+    sandbox.fit("run", &["--engine", "gpu", "--device-memory", "18446744073710"]).done();
+    sandbox.edit(
+        "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"side_specular\", \"hilite\", \"reflection\"",
+        "\"normal_map\"",
+    );
+    sandbox.edit("free = [", "free = [] #");
+    let ran = sandbox.fit("nothing", &["--engine", "gpu"]);
+    ran.refused(&["none of the enabled effects shows anything", "diffuse", "--engine cpu"]);
+}
+
+#[test]
+fn without_an_adapter_each_command_says_how_it_does_without() {
+    let sandbox = Sandbox::new();
+    let fit =
+        |more: &[&str]| without_adapter(&sandbox, &[&["fit", "scene.toml", "-o", "run"], more].concat());
+    fit(&["--engine", "gpu"]).refused(&["no graphics adapter was found", "--engine cpu"]);
+    if cfg!(feature = "burn") {
+        fit(&["--maps", "color"]).refused(&["no graphics adapter was found", "leave --maps out"]);
+    }
 }

@@ -3,7 +3,7 @@
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use super::sandbox::{Ran, Sandbox};
+use super::sandbox::{Ran, Sandbox, png};
 
 /// Enough starts to last for seconds.
 const LONG: [&str; 6] = ["--solver", "lm", "--starts", "300", "--seed", "7"];
@@ -122,6 +122,37 @@ fn states_that_cannot_be_gone_on_from() {
     other(&["--seed", "1"], &["its seed differs (0; now 1)"]);
     other(&["--params", "truth.toml"], &["its start differs"]);
     sandbox.write_grey("targets/side.exr", 32, 24);
-    other(&[], &["its scene differs"]);
+    other(&[], &["its target of view side differs"]);
     assert!(sandbox.read("run/state.json") == state && sandbox.read("run/report.json") == report);
+}
+
+#[test]
+fn a_state_is_refused_where_the_model_is_made_from_something_else() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &["--max-iterations", "1"]);
+    let before = sandbox.files();
+    let restore = |name: &str| sandbox.write(name, &before[&sandbox.path(name)]);
+    let refused = |what: &str| {
+        let words = ["run/state.json: this state belongs to another fit: its ", what, "another run folder"];
+        sandbox.fit("run", &["--resume"]).refused(&words);
+        assert!(sandbox.read("run/state.json") == before[&sandbox.path("run/state.json")], "{what}");
+    };
+    let edits = [
+        ("color = \"color.png\"\n", "", "color map differs ("),
+        ("specular = \"specular.png\"", "specular = \"attenuator.png\"", "specular map differs ("),
+        ("file = \"env.exr\"", "file = \"env.exr\"\nintensity = 1.5", "environment differs ("),
+        ("occlusion_rays = 32", "occlusion_rays = 64", "quality differs ("),
+        ("form = \"corrected\"", "form = \"listing\"", "form differs (corrected; now listing)"),
+        ("silhouette = \"fragment\"", "silhouette = \"bumped\"", "silhouette differs (fragment; now bumped)"),
+        ("fov_y_degrees = 35.0", "fov_y_degrees = 35.5", "camera of view front differs ("),
+    ];
+    for (from, to, what) in edits {
+        sandbox.edit(from, to);
+        refused(what);
+        restore("scene.toml");
+    }
+    sandbox.write("normal.png", &png(|_, _| [0.5, 0.5, 1.0]));
+    refused("normal map differs (");
+    restore("normal.png");
+    sandbox.fit("run", &["--resume"]).done();
 }

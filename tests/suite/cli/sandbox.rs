@@ -257,7 +257,8 @@ pub(crate) fn files(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     found
 }
 
-fn png(color: impl Fn(u32, u32) -> [f32; 3]) -> Vec<u8> {
+/// A picture of 16 x 16 pixels.
+pub(crate) fn png(color: impl Fn(u32, u32) -> [f32; 3]) -> Vec<u8> {
     let pixel = |x, y| Rgb(color(x, y).map(|c| (255.0 * c) as u8));
     let mut bytes = Cursor::new(Vec::new());
     RgbImage::from_fn(16, 16, pixel).write_to(&mut bytes, ImageFormat::Png).unwrap();

@@ -7,13 +7,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::image::{Image, nine, point, tied, truth};
 use super::random_start;
 use skinfit::engine::Point;
+use skinfit::fit::fingerprint::Fingerprint;
 use skinfit::fit::outcome::{Ending, Outcome};
 use skinfit::fit::{FitError, FitOptions, SolverKind, fit};
 use skinfit::model::params::Param;
 use skinfit::scene::Loss;
 
 fn options(solver: SolverKind, state: &Path) -> FitOptions {
-    let fingerprint = "a scene".to_owned();
+    let fingerprint = Fingerprint::default().with("mesh", "a head");
     FitOptions { solver, fingerprint, state: Some(state.to_owned()), ..FitOptions::default() }
 }
 
@@ -124,7 +125,9 @@ fn the_state_of_another_fit_is_refused() {
     };
     #[rustfmt::skip]
     let cases = [
-        (&image, point(&[]), other(|o| o.fingerprint = "another scene".into()), "its scene differs"),
+        (&image, point(&[]), other(|o| o.fingerprint = Fingerprint::default().with("mesh", "a hand")), "its mesh differs (a head; now a hand)"),
+        (&image, point(&[]), other(|o| o.fingerprint = Fingerprint::default()), "its mesh differs (a head; now none)"),
+        (&image, point(&[]), other(|o| o.fingerprint = o.fingerprint.clone().with("map", "x")), "its map differs (none; now x)"),
         (&image, point(&[]), other(|o| o.solver = SolverKind::Lm), "its solver differs (varpro; now lm)"),
         (&image, point(&[]), other(|o| o.starts = 2), "its number of starts differs"),
         (&image, point(&[]), other(|o| o.seed = 2), "its seed differs"),

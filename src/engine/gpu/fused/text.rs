@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::layout::{fields_read, number};
-use super::reduce::{REDUCE, reduction};
+use super::reduce::{functions, reduction};
 use super::{BLOCK_PIXELS, ColumnOf, Fused, Sum, WORKGROUP};
 use crate::engine::residual::{HUBER_THRESHOLD, RELATIVE_FLOOR, SMAPE_CORNER, SMAPE_FLOOR};
 use crate::samples::LANES;
@@ -74,7 +74,7 @@ impl Fused {
         );
         wgsl.push_str(loss_function(self.fitted.loss));
         wgsl.push('\n');
-        wgsl.push_str(REDUCE);
+        wgsl.push_str(&functions());
         wgsl
     }
 

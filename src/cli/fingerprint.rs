@@ -1,0 +1,121 @@
+//! What a fit's state belongs to: everything that the model and its targets are made from, as it was read. Nothing that
+//! an engine computes is in it, so a fit goes on wherever its passes and its samples are made.
+
+use crate::fit::fingerprint::Fingerprint;
+use crate::scene::maps::{Environment, Map, Maps};
+use crate::scene::mesh::Mesh;
+use crate::scene::view::Target;
+use crate::scene::{Quality, Scene};
+
+/// What stands for something that is not there.
+const NONE: &str = "none";
+
+/// The fingerprint of a fit of `scene`; `maps`: which whole maps were fitted with it, in words.
+pub(super) fn fingerprint(scene: &Scene, maps: Option<String>) -> Fingerprint {
+    let effects: Vec<&str> = scene.effects.iter().map(crate::model::effects::Effect::name).collect();
+    let Maps { color, normal, specular, attenuator } = &scene.maps;
+    let all = Fingerprint::default()
+        .with("list of fitted maps", maps.unwrap_or_else(|| NONE.to_owned()))
+        .with("form", scene.form.name())
+        .with("silhouette", scene.silhouette.name())
+        .with("list of effects", effects.join(" "))
+        .with("loss", scene.fit.loss.name())
+        .with("color map", map(color.as_ref()))
+        .with("normal map", map(normal.as_ref()))
+        .with("specular map", map(specular.as_ref()))
+        .with("attenuator map", map(attenuator.as_ref()))
+        .with("environment", environment(scene.environment.as_ref()))
+        .with("mesh or its pose", mesh(&scene.mesh, scene.metres_per_unit))
+        .with("quality", quality(scene.quality));
+    scene.views.iter().fold(all, |all, view| {
+        let camera = Hash::default().words(&view.camera).done();
+        all.with(format!("camera of view {}", view.name), camera)
+            .with(format!("target of view {}", view.name), target(view.target.as_ref()))
+    })
+}
+
+/// A hash under way.
+#[derive(Default)]
+struct Hash(blake3::Hasher);
+
+impl Hash {
+    /// Numbers, and how many there are.
+    fn numbers<T: bytemuck::NoUninit>(mut self, numbers: &[T]) -> Self {
+        self.0.update(&(numbers.len() as u64).to_le_bytes());
+        self.0.update(bytemuck::cast_slice(numbers));
+        self
+    }
+
+    /// What `Debug` says, which tells every bit of a number.
+    fn words(mut self, value: &impl std::fmt::Debug) -> Self {
+        self.0.update(format!("{value:?};").as_bytes());
+        self
+    }
+
+    fn done(self) -> String {
+        self.0.finalize().to_hex()[..16].to_owned()
+    }
+}
+
+fn map<const C: usize>(map: Option<&Map<C>>) -> String {
+    map.map_or_else(
+        || NONE.to_owned(),
+        |map| Hash::default().words(&[map.width, map.height]).numbers(map.texels.as_flattened()).done(),
+    )
+}
+
+fn environment(environment: Option<&Environment>) -> String {
+    let Some(Environment { panorama, rotation_degrees, intensity }) = environment else {
+        return NONE.to_owned();
+    };
+    let of = Hash::default().words(&[panorama.width, panorama.height]).words(&[rotation_degrees, intensity]);
+    of.numbers(panorama.texels.as_flattened()).done()
+}
+
+fn mesh(mesh: &Mesh, metres_per_unit: f64) -> String {
+    let flat = |vectors: &[glam::Vec3]| -> Vec<f32> { vectors.iter().flat_map(|v| v.to_array()).collect() };
+    let tangents: Vec<f32> = mesh.tangents.iter().flat_map(|v| v.to_array()).collect();
+    let uvs: Vec<f32> = mesh.uvs.iter().flat_map(|v| v.to_array()).collect();
+    let bones: Vec<f32> = mesh.bones.iter().flat_map(|m| m.to_cols_array()).collect();
+    let rest = Hash::default()
+        .words(&metres_per_unit)
+        .numbers(&flat(&mesh.positions))
+        .numbers(&flat(&mesh.normals))
+        .numbers(&tangents)
+        .numbers(&uvs)
+        .numbers(mesh.triangles.as_flattened())
+        .numbers(mesh.joints.as_flattened())
+        .numbers(mesh.weights.as_flattened())
+        .numbers(&bones);
+    // A target without weight moves nothing, and its occlusion is not baked.
+    let moved = mesh.morphs.iter().filter(|morph| morph.weight != 0.0);
+    moved
+        .fold(rest, |all, morph| {
+            all.words(&morph.weight).numbers(&flat(&morph.positions)).numbers(&flat(&morph.normals))
+        })
+        .done()
+}
+
+fn quality(quality: Quality) -> String {
+    let Quality {
+        samples_per_axis,
+        irradiance_size,
+        lobe_size,
+        hilite_size,
+        lobes_per_octave,
+        occlusion_rays,
+    } = quality;
+    format!(
+        "samples_per_axis {samples_per_axis}, irradiance_size {irradiance_size}, lobe_size {lobe_size}, hilite_size \
+         {hilite_size}, lobes_per_octave {lobes_per_octave}, occlusion_rays {occlusion_rays}"
+    )
+}
+
+fn target(target: Option<&Target>) -> String {
+    let Some(Target { rgb, alpha, mask, clipped_at }) = target else { return NONE.to_owned() };
+    let of = Hash::default().words(clipped_at).numbers(rgb.as_flattened());
+    [alpha, mask]
+        .into_iter()
+        .fold(of, |all, plane| all.words(&plane.is_some()).numbers(plane.as_deref().unwrap_or_default()))
+        .done()
+}
