@@ -4,6 +4,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::bake::rays::any_can_be_hit;
 use crate::bake::{self, BakeError, BakeStats, Illumination, VertexOcclusion};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
@@ -86,6 +87,12 @@ pub enum PrepareError {
     /// A view that cannot be compared with its target.
     #[error("{scene}: {error}")]
     Target { scene: String, error: SampleError },
+    /// What posing leaves of the mesh.
+    #[error(
+        "{scene}: no triangle of the mesh has an area once it is posed: node scales, bones or morph weights draw it \
+         together. Correct them in the mesh file, or the scene's morph_weights and time."
+    )]
+    Collapsed { scene: String },
     /// No view of that name.
     #[error("{scene}: there is no view `{view}`. {suggestion}.")]
     NoView { scene: String, view: String, suggestion: String },
@@ -125,6 +132,10 @@ impl Prepared {
         let start = Instant::now();
         let load = LoadOptions { effects: options.effects, targets: options.fit, time: options.time };
         let (mut scene, warnings) = Scene::load(path, &load)?;
+        // An animation may begin with nothing and go on with something.
+        if options.time.is_none() {
+            check_area(&scene)?;
+        }
         choose_views(&mut scene, &options.views)?;
         let mut gains = vec![1.0; scene.views.len()];
         if let Some(path) = &options.params {
@@ -253,6 +264,16 @@ impl Prepared {
             observed.push(observe(samples, target));
         }
         Ok(observed)
+    }
+}
+
+/// Refuse a mesh of which posing leaves nothing: at rest the reader has seen to it, but bones and morph targets may
+/// draw all of it together.
+fn check_area(scene: &Scene) -> Result<(), PrepareError> {
+    let posed = scene.mesh.pose();
+    match any_can_be_hit(&posed.positions, &posed.triangles) {
+        true => Ok(()),
+        false => Err(PrepareError::Collapsed { scene: scene.path.display().to_string() }),
     }
 }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::scene::{SceneArguments, parse_effects};
-use super::{Exit, Refusal, say, tell, tell_warnings};
+use super::{Exit, Refusal, interrupt, say, tell, tell_warnings};
 use crate::bake::VertexOcclusion;
 use crate::model::cube::Cube;
 use crate::model::effects::Effects;
@@ -17,7 +17,7 @@ use crate::render::image::Image;
 /// Bake a scene's cube maps and ambient occlusion into files
 #[derive(clap::Args)]
 #[command(
-    after_help = "Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at) and occlusion.csv (a row a vertex: the open share of its hemisphere).\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked"
+    after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at) and occlusion.csv (a row a vertex: the open share of its hemisphere).\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -34,6 +34,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    interrupt::install();
     let (path, _scratch) = arguments.scene.path()?;
     let options = PrepareOptions {
         effects: arguments.effects,
@@ -45,6 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     tell_warnings(&prepared.warnings);
     let folder = &arguments.output;
     let light = &prepared.illumination;
+    interrupt::writing(folder);
     let mut written = 0;
     let mut cube = |name: &str, cube: &Cube<f32>| -> Result<(), Refusal> {
         written += 1;

@@ -6,6 +6,7 @@
 //! - `graphics`: what to do about an adapter that cannot
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
+//! - `interrupt`: Ctrl-C in the commands that are no fits
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
 mod ablate;
@@ -19,6 +20,7 @@ mod fitted_scene;
 #[cfg(feature = "gpu")]
 mod graphics;
 mod info;
+mod interrupt;
 mod maps;
 mod params;
 mod render;
@@ -54,7 +56,12 @@ const EXIT_CODES: [&str; 3] = [
 
 /// A help page's end.
 fn with_exit_codes(text: &str) -> String {
-    let [done, failed, refused] = EXIT_CODES;
+    with_failure(text, EXIT_CODES[1])
+}
+
+/// A help page's end, of a command whose exit code 1 means something of its own.
+fn with_failure(text: &str, failed: &str) -> String {
+    let [done, _, refused] = EXIT_CODES;
     format!("{text}\n\nExit codes:\n  0  {done}\n  1  {failed}\n  2  {refused}")
 }
 

@@ -1,11 +1,11 @@
-//! The run folder: one run at a time, nothing left of a run that was refused, and a scene file that
+//! The run folder: one run of one command at a time, nothing left of a run that was refused, and a scene file that
 //! still finds its files.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use super::Refusal;
 use super::fitted_scene::{Changes, as_fitted};
+use super::{Refusal, interrupt};
 use crate::output::{self, OutputError};
 
 /// A run folder that no other run writes to. Unless [`keep`](Self::keep) is called, what opening it
@@ -20,10 +20,57 @@ pub(super) struct RunFolder {
 
 const LOCK: &str = ".lock";
 
+/// A command that leaves results in a run folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Work {
+    Fit,
+    Ablation,
+    Tradeoff,
+    Stability,
+}
+
+impl Work {
+    const ALL: [Self; 4] = [Self::Fit, Self::Ablation, Self::Tradeoff, Self::Stability];
+
+    const fn command(self) -> &'static str {
+        match self {
+            Self::Fit => "skinfit fit",
+            Self::Ablation => "skinfit ablate",
+            Self::Tradeoff => "skinfit tradeoff",
+            Self::Stability => "skinfit stability",
+        }
+    }
+
+    /// Whether a folder holds results of this command.
+    fn left_in(self, folder: &Path) -> bool {
+        // Two commands share a name; what is in it tells them apart.
+        let results = |key: &str| {
+            let text = std::fs::read(folder.join("results.json")).unwrap_or_default();
+            serde_json::from_slice::<serde_json::Value>(&text).is_ok_and(|file| file.get(key).is_some())
+        };
+        match self {
+            Self::Fit => ["state.json", "report.json"].iter().any(|name| folder.join(name).is_file()),
+            Self::Ablation => results("rows"),
+            Self::Tradeoff => results("axes"),
+            Self::Stability => folder.join("stability.json").is_file(),
+        }
+    }
+}
+
 impl RunFolder {
-    /// Make and lock `output`, or `runs/<name>` after the scene's folder.
+    /// Make and lock `output`, or `runs/<name>` after the scene's folder, for a fit.
     pub(super) fn open(output: Option<&Path>, scene: Option<&Path>) -> Result<Self, Refusal> {
-        let path = output.map_or_else(|| default_folder(scene), Path::to_owned);
+        Self::locked(output.map_or_else(|| default_folder(scene), Path::to_owned), Work::Fit)
+    }
+
+    /// Make and lock `output` for a study, which begins anew when it is interrupted.
+    pub(super) fn of_study(output: &Path, work: Work) -> Result<Self, Refusal> {
+        let folder = Self::locked(output.to_owned(), work)?;
+        interrupt::working(&folder.path, folder.made.contains(&folder.path), &folder.made);
+        Ok(folder)
+    }
+
+    fn locked(path: PathBuf, work: Work) -> Result<Self, Refusal> {
         let refused = |reason: std::io::Error| OutputError::new(&path, &reason);
         let file = path.join(LOCK);
         let places = std::iter::once(file.as_path()).chain(path.ancestors());
@@ -31,14 +78,29 @@ impl RunFolder {
         let made = made.map(Path::to_owned).collect();
         std::fs::create_dir_all(&path).map_err(refused)?;
         let lock = File::create(&file).map_err(refused)?;
-        match lock.try_lock() {
-            Err(std::fs::TryLockError::WouldBlock) => Err(Refusal::new(format!(
+        if let Err(std::fs::TryLockError::WouldBlock) = lock.try_lock() {
+            return Err(Refusal::new(format!(
                 "{}: another run is writing to this folder. Wait for it, or choose another with -o.",
                 path.display()
-            ))),
-            // A file system without locks: two runs at once are then the user's to avoid.
-            Ok(()) | Err(std::fs::TryLockError::Error(_)) => Ok(Self { path, _lock: lock, made }),
+            )));
         }
+        // A file system without locks: two runs at once are then the user's to avoid.
+        let folder = Self { path, _lock: lock, made };
+        folder.check(work)?;
+        Ok(folder)
+    }
+
+    /// Refuse a folder that holds results of another command: the two would be taken for one.
+    fn check(&self, work: Work) -> Result<(), Refusal> {
+        let other = Work::ALL.into_iter().find(|&other| other != work && other.left_in(&self.path));
+        other.map_or(Ok(()), |other| {
+            Err(Refusal::new(format!(
+                "{}: this folder holds results of {}, which those of {} would mix with. Choose another with -o.",
+                self.path.display(),
+                other.command(),
+                work.command()
+            )))
+        })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -48,6 +110,12 @@ impl RunFolder {
     /// From now on the folder stays: there is something in it.
     pub(super) fn keep(&mut self) {
         self.made.clear();
+    }
+
+    /// As [`keep`](Self::keep), of a study: its results are about to be written.
+    pub(super) fn keep_study(&mut self) {
+        interrupt::writing(&self.path);
+        self.keep();
     }
 
     /// The scene file as it was fitted, comments and all: its paths are made absolute, so that it can

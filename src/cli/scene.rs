@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::Refusal;
+use super::{Refusal, interrupt};
 use crate::bake::cache;
 use crate::demo;
 use crate::model::effects::{Effect, Effects};
@@ -40,13 +40,7 @@ impl SceneArguments {
         if self.scene.is_some() || !self.bakes.no_cache {
             return Ok((self.kept_path(Path::new(""))?, None));
         }
-        let scratch = tempfile::tempdir().map_err(|error| {
-            let folder = std::env::temp_dir();
-            Refusal::new(format!(
-                "{}: the built-in scene cannot be written there: {error}. Make room, or set TMPDIR.",
-                folder.display()
-            ))
-        })?;
+        let scratch = interrupt::scratch()?;
         Ok((self.kept_path(scratch.path())?, Some(scratch)))
     }
 

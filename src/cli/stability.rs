@@ -6,8 +6,9 @@ use std::rc::Rc;
 
 #[cfg(feature = "gpu")]
 use super::graphics::Task;
+use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, say, tell, tell_warnings};
+use super::{Exit, Refusal, interrupt, say, tell, tell_warnings};
 use crate::output;
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::progress;
@@ -24,7 +25,7 @@ use crate::study::stability::{Study, evaluators, kept};
 /// Try hard cases on every evaluator, and search for new ones
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("Each evaluator (the model in f64 and f32, the CPU engine, the renderer's shader rules where there is a graphics adapter) is given every hard case of docs/model.md, samples of the scene with each parameter at its bounds and each effect on and off, and random numbers made to break it. Each result must be finite, and as near to f64 as roundings explain. Cases that fail are made as simple as they stay failing and written to DIR/new_cases.toml; DIR/stability.json has every figure.\n\nExamples:\n  skinfit stability                                    the built-in scene\n  skinfit stability scene.toml -o stable --cases 50000 --seed 7\n  skinfit stability --replay stable/new_cases.toml     try again what failed")
+    after_help = super::with_failure("Each evaluator (the model in f64 and f32, the CPU engine, the renderer's shader rules where there is a graphics adapter) is given every hard case of docs/model.md, samples of the scene with each parameter at its bounds and each effect on and off, and random numbers made to break it. Each result must be finite, and as near to f64 as roundings explain. Cases that fail are made as simple as they stay failing and written to DIR/new_cases.toml; DIR/stability.json has every figure.\n\nExamples:\n  skinfit stability                                    the built-in scene\n  skinfit stability scene.toml -o stable --cases 50000 --seed 7\n  skinfit stability --replay stable/new_cases.toml     try again what failed", "a case failed on an evaluator, or the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -55,6 +56,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     super::quieten_graphics();
+    interrupt::install();
+    let output = arguments.output.as_deref();
+    let folder = output.map(|output| RunFolder::of_study(output, Work::Stability)).transpose()?;
     let mut cases = kept::built_in()?;
     if let Some(path) = &arguments.replay {
         cases.extend(kept::read(path)?);
@@ -79,10 +83,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         cases: arguments.cases,
         pixels: usize::try_from(arguments.pixels).unwrap_or(usize::MAX),
     };
-    study_and_tell(arguments, &study)
+    study_and_tell(arguments, &study, folder)
 }
 
-fn study_and_tell(arguments: &Arguments, study: &Study) -> Result<Exit, Refusal> {
+fn study_and_tell(arguments: &Arguments, study: &Study, folder: Option<RunFolder>) -> Result<Exit, Refusal> {
     let mut evaluators = evaluators();
     let missing = add_gpu(arguments, &mut evaluators)?;
     let bar = progress::bar("cases", study.steps() as u64);
@@ -91,7 +95,9 @@ fn study_and_tell(arguments: &Arguments, study: &Study) -> Result<Exit, Refusal>
     report.missing = missing.into_iter().collect();
     say(report.text().trim_end())?;
     report.missing.iter().for_each(|words| tell(words));
-    if let Some(folder) = &arguments.output {
+    if let Some(mut folder) = folder {
+        folder.keep_study();
+        let folder = folder.path();
         let plain = |error: &dyn std::fmt::Display| Refusal::new(format!("{}: {error}", folder.display()));
         let json = report.json().map_err(|error| plain(&error))?;
         output::write(&folder.join("stability.json"), json.as_bytes())?;

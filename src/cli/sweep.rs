@@ -19,7 +19,7 @@ use crate::study::sweep::run::{self, Inputs};
 /// Run the jobs of a plan: many scenes and settings, here or on many machines
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("A plan is a TOML file:\n\n  command = \"fit\"                      # or \"ablate\", \"tradeoff\", \"stability\"\n  scene = \"scene.toml\"                 # left out: the built-in scene\n  [settings]                           # for every job\n  solver = \"varpro\"\n  [[axis]]                             # every combination of the axes\n  key = \"fit.loss\"                     # a scene file's key, or scene, command, solver ...\n  values = [\"l2\", \"huber\"]\n\nEach job leaves one file in the plan's folder of results (results = \"...\", by default beside the plan). A job that has left one is not run again.\n\nExamples:\n  skinfit sweep plan.toml               run what is not done yet\n  skinfit sweep plan.toml --list        a command a job, for a scheduler (docs/sweeps.md)\n  skinfit sweep plan.toml --run 3       one job\n\nskinfit collect merges the results.")
+    after_help = super::with_failure("A plan is a TOML file:\n\n  command = \"fit\"                      # or \"ablate\", \"tradeoff\", \"stability\"\n  scene = \"scene.toml\"                 # left out: the built-in scene\n  [settings]                           # for every job\n  solver = \"varpro\"\n  [[axis]]                             # every combination of the axes\n  key = \"fit.loss\"                     # a scene file's key, or scene, command, solver ...\n  values = [\"l2\", \"huber\"]\n\nEach job leaves one file in the plan's folder of results (results = \"...\", by default beside the plan). A job that has left one is not run again.\n\nExamples:\n  skinfit sweep plan.toml               run what is not done yet\n  skinfit sweep plan.toml --list        a command a job, for a scheduler (docs/sweeps.md)\n  skinfit sweep plan.toml --run 3       one job\n\nskinfit collect merges the results.", "a job failed")
 )]
 pub(super) struct SweepArguments {
     /// The plan file.
@@ -40,7 +40,7 @@ pub(super) struct SweepArguments {
 /// Merge the results of a plan's jobs into one table
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The table is the same whatever order the jobs were done in. Ablations and tradeoffs have a row for each part left out, each setting. Jobs that are missing or failed are named; then the exit code is 1, and the table holds the others.\n\nExamples:\n  skinfit collect plan.toml -o all.csv\n  skinfit collect plan-results -o all.json")
+    after_help = super::with_failure("The table is the same whatever order the jobs were done in. Ablations and tradeoffs have a row for each part left out, each setting. Jobs that are missing or failed are named; then the exit code is 1, and the table holds the others.\n\nExamples:\n  skinfit collect plan.toml -o all.csv\n  skinfit collect plan-results -o all.json", "a job is missing or failed")
 )]
 pub(super) struct CollectArguments {
     /// The plan file, or the folder of its results.

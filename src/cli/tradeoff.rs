@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use super::fitted_scene::Changes;
-use super::run_folder::RunFolder;
+use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, say, tell_warnings};
+use super::{Exit, Refusal, interrupt, say, tell, tell_warnings};
 use crate::scene::suggestion;
 use crate::study::tradeoff::choose::Goal;
 use crate::study::tradeoff::{TradeoffOptions, axes, files, tradeoff};
@@ -13,7 +13,7 @@ use crate::study::tradeoff::{TradeoffOptions, axes, files, tradeoff};
 /// Measure what accuracy costs in time: each approximation swept, error beside cost
 #[derive(clap::Args)]
 #[command(
-    after_help = "DIR gets report.html (open it in a browser), results.csv, results.json, a plot of each axis and, with --within or --budget, scene.toml with the settings that meet it.\n\nAxes:\n  format      f64, f32, f16, and the 12-bit fixed point of the paper's hardware, as its listing declares it\n  silhouette  per vertex, per fragment, bumped; against how fine the mesh is\n  irradiance, specular, hilite  texels a face of the cubes\n  filter      of the cubes: exact, the hardware's, nearest\n  lobes       specular cubes an octave of the exponent\n  rays        a vertex, for ambient occlusion\n  samples     along a pixel's side\n  pixels      used in a fit\n  solver      of a fit\n\nErrors are root mean square differences of linear radiance, relative to the reference's own.\n\nExamples:\n  skinfit tradeoff -o runs/cost                                the built-in scene, every axis\n  skinfit tradeoff scene.toml -o runs/cost --axis rays --axis samples\n  skinfit tradeoff scene.toml -o runs/cost --within 0.5%       the cheapest settings with that error\n  skinfit tradeoff scene.toml -o runs/cost --budget 200ms      the most accurate settings in that time"
+    after_help = super::with_failure("DIR gets report.html (open it in a browser), results.csv, results.json, a plot of each axis and, with --within or --budget, scene.toml with the settings that meet it.\n\nAxes:\n  format      f64, f32, f16, and the 12-bit fixed point of the paper's hardware, as its listing declares it\n  silhouette  per vertex, per fragment, bumped; against how fine the mesh is\n  irradiance, specular, hilite  texels a face of the cubes\n  filter      of the cubes: exact, the hardware's, nearest\n  lobes       specular cubes an octave of the exponent\n  rays        a vertex, for ambient occlusion\n  samples     along a pixel's side\n  pixels      used in a fit\n  solver      of a fit\n\nErrors are root mean square differences of linear radiance, relative to the reference's own.\n\nExamples:\n  skinfit tradeoff -o runs/cost                                the built-in scene, every axis\n  skinfit tradeoff scene.toml -o runs/cost --axis rays --axis samples\n  skinfit tradeoff scene.toml -o runs/cost --within 0.5%       the cheapest settings with that error\n  skinfit tradeoff scene.toml -o runs/cost --budget 200ms      the most accurate settings in that time", "no settings meet --within or --budget, or the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -37,10 +37,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    let mut folder = RunFolder::open(Some(&arguments.output), None)?;
+    interrupt::install();
+    let mut folder = RunFolder::of_study(&arguments.output, Work::Tradeoff)?;
     let path = arguments.scene.kept_path(folder.path())?;
     // Settings are evaluated more than once: without a cache of the user's, bakes are kept for as long as this takes.
-    let scratch = tempfile::tempdir()?;
+    let scratch = interrupt::scratch()?;
     let options = TradeoffOptions {
         axes: arguments.axis.clone(),
         params: arguments.params.clone(),
@@ -49,14 +50,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     let found = tradeoff(&path, &options)?;
     tell_warnings(&found.warnings);
-    folder.keep();
+    folder.keep_study();
     let mut written = files::write(folder.path(), &arguments.scene.name(&path), &found)?.len();
-    if let Some(choice) = &found.choice {
+    if let Some(choice) = found.choice() {
         folder.write_scene(&path, Changes { settings: &choice.keys, ..Changes::default() })?;
         written += 1;
     }
     say(files::table(&found).trim_end())?;
     say(&format!("wrote {written} files to {}; open report.html there", folder.path().display()))?;
+    if let Some(missed) = found.missed() {
+        let place = folder.path().display();
+        tell(&format!("{place}: no settings are {}: {}. Allow more.", missed.goal, missed.least));
+        return Ok(Exit::Failed);
+    }
     Ok(Exit::Done)
 }
 

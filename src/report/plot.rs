@@ -35,8 +35,19 @@ pub struct Plot<'a> {
     pub dots: Vec<Dot>,
     /// The names of the colours; none for a single one.
     pub series: Vec<String>,
-    /// Whether the front's points are joined: what is reached at a given x stays reached beyond it.
-    pub joined: bool,
+    /// Which points are joined.
+    pub joined: Joined,
+}
+
+/// Which points of a [`Plot`] are joined.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Joined {
+    /// None.
+    No,
+    /// The front's: what is reached at a given x stays reached beyond it.
+    Front,
+    /// Those of a colour, in their order: its curve.
+    Series,
 }
 
 const WIDTH: f64 = 860.0;
@@ -148,9 +159,26 @@ impl Plot<'_> {
             0.5 * (TOP + BOTTOM),
             escape(self.y)
         );
-        self.draw_front(&mut svg, &x_at, &y_at);
+        match self.joined {
+            Joined::No => {}
+            Joined::Front => self.draw_front(&mut svg, &x_at, &y_at),
+            Joined::Series => self.draw_curves(&mut svg, &x_at, &y_at),
+        }
         self.draw_dots(&mut svg, &x_at, &y_at);
         svg + "</svg>"
+    }
+
+    /// A curve for each colour.
+    fn draw_curves(&self, svg: &mut String, x_at: &dyn Fn(f64) -> f64, y_at: &dyn Fn(f64) -> f64) {
+        for series in 0..self.series.len() {
+            let of = self.dots.iter().filter(|dot| dot.series == series);
+            let points: Vec<String> =
+                of.map(|dot| format!("{:.1} {:.1}", x_at(dot.x), y_at(dot.y))).collect();
+            if points.len() > 1 {
+                let colour = series % COLOURS;
+                let _ = write!(svg, "<path class=\"trace c{colour}\" d=\"M{}\"/>", points.join("L"));
+            }
+        }
     }
 
     /// The front as a staircase.
@@ -162,23 +190,45 @@ impl Plot<'_> {
             let (x, y) = (x_at(dot.x), y_at(dot.y));
             let _ = if i == 0 { write!(path, "M{x:.1} {y:.1}") } else { write!(path, "H{x:.1}V{y:.1}") };
         }
-        if self.joined && front.len() > 1 {
+        if front.len() > 1 {
             let _ = write!(svg, "<path class=\"front\" d=\"{path}\"/>");
         }
     }
 
+    /// What labels should not cover: dots, and points along curves.
+    fn marks(&self, x_at: &dyn Fn(f64) -> f64, y_at: &dyn Fn(f64) -> f64) -> Vec<(f64, f64)> {
+        let at = |dot: &Dot| (x_at(dot.x), y_at(dot.y));
+        let mut marks: Vec<(f64, f64)> = self.dots.iter().map(at).collect();
+        if self.joined == Joined::Series {
+            for pair in self.dots.windows(2).filter(|pair| pair[0].series == pair[1].series) {
+                let (a, b) = (at(&pair[0]), at(&pair[1]));
+                // Closer together than a letter is high.
+                let steps = ((b.0 - a.0).hypot(b.1 - a.1) / 8.0).ceil().clamp(1.0, 200.0);
+                let along = |k: usize| {
+                    let share = k as f64 / steps;
+                    (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1))
+                };
+                marks.extend((1..steps as usize).map(along));
+            }
+        }
+        marks
+    }
+
     fn draw_dots(&self, svg: &mut String, x_at: &dyn Fn(f64) -> f64, y_at: &dyn Fn(f64) -> f64) {
         let mut written: Vec<(f64, f64, f64)> = Vec::new();
+        let marks = self.marks(x_at, y_at);
+        // On a curve dots are there to be pointed at.
+        let (kind, radius) = if self.joined == Joined::Series { ("point", 1.5) } else { ("dot", 5.0) };
         for dot in &self.dots {
             let (x, y) = (x_at(dot.x), y_at(dot.y));
             let full = if dot.front { " on" } else { "" };
             let _ = write!(
                 svg,
-                "<circle class=\"dot c{}{full}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"5\"><title>{}</title></circle>",
+                "<circle class=\"{kind} c{}{full}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\"><title>{}</title></circle>",
                 dot.series % COLOURS,
                 escape(&dot.title)
             );
-            if let Some((tx, ty, anchor)) = place(&mut written, x, y, dot.label.chars().count()) {
+            if let Some((tx, ty, anchor)) = place(&mut written, &marks, x, y, dot.label.chars().count()) {
                 let _ = write!(
                     svg,
                     "<text class=\"label\" x=\"{tx:.1}\" y=\"{ty:.1}\" text-anchor=\"{anchor}\">{}</text>",
@@ -204,10 +254,11 @@ impl Plot<'_> {
     }
 }
 
-/// A place for a label of so many letters beside (x, y) that covers no label before it; none if there is
-/// no such place.
+/// A place for a label of so many letters beside (x, y) that covers no label before it and, if there is one, none of
+/// the `marks`; none if there is no such place.
 fn place(
     written: &mut Vec<(f64, f64, f64)>,
+    marks: &[(f64, f64)],
     x: f64,
     y: f64,
     letters: usize,
@@ -225,7 +276,7 @@ fn place(
         (-8.0, -8.0, "end"),
         (-8.0, 16.0, "end"),
     ];
-    for (dx, dy, anchor) in places {
+    let free = |&(dx, dy, anchor): &(f64, f64, &'static str)| {
         let left = match anchor {
             "start" => x + dx,
             "end" => x + dx - width,
@@ -234,18 +285,20 @@ fn place(
         let line = y + dy;
         let apart =
             |&(l, t, w): &(f64, f64, f64)| left + width < l || l + w < left || (line - t).abs() > 13.0;
-        if letters > 0
-            && left > LEFT
-            && left + width < WIDTH
-            && line > 10.0
-            && line < BOTTOM
-            && written.iter().all(apart)
-        {
-            written.push((left, line, width));
-            return Some((x + dx, line, anchor));
-        }
+        let inside = left > LEFT && left + width < WIDTH && line > 10.0 && line < BOTTOM;
+        let covered = |&&(mx, my): &&(f64, f64)| {
+            (left - 2.0..left + width + 2.0).contains(&mx) && (line - 12.0..line + 4.0).contains(&my)
+        };
+        let hidden = marks.iter().filter(covered).count();
+        (inside && written.iter().all(apart)).then_some((hidden, left, (x + dx, line, anchor)))
+    };
+    if letters == 0 {
+        return None;
     }
-    None
+    // The first of those that cover least.
+    let (_, left, place) = places.iter().filter_map(free).min_by_key(|(hidden, ..)| *hidden)?;
+    written.push((left, place.1, width));
+    Some(place)
 }
 
 #[cfg(test)]
@@ -254,6 +307,34 @@ mod tests {
 
     fn dot(x: f64, y: f64, front: bool) -> Dot {
         Dot { x, y, label: "a&b".to_owned(), title: format!("{x} {y}"), series: 0, front }
+    }
+
+    #[test]
+    fn curves_are_lines_whose_labels_cover_neither_each_other_nor_the_curves() {
+        let curve = |series: usize| {
+            let dot = move |i: u32| Dot {
+                x: f64::from(i),
+                y: f64::from(10 - i) * (1.0 + 0.01 * series as f64),
+                label: if i == 5 { "solver".to_owned() } else { String::new() },
+                title: String::new(),
+                series,
+                front: true,
+            };
+            (1..=5).map(dot)
+        };
+        let series = vec!["a".to_owned(), "b".to_owned()];
+        let dots: Vec<Dot> = (0..2).flat_map(curve).collect();
+        let plot = Plot { x: "s", y: "loss", log_x: true, dots, series, joined: Joined::Series };
+        let svg = plot.svg();
+        assert_eq!(svg.matches("<path class=\"trace c").count(), 2);
+        let labels: Vec<&str> = svg.split("<text class=\"label\"").skip(1).collect();
+        assert_eq!(labels.len(), 2, "{svg}");
+        let line = |label: &str| {
+            let y = label.split("y=\"").nth(1).unwrap().split('"').next().unwrap();
+            y.parse::<f64>().unwrap()
+        };
+        let right = |label: &str| label.contains("\"start\"");
+        assert!(right(labels[0]) != right(labels[1]) || (line(labels[0]) - line(labels[1])).abs() > 13.0);
     }
 
     #[test]
@@ -269,7 +350,7 @@ mod tests {
                 log_x: true,
                 dots,
                 series: vec!["a".to_owned(), "b".to_owned()],
-                joined: true,
+                joined: Joined::Front,
             };
             for svg in [plot.svg(), plot.file()] {
                 assert_eq!(svg.matches("<circle").count(), plot.dots.len());

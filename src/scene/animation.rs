@@ -9,7 +9,7 @@ use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
 use super::gltf::{Ask, Document, Tangents, Uvs};
 use super::mesh::Mesh;
-use super::settings::number;
+use super::settings::{interval, number, short};
 use crate::model::effects::{Effect, Effects, Form, Needs};
 
 /// The mesh of a scene through its animation 0.
@@ -47,6 +47,11 @@ impl Animation {
     }
 }
 
+/// Beyond f32's range a position would not be finite: weights times deltas must stay well within.
+const MOST_WEIGHT: f64 = 1e6;
+/// Eleven days: no animation is that long, and f32 keys are still a sixteenth of a second apart.
+const MOST_SECONDS: f64 = 1e6;
+
 /// How the mesh is to be posed.
 pub(super) struct Pose {
     morph_weights: Option<Vec<f32>>,
@@ -56,19 +61,25 @@ pub(super) struct Pose {
 impl Pose {
     pub(super) fn check(source: &Source, file: &SceneFile) -> Result<Self, SceneError> {
         let weights = file.mesh.morph_weights.as_ref();
-        // Beyond f32's range a position would not be finite.
         let bad = |weights: &Spanned<Vec<f64>>| {
-            weights.get_ref().iter().copied().find(|w| w.is_nan() || w.abs() > 1e6)
+            weights.get_ref().iter().copied().find(|w| w.is_nan() || w.abs() > MOST_WEIGHT)
         };
         if let Some((spanned, weight)) = weights.and_then(|w| bad(w).map(|weight| (w, weight))) {
-            let what = format!("morph_weights holds {weight}");
-            return Err(source.error(spanned, what, "Give finite weights, mostly in [0, 1]"));
+            let what = format!("morph_weights holds {}", short(weight));
+            let within = interval(-MOST_WEIGHT, MOST_WEIGHT);
+            return Err(source.error(spanned, what, format!("Give weights in {within}, mostly in [0, 1]")));
         }
-        let finite = |_| true;
         Ok(Self {
             morph_weights: weights.map(|w| w.get_ref().iter().map(|&w| w as f32).collect()),
             time: match &file.mesh.time {
-                Some(time) => Some(number(source, Some(time), 0.0, "time", "finite seconds", finite)?),
+                Some(time) => Some(number(
+                    source,
+                    Some(time),
+                    0.0,
+                    "time",
+                    &format!("seconds in {}", interval(-MOST_SECONDS, MOST_SECONDS)),
+                    |seconds| seconds.abs() <= MOST_SECONDS,
+                )?),
                 None => None,
             },
         })

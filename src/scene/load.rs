@@ -7,10 +7,10 @@ use rayon::prelude::*;
 use super::animation::{Pose, ask, idle_effects};
 use super::cameras::{self, ViewPlan};
 use super::error::{SceneError, Warning, Warnings, warn};
-use super::file::{SceneFile, Source};
+use super::file::{EnvironmentTable, SceneFile, Source};
 use super::gltf::Document;
 use super::maps::{Environment, Maps};
-use super::settings::{self, number};
+use super::settings::{self, interval, number};
 use super::view::View;
 use super::{Scene, images};
 use crate::model::effects::{Effects, Needs};
@@ -52,14 +52,7 @@ impl Scene {
         let plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
         let pose = Pose::check(&source, &file)?.at(options.time);
-        let metres_per_unit = number(
-            &source,
-            file.mesh.metres_per_unit.as_ref(),
-            1.0,
-            "metres_per_unit",
-            "metres above 0",
-            |m| m > 0.0,
-        )?;
+        let metres_per_unit = metres(&source, &file)?;
         let given = settings::effects(&source, &file.model)?;
 
         let bar = progress::bar("loading", 3 + plans.len() as u64);
@@ -108,10 +101,7 @@ impl Scene {
 
 fn read_maps(source: &Source, file: &SceneFile, folder: &Path, needs: Needs) -> Result<Maps, SceneError> {
     let maps = &file.maps;
-    let flip = match &maps.normal_y {
-        Some(name) => source.choose("direction", name, &[("up", false), ("down", true)])?,
-        None => false,
-    };
+    let flip = normal_flip(source, file)?;
     let wanted =
         |path: &Option<PathBuf>, need: bool| path.as_ref().filter(|_| need).map(|path| folder.join(path));
     let (color, normal) = (wanted(&maps.color, needs.color_map), wanted(&maps.normal, needs.normal_map));
@@ -147,20 +137,60 @@ fn read_environment(
             "Add [environment] with a lat-long EXR or HDR file, or enable other effects",
         ));
     };
+    let (rotation_degrees, intensity) = light(source, table)?;
     Ok(Environment {
-        rotation_degrees: number(
-            source,
-            table.rotation_degrees.as_ref(),
-            0.0,
-            "rotation_degrees",
-            "finite degrees",
-            |_| true,
-        )?,
-        intensity: number(source, table.intensity.as_ref(), 1.0, "intensity", "a number from 0 up", |i| {
-            i >= 0.0
-        })?,
+        rotation_degrees,
+        intensity,
         panorama: images::panorama(&folder.join(&table.file), warnings)?,
     })
+}
+
+/// A turn needs no more; from far larger numbers f64 has no degrees to tell apart.
+const MOST_DEGREES: f64 = 36_000.0;
+
+/// The numbers of `[environment]`: its turn in degrees, and its intensity.
+fn light(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneError> {
+    let turn = number(
+        source,
+        table.rotation_degrees.as_ref(),
+        0.0,
+        "rotation_degrees",
+        &format!("degrees in {}", interval(-MOST_DEGREES, MOST_DEGREES)),
+        |degrees| degrees.abs() <= MOST_DEGREES,
+    )?;
+    let intensity =
+        number(source, table.intensity.as_ref(), 1.0, "intensity", "a number from 0 up", |i| i >= 0.0)?;
+    Ok((turn, intensity))
+}
+
+/// Refuse the text of a scene file for whatever [`Scene::load`] would refuse before it reads another file.
+pub(crate) fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
+    let source = Source::of(path, text.to_owned());
+    let file: SceneFile = source.parse()?;
+    let (form, _) = settings::form(&source, &file.model)?;
+    settings::params(&source, &file.model.params, form)?;
+    cameras::plan(&source, &file.view)?;
+    settings::quality(&source, &file.quality)?;
+    Pose::check(&source, &file)?;
+    metres(&source, &file)?;
+    // What the mesh adds to the effects concerns no value here.
+    let effects = settings::effects(&source, &file.model)?.unwrap_or(Effects::SURFACE);
+    settings::fit(&source, &file.fit, &file.model.params, effects, &mut Warnings::new())?;
+    normal_flip(&source, &file)?;
+    file.environment.as_ref().map_or(Ok(()), |table| light(&source, table).map(drop))
+}
+
+fn metres(source: &Source, file: &SceneFile) -> Result<f64, SceneError> {
+    let metres = file.mesh.metres_per_unit.as_ref();
+    number(source, metres, 1.0, "metres_per_unit", "metres above 0", |m| m > 0.0)
+}
+
+/// Whether the normal map's Y is to be turned.
+fn normal_flip(source: &Source, file: &SceneFile) -> Result<bool, SceneError> {
+    match &file.maps.normal_y {
+        Some(name) => source.choose("direction", name, &[("up", false), ("down", true)]),
+        None => Ok(false),
+    }
 }
 
 fn read_views(

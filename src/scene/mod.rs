@@ -33,6 +33,7 @@ pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub(crate) use file::{Source, check_text};
 pub use load::LoadOptions;
+pub(crate) use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
 pub(crate) use settings::short;
 pub use settings::{interval, read_params};

@@ -25,9 +25,12 @@ pub enum StudyError {
     /// An axis was named that the scene does not ask for.
     #[error("--axis {axis}: {why}. Leave it out, or name a scene that does.")]
     Idle { axis: &'static str, why: &'static str },
-    /// A goal that no setting meets.
-    #[error("no settings are {goal}: {best}. Allow more.")]
-    NoChoice { goal: String, best: String },
+    /// A goal, and no axis whose settings could meet it.
+    #[error(
+        "{goal}: of the axes to be swept ({swept}) none can be set in a scene file, so there is nothing to choose. \
+         Name some of {settable} with --axis, too."
+    )]
+    NothingToSet { goal: &'static str, swept: String, settable: String },
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error(transparent)]

@@ -7,16 +7,19 @@
 //! - [`subject`]: a scene ready to be evaluated in one setting; [`mod@reference`]: what images are compared with
 //! - [`significance`]: a change of the loss against its sampling error
 //! - [`timing`]: times that can be trusted; [`cost`]: the counts that stand beside them
+//! - [`leftovers`]: the files of an earlier run in a study's folder; [`titles`]: what its page is called
 
 pub mod ablation;
 pub mod cost;
 mod error;
+pub mod leftovers;
 pub mod reference;
 pub mod significance;
 pub mod stability;
 pub mod subject;
 pub mod sweep;
 pub mod timing;
+pub mod titles;
 pub mod tradeoff;
 
 pub use error::StudyError;

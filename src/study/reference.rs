@@ -7,7 +7,7 @@ use super::significance::LossMap;
 use crate::engine::residual::weighted_residual;
 use crate::engine::view::ObservedView;
 use crate::render::image::Image;
-use crate::report::metrics::{COVERED, Comparison, Scores};
+use crate::report::metrics::{COVERED, Comparison, PSNR_OF_EQUALS, Scores};
 use crate::report::pictures::Picture;
 use crate::scene::Loss;
 use crate::scene::view::{Clip, View};
@@ -159,6 +159,26 @@ impl ReferenceView {
             loss: (0..self.weight.len()).into_par_iter().map(of).collect(),
             weight: self.weight.iter().map(|&w| 3.0 * f64::from(w)).collect(),
         }
+    }
+}
+
+/// A PSNR in a table of text, where it is known; of equal images it has no end.
+#[must_use]
+pub fn psnr_in_words(psnr: Option<f64>) -> String {
+    match psnr {
+        Some(psnr) if psnr >= PSNR_OF_EQUALS => "equal".to_owned(),
+        Some(psnr) => format!("{psnr:.2}"),
+        None => "-".to_owned(),
+    }
+}
+
+/// A PSNR as a cell of CSV: empty where it is not known, `inf` of equal images.
+#[must_use]
+pub fn psnr_in_csv(psnr: Option<f64>) -> String {
+    match psnr {
+        Some(psnr) if psnr >= PSNR_OF_EQUALS => "inf".to_owned(),
+        Some(psnr) => format!("{psnr:.5}"),
+        None => String::new(),
     }
 }
 

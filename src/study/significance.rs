@@ -34,8 +34,9 @@ pub struct Change {
     pub loss: f64,
     /// Its standard error.
     pub std_error: f64,
-    /// The change over its error; 0 where nothing changes.
-    pub t: f64,
+    /// The change over its error; 0 where nothing changes. None where the model before leaves no misfit that a change
+    /// could be mistaken for: any that is more than rounding is real.
+    pub t: Option<f64>,
     /// The side of the blocks, in pixels.
     pub block: usize,
     /// What roundings of 32-bit numbers may do to the mean loss: a smaller change is none.
@@ -46,7 +47,7 @@ impl Change {
     /// Whether it is beyond chance.
     #[must_use]
     pub fn is_significant(&self) -> bool {
-        self.t.abs() >= SIGNIFICANT && !self.is_nothing()
+        self.t.is_none_or(|t| t.abs() >= SIGNIFICANT) && !self.is_nothing()
     }
 
     /// Whether it is none, but for rounding.
@@ -71,7 +72,7 @@ pub fn change(before: &[LossMap], after: &[LossMap]) -> Change {
             best = Some(found);
         }
     }
-    best.unwrap_or(Change { loss: 0.0, std_error: 0.0, t: 0.0, block: 0, rounding: 0.0 })
+    best.unwrap_or(Change { loss: 0.0, std_error: 0.0, t: Some(0.0), block: 0, rounding: 0.0 })
 }
 
 /// For each block with any weight: the sum of differences, and of weights.
@@ -98,7 +99,7 @@ fn of_blocks(blocks: &[(f64, f64)], side: usize) -> Change {
         return Change {
             loss: if weight > 0.0 { sum / weight } else { 0.0 },
             std_error: 0.0,
-            t: 0.0,
+            t: Some(0.0),
             block: side,
             rounding: 0.0,
         };
@@ -109,7 +110,7 @@ fn of_blocks(blocks: &[(f64, f64)], side: usize) -> Change {
     let std_error = (squares * n / (n - 1.0)).sqrt() / weight;
     // Blocks that all change by the same share leave no error at all.
     let t = if loss == 0.0 { 0.0 } else { loss / std_error.max(1e-12 * loss.abs()) };
-    Change { loss, std_error, t, block: side, rounding: 0.0 }
+    Change { loss, std_error, t: Some(t), block: side, rounding: 0.0 }
 }
 
 #[cfg(test)]
@@ -134,8 +135,14 @@ mod tests {
     fn equal_models_do_not_differ_at_all() {
         let same = map(vec![0.3; 128 * 128]);
         let found = change(std::slice::from_ref(&same), std::slice::from_ref(&same));
-        assert_eq!((found.loss, found.std_error, found.t), (0.0, 0.0, 0.0));
+        assert_eq!((found.loss, found.std_error, found.t), (0.0, 0.0, Some(0.0)));
         assert!(!found.is_significant());
+    }
+
+    #[test]
+    fn where_there_was_no_misfit_only_rounding_is_no_change() {
+        let change = |loss: f64| Change { loss, std_error: 1e-3, t: None, block: 8, rounding: 1e-9 };
+        assert!(change(1e-6).is_significant() && !change(1e-10).is_significant());
     }
 
     #[test]
@@ -147,7 +154,7 @@ mod tests {
             let want = (1.0 / 12.0_f64).sqrt() * side as f64 / 128.0;
             // The greatest of two or three estimates, from 64 blocks or more: each is off by 9%.
             assert!((0.85..1.4).contains(&(found.std_error / want)), "{side}: {} {want}", found.std_error);
-            assert!(found.t.abs() < 3.5, "{side}: {found:?}");
+            assert!(found.t.unwrap().abs() < 3.5, "{side}: {found:?}");
             assert!(change(std::slice::from_ref(&zero), &[patches(side, 6.0 * want, 7)]).is_significant());
         }
     }

@@ -1,6 +1,6 @@
 //! Times that can be trusted: jobs are warmed up, then run in turn, round after round, so that whatever else
-//! the machine does meets all of them; a time is a median with its quartiles, and a comparison the median of
-//! the rounds' ratios.
+//! the machine does meets all of them; a time is a median with its quartiles (of a bake the least), and a comparison
+//! the median of the rounds' ratios.
 
 use std::time::Instant;
 
@@ -37,18 +37,28 @@ impl Spread {
 pub struct Timed {
     /// Seconds.
     pub seconds: Spread,
+    /// The least of them: what else the machine did only ever adds.
+    pub least: f64,
     /// Its seconds over the first job's of the same round.
     pub ratio: Spread,
-    /// Rounds that were counted.
+    /// Rounds that were counted; one, of a job that takes long.
     pub rounds: usize,
+}
+
+impl Timed {
+    /// The quartiles of the seconds; none of a single round.
+    #[must_use]
+    pub fn quartiles(&self) -> Option<[f64; 2]> {
+        (self.rounds > 1).then_some([self.seconds.lower, self.seconds.upper])
+    }
 }
 
 /// How often jobs are run.
 #[derive(Clone, Copy, Debug)]
 pub struct Rounds {
-    /// Rounds that are not counted.
-    pub warm_up: usize,
-    /// Rounds at least.
+    /// A job whose first run, the warm-up, takes longer than this many seconds is not run again: that run counts.
+    pub long: f64,
+    /// Rounds at least, after the warm-up.
     pub least: usize,
     /// Rounds at most.
     pub most: usize,
@@ -59,7 +69,7 @@ pub struct Rounds {
 impl Default for Rounds {
     fn default() -> Self {
         // Five are the fewest whose quartiles are not their extremes.
-        Self { warm_up: 1, least: 5, most: 60, seconds: 0.5 }
+        Self { long: f64::INFINITY, least: 5, most: 60, seconds: 0.5 }
     }
 }
 
@@ -73,33 +83,44 @@ pub fn seconds_of<T>(work: impl FnOnce() -> T) -> f64 {
 /// A piece of work that says how many seconds it took.
 pub type Job<'a, E> = &'a mut dyn FnMut() -> Result<f64, E>;
 
-/// Run each job once a round, in turn, and say what each took, in their order.
+/// Run each job once to warm up, then once a round, in turn, and say what each took, in their order.
 ///
 /// # Errors
 /// The first job's that fails.
 pub fn interleaved<E>(rounds: Rounds, jobs: &mut [Job<'_, E>]) -> Result<Vec<Timed>, E> {
-    for _ in 0..rounds.warm_up {
-        for job in jobs.iter_mut() {
-            job()?;
-        }
+    let mut times: Vec<Vec<f64>> = Vec::new();
+    for job in jobs.iter_mut() {
+        // A job may do more than what it counts.
+        let clock = Instant::now();
+        let seconds = job()?;
+        times.push(if clock.elapsed().as_secs_f64() > rounds.long { vec![seconds] } else { Vec::new() });
     }
-    let mut times: Vec<Vec<f64>> = vec![Vec::new(); jobs.len()];
+    let short: Vec<usize> = (0..jobs.len()).filter(|&job| times[job].is_empty()).collect();
     let clock = Instant::now();
     for round in 0..rounds.most.max(1) {
         if round >= rounds.least && clock.elapsed().as_secs_f64() >= rounds.seconds {
             break;
         }
         // Each round begins with another job: none is always the one after a pause.
-        for i in 0..jobs.len() {
-            let job = (i + round) % jobs.len();
+        for i in 0..short.len() {
+            let job = short[(i + round) % short.len()];
             times[job].push(jobs[job]()?);
         }
     }
-    let timed = |own: &Vec<f64>| {
-        let ratios: Vec<f64> = own.iter().zip(&times[0]).map(|(own, first)| own / first.max(1e-12)).collect();
-        Some(Timed { seconds: Spread::of(own)?, ratio: Spread::of(&ratios)?, rounds: own.len() })
-    };
-    Ok(times.iter().filter_map(timed).collect())
+    Ok(times.iter().filter_map(|own| timed(own, &times[0])).collect())
+}
+
+/// What a job took in its rounds, beside what the first job took in them.
+fn timed(own: &[f64], first: &[f64]) -> Option<Timed> {
+    // What was run once stands beside every round of the other.
+    let rounds = own.len().max(first.len());
+    let pairs = (0..rounds).filter_map(|round| {
+        let at = |times: &[f64]| times.get(round).or(times.last()).copied();
+        Some(at(own)? / at(first)?.max(1e-12))
+    });
+    let ratio = Spread::of(&pairs.collect::<Vec<f64>>())?;
+    let least = own.iter().copied().fold(f64::INFINITY, f64::min);
+    Some(Timed { seconds: Spread::of(own)?, least, ratio, rounds: own.len() })
 }
 
 #[cfg(test)]
@@ -126,7 +147,7 @@ mod tests {
             Ok::<f64, Infallible>(seconds)
         };
         let job = std::cell::RefCell::new(&mut job);
-        let rounds = Rounds { warm_up: 1, least: 2, most: 2, seconds: 0.0 };
+        let rounds = Rounds { least: 2, most: 2, seconds: 0.0, ..Rounds::default() };
         let timed = interleaved::<Infallible>(
             rounds,
             &mut [&mut || (job.borrow_mut())('a', 2.0), &mut || (job.borrow_mut())('b', 1.0)],
@@ -134,5 +155,27 @@ mod tests {
         let timed = timed.unwrap();
         assert_eq!(*order.borrow(), ['a', 'b', 'a', 'b', 'b', 'a']);
         assert_eq!((timed[0].ratio.median, timed[1].ratio.median, timed[1].rounds), (1.0, 0.5, 2));
+    }
+
+    #[test]
+    fn a_long_job_is_run_once_and_says_so() {
+        let mut runs = [0, 0];
+        let [long, short] = &mut runs;
+        let mut slow = || {
+            *long += 1;
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            Ok::<f64, Infallible>(4.0)
+        };
+        let mut quick = || {
+            *short += 1;
+            Ok(f64::from(*short))
+        };
+        let rounds = Rounds { long: 0.01, least: 3, most: 3, seconds: 0.0 };
+        let timed = interleaved(rounds, &mut [&mut slow, &mut quick]).unwrap();
+        assert_eq!((timed[0].rounds, timed[0].quartiles(), timed[0].least), (1, None, 4.0));
+        // The first run of the other, one second, is its warm-up.
+        assert_eq!((timed[1].rounds, timed[1].least, timed[1].seconds.median), (3, 2.0, 3.0));
+        assert_eq!((timed[1].quartiles(), timed[1].ratio.median), (Some([2.5, 3.5]), 0.75));
+        assert_eq!(runs, [1, 4]);
     }
 }

@@ -6,45 +6,84 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::{Ablation, Row, ViewRow, page};
-use crate::output;
+use crate::output::{self, OutputError};
 use crate::render::files::write_png_bytes;
+use crate::render::image::Image;
 use crate::report::file_stem;
+use crate::report::metrics::PSNR_OF_EQUALS;
 use crate::report::pictures::{Picture, strip};
 use crate::study::StudyError;
+use crate::study::leftovers::Leftovers;
+use crate::study::reference::{psnr_in_csv, psnr_in_words};
+use crate::study::significance::Change;
 use crate::study::timing::Timed;
 
 /// Write `results.csv`, `results.json`, `report.html` and, for each part and view, `<view>_without_<part>.png`
-/// (reference, what is left, FLIP error). What was written.
+/// (reference, what is left, FLIP error); what an earlier ablation left there and this one does not write anew goes.
+/// What was written.
 ///
 /// # Errors
 /// When a file cannot be written; each is whole or not there.
 pub fn write(folder: &Path, scene: &str, ablation: &Ablation) -> Result<Vec<PathBuf>, StudyError> {
+    let earlier = Leftovers::of(folder);
+    let pictures = pictures(ablation);
+    let mut names = vec!["results.csv".to_owned(), "report.html".to_owned()];
+    names.extend(pictures.iter().map(|picture| picture.name.clone()));
     let mut written = Vec::new();
     let mut add = |name: &str, bytes: &[u8]| -> Result<(), StudyError> {
         written.push(folder.join(name));
         Ok(output::write(&folder.join(name), bytes)?)
     };
     add("results.csv", csv(ablation).as_bytes())?;
-    add("results.json", json(scene, ablation).map_err(|e| output::OutputError::new(folder, &e))?.as_bytes())?;
-    let html = page::page(scene, ablation).map_err(|e| output::OutputError::new(folder, &e))?;
+    let html = page::page(scene, ablation).map_err(|e| OutputError::new(folder, &e))?;
     add("report.html", html.as_bytes())?;
+    let json = json(scene, ablation, &names).map_err(|e| OutputError::new(folder, &e))?;
+    add("results.json", json.as_bytes())?;
+    for StripOf { name, left_out, view, reference } in &pictures {
+        let Some((image, flip)) = &view.pictures else { continue };
+        let before = Picture::of_image(reference);
+        let words = ["reference".to_owned(), format!("without {left_out}"), "FLIP error".to_owned()];
+        let sheet = strip(&view.view, &[before, image.clone(), flip.clone()], &words, &scores(view));
+        let path = folder.join(name);
+        write_png_bytes(&path, sheet.width, sheet.height, &sheet.bytes)?;
+        written.push(path);
+    }
+    earlier.remove(&names)?;
+    Ok(written)
+}
+
+/// A picture of a part and a view.
+struct StripOf<'a> {
+    /// Its file.
+    name: String,
+    left_out: String,
+    view: &'a ViewRow,
+    reference: &'a Image,
+}
+
+/// The pictures of each single part.
+fn pictures(ablation: &Ablation) -> Vec<StripOf<'_>> {
+    let mut pictures = Vec::new();
     for row in ablation.rows.iter().filter(|row| row.left_out.left_out.len() == 1) {
+        let left_out = row.left_out.name();
         for (view, reference) in row.views.iter().zip(&ablation.references) {
-            let Some((image, flip)) = &view.pictures else { continue };
-            let name = row.left_out.name();
-            let before = Picture::of_image(&reference.image);
-            let words = ["reference".to_owned(), format!("without {name}"), "FLIP error".to_owned()];
-            let sheet = strip(&view.view, &[before, image.clone(), flip.clone()], &words, &scores(view));
-            let path = folder.join(format!("{}_without_{name}.png", file_stem(&view.view)));
-            write_png_bytes(&path, sheet.width, sheet.height, &sheet.bytes)?;
-            written.push(path);
+            if view.pictures.is_some() {
+                let name = format!("{}_without_{left_out}.png", file_stem(&view.view));
+                pictures.push(StripOf {
+                    name,
+                    left_out: left_out.clone(),
+                    view,
+                    reference: &reference.image,
+                });
+            }
         }
     }
-    Ok(written)
+    pictures
 }
 
 fn scores(view: &ViewRow) -> String {
     match (view.psnr, view.ssim, view.flip) {
+        (Some(psnr), ..) if psnr >= PSNR_OF_EQUALS => "equal".to_owned(),
         (Some(psnr), Some(ssim), Some(flip)) => {
             format!("PSNR {psnr:.2} dB    SSIM {ssim:.4}    FLIP {flip:.4}")
         }
@@ -63,10 +102,10 @@ fn csv(ablation: &Ablation) -> String {
         let Row { loss, change, counts, .. } = row;
         let _ = writeln!(
             text,
-            "{name},all,{loss:e},{:e},{:e},{:.2},{},{},{},{:.1},{},{},{},{}",
+            "{name},all,{loss:e},{:e},{:e},{},{},{},{},{:.1},{},{},{},{}",
             change.loss,
             change.std_error,
-            change.t,
+            change.t.map_or_else(String::new, |t| format!("{t:.2}")),
             view_columns(&mean),
             timed(row.cpu),
             timed(row.gpu),
@@ -87,15 +126,15 @@ fn csv(ablation: &Ablation) -> String {
 
 fn view_columns(view: &ViewRow) -> String {
     let score = |x: Option<f64>| x.map_or_else(String::new, |x| format!("{x:.5}"));
-    let scores = [view.psnr, view.ssim, view.flip].map(score).join(",");
-    format!("{:e},{:e},{scores}", view.linear_rms, view.relative_rms)
+    let (psnr, ssim, flip) = (psnr_in_csv(view.psnr), score(view.ssim), score(view.flip));
+    format!("{:e},{:e},{psnr},{ssim},{flip}", view.linear_rms, view.relative_rms)
 }
 
 fn timed(time: Option<Timed>) -> String {
     time.map_or_else(|| ",".to_owned(), |t| format!("{:.4},{:.4}", 1e3 * t.seconds.median, t.ratio.median))
 }
 
-fn json(scene: &str, ablation: &Ablation) -> Result<String, serde_json::Error> {
+fn json(scene: &str, ablation: &Ablation, files: &[String]) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
     struct File<'a> {
         scene: &'a str,
@@ -106,10 +145,11 @@ fn json(scene: &str, ablation: &Ablation) -> Result<String, serde_json::Error> {
         adapter: &'a Option<String>,
         rows: &'a [Row],
         warnings: &'a [String],
+        files: &'a [String],
     }
     let Ablation { source, constants, refitted, loss, adapter, rows, warnings, .. } = ablation;
     let (reference, refitted, loss) = (*source, *refitted, loss.name());
-    let file = File { scene, reference, constants, refitted, loss, adapter, rows, warnings };
+    let file = File { scene, reference, constants, refitted, loss, adapter, rows, warnings, files };
     Ok(serde_json::to_string_pretty(&file)? + "\n")
 }
 
@@ -130,6 +170,20 @@ impl Row {
             ssim: all(&|v| v.ssim),
             flip: all(&|v| v.flip),
             pictures: None,
+        }
+    }
+}
+
+impl Change {
+    /// `t` in a table of text: `-` where nothing changes, `exact` where there was no misfit to compare with.
+    #[must_use]
+    pub fn t_in_words(&self) -> String {
+        match self.t {
+            _ if self.is_nothing() => "-".to_owned(),
+            None => "exact".to_owned(),
+            // Blocks that all change alike leave next to no error.
+            Some(t) if t.abs() >= 1e4 => format!("{t:+.0e}"),
+            Some(t) => format!("{t:+.1}"),
         }
     }
 }
@@ -167,8 +221,8 @@ pub fn table(ablation: &Ablation) -> String {
             row.left_out.name(),
             row.loss,
             if row.change.loss == 0.0 { "0".to_owned() } else { format!("{:+.2e}", row.change.loss) },
-            if row.change.is_nothing() { "-".to_owned() } else { format!("{:+.1}", row.change.t) },
-            score(mean.psnr, 2),
+            row.change.t_in_words(),
+            psnr_in_words(mean.psnr),
             score(mean.ssim, 4),
             score(mean.flip, 4),
             ratio(row.cpu),

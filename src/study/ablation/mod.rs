@@ -307,13 +307,11 @@ impl Evaluated {
 }
 
 /// How the loss changes. Where the whole model leaves nothing but rounding, there is no misfit that a change could be
-/// mistaken for: rounding is its error.
+/// mistaken for.
 fn change_of(subject: &Subject, before: &[LossMap], after: &[LossMap]) -> Change {
     let (found, rounding) = (change(before, after), rounding(subject, before));
-    if rounding > 0.0 && mean_loss(before) <= rounding {
-        return Change { std_error: rounding, t: found.loss / rounding, rounding, ..found };
-    }
-    Change { rounding, ..found }
+    let t = found.t.filter(|_| rounding == 0.0 || mean_loss(before) > rounding);
+    Change { t, rounding, ..found }
 }
 
 /// What roundings may do to the mean loss, of either of two fits and in either direction.

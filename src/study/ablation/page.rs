@@ -9,10 +9,11 @@ use crate::model::effects::Effect;
 use crate::report::figures::triple;
 use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
 use crate::report::pictures::Picture;
-use crate::report::plot::{Dot, Plot};
+use crate::report::plot::{Dot, Joined, Plot};
 use crate::report::{number, seconds};
-use crate::study::reference::Source;
+use crate::study::reference::{Source, psnr_in_words};
 use crate::study::timing::Timed;
+use crate::study::titles::title;
 
 /// `report.html` of an ablation of the scene of that name.
 ///
@@ -33,8 +34,13 @@ pub fn page(scene: &str, ablation: &Ablation) -> Result<String, String> {
     }
     main += &section("pictures", "Pictures", &pictures(ablation, cases)?);
     main += &section("method", "How it was measured", &method(scene, ablation, full));
-    let page =
-        Page { kind: "ablation", title: scene, lead: lead(ablation, cases), tiles: tiles(full, cases), main };
+    let page = Page {
+        kind: "ablation",
+        title: &title(scene),
+        lead: lead(ablation, cases),
+        tiles: tiles(full, cases),
+        main,
+    };
     Ok(page.html())
 }
 
@@ -88,7 +94,7 @@ fn tiles(full: &Row, cases: &[Row]) -> String {
     let pass = full.cpu.map_or_else(|| "–".to_owned(), |t| seconds(t.seconds.median));
     let tiles = [
         ("loss, whole model", number(full.loss, 3), String::new()),
-        ("PSNR", score(mean.psnr, 1), "dB, mean of the views".to_owned()),
+        ("PSNR", psnr_in_words(mean.psnr), "dB, mean of the views".to_owned()),
         ("SSIM", score(mean.ssim, 3), String::new()),
         ("FLIP", score(mean.flip, 3), String::new()),
         ("parts", single.to_string(), format!("{} cases", cases.len())),
@@ -105,7 +111,10 @@ fn summary(ablation: &Ablation, full: &Row) -> String {
         ("left out", "which effects or terms"),
         ("loss", "mean loss over all views"),
         ("change", "of the loss, with one standard error"),
-        ("t", "the change over its standard error; 3 and more is beyond chance"),
+        (
+            "t",
+            "the change over its standard error; 3 and more is beyond chance; exact: the whole model left no misfit, so any change is real",
+        ),
         ("linear RMS, %", "difference of linear radiance, relative to the reference's root mean square"),
         ("PSNR, dB", "mean of the views"),
         ("SSIM", "mean of the views"),
@@ -163,10 +172,11 @@ fn cells(row: &Row, full: &Row) -> Vec<Cell> {
             Cell::value(format!("{}% <span class=\"pm inline\">± {error}</span>", signed(percent, 2)), change)
         }
     };
-    let t = if row.change.is_nothing() {
-        Cell::none()
-    } else {
-        Cell::value(signed(row.change.t, 1), row.change.t)
+    let t = match row.change.t {
+        _ if row.change.is_nothing() => Cell::none(),
+        // Sorted before every number.
+        None => Cell::value("exact", f64::MAX),
+        Some(t) => Cell::value(row.change.t_in_words().replace('-', "−"), t),
     };
     vec![
         Cell::text(&row.left_out.name()),
@@ -223,11 +233,11 @@ fn tradeoff(ablation: &Ablation, full: &Row, cases: &[Row]) -> String {
         } else {
             Vec::new()
         },
-        joined: false,
+        joined: Joined::No,
     };
     format!(
         "<p class=\"quiet\">Low and to the right: what saves much and is hardly missed. Filled where the change is beyond chance \
-         (t of 3). Point at a dot for its values.</p>{}{}",
+         (t of 3, or exact). Point at a dot for its values.</p>{}{}",
         plot.svg(),
         plot.legend()
     )

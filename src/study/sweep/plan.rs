@@ -9,7 +9,7 @@ use super::command::{Command, check_setting};
 use super::job::{Job, Setting, combine, flattened};
 use super::scene_text::with_key;
 use crate::scene::error::SceneError;
-use crate::scene::{Source, check_text};
+use crate::scene::{Source, check_text, check_values};
 
 /// Most jobs of a plan.
 const MOST: usize = 1_000_000;
@@ -70,7 +70,13 @@ impl Plan {
         if lists.is_empty() {
             lists.push(Vec::new());
         }
-        for axis in &file.axis {
+        for (i, axis) in file.axis.iter().enumerate() {
+            let key = axis.key.get_ref();
+            let before = file.axis[..i].iter().any(|other| other.key.get_ref() == key);
+            if before || lists.iter().flatten().any(|(listed, _)| listed == key) {
+                let what = format!("`{key}` is set by another axis or job, too");
+                return Err(source.error(&axis.key, what, "Put all of its values into one axis"));
+            }
             if axis.values.get_ref().is_empty() {
                 return Err(source.error(&axis.values, "an axis without values", "Give it at least one"));
             }
@@ -126,7 +132,7 @@ impl Plan {
     /// settings are set, paths in it are as they were.
     ///
     /// # Errors
-    /// When a key is not one of a scene's, or its value is not of the kind that it takes.
+    /// When a key is not one of a scene's, or a value is none that a scene takes.
     pub fn scene_text(&self, job: &Job, scene: &Path, text: &str) -> Result<String, SceneError> {
         let mut text = text.to_owned();
         for (key, value) in job.settings.iter().rev() {
@@ -144,6 +150,11 @@ impl Plan {
             text = with_key(&text, key, value).map_err(refuse)?;
             check_text(scene, &text).map_err(|error| refuse(error.what()))?;
         }
+        // All at once: one setting may need another.
+        check_values(scene, &text).map_err(|error| {
+            let what = format!("job {}: {}", job.index, error.what());
+            SceneError::new(&self.path, what, "Correct the plan's values for it, or the scene's own")
+        })?;
         Ok(text)
     }
 
@@ -270,11 +281,46 @@ mod tests {
             ("[1, 2]", "[1, -2]", "line 7: seed = -2. Give a whole number from 0 on"),
             ("[1, 2]", "[]", "line 8: an axis without values. Give it at least one"),
             ("\"lm\"", "\"ml\"", "unknown solver \"ml\". Did you mean `lm`?"),
+            (
+                "\"model.params.hilite\"",
+                "\"seed\"",
+                "line 10: `seed` is set by another axis or job, too. Put all of its values into one axis",
+            ),
             ("values = [1", "valeus = [1", "unknown key `valeus`. Did you mean `values`?"),
         ] {
             let told = read(&PLAN.replacen(from, to, 1)).unwrap_err();
             assert!(told.contains(words), "{told}");
         }
+    }
+
+    #[test]
+    fn values_of_scenes_are_checked_before_any_job_runs() {
+        let scene = "[mesh]\nfile = \"a.glb\"\n";
+        let told = |key: &str, value: &str| {
+            let text = format!("command = \"fit\"\n[[axis]]\nkey = \"{key}\"\nvalues = [{value}]\n");
+            let plan = read(&text).unwrap();
+            plan.scene_text(&plan.jobs[0], Path::new("a.toml"), scene).map_err(|error| error.to_string())
+        };
+        for (key, value, words) in [
+            ("fit.loss", "\"l3\"", "job 0: unknown loss `l3`. Did you mean `l2`?"),
+            ("model.form", "\"listin\"", "unknown form `listin`"),
+            ("model.silhouette", "\"vertx\"", "unknown silhouette `vertx`"),
+            ("model.effects", "[\"rimm\"]", "unknown effect `rimm`"),
+            ("model.params.hilite", "-1.0", "hilite = -1 is out of bounds"),
+            ("fit.free", "[\"hilit\"]", "unknown parameter `hilit`"),
+            ("quality.lobe_size", "0", "lobe_size = 0 is out of bounds"),
+            ("maps.normal_y", "\"left\"", "unknown direction `left`"),
+            ("mesh.time", "1e300", "time = 1e300 is out of bounds. Give seconds in [-1000000, 1000000]"),
+            (
+                "mesh.morph_weights",
+                "[1e300]",
+                "morph_weights holds 1e300. Give weights in [-1000000, 1000000]",
+            ),
+        ] {
+            let told = told(key, value).unwrap_err();
+            assert!(told.contains(words), "{told}");
+        }
+        assert!(told("fit.loss", "\"huber\"").is_ok());
     }
 
     #[test]

@@ -44,7 +44,7 @@ fn case(row: &ablation::Row) -> Figures {
         ("loss", number(row.loss)),
         ("loss_change", number(row.change.loss)),
         ("loss_change_error", number(row.change.std_error)),
-        ("t", number(row.change.t)),
+        ("t", row.change.t.map_or(Value::Null, number)),
         ("operations", number(row.counts.operations)),
         ("bytes_a_sample", row.counts.bytes_a_sample.into()),
         ("baked_bytes", row.counts.baked_bytes.into()),

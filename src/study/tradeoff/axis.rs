@@ -18,6 +18,10 @@ pub trait Axis: Sync {
     /// # Errors
     /// The reason.
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str>;
+    /// Whether a scene file can have its settings, so that some may be chosen.
+    fn settable(&self) -> bool {
+        false
+    }
     /// Measure each setting.
     ///
     /// # Errors

@@ -9,6 +9,7 @@ use serde::Serialize;
 
 use super::axis::{Choose, Setting, Sweep};
 use super::bench::{Bench, Settings};
+use crate::report::number;
 use crate::study::StudyError;
 use crate::study::reference::Difference;
 
@@ -41,6 +42,18 @@ pub struct Choice {
     pub reference_seconds: f64,
 }
 
+/// A goal that no settings meet.
+#[derive(Clone, Debug, Serialize)]
+pub struct Missed {
+    /// What was asked for, in words.
+    pub goal: String,
+    /// The least that was reached, in words.
+    pub least: String,
+}
+
+/// What the search for settings ends with.
+pub type Answer = Result<Choice, Missed>;
+
 /// How often less is asked of the sum of squares.
 const ATTEMPTS: usize = 24;
 /// By how much less each time.
@@ -49,21 +62,18 @@ const TIGHTER: f64 = 0.8;
 /// Choose a setting along each axis, and measure them together.
 ///
 /// # Errors
-/// When nothing meets the goal, or a stage fails.
-pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Choice, StudyError> {
+/// When a stage fails.
+pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Answer, StudyError> {
     let axes: Vec<Vec<&Setting>> = sweeps.iter().map(candidates).filter(|axis| !axis.is_empty()).collect();
     let names: Vec<&'static str> =
         sweeps.iter().filter(|sweep| !candidates(sweep).is_empty()).map(|sweep| sweep.axis).collect();
-    if axes.is_empty() {
-        let best = "none of the axes that were swept can be set in a scene file".to_owned();
-        return Err(StudyError::NoChoice { goal: words(goal), best });
-    }
     let references: Vec<&Setting> = sweeps.iter().flat_map(reference).collect();
     let exact = bench.evaluate(settings(bench, &references))?.images(&bench.point());
     let mut asked = match goal {
         Goal::Within(error) => error,
         Goal::Seconds(_) => f64::INFINITY,
     };
+    let mut least = f64::INFINITY;
     for _ in 0..ATTEMPTS {
         let found = match goal {
             Goal::Within(_) => best(&axes, &|_, error| error <= asked, &|seconds, error| (seconds, error)),
@@ -76,10 +86,11 @@ pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Choice,
             Difference::of_all(&exact, &bench.evaluate(settings(bench, &found))?.images(&bench.point()));
         let (seconds, foretold) = sums(&found);
         if matches!(goal, Goal::Within(most) if error.relative > most) {
+            least = least.min(error.relative);
             asked *= TIGHTER;
             continue;
         }
-        return Ok(Choice {
+        return Ok(Ok(Choice {
             goal: words(goal),
             settings: names.iter().copied().zip(found.iter().map(|setting| setting.name.clone())).collect(),
             keys: found.iter().filter_map(|setting| setting.choose).collect(),
@@ -87,23 +98,32 @@ pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Choice,
             foretold,
             seconds,
             reference_seconds: sums(&references).0,
-        });
+        }));
     }
-    let least =
-        axes.iter().map(|axis| axis.iter().map(|s| seconds_of(s)).fold(f64::INFINITY, f64::min)).sum::<f64>();
-    let best = match goal {
-        Goal::Within(_) => {
-            "no combination of the settings that were swept comes that near to the reference".to_owned()
+    let least = match goal {
+        Goal::Within(_) if least.is_finite() => {
+            format!("those tried are off by {:.4}% or more", 100.0 * least)
         }
-        Goal::Seconds(_) => format!("the cheapest take {least:.3} s"),
+        Goal::Within(_) => "no settings' errors sum to so little".to_owned(),
+        Goal::Seconds(_) => {
+            let cheapest = best(&axes, &|_, _| true, &|seconds, error| (seconds, error));
+            cheapest.map_or_else(String::new, |cheapest| least_time(&names, &cheapest))
+        }
     };
-    Err(StudyError::NoChoice { goal: words(goal), best })
+    Ok(Err(Missed { goal: words(goal), least }))
+}
+
+/// What the cheapest settings take, in words.
+fn least_time(names: &[&str], cheapest: &[&Setting]) -> String {
+    let settings = names.iter().zip(cheapest).map(|(axis, setting)| format!("{axis} {}", setting.name));
+    let settings: Vec<String> = settings.collect();
+    format!("the cheapest take {:.3} ms ({})", 1e3 * sums(cheapest).0, settings.join(", "))
 }
 
 fn words(goal: Goal) -> String {
     match goal {
         Goal::Within(error) => format!("within {:.4}%", 100.0 * error),
-        Goal::Seconds(seconds) => format!("within {:.1} ms", 1e3 * seconds),
+        Goal::Seconds(seconds) => format!("within {} ms", number(1e3 * seconds, 3)),
     }
 }
 
@@ -131,7 +151,8 @@ fn settings(bench: &Bench<'_>, chosen: &[&Setting]) -> Settings {
 
 /// The seconds of a setting, where its cost is a time; operations of a shader take none of it.
 fn seconds_of(setting: &Setting) -> f64 {
-    setting.time.map_or(0.0, |time| time.seconds.median)
+    // Of what a scene file can have, whatever was timed has its cost in seconds.
+    setting.time.map_or(0.0, |_| setting.cost)
 }
 
 /// Seconds, and the root of the sum of squared errors.

@@ -6,43 +6,51 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::axis::{Setting, Sweep};
-use super::choose::Choice;
+use super::choose::{Choice, Missed};
 use super::{Tradeoff, page};
 use crate::output::{self, OutputError};
 use crate::study::StudyError;
+use crate::study::leftovers::Leftovers;
+use crate::study::reference::{psnr_in_csv, psnr_in_words};
+use crate::study::timing::Timed;
 
-/// Write `results.csv`, `results.json`, `report.html` and a plot for each axis, `<axis>.svg`. What was written.
+/// What the CLI adds: the scene with what was chosen.
+pub const CHOSEN: &str = "scene.toml";
+
+/// Write `results.csv`, `results.json`, `report.html` and a plot for each axis, `<axis>.svg`; what an earlier
+/// tradeoff left there and this one does not write anew goes. What was written.
 ///
 /// # Errors
 /// When a file cannot be written; each is whole or not there.
 pub fn write(folder: &Path, scene: &str, tradeoff: &Tradeoff) -> Result<Vec<PathBuf>, StudyError> {
+    let earlier = Leftovers::of(folder);
+    let plot = |sweep: &Sweep| (format!("{}.svg", sweep.axis), page::plot(sweep).file());
     let mut files = vec![
         ("results.csv".to_owned(), csv(&tradeoff.sweeps)),
-        ("results.json".to_owned(), json(scene, tradeoff).map_err(|e| OutputError::new(folder, &e))?),
         ("report.html".to_owned(), page::page(scene, tradeoff)),
     ];
-    files.extend(
-        tradeoff.sweeps.iter().map(|sweep| (format!("{}.svg", sweep.axis), page::plot(sweep).file())),
-    );
+    files.extend(tradeoff.sweeps.iter().map(plot));
+    let mut names: Vec<String> = files.iter().map(|(name, _)| name.clone()).collect();
+    names.extend(tradeoff.choice().map(|_| CHOSEN.to_owned()));
+    let json = json(scene, tradeoff, &names).map_err(|e| OutputError::new(folder, &e))?;
+    files.push(("results.json".to_owned(), json));
     let mut written = Vec::new();
     for (name, text) in files {
         output::write(&folder.join(&name), text.as_bytes())?;
         written.push(folder.join(name));
     }
+    earlier.remove(&names)?;
     Ok(written)
 }
 
 fn csv(sweeps: &[Sweep]) -> String {
     let mut text = String::from(
-        "axis,setting,relative_rms,linear_rms,psnr_db,flip,cost,unit,seconds,seconds_lower,seconds_upper,reference,front,counts\n",
+        "axis,setting,relative_rms,linear_rms,psnr_db,flip,cost,unit,seconds,seconds_lower,seconds_upper,rounds,reference,front,counts\n",
     );
     for sweep in sweeps {
         for Setting { name, error, cost, time, counts, reference, front, .. } in &sweep.settings {
             let score = |x: Option<f64>| x.map_or_else(String::new, |x| format!("{x:.5}"));
-            let time = time.map_or_else(
-                || ",,".to_owned(),
-                |t| format!("{:.6},{:.6},{:.6}", t.seconds.median, t.seconds.lower, t.seconds.upper),
-            );
+            let time = time.map_or_else(|| ",,,".to_owned(), columns);
             let counts: Vec<String> =
                 counts.iter().map(|(name, n)| format!("{} {n}", name.replace(',', ""))).collect();
             let _ = writeln!(
@@ -52,7 +60,7 @@ fn csv(sweeps: &[Sweep]) -> String {
                 name.replace(',', ";"),
                 error.relative,
                 error.linear,
-                score(error.psnr),
+                psnr_in_csv(error.psnr),
                 score(error.flip),
                 sweep.cost,
                 counts.join("; ")
@@ -62,16 +70,25 @@ fn csv(sweeps: &[Sweep]) -> String {
     text
 }
 
-fn json(scene: &str, tradeoff: &Tradeoff) -> Result<String, serde_json::Error> {
+/// The median, its quartiles where it was run more than once, and how often it was.
+fn columns(time: Timed) -> String {
+    let quartiles = time.quartiles().map_or_else(|| ",".to_owned(), |[a, b]| format!("{a:.6},{b:.6}"));
+    format!("{:.6},{quartiles},{}", time.seconds.median, time.rounds)
+}
+
+fn json(scene: &str, tradeoff: &Tradeoff, files: &[String]) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
     struct File<'a> {
         scene: &'a str,
         axes: &'a [Sweep],
         choice: Option<&'a Choice>,
+        missed: Option<&'a Missed>,
         warnings: &'a [String],
+        files: &'a [String],
     }
-    let Tradeoff { sweeps, choice, warnings } = tradeoff;
-    Ok(serde_json::to_string_pretty(&File { scene, axes: sweeps, choice: choice.as_ref(), warnings })? + "\n")
+    let Tradeoff { sweeps, warnings, .. } = tradeoff;
+    let (choice, missed) = (tradeoff.choice(), tradeoff.missed());
+    Ok(serde_json::to_string_pretty(&File { scene, axes: sweeps, choice, missed, warnings, files })? + "\n")
 }
 
 /// The tables on standard output.
@@ -99,7 +116,7 @@ pub fn table(tradeoff: &Tradeoff) -> String {
                 "  {:width$}  {:>10.4} {:>8} {:>8} {:>12}{mark}",
                 setting.name,
                 100.0 * setting.error.relative,
-                score(setting.error.psnr, 2),
+                psnr_in_words(setting.error.psnr),
                 score(setting.error.flip, 5),
                 if sweep.cost == "seconds" {
                     format!("{:.4}", setting.cost)
@@ -109,7 +126,7 @@ pub fn table(tradeoff: &Tradeoff) -> String {
             );
         }
     }
-    if let Some(choice) = &tradeoff.choice {
+    if let Some(choice) = tradeoff.choice() {
         let settings: Vec<String> =
             choice.settings.iter().map(|(axis, name)| format!("{axis} {name}")).collect();
         let _ = writeln!(text, "{}: {}", choice.goal, settings.join(", "));

@@ -18,7 +18,7 @@ use super::StudyError;
 use crate::progress;
 use axis::{Axis, Sweep};
 use bench::Bench;
-use choose::{Choice, Goal, choose};
+use choose::{Answer, Choice, Goal, Missed, choose};
 
 /// What is to be swept, and how.
 #[derive(Clone, Debug, Default)]
@@ -38,16 +38,30 @@ pub struct TradeoffOptions {
 pub struct Tradeoff {
     /// The sweeps, in the order of documentation.
     pub sweeps: Vec<Sweep>,
-    /// The settings that meet the goal, where there is one.
-    pub choice: Option<Choice>,
+    /// The settings that meet the goal, where there is one, or that none do.
+    pub answer: Option<Answer>,
     /// What the user should know.
     pub warnings: Vec<String>,
+}
+
+impl Tradeoff {
+    /// The settings that meet the goal.
+    #[must_use]
+    pub fn choice(&self) -> Option<&Choice> {
+        self.answer.as_ref()?.as_ref().ok()
+    }
+
+    /// That no settings meet the goal.
+    #[must_use]
+    pub fn missed(&self) -> Option<&Missed> {
+        self.answer.as_ref()?.as_ref().err()
+    }
 }
 
 /// Sweep a scene's axes.
 ///
 /// # Errors
-/// When a stage refuses its input, or nothing meets the goal.
+/// When a stage refuses its input, or there is a goal and nothing to choose.
 pub fn tradeoff(scene: &Path, options: &TradeoffOptions) -> Result<Tradeoff, StudyError> {
     let bench = Bench::new(scene, options.params.as_deref(), options.cache.as_deref())?;
     let wanted =
@@ -65,6 +79,7 @@ pub fn tradeoff(scene: &Path, options: &TradeoffOptions) -> Result<Tradeoff, Stu
     if !idle.is_empty() {
         warnings.push(format!("Left out, as the scene does not ask for it: {}.", idle.join("; ")));
     }
+    check_goal(options.goal, &axes)?;
     let bar = progress::bar("axes", axes.len() as u64);
     let mut sweeps = Vec::new();
     for axis in axes {
@@ -73,6 +88,21 @@ pub fn tradeoff(scene: &Path, options: &TradeoffOptions) -> Result<Tradeoff, Stu
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let choice = options.goal.map(|goal| choose(&bench, &sweeps, goal)).transpose()?;
-    Ok(Tradeoff { sweeps, choice, warnings })
+    let answer = options.goal.map(|goal| choose(&bench, &sweeps, goal)).transpose()?;
+    Ok(Tradeoff { sweeps, answer, warnings })
+}
+
+/// Refuse a goal that no sweep of these axes could meet, before anything is measured.
+fn check_goal(goal: Option<Goal>, axes: &[&dyn Axis]) -> Result<(), StudyError> {
+    let goal = match goal {
+        Some(Goal::Within(_)) => "--within",
+        Some(Goal::Seconds(_)) => "--budget",
+        None => return Ok(()),
+    };
+    if axes.iter().any(|axis| axis.settable()) {
+        return Ok(());
+    }
+    let names = |axes: &[&dyn Axis]| axes.iter().map(|axis| axis.name()).collect::<Vec<_>>().join(", ");
+    let settable: Vec<&dyn Axis> = axes::all().into_iter().filter(|axis| axis.settable()).collect();
+    Err(StudyError::NothingToSet { goal, swept: names(axes), settable: names(&settable) })
 }

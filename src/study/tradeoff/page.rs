@@ -6,8 +6,10 @@ use super::Tradeoff;
 use super::axis::{Setting, Sweep};
 use super::choose::Choice;
 use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
-use crate::report::plot::{Dot, Plot};
+use crate::report::plot::{Dot, Joined, Plot};
 use crate::report::{count, number, seconds};
+use crate::study::timing::Timed;
+use crate::study::titles::title;
 
 /// Errors of so much of the image's root mean square are told of each axis.
 const TOLD: [f64; 2] = [0.01, 0.001];
@@ -19,7 +21,11 @@ pub fn page(scene: &str, tradeoff: &Tradeoff) -> String {
     for warning in &tradeoff.warnings {
         let _ = write!(main, "<p class=\"quiet\">{}</p>", escape(warning));
     }
-    if let Some(choice) = &tradeoff.choice {
+    if let Some(missed) = tradeoff.missed() {
+        let words = format!("<p>No settings are {}: {}.</p>", escape(&missed.goal), escape(&missed.least));
+        main += &section("choice", &format!("No settings {}", missed.goal), &words);
+    }
+    if let Some(choice) = tradeoff.choice() {
         main += &section("choice", &format!("Settings {}", choice.goal), &chosen(choice));
     }
     main += &section("summary", "The cheapest setting of each axis", &summary(&tradeoff.sweeps));
@@ -30,7 +36,7 @@ pub fn page(scene: &str, tradeoff: &Tradeoff) -> String {
     let lead = "Each approximation swept by itself, all else as the scene has it. The error is the root mean square difference of the \
                 images in linear radiance, relative to the reference's own root mean square, over all views; the cost is beside it."
         .to_owned();
-    Page { kind: "tradeoff", title: scene, lead, tiles: tiles(tradeoff), main }.html()
+    Page { kind: "tradeoff", title: &title(scene), lead, tiles: tiles(tradeoff), main }.html()
 }
 
 fn tiles(tradeoff: &Tradeoff) -> String {
@@ -43,7 +49,7 @@ fn tiles(tradeoff: &Tradeoff) -> String {
         ("on a front", front.to_string()),
     ];
     let mut html: String = tiles.iter().map(|(name, value)| tile(name, value, "")).collect();
-    if let Some(choice) = &tradeoff.choice {
+    if let Some(choice) = tradeoff.choice() {
         html +=
             &tile("error", &format!("{}%", number(100.0 * choice.error.relative, 3)), &escape(&choice.goal));
         html += &tile(
@@ -135,13 +141,9 @@ fn axis(sweep: &Sweep) -> String {
     let mut table = Table::new(&columns);
     for setting in &sweep.settings {
         let time = setting.time.map_or_else(Cell::none, |time| {
-            let half = 0.5 * (time.seconds.upper - time.seconds.lower);
-            // What was run once has no spread to tell of.
-            let spread = if half == 0.0 { "once".to_owned() } else { format!("± {}", seconds(half)) };
-            Cell::value(
-                format!("{} <span class=\"pm inline\">{spread}</span>", seconds(time.seconds.median)),
-                time.seconds.median,
-            )
+            // What it costs is a median, or of bakes the least; operations and bits are no times.
+            let own = if sweep.cost == "seconds" { setting.cost } else { time.seconds.median };
+            Cell::value(format!("{} <span class=\"pm inline\">{}</span>", seconds(own), spread(time)), own)
         });
         let mut cells = vec![
             Cell::text(&setting.name),
@@ -177,6 +179,15 @@ fn axis(sweep: &Sweep) -> String {
     )
 }
 
+/// The quartiles of a time.
+fn spread(time: Timed) -> String {
+    match time.quartiles() {
+        Some([lower, upper]) => format!("{} to {}", seconds(lower), seconds(upper)),
+        // What was run once has no spread to tell of.
+        None => "once".to_owned(),
+    }
+}
+
 /// Error against cost.
 #[must_use]
 pub fn plot(sweep: &Sweep) -> Plot<'_> {
@@ -199,26 +210,27 @@ pub fn plot(sweep: &Sweep) -> Plot<'_> {
         log_x: true,
         dots: sweep.settings.iter().map(dot).collect(),
         series: Vec::new(),
-        joined: true,
+        joined: Joined::Front,
     }
 }
 
-/// How far above the best loss each run was after so many passes.
+/// How far above the best loss each run was after so many seconds.
 fn traces(sweep: &Sweep) -> String {
     let all = || sweep.traces.iter().flat_map(|trace| &trace.points);
     let best = all().map(|point| point.2).fold(f64::INFINITY, f64::min);
     let mut dots = Vec::new();
     for (series, trace) in sweep.traces.iter().enumerate() {
-        // Beyond some dots a curve is as clear.
-        let every = trace.points.len().div_ceil(60).max(1);
+        // Beyond some points a curve is as clear.
+        let every = trace.points.len().div_ceil(120).max(1);
         for (i, (passes, took, loss)) in trace.points.iter().enumerate() {
-            if i % every == 0 || i + 1 == trace.points.len() {
+            let last = i + 1 == trace.points.len();
+            if i % every == 0 || last {
                 dots.push(Dot {
-                    x: *passes as f64,
+                    x: *took,
                     y: (loss - best).max(0.0),
-                    label: if i + 1 == trace.points.len() { trace.name.clone() } else { String::new() },
+                    label: if last { trace.name.clone() } else { String::new() },
                     title: format!(
-                        "{}: loss {} after {passes} passes, {}",
+                        "{}: loss {} after {}, {passes} passes",
                         trace.name,
                         number(*loss, 5),
                         seconds(*took)
@@ -230,12 +242,12 @@ fn traces(sweep: &Sweep) -> String {
         }
     }
     let plot = Plot {
-        x: "passes over the samples",
+        x: "seconds",
         y: "loss above the best",
         log_x: true,
         dots,
         series: sweep.traces.iter().map(|trace| trace.name.clone()).collect(),
-        joined: false,
+        joined: Joined::Series,
     };
     format!("<h3>The loss on the way</h3>{}{}", plot.svg(), plot.legend())
 }
@@ -249,7 +261,8 @@ fn method(scene: &str) -> String {
     ]
     .map(|(name, text)| (name.to_owned(), text));
     format!(
-        "<p>Times are medians of rounds in which all settings of an axis take turns, with half the distance of their quartiles; a bake or a trace of more than half a second is run once. Counts \
+        "<p>Times are of rounds in which all settings of an axis take turns, after one that warms up: of bakes, traces and passes the \
+         least, of fits the median, with the rounds' quartiles beside them; what takes more than 3 s is run once. Counts \
          stand beside them, as they are the same on every machine. Filled dots are on the front: nothing is both as cheap and as \
          accurate; the dashed line joins them. Dots on the line marked 0 have no error at all.</p>{}",
         facts(&rows)

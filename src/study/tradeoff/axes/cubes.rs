@@ -60,6 +60,10 @@ impl Axis for CubeSize {
         asked.then_some(()).ok_or("no effect looks this cube up")
     }
 
+    fn settable(&self) -> bool {
+        true
+    }
+
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let swept = Swept {
             axis: self.name,

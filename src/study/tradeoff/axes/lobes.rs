@@ -23,6 +23,10 @@ impl Axis for Density {
         asked.then_some(()).ok_or("no effect looks the specular cube up")
     }
 
+    fn settable(&self) -> bool {
+        true
+    }
+
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let mut point = bench.point();
         let exponent = point.params.scalar(Param::SpecularLobe);

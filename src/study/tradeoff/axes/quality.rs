@@ -8,8 +8,9 @@ use crate::study::timing::{Job, Rounds, interleaved};
 use crate::study::tradeoff::axis::{Choose, Knob, Setting, Sweep, mark_front};
 use crate::study::tradeoff::bench::{Bench, Settings, baked};
 
-/// Seconds from which on a job is run once.
-const LONG: f64 = 0.5;
+/// How bakes, traces and fits are timed. What takes longer than a few seconds is run once: what disturbs it for a
+/// moment does not show in it. Of the others three rounds are the fewest with a middle.
+pub(super) const ROUNDS: Rounds = Rounds { long: 3.0, least: 3, most: 7, seconds: 1.0 };
 
 /// A number of the `[quality]` table to be swept.
 pub(super) struct Swept<'a> {
@@ -41,32 +42,22 @@ impl Swept<'_> {
         for &value in self.values {
             images.push(bench.evaluate(self.settings(bench, value))?.images(point));
         }
-        let mut times: Vec<Box<dyn FnMut() -> Result<f64, StudyError> + '_>> = Vec::new();
+        let mut works: Vec<Box<dyn FnMut() -> Result<f64, StudyError> + '_>> = Vec::new();
         for &value in self.values {
             let settings = self.settings(bench, value);
-            let mut before: Option<f64> = None;
-            times.push(Box::new(move || {
-                let seconds = match before {
-                    // So long a job is not run again: what disturbs it for a moment does not show in it.
-                    Some(seconds) if seconds > LONG => seconds,
-                    _ => work(settings)?,
-                };
-                before = Some(seconds);
-                Ok(seconds)
-            }));
+            works.push(Box::new(move || work(settings)));
         }
         let mut jobs: Vec<Job<'_, StudyError>> =
-            times.iter_mut().map(|job| &mut **job as Job<'_, StudyError>).collect();
-        // A bake may take seconds: two rounds are the fewest that show a spread.
-        let rounds = Rounds { warm_up: 0, least: 2, most: 7, seconds: 1.0 };
-        let timed = interleaved(rounds, &mut jobs)?;
+            works.iter_mut().map(|job| &mut **job as Job<'_, StudyError>).collect();
+        let timed = interleaved(ROUNDS, &mut jobs)?;
         drop(jobs);
         let reference = images.len() - 1;
         let setting = |(i, &value): (usize, &u32)| Setting {
             name: value.to_string(),
             choose: Some(Choose::Quality(self.knob, value)),
             error: Difference::of_all(&images[reference], &images[i]),
-            cost: timed[i].seconds.median,
+            // The work is the same each time: what is more than the least was another program's.
+            cost: timed[i].least,
             time: Some(timed[i]),
             counts: vec![(self.count.0, (self.count.1)(value))],
             reference: i == reference,

@@ -20,6 +20,10 @@ impl Axis for Rays {
         asked.then_some(()).ok_or("no effect asks for occlusion")
     }
 
+    fn settable(&self) -> bool {
+        true
+    }
+
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let vertices = bench.prepared.scene.mesh.positions.len() as f64;
         let swept = Swept {

@@ -19,6 +19,10 @@ impl Axis for Samples {
         Ok(())
     }
 
+    fn settable(&self) -> bool {
+        true
+    }
+
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let point = bench.point();
         let pixels: u32 =

@@ -28,6 +28,10 @@ impl Axis for Silhouettes {
         asked.then_some(()).ok_or("no effect asks for the silhouette")
     }
 
+    fn settable(&self) -> bool {
+        true
+    }
+
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let own = Remeshed::of(bench)?;
         let coarser = std::iter::successors(own.coarser(), Remeshed::coarser).take(COARSER);

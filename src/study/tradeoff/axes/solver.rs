@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 
+use super::quality::ROUNDS;
 use crate::engine::Point;
 use crate::engine::cpu::CpuEngine;
 use crate::fit::outcome::Outcome;
@@ -9,7 +10,7 @@ use crate::fit::{self, FitOptions, SolverKind};
 use crate::study::StudyError;
 use crate::study::reference::Difference;
 use crate::study::subject::Subject;
-use crate::study::timing::{Job, Rounds, interleaved};
+use crate::study::timing::{Job, interleaved};
 use crate::study::tradeoff::axis::{Axis, Setting, Sweep, Trace, mark_front};
 use crate::study::tradeoff::bench::Bench;
 
@@ -87,8 +88,7 @@ impl Fits {
         }
         let mut jobs: Vec<Job<'_, StudyError>> =
             works.iter_mut().map(|job| &mut **job as Job<'_, StudyError>).collect();
-        // The slowest take minutes of passes; the others are taken several times.
-        let timed = interleaved(Rounds { warm_up: 0, least: 1, most: 3, seconds: 4.0 }, &mut jobs)?;
+        let timed = interleaved(ROUNDS, &mut jobs)?;
         drop(jobs);
         drop(works);
         let outcomes: Vec<(Outcome, u64)> = outcomes.into_iter().filter_map(RefCell::into_inner).collect();
