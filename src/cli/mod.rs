@@ -5,6 +5,7 @@
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
+//! - `interrupt`: Ctrl-C
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
 mod ablate;
@@ -15,6 +16,7 @@ mod fit;
 mod fit_engine;
 mod fitted_scene;
 mod info;
+mod interrupt;
 mod maps;
 mod params;
 mod render;

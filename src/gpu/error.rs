@@ -56,7 +56,7 @@ pub enum GpuError {
     },
     /// A buffer is beyond the adapter's limit.
     #[error(
-        "adapter {adapter}: the {what} takes {bytes} bytes, but a buffer may have {limit} at most there. Use a smaller mesh or fewer morph targets, choose another adapter with --adapter, or take --engine cpu."
+        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there. Use a smaller mesh or fewer morph targets, choose another adapter with --adapter, or take --engine cpu."
     )]
     BufferSize {
         /// The adapter.
