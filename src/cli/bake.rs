@@ -99,7 +99,7 @@ fn write_cube(folder: &Path, name: &str, cube: &Cube<f32>) -> Result<(), Refusal
 }
 
 /// A column for each morph target that has a weight; the others are not baked.
-fn occlusion_csv(occlusion: &VertexOcclusion) -> String {
+pub(super) fn occlusion_csv(occlusion: &VertexOcclusion) -> String {
     let mut text = "vertex,open".to_owned();
     let baked = || occlusion.morphs.iter().enumerate().filter(|(_, set)| !set.is_empty());
     for (morph, _) in baked() {

@@ -1,14 +1,14 @@
 //! `skinfit fit`: a scene goes in, fitted constants come out, with the evidence of how good they are.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use super::fingerprint::fingerprint;
 use super::fit_engine::{Chosen, FitEngine, FitEngineArguments};
 use super::fitted_scene::{Changes, Start};
-use super::maps::MapArguments;
+use super::interrupt::Interrupt;
+use super::maps::{MapArguments, MapRun, MapsLeft};
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings};
@@ -18,6 +18,7 @@ use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::params_file::ParamsFile;
 use crate::fit::state::Saved;
 use crate::fit::{self, FitError, FitOptions, SolverKind};
+use crate::output::OutputError;
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::progress;
 use crate::render::image::Image;
@@ -92,19 +93,21 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let solving = Solving::of(arguments, folder.path())?;
     let observed = if own { prepared.keep_targets().map(|()| None) } else { prepared.observed().map(Some) }?;
     tell_warnings(&prepared.warnings);
+    let interrupt = Interrupt::default();
     let (observed, maps) = match observed {
-        Some(observed) => {
-            let adapter = arguments.engine.adapter();
-            let (observed, maps) = arguments.maps.fit(&mut prepared, observed, adapter)?;
+        Some(observed) if arguments.maps.any() => {
+            let (adapter, quiet) = (arguments.engine.adapter(), arguments.json);
+            let run = MapRun { adapter, interrupt: interrupt.watch(), quiet };
+            let (observed, maps) = arguments.maps.fit(&mut prepared, observed, &run)?;
             (Some(observed), maps)
         }
-        None => (None, None),
+        observed => (observed, None),
     };
     arguments.engine.with_engine(&prepared, observed, |chosen| {
-        let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine)?;
+        let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine, &interrupt)?;
         folder.keep();
         let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
-        let fitted = Fitted { path: &path, maps: &maps.unwrap_or_default() };
+        let fitted = Fitted { path: &path, maps: maps.as_ref() };
         conclude(arguments, solving, &folder, fitted, &prepared, chosen, &outcome)
     })
 }
@@ -135,11 +138,11 @@ impl Solving {
 /// What a fit goes on from, in its run folder.
 const STATE: &str = "state.json";
 
-/// The scene file that was fitted, and the files of fitted maps: key in `[maps]` and path.
+/// The scene file that was fitted, and what was left of its maps.
 #[derive(Clone, Copy)]
 struct Fitted<'a> {
     path: &'a Path,
-    maps: &'a [(&'static str, String)],
+    maps: Option<&'a MapsLeft>,
 }
 
 /// Leave the run folder's files, and tell how it ended.
@@ -160,9 +163,16 @@ fn conclude(
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
-    folder.write_scene(path, Changes { maps, ..changes(arguments, prepared) })?;
+    let maps_named = maps.map_or(&[][..], |left| &left.named);
+    let named = folder.write_scene(path, Changes { maps: maps_named, ..changes(arguments, prepared) })?;
     params_file(prepared, outcome).write(&folder.path().join("params.toml"), path, Some(outcome))?;
-    let run = RunInfo { seconds, ..run_info(arguments, solving, path, prepared, engine, views) };
+    let mut run = RunInfo { seconds, named, ..run_info(arguments, solving, path, prepared, engine, views) };
+    if let Some(left) = maps {
+        tell_warnings(&left.warnings);
+        run.warnings.extend(left.warnings.iter().cloned());
+        run.provenance.extend(left.provenance.iter().cloned());
+        run.maps = Some(left.evidence.clone());
+    }
     let report = report::write_run(folder.path(), &run, outcome)?;
     if arguments.json {
         say(report.json.trim_end())?;
@@ -177,7 +187,11 @@ fn conclude(
         }
         say(&format!("{}: final loss {:.6e}", folder.path().display(), outcome.loss_end))?;
     }
-    if let Some(advice) = advice(outcome) {
+    let advice = match maps {
+        Some(left) => advice_on_maps(arguments, folder.path(), left, outcome),
+        None => advice(outcome),
+    };
+    if let Some(advice) = advice {
         tell(&format!("{}: {advice}", folder.path().display()));
         return Ok(Exit::Failed);
     }
@@ -190,7 +204,8 @@ fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> 
     let start = Start { form: *form, params, free: &fit.free };
     Changes {
         loss: arguments.loss.as_deref(),
-        start: arguments.params.as_ref().map(|_| start),
+        // Where maps are fitted, the constants start from what their last round found.
+        start: (arguments.params.is_some() || arguments.maps.any()).then_some(start),
         ..Changes::default()
     }
 }
@@ -214,6 +229,30 @@ fn advice(outcome: &Outcome) -> Option<String> {
     }
 }
 
+/// What to do about a fit of maps that did not end well: no state of it is kept.
+fn advice_on_maps(
+    arguments: &Arguments,
+    folder: &Path,
+    left: &MapsLeft,
+    outcome: &Outcome,
+) -> Option<String> {
+    if left.evidence.interrupted {
+        return Some(format!("the fit of the maps was interrupted. {}", arguments.maps.advice(folder)));
+    }
+    let iterations = outcome.iterations;
+    match outcome.ending {
+        Ending::Interrupted => Some(format!(
+            "the last solve of the constants was interrupted after {iterations} iterations; the maps are fitted. {}",
+            arguments.maps.advice(folder)
+        )),
+        Ending::RanOut => Some(format!(
+            "the last solve of the constants ran out after {iterations} iterations and has not converged. Fit again \
+             with a greater --max-iterations."
+        )),
+        Ending::Converged | Ending::Stalled => advice(outcome),
+    }
+}
+
 /// The fitted parameters, to be used again.
 fn params_file(prepared: &Prepared, outcome: &Outcome) -> ParamsFile {
     let names = prepared.scene.views.iter().map(|view| view.name.clone());
@@ -233,17 +272,19 @@ fn solve(
     folder: &RunFolder,
     prepared: &Prepared,
     engine: &FitEngine<'_>,
+    interrupt: &Interrupt,
 ) -> Result<Outcome, Refusal> {
-    let interrupt = Arc::new(AtomicBool::new(false));
-    let flag = Arc::clone(&interrupt);
-    // Refused only if a handler is there already; then Ctrl-C ends the program as it always did.
-    let _ = ctrlc::set_handler(move || {
-        // Pressed twice, it is meant at once; the state is at most a second old.
-        if flag.swap(true, Ordering::SeqCst) {
-            std::process::exit(1);
-        }
-    });
     let state = folder.path().join(STATE);
+    let maps = arguments.maps.any();
+    if maps {
+        // A state holds no maps: what could be resumed from one is another fit, and so is that of an earlier run.
+        match std::fs::remove_file(&state) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(OutputError::new(&state, &error).into());
+            }
+            _ => {}
+        }
+    }
     let options = FitOptions {
         solver: solving.solver,
         max_iterations: arguments.max_iterations,
@@ -251,8 +292,8 @@ fn solve(
         seed: solving.seed,
         fingerprint: fingerprint(&prepared.scene, arguments.maps.words()),
         resume: arguments.resume.then(|| state.clone()),
-        state: Some(state),
-        interrupt: Some(interrupt),
+        state: (!maps).then_some(state),
+        interrupt: Some(interrupt.watch()),
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");
@@ -350,6 +391,8 @@ fn run_info(
         .into_iter()
         .chain(engine.provenance())
         .collect(),
+        maps: None,
+        named: Vec::new(),
     }
 }
 

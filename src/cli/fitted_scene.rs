@@ -1,13 +1,16 @@
 //! The text of a scene file as it was fitted: comments and order stay, paths become absolute, and what
 //! the command line said stands in the place of the file's own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, TomlError, Value};
 
 use crate::model::effects::Form;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::study::tradeoff::axis::Choose;
+
+/// The keys of `[maps]` that name files.
+const MAPS: [&str; 4] = ["color", "normal", "specular", "attenuator"];
 
 /// What the command line changed.
 #[derive(Clone, Copy, Default)]
@@ -37,11 +40,7 @@ pub(super) struct Start<'a> {
 /// When it is not TOML.
 pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Result<String, TomlError> {
     let mut scene: DocumentMut = text.parse()?;
-    let files = [
-        ("mesh", &["file"][..]),
-        ("environment", &["file"]),
-        ("maps", &["color", "normal", "specular", "attenuator"]),
-    ];
+    let files = [("mesh", &["file"][..]), ("environment", &["file"]), ("maps", &MAPS)];
     for (name, keys) in files {
         if let Some(table) = scene.get_mut(name).and_then(Item::as_table_like_mut) {
             make_absolute(table, keys, folder);
@@ -84,6 +83,14 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
         }
     }
     Ok(scene.to_string())
+}
+
+/// The files that the text of a fitted scene names as its maps.
+pub(super) fn named_maps(text: &str) -> Vec<PathBuf> {
+    let scene: DocumentMut = text.parse().unwrap_or_default();
+    let maps = scene.get("maps").and_then(Item::as_table_like);
+    let paths = maps.into_iter().flat_map(|maps| MAPS.into_iter().filter_map(|key| maps.get(key)?.as_str()));
+    paths.map(PathBuf::from).collect()
 }
 
 fn make_absolute(table: &mut dyn TableLike, keys: &[&str], folder: &Path) {

@@ -4,7 +4,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use super::fitted_scene::{Changes, as_fitted};
+use super::fitted_scene::{Changes, as_fitted, named_maps};
 use super::{Refusal, interrupt};
 use crate::output::{self, OutputError};
 
@@ -119,8 +119,8 @@ impl RunFolder {
     }
 
     /// The scene file as it was fitted, comments and all: its paths are made absolute, so that it can
-    /// be used from here, and `changes` stand in place of its own words.
-    pub(super) fn write_scene(&self, scene: &Path, changes: Changes<'_>) -> Result<(), Refusal> {
+    /// be used from here, and `changes` stand in place of its own words. Returns the maps that it names.
+    pub(super) fn write_scene(&self, scene: &Path, changes: Changes<'_>) -> Result<Vec<PathBuf>, Refusal> {
         let refused = |reason: String| {
             Refusal::new(format!(
                 "{}: changed while it was fitted: {reason}. Run the fit again.",
@@ -132,7 +132,8 @@ impl RunFolder {
         let folder = absolute.parent().unwrap_or(Path::new("/"));
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let text = as_fitted(&text, &folder, changes).map_err(|e| refused(e.message().to_owned()))?;
-        Ok(output::write(&self.path.join("scene.toml"), text.as_bytes())?)
+        output::write(&self.path.join("scene.toml"), text.as_bytes())?;
+        Ok(named_maps(&text))
     }
 }
 

@@ -64,7 +64,9 @@ pub enum GpuError {
         of: Oversized,
     },
     /// A buffer is beyond the adapter's limit.
-    #[error("adapter {adapter}: {what}: {bytes} bytes, but a buffer may have {limit} at most there.")]
+    #[error(
+        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there."
+    )]
     BufferSize {
         /// The adapter.
         adapter: String,

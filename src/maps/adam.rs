@@ -12,11 +12,18 @@ struct Texels {
     texels: Param<Tensor<2>>,
 }
 
-/// Improve layer `index` by `steps` steps of length `rate`; returns the loss before and after.
+/// Improve layer `index` by `steps` steps of length `rate`, fewer where `stopped` says so; returns the loss before and
+/// after.
 ///
 /// # Errors
 /// When the device does not take it, or the loss is not finite.
-pub fn solve(problem: &mut Problem, index: usize, steps: usize, rate: f64) -> Result<(f64, f64), MapError> {
+pub fn solve(
+    problem: &mut Problem,
+    index: usize,
+    steps: usize,
+    rate: f64,
+    stopped: &dyn Fn() -> bool,
+) -> Result<(f64, f64), MapError> {
     let prior = problem.layers[index].prior;
     let (lower, upper) = (prior.lower as f32, prior.upper as f32);
     let start = problem.layers[index].value.clone().clamp(lower, upper);
@@ -25,6 +32,9 @@ pub fn solve(problem: &mut Problem, index: usize, steps: usize, rate: f64) -> Re
     let mut module = Texels { texels: Param::from_tensor(start.autodiff()) };
     let mut optimiser = AdamConfig::new().init();
     for _ in 0..steps {
+        if stopped() {
+            break;
+        }
         let at = module.texels.val().inner();
         let (loss, slope) = problem.slope(index, &at)?;
         if loss < best.0 {

@@ -15,11 +15,16 @@ const MOST_GROWTH: f64 = 1e4;
 /// No step changes a texel by more than this.
 const MOST_CHANGE: f64 = 1e6;
 
-/// Improve layer `index` by at most `steps` steps; returns the loss before and after.
+/// Improve layer `index` by at most `steps` steps, fewer where `stopped` says so; returns the loss before and after.
 ///
 /// # Errors
 /// When the device does not take it, or the loss is not finite.
-pub fn solve(problem: &mut Problem, index: usize, steps: usize) -> Result<(f64, f64), MapError> {
+pub fn solve(
+    problem: &mut Problem,
+    index: usize,
+    steps: usize,
+    stopped: &dyn Fn() -> bool,
+) -> Result<(f64, f64), MapError> {
     let layer = &problem.layers[index];
     let (lower, upper) = (layer.prior.lower as f32, layer.prior.upper as f32);
     let bounded = |x: Tensor<2>| x.clamp(lower, upper);
@@ -29,6 +34,9 @@ pub fn solve(problem: &mut Problem, index: usize, steps: usize) -> Result<(f64, 
     let mut f = first;
     let mut last: Option<(Tensor<2>, f64)> = None;
     for _ in 0..steps {
+        if stopped() {
+            break;
+        }
         // Texels at a bound that the slope pushes against stay there.
         let free = free(&x, &g, lower, upper);
         let z = -g.clone() * inverse.clone() * free.clone();

@@ -1,14 +1,17 @@
 //! The rounds over maps and constants.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use burn::tensor::{Tensor, TensorData};
 
-use super::layer::{Grid, Layer, LayerParts};
-use super::problem::{Observed, Problem, read};
+use super::layer::Layer;
+use super::layers::{layers, take_back};
+use super::parts::{Cut, cuts, most_samples};
+use super::problem::{Observed, Problem};
 use super::{MapError, adam, cg};
-use crate::bake::rays::RayMesh;
-use crate::bake::{Illumination, LobeStack};
+use crate::bake::Illumination;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
@@ -16,15 +19,11 @@ use crate::fit::{self, FitOptions};
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
+use crate::samples::ViewSamples;
 use crate::samples::rows::Row;
-use crate::samples::{Hit, ViewSamples, sample_hits};
 use crate::scene::mesh::PosedMesh;
 use crate::scene::{MapKind, MapSolver, Scene};
-use crate::tensor::footprint::{cube_border, cube_pairs, edges, texel_pairs, texels, vertices};
-use crate::tensor::{Input, Scatter, Shade, Shaded, SharedDevice};
-
-/// Texels along a side of a map that the scene leaves out, where there is no other to go by.
-const MADE_SIZE: usize = 512;
+use crate::tensor::{Input, Inputs, Scatter, Shade, Shaded, SharedDevice, TensorError};
 
 /// What is to be fitted.
 pub struct MapTask<'a> {
@@ -46,6 +45,10 @@ pub struct MapTask<'a> {
     pub start: Point,
     /// What is free of them.
     pub unknowns: Vec<Unknown>,
+    /// Most samples that are shaded at once; else as many as the device's buffers hold.
+    pub most_samples: Option<usize>,
+    /// Set by somebody who wants the fit to stop after the present step.
+    pub interrupt: Option<Arc<AtomicBool>>,
 }
 
 /// What was found.
@@ -62,6 +65,8 @@ pub struct FittedMaps {
     pub observed: Vec<ObservedView>,
     /// How it went: for each round each layer and then the constants.
     pub history: Vec<MapStep>,
+    /// Whether somebody stopped it.
+    pub interrupted: bool,
 }
 
 /// One step of a round.
@@ -75,6 +80,8 @@ pub struct MapStep {
     pub before: f64,
     /// The loss after it.
     pub after: f64,
+    /// What of that are the map's priors, and not the images.
+    pub prior: f64,
     /// Seconds since the start.
     pub seconds: f64,
 }
@@ -97,59 +104,169 @@ pub fn fit_maps(
     told: &mut dyn FnMut(&MapStep),
 ) -> Result<FittedMaps, MapError> {
     let clock = Instant::now();
-    let Scene { form, silhouette, effects, fit: settings, .. } = task.scene;
-    let setup = Setup { form: *form, silhouette: *silhouette, effects: *effects };
-    let columns = all_columns();
-    let (initial, _) = solve_constants(
-        &task.unknowns,
-        setup,
-        &task.illumination,
-        &task.observed,
-        task.held_out,
-        &task.start,
-        settings.loss,
-    )?;
-    let mut constants = initial.clone();
-    let shaded =
-        Shaded { setup, params: &constants.params, columns: &columns, illumination: &task.illumination };
-    let views: Vec<&ViewSamples> = task.observed.iter().map(|view| &view.samples).collect();
-    let (shade, inputs) = Shade::new(shared, &shaded, &views, Scatter::Exact)?;
-    let layers = layers(shared, &task, &shade, constants.params.scalar(Param::SpecularLobe))?;
-    let mut problem = Problem::new(shared, shade, inputs, layers)?;
-    let (mut illumination, mut observed) = (task.illumination, task.observed);
-    let mut history: Vec<MapStep> = Vec::new();
-    for round in 1..=settings.maps.rounds {
-        let mut step = |what, (before, after)| {
-            let seconds = clock.elapsed().as_secs_f64();
-            history.push(MapStep { round, what, before, after, seconds });
-            history.iter().last().into_iter().for_each(&mut *told);
-        };
-        for index in 0..problem.layers.len() {
-            let seen = seen(&observed, &constants, task.held_out);
-            problem.reweight(shared, &seen, settings.loss)?;
-            let steps = settings.maps.steps as usize;
-            let losses = match settings.maps.solver {
-                MapSolver::ConjugateGradients => cg::solve(&mut problem, index, steps)?,
-                MapSolver::Adam => adam::solve(&mut problem, index, steps, settings.maps.rate)?,
-            };
-            shared.gpu().check().map_err(crate::tensor::TensorError::from)?;
-            step(problem.layers[index].name, losses);
+    let fixed = Fixed::of(&task);
+    let (initial, _) = fixed.solve_constants(&task.illumination, &task.observed, &task.start)?;
+    let problem = problem(shared, &task, fixed.setup, &initial)?;
+    let MapTask { scene, illumination, observed, .. } = task;
+    let mut rounds = Rounds {
+        shared,
+        fixed,
+        problem,
+        constants: initial.clone(),
+        illumination,
+        observed,
+        history: Vec::new(),
+        clock,
+        told,
+    };
+    for round in 1..=scene.fit.maps.rounds {
+        if !rounds.fixed.stopped() {
+            rounds.round(round)?;
         }
-        take_back(&problem, &mut observed, &mut illumination, &constants)?;
-        let (next, losses) = solve_constants(
-            &task.unknowns,
-            setup,
-            &illumination,
-            &observed,
-            task.held_out,
-            &constants,
-            settings.loss,
-        )?;
-        constants = next;
-        problem.inputs.columns = column_tensor(shared, &columns, &constants);
-        step("constants", losses);
     }
-    Ok(FittedMaps { layers: problem.layers, initial, constants, illumination, observed, history })
+    let interrupted = rounds.fixed.stopped();
+    let Rounds { problem, constants, illumination, observed, history, .. } = rounds;
+    Ok(FittedMaps {
+        layers: problem.layers,
+        initial,
+        constants,
+        illumination,
+        observed,
+        history,
+        interrupted,
+    })
+}
+
+/// The problem at the constants that the maps of the start ask for.
+fn problem(
+    shared: &SharedDevice,
+    task: &MapTask<'_>,
+    setup: Setup,
+    initial: &Point,
+) -> Result<Problem, MapError> {
+    let views: Vec<&ViewSamples> = task.observed.iter().map(|view| &view.samples).collect();
+    let cuts = cuts(&views, task.most_samples.unwrap_or_else(|| most_samples(shared)));
+    let columns = all_columns();
+    let shaded =
+        Shaded { setup, params: &initial.params, columns: &columns, illumination: &task.illumination };
+    let shade = |cut: &Cut| -> Result<(Shade, Inputs), TensorError> {
+        let part = cut.views(&views);
+        let part: Vec<&ViewSamples> = part.iter().map(AsRef::as_ref).collect();
+        Shade::new(shared, &shaded, &part, Scatter::Exact)
+    };
+    let parts = cuts.iter().map(shade).collect::<Result<Vec<_>, _>>()?;
+    let reads = |input: Input| parts.iter().all(|(shade, _)| shade.reads(input));
+    let layers = layers(shared, task, &cuts, &reads, initial.params.scalar(Param::SpecularLobe))?;
+    Ok(Problem::new(shared, parts, layers)?)
+}
+
+/// What is the same in every round.
+struct Fixed<'a> {
+    scene: &'a Scene,
+    setup: Setup,
+    unknowns: Vec<Unknown>,
+    held_out: Option<usize>,
+    interrupt: Option<Arc<AtomicBool>>,
+}
+
+impl<'a> Fixed<'a> {
+    fn of(task: &MapTask<'a>) -> Self {
+        let Scene { form, silhouette, effects, .. } = task.scene;
+        Self {
+            scene: task.scene,
+            setup: Setup { form: *form, silhouette: *silhouette, effects: *effects },
+            unknowns: task.unknowns.clone(),
+            held_out: task.held_out,
+            interrupt: task.interrupt.clone(),
+        }
+    }
+
+    fn stopped(&self) -> bool {
+        self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::SeqCst))
+    }
+
+    /// The best constants for the maps as they are, and the loss before and after.
+    fn solve_constants(
+        &self,
+        illumination: &Illumination,
+        observed: &[ObservedView],
+        start: &Point,
+    ) -> Result<(Point, (f64, f64)), MapError> {
+        let mut views = observed.to_vec();
+        if let Some(view) = self.held_out {
+            // It stays in its place, for the gains' sake, and counts nothing.
+            let groups = views[view].samples.groups();
+            views[view].weight = vec![Row::ZERO; groups];
+        }
+        let loss = self.scene.fit.loss;
+        let engine = CpuEngine::new(self.setup, illumination.clone(), views, loss, self.unknowns.clone());
+        let options = FitOptions { interrupt: self.interrupt.clone(), ..FitOptions::default() };
+        let outcome = fit::fit(&engine, start, &options, &mut |_| {})?;
+        Ok((outcome.end, (outcome.loss_start, outcome.loss_end)))
+    }
+}
+
+/// The rounds: where they are, and how they went.
+struct Rounds<'a, 't> {
+    shared: &'a SharedDevice,
+    fixed: Fixed<'a>,
+    problem: Problem,
+    constants: Point,
+    illumination: Illumination,
+    observed: Vec<ObservedView>,
+    history: Vec<MapStep>,
+    clock: Instant,
+    told: &'t mut dyn FnMut(&MapStep),
+}
+
+impl Rounds<'_, '_> {
+    /// Each layer, then the constants, as far as nobody interrupts.
+    fn round(&mut self, round: u32) -> Result<(), MapError> {
+        for index in 0..self.problem.layers.len() {
+            if !self.fixed.stopped() {
+                self.layer(round, index)?;
+            }
+        }
+        take_back(&self.problem, &mut self.observed, &mut self.illumination, &self.constants)?;
+        if self.fixed.stopped() { Ok(()) } else { self.solve_constants(round) }
+    }
+
+    fn layer(&mut self, round: u32, index: usize) -> Result<(), MapError> {
+        let settings = &self.fixed.scene.fit;
+        let held_out = self.fixed.held_out;
+        let of = |(i, view)| Observed { view, gain: self.constants.gains[i], counts: held_out != Some(i) };
+        let seen: Vec<Observed<'_>> = self.observed.iter().enumerate().map(of).collect();
+        self.problem.reweight(self.shared, &seen, settings.loss)?;
+        let (steps, stopped) = (settings.maps.steps as usize, || self.fixed.stopped());
+        let losses = match settings.maps.solver {
+            MapSolver::ConjugateGradients => cg::solve(&mut self.problem, index, steps, &stopped)?,
+            MapSolver::Adam => adam::solve(&mut self.problem, index, steps, settings.maps.rate, &stopped)?,
+        };
+        self.shared.gpu().check().map_err(TensorError::from)?;
+        let prior = self.problem.prior(index)?;
+        self.step(round, self.problem.layers[index].name, losses, prior);
+        Ok(())
+    }
+
+    fn solve_constants(&mut self, round: u32) -> Result<(), MapError> {
+        let (next, losses) =
+            self.fixed.solve_constants(&self.illumination, &self.observed, &self.constants)?;
+        self.constants = next;
+        let columns = column_tensor(self.shared, &all_columns(), &self.constants);
+        let exponent = self.constants.params.scalar(Param::SpecularLobe);
+        let lobes = self.illumination.lobes.as_ref();
+        let lobe = lobes.map(|stack| cube_tensor(self.shared, &stack.at(exponent).0));
+        self.problem.set_constants(&columns, lobe.as_ref());
+        self.step(round, "constants", losses, 0.0);
+        Ok(())
+    }
+
+    fn step(&mut self, round: u32, what: &'static str, (before, after): (f64, f64), prior: f64) {
+        let seconds = self.clock.elapsed().as_secs_f64();
+        let step = MapStep { round, what, before, after, prior, seconds };
+        (self.told)(&step);
+        self.history.push(step);
+    }
 }
 
 /// Every parameter but the lobe, each channel its own.
@@ -166,176 +283,9 @@ fn column_tensor(shared: &SharedDevice, columns: &[Column], point: &Point) -> Te
     Tensor::from_data(TensorData::new(values, [count]), shared.device())
 }
 
-fn seen<'a>(observed: &'a [ObservedView], constants: &Point, held_out: Option<usize>) -> Vec<Observed<'a>> {
-    let of = |(i, view)| Observed { view, gain: constants.gains[i], counts: held_out != Some(i) };
-    observed.iter().enumerate().map(of).collect()
-}
-
-/// The layers of a task.
-fn layers(
-    shared: &SharedDevice,
-    task: &MapTask<'_>,
-    shade: &Shade,
-    lobe: f64,
-) -> Result<Vec<Layer>, MapError> {
-    let scene = task.scene;
-    let rays = RayMesh::new(&task.posed.positions, &task.posed.triangles);
-    let hits: Vec<Hit> =
-        scene.views.iter().flat_map(|view| sample_hits(scene, task.posed, &rays, &view.camera)).collect();
-    let mut layers = Vec::new();
-    for &kind in &task.kinds {
-        let parts = parts(task, kind, &hits, lobe);
-        let read: Vec<LayerParts> = parts.into_iter().filter(|parts| shade.reads(parts.input)).collect();
-        if read.is_empty() {
-            return Err(MapError::Unread { map: kind.name(), effects: kind.effects() });
-        }
-        for parts in read {
-            layers.push(Layer::new(shared, parts)?);
-        }
-    }
-    Ok(layers)
-}
-
-/// What the layers of a kind are made of.
-fn parts(task: &MapTask<'_>, kind: MapKind, hits: &[Hit], lobe: f64) -> Vec<LayerParts> {
-    let maps = &task.scene.maps;
-    let prior = task.scene.fit.maps.prior(kind);
-    let colour_size = maps.color.as_ref().map_or((MADE_SIZE, MADE_SIZE), |map| (map.width, map.height));
-    let texture = |input: Input, size: Option<(usize, usize)>, start: Option<Vec<f32>>| {
-        let (width, height) = size.unwrap_or(colour_size);
-        let channels = input.width().unwrap_or(1);
-        LayerParts {
-            name: kind.name(),
-            input,
-            grid: Grid::Texels { width, height },
-            footprint: texels(width, height, hits.iter().map(|hit| hit.uv(task.posed))),
-            pairs: texel_pairs(width, height),
-            // The neutral value of a map that the scene leaves out.
-            start: start.unwrap_or_else(|| vec![1.0; width * height * channels]),
-            prior,
-        }
-    };
-    let single = |input: Input, map: &Option<crate::scene::maps::Map<1>>| {
-        let size = map.as_ref().map(|map| (map.width, map.height));
-        vec![texture(input, size, map.as_ref().map(|map| map.texels.as_flattened().to_vec()))]
-    };
-    let cube = |name: &'static str, input: Input, cube: Option<&Cube<f32>>| {
-        let cube = cube?;
-        let size = cube.size();
-        Some(LayerParts {
-            name,
-            input,
-            grid: Grid::Cube(size),
-            footprint: cube_border(size),
-            pairs: cube_pairs(size),
-            start: cube_texels(cube),
-            prior,
-        })
-    };
-    match kind {
-        MapKind::Color => {
-            let start = maps.color.as_ref().map(|map| map.texels.as_flattened().to_vec());
-            vec![texture(Input::Albedo, None, start)]
-        }
-        MapKind::Specular => single(Input::Specular, &maps.specular),
-        MapKind::Attenuator => single(Input::Attenuator, &maps.attenuator),
-        MapKind::Occlusion => {
-            let count = task.posed.positions.len();
-            vec![LayerParts {
-                name: kind.name(),
-                input: Input::Open,
-                grid: Grid::Vertices(count),
-                footprint: vertices(count, &task.posed.triangles, hits),
-                pairs: edges(&task.posed.triangles),
-                start: task.open.clone().unwrap_or_else(|| vec![1.0; count]),
-                prior,
-            }]
-        }
-        MapKind::Environment => {
-            let Illumination { irradiance, lobes, hilite } = &task.illumination;
-            let lobe = lobes.as_ref().map(|stack| stack.at(lobe).0);
-            [
-                cube("irradiance", Input::Irradiance, irradiance.as_ref()),
-                cube("lobe", Input::Lobe, lobe.as_ref()),
-                cube("hilite", Input::Hilite, hilite.as_ref()),
-            ]
-            .into_iter()
-            .flatten()
-            .collect()
-        }
-    }
-}
-
-/// A cube's texels without the border, by `(face * size + row) * size + column`.
-fn cube_texels(cube: &Cube<f32>) -> Vec<f32> {
-    let size = cube.size();
-    let places = (0..6 * size * size).map(|i| (i / (size * size), i % size, i / size % size));
-    places.flat_map(|(face, column, row)| cube.texel(face, column, row)).collect()
-}
-
-/// Take what the layers show back to the samples and cubes that the constants are fitted with.
-fn take_back(
-    problem: &Problem,
-    observed: &mut [ObservedView],
-    illumination: &mut Illumination,
-    constants: &Point,
-) -> Result<(), MapError> {
-    for layer in &problem.layers {
-        if let Grid::Cube(size) = layer.grid {
-            let texels = read(layer.value.clone())?;
-            let cube = Cube::from_fn(size, |face, column, row| {
-                let at = 4 * ((face * size + row) * size + column);
-                std::array::from_fn(|c| texels[at + c])
-            });
-            match layer.input {
-                Input::Irradiance => illumination.irradiance = Some(cube),
-                Input::Hilite => illumination.hilite = Some(cube),
-                _ => {
-                    let exponent = constants.params.scalar(Param::SpecularLobe);
-                    illumination.lobes = Some(LobeStack { exponents: vec![exponent], cubes: vec![cube] });
-                }
-            }
-            continue;
-        }
-        let numbers = read(layer.footprint.apply(layer.value.clone())?)?;
-        let width = layer.input.width().unwrap_or(1);
-        let mut first = 0;
-        for view in observed.iter_mut() {
-            let surface = &mut view.samples.surface;
-            let (slots, places) = (surface.slots(), *surface.places());
-            let place = match layer.input {
-                Input::Albedo => places.albedo,
-                Input::Specular => places.specular,
-                Input::Attenuator => places.attenuator,
-                _ => places.occlusion,
-            };
-            for (c, at) in place.into_iter().flat_map(|at| (0..width).map(move |c| (c, at + c))) {
-                let plane = surface.rows_mut().plane_mut(at);
-                plane.enumerate().for_each(|(slot, number)| *number = numbers[(first + slot) * width + c]);
-            }
-            first += slots;
-        }
-    }
-    Ok(())
-}
-
-/// The best constants for the maps as they are.
-fn solve_constants(
-    unknowns: &[Unknown],
-    setup: Setup,
-    illumination: &Illumination,
-    observed: &[ObservedView],
-    held_out: Option<usize>,
-    start: &Point,
-    loss: crate::scene::Loss,
-) -> Result<(Point, (f64, f64)), MapError> {
-    let mut views = observed.to_vec();
-    if let Some(view) = held_out {
-        // It stays in its place, for the gains' sake, and counts nothing.
-        let groups = views[view].samples.groups();
-        views[view].weight = vec![Row::ZERO; groups];
-    }
-    let engine = CpuEngine::new(setup, illumination.clone(), views, loss, unknowns.to_vec());
-    let outcome = fit::fit(&engine, start, &FitOptions::default(), &mut |_| {})?;
-    Ok((outcome.end, (outcome.loss_start, outcome.loss_end)))
+/// A cube with its borders, as the shading operation takes it.
+fn cube_tensor(shared: &SharedDevice, cube: &Cube<f32>) -> Tensor<2> {
+    let texels = cube.padded().as_flattened().to_vec();
+    let rows = texels.len() / 4;
+    Tensor::from_data(TensorData::new(texels, [rows, 4]), shared.device())
 }

@@ -2,6 +2,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 
+use super::parts::Cut;
 use crate::scene::MapPrior;
 use crate::tensor::sparse::Entries;
 use crate::tensor::{Input, Inputs, SharedDevice, Sparse, TensorError};
@@ -31,8 +32,8 @@ pub struct Layer {
     pub input: Input,
     /// How its texels lie.
     pub grid: Grid,
-    /// From texels to the input.
-    pub footprint: Sparse,
+    /// From texels to the input, a matrix for each part of the samples; a cube's are all the same.
+    pub footprints: Vec<Sparse>,
     /// From texels to the differences of neighbours.
     pub differences: Sparse,
     /// Of each texel, how many neighbours it has: \[texels, 1\].
@@ -65,11 +66,11 @@ pub struct LayerParts {
 }
 
 impl Layer {
-    /// A layer on the device.
+    /// A layer on the device, of samples that are cut so.
     ///
     /// # Errors
     /// When the device does not take it.
-    pub fn new(shared: &SharedDevice, parts: LayerParts) -> Result<Self, TensorError> {
+    pub fn new(shared: &SharedDevice, parts: LayerParts, cuts: &[Cut]) -> Result<Self, TensorError> {
         let texels = parts.footprint.columns;
         let channels = parts.start.len() / texels.max(1);
         let mut neighbours = vec![0.0_f32; texels];
@@ -83,7 +84,7 @@ impl Layer {
             name: parts.name,
             input: parts.input,
             grid: parts.grid,
-            footprint: Sparse::new(shared, &parts.footprint)?,
+            footprints: footprints(shared, parts.grid, &parts.footprint, cuts)?,
             differences: Sparse::new(shared, &differences)?,
             neighbours: matrix(neighbours, 1),
             value: start.clone(),
@@ -99,12 +100,12 @@ impl Layer {
         texels * channels
     }
 
-    /// Put what `texels` show in the place of its input.
+    /// Put what `texels` show to a part of the samples in the place of its input.
     ///
     /// # Errors
     /// When the device does not take it.
-    pub fn show(&self, texels: Tensor<2>, inputs: &mut Inputs) -> Result<(), TensorError> {
-        *slot(self.input, inputs) = self.footprint.apply(texels)?;
+    pub fn show(&self, part: usize, texels: Tensor<2>, inputs: &mut Inputs) -> Result<(), TensorError> {
+        *slot(self.input, inputs) = self.footprints[part].apply(texels)?;
         Ok(())
     }
 
@@ -129,6 +130,18 @@ impl Layer {
         let [_, channels] = self.start.dims();
         self.prior.smoothness / (self.differences.rows() * channels).max(1) as f64
     }
+}
+
+fn footprints(
+    shared: &SharedDevice,
+    grid: Grid,
+    entries: &Entries,
+    cuts: &[Cut],
+) -> Result<Vec<Sparse>, TensorError> {
+    if cuts.len() == 1 || matches!(grid, Grid::Cube(_)) {
+        return Ok(vec![Sparse::new(shared, entries)?; cuts.len()]);
+    }
+    cuts.iter().map(|cut| Sparse::new(shared, &entries.part(cut.samples.clone()))).collect()
 }
 
 /// The tensor of an input that is a matrix.

@@ -8,6 +8,7 @@
 //! - [`layer`]: a map as an unknown: texels, how samples see them, priors
 //! - [`problem`]: the loss of the images and the priors, and its slope by a layer's texels
 //! - [`cg`]: projected conjugate gradients; [`adam`]: burn's Adam
+//! - [`layers`]: the maps that a fit begins with, and what they show; [`parts`]: samples in parts that fit a buffer
 //! - [`fit`]: the rounds over maps and constants
 //! - [`pictures`]: maps as images
 
@@ -15,6 +16,8 @@ pub mod adam;
 pub mod cg;
 pub mod fit;
 pub mod layer;
+pub mod layers;
+pub mod parts;
 pub mod pictures;
 pub mod problem;
 
@@ -22,6 +25,7 @@ pub use fit::{FittedMaps, MapTask, fit_maps};
 pub use layer::{Grid, Layer};
 
 use crate::fit::FitError;
+use crate::gpu::GpuError;
 use crate::tensor::TensorError;
 
 /// A fit of maps that cannot be done.
@@ -29,7 +33,29 @@ use crate::tensor::TensorError;
 pub enum MapError {
     /// The device does not take it.
     #[error(transparent)]
-    Tensor(#[from] TensorError),
+    Tensor(TensorError),
+    /// A map, or what is looked up for it, is beyond what one buffer of the device holds.
+    #[error(
+        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there. Scale the maps down, lower samples_per_axis in [quality], or choose an adapter with larger buffers (--adapter)."
+    )]
+    TooLarge {
+        /// The adapter.
+        adapter: String,
+        /// What the buffer holds.
+        what: String,
+        /// Its bytes.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// The device has no room for all samples and maps.
+    #[error(
+        "adapter {adapter}: out of memory. A fit of maps keeps all samples on the adapter: lower samples_per_axis in [quality], give fewer or smaller views and maps, or choose another adapter (--adapter)."
+    )]
+    OutOfMemory {
+        /// The adapter.
+        adapter: String,
+    },
     /// The constants cannot be fitted.
     #[error(transparent)]
     Constants(#[from] FitError),
@@ -43,10 +69,30 @@ pub enum MapError {
         /// Effects that read it.
         effects: &'static str,
     },
+    /// A texture of a mesh on which no texel has a place.
+    #[error(
+        "the mesh has no texture coordinates (or only one), so no texel of {map} has a place on it. Unwrap the mesh, or leave {map} out of --maps."
+    )]
+    NotUnwrapped {
+        /// The map's name.
+        map: &'static str,
+    },
     /// The loss became no number.
     #[error("the loss is not finite after a step of {map}: its values or its priors are too large.")]
     NotFinite {
         /// The map's name.
         map: &'static str,
     },
+}
+
+impl From<TensorError> for MapError {
+    fn from(error: TensorError) -> Self {
+        match error {
+            TensorError::Gpu(GpuError::BufferSize { adapter, what, bytes, limit, .. }) => {
+                Self::TooLarge { adapter, what, bytes, limit }
+            }
+            TensorError::Gpu(GpuError::OutOfMemory { adapter }) => Self::OutOfMemory { adapter },
+            other => Self::Tensor(other),
+        }
+    }
 }

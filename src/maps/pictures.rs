@@ -69,13 +69,52 @@ fn unwrapped(numbers: &[f32], mesh: &PosedMesh) -> Image {
     image
 }
 
-/// A map's change, as something to look at: mid grey where there is none, brighter where it grew; the largest change
-/// reaches black or white. With the change that this stands for.
+/// The largest change of a colour, or of a map's only number, over all texels.
 #[must_use]
-pub fn change(before: &Image, after: &Image) -> (Image, f32) {
-    let differences = || before.rgb.iter().zip(&after.rgb).map(|(b, a)| [0, 1, 2].map(|c| a[c] - b[c]));
-    let largest = differences().flatten().fold(0.0_f32, |most, d| most.max(d.abs()));
+pub fn largest_change(before: &[f32], after: &[f32], channels: usize) -> f32 {
+    // Of a cube's four numbers, pictures show three.
+    let shown = before.iter().zip(after).enumerate().filter(|(i, _)| i % channels < 3);
+    shown.fold(0.0, |most, (_, (b, a))| most.max((a - b).abs()))
+}
+
+/// A map's change: positive where it grew.
+#[must_use]
+pub fn change(before: &Image, after: &Image) -> Image {
+    let differences = before.rgb.iter().zip(&after.rgb).map(|(b, a)| [0, 1, 2].map(|c| a[c] - b[c]));
+    Image { rgb: differences.collect(), ..after.clone() }
+}
+
+/// A change as something to look at: mid grey where there is none, brighter where the map grew, black or white at the
+/// `largest`.
+#[must_use]
+pub fn change_to_see(change: &Image, largest: f32) -> Image {
     let scale = if largest > 0.0 { 0.5 / largest } else { 0.0 };
-    let rgb = differences().map(|d| d.map(|d| 0.5 + scale * d)).collect();
-    (Image { rgb, ..after.clone() }, largest)
+    let rgb = change.rgb.iter().map(|d| d.map(|d| 0.5 + scale * d)).collect();
+    Image { rgb, ..change.clone() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_grew_is_positive_and_bright() {
+        let grid = Grid::Texels { width: 3, height: 1 };
+        let mesh = PosedMesh::default();
+        let (before, after) = ([0.5, 0.5, 0.5], [0.7, 0.4, 0.5]);
+        let change = change(&picture(grid, &before, 1, &mesh), &picture(grid, &after, 1, &mesh));
+        let near = |found: [f32; 3], wanted: f32| found.iter().all(|x| (x - wanted).abs() < 1e-6);
+        assert!(near(change.rgb[0], 0.2) && near(change.rgb[1], -0.1) && near(change.rgb[2], 0.0));
+        let largest = largest_change(&before, &after, 1);
+        assert!((largest - 0.2).abs() < 1e-6);
+        let seen = change_to_see(&change, largest);
+        assert!(near(seen.rgb[0], 1.0) && near(seen.rgb[1], 0.25) && near(seen.rgb[2], 0.5));
+    }
+
+    #[test]
+    fn the_fourth_number_of_a_cube_is_no_change_of_its_colour() {
+        assert!(
+            (largest_change(&[0.0; 8], &[0.1, 0.0, 0.0, 5.0, 0.0, -0.3, 0.0, 7.0], 4) - 0.3).abs() < 1e-6
+        );
+    }
 }

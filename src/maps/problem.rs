@@ -11,19 +11,25 @@ use crate::engine::residual::weighted_residual;
 use crate::engine::view::ObservedView;
 use crate::samples::LANES;
 use crate::scene::Loss;
-use crate::tensor::{Inputs, Shade, SharedDevice, TensorError};
+use crate::tensor::{Input, Inputs, Shade, SharedDevice, TensorError};
 
 /// Images to be matched, and the layers that may move for it.
 pub struct Problem {
-    /// The shading operation over all views.
-    pub shade: Shade,
-    /// What it takes; layers' own inputs follow their values.
-    pub inputs: Inputs,
+    /// The views' pixels, in parts.
+    parts: Vec<Part>,
     /// The layers.
     pub layers: Vec<Layer>,
+}
+
+/// Some of the pixels.
+struct Part {
+    /// The shading operation over them.
+    shade: Shade,
+    /// What it takes; layers' own inputs follow their values.
+    inputs: Inputs,
     /// What each pixel slot's image is multiplied with: \[slots, 1\].
     gain: Tensor<2>,
-    /// Working targets and their weights (which add up to 1): \[slots, 4\].
+    /// Working targets and their weights (which add up to 1 over all parts): \[slots, 4\].
     target: Tensor<2>,
     weight: Tensor<2>,
 }
@@ -45,23 +51,35 @@ impl Problem {
     /// When the device does not take it.
     pub fn new(
         shared: &SharedDevice,
-        shade: Shade,
-        inputs: Inputs,
+        parts: Vec<(Shade, Inputs)>,
         layers: Vec<Layer>,
     ) -> Result<Self, TensorError> {
         let device = shared.device();
-        let (slots, mut inputs) = (shade.slots(), inputs);
-        for layer in &layers {
-            layer.show(layer.value.clone(), &mut inputs)?;
+        let part = |(index, (shade, mut inputs)): (usize, (Shade, Inputs))| {
+            for layer in &layers {
+                layer.show(index, layer.value.clone(), &mut inputs)?;
+            }
+            let slots = shade.slots();
+            Ok::<_, TensorError>(Part {
+                gain: Tensor::ones([slots, 1], device),
+                target: Tensor::zeros([slots, 4], device),
+                weight: Tensor::zeros([slots, 4], device),
+                shade,
+                inputs,
+            })
+        };
+        Ok(Self { parts: parts.into_iter().enumerate().map(part).collect::<Result<_, _>>()?, layers })
+    }
+
+    /// Take other constants: the columns of the parameters and, where no layer is the specular cube, that cube.
+    pub fn set_constants(&mut self, columns: &Tensor<1>, lobe: Option<&Tensor<2>>) {
+        let own = self.layers.iter().any(|layer| layer.input == Input::Lobe);
+        for part in &mut self.parts {
+            part.inputs.columns = columns.clone();
+            if let Some(lobe) = lobe.filter(|_| !own) {
+                part.inputs.lobe = lobe.clone();
+            }
         }
-        Ok(Self {
-            gain: Tensor::ones([slots, 1], device),
-            target: Tensor::zeros([slots, 4], device),
-            weight: Tensor::zeros([slots, 4], device),
-            shade,
-            inputs,
-            layers,
-        })
     }
 
     /// Take gains, weights and working targets anew, at the present image.
@@ -74,7 +92,10 @@ impl Problem {
         views: &[Observed<'_>],
         loss: Loss,
     ) -> Result<(), TensorError> {
-        let image = read(self.shade.image(self.inputs.clone())?)?;
+        let mut image = Vec::new();
+        for part in &self.parts {
+            image.extend(read(part.shade.image(part.inputs.clone())?)?);
+        }
         let (mut gains, mut targets, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let mut total = 0.0;
         for Observed { view, gain, counts } in views {
@@ -101,11 +122,17 @@ impl Problem {
         }
         let weights: Vec<f32> =
             weights.into_iter().map(|w| (w / total.max(f64::MIN_POSITIVE)) as f32).collect();
-        let slots = gains.len();
-        let matrix = |numbers: Vec<f32>, columns: usize| {
-            Tensor::<2>::from_data(TensorData::new(numbers, [slots, columns]), shared.device())
-        };
-        (self.gain, self.target, self.weight) = (matrix(gains, 1), matrix(targets, 4), matrix(weights, 4));
+        let mut first = 0;
+        for part in &mut self.parts {
+            let slots = part.shade.slots();
+            let matrix = |numbers: &[f32], columns: usize| {
+                let numbers = numbers[first * columns..(first + slots) * columns].to_vec();
+                Tensor::<2>::from_data(TensorData::new(numbers, [slots, columns]), shared.device())
+            };
+            (part.gain, part.target, part.weight) =
+                (matrix(&gains, 1), matrix(&targets, 4), matrix(&weights, 4));
+            first += slots;
+        }
         Ok(())
     }
 
@@ -115,19 +142,44 @@ impl Problem {
     /// When the device does not take it, or the loss is not finite.
     pub fn slope(&self, index: usize, texels: &Tensor<2>) -> Result<(f64, Tensor<2>), MapError> {
         let layer = &self.layers[index];
-        let texels = texels.clone().autodiff().require_grad();
-        let mut inputs = self.inputs.clone();
-        layer.show(texels.clone(), &mut inputs)?;
-        let image = self.shade.image(inputs)?;
-        let residual = image * self.gain.clone().autodiff() - self.target.clone().autodiff();
-        let loss =
-            (residual.square() * self.weight.clone().autodiff()).sum() + layer.penalty(texels.clone())?;
-        let value = f64::from(read(loss.clone().inner())?[0]);
-        let gradients = loss.backward();
-        match texels.grad(&gradients) {
+        let (mut value, mut slope) = (0.0, None);
+        for part in 0..self.parts.len() {
+            let texels = texels.clone().autodiff().require_grad();
+            let mut loss = self.image_loss(part, layer, texels.clone())?;
+            if part == 0 {
+                loss = loss + layer.penalty(texels.clone())?;
+            }
+            value += f64::from(read(loss.clone().inner())?[0]);
+            let gradients = loss.backward();
+            let one = texels.grad(&gradients).ok_or(MapError::NotFinite { map: layer.name })?;
+            slope = Some(match slope {
+                None => one,
+                Some(sum) => sum + one,
+            });
+        }
+        match slope {
             Some(slope) if value.is_finite() => Ok((value, slope)),
             _ => Err(MapError::NotFinite { map: layer.name }),
         }
+    }
+
+    /// A part's share of the images' loss.
+    fn image_loss(&self, index: usize, layer: &Layer, texels: Tensor<2>) -> Result<Tensor<1>, TensorError> {
+        let part = &self.parts[index];
+        let mut inputs = part.inputs.clone();
+        layer.show(index, texels, &mut inputs)?;
+        let image = part.shade.image(inputs)?;
+        let residual = image * part.gain.clone().autodiff() - part.target.clone().autodiff();
+        Ok((residual.square() * part.weight.clone().autodiff()).sum())
+    }
+
+    /// What a layer's priors say against its values: their share of the loss.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn prior(&self, index: usize) -> Result<f64, TensorError> {
+        let layer = &self.layers[index];
+        Ok(f64::from(read(layer.penalty(layer.value.clone())?)?[0]))
     }
 
     /// Give a layer other texels.
@@ -135,7 +187,9 @@ impl Problem {
     /// # Errors
     /// When the device does not take it.
     pub fn set(&mut self, index: usize, texels: Tensor<2>) -> Result<(), TensorError> {
-        self.layers[index].show(texels.clone(), &mut self.inputs)?;
+        for (part, Part { inputs, .. }) in self.parts.iter_mut().enumerate() {
+            self.layers[index].show(part, texels.clone(), inputs)?;
+        }
         self.layers[index].value = texels;
         Ok(())
     }

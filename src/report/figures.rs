@@ -9,7 +9,7 @@ use super::pictures::Picture;
 use crate::render::files::{Image, encode_png};
 
 /// The longest side of a picture in the page; larger ones are shrunk by a whole factor.
-const LONGEST: usize = 1024;
+pub const LONGEST: usize = 1024;
 /// The same for the small pictures of single terms.
 const LONGEST_TERM: usize = 320;
 
@@ -38,8 +38,19 @@ pub fn triple(
     error: &Picture,
     [first, second, wipe]: [&str; 3],
 ) -> Result<String, String> {
-    let name = escape(name);
-    let legend = "FLIP error <span class=\"bar\"><i>0</i><b></b><i>1</i></span>".to_owned();
+    let legend = "FLIP error <span class=\"bar\"><i>0</i><b></b><i>1</i></span>";
+    triple_of(&format!("view {name}"), [before, after, error], [first, second, wipe], ["FLIP error", legend])
+}
+
+/// Three pictures of `subject` side by side, of which the first can be wiped over the second; `third` says what the
+/// last one is, and its caption in HTML.
+pub(super) fn triple_of(
+    subject: &str,
+    [before, after, third]: [&Picture; 3],
+    [first, second, wipe]: [&str; 3],
+    [what, caption]: [&str; 2],
+) -> Result<String, String> {
+    let subject = escape(subject);
     let hint = format!("{second}<span class=\"hint\" hidden> · drag across it to {wipe}</span>");
     // Single pixels of a tiny image are meant to be seen.
     let frame = if after.width < 200 { "frame tiny" } else { "frame" };
@@ -48,10 +59,11 @@ pub fn triple(
         let uri = data_uri(&thinned(picture, LONGEST))?;
         Ok(format!(
             "<figure><div class=\"{frame}\"><img src=\"{uri}\" width=\"{width}\" height=\"{height}\" \
-             alt=\"{what} of view {name}\"></div><figcaption>{caption}</figcaption></figure>"
+             alt=\"{what} of {subject}\"></div><figcaption>{caption}</figcaption></figure>"
         ))
     };
-    let panels = [(before, first, first.to_owned()), (after, second, hint), (error, "FLIP error", legend)];
+    let panels =
+        [(before, first, first.to_owned()), (after, second, hint), (third, what, caption.to_owned())];
     let figures = panels.into_iter().map(figure).collect::<Result<Vec<_>, String>>()?;
     Ok(format!("<div class=\"triple\">{}</div>", figures.concat()))
 }

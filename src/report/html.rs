@@ -8,7 +8,7 @@ use super::json::{Summary, ViewSummary};
 use super::page::{Page, escape, filled, tile};
 use super::pictures::Picture;
 use super::words::{count, counted, direction, ending, entangled, number, seconds, verdict};
-use super::{RunInfo, charts, figures, tables};
+use super::{RunInfo, charts, figures, maps, tables};
 use crate::fit::outcome::Ending;
 
 /// The page of the run called `title`; `errors` are the views' error pictures, in their order.
@@ -19,9 +19,12 @@ pub fn page(title: &str, run: &RunInfo, summary: &Summary, errors: &[Picture]) -
     let sections = run.views.par_iter().zip(&summary.views.0).zip(errors);
     let sections = sections.map(|((view, (_, scores)), error)| figures::view(view, scores, error));
     let views = sections.collect::<Result<Vec<_>, _>>()?.concat();
+    let shown = run.maps.as_ref().map(maps::shown).transpose()?.unwrap_or_default();
     let fill = |key: &str| match key {
         "warnings" => warnings(&summary.warnings),
         "views" => views.clone(),
+        "maps" => shown.clone(),
+        "held" if run.maps.is_some() => format!("<p>{}</p>\n", maps::HELD),
         "parameters" => tables::parameters(summary),
         "identifiability" => identifiability(summary),
         "convergence" => charts::convergence(summary),
@@ -61,7 +64,7 @@ fn tiles(summary: &Summary) -> String {
     };
     let score = |x: Option<f64>, text: fn(f64) -> String| x.map_or_else(|| "–".to_owned(), text);
     let total = summary.seconds;
-    let total = total.load + total.bake + total.samples + total.fit + total.render;
+    let total = total.load + total.bake + total.samples + total.maps + total.fit + total.render;
     let tiles = [
         ("loss", number(summary.loss.end, 3), format!("from {}", number(summary.loss.start, 3))),
         ("PSNR", score(mean(|v| v.psnr), |x| format!("{x:.1} <small>dB</small>")), of_views.clone()),

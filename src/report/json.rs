@@ -5,6 +5,7 @@
 
 use serde::ser::{Serialize, Serializer};
 
+use super::maps::{MapEvidence, MapSummary};
 use super::metrics::Scores;
 use super::{RunInfo, StageSeconds};
 use crate::engine::{Point, Unknown};
@@ -46,12 +47,15 @@ pub struct Summary {
     pub undetermined: Vec<Ordered<f64>>,
     /// The loss after each iteration.
     pub history: Vec<Iteration>,
-    /// The names of the views' pictures and terms, beside this file.
+    /// The views' pictures and terms, and the files of fitted maps, beside this file.
     pub files: Vec<String>,
     /// What the user should know.
     pub warnings: Vec<String>,
     /// Where the numbers come from.
     pub provenance: Ordered<String>,
+    /// What whole maps gained, where they were fitted.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub maps: Option<MapSummary>,
 }
 
 /// A number before and after the fit.
@@ -193,6 +197,7 @@ impl Summary {
             files,
             warnings,
             provenance: Ordered(run.provenance()),
+            maps: run.maps.as_ref().map(MapEvidence::summary),
         }
     }
 

@@ -27,7 +27,7 @@ pub struct Comparison {
 }
 
 /// What [`Comparison`] says in three numbers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct Scores {
     /// Peak signal-to-noise ratio over all channels, dB; at most [`PSNR_OF_EQUALS`].
     pub psnr: f64,

@@ -4,6 +4,7 @@
 //! - [`json`]: the file `report.json`
 //! - [`pictures`]: target | fit | error side by side
 //! - [`page`], [`plot`]: what all pages share: sortable tables, scatter plots, pictures that wipe
+//! - [`maps`]: what whole maps gained, where they were fitted
 //! - [`html`]: the page `report.html`, with its `figures`, `charts`, `tables` and `words`
 //!
 //! [`write_run`] leaves all of it in a run's folder, with an EXR of the terms for each view.
@@ -15,6 +16,7 @@ pub mod flip;
 pub mod html;
 pub mod json;
 mod lettering;
+pub mod maps;
 pub mod metrics;
 pub mod page;
 pub mod pictures;
@@ -33,8 +35,14 @@ use crate::progress;
 use crate::render::files::{self, Image, ImageFileError, ImageOptions};
 use crate::scene::Loss;
 use json::{Summary, ViewSummary};
+use maps::MapEvidence;
 use metrics::Comparison;
 use pictures::Picture;
+
+/// The folder of fitted maps in a run folder.
+pub const MAPS: &str = "maps";
+/// What was found of fitted maps, in numbers.
+pub const MAPS_JSON: &str = "maps.json";
 
 /// What a report says of a run beside the fit's outcome.
 #[derive(Clone, Debug)]
@@ -55,6 +63,10 @@ pub struct RunInfo {
     pub warnings: Vec<String>,
     /// Further (name, text) to tell where the numbers come from: effects, seed, threads.
     pub provenance: Vec<(String, String)>,
+    /// What whole maps gained, where they were fitted.
+    pub maps: Option<MapEvidence>,
+    /// Files that the run's scene names: where one is what an earlier run left, it stays.
+    pub named: Vec<PathBuf>,
 }
 
 /// Seconds spent in each stage of a run.
@@ -66,7 +78,9 @@ pub struct StageSeconds {
     pub bake: f64,
     /// Tracing the visible surface.
     pub samples: f64,
-    /// Fitting.
+    /// Fitting whole maps, where they are.
+    pub maps: f64,
+    /// Fitting the constants.
     pub fit: f64,
     /// Rendering what the report shows.
     pub render: f64,
@@ -125,7 +139,8 @@ pub enum ReportError {
 }
 
 /// Write `report.json`, `report.html` and, for each view, `<view>.png` and `<view>_terms.exr` into
-/// `folder`, which is made if need be; pictures that an earlier run of other views left there go.
+/// `folder`, which is made if need be; pictures that an earlier run of other views left there go, and its fitted maps,
+/// unless the scene names them.
 /// Characters of a view's name that a file name should not hold become `_`.
 ///
 /// # Errors
@@ -155,9 +170,12 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
     }
     bar.finish_and_clear();
 
-    let summary = Summary::new(run, outcome, &views, file_names(&written), warnings);
     let path = folder.join("report.json");
-    remove_stale(folder, &path, &summary.files)?;
+    let mut left = file_names(&written);
+    left.extend(run.maps.iter().flat_map(|maps| maps.files.iter().cloned()));
+    let kept = remove_stale(folder, &path, &left, &run.named)?;
+    left.extend(kept);
+    let summary = Summary::new(run, outcome, &views, left, warnings);
     let json = summary.to_json().map_err(|e| OutputError::new(&path, &e))?;
     output::write(&path, json.as_bytes())?;
     written.push(path);
@@ -178,27 +196,52 @@ fn file_names(paths: &[PathBuf]) -> Vec<String> {
     paths.iter().filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect()
 }
 
-/// Remove the pictures that an earlier run says in its `report.json` that it left in `folder`, and that
-/// this one, of other views, has not written anew.
-fn remove_stale(folder: &Path, report: &Path, written: &[String]) -> Result<(), OutputError> {
+/// Remove the pictures and maps that an earlier run says in its `report.json` that it left in `folder`, and that this
+/// one has not written anew. Returns those that stay as they are `named` by the scene.
+fn remove_stale(
+    folder: &Path,
+    report: &Path,
+    written: &[String],
+    named: &[PathBuf],
+) -> Result<Vec<String>, OutputError> {
     #[derive(serde::Deserialize)]
     struct Earlier {
         files: Vec<String>,
     }
     // Without a report, or with one that is not ours, nothing in the folder is known to be ours.
     let earlier = std::fs::read(report).ok().and_then(|bytes| serde_json::from_slice::<Earlier>(&bytes).ok());
+    let named: Vec<PathBuf> = named.iter().filter_map(|path| path.canonicalize().ok()).collect();
+    let (mut kept, mut maps) = (Vec::new(), false);
     for name in earlier.map(|earlier| earlier.files).unwrap_or_default() {
-        let ours = is_file_stem(name.strip_suffix("_terms.exr").or(name.strip_suffix(".png")).unwrap_or(""));
-        if ours && !written.contains(&name) {
-            match std::fs::remove_file(folder.join(&name)) {
-                Err(error) if error.kind() != ErrorKind::NotFound => {
-                    return Err(OutputError::new(&folder.join(&name), &error));
-                }
-                _ => {}
-            }
+        if !is_ours(&name) || written.contains(&name) {
+            continue;
+        }
+        let path = folder.join(&name);
+        if path.canonicalize().is_ok_and(|path| named.contains(&path)) {
+            kept.push(name);
+            continue;
+        }
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(OutputError::new(&path, &error)),
+            _ => maps |= name != MAPS_JSON && name.starts_with(MAPS),
         }
     }
-    Ok(())
+    if maps {
+        // A folder that still holds something stays.
+        let _ = std::fs::remove_dir(folder.join(MAPS));
+    }
+    Ok(kept)
+}
+
+/// Whether a run could have left a file of that name, by its path from the run folder: one that leads elsewhere is
+/// never removed.
+fn is_ours(name: &str) -> bool {
+    let stem = match name.strip_prefix(MAPS).and_then(|name| name.strip_prefix('/')) {
+        Some(map) => [".png", ".exr", ".csv"].iter().find_map(|ending| map.strip_suffix(ending)),
+        None if name == MAPS_JSON => return true,
+        None => name.strip_suffix("_terms.exr").or(name.strip_suffix(".png")),
+    };
+    stem.is_some_and(is_file_stem)
 }
 
 impl RunInfo {

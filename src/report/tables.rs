@@ -101,14 +101,21 @@ fn notes(unknown: &UnknownSummary) -> String {
 /// The stages' shares of the time: a bar and its legend.
 pub(super) fn stages(summary: &Summary) -> String {
     let s = summary.seconds;
-    let stages =
-        [("load", s.load), ("bake", s.bake), ("samples", s.samples), ("fit", s.fit), ("render", s.render)];
-    let stages = stages.map(|(name, t)| (name, if t.is_finite() { t.max(0.0) } else { 0.0 }));
-    let total: f64 = stages.iter().map(|(_, t)| t).sum();
+    let stages = [
+        ("load", 0, s.load),
+        ("bake", 1, s.bake),
+        ("samples", 2, s.samples),
+        ("maps", 5, s.maps),
+        ("fit", 3, s.fit),
+        ("render", 4, s.render),
+    ];
+    let stages = stages.map(|(name, i, t)| (name, i, if t.is_finite() { t.max(0.0) } else { 0.0 }));
+    let total: f64 = stages.iter().map(|(_, _, t)| t).sum();
     let (mut bar, mut legend) = (String::new(), String::new());
-    for (i, (name, t)) in stages.iter().enumerate() {
+    // Few fits have whole maps.
+    for (name, i, t) in stages.into_iter().filter(|(name, _, t)| *name != "maps" || *t > 0.0) {
         let share = if total > 0.0 { 100.0 * t / total } else { 0.0 };
-        let time = seconds(*t);
+        let time = seconds(t);
         if share > 0.0 {
             let _ = write!(
                 bar,

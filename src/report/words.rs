@@ -138,6 +138,9 @@ fn how_it_ended(summary: &Summary) -> String {
         Ending::Stalled => format!(
             "The fit stalled {after}: no step lowers the loss, yet no tolerance was met. Try another start."
         ),
+        Ending::Interrupted if summary.maps.is_some() => {
+            format!("The fit was interrupted {after}; a new one can begin with the maps that it has left.")
+        }
         Ending::Interrupted => format!("The fit was interrupted {after}; it can be resumed from its state."),
     }
 }

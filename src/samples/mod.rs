@@ -22,6 +22,8 @@ pub mod surface_records;
 pub mod targets;
 mod trace;
 
+use std::ops::Range;
+
 use glam::Vec2;
 
 use crate::bake::VertexOcclusion;
@@ -62,6 +64,20 @@ impl ViewSamples {
     #[must_use]
     pub fn records(&self) -> usize {
         self.group_start.last().map_or(0, |&end| end as usize)
+    }
+
+    /// A range of its groups, as a view of their own.
+    #[must_use]
+    pub fn part(&self, groups: Range<usize>) -> Self {
+        let starts = &self.group_start[groups.start..=groups.end];
+        let first = starts[0];
+        let pixels = groups.start * LANES..groups.end * LANES;
+        Self {
+            group_start: starts.iter().map(|start| start - first).collect(),
+            pixel: self.pixel[pixels.clone()].to_vec(),
+            coverage: self.coverage[pixels].to_vec(),
+            surface: self.surface.part(first as usize..starts[starts.len() - 1] as usize),
+        }
     }
 
     /// Samples of positive weight: all but the padding.

@@ -3,7 +3,7 @@
 //! Twenty planes read in step would be twenty streams, which no prefetcher follows and which compete
 //! for the same cache sets, as planes of equal length do; a record is read from one stream.
 
-use std::ops::{Deref, DerefMut};
+use std::ops::{Deref, DerefMut, Range};
 
 use bytemuck::{Pod, Zeroable};
 use prefetch_index::prefetch_index;
@@ -74,6 +74,13 @@ impl Rows {
     /// Set every number, as far as there are some: row after row of each record.
     pub fn fill(&mut self, numbers: &[f32]) {
         self.rows.iter_mut().zip(numbers.as_chunks::<LANES>().0).for_each(|(row, numbers)| row.0 = *numbers);
+    }
+
+    /// A range of records.
+    #[must_use]
+    pub(super) fn part(&self, records: Range<usize>) -> Self {
+        let rows = records.start * self.stride..records.end * self.stride;
+        Self { stride: self.stride, rows: self.rows[rows].to_vec() }
     }
 
     /// A record's rows.

@@ -1,5 +1,7 @@
 //! What the model reads of each sample, record by record.
 
+use std::ops::Range;
+
 use super::LANES;
 use super::rows::{Row, Rows};
 use crate::model::fragment::Fragment;
@@ -164,6 +166,12 @@ impl SurfaceRecords {
     pub fn new(asked: Asked, count: usize) -> Self {
         let (places, stride) = Places::new(asked);
         Self { places, rows: Rows::new(stride, count) }
+    }
+
+    /// A range of records.
+    #[must_use]
+    pub(super) fn part(&self, records: Range<usize>) -> Self {
+        Self { places: self.places, rows: self.rows.part(records) }
     }
 
     /// Where a record's numbers stand.

@@ -54,3 +54,11 @@ pub struct PosedMesh {
     /// Vertex indices.
     pub triangles: Vec<[u32; 3]>,
 }
+
+impl PosedMesh {
+    /// Whether its texture coordinates tell places apart: where a file has none, all of them are 0.
+    #[must_use]
+    pub fn is_unwrapped(&self) -> bool {
+        self.uvs.iter().any(|uv| *uv != self.uvs[0])
+    }
+}

@@ -3,6 +3,7 @@
 //! The transpose is kept as its own list of rows, made once: the backward pass gathers as the forward pass does.
 //! Nothing is added up by atomics, so the same numbers give the same bits every time.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
@@ -74,6 +75,20 @@ impl Entries {
     #[must_use]
     pub fn rows(&self) -> usize {
         self.starts.len() - 1
+    }
+
+    /// A range of its rows.
+    #[must_use]
+    pub fn part(&self, rows: Range<usize>) -> Self {
+        let starts = &self.starts[rows.start..=rows.end];
+        let first = starts[0];
+        let entries = first as usize..starts[starts.len() - 1] as usize;
+        Self {
+            columns: self.columns,
+            starts: starts.iter().map(|start| start - first).collect(),
+            column: self.column[entries.clone()].to_vec(),
+            weight: self.weight[entries].to_vec(),
+        }
     }
 
     /// Rows and columns exchanged; a row's entries stand in the order of the old rows.

@@ -70,10 +70,12 @@ fn run_of(side: usize) -> RunInfo {
         loss: Loss::RelativeL2,
         engine: "cpu".to_owned(),
         samples: 1_234_567,
-        seconds: StageSeconds { load: 0.61, bake: 3.2, samples: 0.45, fit: 0.083, render: 0.2 },
+        seconds: StageSeconds { load: 0.61, bake: 3.2, samples: 0.45, maps: 0.0, fit: 0.083, render: 0.2 },
         views: vec![ball("front", side, [0.5, 0.6, 0.62]), ball(ODD_NAME, side - 16, [-0.8, 0.3, -0.1])],
         warnings: vec!["head.glb: weights of 3 vertices did not sum to 1 & were <scaled>.".to_owned()],
         provenance: vec![("effects".to_owned(), "diffuse, rim, hilite".to_owned())],
+        maps: None,
+        named: Vec::new(),
     }
 }
 

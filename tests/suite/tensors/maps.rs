@@ -1,20 +1,29 @@
 //! Fits of whole maps on the built-in scene: a map that was changed is found again from images.
 
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use skinfit::demo;
+use skinfit::engine::Unknown;
 use skinfit::engine::view::ObservedView;
+use skinfit::maps::layer::{Layer, LayerParts};
+use skinfit::maps::parts::Cut;
 use skinfit::maps::problem::read;
-use skinfit::maps::{FittedMaps, MapError, MapTask, fit_maps};
+use skinfit::maps::{FittedMaps, Grid, MapError, MapTask, fit_maps};
 use skinfit::model::effects::Effect;
-use skinfit::prepare::{PrepareOptions, Prepared, Views};
+use skinfit::model::params::{Column, Param};
+use skinfit::prepare::{PrepareOptions, Prepared};
 use skinfit::render::shade::Shader;
 use skinfit::samples::{LANES, TargetRows, ViewSamples, sample_views};
 use skinfit::scene::maps::Map;
+use skinfit::scene::mesh::PosedMesh;
 use skinfit::scene::view::{Target, View};
 use skinfit::scene::{Loss, MapKind, MapPrior, MapSolver};
+use skinfit::tensor::Input;
+use skinfit::tensor::footprint::{texel_pairs, texels};
 
-use super::bench::shared;
+use super::bench::{matrix, shared};
 
 /// Pixels along a side, and texels of the maps: a few samples see each.
 const PIXELS: u32 = 96;
@@ -22,12 +31,20 @@ const TEXELS: usize = 48;
 
 /// The built-in scene, small: its first view, and maps of a few texels.
 fn small() -> Prepared {
+    small_of(1)
+}
+
+/// Of so many views.
+fn small_of(views: usize) -> Prepared {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
     let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
-    let options = PrepareOptions { views: Views::First, cache: Some(cache), ..PrepareOptions::default() };
+    let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
     let mut prepared = Prepared::baked(&scene, &options).unwrap();
-    let camera = &mut prepared.scene.views[0].camera;
-    (camera.width, camera.height) = (PIXELS, PIXELS);
+    prepared.scene.views.truncate(views);
+    prepared.gains.truncate(views);
+    for View { camera, .. } in &mut prepared.scene.views {
+        (camera.width, camera.height) = (PIXELS, PIXELS);
+    }
     let maps = &mut prepared.scene.maps;
     maps.color = maps.color.as_ref().map(shrunk);
     maps.specular = maps.specular.as_ref().map(shrunk);
@@ -88,21 +105,33 @@ fn fit(
     kind: MapKind,
     open: Option<Vec<f32>>,
 ) -> Result<FittedMaps, MapError> {
-    let observed = observed(changed, &targets(truth));
     let posed = changed.scene.mesh.pose();
+    let mut task = task(changed, &posed, observed(changed, &targets(truth)), kind);
+    task.open = open.or(task.open);
+    fit_maps(shared().unwrap(), task, &mut |_| {})
+}
+
+/// The maps of `changed` to be fitted to what was observed, its constants held.
+fn task<'a>(
+    changed: &'a Prepared,
+    posed: &'a PosedMesh,
+    observed: Vec<ObservedView>,
+    kind: MapKind,
+) -> MapTask<'a> {
     let weights: Vec<f32> = changed.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
-    let task = MapTask {
+    MapTask {
         scene: &changed.scene,
-        posed: &posed,
+        posed,
         illumination: changed.illumination.clone(),
-        open: open.or_else(|| changed.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights))),
+        open: changed.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
         observed,
         held_out: None,
         kinds: vec![kind],
         start: changed.start(),
         unknowns: Vec::new(),
-    };
-    fit_maps(shared().unwrap(), task, &mut |_| {})
+        most_samples: None,
+        interrupt: None,
+    }
 }
 
 /// The root mean square of how far two scenes' samples differ in what `of` reads, by their shares of pixels.
@@ -238,6 +267,131 @@ fn bounds_and_priors_hold() {
         (read(held.layers[0].start.clone()).unwrap(), read(held.layers[0].value.clone()).unwrap());
     // The images pull with less than 1e-6 of the prior's weight.
     assert!(then.iter().zip(&now).all(|(a, b)| (a - b).abs() < 1e-5));
+}
+
+/// Two views of a scene whose colour map is darker than in the targets.
+fn darker() -> (Prepared, Vec<(View, Target)>) {
+    let (truth, mut changed) = (small_of(2), small_of(2));
+    changed.scene.maps.color.as_mut().unwrap().texels.iter_mut().for_each(|t| *t = t.map(|x| 0.9 * x));
+    changed.scene.fit.maps.rounds = 2;
+    changed.scene.fit.maps.steps = 3;
+    let targets = targets(&truth);
+    (changed, targets)
+}
+
+fn values(found: &FittedMaps) -> Vec<f32> {
+    found.layers.iter().flat_map(|layer| read(layer.value.clone()).unwrap()).collect()
+}
+
+#[test]
+fn a_view_that_is_held_out_counts_nothing_for_maps_and_constants() {
+    let Some(shared) = shared() else { return };
+    let (changed, targets) = darker();
+    let posed = changed.scene.mesh.pose();
+    let mut other = targets.clone();
+    other[1].1.rgb.iter_mut().for_each(|rgb| *rgb = [rgb[1] + 0.1, 0.5 * rgb[2], 0.3]);
+    let fit = |targets: &[(View, Target)], held_out| {
+        let free = [Param::BaseWeight, Param::Hilite, Param::RimExponent];
+        let unknowns = free.map(|param| Unknown::Param(Column::tied(param))).to_vec();
+        let task = task(&changed, &posed, observed(&changed, targets), MapKind::Color);
+        fit_maps(shared, MapTask { held_out, unknowns, ..task }, &mut |_| {}).unwrap()
+    };
+    let [as_it_is, as_another] = [&targets, &other].map(|targets| fit(targets, Some(1)));
+    assert!(values(&as_it_is) == values(&as_another), "the maps differ");
+    assert_eq!(as_it_is.constants, as_another.constants);
+    // Of a view that is not held out, both would.
+    let counted = fit(&other, None);
+    assert!(values(&as_it_is) != values(&counted));
+    assert_ne!(as_it_is.constants, counted.constants);
+}
+
+#[test]
+fn samples_in_parts_give_the_same_maps() {
+    let Some(shared) = shared() else { return };
+    let (changed, targets) = darker();
+    let posed = changed.scene.mesh.pose();
+    for kind in [MapKind::Color, MapKind::Occlusion, MapKind::Environment] {
+        let fit = |most_samples| {
+            let task = task(&changed, &posed, observed(&changed, &targets), kind);
+            fit_maps(shared, MapTask { most_samples, ..task }, &mut |_| {}).unwrap()
+        };
+        // A view has some twenty thousand samples.
+        let (whole, parts) = (fit(None), fit(Some(7_000)));
+        assert!(parts.layers[0].footprints.len() > 4);
+        for (a, b) in whole.history.iter().zip(&parts.history) {
+            // A few roundings of sums of f32, through as many steps.
+            let near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * a.abs();
+            assert!(a.what == b.what && near(a.before, b.before) && near(a.after, b.after), "{a:?} {b:?}");
+        }
+        assert!(whole.history[0].after < 0.5 * whole.history[0].before, "{:?}", whole.history[0]);
+    }
+}
+
+#[test]
+fn an_interrupted_fit_leaves_what_its_steps_have_found() {
+    let Some(shared) = shared() else { return };
+    let (changed, targets) = darker();
+    let posed = changed.scene.mesh.pose();
+    let flag = Arc::new(AtomicBool::new(false));
+    let task = task(&changed, &posed, observed(&changed, &targets), MapKind::Color);
+    let task =
+        MapTask { kinds: vec![MapKind::Color, MapKind::Specular], interrupt: Some(flag.clone()), ..task };
+    let found = fit_maps(shared, task, &mut |_| flag.store(true, Ordering::SeqCst)).unwrap();
+    assert!(found.interrupted);
+    let steps: Vec<_> = found.history.iter().map(|step| step.what).collect();
+    assert_eq!(steps, ["color"]);
+    let [color, specular] = [0, 1].map(|layer| {
+        let layer = &found.layers[layer];
+        read(layer.start.clone()).unwrap() != read(layer.value.clone()).unwrap()
+    });
+    assert!(color && !specular);
+    // The samples show the map as it is.
+    let before = &sampled(&changed)[0];
+    assert!(difference(before, &found.observed[0].samples, albedo) > 1e-3);
+}
+
+#[test]
+fn the_priors_are_the_weighted_means_of_squares() {
+    let Some(shared) = shared() else { return };
+    // Three texels in a row, of one channel and of three: two pairs of neighbours.
+    for channels in [1, 3] {
+        let (start, value) = ([0.2, 0.5, 0.9], [0.5, 0.4, 0.9]);
+        let change: [f64; 3] = [0.3, -0.1, 0.0];
+        let spread = |x: [f64; 3]| -> Vec<f64> { x.iter().flat_map(|&x| vec![x; channels]).collect() };
+        let input = if channels == 1 { Input::Specular } else { Input::Albedo };
+        for (smoothness, closeness) in [(0.7, 0.0), (0.0, 0.3), (0.7, 0.3)] {
+            let parts = LayerParts {
+                name: "row",
+                input,
+                grid: Grid::Texels { width: 3, height: 1 },
+                footprint: texels(3, 1, []),
+                pairs: texel_pairs(3, 1),
+                start: spread(start).into_iter().map(|x| x as f32).collect(),
+                prior: MapPrior { smoothness, closeness, lower: 0.0, upper: 1.0 },
+            };
+            let layer = Layer::new(shared, parts, &[Cut::default()]).unwrap();
+            let found = layer.penalty(matrix(&spread(value), channels, shared.device())).unwrap();
+            let rough = ((change[0] - change[1]).powi(2) + (change[1] - change[2]).powi(2)) / 2.0;
+            let close = change.iter().map(|d| d * d).sum::<f64>() / 3.0;
+            let wanted = smoothness * rough + closeness * close;
+            // A handful of roundings of f32.
+            assert!(
+                (f64::from(read(found).unwrap()[0]) / wanted - 1.0).abs() < 1e-5,
+                "{channels} {smoothness}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_mesh_whose_texture_coordinates_are_all_the_same_has_no_texels_to_fit() {
+    let Some(shared) = shared() else { return };
+    let (changed, targets) = darker();
+    let mut posed = changed.scene.mesh.pose();
+    posed.uvs.iter_mut().for_each(|uv| *uv = glam::Vec2::ZERO);
+    let task = task(&changed, &posed, observed(&changed, &targets), MapKind::Color);
+    let Err(error) = fit_maps(shared, task, &mut |_| {}) else { panic!("it was fitted") };
+    assert!(error.to_string().contains("no texture coordinates"), "{error}");
 }
 
 #[test]

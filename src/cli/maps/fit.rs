@@ -1,0 +1,169 @@
+//! The fit of maps, as the command's arguments and the scene say.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::found::MapsFound;
+use super::pictures::MapPictures;
+use super::{MapArguments, MapRun};
+use crate::cli::fit::compared;
+use crate::cli::graphics::tensor_words;
+use crate::cli::{Refusal, say};
+use crate::engine::view::ObservedView;
+use crate::gpu::Choice;
+use crate::maps::fit::{MapStep, columns_beside};
+use crate::maps::{FittedMaps, MapError, MapTask, fit_maps};
+use crate::prepare::Prepared;
+use crate::progress;
+use crate::render::shade::Shader;
+use crate::report::maps::MapView;
+use crate::report::metrics::Comparison;
+use crate::scene::MapKind;
+use crate::scene::mesh::PosedMesh;
+use crate::scene::view::View;
+use crate::tensor::SharedDevice;
+
+impl MapArguments {
+    /// Fit the maps that are asked for: samples, cubes, constants and free columns are then those of the fitted maps,
+    /// and a view that was held out is gone.
+    pub(in crate::cli) fn fit(
+        &self,
+        prepared: &mut Prepared,
+        observed: Vec<ObservedView>,
+        run: &MapRun<'_>,
+    ) -> Result<(Vec<ObservedView>, Option<MapsFound>), Refusal> {
+        if self.maps.is_empty() {
+            return Ok((observed, None));
+        }
+        let clock = Instant::now();
+        let named = |kind: &MapKind| self.maps.iter().any(|name| name == kind.name());
+        let kinds: Vec<MapKind> = MapKind::ALL.into_iter().filter(named).collect();
+        let held_out = self.held_out(&prepared.scene.views, &prepared.scene.path)?;
+        let choice = Choice { name: run.adapter.map(str::to_owned), ..Choice::default() };
+        let shared = SharedDevice::open(&choice).map_err(|error| Refusal::new(tensor_words(&error)))?;
+        prepared.scene.fit.free = columns_beside(&kinds, &prepared.scene.fit.free);
+        let posed = prepared.scene.mesh.pose();
+        let task = task(prepared, &posed, &observed, kinds, held_out, run);
+        let found = told(&shared, task, prepared.scene.fit.maps.rounds, run.quiet)
+            .map_err(|error| refusal(&error, &prepared.scene.path))?;
+        let views = gained(prepared, &observed, &found, held_out);
+        let maps = found.layers.iter().map(|layer| MapPictures::new(layer, &posed));
+        let maps = maps.collect::<Result<Vec<_>, _>>()?;
+        let FittedMaps { illumination, mut observed, constants, history, interrupted, .. } = found;
+        prepared.illumination = illumination;
+        (prepared.scene.params, prepared.gains) = (constants.params, constants.gains);
+        if let Some(view) = held_out {
+            observed.remove(view);
+            prepared.scene.views.remove(view);
+            prepared.gains.remove(view);
+        }
+        prepared.seconds.maps = clock.elapsed().as_secs_f64();
+        let adapter = shared.gpu().name().to_owned();
+        let settings = prepared.scene.fit.maps.clone();
+        Ok((observed, Some(MapsFound { views, maps, history, adapter, settings, interrupted })))
+    }
+
+    fn held_out(&self, views: &[View], scene: &Path) -> Result<Option<usize>, Refusal> {
+        let Some(name) = &self.hold_out else { return Ok(None) };
+        let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+        let path = scene.display();
+        match names.iter().position(|found| found == name) {
+            None => Err(Refusal::new(format!(
+                "{path}: --hold-out: there is no view `{name}` with a target. {}.",
+                crate::scene::suggestion(name, &names)
+            ))),
+            Some(_) if names.len() == 1 => Err(Refusal::new(format!(
+                "{path}: --hold-out {name}: it is the only view with a target, so nothing is left to fit. Leave \
+                 --hold-out out, or add a [[view]]."
+            ))),
+            found => Ok(found),
+        }
+    }
+}
+
+fn task<'a>(
+    prepared: &'a Prepared,
+    posed: &'a PosedMesh,
+    observed: &[ObservedView],
+    kinds: Vec<MapKind>,
+    held_out: Option<usize>,
+    run: &MapRun<'_>,
+) -> MapTask<'a> {
+    let weights: Vec<f32> = prepared.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
+    MapTask {
+        scene: &prepared.scene,
+        posed,
+        illumination: prepared.illumination.clone(),
+        open: prepared.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
+        observed: observed.to_vec(),
+        held_out,
+        kinds,
+        start: prepared.start(),
+        unknowns: prepared.unknowns(),
+        most_samples: None,
+        interrupt: Some(Arc::clone(&run.interrupt)),
+    }
+}
+
+/// Fit, with a progress line, and a line for each round that stays.
+fn told(shared: &SharedDevice, task: MapTask<'_>, rounds: u32, quiet: bool) -> Result<FittedMaps, MapError> {
+    let bar = progress::spinner("maps");
+    let mut tell = |step: &MapStep| {
+        bar.inc(1);
+        bar.set_message(format!("round {} {}: loss {:.6e}", step.round, step.what, step.after));
+        if step.what == "constants" && !quiet {
+            let MapStep { round, after, seconds, .. } = step;
+            let line = format!("maps, round {round} of {rounds}: loss {after:.6e}, {seconds:.1} s");
+            // A line that cannot be written will be heard of when the fit is over.
+            bar.suspend(|| drop(say(&line)));
+        }
+    };
+    let found = fit_maps(shared, task, &mut tell);
+    bar.finish_and_clear();
+    found
+}
+
+fn refusal(error: &MapError, scene: &Path) -> Refusal {
+    let what = match error {
+        MapError::Tensor(error) => tensor_words(error),
+        error => error.to_string(),
+    };
+    let words = format!("{}: {what}", scene.display());
+    match error {
+        MapError::Tensor(_) | MapError::OutOfMemory { .. } | MapError::NotFinite { .. } => {
+            Refusal::failure(words)
+        }
+        MapError::Constants(_)
+        | MapError::TooLarge { .. }
+        | MapError::Unread { .. }
+        | MapError::NotUnwrapped { .. } => Refusal::new(words),
+    }
+}
+
+/// How well each view is met by the maps of the start and by the fitted ones, each with their best constants.
+fn gained(
+    prepared: &Prepared,
+    before: &[ObservedView],
+    found: &FittedMaps,
+    held_out: Option<usize>,
+) -> Vec<MapView> {
+    let initial = Shader::new(prepared.setup(), &prepared.illumination, &found.initial.params);
+    let fitted = Shader::new(prepared.setup(), &found.illumination, &found.constants.params);
+    let views = prepared.scene.views.iter().enumerate();
+    views
+        .map(|(i, view)| {
+            let scores = |shader: &Shader, observed: &ObservedView, gain: f64| {
+                let image = shader.shade(&observed.samples, &view.camera, gain).image;
+                let (target, coverage) = compared(view, observed, &image);
+                Comparison::new(&target, &image, &coverage).scores()
+            };
+            MapView {
+                name: view.name.clone(),
+                held_out: held_out == Some(i),
+                before: scores(&initial, &before[i], found.initial.gains[i]),
+                after: scores(&fitted, &found.observed[i], found.constants.gains[i]),
+            }
+        })
+        .collect()
+}

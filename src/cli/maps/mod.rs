@@ -1,0 +1,96 @@
+//! `skinfit fit --maps`: whole maps beside the constants, and the evidence of what that gained.
+//!
+//! - `absent`: what stands in where the program is built without the fit of maps
+//! - `fit`: the fit, for the command's arguments; `found`: what it leaves in the run folder; `pictures`: its images
+
+#[cfg(not(feature = "burn"))]
+mod absent;
+#[cfg(feature = "burn")]
+mod fit;
+#[cfg(feature = "burn")]
+mod found;
+#[cfg(feature = "burn")]
+mod pictures;
+
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::Refusal;
+use crate::report::maps::MapEvidence;
+use crate::scene::MapKind;
+
+/// How to build the program so that it fits maps.
+const BUILD: &str = "cargo build --release --features burn";
+
+/// Which maps, and what is held out of their fit.
+#[derive(clap::Args)]
+#[command(next_help_heading = "Maps")]
+pub(super) struct MapArguments {
+    /// Besides the constants, fit every texel of these maps (comma-separated): color, specular, attenuator,
+    /// occlusion (every vertex), environment (every texel of the cubes). The scene's [fit.maps] says how.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = ["color", "specular", "attenuator", "occlusion", "environment"], conflicts_with = "resume")]
+    maps: Vec<String>,
+    /// Leave a view out of the fit of maps, and tell how well it is met all the same.
+    #[arg(long, value_name = "VIEW", requires = "maps")]
+    hold_out: Option<String>,
+}
+
+/// How a fit of maps goes about it, beside what is fitted.
+#[cfg_attr(not(feature = "burn"), allow(dead_code, reason = "nothing fits maps"))]
+pub(super) struct MapRun<'a> {
+    /// Part of the name of the adapter to take.
+    pub(super) adapter: Option<&'a str>,
+    /// Set when somebody presses Ctrl-C.
+    pub(super) interrupt: Arc<AtomicBool>,
+    /// Whether nothing is said on standard output.
+    pub(super) quiet: bool,
+}
+
+/// What a fit of maps has left in the run folder.
+pub(super) struct MapsLeft {
+    /// The maps that a scene file can name: key in `[maps]` and path.
+    pub(super) named: Vec<(&'static str, String)>,
+    /// For the report.
+    pub(super) evidence: MapEvidence,
+    /// For the report, too: names and texts.
+    pub(super) provenance: Vec<(String, String)>,
+    /// What the user should know.
+    pub(super) warnings: Vec<String>,
+}
+
+impl MapArguments {
+    /// Whether maps are fitted.
+    pub(super) fn any(&self) -> bool {
+        !self.maps.is_empty()
+    }
+
+    /// The maps that are fitted and the view that is held out, in words; `None`: no maps.
+    pub(super) fn words(&self) -> Option<String> {
+        let named = |kind: &&str| self.maps.iter().any(|name| name == kind);
+        let kinds: Vec<&str> = MapKind::ALL.into_iter().map(MapKind::name).filter(named).collect();
+        let held_out = self.hold_out.as_ref().map(|view| format!(", view {view} held out"));
+        self.any().then(|| kinds.join(" ") + held_out.as_deref().unwrap_or_default())
+    }
+
+    /// Refuse maps in a program that was built without them.
+    pub(super) fn check(&self) -> Result<(), Refusal> {
+        if cfg!(feature = "burn") || (self.maps.is_empty() && self.hold_out.is_none()) {
+            return Ok(());
+        }
+        Err(Refusal::new(format!(
+            "--maps: this program was built without the fit of maps. Build it with `{BUILD}`, or leave --maps out."
+        )))
+    }
+
+    /// What to do after Ctrl-C, which left maps in `folder`.
+    pub(super) fn advice(&self, folder: &Path) -> String {
+        let (folder, maps) = (folder.display(), self.maps.join(","));
+        let held_out = self.hold_out.as_ref().map(|view| format!(" --hold-out {view}")).unwrap_or_default();
+        format!(
+            "Its scene.toml names the maps so far and begins with the constants that belong to them. Go on from there \
+             with `skinfit fit {folder}/scene.toml --maps {maps}{held_out}`; what is held of the maps \
+             beforehand is then held of these."
+        )
+    }
+}
