@@ -215,7 +215,8 @@ fn run(arguments: &Arguments) -> Result<Value> {
             .map(|(c, i)| error(c, i))
             .fold(0.0, f64::max);
         drop(image);
-        let forward = timed(arguments.reps, || engine.forward(&start));
+        let mut planes = Vec::new();
+        let forward = timed(arguments.reps, || engine.forward(&start, &mut planes));
         let grad = timed(arguments.reps, || drop(std::hint::black_box(engine.gradient(&start))));
         let normal = timed(arguments.reps, || drop(std::hint::black_box(engine.normal_equations(&start))));
         engine.fault().map_or(Ok(()), Err)?;

@@ -7,8 +7,8 @@ use skinfit::engine::{Objective, Point};
 pub(crate) trait Racer: Objective {
     /// Read every so-many-th block of pixels.
     fn read_every(&mut self, stride: usize);
-    /// The image, in the engine's own memory.
-    fn forward(&self, point: &Point);
+    /// The image, in the engine's own memory; the CPU's is `planes`, which an earlier one has left.
+    fn forward(&self, point: &Point, planes: &mut Vec<Vec<f32>>);
     /// The image, for the host.
     fn image_planes(&self, point: &Point) -> Vec<Vec<f32>>;
     /// Of the table.
@@ -21,8 +21,9 @@ impl Racer for CpuEngine {
     fn read_every(&mut self, stride: usize) {
         self.set_stride(stride);
     }
-    fn forward(&self, point: &Point) {
-        drop(std::hint::black_box(self.image(0, point)));
+    fn forward(&self, point: &Point, planes: &mut Vec<Vec<f32>>) {
+        self.image_into(0, point, planes);
+        std::hint::black_box(planes);
     }
     fn image_planes(&self, point: &Point) -> Vec<Vec<f32>> {
         self.image(0, point)
@@ -40,7 +41,7 @@ impl Racer for skinfit::engine::gpu::GpuEngine<'_> {
     fn read_every(&mut self, stride: usize) {
         self.set_stride(stride);
     }
-    fn forward(&self, point: &Point) {
+    fn forward(&self, point: &Point, _: &mut Vec<Vec<f32>>) {
         // A device that fails says so in the passes.
         let _ = self.shade(point);
     }

@@ -87,26 +87,46 @@ fn look_up<R: Real>(cube: &Cube<R::Texel>, at: &CubePoint<R::Wide>) -> [R; 4] {
 }
 
 /// The wanted terms of a fragment.
+///
+/// First where every lookup falls, then the lookups: a processor that works ahead then has all their
+/// texels to ask for at once.
 #[inline(always)]
 pub fn terms<R: Real>(lights: &Lights<'_, R>, f: &Fragment<R>, s: &Shading<R>, wanted: Wanted) -> Terms<R> {
     let zero = f.view[0].lit(0.0);
-    let mut terms = Terms::none(s.silhouette);
+    let origin = zero.widen();
+    let nowhere = Footprint { first: origin, place: [origin; 2] };
+    let (mut diffuse, mut side, mut mirror, mut hilite) = (nowhere, nowhere, nowhere, nowhere);
     if (wanted.diffuse && lights.irradiance.is_some()) || (wanted.side && lights.side.is_some()) {
         let n = point(lights.turned(s.n));
         if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-            terms.diffuse = mul(f.albedo, rgb(look_up(cube, &n))).map(R::fixed);
+            diffuse = cube.footprint(&n);
         }
         if let (true, Some(cube)) = (wanted.side, lights.side) {
-            terms.side = scale(f.specular, rgb(look_up(cube, &n))).map(R::fixed);
+            side = cube.footprint(&n);
         }
     }
     if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
-        let e = look_up(cube, &point(lights.turned(s.reflection)));
+        mirror = cube.footprint(&point(lights.turned(s.reflection)));
+    }
+    if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
+        hilite = cube.footprint(&point(lights.turned(f.view)));
+    }
+
+    let mut terms = Terms::none(s.silhouette);
+    let read = |cube: &Cube<R::Texel>, at: &Footprint<R::Wide>| cube.sample_at(at).map(R::narrow);
+    if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
+        terms.diffuse = mul(f.albedo, rgb(read(cube, &diffuse))).map(R::fixed);
+    }
+    if let (true, Some(cube)) = (wanted.side, lights.side) {
+        terms.side = scale(f.specular, rgb(read(cube, &side))).map(R::fixed);
+    }
+    if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
+        let e = read(cube, &mirror);
         terms.mirror = scale(f.dapple, rgb(e)).map(R::fixed);
         terms.haze = ((f.dapple * e[3]).fixed() * f.attenuator).fixed();
     }
     if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
-        terms.hilite = scale(f.attenuator, rgb(look_up(cube, &point(lights.turned(f.view)))));
+        terms.hilite = scale(f.attenuator, rgb(read(cube, &hilite)));
     }
     if let (true, Some(key)) = (wanted.key, lights.key) {
         let lambert = |n: V3<R>| dot(n, key.direction).max(zero);
