@@ -73,10 +73,11 @@ fn environment(environment: Option<&Environment>) -> String {
 }
 
 fn mesh(mesh: &Mesh, metres_per_unit: f64) -> String {
-    let flat = |vectors: &[glam::Vec3]| -> Vec<f32> { vectors.iter().flat_map(|v| v.to_array()).collect() };
-    let tangents: Vec<f32> = mesh.tangents.iter().flat_map(|v| v.to_array()).collect();
-    let uvs: Vec<f32> = mesh.uvs.iter().flat_map(|v| v.to_array()).collect();
-    let bones: Vec<f32> = mesh.bones.iter().flat_map(|m| m.to_cols_array()).collect();
+    let flat =
+        |vectors: &[glam::Vec3]| -> Vec<f32> { vectors.iter().flat_map(glam::Vec3::to_array).collect() };
+    let tangents: Vec<f32> = mesh.tangents.iter().flat_map(glam::Vec4::to_array).collect();
+    let uvs: Vec<f32> = mesh.uvs.iter().flat_map(glam::Vec2::to_array).collect();
+    let bones: Vec<f32> = mesh.bones.iter().flat_map(glam::Mat4::to_cols_array).collect();
     let rest = Hash::default()
         .words(&metres_per_unit)
         .numbers(&flat(&mesh.positions))
