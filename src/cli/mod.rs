@@ -5,7 +5,7 @@
 //! - `fit_engine`: what evaluates the passes of a fit
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
-//! - `interrupt`: Ctrl-C in the commands that are no fits
+//! - `unfinished`: what goes with Ctrl-C in the commands that are no fits
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
 mod ablate;
@@ -16,7 +16,6 @@ mod fit;
 mod fit_engine;
 mod fitted_scene;
 mod info;
-mod interrupt;
 mod maps;
 mod params;
 mod render;
@@ -26,6 +25,7 @@ mod shader;
 mod stability;
 mod sweep;
 mod tradeoff;
+mod unfinished;
 
 use std::io::Write as _;
 use std::path::Path;

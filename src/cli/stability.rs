@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, interrupt, say, tell, tell_warnings};
+use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::output;
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::progress;
@@ -54,7 +54,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     super::quieten_graphics();
-    interrupt::install();
+    unfinished::install();
     let output = arguments.output.as_deref();
     let folder = output.map(|output| RunFolder::of_study(output, Work::Stability)).transpose()?;
     let mut cases = kept::built_in()?;

@@ -3,10 +3,12 @@
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
+use std::time::Duration;
 
 use tempfile::TempDir;
 
 use super::{Refusal, tell};
+use crate::output;
 
 /// What goes when the command is interrupted.
 struct Unfinished {
@@ -48,6 +50,8 @@ fn interrupted(unfinished: &mut Unfinished) {
         unfinished.asked = true;
         return;
     }
+    // A bake that is being kept would bring its folder back; a disk that does not answer is not waited for.
+    let _halted = output::halt(Duration::from_secs(5));
     for folder in &unfinished.folders {
         let _ = std::fs::remove_dir_all(folder);
     }
