@@ -2,6 +2,8 @@
 
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{PoisonError, RwLock, RwLockWriteGuard, TryLockError};
+use std::time::{Duration, Instant};
 
 /// A file could not be written; nothing is left where it should have stood.
 #[derive(Debug, thiserror::Error)]
@@ -30,6 +32,25 @@ impl OutputError {
     }
 }
 
+/// Shared by those who write a file.
+static WRITING: RwLock<()> = RwLock::new(());
+
+/// For as long as the guard lives no file is begun: what is there can be removed before the program ends. Those that
+/// were begun are finished first; nothing, if that takes longer than `patience`.
+#[must_use]
+pub fn halt(patience: Duration) -> Option<RwLockWriteGuard<'static, ()>> {
+    let since = Instant::now();
+    loop {
+        // Not by waiting in line: a writer may need another's file first.
+        match WRITING.try_write() {
+            Ok(guard) => return Some(guard),
+            Err(TryLockError::Poisoned(guard)) => return Some(guard.into_inner()),
+            Err(TryLockError::WouldBlock) if since.elapsed() > patience => return None,
+            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(2)),
+        }
+    }
+}
+
 /// Write a file through `fill`; folders on the way are made.
 ///
 /// # Errors
@@ -38,6 +59,7 @@ pub fn write_with<E: ToString>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&mut std::fs::File>) -> Result<(), E>,
 ) -> Result<(), OutputError> {
+    let _writing = WRITING.read().unwrap_or_else(PoisonError::into_inner);
     let error = |reason: String| OutputError::new(path, &reason);
     // Through links, so that what they lead to is replaced and not they; what is not there yet is no link.
     let resolved = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());

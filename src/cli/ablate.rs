@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, interrupt, quieten_graphics, say, tell, tell_warnings};
+use super::{Exit, Refusal, quieten_graphics, say, tell, tell_warnings, unfinished};
 use crate::study::ablation::{AblationOptions, GpuTiming, ablate, files};
 
 /// Leave each effect and term out in turn: what the images lose, and what is saved
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("Images are compared with the scene's targets or, where it names none, with the whole model. DIR gets report.html (open it in a browser), results.csv, results.json, and for each part and view a picture: reference, what is left, FLIP error.\n\nThe table on standard output:\n  change, t  of the mean loss, and over its standard error: 3 and more is beyond chance;\n             exact: the whole model left no misfit, so any change is real\n  CPU, GPU   time over the whole model's, the two taking turns\n  ops        operations a fragment in the renderer, as its planner counts them\n  B/sample   bytes of attributes and texels that a sample reads\n\nExamples:\n  skinfit ablate -o runs/parts                                     the built-in scene\n  skinfit ablate scene.toml -o runs/parts --refit                  what is left, fitted again\n  skinfit ablate scene.toml -o runs/parts --params runs/a/params.toml --pairs", "a fit did not converge, the command was interrupted, or a device failed")
+    after_help = super::with_failure("Images are compared with the scene's targets or, where it names none, with the whole model. DIR gets report.html (open it in a browser), results.csv, results.json, and for each part and view a picture: reference, what is left, FLIP error.\n\nThe table on standard output:\n  change, t  of the mean loss, and over its standard error: 3 and more is beyond chance;\n             exact: the whole model left no misfit, so any change is real\n  CPU, GPU   time over the whole model's, the two taking turns\n  ops        operations a fragment in the renderer, as its planner counts them\n  B/sample   bytes of attributes and texels that a sample reads\n\nExamples:\n  skinfit ablate -o runs/parts                                     the built-in scene\n  skinfit ablate scene.toml -o runs/parts --refit                  what is left, fitted again\n  skinfit ablate scene.toml -o runs/parts --params runs/a/params.toml --pairs", "a fit did not converge, or the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -43,11 +43,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if gpu != GpuTiming::Never {
         quieten_graphics();
     }
-    interrupt::install();
+    unfinished::install();
     let mut folder = RunFolder::of_study(&arguments.output, Work::Ablation)?;
     let (path, _scratch) = arguments.scene.path()?;
     // Every case looks for its bakes: without a cache of the user's, they are kept for as long as this takes.
-    let scratch = interrupt::scratch()?;
+    let scratch = unfinished::scratch()?;
     let options = AblationOptions {
         pairs: arguments.pairs,
         refit: arguments.refit,

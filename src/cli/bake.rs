@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use super::scene::{SceneArguments, parse_effects};
-use super::{Exit, Refusal, interrupt, say, tell, tell_warnings};
+use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::bake::VertexOcclusion;
 use crate::model::cube::Cube;
 use crate::model::effects::Effects;
@@ -34,7 +34,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    interrupt::install();
+    unfinished::install();
     let (path, _scratch) = arguments.scene.path()?;
     let options = PrepareOptions {
         effects: arguments.effects,
@@ -46,7 +46,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     tell_warnings(&prepared.warnings);
     let folder = &arguments.output;
     let light = &prepared.illumination;
-    interrupt::writing(folder);
+    unfinished::writing(folder);
     let mut written = 0;
     let mut cube = |name: &str, cube: &Cube<f32>| -> Result<(), Refusal> {
         written += 1;

@@ -6,7 +6,7 @@
 //! - `graphics`: what to do about an adapter that cannot
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
-//! - `interrupt`: Ctrl-C
+//! - `interrupt`: Ctrl-C in a fit; `unfinished`: what goes with it in the other commands
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
 mod ablate;
@@ -30,6 +30,7 @@ mod shader;
 mod stability;
 mod sweep;
 mod tradeoff;
+mod unfinished;
 
 use std::io::Write as _;
 use std::path::Path;

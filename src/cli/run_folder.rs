@@ -5,7 +5,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 use super::fitted_scene::{Changes, as_fitted, named_maps};
-use super::{Refusal, interrupt};
+use super::{Refusal, unfinished};
 use crate::output::{self, OutputError};
 
 /// A run folder that no other run writes to. Unless [`keep`](Self::keep) is called, what opening it
@@ -66,7 +66,7 @@ impl RunFolder {
     /// Make and lock `output` for a study, which begins anew when it is interrupted.
     pub(super) fn of_study(output: &Path, work: Work) -> Result<Self, Refusal> {
         let folder = Self::locked(output.to_owned(), work)?;
-        interrupt::working(&folder.path, folder.made.contains(&folder.path), &folder.made);
+        unfinished::working(&folder.path, folder.made.contains(&folder.path), &folder.made);
         Ok(folder)
     }
 
@@ -114,7 +114,7 @@ impl RunFolder {
 
     /// As [`keep`](Self::keep), of a study: its results are about to be written.
     pub(super) fn keep_study(&mut self) {
-        interrupt::writing(&self.path);
+        unfinished::writing(&self.path);
         self.keep();
     }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use tempfile::TempDir;
 
-use super::{Refusal, interrupt};
+use super::{Refusal, unfinished};
 use crate::bake::cache;
 use crate::demo;
 use crate::model::effects::{Effect, Effects};
@@ -40,7 +40,7 @@ impl SceneArguments {
         if self.scene.is_some() || !self.bakes.no_cache {
             return Ok((self.kept_path(Path::new(""))?, None));
         }
-        let scratch = interrupt::scratch()?;
+        let scratch = unfinished::scratch()?;
         Ok((self.kept_path(scratch.path())?, Some(scratch)))
     }
 

@@ -8,7 +8,7 @@ use std::rc::Rc;
 use super::graphics::Task;
 use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, interrupt, say, tell, tell_warnings};
+use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::output;
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::progress;
@@ -56,7 +56,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     super::quieten_graphics();
-    interrupt::install();
+    unfinished::install();
     let output = arguments.output.as_deref();
     let folder = output.map(|output| RunFolder::of_study(output, Work::Stability)).transpose()?;
     let mut cases = kept::built_in()?;

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::fitted_scene::Changes;
 use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, interrupt, say, tell, tell_warnings};
+use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::scene::suggestion;
 use crate::study::tradeoff::choose::Goal;
 use crate::study::tradeoff::{TradeoffOptions, axes, files, tradeoff};
@@ -37,11 +37,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    interrupt::install();
+    unfinished::install();
     let mut folder = RunFolder::of_study(&arguments.output, Work::Tradeoff)?;
     let path = arguments.scene.kept_path(folder.path())?;
     // Settings are evaluated more than once: without a cache of the user's, bakes are kept for as long as this takes.
-    let scratch = interrupt::scratch()?;
+    let scratch = unfinished::scratch()?;
     let options = TradeoffOptions {
         axes: arguments.axis.clone(),
         params: arguments.params.clone(),

@@ -63,6 +63,17 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         ("\"env.exr\"", "\"missing.exr\"".into(), &["missing.exr", "no such file"]),
         ("\"env.exr\"", "\".\"".into(), &["not a file"]),
         ("\"quad.glb\"", "\"missing.glb\"".into(), &["missing.glb", "no such file"]),
+        (
+            "\"env.exr\"",
+            "\"env.exr\"\nrotation_degrees = 1e300".into(),
+            &["rotation_degrees = 1e300", "[-36000, 36000]"],
+        ),
+        ("\"quad.glb\"", "\"quad.glb\"\ntime = 1e300".into(), &["time = 1e300", "[-1000000, 1000000]"]),
+        (
+            "\"quad.glb\"",
+            "\"quad.glb\"\nmorph_weights = [1e300]".into(),
+            &["morph_weights holds 1e300. Give weights in [-1000000"],
+        ),
         ("\"quad.glb\"", "\"quad.glb\"\nmorph_weights = [1]".into(), &["0 morph targets", "1 weights"]),
         ("\"quad.glb\"", "\"quad.glb\"\nmorph_weights = [nan]".into(), &["morph_weights holds NaN"]),
         ("\"quad.glb\"", "\"quad.glb\"\nmetres_per_unit = 0".into(), &["metres_per_unit = 0"]),

@@ -213,6 +213,9 @@ mod tests {
     const PLAN: &str = "command = \"fit\"\nscene = \"a.toml\"\n[settings]\nsolver = \"lm\"\nfit.loss = \"l2\"\n\
         [[axis]]\nkey = \"seed\"\nvalues = [1, 2]\n[[axis]]\nkey = \"model.params.hilite\"\nvalues = [0.5, 1.0, 2.0]\n";
 
+    const SCENE: &str = "[mesh]\nfile = \"a.glb\"\n[[view]]\nname = \"front\"\nfov_y_degrees = 35.0\nwidth = 4\nheight = 4\n\
+        world_to_camera = [1,0,0,0, 0,1,0,0, 0,0,1,-4, 0,0,0,1]\n";
+
     #[test]
     fn axes_are_combined_with_the_last_one_fastest() {
         let plan = read(PLAN).unwrap();
@@ -295,11 +298,10 @@ mod tests {
 
     #[test]
     fn values_of_scenes_are_checked_before_any_job_runs() {
-        let scene = "[mesh]\nfile = \"a.glb\"\n";
         let told = |key: &str, value: &str| {
             let text = format!("command = \"fit\"\n[[axis]]\nkey = \"{key}\"\nvalues = [{value}]\n");
             let plan = read(&text).unwrap();
-            plan.scene_text(&plan.jobs[0], Path::new("a.toml"), scene).map_err(|error| error.to_string())
+            plan.scene_text(&plan.jobs[0], Path::new("a.toml"), SCENE).map_err(|error| error.to_string())
         };
         for (key, value, words) in [
             ("fit.loss", "\"l3\"", "job 0: unknown loss `l3`. Did you mean `l2`?"),
@@ -326,11 +328,10 @@ mod tests {
     #[test]
     fn scene_keys_are_checked_against_the_scene() {
         let plan = read(&PLAN.replace("model.params.hilite", "fit.losss")).unwrap();
-        let scene = "[mesh]\nfile = \"a.glb\"\n";
-        let told = plan.scene_text(&plan.jobs[0], Path::new("a.toml"), scene).unwrap_err().to_string();
+        let told = plan.scene_text(&plan.jobs[0], Path::new("a.toml"), SCENE).unwrap_err().to_string();
         assert!(told.contains("fit.losss = 0.5: unknown key `losss`"), "{told}");
         let plan = read(PLAN).unwrap();
-        let text = plan.scene_text(&plan.jobs[4], Path::new("a.toml"), scene).unwrap();
+        let text = plan.scene_text(&plan.jobs[4], Path::new("a.toml"), SCENE).unwrap();
         assert!(text.contains("hilite = 1.0") && text.contains("loss = \"l2\""), "{text}");
     }
 }

@@ -84,6 +84,41 @@ fn an_interrupted_fit_keeps_its_state_and_goes_on_to_the_same_end() {
     assert_eq!(evaluations("run"), evaluations("whole"));
 }
 
+/// A study that lasts for seconds, interrupted once its folder is there; its scratch goes to `tmp`.
+#[cfg(unix)]
+fn interrupted_study(sandbox: &Sandbox, command: &str, more: &[&str]) -> Ran {
+    std::fs::create_dir_all(sandbox.path("tmp")).unwrap();
+    let study = [&[command, "scene.toml", "-o", "made/study", "--no-cache"], more].concat();
+    let mut command = sandbox.command(&study);
+    command.env("TMPDIR", sandbox.path("tmp")).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = Running(command.spawn().unwrap());
+    let since = Instant::now();
+    while std::fs::read_dir(sandbox.path("tmp")).unwrap().count() == 0 {
+        assert!(child.0.try_wait().unwrap().is_none(), "it ended before it began");
+        assert!(since.elapsed() < Duration::from_secs(60), "no scratch after a minute");
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // Into the first of its bakes.
+    std::thread::sleep(Duration::from_millis(50));
+    assert!(Command::new("kill").args(["-INT", &child.0.id().to_string()]).status().unwrap().success());
+    finish(child)
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_study_says_so_and_leaves_nothing() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("occlusion_rays = 32", "occlusion_rays = 65536");
+    for (command, more) in [("ablate", &["--gpu", "never"][..]), ("tradeoff", &["--axis", "samples"])] {
+        let ran = interrupted_study(&sandbox, command, more);
+        assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
+        let words = "skinfit: interrupted: no results were written; only bakes in the cache were kept.\n";
+        assert_eq!(ran.err, words, "{ran:?}");
+        assert!(!sandbox.path("made").exists(), "{command}: its folder is left");
+        assert_eq!(std::fs::read_dir(sandbox.path("tmp")).unwrap().count(), 0, "{command}: scratch is left");
+    }
+}
+
 #[test]
 fn two_runs_into_one_folder_are_one_too_many() {
     let sandbox = Sandbox::new();
@@ -91,6 +126,9 @@ fn two_runs_into_one_folder_are_one_too_many() {
     sandbox
         .fit("run", &[])
         .refused(&["run: another run is writing to this folder", "choose another with -o"]);
+    sandbox
+        .run(&["stability", "scene.toml", "--no-gpu", "-o", "run"])
+        .refused(&["run: another run is writing to this folder"]);
     assert_eq!(finish(first).code, Some(0));
     sandbox.fit("run", &[]).done();
 }

@@ -182,3 +182,33 @@ fn parameter_files_that_cannot_be_used() {
         }
     }
 }
+
+/// The ball with its vertices on two bones, those from vertex `first` on on the second; the first is scaled to nothing.
+fn with_a_bone_of_no_size(first: usize) -> Vec<u8> {
+    mesh(|json, bin| {
+        let attributes = &mut json["meshes"][0]["primitives"][0]["attributes"];
+        attributes["JOINTS_0"] = 3.into();
+        attributes["WEIGHTS_0"] = 4.into();
+        json["nodes"] = json!([{"mesh": 0, "skin": 0}, {"scale": [0, 0, 0]}, {}]);
+        json["scenes"] = json!([{"nodes": [0, 1, 2]}]);
+        json["skins"] = json!([{"joints": [1, 2]}]);
+        let joints = json["bufferViews"][3]["byteOffset"].as_u64().unwrap() as usize;
+        let count = json["accessors"][3]["count"].as_u64().unwrap() as usize;
+        (first..count).for_each(|vertex| bin[joints + 4 * vertex] = 1);
+    })
+}
+
+#[test]
+fn a_mesh_that_its_bones_draw_together_is_refused_and_a_part_of_it_is_only_hidden() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("[\"diffuse\", ", "[\"skin\", \"diffuse\", ");
+    sandbox.write("mesh.glb", &with_a_bone_of_no_size(usize::MAX / 2));
+    let words =
+        ["scene.toml: no triangle of the mesh has an area once it is posed", "node scales, bones or morph"];
+    sandbox.fit("run", &[]).refused(&words);
+    sandbox.run(&["render", "scene.toml", "-o", "a.exr"]).refused(&words);
+    sandbox.run(&["ablate", "scene.toml", "-o", "run"]).refused(&words);
+    assert!(!sandbox.path("run").exists());
+    sandbox.write("mesh.glb", &with_a_bone_of_no_size(200));
+    sandbox.run(&["render", "scene.toml", "--engine", "cpu", "-o", "a.exr"]).done();
+}

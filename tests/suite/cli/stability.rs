@@ -41,3 +41,12 @@ fn cases_of_a_file_are_tried_again_and_other_files_are_refused() {
         .run(&["stability", "scene.toml", "--replay", "none.toml"])
         .refused(&["none.toml: there is no such file"]);
 }
+
+#[test]
+fn a_folder_that_cannot_be_had_is_refused_before_anything_is_studied() {
+    let sandbox = Sandbox::new();
+    sandbox.write("file", b"in the way");
+    let study = ["stability", "scene.toml", "--no-gpu", "--cases", "1000000", "-o", "file"];
+    sandbox.run(&study).refused(&["file: cannot be written", "Choose a folder"]);
+    assert_eq!(sandbox.read("file"), b"in the way");
+}

@@ -43,6 +43,23 @@ fn every_help_page_holds_an_example_that_is_understood() {
     assert_eq!(version, format!("skinfit {}\n", env!("CARGO_PKG_VERSION")));
 }
 
+#[test]
+fn what_exit_code_1_means_is_said_of_each_command_that_has_its_own() {
+    let sandbox = Sandbox::new();
+    for (command, words) in [
+        ("fit", "the fit failed"),
+        ("ablate", "a fit did not converge"),
+        ("tradeoff", "no settings meet --within or --budget"),
+        ("bake", "the command was interrupted"),
+        ("stability", "a case failed on an evaluator"),
+        ("sweep", "a job failed"),
+        ("collect", "a job is missing or failed"),
+    ] {
+        let help = sandbox.run(&[command, "--help"]).done().out;
+        assert!(help.contains(&format!("\n  1  {words}")), "{command}: {help}");
+    }
+}
+
 /// A Markdown cell's text.
 fn plain(cell: &str) -> String {
     cell.trim_start_matches("| ").trim_end_matches(" |").replace("\\|", "|")

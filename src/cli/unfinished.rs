@@ -1,0 +1,100 @@
+//! Ctrl-C in a command that has nothing to go on from: what is unfinished goes, and one line says what stays.
+
+use std::io::{IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Duration;
+
+use tempfile::TempDir;
+
+use super::{Refusal, tell};
+use crate::output;
+
+/// What goes when the command is interrupted.
+struct Unfinished {
+    /// Folders that were made for this run alone: they go with all that is in them.
+    folders: Vec<PathBuf>,
+    /// Files, and folders that go if they are empty; in this order.
+    places: Vec<PathBuf>,
+    /// What is written into, where the results are being written.
+    writing: Option<PathBuf>,
+    /// Whether it was asked for once while they are.
+    asked: bool,
+}
+
+static UNFINISHED: Mutex<Unfinished> =
+    Mutex::new(Unfinished { folders: Vec::new(), places: Vec::new(), writing: None, asked: false });
+
+/// Change what goes; a thread that panicked has left it whole.
+fn change(change: impl FnOnce(&mut Unfinished)) {
+    change(&mut UNFINISHED.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
+}
+
+/// From now on Ctrl-C ends the program by [`interrupted`], with the exit code of an interrupted fit.
+pub(super) fn install() {
+    // Refused only if a handler is there already; then Ctrl-C ends the program as it always did.
+    let _ = ctrlc::set_handler(|| change(interrupted));
+}
+
+/// Whoever wants to begin writing waits for this to end, and with it the program.
+fn interrupted(unfinished: &mut Unfinished) {
+    if std::io::stderr().is_terminal() {
+        // Off the line of the progress bar.
+        let _ = writeln!(std::io::stderr());
+    }
+    if let (Some(folder), false) = (&unfinished.writing, unfinished.asked) {
+        tell(&format!(
+            "{}: the results are being written and will be whole in a moment. Press Ctrl-C again to stop at once.",
+            folder.display()
+        ));
+        unfinished.asked = true;
+        return;
+    }
+    // A bake that is being kept would bring its folder back; a disk that does not answer is not waited for.
+    let _halted = output::halt(Duration::from_secs(5));
+    for folder in &unfinished.folders {
+        let _ = std::fs::remove_dir_all(folder);
+    }
+    for place in &unfinished.places {
+        // Whatever is in the way is not ours to remove.
+        let _ = if place.is_dir() { std::fs::remove_dir(place) } else { std::fs::remove_file(place) };
+    }
+    match &unfinished.writing {
+        Some(folder) => tell(&format!(
+            "{}: interrupted while the results were written: each file is whole, but they may be of two runs.",
+            folder.display()
+        )),
+        None => tell("interrupted: no results were written; only bakes in the cache were kept."),
+    }
+    std::process::exit(1);
+}
+
+/// `folder` is being worked for: `own` if it was made for it, and `made`, what else was made for it, innermost first.
+pub(super) fn working(folder: &Path, own: bool, made: &[PathBuf]) {
+    change(|unfinished| {
+        unfinished.folders.extend(own.then(|| folder.to_owned()));
+        unfinished.places.extend(made.iter().cloned());
+    });
+}
+
+/// The results are about to be written into `folder`: what was made for them stays.
+pub(super) fn writing(folder: &Path) {
+    change(|unfinished| {
+        unfinished.folders.retain(|own| !folder.starts_with(own));
+        unfinished.places.clear();
+        unfinished.writing = Some(folder.to_owned());
+    });
+}
+
+/// A folder for what is needed only as long as the command runs; it goes when the command ends or is interrupted.
+pub(super) fn scratch() -> Result<TempDir, Refusal> {
+    let scratch = tempfile::tempdir().map_err(|error| {
+        let folder = std::env::temp_dir();
+        Refusal::new(format!(
+            "{}: a scratch folder cannot be made there: {error}. Make room, or set TMPDIR.",
+            folder.display()
+        ))
+    })?;
+    working(scratch.path(), true, &[]);
+    Ok(scratch)
+}
