@@ -30,7 +30,7 @@ use crate::scene::{Loss, Scene};
 /// Fit a scene's free parameters to its target images
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs; with --maps, maps.json and the fitted maps in maps/ instead of the latter.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -173,6 +173,10 @@ fn conclude(
         run.provenance.extend(left.provenance.iter().cloned());
         run.maps = Some(left.evidence.clone());
     }
+    // A fit of maps that was interrupted is so as a whole, even where the constants had nothing left to do.
+    let interrupted = maps.is_some_and(|left| left.evidence.interrupted);
+    let ending = if interrupted { Ending::Interrupted } else { outcome.ending };
+    let outcome = &Outcome { ending, ..outcome.clone() };
     let report = report::write_run(folder.path(), &run, outcome)?;
     if arguments.json {
         say(report.json.trim_end())?;

@@ -137,8 +137,9 @@ impl Gpu {
         Ok(made)
     }
 
+    /// Refuse what a binding cannot hold.
     #[cfg(feature = "burn")]
-    fn check_binding(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
+    pub(crate) fn check_binding(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
         let limits = self.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes <= limit {

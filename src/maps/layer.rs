@@ -76,6 +76,8 @@ impl Layer {
         let mut neighbours = vec![0.0_f32; texels];
         parts.pairs.iter().flatten().for_each(|&texel| neighbours[texel as usize] += 1.0);
         let differences = crate::tensor::footprint::differences(texels, parts.pairs);
+        let bytes = 4 * (differences.rows() * channels) as u64;
+        shared.gpu().check_binding("differences between neighbouring texels", bytes)?;
         let matrix = |numbers: Vec<f32>, columns: usize| {
             Tensor::<2>::from_data(TensorData::new(numbers, [texels, columns]), shared.device())
         };

@@ -140,7 +140,7 @@ fn check_report(sandbox: &Sandbox) {
     assert!(psnr("front", "after") > psnr("front", "before") + 3.0, "{gained}");
     assert_eq!(gained["side"]["held_out"], true);
     assert_eq!(report["maps"]["interrupted"], false);
-    assert!(report["maps"]["largest_change"]["occlusion"].as_f64().unwrap() > 0.0);
+    assert!(report["maps"]["largest_change"]["color"].as_f64().unwrap() > 0.01);
     assert!(report["seconds"]["maps"].as_f64().unwrap() > 0.0);
     assert_eq!(report["provenance"]["fitted maps"], "color, occlusion");
     assert_eq!(report["provenance"]["held out"], "side");
@@ -232,6 +232,8 @@ fn ctrl_c_leaves_the_maps_so_far_and_says_how_to_go_on() {
     use std::process::{Command, Stdio};
 
     let sandbox = Sandbox::new();
+    // Without its map, the scene is far from what the constants alone could meet.
+    sandbox.edit("color = \"color.png\"\n", "");
     sandbox.edit("loss = ", "maps = { rounds = 1000, steps = 50 }\nloss = ");
     let mut command = sandbox.command(&["fit", "scene.toml", "-o", "run", "--maps", "color"]);
     let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
@@ -277,6 +279,9 @@ fn without_texture_coordinates_textures_are_refused_and_vertices_are_fitted() {
         sandbox.edit(&format!("{map} = \"{map}.png\"\n"), "");
     }
     sandbox.edit("loss = ", "maps = { rounds = 1, steps = 2 }\nloss = ");
+    // Held, so that there is an occlusion to be seen.
+    sandbox.edit("hilite = 0.7\n", "hilite = 0.7\nocclusion = 0.7\n");
+    sandbox.edit("\"reflection\", \"occlusion\", \"specular_lobe\"]", "\"reflection\"]");
     for map in ["color", "specular", "attenuator"] {
         sandbox.fit("run", &["--maps", map]).refused(&["no texture coordinates", map, "Unwrap the mesh"]);
         assert!(!sandbox.path("run").exists());

@@ -290,19 +290,25 @@ fn a_view_that_is_held_out_counts_nothing_for_maps_and_constants() {
     let posed = changed.scene.mesh.pose();
     let mut other = targets.clone();
     other[1].1.rgb.iter_mut().for_each(|rgb| *rgb = [rgb[1] + 0.1, 0.5 * rgb[2], 0.3]);
+    let free = [Param::BaseWeight, Param::Hilite, Param::RimExponent];
+    let unknowns = free.map(|param| Unknown::Param(Column::tied(param))).to_vec();
     let fit = |targets: &[(View, Target)], held_out| {
-        let free = [Param::BaseWeight, Param::Hilite, Param::RimExponent];
-        let unknowns = free.map(|param| Unknown::Param(Column::tied(param))).to_vec();
+        let unknowns = unknowns.clone();
         let task = task(&changed, &posed, observed(&changed, targets), MapKind::Color);
         fit_maps(shared, MapTask { held_out, unknowns, ..task }, &mut |_| {}).unwrap()
     };
     let [as_it_is, as_another] = [&targets, &other].map(|targets| fit(targets, Some(1)));
-    assert!(values(&as_it_is) == values(&as_another), "the maps differ");
-    assert_eq!(as_it_is.constants, as_another.constants);
-    // Of a view that is not held out, both would.
-    let counted = fit(&other, None);
-    assert!(values(&as_it_is) != values(&counted));
-    assert_ne!(as_it_is.constants, counted.constants);
+    let apart = |a: &FittedMaps, b: &FittedMaps| {
+        let texels = values(a).iter().zip(values(b)).fold(0.0_f32, |most, (a, b)| most.max((a - b).abs()));
+        let constant = |unknown: &Unknown| (unknown.get(&a.constants) - unknown.get(&b.constants)).abs();
+        (texels, unknowns.iter().map(constant).fold(0.0, f64::max))
+    };
+    // burn adds a tensor up in an order that is not always the same; some steps later that is a few roundings.
+    let (texels, constant) = apart(&as_it_is, &as_another);
+    assert!(texels < 1e-4 && constant < 1e-4, "{texels} {constant}");
+    // Where the view counts, both are moved by far more.
+    let (texels, constant) = apart(&as_it_is, &fit(&other, None));
+    assert!(texels > 0.05 && constant > 0.01, "{texels} {constant}");
 }
 
 #[test]
@@ -318,9 +324,10 @@ fn samples_in_parts_give_the_same_maps() {
         // A view has some twenty thousand samples.
         let (whole, parts) = (fit(None), fit(Some(7_000)));
         assert!(parts.layers[0].footprints.len() > 4);
+        let first = whole.history[0].before;
         for (a, b) in whole.history.iter().zip(&parts.history) {
-            // A few roundings of sums of f32, through as many steps.
-            let near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * a.abs();
+            // A few roundings of sums of f32, of the size that the loss begins with.
+            let near = |a: f64, b: f64| (a - b).abs() <= 1e-5 * first;
             assert!(a.what == b.what && near(a.before, b.before) && near(a.after, b.after), "{a:?} {b:?}");
         }
         assert!(whole.history[0].after < 0.5 * whole.history[0].before, "{:?}", whole.history[0]);
