@@ -217,6 +217,7 @@ fn run(arguments: &Arguments) -> Result<Value> {
         drop(image);
         let mut planes = Vec::new();
         let forward = timed(arguments.reps, || engine.forward(&start, &mut planes));
+        drop(planes);
         let grad = timed(arguments.reps, || drop(std::hint::black_box(engine.gradient(&start))));
         let normal = timed(arguments.reps, || drop(std::hint::black_box(engine.normal_equations(&start))));
         engine.fault().map_or(Ok(()), Err)?;

@@ -10,12 +10,11 @@ use crate::scene::{Quality, Scene};
 /// What stands for something that is not there.
 const NONE: &str = "none";
 
-/// The fingerprint of a fit of `scene`; `maps`: which whole maps were fitted with it, in words.
-pub(super) fn fingerprint(scene: &Scene, maps: Option<String>) -> Fingerprint {
+/// The fingerprint of a fit of `scene`.
+pub(super) fn fingerprint(scene: &Scene) -> Fingerprint {
     let effects: Vec<&str> = scene.effects.iter().map(crate::model::effects::Effect::name).collect();
     let Maps { color, normal, specular, attenuator } = &scene.maps;
     let all = Fingerprint::default()
-        .with("list of fitted maps", maps.unwrap_or_else(|| NONE.to_owned()))
         .with("form", scene.form.name())
         .with("silhouette", scene.silhouette.name())
         .with("list of effects", effects.join(" "))

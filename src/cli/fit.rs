@@ -294,7 +294,7 @@ fn solve(
         max_iterations: arguments.max_iterations,
         starts: solving.starts,
         seed: solving.seed,
-        fingerprint: fingerprint(&prepared.scene, arguments.maps.words()),
+        fingerprint: fingerprint(&prepared.scene),
         resume: arguments.resume.then(|| state.clone()),
         state: (!maps).then_some(state),
         interrupt: Some(interrupt.watch()),

@@ -49,8 +49,8 @@ impl Animation {
 
 /// Beyond f32's range a position would not be finite: weights times deltas must stay well within.
 const MOST_WEIGHT: f64 = 1e6;
-/// Eleven days: no animation is that long, and f32 keys are still a sixteenth of a second apart.
-const MOST_SECONDS: f64 = 1e6;
+/// Thirty years: whatever an animation's length, its last pose is meant.
+const MOST_SECONDS: f64 = 1e9;
 
 /// How the mesh is to be posed.
 pub(super) struct Pose {

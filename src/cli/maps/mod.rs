@@ -18,7 +18,6 @@ use std::sync::atomic::AtomicBool;
 
 use super::Refusal;
 use crate::report::maps::MapEvidence;
-use crate::scene::MapKind;
 
 /// How to build the program so that it fits maps.
 const BUILD: &str = "cargo build --release --features burn";
@@ -63,14 +62,6 @@ impl MapArguments {
     /// Whether maps are fitted.
     pub(super) fn any(&self) -> bool {
         !self.maps.is_empty()
-    }
-
-    /// The maps that are fitted and the view that is held out, in words; `None`: no maps.
-    pub(super) fn words(&self) -> Option<String> {
-        let named = |kind: &&str| self.maps.iter().any(|name| name == kind);
-        let kinds: Vec<&str> = MapKind::ALL.into_iter().map(MapKind::name).filter(named).collect();
-        let held_out = self.hold_out.as_ref().map(|view| format!(", view {view} held out"));
-        self.any().then(|| kinds.join(" ") + held_out.as_deref().unwrap_or_default())
     }
 
     /// Refuse maps in a program that was built without them.
