@@ -214,8 +214,7 @@ fn run(arguments: &Arguments) -> Result<Value> {
             .flat_map(|c| (0..manifest.pixels).map(move |i| (c, i)))
             .map(|(c, i)| error(c, i))
             .fold(0.0, f64::max);
-        drop(image);
-        let mut planes = Vec::new();
+        let mut planes = image;
         let forward = timed(arguments.reps, || engine.forward(&start, &mut planes));
         drop(planes);
         let grad = timed(arguments.reps, || drop(std::hint::black_box(engine.gradient(&start))));
