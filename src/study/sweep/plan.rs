@@ -312,11 +312,15 @@ mod tests {
             ("fit.free", "[\"hilit\"]", "unknown parameter `hilit`"),
             ("quality.lobe_size", "0", "lobe_size = 0 is out of bounds"),
             ("maps.normal_y", "\"left\"", "unknown direction `left`"),
-            ("mesh.time", "1e300", "time = 1e300 is out of bounds. Give seconds in [-1000000000, 1000000000]"),
+            (
+                "mesh.time",
+                "1e300",
+                "time = 1e300 is out of bounds. Give seconds in [-1000000000, 1000000000]",
+            ),
             (
                 "mesh.morph_weights",
                 "[1e300]",
-                "morph_weights holds 1e300. Give weights in [-1000000000, 1000000000]",
+                "morph_weights holds 1e300. Give weights in [-1000000, 1000000]",
             ),
         ] {
             let told = told(key, value).unwrap_err();
