@@ -1,8 +1,8 @@
 //! A group's window in the scratch: the columns and the residual of each channel, a row each.
 //!
 //! A column's row follows from its parameter and channel alone. So the kernel stores to places that are
-//! known when it is compiled, which takes half the time of places that are looked up; rows of parameters
-//! that are held are never read.
+//! known when it is compiled: with all lookups kept, a pass takes a third less time than with places that are
+//! looked up. Rows of parameters that are held are never read.
 
 use crate::model::params::Param;
 use crate::samples::rows::Row;

@@ -66,11 +66,12 @@ impl<S: Simd> Kernel<'_, S> {
         for record in first..end {
             self.sample::<COLUMNS>(record, rims, &mut own);
             let weight = Lanes::of_row(self.simd, &self.view.record(record)[weight]);
-            let before = self.lit(if record > first { 1.0 } else { 0.0 });
             for &place in self.plan.channels.iter().flat_map(|channel| &channel.rows) {
                 let value = weight * Lanes::of_row(self.simd, window::row(&own, place));
                 let sum = row_mut(sum, place);
-                before.mul_add(Lanes::of_row(self.simd, sum), value).store(sum);
+                // What the group before has left is not touched: times 0 it need not be 0.
+                let value = if record > first { value + Lanes::of_row(self.simd, sum) } else { value };
+                value.store(sum);
             }
         }
     }

@@ -1,7 +1,6 @@
 //! Rims of records whose silhouettes no free parameter moves, a run of records at once.
 //!
-//! A power is a chain of some forty dependent steps, longer than the rest of such a record takes. One after
-//! the other the processor would wait for each; side by side they hide one another.
+//! A power is a chain of some forty steps that wait for each other; side by side, chains hide one another.
 
 use std::ops::Range;
 
