@@ -23,7 +23,6 @@ use crate::model::effects::Silhouette;
 use crate::model::fragment::{Fragment, Shading, shading};
 use crate::model::lights::Lights;
 use crate::model::params::Param;
-use crate::model::real::Real;
 use crate::model::rim::rim;
 use crate::model::terms::{LookupParam, Terms, terms, terms_tangent, terms_with_strength_tangent};
 use crate::samples::rows::{Row, prefetch_rows};
