@@ -17,12 +17,13 @@ pub(super) use self::rims::Rims;
 use super::lanes::Lanes;
 use super::plan::Plan;
 use super::records::{AHEAD, Records};
-use super::window::{self, Window, row_mut};
+use super::window::{self, Window};
 use crate::model::compose::{Composition, Weights};
 use crate::model::effects::Silhouette;
 use crate::model::fragment::{Fragment, Shading, shading};
 use crate::model::lights::Lights;
 use crate::model::params::Param;
+use crate::model::real::Real;
 use crate::model::rim::rim;
 use crate::model::terms::{LookupParam, Terms, terms, terms_tangent, terms_with_strength_tangent};
 use crate::samples::rows::{Row, prefetch_rows};
@@ -57,27 +58,24 @@ impl<S: Simd> Kernel<'_, S> {
         let Some(weight) = self.view.places.weight else {
             // One sample a pixel.
             for record in first..end {
-                self.sample::<COLUMNS>(record, rims, sum);
+                self.sample::<COLUMNS>(
+                    record,
+                    rims,
+                    &mut Sink { window: &mut *sum, weight: None, add: false },
+                );
             }
             return;
         };
-        let mut own = window::EMPTY;
         for record in first..end {
-            self.sample::<COLUMNS>(record, rims, &mut own);
             let weight = Lanes::of_row(self.simd, &self.view.record(record)[weight]);
-            for &place in self.plan.channels.iter().flat_map(|channel| &channel.rows) {
-                let value = weight * Lanes::of_row(self.simd, window::row(&own, place));
-                let sum = row_mut(sum, place);
-                // What the group before has left is not touched: times 0 it need not be 0.
-                let value = if record > first { value + Lanes::of_row(self.simd, sum) } else { value };
-                value.store(sum);
-            }
+            let mut sink = Sink { window: &mut *sum, weight: Some(weight), add: record > first };
+            self.sample::<COLUMNS>(record, rims, &mut sink);
         }
     }
 
     /// Value (and columns) of one sample of each pixel.
     #[inline(always)]
-    fn sample<const COLUMNS: bool>(&self, record: usize, rims: &Rims, window: &mut Window) {
+    fn sample<const COLUMNS: bool>(&self, record: usize, rims: &Rims, sink: &mut Sink<'_, S>) {
         let setup = self.plan.setup;
         let live = self.plan.live;
         prefetch_rows(self.kept, (record + AHEAD) * self.plan.kept.rows, self.plan.kept.rows);
@@ -87,7 +85,7 @@ impl<S: Simd> Kernel<'_, S> {
             let open = self.load(self.kept_rows(record), self.plan.kept.open, 1.0);
             let rim = rims.of(self.simd, record);
             let composition = Composition::with_rim(terms, rim, open, self.weights);
-            self.put_value_and_direct::<COLUMNS>(&composition, window);
+            self.put_value_and_direct::<COLUMNS>(&composition, sink);
             return;
         }
         self.view.prefetch_record(record);
@@ -103,16 +101,16 @@ impl<S: Simd> Kernel<'_, S> {
             let (mut terms, slope) = terms_with_strength_tangent(&self.lights, &f, &s, live);
             self.fill_kept(&mut terms, record);
             let composition = Composition::with_rim(terms, rim, f.occlusion, self.weights);
-            self.put_value_and_direct::<COLUMNS>(&composition, window);
-            self.put_slope(Param::NormalStrength, &composition, &slope, window);
-            self.put_other_slopes(&composition, &f, &s, window);
+            self.put_value_and_direct::<COLUMNS>(&composition, sink);
+            self.put_slope(Param::NormalStrength, &composition, &slope, sink);
+            self.put_other_slopes(&composition, &f, &s, sink);
         } else {
             let mut terms = terms(&self.lights, &f, &s, live);
             self.fill_kept(&mut terms, record);
             let composition = Composition::with_rim(terms, rim, f.occlusion, self.weights);
-            self.put_value_and_direct::<COLUMNS>(&composition, window);
+            self.put_value_and_direct::<COLUMNS>(&composition, sink);
             if COLUMNS {
-                self.put_other_slopes(&composition, &f, &s, window);
+                self.put_other_slopes(&composition, &f, &s, sink);
             }
         }
     }
@@ -131,10 +129,10 @@ impl<S: Simd> Kernel<'_, S> {
     fn put_value_and_direct<const COLUMNS: bool>(
         &self,
         composition: &Composition<Lanes<S>>,
-        window: &mut Window,
+        sink: &mut Sink<'_, S>,
     ) {
         for c in 0..3 {
-            composition.result(c).store(&mut window[window::residual(c)]);
+            sink.put(window::residual(c), composition.result(c));
         }
         if COLUMNS {
             // By name, so that the match in `derivative` is resolved while compiling.
@@ -143,7 +141,7 @@ impl<S: Simd> Kernel<'_, S> {
                     if self.plan.free[Param::$param as usize] {
                         for c in 0..3 {
                             let column = composition.derivative(Param::$param, c);
-                            column.store(&mut window[window::column(c, Param::$param)]);
+                            sink.put(window::column(c, Param::$param), column);
                         }
                     }
                 )*};
@@ -151,9 +149,9 @@ impl<S: Simd> Kernel<'_, S> {
             put!(BaseWeight RimWeight RimExponent Hilite Reflection SideSpecular Occlusion KeyColor);
         }
         if self.compares_alpha() {
-            composition.alpha().store(&mut window[window::residual(ALPHA)]);
+            sink.put(window::residual(ALPHA), composition.alpha());
             if COLUMNS {
-                composition.terms.haze.store(&mut window[window::column(ALPHA, Param::HazeWeight)]);
+                sink.put(window::column(ALPHA, Param::HazeWeight), composition.terms.haze);
             }
         }
     }
@@ -165,13 +163,13 @@ impl<S: Simd> Kernel<'_, S> {
         param: Param,
         composition: &Composition<Lanes<S>>,
         slope: &Terms<Lanes<S>>,
-        window: &mut Window,
+        sink: &mut Sink<'_, S>,
     ) {
         for c in 0..3 {
-            composition.along(slope, c).store(&mut window[window::column(c, param)]);
+            sink.put(window::column(c, param), composition.along(slope, c));
         }
         if self.compares_alpha() {
-            composition.alpha_along(slope).store(&mut window[window::column(ALPHA, param)]);
+            sink.put(window::column(ALPHA, param), composition.alpha_along(slope));
         }
     }
 
@@ -186,16 +184,37 @@ impl<S: Simd> Kernel<'_, S> {
         composition: &Composition<Lanes<S>>,
         f: &Fragment<Lanes<S>>,
         s: &Shading<Lanes<S>>,
-        window: &mut Window,
+        sink: &mut Sink<'_, S>,
     ) {
         macro_rules! put {
             ($($param:ident)*) => {$(
                 if self.plan.lookups.contains(&LookupParam::$param) {
                     let slope = terms_tangent(&self.lights, f, s, LookupParam::$param);
-                    self.put_slope(Param::$param, composition, &slope, window);
+                    self.put_slope(Param::$param, composition, &slope, sink);
                 }
             )*};
         }
         put!(SpecularLobe EnvironmentRotation KeyAzimuth KeyElevation);
+    }
+}
+
+/// Where a sample's numbers go: stored, or (where a pixel has several samples) stored by the pixel's first
+/// sample and added by the others, with their weights.
+struct Sink<'a, S: Simd> {
+    window: &'a mut Window,
+    weight: Option<Lanes<S>>,
+    add: bool,
+}
+
+impl<S: Simd> Sink<'_, S> {
+    /// `place` is known when this is compiled.
+    #[inline(always)]
+    fn put(&mut self, place: usize, value: Lanes<S>) {
+        let row = &mut self.window[place];
+        match self.weight {
+            None => value.store(row),
+            Some(weight) if self.add => weight.mul_add(value, Lanes::of_row(value.0.simd, row)).store(row),
+            Some(weight) => (weight * value).store(row),
+        }
     }
 }
