@@ -10,13 +10,15 @@ use skinfit::model::effects::Form;
 use skinfit::model::params::{Channels, Column, Param, Params};
 use skinfit::samples::rows::{Row, Rows};
 use skinfit::samples::surface_records::Asked;
-use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
+use skinfit::samples::{LANES, SurfaceRecords, ViewSamples, z_order};
 
 /// What the data folder says of itself.
 #[derive(Debug, Deserialize)]
 pub(crate) struct Manifest {
     pub format: String,
     pub pixels: usize,
+    /// Pixels along a row.
+    pub side: usize,
     pub param_names: Vec<String>,
     pub params_true: Vec<f64>,
     pub params_init: Vec<f64>,
@@ -89,9 +91,18 @@ fn parse(bytes: &[u8]) -> impl Iterator<Item = f32> {
     bytes.as_chunks().0.iter().map(|&four| f32::from_le_bytes(four))
 }
 
-/// `count` planes of `pixels` numbers into the rows from `place` on, each padded to whole groups by
-/// repeating its last number.
-fn fill(rows: &mut Rows, place: usize, count: usize, pixels: usize, folder: &Path, name: &str) -> Result<()> {
+/// The pixels as they are packed: along a Z-order curve, as those of a scene are.
+fn order(manifest: &Manifest) -> Vec<u32> {
+    let side = manifest.side.max(1) as u32;
+    let mut order: Vec<u32> = (0..manifest.pixels as u32).collect();
+    order.sort_unstable_by_key(|&pixel| z_order(pixel % side, pixel / side));
+    order
+}
+
+/// `count` planes of numbers, in the order of the pixels, into the rows from `place` on; each padded to
+/// whole groups by repeating its last number.
+fn fill(rows: &mut Rows, place: usize, count: usize, order: &[u32], folder: &Path, name: &str) -> Result<()> {
+    let pixels = order.len();
     let bytes = numbers(folder, name)?;
     if bytes.len() != 4 * count * pixels {
         let found = bytes.len() / 4;
@@ -101,9 +112,12 @@ fn fill(rows: &mut Rows, place: usize, count: usize, pixels: usize, folder: &Pat
         ));
     }
     for (c, plane) in bytes.chunks_exact(4 * pixels).enumerate() {
-        let last = parse(plane).last().unwrap_or(0.0);
-        let padded = parse(plane).chain(std::iter::repeat(last));
-        rows.plane_mut(place + c).zip(padded).for_each(|(number, value)| *number = value);
+        let (plane, _) = plane.as_chunks();
+        let last = order.last().copied();
+        let padded = order.iter().copied().chain(std::iter::repeat_with(|| last).flatten());
+        for (number, pixel) in rows.plane_mut(place + c).zip(padded) {
+            *number = f32::from_le_bytes(plane[pixel as usize]);
+        }
     }
     Ok(())
 }
@@ -112,6 +126,7 @@ fn fill(rows: &mut Rows, place: usize, count: usize, pixels: usize, folder: &Pat
 pub(crate) fn view(folder: &Path, manifest: &Manifest, which: &str) -> Result<ObservedView> {
     let n = manifest.pixels;
     let groups = n.div_ceil(LANES);
+    let order = order(manifest);
     let asked = Asked {
         bump: true,
         albedo: true,
@@ -133,11 +148,11 @@ pub(crate) fn view(folder: &Path, manifest: &Manifest, which: &str) -> Result<Ob
     ];
     for (name, place, count) in files {
         if let Some(place) = place {
-            fill(surface.rows_mut(), place, count, n, folder, name)?;
+            fill(surface.rows_mut(), place, count, &order, folder, name)?;
         }
     }
     let mut target = Rows::new(4, groups);
-    fill(&mut target, 0, 4, n, folder, &format!("target_{which}"))?;
+    fill(&mut target, 0, 4, &order, folder, &format!("target_{which}"))?;
     let one = |i: usize| if i < n { 1.0 } else { 0.0 };
     let weight = if n.is_multiple_of(LANES) {
         Vec::new()

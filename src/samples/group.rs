@@ -100,8 +100,10 @@ fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], 
     });
 }
 
-/// The bits of x and y interleaved.
-fn z_order(x: u32, y: u32) -> u64 {
+/// The place of (x, y) along a Z-order curve: the bits of both interleaved. Pixels that are neighbours along it are
+/// neighbours in the image, and look up the same texels.
+#[must_use]
+pub fn z_order(x: u32, y: u32) -> u64 {
     let spread = |v: u32| {
         let mut v = u64::from(v);
         for (shift, mask) in [

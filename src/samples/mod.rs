@@ -32,6 +32,7 @@ use crate::progress;
 use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
+pub use group::z_order;
 pub use surface_records::SurfaceRecords;
 pub use targets::TargetRows;
 pub use trace::Hit;
