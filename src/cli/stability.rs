@@ -96,7 +96,7 @@ fn study_and_tell(arguments: &Arguments, study: &Study, folder: Option<RunFolder
     say(report.text().trim_end())?;
     report.missing.iter().for_each(|words| tell(words));
     if let Some(mut folder) = folder {
-        folder.keep_study();
+        folder.keep_results();
         let folder = folder.path();
         let plain = |error: &dyn std::fmt::Display| Refusal::new(format!("{}: {error}", folder.display()));
         let json = report.json().map_err(|error| plain(&error))?;
