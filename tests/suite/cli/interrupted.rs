@@ -136,6 +136,31 @@ fn an_interrupted_study_says_so_and_leaves_nothing() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn an_interrupted_sweep_keeps_the_results_of_its_jobs_and_leaves_no_scratch() {
+    let sandbox = slow_bakes();
+    let ablation = "command = \"ablate\"\nscene = \"scene.toml\"\nresults = \"out\"\n";
+    sandbox.write("plan.toml", format!("{ablation}[[job]]\nrefit = true\n[[job]]\n").as_bytes());
+    let go_on = "skinfit: plan.toml: interrupted: jobs that were done have left their results.";
+    for workers in ["1", "2"] {
+        let sweep = ["sweep", "plan.toml", "--no-cache", "--workers", workers];
+        let ran = interrupted_in_its_bakes(&sandbox, &sweep);
+        assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
+        assert!(ran.err.lines().any(|line| line.starts_with(go_on)), "{ran:?}");
+        assert_eq!(scratch(&sandbox), 0, "{workers} workers: scratch is left");
+        let left = std::fs::read_dir(sandbox.path("out")).unwrap();
+        let left: Vec<_> = left.map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["scenes"], "{workers} workers");
+    }
+    let ran = interrupted_in_its_bakes(&sandbox, &["sweep", "plan.toml", "--no-cache", "--run", "1"]);
+    assert_eq!(
+        ran.err, "skinfit: plan.toml: interrupted: job 1 has left no result. Run it again.\n",
+        "{ran:?}"
+    );
+    assert_eq!((ran.code, scratch(&sandbox)), (Some(1), 0), "{ran:?}");
+}
+
 #[test]
 fn two_runs_into_one_folder_are_one_too_many() {
     let sandbox = Sandbox::new();
