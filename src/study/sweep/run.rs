@@ -125,7 +125,7 @@ fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figure
         pixels: whole("pixels", 10_000_000),
     };
     // The evaluators that every machine has.
-    let report = study.run(&evaluators(), &mut |_| {});
+    let report = study.run(&evaluators(), &|_| {});
     let mut figures = Figures::from([
         ("failures".to_owned(), report.failures().join("; ").into()),
         ("new_cases".to_owned(), report.found.len().into()),
