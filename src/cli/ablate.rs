@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     let ablation = ablate(&path, &options)?;
     tell_warnings(&ablation.warnings);
-    folder.keep_study();
+    folder.keep_results();
     let written = files::write(folder.path(), &arguments.scene.name(&path), &ablation)?;
     say(files::table(&ablation).trim_end())?;
     say(&format!("wrote {} files to {}; open report.html there", written.len(), folder.path().display()))?;

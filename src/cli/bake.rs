@@ -1,14 +1,16 @@
 //! `skinfit bake`: what a scene's effects ask to be baked, as files to look at.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use super::run_folder::RunFolder;
 use super::scene::{SceneArguments, parse_effects};
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
-use crate::bake::VertexOcclusion;
+use crate::bake::{Illumination, VertexOcclusion};
 use crate::model::cube::Cube;
 use crate::model::effects::Effects;
-use crate::model::params::Param;
+use crate::model::params::{Param, Params};
 use crate::output;
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::render::files::{ImageOptions, write_image};
@@ -35,6 +37,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     unfinished::install();
+    let mut folder = RunFolder::of_files(&arguments.output)?;
     let (path, _scratch) = arguments.scene.path()?;
     let options = PrepareOptions {
         effects: arguments.effects,
@@ -44,31 +47,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     let prepared = Prepared::baked(&path, &options)?;
     tell_warnings(&prepared.warnings);
-    let folder = &arguments.output;
-    let light = &prepared.illumination;
-    unfinished::writing(folder);
-    let mut written = 0;
-    let mut cube = |name: &str, cube: &Cube<f32>| -> Result<(), Refusal> {
-        written += 1;
-        write_cube(folder, name, cube)
-    };
-    if let Some(irradiance) = &light.irradiance {
-        cube("irradiance", irradiance)?;
+    let cubes = cubes(&prepared.illumination, &prepared.scene.params);
+    let written = cubes.len() + usize::from(prepared.occlusion.is_some());
+    if written > 0 {
+        folder.keep_results();
     }
-    if let Some(lobes) = &light.lobes {
-        for (exponent, lobe) in lobes.exponents.iter().zip(&lobes.cubes) {
-            cube(&format!("lobe_{exponent}"), lobe)?;
-        }
-        // Between the stack's exponents, what shaders look up is none of its cubes.
-        if lobes.cubes.len() > 1 {
-            cube("specular", &lobes.at(prepared.scene.params.scalar(Param::SpecularLobe)).0)?;
-        }
-    }
-    if let Some(hilite) = &light.hilite {
-        cube("hilite", hilite)?;
+    let folder = folder.path();
+    for (name, cube) in &cubes {
+        write_cube(folder, name, cube)?;
     }
     if let Some(occlusion) = &prepared.occlusion {
-        written += 1;
         output::write(&folder.join("occlusion.csv"), occlusion_csv(occlusion).as_bytes())?;
     }
     for row in &prepared.baked.rows {
@@ -81,6 +69,28 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         _ => say(&format!("wrote {written} bakes to {}", folder.display()))?,
     }
     Ok(Exit::Done)
+}
+
+/// The cubes that were baked, by the names of their files.
+fn cubes<'a>(light: &'a Illumination, params: &Params) -> Vec<(String, Cow<'a, Cube<f32>>)> {
+    let mut cubes = Vec::new();
+    let mut add = |name: &str, cube| cubes.push((name.to_owned(), cube));
+    if let Some(irradiance) = &light.irradiance {
+        add("irradiance", Cow::Borrowed(irradiance));
+    }
+    if let Some(lobes) = &light.lobes {
+        for (exponent, lobe) in lobes.exponents.iter().zip(&lobes.cubes) {
+            add(&format!("lobe_{exponent}"), Cow::Borrowed(lobe));
+        }
+        // Between the stack's exponents, what shaders look up is none of its cubes.
+        if lobes.cubes.len() > 1 {
+            add("specular", Cow::Owned(lobes.at(params.scalar(Param::SpecularLobe)).0));
+        }
+    }
+    if let Some(hilite) = &light.hilite {
+        add("hilite", Cow::Borrowed(hilite));
+    }
+    cubes
 }
 
 /// The faces below each other, as EXR and as PNG.

@@ -1,5 +1,5 @@
 //! The run folder: one run of one command at a time, nothing left of a run that was refused, and a scene file that
-//! still finds its files.
+//! still finds its files. What bakes are written to is locked in the same way.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -60,17 +60,30 @@ impl Work {
 impl RunFolder {
     /// Make and lock `output`, or `runs/<name>` after the scene's folder, for a fit.
     pub(super) fn open(output: Option<&Path>, scene: Option<&Path>) -> Result<Self, Refusal> {
-        Self::locked(output.map_or_else(|| default_folder(scene), Path::to_owned), Work::Fit)
+        let folder = Self::locked(output.map_or_else(|| default_folder(scene), Path::to_owned))?;
+        folder.check(Work::Fit)?;
+        Ok(folder)
     }
 
     /// Make and lock `output` for a study, which begins anew when it is interrupted.
     pub(super) fn of_study(output: &Path, work: Work) -> Result<Self, Refusal> {
-        let folder = Self::locked(output.to_owned(), work)?;
-        unfinished::working(&folder.path, folder.made.contains(&folder.path), &folder.made);
-        Ok(folder)
+        let folder = Self::locked(output.to_owned())?;
+        folder.check(work)?;
+        Ok(folder.unfinished())
     }
 
-    fn locked(path: PathBuf, work: Work) -> Result<Self, Refusal> {
+    /// Make and lock `output` for files that may stand beside a command's results.
+    pub(super) fn of_files(output: &Path) -> Result<Self, Refusal> {
+        Ok(Self::locked(output.to_owned())?.unfinished())
+    }
+
+    /// What was made for it goes when the command is interrupted.
+    fn unfinished(self) -> Self {
+        unfinished::working(&self.path, self.made.contains(&self.path), &self.made);
+        self
+    }
+
+    fn locked(path: PathBuf) -> Result<Self, Refusal> {
         let refused = |reason: std::io::Error| OutputError::new(&path, &reason);
         let file = path.join(LOCK);
         let places = std::iter::once(file.as_path()).chain(path.ancestors());
@@ -85,9 +98,7 @@ impl RunFolder {
             )));
         }
         // A file system without locks: two runs at once are then the user's to avoid.
-        let folder = Self { path, _lock: lock, made };
-        folder.check(work)?;
-        Ok(folder)
+        Ok(Self { path, _lock: lock, made })
     }
 
     /// Refuse a folder that holds results of another command: the two would be taken for one.
@@ -112,8 +123,9 @@ impl RunFolder {
         self.made.clear();
     }
 
-    /// As [`keep`](Self::keep), of a study: its results are about to be written.
-    pub(super) fn keep_study(&mut self) {
+    /// As [`keep`](Self::keep), of a command that begins anew when it is interrupted: its results are about to be
+    /// written.
+    pub(super) fn keep_results(&mut self) {
         unfinished::writing(&self.path);
         self.keep();
     }

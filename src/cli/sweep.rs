@@ -5,9 +5,11 @@ use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
+use tempfile::TempDir;
+
 use super::fitted_scene::{Changes, as_fitted};
 use super::scene::BakeArguments;
-use super::{Exit, Refusal, say, tell};
+use super::{Exit, Refusal, say, tell, unfinished};
 use crate::output;
 use crate::progress;
 use crate::study::sweep::collect::Collection;
@@ -19,7 +21,7 @@ use crate::study::sweep::run::{self, Inputs};
 /// Run the jobs of a plan: many scenes and settings, here or on many machines
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("A plan is a TOML file:\n\n  command = \"fit\"                      # or \"ablate\", \"tradeoff\", \"stability\"\n  scene = \"scene.toml\"                 # left out: the built-in scene\n  [settings]                           # for every job\n  solver = \"varpro\"\n  [[axis]]                             # every combination of the axes\n  key = \"fit.loss\"                     # a scene file's key, or scene, command, solver ...\n  values = [\"l2\", \"huber\"]\n\nEach job leaves one file in the plan's folder of results (results = \"...\", by default beside the plan). A job that has left one is not run again.\n\nExamples:\n  skinfit sweep plan.toml               run what is not done yet\n  skinfit sweep plan.toml --list        a command a job, for a scheduler (docs/sweeps.md)\n  skinfit sweep plan.toml --run 3       one job\n\nskinfit collect merges the results.", "a job failed")
+    after_help = super::with_failure("A plan is a TOML file:\n\n  command = \"fit\"                      # or \"ablate\", \"tradeoff\", \"stability\"\n  scene = \"scene.toml\"                 # left out: the built-in scene\n  [settings]                           # for every job\n  solver = \"varpro\"\n  [[axis]]                             # every combination of the axes\n  key = \"fit.loss\"                     # a scene file's key, or scene, command, solver ...\n  values = [\"l2\", \"huber\"]\n\nEach job leaves one file in the plan's folder of results (results = \"...\", by default beside the plan). A job that has left one is not run again.\n\nExamples:\n  skinfit sweep plan.toml               run what is not done yet\n  skinfit sweep plan.toml --list        a command a job, for a scheduler (docs/sweeps.md)\n  skinfit sweep plan.toml --run 3       one job\n\nskinfit collect merges the results.", "a job failed, or the command was interrupted")
 )]
 pub(super) struct SweepArguments {
     /// The plan file.
@@ -65,6 +67,7 @@ struct Ready<'a> {
 
 pub(super) fn run(arguments: &SweepArguments) -> Result<Exit, Refusal> {
     let plan = Plan::read(&arguments.plan)?;
+    unfinished::install_saying(words_of_interruption(arguments));
     if let Some(name) = &arguments.run {
         let ready = ready(&plan, plan.job(name)?, &arguments.bakes)?;
         return run_one(&plan, &ready, &arguments.bakes, true);
@@ -99,6 +102,17 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<Exit, Refusal> {
         plan.results.display()
     ))?;
     Ok(if failed == 0 { Exit::Done } else { Exit::Failed })
+}
+
+/// What stays of an interrupted sweep.
+fn words_of_interruption(SweepArguments { plan, run, .. }: &SweepArguments) -> String {
+    let plan = plan.display();
+    match run {
+        Some(job) => format!("{plan}: interrupted: job {job} has left no result. Run it again."),
+        None => format!(
+            "{plan}: interrupted: jobs that were done have left their results. Go on with the others by the same command."
+        ),
+    }
 }
 
 pub(super) fn run_collect(arguments: &CollectArguments) -> Result<Exit, Refusal> {
@@ -192,7 +206,13 @@ fn run_one(plan: &Plan, ready: &Ready<'_>, bakes: &BakeArguments, tells: bool) -
     output::write(&scene, ready.scene_text.as_bytes())?;
     let clock = Instant::now();
     let cache = bakes.cache();
-    let inputs = Inputs { scene: &scene, constants: ready.constants.as_deref(), cache: cache.as_deref() };
+    let scratch = if cache.is_none() { Some(unfinished::scratch()?) } else { None };
+    let inputs = Inputs {
+        scene: &scene,
+        constants: ready.constants.as_deref(),
+        cache: cache.as_deref(),
+        scratch: scratch.as_ref().map(TempDir::path),
+    };
     let (status, Findings { figures, rows }) = match run::run(ready.job, inputs) {
         Ok(found) => (Status::Done, found),
         Err(error) => (Status::Failed(error.to_string()), Findings::default()),
@@ -262,7 +282,9 @@ fn run_workers(
                     if arguments.bakes.threads.is_none() {
                         command.args(["--threads", &threads.to_string()]);
                     }
-                    let done = command.stdin(Stdio::null()).status().is_ok_and(|status| status.success());
+                    // At a terminal, Ctrl-C is for the processes that run, too; one that is begun later would go on.
+                    let child = unfinished::begin(|| command.stdin(Stdio::null()).spawn());
+                    let done = child.and_then(|mut child| child.wait()).is_ok_and(|status| status.success());
                     failed.fetch_add(usize::from(!done), Ordering::Relaxed);
                     bar.inc(1);
                 }

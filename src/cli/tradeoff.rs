@@ -50,7 +50,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     let found = tradeoff(&path, &options)?;
     tell_warnings(&found.warnings);
-    folder.keep_study();
+    folder.keep_results();
     let mut written = files::write(folder.path(), &arguments.scene.name(&path), &found)?.len();
     if let Some(choice) = found.choice() {
         folder.write_scene(&path, Changes { settings: &choice.keys, ..Changes::default() })?;

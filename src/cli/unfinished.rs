@@ -1,5 +1,6 @@
 //! Ctrl-C in a command that has nothing to go on from: what is unfinished goes, and one line says what stays.
 
+use std::borrow::Cow;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -20,20 +21,39 @@ struct Unfinished {
     writing: Option<PathBuf>,
     /// Whether it was asked for once while they are.
     asked: bool,
+    /// What is said when it is interrupted before that.
+    words: Cow<'static, str>,
 }
 
-static UNFINISHED: Mutex<Unfinished> =
-    Mutex::new(Unfinished { folders: Vec::new(), places: Vec::new(), writing: None, asked: false });
+static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
+    folders: Vec::new(),
+    places: Vec::new(),
+    writing: None,
+    asked: false,
+    words: Cow::Borrowed("interrupted: no results were written; only bakes in the cache were kept."),
+});
 
 /// Change what goes; a thread that panicked has left it whole.
-fn change(change: impl FnOnce(&mut Unfinished)) {
-    change(&mut UNFINISHED.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
+fn change<T>(change: impl FnOnce(&mut Unfinished) -> T) -> T {
+    change(&mut UNFINISHED.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
 
 /// From now on Ctrl-C ends the program by [`interrupted`], with the exit code of an interrupted fit.
 pub(super) fn install() {
     // Refused only if a handler is there already; then Ctrl-C ends the program as it always did.
     let _ = ctrlc::set_handler(|| change(interrupted));
+}
+
+/// As [`install`], of a command that has left some results before it is interrupted: `words` say so.
+pub(super) fn install_saying(words: String) {
+    change(|unfinished| unfinished.words = words.into());
+    install();
+}
+
+/// Begin something, such as another process, that nobody would end once the program is interrupted: not any more then.
+pub(super) fn begin<T>(work: impl FnOnce() -> T) -> T {
+    // Who interrupts it never gives back what is waited for here.
+    change(|_| work())
 }
 
 /// Whoever wants to begin writing waits for this to end, and with it the program.
@@ -64,7 +84,7 @@ fn interrupted(unfinished: &mut Unfinished) {
             "{}: interrupted while the results were written: each file is whole, but they may be of two runs.",
             folder.display()
         )),
-        None => tell("interrupted: no results were written; only bakes in the cache were kept."),
+        None => tell(&unfinished.words),
     }
     std::process::exit(1);
 }
@@ -88,13 +108,17 @@ pub(super) fn writing(folder: &Path) {
 
 /// A folder for what is needed only as long as the command runs; it goes when the command ends or is interrupted.
 pub(super) fn scratch() -> Result<TempDir, Refusal> {
-    let scratch = tempfile::tempdir().map_err(|error| {
+    // Made and noted at once: an interruption comes before both, or after.
+    let made = change(|unfinished| {
+        let scratch = tempfile::tempdir()?;
+        unfinished.folders.push(scratch.path().to_owned());
+        Ok(scratch)
+    });
+    made.map_err(|error: std::io::Error| {
         let folder = std::env::temp_dir();
         Refusal::new(format!(
             "{}: a scratch folder cannot be made there: {error}. Make room, or set TMPDIR.",
             folder.display()
         ))
-    })?;
-    working(scratch.path(), true, &[]);
-    Ok(scratch)
+    })
 }

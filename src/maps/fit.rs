@@ -10,6 +10,7 @@ use super::layer::Layer;
 use super::layers::{layers, take_back};
 use super::parts::{Cut, cuts, most_samples};
 use super::problem::{Observed, Problem};
+use super::task::MapTask;
 use super::{MapError, adam, cg};
 use crate::bake::Illumination;
 use crate::engine::cpu::CpuEngine;
@@ -21,35 +22,8 @@ use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
 use crate::samples::ViewSamples;
 use crate::samples::rows::Row;
-use crate::scene::mesh::PosedMesh;
-use crate::scene::{MapKind, MapSolver, Scene};
+use crate::scene::{MapSolver, Scene};
 use crate::tensor::{Input, Inputs, Scatter, Shade, Shaded, SharedDevice, TensorError};
-
-/// What is to be fitted.
-pub struct MapTask<'a> {
-    /// The scene; its views are those of `observed`.
-    pub scene: &'a Scene,
-    /// Its mesh.
-    pub posed: &'a PosedMesh,
-    /// The cubes to start from.
-    pub illumination: Illumination,
-    /// Each vertex's open share of the hemisphere to start from.
-    pub open: Option<Vec<f32>>,
-    /// Samples and targets.
-    pub observed: Vec<ObservedView>,
-    /// A view that takes no part in the fit.
-    pub held_out: Option<usize>,
-    /// Which maps.
-    pub kinds: Vec<MapKind>,
-    /// The constants to start from, and which of them are free.
-    pub start: Point,
-    /// What is free of them.
-    pub unknowns: Vec<Unknown>,
-    /// Most samples that are shaded at once; else as many as the device's buffers hold.
-    pub most_samples: Option<usize>,
-    /// Set by somebody who wants the fit to stop after the present step.
-    pub interrupt: Option<Arc<AtomicBool>>,
-}
 
 /// What was found.
 pub struct FittedMaps {
@@ -84,14 +58,6 @@ pub struct MapStep {
     pub prior: f64,
     /// Seconds since the start.
     pub seconds: f64,
-}
-
-/// The free columns that a fit of maps leaves: a fitted environment holds what turns and blurs it.
-#[must_use]
-pub fn columns_beside(kinds: &[MapKind], free: &[Column]) -> Vec<Column> {
-    let environment = kinds.contains(&MapKind::Environment);
-    let of_light = |column: &Column| matches!(column.param, Param::SpecularLobe | Param::EnvironmentRotation);
-    free.iter().copied().filter(|column| !(environment && of_light(column))).collect()
 }
 
 /// Fit maps and constants by turns. `told` hears of each step.

@@ -1,10 +1,10 @@
 //! The layers that a fit of maps begins with, and what they show, for the fit of the constants.
 
 use super::MapError;
-use super::fit::MapTask;
 use super::layer::{Grid, Layer, LayerParts};
 use super::parts::Cut;
 use super::problem::{Problem, read};
+use super::task::MapTask;
 use crate::bake::rays::RayMesh;
 use crate::bake::{Illumination, LobeStack};
 use crate::engine::Point;

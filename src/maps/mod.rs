@@ -9,7 +9,7 @@
 //! - [`problem`]: the loss of the images and the priors, and its slope by a layer's texels
 //! - [`cg`]: projected conjugate gradients; [`adam`]: burn's Adam
 //! - [`layers`]: the maps that a fit begins with, and what they show; [`parts`]: samples in parts that fit a buffer
-//! - [`fit`]: the rounds over maps and constants
+//! - [`task`]: what is asked for; [`fit`]: the rounds over maps and constants
 //! - [`pictures`]: maps as images
 
 pub mod adam;
@@ -20,9 +20,11 @@ pub mod layers;
 pub mod parts;
 pub mod pictures;
 pub mod problem;
+pub mod task;
 
-pub use fit::{FittedMaps, MapTask, fit_maps};
+pub use fit::{FittedMaps, fit_maps};
 pub use layer::{Grid, Layer};
+pub use task::MapTask;
 
 use crate::fit::FitError;
 use crate::gpu::GpuError;

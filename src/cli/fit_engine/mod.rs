@@ -15,9 +15,9 @@ use crate::engine::view::ObservedView;
 use crate::prepare::Prepared;
 use crate::progress;
 
-/// How far an engine's sums may be from those in f64, relative to the largest entry that shares row and
-/// column: a few hundred roundings of f32, of either sign. A robust loss' weights move with the residual, whose
-/// roundings a small one makes large: that comes on top, by [`Reference::with_rounding`].
+/// How far an engine's sums may be from those in f64, relative to the geometric mean of the diagonal entries that
+/// share row and column: a few hundred roundings of f32, of either sign. A robust loss' weights move with the
+/// residual, whose roundings a small one makes large: that comes on top, by [`Reference::with_rounding`].
 const TOLERANCE: f64 = 1e-5;
 
 /// Which engine, and its options.

@@ -12,7 +12,8 @@ use crate::cli::graphics::tensor_words;
 use crate::cli::{Refusal, say};
 use crate::engine::view::ObservedView;
 use crate::gpu::Choice;
-use crate::maps::fit::{MapStep, columns_beside};
+use crate::maps::fit::MapStep;
+use crate::maps::task::columns_beside;
 use crate::maps::{FittedMaps, MapError, MapTask, fit_maps};
 use crate::prepare::Prepared;
 use crate::progress;
@@ -20,7 +21,6 @@ use crate::render::shade::Shader;
 use crate::report::maps::MapView;
 use crate::report::metrics::Comparison;
 use crate::scene::MapKind;
-use crate::scene::mesh::PosedMesh;
 use crate::scene::view::View;
 use crate::tensor::SharedDevice;
 
@@ -44,7 +44,9 @@ impl MapArguments {
         let shared = SharedDevice::open(&choice).map_err(|error| Refusal::new(tensor_words(&error)))?;
         prepared.scene.fit.free = columns_beside(&kinds, &prepared.scene.fit.free);
         let posed = prepared.scene.mesh.pose();
-        let task = task(prepared, &posed, &observed, kinds, held_out, run);
+        let interrupt = Some(Arc::clone(&run.interrupt));
+        let task = MapTask::new(prepared, &posed, observed.clone(), kinds);
+        let task = MapTask { held_out, interrupt, ..task };
         let found = told(&shared, task, prepared.scene.fit.maps.rounds, run.quiet)
             .map_err(|error| refusal(&error, &prepared.scene.path))?;
         let views = gained(prepared, &observed, &found, held_out);
@@ -79,30 +81,6 @@ impl MapArguments {
             ))),
             found => Ok(found),
         }
-    }
-}
-
-fn task<'a>(
-    prepared: &'a Prepared,
-    posed: &'a PosedMesh,
-    observed: &[ObservedView],
-    kinds: Vec<MapKind>,
-    held_out: Option<usize>,
-    run: &MapRun<'_>,
-) -> MapTask<'a> {
-    let weights: Vec<f32> = prepared.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
-    MapTask {
-        scene: &prepared.scene,
-        posed,
-        illumination: prepared.illumination.clone(),
-        open: prepared.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
-        observed: observed.to_vec(),
-        held_out,
-        kinds,
-        start: prepared.start(),
-        unknowns: prepared.unknowns(),
-        most_samples: None,
-        interrupt: Some(Arc::clone(&run.interrupt)),
     }
 }
 

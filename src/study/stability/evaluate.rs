@@ -75,6 +75,29 @@ pub trait Evaluator {
     }
 }
 
+/// Evaluators, in the order of the tables: first those that all threads may ask at once.
+#[derive(Default)]
+pub struct Evaluators {
+    /// Those of the CPU.
+    pub shared: Vec<Box<dyn Evaluator + Sync>>,
+    /// Those that only the thread that made them may ask, as what they run on is its own.
+    pub own: Vec<Box<dyn Evaluator>>,
+}
+
+impl Evaluators {
+    /// Every one.
+    pub fn iter(&self) -> impl Iterator<Item = &dyn Evaluator> {
+        let shared = self.shared.iter().map(|evaluator| &**evaluator as &dyn Evaluator);
+        shared.chain(self.own.iter().map(|evaluator| &**evaluator))
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.shared.len() + self.own.len()
+    }
+}
+
 /// A plain number that the model is evaluated in.
 pub trait Scalar: Real + Send + Sync {
     /// Its name in tables.

@@ -30,7 +30,7 @@ pub mod shader;
 use case::Batch;
 use check::{Verdict, check_against, check_frame};
 use demands::{Circumstances, DEMANDS};
-use evaluate::{Evaluator, Plain};
+use evaluate::{Evaluator, Evaluators, Plain};
 use kept::KeptCase;
 use lights::LightBox;
 use objectives::{Cpu, EngineEvaluator};
@@ -57,8 +57,10 @@ pub struct Study {
 
 /// The model itself, and the CPU engine.
 #[must_use]
-pub fn evaluators() -> Vec<Box<dyn Evaluator>> {
-    vec![Box::new(Plain::<f64>::new()), Box::new(Plain::<f32>::new()), Box::new(EngineEvaluator(Cpu))]
+pub fn evaluators() -> Evaluators {
+    let shared: Vec<Box<dyn Evaluator + Sync>> =
+        vec![Box::new(Plain::<f64>::new()), Box::new(Plain::<f32>::new()), Box::new(EngineEvaluator(Cpu))];
+    Evaluators { shared, own: Vec::new() }
 }
 
 impl Study {
@@ -73,50 +75,41 @@ impl Study {
             + self.cases
     }
 
-    /// Every case on every evaluator; `progress` is told after each how many are done.
-    pub fn run(&self, evaluators: &[Box<dyn Evaluator>], progress: &mut dyn FnMut(usize)) -> Report {
-        let names = evaluators.iter().map(|evaluator| evaluator.name()).collect();
+    /// Every case on every evaluator; `progress` is told after each, by whichever thread, how many more are done.
+    /// The report is the same for any number of threads.
+    pub fn run(&self, evaluators: &Evaluators, progress: &(dyn Fn(usize) + Sync)) -> Report {
+        let names = evaluators.iter().map(Evaluator::name).collect();
         let mut report = Report::new(names, self.seed);
-        let mut done = 0;
-        let mut step = |count: usize| {
-            done += count;
-            progress(done);
-        };
         for case in hard::cases() {
             let verdicts = self.verdicts(evaluators, &case.batch, &case.holds);
             report.add((case.name, case.hard), case.batch.fragments.len(), verdicts);
-            step(1);
+            progress(1);
         }
         for frame in hard::frames() {
-            let verdicts =
-                evaluators.iter().map(|evaluator| check_frame(&**evaluator, frame.vertex)).collect();
+            let verdicts = evaluators.iter().map(|evaluator| check_frame(evaluator, frame.vertex)).collect();
             report.add((frame.name, "any unit frame, the same on every evaluator"), 1, verdicts);
-            step(1);
+            progress(1);
         }
         let given = Circumstances { lights: &self.lights, pixels: self.pixels };
         for demand in &DEMANDS {
-            let engines = evaluators.iter().map(|evaluator| evaluator.engine());
+            let engines = evaluators.iter().map(Evaluator::engine);
             let check = |engine| demanded((demand.check)(engine, &given));
             report.add((demand.name, demand.hard), 1, engines.map(|engine| engine.map(check)).collect());
-            step(1);
+            progress(1);
         }
         for case in &self.kept {
             let verdicts = self.verdicts(evaluators, &case.batch, &[]);
             let name = format!("kept: {}", case.name);
             report.add((&name, "found by a search"), case.batch.fragments.len(), verdicts);
-            step(1);
+            progress(1);
         }
-        let mut swept = Hunt::new(evaluators.len());
+        let mut swept = Hunt::new(evaluators, &self.lights);
         for batch in &self.swept {
-            swept.try_batch(evaluators, &self.lights, batch);
-            step(1);
+            swept.batch(batch);
+            progress(1);
         }
-        let mut hunt = Hunt::new(evaluators.len());
-        let mut before = 0;
-        hunt.random(evaluators, &self.lights, self.seed, self.cases, &mut |tried| {
-            step(tried - before);
-            before = tried;
-        });
+        let mut hunt = Hunt::new(evaluators, &self.lights);
+        hunt.random(self.seed, self.cases, progress);
         report.swept = swept.tallies;
         report.random = hunt.tallies;
         report.found = swept.found.into_iter().chain(hunt.found).collect();
@@ -125,14 +118,14 @@ impl Study {
 
     fn verdicts(
         &self,
-        evaluators: &[Box<dyn Evaluator>],
+        evaluators: &Evaluators,
         batch: &Batch,
         holds: &[hard::Holds],
     ) -> Vec<Option<Verdict>> {
         let reference = Reference::new(&self.lights, batch, FEW);
         let check =
             |evaluator: &dyn Evaluator| check_against(evaluator, &self.lights, batch, holds, &reference);
-        evaluators.iter().map(|evaluator| Some(check(&**evaluator))).collect()
+        evaluators.iter().map(|evaluator| Some(check(evaluator))).collect()
     }
 }
 

@@ -1,8 +1,10 @@
 //! The random search: batches on every evaluator, and what fails made as simple as it stays failing.
 
+use rayon::prelude::*;
+
 use super::case::{Batch, FragmentInputs, Setting};
 use super::check::{Verdict, check, check_against};
-use super::evaluate::Evaluator;
+use super::evaluate::{Evaluator, Evaluators};
 use super::lights::{LightBox, LightKind};
 use super::random::{BATCH, batch};
 use super::reference::{FEW, Reference};
@@ -35,47 +37,74 @@ pub struct Tally {
 /// Failing cases that are kept of each evaluator: more of them would mostly say the same.
 const KEPT: usize = 10;
 
-/// What a search finds of each evaluator.
-#[derive(Clone, Debug, Default)]
-pub struct Hunt {
+/// A search, and what it finds of each evaluator.
+pub struct Hunt<'a> {
+    evaluators: &'a Evaluators,
+    lights: &'a LightBox,
     /// In the order of the evaluators.
     pub tallies: Vec<Tally>,
     /// What failed.
     pub found: Vec<Found>,
 }
 
-impl Hunt {
-    /// Nothing tried yet, of that many evaluators.
+/// A batch that the shared evaluators have answered.
+struct Tried {
+    batch: Batch,
+    reference: Reference,
+    verdicts: Vec<Verdict>,
+}
+
+impl<'a> Hunt<'a> {
+    /// Nothing tried yet.
     #[must_use]
-    pub fn new(evaluators: usize) -> Self {
-        Self { tallies: vec![Tally::default(); evaluators], found: Vec::new() }
+    pub fn new(evaluators: &'a Evaluators, lights: &'a LightBox) -> Self {
+        let tallies = vec![Tally::default(); evaluators.count()];
+        Self { evaluators, lights, tallies, found: Vec::new() }
     }
 
-    /// Try `cases` random fragments on every evaluator; `progress` is told how many are done.
-    pub fn random(
-        &mut self,
-        evaluators: &[Box<dyn Evaluator>],
-        lights: &LightBox,
-        seed: u64,
-        cases: usize,
-        progress: &mut dyn FnMut(usize),
-    ) {
-        for index in 0..cases.div_ceil(BATCH) {
-            let count = BATCH.min(cases - index * BATCH);
-            self.try_batch(evaluators, lights, &batch(seed, index as u64, count));
-            progress(index * BATCH + count);
+    /// Try `cases` random fragments on every evaluator; `progress` is told how many more are done.
+    pub fn random(&mut self, seed: u64, cases: usize, progress: &(dyn Fn(usize) + Sync)) {
+        let (evaluators, lights) = (self.evaluators, self.lights);
+        let shared = &evaluators.shared;
+        let count = |index: usize| BATCH.min(cases - index * BATCH);
+        // Others have all of their work still before them when the shared ones are done.
+        let alone = evaluators.own.is_empty();
+        let ask = |index: usize| {
+            let tried = Tried::new(shared, lights, batch(seed, index as u64, count(index)));
+            if alone {
+                progress(count(index));
+            }
+            tried
+        };
+        // As many at a time as there are threads, so that there is a bound on what is held of them; then each in its
+        // turn, as what is kept of a failing one depends on those before it.
+        let indices: Vec<usize> = (0..cases.div_ceil(BATCH)).collect();
+        for together in indices.chunks(rayon::current_num_threads()) {
+            let tried: Vec<Tried> = together.par_iter().map(|&index| ask(index)).collect();
+            for (&index, tried) in together.iter().zip(tried) {
+                self.note(tried);
+                if !alone {
+                    progress(count(index));
+                }
+            }
         }
     }
 
     /// Try a batch on every evaluator.
-    pub fn try_batch(&mut self, evaluators: &[Box<dyn Evaluator>], lights: &LightBox, batch: &Batch) {
-        let reference = Reference::new(lights, batch, FEW);
-        for (index, evaluator) in evaluators.iter().enumerate() {
-            let verdict = check_against(&**evaluator, lights, batch, &[], &reference);
-            let failed = if verdict.failure.is_some() {
-                self.pick_apart(index, &**evaluator, lights, batch, &verdict)
-            } else {
-                0
+    pub fn batch(&mut self, batch: &Batch) {
+        self.note(Tried::new(&self.evaluators.shared, self.lights, batch.clone()));
+    }
+
+    /// Ask the other evaluators, too, and take note of all.
+    fn note(&mut self, Tried { batch, reference, verdicts }: Tried) {
+        let (evaluators, lights) = (self.evaluators, self.lights);
+        let ask = |own: &dyn Evaluator| check_against(own, lights, &batch, &[], &reference);
+        let own = evaluators.own.iter().map(|own| ask(&**own));
+        let verdicts: Vec<Verdict> = verdicts.into_iter().chain(own).collect();
+        for (index, (evaluator, verdict)) in evaluators.iter().zip(verdicts).enumerate() {
+            let failed = match verdict.failure {
+                Some(_) => self.pick_apart(index, evaluator, &batch, &verdict),
+                None => 0,
             };
             let tally = &mut self.tallies[index];
             tally.tried += batch.fragments.len();
@@ -89,10 +118,10 @@ impl Hunt {
         &mut self,
         index: usize,
         evaluator: &dyn Evaluator,
-        lights: &LightBox,
         batch: &Batch,
         verdict: &Verdict,
     ) -> usize {
+        let lights = self.lights;
         let alone = |fragment: &FragmentInputs| Batch { setting: batch.setting, fragments: vec![*fragment] };
         let name = evaluator.name();
         let room = KEPT.saturating_sub(self.found.iter().filter(|found| found.evaluator == name).count());
@@ -119,6 +148,15 @@ impl Hunt {
             self.found.push(Found { evaluator: name, failure, batch: batch.clone() });
         }
         failed.max(1)
+    }
+}
+
+impl Tried {
+    fn new(shared: &[Box<dyn Evaluator + Sync>], lights: &LightBox, batch: Batch) -> Self {
+        let reference = Reference::new(lights, &batch, FEW);
+        let ask = |evaluator: &dyn Evaluator| check_against(evaluator, lights, &batch, &[], &reference);
+        let verdicts = shared.iter().map(|shared| ask(&**shared)).collect();
+        Self { batch, reference, verdicts }
     }
 }
 

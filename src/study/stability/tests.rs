@@ -1,5 +1,7 @@
 //! A broken evaluator is told, and the same seed finds the same.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use super::case::{FragmentInputs, VertexInputs};
 use super::evaluate::{Answer, Frame};
 use super::hard::cases;
@@ -29,9 +31,14 @@ impl Evaluator for Broken {
     }
 }
 
+/// An evaluator alone.
+fn only(broken: Broken) -> Evaluators {
+    Evaluators { shared: vec![Box::new(broken)], own: Vec::new() }
+}
+
 #[test]
 fn sound_evaluators_pass_every_case() {
-    let report = study(1, 600).run(&evaluators(), &mut |_| {});
+    let report = study(1, 600).run(&evaluators(), &|_| {});
     assert!(report.failures().is_empty(), "{:#?}\n{:#?}", report.failures(), report.found);
     assert!(report.hard.iter().all(|&count| count > 100), "{:?}", report.hard);
     assert!(report.random.iter().all(|tally| tally.tried == 600));
@@ -79,7 +86,7 @@ fn every_guard_that_is_taken_out_turns_the_study_red() {
         (Broken(|_, value, _| value[0] += 1e-3 * value[0].abs()), &["grazing", "random search"]),
     ];
     for (broken, where_told) in guards {
-        let report = study(2, 512).run(&[Box::new(broken)], &mut |_| {});
+        let report = study(2, 512).run(&only(broken), &|_| {});
         let failures = report.failures().join("\n");
         for place in where_told {
             assert!(failures.contains(place), "{place} is not told:\n{failures}");
@@ -88,16 +95,18 @@ fn every_guard_that_is_taken_out_turns_the_study_red() {
     }
 }
 
+fn fails_where_nothing_is_attenuated() -> Broken {
+    Broken(|f, value, _| {
+        if f.attenuator == 1.0 {
+            value[3] = f64::NAN;
+        }
+    })
+}
+
 #[test]
 fn a_failing_case_is_made_simple_and_stays_failing_when_it_is_read_back() {
-    let broken = || -> Vec<Box<dyn Evaluator>> {
-        vec![Box::new(Broken(|f, value, _| {
-            if f.attenuator == 1.0 {
-                value[3] = f64::NAN;
-            }
-        }))]
-    };
-    let report = study(3, 256).run(&broken(), &mut |_| {});
+    let broken = || only(fails_where_nothing_is_attenuated());
+    let report = study(3, 256).run(&broken(), &|_| {});
     let found = report.found.first().expect("a case");
     let [fragment] = &found.batch.fragments[..] else { panic!("not simple: {found:?}") };
     // All but the number that it needs is ordinary.
@@ -108,17 +117,47 @@ fn a_failing_case_is_made_simple_and_stays_failing_when_it_is_read_back() {
     std::fs::write(&path, text).unwrap();
     let kept = kept::read(&path).unwrap();
     assert!(cases().iter().all(|case| case.batch.fragments.iter().all(|f| f.attenuator != 1.0)));
-    let replayed = Study { kept, ..study(3, 0) }.run(&broken(), &mut |_| {});
+    let replayed = Study { kept, ..study(3, 0) }.run(&broken(), &|_| {});
     assert!(replayed.failures().iter().any(|line| line.starts_with("kept: found 1: broken: alpha is NaN")));
-    let sound = Study { kept: kept::read(&path).unwrap(), ..study(3, 0) }.run(&evaluators(), &mut |_| {});
+    let sound = Study { kept: kept::read(&path).unwrap(), ..study(3, 0) }.run(&evaluators(), &|_| {});
     assert!(sound.failures().is_empty(), "{:#?}", sound.failures());
 }
 
 #[test]
 fn the_same_seed_finds_the_same_and_another_one_something_else() {
-    let report = |seed| study(seed, 300).run(&evaluators(), &mut |_| {}).json().unwrap();
+    let report = |seed| study(seed, 300).run(&evaluators(), &|_| {}).json().unwrap();
     assert_eq!(report(5), report(5));
     assert_ne!(report(5), report(6));
+}
+
+#[test]
+fn any_number_of_threads_finds_the_same_and_tells_of_every_case() {
+    // Failures in every batch, more than are kept, of one that all threads ask and of one that is its thread's own.
+    let all_ask = || Evaluators {
+        shared: vec![Box::new(Plain::<f32>::new()), Box::new(fails_where_nothing_is_attenuated())],
+        own: vec![Box::new(Plain::<f64>::new())],
+    };
+    let its_own = || Evaluators {
+        shared: vec![Box::new(Plain::<f32>::new())],
+        own: vec![Box::new(fails_where_nothing_is_attenuated())],
+    };
+    let study = study(4, 2_000);
+    for evaluators in [all_ask as fn() -> Evaluators, its_own] {
+        let found = |threads: usize| {
+            let told = AtomicUsize::new(0);
+            let tell = |more| _ = told.fetch_add(more, Ordering::Relaxed);
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let report = pool.install(|| study.run(&evaluators(), &tell));
+            assert_eq!(told.into_inner(), study.steps(), "{threads} threads");
+            assert!(
+                report.random.iter().any(|tally| tally.failed > report.found.len()),
+                "{:?}",
+                report.random
+            );
+            (report.json().unwrap(), report.text(), kept::to_toml(&report.found).unwrap())
+        };
+        assert!(found(1) == found(4), "the report depends on the number of threads");
+    }
 }
 
 #[test]

@@ -32,8 +32,6 @@ pub enum JobError {
     Scene(#[from] SceneError),
     #[error(transparent)]
     Study(#[from] StudyError),
-    #[error("a folder for bakes cannot be made: {0}. Make room, or name one with --cache.")]
-    Scratch(#[from] std::io::Error),
 }
 
 /// What a job reads.
@@ -45,6 +43,8 @@ pub struct Inputs<'a> {
     pub constants: Option<&'a Path>,
     /// Where bakes are kept.
     pub cache: Option<&'a Path>,
+    /// Where, without that, they may be kept as long as the job runs: studies ask for them again and again.
+    pub scratch: Option<&'a Path>,
 }
 
 /// Run a job. The figures, but for those that are times, are the same for any number of threads.
@@ -125,7 +125,7 @@ fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figure
         pixels: whole("pixels", 10_000_000),
     };
     // The evaluators that every machine has.
-    let report = study.run(&evaluators(), &mut |_| {});
+    let report = study.run(&evaluators(), &|_| {});
     let mut figures = Figures::from([
         ("failures".to_owned(), report.failures().join("; ").into()),
         ("new_cases".to_owned(), report.found.len().into()),

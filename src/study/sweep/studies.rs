@@ -12,23 +12,18 @@ use crate::study::timing::Timed;
 use crate::study::tradeoff::axis::{Setting, Sweep};
 use crate::study::tradeoff::{TradeoffOptions, tradeoff};
 
-/// Bakes are asked for again and again: without a cache of the user's they are kept as long as the job runs.
-fn cache(inputs: &Inputs<'_>) -> Result<(PathBuf, Option<tempfile::TempDir>), JobError> {
-    if let Some(cache) = inputs.cache {
-        return Ok((cache.to_owned(), None));
-    }
-    let scratch = tempfile::tempdir()?;
-    Ok((scratch.path().to_owned(), Some(scratch)))
+/// Where a study keeps its bakes.
+fn cache(inputs: &Inputs<'_>) -> Option<PathBuf> {
+    inputs.cache.or(inputs.scratch).map(Into::into)
 }
 
 /// An ablation; the renderer is not timed, as not every machine has an adapter.
 pub(super) fn ablation(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobError> {
-    let (cache, _scratch) = cache(&inputs)?;
     let options = AblationOptions {
         pairs: job.is_set("pairs"),
         refit: job.is_set("refit"),
         params: inputs.constants.map(Into::into),
-        cache: Some(cache),
+        cache: cache(&inputs),
         gpu: GpuTiming::Never,
     };
     let found = ablate(inputs.scene, &options)?;
@@ -58,12 +53,11 @@ fn case(row: &ablation::Row) -> Figures {
 
 /// A tradeoff.
 pub(super) fn tradeoffs(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobError> {
-    let (cache, _scratch) = cache(&inputs)?;
     let axes = job.get("axes").and_then(toml::Value::as_array).into_iter().flatten();
     let options = TradeoffOptions {
         axes: axes.filter_map(|axis| axis.as_str().map(str::to_owned)).collect(),
         params: inputs.constants.map(Into::into),
-        cache: Some(cache),
+        cache: cache(&inputs),
         goal: None,
     };
     let found = tradeoff(inputs.scene, &options)?;

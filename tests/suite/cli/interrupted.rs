@@ -18,18 +18,35 @@ impl Drop for Running {
     }
 }
 
-/// A long fit into `run`, once its state is there.
-fn long_fit(sandbox: &Sandbox, more: &[&str]) -> Running {
-    let arguments = [&["fit", "scene.toml", "-o", "run"], &LONG[..], more].concat();
-    let mut command = sandbox.command(&arguments);
-    let mut child = Running(command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap());
+/// The program on `arguments`, once it has `begun`; its scratch goes to `tmp`.
+fn started(sandbox: &Sandbox, arguments: &[&str], begun: impl Fn() -> bool) -> Running {
+    std::fs::create_dir_all(sandbox.path("tmp")).unwrap();
+    let mut command = sandbox.command(arguments);
+    command.env("TMPDIR", sandbox.path("tmp")).stdout(Stdio::piped()).stderr(Stdio::piped());
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    let mut child = Running(command.spawn().unwrap());
     let since = Instant::now();
-    while !sandbox.path("run/state.json").exists() {
+    while !begun() {
         assert!(child.0.try_wait().unwrap().is_none(), "it ended before it began");
-        assert!(since.elapsed() < Duration::from_secs(60), "no state after a minute");
+        assert!(since.elapsed() < Duration::from_secs(60), "it has not begun after a minute");
         std::thread::sleep(Duration::from_millis(2));
     }
     child
+}
+
+/// A long fit into `run`, once its state is there.
+fn long_fit(sandbox: &Sandbox) -> Running {
+    let arguments = [&["fit", "scene.toml", "-o", "run"], &LONG[..]].concat();
+    started(sandbox, &arguments, || sandbox.path("run/state.json").exists())
+}
+
+/// Ctrl-C, for the child and what it has started, as a terminal does it.
+#[cfg(unix)]
+fn interrupt(child: Running) -> Ran {
+    let group = format!("-{}", child.0.id());
+    assert!(Command::new("kill").args(["-INT", "--", &group]).status().unwrap().success());
+    finish(child)
 }
 
 fn finish(mut child: Running) -> Ran {
@@ -69,10 +86,7 @@ fn a_fit_that_ran_out_goes_on_to_the_same_end() {
 fn an_interrupted_fit_keeps_its_state_and_goes_on_to_the_same_end() {
     let sandbox = Sandbox::new();
     sandbox.run(&[&["fit", "scene.toml", "-o", "whole"], &LONG[..]].concat()).done();
-    let child = long_fit(&sandbox, &[]);
-    let pid = child.0.id().to_string();
-    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
-    let ran = finish(child);
+    let ran = interrupt(long_fit(&sandbox));
     assert_eq!(ran.code, Some(1), "{ran:?}");
     assert!(ran.err.contains("run: the fit was interrupted") && ran.err.contains("--resume"), "{ran:?}");
     assert!(ran.out.lines().last().unwrap().starts_with("run: final loss "), "{ran:?}");
@@ -84,53 +98,101 @@ fn an_interrupted_fit_keeps_its_state_and_goes_on_to_the_same_end() {
     assert_eq!(evaluations("run"), evaluations("whole"));
 }
 
-/// A study that lasts for seconds, interrupted once its folder is there; its scratch goes to `tmp`.
+/// So many rays that tracing them lasts for seconds.
 #[cfg(unix)]
-fn interrupted_study(sandbox: &Sandbox, command: &str, more: &[&str]) -> Ran {
-    std::fs::create_dir_all(sandbox.path("tmp")).unwrap();
-    let study = [&[command, "scene.toml", "-o", "made/study", "--no-cache"], more].concat();
-    let mut command = sandbox.command(&study);
-    command.env("TMPDIR", sandbox.path("tmp")).stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut child = Running(command.spawn().unwrap());
-    let since = Instant::now();
-    while std::fs::read_dir(sandbox.path("tmp")).unwrap().count() == 0 {
-        assert!(child.0.try_wait().unwrap().is_none(), "it ended before it began");
-        assert!(since.elapsed() < Duration::from_secs(60), "no scratch after a minute");
-        std::thread::sleep(Duration::from_millis(2));
-    }
-    // Into the first of its bakes.
+fn slow_bakes() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.edit("occlusion_rays = 32", "occlusion_rays = 65536");
+    sandbox
+}
+
+/// What is left of the scratch.
+#[cfg(unix)]
+fn scratch(sandbox: &Sandbox) -> usize {
+    std::fs::read_dir(sandbox.path("tmp")).unwrap().count()
+}
+
+/// A command that bakes without a cache, interrupted once its scratch is there.
+#[cfg(unix)]
+fn interrupted_in_its_bakes(sandbox: &Sandbox, arguments: &[&str]) -> Ran {
+    let child = started(sandbox, arguments, || scratch(sandbox) > 0);
+    // Into the first of them.
     std::thread::sleep(Duration::from_millis(50));
-    assert!(Command::new("kill").args(["-INT", &child.0.id().to_string()]).status().unwrap().success());
-    finish(child)
+    interrupt(child)
 }
 
 #[cfg(unix)]
 #[test]
 fn an_interrupted_study_says_so_and_leaves_nothing() {
-    let sandbox = Sandbox::new();
-    sandbox.edit("occlusion_rays = 32", "occlusion_rays = 65536");
+    let sandbox = slow_bakes();
     for (command, more) in [("ablate", &["--gpu", "never"][..]), ("tradeoff", &["--axis", "samples"])] {
-        let ran = interrupted_study(&sandbox, command, more);
+        let study = [&[command, "scene.toml", "-o", "made/study", "--no-cache"], more].concat();
+        let ran = interrupted_in_its_bakes(&sandbox, &study);
         assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
         let words = "skinfit: interrupted: no results were written; only bakes in the cache were kept.\n";
         assert_eq!(ran.err, words, "{ran:?}");
         assert!(!sandbox.path("made").exists(), "{command}: its folder is left");
-        assert_eq!(std::fs::read_dir(sandbox.path("tmp")).unwrap().count(), 0, "{command}: scratch is left");
+        assert_eq!(scratch(&sandbox), 0, "{command}: scratch is left");
     }
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_sweep_keeps_the_results_of_its_jobs_and_leaves_no_scratch() {
+    let sandbox = slow_bakes();
+    let ablation = "command = \"ablate\"\nscene = \"scene.toml\"\nresults = \"out\"\n";
+    sandbox.write("plan.toml", format!("{ablation}[[job]]\nrefit = true\n[[job]]\n").as_bytes());
+    let go_on = "skinfit: plan.toml: interrupted: jobs that were done have left their results.";
+    for workers in ["1", "2"] {
+        let sweep = ["sweep", "plan.toml", "--no-cache", "--workers", workers];
+        let ran = interrupted_in_its_bakes(&sandbox, &sweep);
+        assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
+        assert!(ran.err.lines().any(|line| line.starts_with(go_on)), "{ran:?}");
+        assert_eq!(scratch(&sandbox), 0, "{workers} workers: scratch is left");
+        let left = std::fs::read_dir(sandbox.path("out")).unwrap();
+        let left: Vec<_> = left.map(|entry| entry.unwrap().file_name()).collect();
+        assert_eq!(left, ["scenes"], "{workers} workers");
+    }
+    let ran = interrupted_in_its_bakes(&sandbox, &["sweep", "plan.toml", "--no-cache", "--run", "1"]);
+    assert_eq!(
+        ran.err, "skinfit: plan.toml: interrupted: job 1 has left no result. Run it again.\n",
+        "{ran:?}"
+    );
+    assert_eq!((ran.code, scratch(&sandbox)), (Some(1), 0), "{ran:?}");
 }
 
 #[test]
 fn two_runs_into_one_folder_are_one_too_many() {
     let sandbox = Sandbox::new();
-    let first = long_fit(&sandbox, &[]);
+    let first = long_fit(&sandbox);
     sandbox
         .fit("run", &[])
         .refused(&["run: another run is writing to this folder", "choose another with -o"]);
     sandbox
         .run(&["stability", "scene.toml", "--no-gpu", "-o", "run"])
         .refused(&["run: another run is writing to this folder"]);
+    sandbox
+        .run(&["bake", "scene.toml", "-o", "run"])
+        .refused(&["run: another run is writing to this folder"]);
     assert_eq!(finish(first).code, Some(0));
     sandbox.fit("run", &[]).done();
+}
+
+#[cfg(unix)]
+#[test]
+fn two_bakes_into_one_folder_are_one_too_many() {
+    let sandbox = slow_bakes();
+    let bake = ["bake", "scene.toml", "--no-cache", "-o", "made/baked"];
+    let first = started(&sandbox, &bake, || sandbox.path("made/baked/.lock").exists());
+    // It is there a moment before it is locked.
+    std::thread::sleep(Duration::from_millis(50));
+    let words = ["made/baked: another run is writing to this folder", "choose another with -o"];
+    sandbox.run(&bake).refused(&words);
+    sandbox.fit("made/baked", &[]).refused(&words);
+    let ran = interrupt(first);
+    assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
+    assert!(ran.err.starts_with("skinfit: interrupted: no results were written"), "{ran:?}");
+    assert!(!sandbox.path("made").exists(), "its folder is left");
 }
 
 #[test]

@@ -19,7 +19,7 @@ fn paths_that_cannot_be_written() {
             &["render", "--engine", "cpu", "scene.toml", "-o", "file/a.png"],
             &["file/a.png: cannot be written"],
         ),
-        (&["bake", "scene.toml", "-o", "file/baked"], &["file/baked/irradiance.exr: cannot be written"]),
+        (&["bake", "scene.toml", "-o", "file/baked"], &["file/baked: cannot be written", "Choose a folder"]),
         (&["demo", "file"], &["file: is a file", "Name another place"]),
         (&["render", "scene.toml", "-o", "a.tiff"], &["a.tiff: ", ".exr or .png"]),
         (&["render", "scene.toml", "-o", "a"], &["a: ", ".exr or .png"]),

@@ -3,16 +3,17 @@
 use super::sandbox::{Ran, Sandbox};
 
 /// Enough to try everything, and no more.
-const SHORT: [&str; 7] = ["--no-gpu", "--cases", "300", "--pixels", "1000", "-o", "stable"];
+const SHORT: [&str; 7] = ["--no-gpu", "--cases", "1500", "--pixels", "1000", "-o", "stable"];
 
-fn study(sandbox: &Sandbox, more: &[&str]) -> Ran {
-    sandbox.run(&[&["stability", "scene.toml"], &SHORT[..], more].concat())
+fn study(sandbox: &Sandbox, threads: &str, seed: &str) -> Ran {
+    let arguments = [&["stability", "scene.toml", "--seed", seed], &SHORT[..]].concat();
+    Ran::of(sandbox.command(&arguments).env("RAYON_NUM_THREADS", threads))
 }
 
 #[test]
-fn a_scene_is_studied_on_every_evaluator_and_the_same_seed_gives_the_same() {
+fn a_scene_is_studied_on_every_evaluator_and_the_same_seed_gives_the_same_on_any_number_of_threads() {
     let sandbox = Sandbox::new();
-    let ran = study(&sandbox, &["--seed", "3"]);
+    let ran = study(&sandbox, "1", "3");
     assert_eq!(ran.code, Some(0), "{ran:?}");
     for word in ["facing", "65504 beside 0", "many pixels", "random search", "model f32: "] {
         assert!(ran.out.contains(word), "{word}: {ran:?}");
@@ -20,14 +21,15 @@ fn a_scene_is_studied_on_every_evaluator_and_the_same_seed_gives_the_same() {
     assert!(ran.err.contains("WERE NOT TRIED"), "{ran:?}");
     let report = sandbox.json("stable/stability.json");
     for engine in report["engines"].as_array().unwrap() {
-        assert_eq!(engine["random"]["tried"], 300);
+        assert_eq!(engine["random"]["tried"], 1500);
         assert!(engine["hard"].as_u64().unwrap() > 100 && engine["scene"]["tried"].as_u64().unwrap() > 1000);
     }
-    let first = sandbox.read("stable/stability.json");
-    study(&sandbox, &["--seed", "3"]);
-    assert!(sandbox.read("stable/stability.json") == first, "the same seed gave something else");
-    study(&sandbox, &["--seed", "4"]);
-    assert!(sandbox.read("stable/stability.json") != first);
+    let left = || ["stability.json", "new_cases.toml"].map(|name| sandbox.read(&format!("stable/{name}")));
+    let first = left();
+    let again = study(&sandbox, "4", "3");
+    assert!(left() == first && again.out == ran.out, "the same seed gave something else: {again:?}");
+    study(&sandbox, "4", "4");
+    assert!(left() != first);
 }
 
 #[test]

@@ -70,6 +70,7 @@ fn baked(sandbox: &Sandbox, effects: &str) -> BTreeSet<String> {
     let names = std::fs::read_dir(sandbox.path(&folder)).unwrap();
     names
         .map(|entry| entry.unwrap().path().file_stem().unwrap().to_str().unwrap().to_owned())
+        .filter(|name| name != ".lock")
         .map(|name| if name.starts_with("lobe_") { "lobe".to_owned() } else { name })
         .collect()
 }

@@ -118,20 +118,7 @@ fn task<'a>(
     observed: Vec<ObservedView>,
     kind: MapKind,
 ) -> MapTask<'a> {
-    let weights: Vec<f32> = changed.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
-    MapTask {
-        scene: &changed.scene,
-        posed,
-        illumination: changed.illumination.clone(),
-        open: changed.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
-        observed,
-        held_out: None,
-        kinds: vec![kind],
-        start: changed.start(),
-        unknowns: Vec::new(),
-        most_samples: None,
-        interrupt: None,
-    }
+    MapTask { unknowns: Vec::new(), ..MapTask::new(changed, posed, observed, vec![kind]) }
 }
 
 /// The root mean square of how far two scenes' samples differ in what `of` reads, by their shares of pixels.

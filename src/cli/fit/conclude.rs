@@ -1,0 +1,134 @@
+//! What a fit leaves in its run folder, and what it says at its end.
+
+use std::path::Path;
+use std::time::Instant;
+
+use super::Arguments;
+use super::evidence::evidence;
+use super::solve::Solving;
+use super::words::{advice, advice_on_maps, tell_run};
+use crate::cli::fit_engine::{Chosen, FitEngine};
+use crate::cli::fitted_scene::{Changes, Start};
+use crate::cli::maps::MapsLeft;
+use crate::cli::run_folder::RunFolder;
+use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
+use crate::fit::outcome::{Ending, Outcome};
+use crate::fit::params_file::ParamsFile;
+use crate::prepare::Prepared;
+use crate::report::{self, RunInfo, ViewEvidence};
+use crate::scene::Scene;
+
+/// The scene file that was fitted, and what was left of its maps.
+#[derive(Clone, Copy)]
+pub(super) struct Fitted<'a> {
+    pub(super) path: &'a Path,
+    pub(super) maps: Option<&'a MapsLeft>,
+}
+
+/// Leave the run folder's files, and tell how it ended.
+pub(super) fn conclude(
+    arguments: &Arguments,
+    solving: Solving,
+    folder: &RunFolder,
+    Fitted { path, maps }: Fitted<'_>,
+    prepared: &Prepared,
+    chosen: &Chosen<'_>,
+    outcome: &Outcome,
+) -> Result<Exit, Refusal> {
+    let engine = &chosen.engine;
+    let clock = Instant::now();
+    let views = evidence(prepared, engine, outcome)?;
+    let mut seconds = prepared.seconds;
+    seconds.samples = chosen.sample_seconds().unwrap_or(seconds.samples);
+    // Of every process that had a part in it, where the fit was resumed.
+    seconds.fit = outcome.seconds;
+    seconds.render = clock.elapsed().as_secs_f64();
+    let maps_named = maps.map_or(&[][..], |left| &left.named);
+    let named = folder.write_scene(path, Changes { maps: maps_named, ..changes(arguments, prepared) })?;
+    params_file(prepared, outcome).write(&folder.path().join("params.toml"), path, Some(outcome))?;
+    let mut run = RunInfo { seconds, named, ..run_info(arguments, solving, path, prepared, engine, views) };
+    if let Some(left) = maps {
+        tell_warnings(&left.warnings);
+        run.warnings.extend(left.warnings.iter().cloned());
+        run.provenance.extend(left.provenance.iter().cloned());
+        run.maps = Some(left.evidence.clone());
+    }
+    // A fit of maps that was interrupted is so as a whole, even where the constants had nothing left to do.
+    let interrupted = maps.is_some_and(|left| left.evidence.interrupted);
+    let ending = if interrupted { Ending::Interrupted } else { outcome.ending };
+    let outcome = &Outcome { ending, ..outcome.clone() };
+    let report = report::write_run(folder.path(), &run, outcome)?;
+    if arguments.json {
+        say(report.json.trim_end())?;
+    } else {
+        tell_run(folder.path(), &prepared.scene.views, chosen, outcome, seconds.samples)?;
+    }
+    let advice = match maps {
+        Some(left) => advice_on_maps(arguments, folder.path(), left, outcome),
+        None => advice(outcome),
+    };
+    if let Some(advice) = advice {
+        tell(&format!("{}: {advice}", folder.path().display()));
+        return Ok(Exit::Failed);
+    }
+    Ok(Exit::Done)
+}
+
+/// Where the fit differed from its scene file.
+fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> {
+    let Scene { form, params, fit, .. } = &prepared.scene;
+    let start = Start { form: *form, params, free: &fit.free };
+    Changes {
+        loss: arguments.loss.as_deref(),
+        // Where maps are fitted, the constants start from what their last round found.
+        start: (arguments.params.is_some() || arguments.maps.any()).then_some(start),
+        ..Changes::default()
+    }
+}
+
+/// The fitted parameters, to be used again.
+fn params_file(prepared: &Prepared, outcome: &Outcome) -> ParamsFile {
+    let names = prepared.scene.views.iter().map(|view| view.name.clone());
+    ParamsFile {
+        form: prepared.scene.form,
+        effects: Some(prepared.scene.effects),
+        loss: Some(prepared.scene.fit.loss),
+        params: outcome.end.params,
+        gains: names.zip(outcome.end.gains.iter().copied()).collect(),
+    }
+}
+
+fn run_info(
+    arguments: &Arguments,
+    solving: Solving,
+    path: &Path,
+    prepared: &Prepared,
+    engine: &FitEngine<'_>,
+    views: Vec<ViewEvidence>,
+) -> RunInfo {
+    let scene = match &arguments.scene.scene {
+        Some(_) => path.display().to_string(),
+        None => "the built-in scene".to_owned(),
+    };
+    let effects: Vec<&str> = prepared.scene.effects.iter().map(crate::model::effects::Effect::name).collect();
+    RunInfo {
+        scene,
+        loss: prepared.scene.fit.loss,
+        engine: engine.name().to_owned(),
+        samples: engine.samples() as u64,
+        seconds: prepared.seconds,
+        views,
+        warnings: prepared.warnings.clone(),
+        provenance: vec![
+            ("form".to_owned(), prepared.scene.form.name().to_owned()),
+            ("silhouette".to_owned(), prepared.scene.silhouette.name().to_owned()),
+            ("effects".to_owned(), effects.join(", ")),
+            ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
+        ]
+        .into_iter()
+        .chain(engine.provenance())
+        .collect(),
+        maps: None,
+        named: Vec::new(),
+    }
+}

@@ -1,0 +1,61 @@
+//! The evidence: each view's target, fit and terms.
+
+use crate::cli::Refusal;
+use crate::cli::fit_engine::FitEngine;
+use crate::engine::view::ObservedView;
+use crate::fit::outcome::Outcome;
+use crate::prepare::Prepared;
+use crate::progress;
+use crate::render::image::Image;
+use crate::render::shade::Shader;
+use crate::report::ViewEvidence;
+use crate::scene::view::View;
+
+/// For each view the target, the fit and its terms.
+pub(super) fn evidence(
+    prepared: &Prepared,
+    engine: &FitEngine<'_>,
+    outcome: &Outcome,
+) -> Result<Vec<ViewEvidence>, Refusal> {
+    let observed = engine.surfaced_views()?;
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
+    let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
+    let views = prepared.scene.views.iter().zip(observed.iter()).enumerate();
+    let evidence = views
+        .map(|(index, (view, observed))| {
+            let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
+            let (target, coverage) = compared(view, observed, &shaded.image);
+            bar.inc(1);
+            ViewEvidence {
+                name: view.name.clone(),
+                target,
+                fit: shaded.image,
+                coverage,
+                terms: shaded
+                    .terms
+                    .into_iter()
+                    .map(|(name, image)| (name.name().to_owned(), image))
+                    .collect(),
+            }
+        })
+        .collect();
+    bar.finish_and_clear();
+    Ok(evidence)
+}
+
+/// The target as an image, and how much of each pixel is compared.
+pub(in crate::cli) fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
+    let mut target = Image::new(fit.width, fit.height);
+    let Some(source) = &view.target else { return (target, fit.alpha.clone()) };
+    target.rgb.clone_from(&source.rgb);
+    // Without an alpha of its own, the target is opaque.
+    target.alpha = source.alpha.clone().unwrap_or_else(|| vec![1.0; source.rgb.len()]);
+    let mut coverage = vec![0.0; fit.alpha.len()];
+    for (slot, &pixel) in observed.samples.pixel.iter().enumerate() {
+        if pixel != u32::MAX && observed.pixel_weight(slot) > 0.0 {
+            let at = pixel as usize;
+            coverage[at] = observed.samples.coverage[slot].min(target.alpha[at]);
+        }
+    }
+    (target, coverage)
+}

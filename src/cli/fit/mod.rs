@@ -1,0 +1,110 @@
+//! `skinfit fit`: a scene goes in, fitted constants come out, with the evidence of how good they are.
+//!
+//! - `solve`: the search, and what it goes on from
+//! - `evidence`: each view's target, fit and terms
+//! - `conclude`: what is left in the run folder; `words`: the outcome, told
+
+mod conclude;
+mod evidence;
+mod solve;
+mod words;
+
+use std::path::PathBuf;
+
+use super::fit_engine::FitEngineArguments;
+use super::interrupt::Interrupt;
+use super::maps::{MapArguments, MapRun};
+use super::run_folder::RunFolder;
+use super::scene::SceneArguments;
+use super::{Exit, Refusal, quieten_graphics, tell_warnings};
+use crate::prepare::{PrepareOptions, Prepared};
+use crate::scene::Loss;
+use conclude::{Fitted, conclude};
+#[cfg(feature = "burn")]
+pub(super) use evidence::compared;
+use solve::{Solving, solve};
+
+/// Fit a scene's free parameters to its target images
+#[derive(clap::Args)]
+#[command(
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs; with --maps, maps.json and the fitted maps in maps/ instead of the latter.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
+)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+    /// The run folder [default: runs/<the scene's folder>].
+    #[arg(short, long, value_name = "RUN")]
+    output: Option<PathBuf>,
+    /// Start from these parameters, instead of the scene's start values.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+    /// Which solver: varpro and lm take few passes; lbfgs, nelder-mead and adam are there to
+    /// compare
+    /// [default: varpro].
+    #[arg(long, value_parser = ["varpro", "lm", "lbfgs", "nelder-mead", "adam"], help_heading = "Solver")]
+    solver: Option<String>,
+    /// What is minimised, instead of the scene's loss.
+    #[arg(long, value_parser = ["l2", "relative_l2", "huber", "smape"], help_heading = "Solver")]
+    loss: Option<String>,
+    /// Fit from this many starts and keep the best: the given one, and others drawn about it
+    /// [default: 1].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000), help_heading = "Solver")]
+    starts: Option<u32>,
+    /// What the other starts are drawn from [default: 0].
+    #[arg(long, help_heading = "Solver")]
+    seed: Option<u64>,
+    /// Most iterations of each start.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..), help_heading = "Solver")]
+    max_iterations: Option<u64>,
+    /// Go on from where an interrupted fit in this run folder stopped, with its solver, starts and seed.
+    #[arg(long, help_heading = "Solver")]
+    resume: bool,
+    #[command(flatten)]
+    maps: MapArguments,
+    #[command(flatten)]
+    engine: FitEngineArguments,
+    /// Print report.json on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    arguments.maps.check()?;
+    arguments.engine.check(arguments.maps.any())?;
+    if arguments.engine.may_be_gpu() {
+        quieten_graphics();
+    }
+    let mut folder = RunFolder::open(arguments.output.as_deref(), arguments.scene.scene.as_deref())?;
+    let path = arguments.scene.kept_path(folder.path())?;
+    let options = PrepareOptions {
+        fit: true,
+        params: arguments.params.clone(),
+        cache: arguments.scene.cache(),
+        ..PrepareOptions::default()
+    };
+    let own = arguments.engine.makes_samples();
+    let mut prepared = if own { Prepared::baked(&path, &options) } else { Prepared::new(&path, &options) }?;
+    if let Some(loss) = &arguments.loss {
+        prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
+    }
+    let solving = Solving::of(arguments, folder.path())?;
+    let observed = if own { prepared.keep_targets().map(|()| None) } else { prepared.observed().map(Some) }?;
+    tell_warnings(&prepared.warnings);
+    let interrupt = Interrupt::default();
+    let (observed, maps) = match observed {
+        Some(observed) if arguments.maps.any() => {
+            let (adapter, quiet) = (arguments.engine.adapter(), arguments.json);
+            let run = MapRun { adapter, interrupt: interrupt.watch(), quiet };
+            let (observed, maps) = arguments.maps.fit(&mut prepared, observed, &run)?;
+            (Some(observed), maps)
+        }
+        observed => (observed, None),
+    };
+    arguments.engine.with_engine(&prepared, observed, |chosen| {
+        let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine, &interrupt)?;
+        folder.keep();
+        let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
+        let fitted = Fitted { path: &path, maps: maps.as_ref() };
+        conclude(arguments, solving, &folder, fitted, &prepared, chosen, &outcome)
+    })
+}

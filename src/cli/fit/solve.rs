@@ -1,0 +1,90 @@
+//! The search: how it goes about it, and what it goes on from.
+
+use std::io::ErrorKind;
+use std::path::Path;
+
+use super::Arguments;
+use crate::cli::Refusal;
+use crate::cli::fingerprint::fingerprint;
+use crate::cli::fit_engine::FitEngine;
+use crate::cli::interrupt::Interrupt;
+use crate::cli::run_folder::RunFolder;
+use crate::fit::outcome::Outcome;
+use crate::fit::state::Saved;
+use crate::fit::{self, FitError, FitOptions, SolverKind};
+use crate::output::OutputError;
+use crate::prepare::Prepared;
+use crate::progress;
+
+/// How the unknowns are searched for: as the command line says, else as the fit that is resumed was
+/// begun.
+#[derive(Clone, Copy)]
+pub(super) struct Solving {
+    solver: SolverKind,
+    pub(super) starts: u32,
+    pub(super) seed: u64,
+}
+
+impl Solving {
+    pub(super) fn of(arguments: &Arguments, folder: &Path) -> Result<Self, Refusal> {
+        let (solver, starts, seed) = match arguments.resume {
+            true => Saved::begun_with(&folder.join(STATE))?,
+            false => (SolverKind::default(), 1, 0),
+        };
+        Ok(Self {
+            solver: arguments.solver.as_deref().and_then(SolverKind::from_name).unwrap_or(solver),
+            starts: arguments.starts.unwrap_or(starts),
+            seed: arguments.seed.unwrap_or(seed),
+        })
+    }
+}
+
+/// What a fit goes on from, in its run folder.
+const STATE: &str = "state.json";
+
+/// Fit, with a progress line and Ctrl-C that keeps the state.
+pub(super) fn solve(
+    arguments: &Arguments,
+    solving: Solving,
+    folder: &RunFolder,
+    prepared: &Prepared,
+    engine: &FitEngine<'_>,
+    interrupt: &Interrupt,
+) -> Result<Outcome, Refusal> {
+    let state = folder.path().join(STATE);
+    let maps = arguments.maps.any();
+    if maps {
+        // A state holds no maps: what could be resumed from one is another fit, and so is that of an earlier run.
+        match std::fs::remove_file(&state) {
+            Err(error) if error.kind() != ErrorKind::NotFound => {
+                return Err(OutputError::new(&state, &error).into());
+            }
+            _ => {}
+        }
+    }
+    let options = FitOptions {
+        solver: solving.solver,
+        max_iterations: arguments.max_iterations,
+        starts: solving.starts,
+        seed: solving.seed,
+        fingerprint: fingerprint(&prepared.scene),
+        resume: arguments.resume.then(|| state.clone()),
+        state: (!maps).then_some(state),
+        interrupt: Some(interrupt.watch()),
+        ..FitOptions::default()
+    };
+    let bar = progress::spinner("fit");
+    let outcome = fit::fit(engine.objective(), &prepared.start(), &options, &mut |iteration| {
+        bar.set_position(iteration.iteration);
+        bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
+    });
+    bar.finish_and_clear();
+    outcome.map_err(|error| match error {
+        // It names its file itself.
+        FitError::State(error) => Refusal::from(error),
+        FitError::Engine(fault) => {
+            Refusal::failure(format!("{}: {}", prepared.scene.path.display(), FitError::Engine(fault)))
+        }
+        error => Refusal::new(format!("{}: {error}", prepared.scene.path.display())),
+    })
+}

@@ -1,0 +1,101 @@
+//! The outcome in words: the fitted values, and what to do where they are not the best.
+
+use std::path::Path;
+
+use super::Arguments;
+use crate::cli::fit_engine::Chosen;
+use crate::cli::maps::MapsLeft;
+use crate::cli::{Refusal, say};
+use crate::engine::Unknown;
+use crate::fit::outcome::{Ending, Outcome};
+use crate::scene::view::View;
+
+/// How the run went: the fitted values, what made the passes and the samples (in so many seconds), and where it is.
+pub(super) fn tell_run(
+    folder: &Path,
+    views: &[View],
+    chosen: &Chosen<'_>,
+    outcome: &Outcome,
+    sample_seconds: f64,
+) -> Result<(), Refusal> {
+    let engine = &chosen.engine;
+    tell_outcome(outcome, views)?;
+    if engine.name() == "gpu" {
+        let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
+        say(&format!("{} samples made by the {by} in {sample_seconds:.3} s", engine.samples()))?;
+    }
+    if let Some(why) = &chosen.reasons.why {
+        say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
+    }
+    say(&format!("{}: final loss {:.6e}", folder.display(), outcome.loss_end))
+}
+
+/// The fitted values as a small table.
+fn tell_outcome(outcome: &Outcome, views: &[View]) -> Result<(), Refusal> {
+    for unknown in &outcome.unknowns {
+        let (name, unit) = match unknown.unknown {
+            Unknown::Gain(view) => (format!("gain.{}", views[view].name), ""),
+            Unknown::Param(column) => (column.name(), column.param.info().unit),
+        };
+        let error = match unknown.std_error {
+            Some(error) => format!("+- {error:.2e}"),
+            None if !unknown.identifiable => "not determined by the images".to_owned(),
+            None if unknown.at_bound => "at its bound".to_owned(),
+            None => String::new(),
+        };
+        say(format!("{name:>22} {:>12.6}  {error:<11}  {unit}", unknown.value).trim_end())?;
+    }
+    let ending = outcome.ending.words();
+    let count = |n: u64, one: &str, more: &str| format!("{n} {}", if n == 1 { one } else { more });
+    say(&format!(
+        "{ending} after {} and {} over the samples, {:.2} s; loss {:.6e} -> {:.6e}",
+        count(outcome.iterations, "iteration", "iterations"),
+        count(outcome.evaluations, "pass", "passes"),
+        outcome.seconds,
+        outcome.loss_start,
+        outcome.loss_end
+    ))
+}
+
+/// What to do about a fit that did not converge.
+pub(super) fn advice(outcome: &Outcome) -> Option<String> {
+    let iterations = outcome.iterations;
+    match outcome.ending {
+        Ending::Converged => None,
+        Ending::RanOut => Some(format!(
+            "the fit ran out after {iterations} iterations and has not converged. Go on with the same command, --resume and a greater \
+             --max-iterations."
+        )),
+        Ending::Stalled => Some(
+            "the fit stalled: no step lowers the loss, yet it has not converged. Try --solver lm, or --starts 8."
+                .to_owned(),
+        ),
+        Ending::Interrupted => {
+            Some(format!("the fit was interrupted after {iterations} iterations. Go on with the same command and --resume."))
+        }
+    }
+}
+
+/// What to do about a fit of maps that did not end well: no state of it is kept.
+pub(super) fn advice_on_maps(
+    arguments: &Arguments,
+    folder: &Path,
+    left: &MapsLeft,
+    outcome: &Outcome,
+) -> Option<String> {
+    if left.evidence.interrupted {
+        return Some(format!("the fit of the maps was interrupted. {}", arguments.maps.advice(folder)));
+    }
+    let iterations = outcome.iterations;
+    match outcome.ending {
+        Ending::Interrupted => Some(format!(
+            "the last solve of the constants was interrupted after {iterations} iterations; the maps are fitted. {}",
+            arguments.maps.advice(folder)
+        )),
+        Ending::RanOut => Some(format!(
+            "the last solve of the constants ran out after {iterations} iterations and has not converged. Fit again \
+             with a greater --max-iterations."
+        )),
+        Ending::Converged | Ending::Stalled => advice(outcome),
+    }
+}

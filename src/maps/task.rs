@@ -1,0 +1,72 @@
+//! What a fit of maps is asked for.
+
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::bake::Illumination;
+use crate::engine::view::ObservedView;
+use crate::engine::{Point, Unknown};
+use crate::model::params::{Column, Param};
+use crate::prepare::Prepared;
+use crate::scene::mesh::PosedMesh;
+use crate::scene::{MapKind, Scene};
+
+/// What is to be fitted.
+pub struct MapTask<'a> {
+    /// The scene; its views are those of `observed`.
+    pub scene: &'a Scene,
+    /// Its mesh.
+    pub posed: &'a PosedMesh,
+    /// The cubes to start from.
+    pub illumination: Illumination,
+    /// Each vertex's open share of the hemisphere to start from.
+    pub open: Option<Vec<f32>>,
+    /// Samples and targets.
+    pub observed: Vec<ObservedView>,
+    /// A view that takes no part in the fit.
+    pub held_out: Option<usize>,
+    /// Which maps.
+    pub kinds: Vec<MapKind>,
+    /// The constants to start from, and which of them are free.
+    pub start: Point,
+    /// What is free of them.
+    pub unknowns: Vec<Unknown>,
+    /// Most samples that are shaded at once; else as many as the device's buffers hold.
+    pub most_samples: Option<usize>,
+    /// Set by somebody who wants the fit to stop after the present step.
+    pub interrupt: Option<Arc<AtomicBool>>,
+}
+
+impl<'a> MapTask<'a> {
+    /// Maps of these `kinds` and the scene's constants, from where the stages before leave them; every view counts.
+    #[must_use]
+    pub fn new(
+        prepared: &'a Prepared,
+        posed: &'a PosedMesh,
+        observed: Vec<ObservedView>,
+        kinds: Vec<MapKind>,
+    ) -> Self {
+        let weights: Vec<f32> = prepared.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
+        Self {
+            scene: &prepared.scene,
+            posed,
+            illumination: prepared.illumination.clone(),
+            open: prepared.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
+            observed,
+            held_out: None,
+            kinds,
+            start: prepared.start(),
+            unknowns: prepared.unknowns(),
+            most_samples: None,
+            interrupt: None,
+        }
+    }
+}
+
+/// The free columns that a fit of maps leaves: a fitted environment holds what turns and blurs it.
+#[must_use]
+pub fn columns_beside(kinds: &[MapKind], free: &[Column]) -> Vec<Column> {
+    let environment = kinds.contains(&MapKind::Environment);
+    let of_light = |column: &Column| matches!(column.param, Param::SpecularLobe | Param::EnvironmentRotation);
+    free.iter().copied().filter(|column| !(environment && of_light(column))).collect()
+}
