@@ -69,7 +69,7 @@ impl Images {
                 pass.set_pipeline(&self.pipeline);
                 pass.set_bind_group(0, lights, &[]);
                 pass.set_bind_group(1, bindings, &[]);
-                pass.dispatch_workgroups(Parts::most_workgroups(part), 1, 1);
+                pass.dispatch_workgroups(Parts::image_workgroups(part), 1, 1);
             }
             if let Some(timer) = &timer {
                 timer.finish(&mut commands);

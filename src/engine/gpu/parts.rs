@@ -6,6 +6,7 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::Memory;
 use super::fused::WORKGROUP;
+use super::pipeline::DISPATCH;
 use super::samples::DeviceSamples;
 use crate::engine::BLOCK;
 use crate::engine::view::ObservedView;
@@ -233,6 +234,13 @@ impl Parts {
     pub(super) fn most_workgroups(part: &Part) -> u32 {
         let tiles = Self::slots(part).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
         tiles.clamp(1, MOST_WORKGROUPS) as u32
+    }
+
+    /// Workgroups of a part's image. Where nothing is added up a workgroup costs nothing, and as many as there can be
+    /// take a tenth less time than [`MOST_WORKGROUPS`] (4 to 16 million pixels on an H200).
+    pub(super) fn image_workgroups(part: &Part) -> u32 {
+        let tiles = Self::slots(part).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
+        tiles.clamp(1, DISPATCH) as u32
     }
 
     /// The uniform block of a part's dispatch: its counts and gain, and where its sums go.

@@ -5,7 +5,7 @@ use wgpu::{BufferUsages, ComputePassDescriptor};
 use super::fused::{Fitted, Layout, WORKGROUP, terms_module};
 use super::lights::{DeviceLights, Inputs};
 use super::parts::Parts;
-use super::pipeline::{READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, pipeline};
+use super::pipeline::{DISPATCH, READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, pipeline};
 use crate::engine::view::ObservedView;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::params::{Param, Params};
@@ -18,9 +18,6 @@ pub(super) const HELD: [Param; 5] = [
     Param::KeyAzimuth,
     Param::KeyElevation,
 ];
-
-/// Most workgroups: WebGPU's limit for a dispatch.
-const MOST_WORKGROUPS: usize = 65_535;
 
 /// Put terms in the place of every part's samples.
 pub(super) fn replace_samples(
@@ -50,7 +47,7 @@ pub(super) fn replace_samples(
             pass.set_pipeline(&made);
             pass.set_bind_group(0, bound, &[]);
             pass.set_bind_group(1, &bindings, &[]);
-            let workgroups = samples.div_ceil(WORKGROUP as usize).clamp(1, MOST_WORKGROUPS);
+            let workgroups = samples.div_ceil(WORKGROUP as usize).clamp(1, DISPATCH);
             pass.dispatch_workgroups(workgroups as u32, 1, 1);
         }
         gpu.queue.submit([commands.finish()]);
