@@ -1,4 +1,4 @@
-//! The command line: one file a command. Every command ends with an [`Exit`].
+//! The command line: a file or folder a command. Every command ends with an [`Exit`].
 //!
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `stability`,
 //!   `sweep`, `collect`: the commands
@@ -178,9 +178,10 @@ fn write_or_say(file: Option<&Path>, text: &str) -> Result<(), Refusal> {
     }
 }
 
-/// Print a line on standard error, after the program's name; there is nobody to tell that it failed.
+/// Print a line on standard error, after the program's name; there is nobody to tell that it failed. At once, as
+/// processes of one sweep share it.
 fn tell(line: &str) {
-    let _ = writeln!(std::io::stderr(), "skinfit: {line}");
+    let _ = std::io::stderr().write_all(format!("skinfit: {line}\n").as_bytes());
 }
 
 /// Print what was mended or left out.

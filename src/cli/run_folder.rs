@@ -90,7 +90,7 @@ impl RunFolder {
         let made = places.filter(|p| !p.as_os_str().is_empty()).take_while(|p| !p.exists());
         let made = made.map(Path::to_owned).collect();
         std::fs::create_dir_all(&path).map_err(refused)?;
-        let lock = File::create(&file).map_err(refused)?;
+        let lock = File::create(&file).map_err(|reason| OutputError::new(&file, &reason))?;
         if let Err(std::fs::TryLockError::WouldBlock) = lock.try_lock() {
             return Err(Refusal::new(format!(
                 "{}: another run is writing to this folder. Wait for it, or choose another with -o.",

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
@@ -108,7 +108,7 @@ pub(super) fn run(arguments: &SweepArguments) -> Result<Exit, Refusal> {
 fn words_of_interruption(SweepArguments { plan, run, .. }: &SweepArguments) -> String {
     let plan = plan.display();
     match run {
-        Some(job) => format!("{plan}: interrupted: job {job} has left no result. Run it again."),
+        Some(job) => format!("{plan}: interrupted: job {job} has left a whole result or none. Run it again."),
         None => format!(
             "{plan}: interrupted: jobs that were done have left their results. Go on with the others by the same command."
         ),
@@ -262,6 +262,9 @@ fn quoted(word: &str) -> String {
     }
 }
 
+/// How much later than its jobs a sweep may hear of a Ctrl-C that was for all of them, at the most.
+const HEARSAY: Duration = Duration::from_millis(500);
+
 /// Jobs in processes of their own, a few at a time; how many failed.
 fn run_workers(
     arguments: &SweepArguments,
@@ -286,6 +289,10 @@ fn run_workers(
                     let child = unfinished::begin(|| command.stdin(Stdio::null()).spawn());
                     let done = child.and_then(|mut child| child.wait()).is_ok_and(|status| status.success());
                     failed.fetch_add(usize::from(!done), Ordering::Relaxed);
+                    if !done && JobResult::read(&JobResult::path(&plan.results, &ready.identity)).is_none() {
+                        // Perhaps it was interrupted, and this process hears of that a moment later.
+                        std::thread::sleep(HEARSAY);
+                    }
                     bar.inc(1);
                 }
             });

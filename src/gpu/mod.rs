@@ -39,3 +39,6 @@ pub use adapter::Choice;
 pub use device::Gpu;
 pub use error::{GpuError, Oversized};
 pub use renderer::{Frame, RenderOptions, Renderer};
+
+/// Most workgroups of a dispatch, along each of its dimensions: WebGPU's limit.
+pub(crate) const MOST_OF_A_DISPATCH: u32 = 65_535;

@@ -6,7 +6,7 @@ use wgpu::{
     ShaderModuleDescriptor, ShaderSource,
 };
 
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Gpu, GpuError, MOST_OF_A_DISPATCH};
 
 /// Threads of a workgroup, in every module here.
 pub(super) const WORKGROUP: u32 = 64;
@@ -66,11 +66,11 @@ pub(super) fn dispatch(
     pass.dispatch_workgroups(x, y, 1);
 }
 
-/// Workgroups in two dimensions, of which each may have 65,535: a thread's index is
+/// Workgroups in two dimensions, of which each may have [`MOST_OF_A_DISPATCH`]: a thread's index is
 /// `id.x + id.y * workgroups.x * 64`.
 fn workgroups(threads: u64) -> [u32; 2] {
     let count = threads.div_ceil(u64::from(WORKGROUP)).max(1);
-    let rows = count.div_ceil(65_535);
+    let rows = count.div_ceil(u64::from(MOST_OF_A_DISPATCH));
     [count.div_ceil(rows) as u32, rows as u32]
 }
 

@@ -6,11 +6,10 @@ use wgpu::{Buffer, BufferDescriptor, BufferUsages};
 
 use super::Memory;
 use super::fused::WORKGROUP;
-use super::pipeline::DISPATCH;
 use super::samples::DeviceSamples;
 use crate::engine::BLOCK;
 use crate::engine::view::ObservedView;
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Gpu, GpuError, MOST_OF_A_DISPATCH};
 use crate::samples::LANES;
 use crate::samples::rows::{Row, Rows};
 use crate::samples::surface_records::Places;
@@ -19,6 +18,11 @@ use crate::samples::surface_records::Places;
 const PIXELS_A_THREAD: usize = 4;
 /// Most workgroups of a part: eight for each of the 132 processors of an H200, which the largest adapters resemble.
 const MOST_WORKGROUPS: usize = 1056;
+
+/// Workgroups for so many pixels, of which each thread shades a few.
+fn tiles(pixels: usize, most: usize) -> u32 {
+    pixels.div_ceil(WORKGROUP as usize * PIXELS_A_THREAD).clamp(1, most) as u32
+}
 
 /// Bytes of a dispatch's uniform block.
 pub(super) const PART_BYTES: usize = 32;
@@ -226,21 +230,18 @@ impl Parts {
 
     /// Workgroups of a part's dispatch.
     pub(super) fn workgroups(part: &Part) -> u32 {
-        let tiles = (part.read as usize).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
-        tiles.clamp(1, MOST_WORKGROUPS) as u32
+        tiles(part.read as usize, MOST_WORKGROUPS)
     }
 
     /// Most workgroups that a part's dispatch may have, at any stride.
     pub(super) fn most_workgroups(part: &Part) -> u32 {
-        let tiles = Self::slots(part).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
-        tiles.clamp(1, MOST_WORKGROUPS) as u32
+        tiles(Self::slots(part), MOST_WORKGROUPS)
     }
 
-    /// Workgroups of a part's image. Where nothing is added up a workgroup costs nothing, and as many as there can be
-    /// take a tenth less time than [`MOST_WORKGROUPS`] (4 to 16 million pixels on an H200).
+    /// Workgroups of a part's image. Where nothing is added up a workgroup costs nothing, and an image takes a tenth
+    /// less time than with [`MOST_WORKGROUPS`] (4 to 16 million pixels on an H200).
     pub(super) fn image_workgroups(part: &Part) -> u32 {
-        let tiles = Self::slots(part).div_ceil(WORKGROUP as usize * PIXELS_A_THREAD);
-        tiles.clamp(1, DISPATCH) as u32
+        tiles(Self::slots(part), MOST_OF_A_DISPATCH as usize)
     }
 
     /// The uniform block of a part's dispatch: its counts and gain, and where its sums go.

@@ -36,9 +36,6 @@ impl Uniform {
     }
 }
 
-/// Most workgroups of a dispatch: WebGPU's limit.
-pub(super) const DISPATCH: usize = 65_535;
-
 /// A buffer of so many bytes; of 16 at the least, as bindings may not be empty.
 pub(super) fn buffer(gpu: &Gpu, label: &str, bytes: usize, usage: BufferUsages) -> Buffer {
     gpu.device.create_buffer(&BufferDescriptor {

@@ -5,9 +5,9 @@ use wgpu::{BufferUsages, ComputePassDescriptor};
 use super::fused::{Fitted, Layout, WORKGROUP, terms_module};
 use super::lights::{DeviceLights, Inputs};
 use super::parts::Parts;
-use super::pipeline::{DISPATCH, READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, pipeline};
+use super::pipeline::{READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, pipeline};
 use crate::engine::view::ObservedView;
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{Gpu, GpuError, MOST_OF_A_DISPATCH};
 use crate::model::params::{Param, Params};
 
 /// The parameters that terms are made with.
@@ -47,7 +47,7 @@ pub(super) fn replace_samples(
             pass.set_pipeline(&made);
             pass.set_bind_group(0, bound, &[]);
             pass.set_bind_group(1, &bindings, &[]);
-            let workgroups = samples.div_ceil(WORKGROUP as usize).clamp(1, DISPATCH);
+            let workgroups = samples.div_ceil(WORKGROUP as usize).clamp(1, MOST_OF_A_DISPATCH as usize);
             pass.dispatch_workgroups(workgroups as u32, 1, 1);
         }
         gpu.queue.submit([commands.finish()]);

@@ -8,14 +8,13 @@ use wgpu::{
 
 use super::draw::WORKGROUP;
 use super::surfaces::Surfaces;
+use crate::gpu::MOST_OF_A_DISPATCH;
 use crate::gpu::device::Gpu;
 use crate::gpu::error::GpuError;
 use crate::gpu::readback::read_words;
 
 /// Threads of a workgroup of `coverage.wgsl`.
 const COVERAGE_THREADS: u32 = 64;
-/// Most workgroups: WebGPU's limit for a dispatch.
-const MOST_WORKGROUPS: u32 = 65_535;
 
 /// Packs a bit for each sample that was drawn.
 pub(super) struct Coverage(ComputePipeline);
@@ -93,7 +92,7 @@ impl Gather {
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &bound, &[]);
-        pass.dispatch_workgroups(slots.div_ceil(WORKGROUP).clamp(1, MOST_WORKGROUPS), 1, 1);
+        pass.dispatch_workgroups(slots.div_ceil(WORKGROUP).clamp(1, MOST_OF_A_DISPATCH), 1, 1);
     }
 }
 

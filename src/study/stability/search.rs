@@ -78,10 +78,11 @@ impl<'a> Hunt<'a> {
         };
         // As many at a time as there are threads, so that there is a bound on what is held of them; then each in its
         // turn, as what is kept of a failing one depends on those before it.
-        let indices: Vec<usize> = (0..cases.div_ceil(BATCH)).collect();
-        for together in indices.chunks(rayon::current_num_threads()) {
-            let tried: Vec<Tried> = together.par_iter().map(|&index| ask(index)).collect();
-            for (&index, tried) in together.iter().zip(tried) {
+        let (batches, threads) = (cases.div_ceil(BATCH), rayon::current_num_threads());
+        for first in (0..batches).step_by(threads) {
+            let together = first..batches.min(first + threads);
+            let tried: Vec<Tried> = together.clone().into_par_iter().map(ask).collect();
+            for (index, tried) in together.zip(tried) {
                 self.note(tried);
                 if !alone {
                     progress(count(index));

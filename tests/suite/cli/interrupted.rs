@@ -141,7 +141,10 @@ fn an_interrupted_study_says_so_and_leaves_nothing() {
 fn an_interrupted_sweep_keeps_the_results_of_its_jobs_and_leaves_no_scratch() {
     let sandbox = slow_bakes();
     let ablation = "command = \"ablate\"\nscene = \"scene.toml\"\nresults = \"out\"\n";
-    sandbox.write("plan.toml", format!("{ablation}[[job]]\nrefit = true\n[[job]]\n").as_bytes());
+    sandbox.write(
+        "plan.toml",
+        format!("{ablation}[[job]]\nrefit = true\n[[job]]\n[[job]]\npairs = true\n").as_bytes(),
+    );
     let go_on = "skinfit: plan.toml: interrupted: jobs that were done have left their results.";
     for workers in ["1", "2"] {
         let sweep = ["sweep", "plan.toml", "--no-cache", "--workers", workers];
@@ -155,7 +158,7 @@ fn an_interrupted_sweep_keeps_the_results_of_its_jobs_and_leaves_no_scratch() {
     }
     let ran = interrupted_in_its_bakes(&sandbox, &["sweep", "plan.toml", "--no-cache", "--run", "1"]);
     assert_eq!(
-        ran.err, "skinfit: plan.toml: interrupted: job 1 has left no result. Run it again.\n",
+        ran.err, "skinfit: plan.toml: interrupted: job 1 has left a whole result or none. Run it again.\n",
         "{ran:?}"
     );
     assert_eq!((ran.code, scratch(&sandbox)), (Some(1), 0), "{ran:?}");
