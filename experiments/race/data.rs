@@ -113,9 +113,9 @@ fn fill(rows: &mut Rows, place: usize, count: usize, order: &[u32], folder: &Pat
     }
     for (c, plane) in bytes.chunks_exact(4 * pixels).enumerate() {
         let (plane, _) = plane.as_chunks();
-        let last = order.last().copied();
-        let padded = order.iter().copied().chain(std::iter::repeat_with(|| last).flatten());
-        for (number, pixel) in rows.plane_mut(place + c).zip(padded) {
+        // The last one again and again, where there is one.
+        let padding = order.last().into_iter().cycle();
+        for (number, &pixel) in rows.plane_mut(place + c).zip(order.iter().chain(padding)) {
             *number = f32::from_le_bytes(plane[pixel as usize]);
         }
     }
