@@ -40,6 +40,9 @@ struct Arguments {
     /// Repetitions of each timing, at the least.
     #[arg(long, default_value_t = 7)]
     reps: usize,
+    /// Time the passes and leave the fits out.
+    #[arg(long)]
+    passes_only: bool,
 }
 
 const SETUP: Setup = Setup {
@@ -228,7 +231,9 @@ fn run(arguments: &Arguments) -> Result<Value> {
             "rss_import_mb": before, "rss_before_fits_mb": inputs, "other_cpu": 0,
         }))
     })?;
-    row["fits"] = fits(arguments, &manifest, &start)?;
+    if !arguments.passes_only {
+        row["fits"] = fits(arguments, &manifest, &start)?;
+    }
     row["peak_rss_mb"] = json!(peak_rss_mb());
     Ok(row)
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::facts::{Facts, Source};
-use super::quantity::{Attribute, Constant, Resource};
+use super::quantity::{Attribute, Constant, Kind, Resource};
 use super::rule::{LIBRARY, RULES, Rule, Stage};
 use super::search::{INTERPOLATION_COST, PlanError, VERTEX_SHARE, components, search};
 use crate::model::compose::TermName;
@@ -273,6 +273,9 @@ impl Plan {
         for (_, text) in LIBRARY.iter().filter(|(name, _)| used(name)) {
             let _ = write!(wgsl, "\n{text}");
         }
+        if stages.contains(&Stage::Fragment) {
+            wgsl.push_str(&self.face_sizes());
+        }
         for step in steps().filter(|step| step.rule.plain_value().is_none()) {
             if !step.rule.about.is_empty() {
                 wgsl.push('\n');
@@ -283,6 +286,21 @@ impl Plan {
             }
         }
         wgsl
+    }
+
+    /// `NAME_size()` for each resource of faces, which rules hand to `sample_faces`: texels along a side, without the
+    /// border.
+    fn face_sizes(&self) -> String {
+        let faces = self.resources.iter().filter(|resource| resource.kind() == Kind::Faces);
+        let function = |resource: &Resource| {
+            let name = resource.name();
+            let size = match self.facts.faces.of(*resource) {
+                Some(size) => format!("{:?}", size as f32),
+                None => format!("f32(textureDimensions({name}).x - 2u)"),
+            };
+            format!("\nfn {name}_size() -> f32 {{\n    return {size};\n}}\n")
+        };
+        faces.map(function).collect()
     }
 
     /// The rules of a stage, in the order of their evaluation.

@@ -70,7 +70,12 @@ impl Plan {
                 let fetch = |kind, lookup: &str| Some(lookup.replace("{t}", read(kind)?));
                 fetch(Kind::Cube, &format!("textureSampleLevel({{t}}, cube_sampler, {direction}, 0.0)"))
                     .or_else(|| fetch(Kind::Map, "textureSampleLevel({t}, map_sampler, at.vertex_uv, 0.0)"))
-                    .or_else(|| fetch(Kind::Faces, &format!("sample_faces({{t}}, cube_place({direction}))")))
+                    .or_else(|| {
+                        fetch(
+                            Kind::Faces,
+                            &format!("sample_faces({{t}}, {{t}}_size(), cube_place({direction}))"),
+                        )
+                    })
                     .or_else(|| fetch(Kind::Texels, "sample_texels({t}, at.vertex_uv)"))
             })
             .collect();

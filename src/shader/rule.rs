@@ -213,7 +213,7 @@ const VERTEX: [(Stage, &str, &str); 19] = rules! { Vertex in "vertex":
 };
 
 #[rustfmt::skip]
-const FRAGMENT: [(Stage, &str, &str); 77] = rules! { Fragment in "fragment":
+const FRAGMENT: [(Stage, &str, &str); 80] = rules! { Fragment in "fragment":
     view_exact view_interpolated smooth_normal smooth_normal_unguarded normal_of_base
     color_texels color_map color_neutral specular_texels specular_map specular_neutral
     attenuator_texels attenuator_map attenuator_neutral normal_texels normal_map normal_neutral
@@ -222,8 +222,9 @@ const FRAGMENT: [(Stage, &str, &str); 77] = rules! { Fragment in "fragment":
     n_of_base n_of_base_as_listed reflected reflected_as_listed dapple dapple_as_listed
     silhouette_interpolated silhouette_approximated silhouette_smooth silhouette_bumped
     rim rim_squared open occ occ_open
-    n_turned n_unturned n_place reflected_turned reflected_unturned reflected_place
-    view_turned view_unturned view_place
+    n_turned n_unturned n_place n_place_as_listed
+    reflected_turned reflected_unturned reflected_place reflected_place_as_listed
+    view_turned view_unturned view_place view_place_as_listed
     irradiance_faces irradiance_cube side_light_faces side_light_cube
     mirror_light_faces mirror_light_cube hilite_light_faces hilite_light_cube
     diffuse_term side_term hilite_term mirror_term haze_term key_term

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use skinfit::model::compose::TermName;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
-use skinfit::shader::facts::MapFacts;
+use skinfit::shader::facts::{FaceSizes, MapFacts};
 use skinfit::shader::{Budget, Facts, Plan, Resource, Source, plan};
 
 /// The effects that the fragment stage knows; morphs and bones are facts of their own.
@@ -134,21 +134,27 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
         let held = |u: &Unknown| !matches!(u, Unknown::Param(c) if lookups.contains(&c.param));
         let kept: Vec<Unknown> = all.iter().copied().filter(held).collect();
         let samples = Layout::of_samples(&places, 6);
-        let fitted = |unknowns: Vec<Unknown>, layout: &Layout| Fitted {
+        let sizes = FaceSizes { irradiance: Some(16), specular: Some(32), hilite: Some(8) };
+        let fitted = |unknowns: Vec<Unknown>, layout: &Layout, plain: bool| Fitted {
             setup,
             unknowns,
             loss: Loss::RelativeL2,
             alpha: true,
             turned: true,
             layout: layout.clone(),
-            several: true,
-            weighted: true,
-            clipped: true,
+            several: !plain,
+            weighted: !plain,
+            clipped: !plain,
+            gained: !plain,
+            faces: if plain { sizes } else { FaceSizes::default() },
         };
         let terms = Layout::of_terms(setup, &samples);
-        check(&terms_module(&fitted(Vec::new(), &samples), &terms).unwrap().1);
-        for (unknowns, layout) in [(all, &samples), (kept, &terms)] {
-            let fused = Fused::new(fitted(unknowns, layout)).unwrap();
+        check(&terms_module(&fitted(Vec::new(), &samples, false), &terms).unwrap().1);
+        let both = [false, true];
+        for (unknowns, layout, plain) in
+            [(all, &samples), (kept, &terms)].into_iter().flat_map(|(u, l)| both.map(|p| (u.clone(), l, p)))
+        {
+            let fused = Fused::new(fitted(unknowns, layout, plain)).unwrap();
             fused.slabs(Wish::Normal).iter().for_each(|slab| check(&slab.wgsl));
             check(&fused.image_module());
         }
@@ -174,6 +180,7 @@ fn shaders_of_every_combination_of_facts_validate() {
             color_specular: bit(bits, 0) && bit(bits, 2),
             normal_attenuator: bit(bits, 1) && bit(bits, 3),
         },
+        faces: FaceSizes::default(),
         morphs: if bit(bits, 4) { 2 } else { 0 },
         bones: bit(bits, 5),
         turned: bit(bits, 6),

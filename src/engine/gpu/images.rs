@@ -158,12 +158,13 @@ impl GpuEngine<'_> {
         point: &Point,
         then: impl FnOnce(&Images, &Parts) -> Result<T, GpuError>,
     ) -> Result<T, GpuError> {
-        let turned = self.turned(point);
+        let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
         let OnDevice { parts, lights, images, .. } = &mut *device;
-        if images.as_ref().is_none_or(|(of, _)| *of != turned) {
-            *images = Some((turned, Images::new(self.gpu, &self.fused(turned)?, parts)?));
+        if images.as_ref().is_none_or(|(of, _)| *of != written) {
+            let fused = self.fused(written, lights.face_sizes())?;
+            *images = Some((written, Images::new(self.gpu, &fused, parts)?));
         }
         let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
         lights.set(self.gpu, &point.params, &mut images.inputs)?;

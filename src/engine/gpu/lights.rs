@@ -11,6 +11,7 @@ use crate::gpu::constants::model_block;
 use crate::gpu::{Gpu, GpuError, texels, upload};
 use crate::model::cube::Cube;
 use crate::model::params::{Param, Params};
+use crate::shader::facts::FaceSizes;
 use crate::shader::{Plan, Resource};
 
 /// The cubes, each uploaded once, but for the specular one: again when its exponent has changed.
@@ -27,6 +28,17 @@ pub(super) struct DeviceLights {
 impl DeviceLights {
     pub(super) const fn new(illumination: Illumination) -> Self {
         Self { illumination, irradiance: None, hilite: None, specular: None, version: 0 }
+    }
+
+    /// The cubes' sizes.
+    pub(super) fn face_sizes(&self) -> FaceSizes {
+        let Illumination { irradiance, lobes, hilite } = &self.illumination;
+        let specular = lobes.as_ref().and_then(|stack| stack.cubes.first());
+        FaceSizes {
+            irradiance: irradiance.as_ref().map(Cube::size),
+            specular: specular.map(Cube::size),
+            hilite: hilite.as_ref().map(Cube::size),
+        }
     }
 
     /// Have what a program reads ready for a pass at `params`.

@@ -39,6 +39,7 @@ use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::scene::Loss;
+use crate::shader::facts::FaceSizes;
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -91,12 +92,21 @@ pub struct GpuEngine<'g> {
 struct OnDevice {
     parts: Parts,
     lights: DeviceLights,
-    /// By wish, and by whether the environment is turned.
-    programs: BTreeMap<(Wish, bool), Program>,
+    /// By wish, and by what is written into the text.
+    programs: BTreeMap<(Wish, Written), Program>,
     /// What the terms were made with that stand in the samples' place.
     terms: Option<[f64; 5]>,
-    /// The forward pass, and whether it is for a turned environment.
-    images: Option<(bool, Images)>,
+    /// The forward pass, and what is written into its text.
+    images: Option<(Written, Images)>,
+}
+
+/// What of a point is written into shaders' text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Written {
+    /// Whether the environment is turned, or will be.
+    turned: bool,
+    /// Whether a view's gain is not 1, or will not be.
+    gained: bool,
 }
 
 impl<'g> GpuEngine<'g> {
@@ -222,20 +232,25 @@ impl<'g> GpuEngine<'g> {
         self.device.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether the environment is turned at `point`, or will be.
-    fn turned(&self, point: &Point) -> bool {
-        let free = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
-        point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.unknowns.iter().any(free)
+    fn written(&self, point: &Point) -> Written {
+        let turns = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
+        let gains = |u: &Unknown| matches!(u, Unknown::Gain(_));
+        Written {
+            turned: point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.unknowns.iter().any(turns),
+            gained: point.gains.iter().any(|gain| *gain != 1.0) || self.unknowns.iter().any(gains),
+        }
     }
 
     /// What is the same for every view, over samples.
-    fn fitted(&self, turned: bool) -> Fitted {
+    fn fitted(&self, written: Written, faces: FaceSizes) -> Fitted {
         Fitted {
             setup: self.setup,
             unknowns: self.unknowns.clone(),
             loss: self.loss,
             alpha: self.alpha,
-            turned,
+            turned: written.turned,
+            gained: written.gained,
+            faces,
             layout: Layout::of_samples(&self.traits.places, self.traits.rows),
             several: self.traits.several,
             weighted: self.traits.weighted,
@@ -243,8 +258,8 @@ impl<'g> GpuEngine<'g> {
         }
     }
 
-    fn fused(&self, turned: bool) -> Result<Fused, GpuError> {
-        let mut fitted = self.fitted(turned);
+    fn fused(&self, written: Written, faces: FaceSizes) -> Result<Fused, GpuError> {
+        let mut fitted = self.fitted(written, faces);
         if self.keeps {
             fitted.layout = Layout::of_terms(self.setup, &fitted.layout);
         }
@@ -264,7 +279,7 @@ impl<'g> GpuEngine<'g> {
         // Their bindings are to the buffers before.
         programs.clear();
         *images = None;
-        let fitted = self.fitted(self.turned(point));
+        let fitted = self.fitted(self.written(point), lights.face_sizes());
         let layout = Layout::of_terms(self.setup, &fitted.layout);
         replace_samples(self.gpu, &fitted, &layout, &point.params, lights, parts, self.views)?;
         *terms = Some(key);
@@ -273,14 +288,15 @@ impl<'g> GpuEngine<'g> {
 
     /// One pass: for each part of each view its sums.
     fn sums(&self, point: &Point, wish: Wish) -> Result<Passed, GpuError> {
-        let turned = self.turned(point);
+        let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
         let OnDevice { parts, lights, programs, .. } = &mut *device;
-        let program = match programs.entry((wish, turned)) {
+        let program = match programs.entry((wish, written)) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
-                entry.insert(Program::new(self.gpu, self.fused(turned)?, wish, parts)?)
+                let fused = self.fused(written, lights.face_sizes())?;
+                entry.insert(Program::new(self.gpu, fused, wish, parts)?)
             }
         };
         lights.set(self.gpu, &point.params, &mut program.inputs)?;

@@ -6,7 +6,7 @@
 //! no derivative is kept by hand beside the model that it belongs to. The exceptions are
 //! `rules/tangent/*.wgsl`: taken as they are where the chain rule would be right but inaccurate
 //! (`normalize_or` divides by the largest component), or MODEL 7 asks for another value at a singular
-//! point (`rim_power` at 0, `cube_place` at no direction).
+//! point (`rim_power` at 0, `cube_place` of a tiny direction).
 //!
 //! - [`Tangents`]: the functions that were asked for
 //! - `function`: one function's statements; `expression`: the chain rule
@@ -24,7 +24,7 @@ use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 
 /// Functions whose tangent is taken as it is, with its text. It takes the arguments, then a tangent for each.
 const BY_HAND: [(&str, &str); 3] = [
-    ("cube_place", include_str!("../rules/tangent/cube_place.wgsl")),
+    ("cube_place_of_unit", include_str!("../rules/tangent/cube_place_of_unit.wgsl")),
     ("normalize_or", include_str!("../rules/tangent/normalize_or.wgsl")),
     ("rim_power", include_str!("../rules/tangent/rim_power.wgsl")),
 ];

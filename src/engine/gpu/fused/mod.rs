@@ -9,10 +9,12 @@
 //! Only enabled effects and free parameters leave a trace in the text. Where there are more sums than
 //! registers, they are cut into [`Slab`]s, each with a shader of its own.
 //!
-//! - `layout`: where a record's numbers stand; `text`: the pass, line by line; `loss/*.wgsl`: the losses
+//! - `layout`: where a record's numbers stand; `pixel`: how a pixel is read
+//! - `text`: the pass, line by line; `loss/*.wgsl`: the losses
 //! - `reduce`: sums of threads and workgroups; `terms`: the shader that keeps terms
 
 mod layout;
+mod pixel;
 mod reduce;
 mod terms;
 mod text;
@@ -27,7 +29,7 @@ use crate::model::params::{Channels, Param};
 use crate::samples::LANES;
 use crate::scene::Loss;
 use crate::shader::emit::{Plan, plan, sample_fields};
-use crate::shader::facts::{Budget, Facts, MapFacts};
+use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts};
 use crate::shader::quantity::Constant;
 use crate::shader::tangent::chain::{Chain, Seed};
 
@@ -72,6 +74,10 @@ pub struct Fitted {
     pub weighted: bool,
     /// Whether targets are clipped.
     pub clipped: bool,
+    /// Whether views have gains other than 1, or will.
+    pub gained: bool,
+    /// The cubes' sizes.
+    pub faces: FaceSizes,
 }
 
 /// One sum over pixels and channels.
@@ -90,8 +96,29 @@ pub struct ColumnOf {
     pub unknown: Option<usize>,
     /// The seed whose tangent it is.
     seed: Option<usize>,
-    /// The one channel that it moves; `None`: all.
-    channel: Option<usize>,
+    channels: Moved,
+}
+
+/// Channels that a column moves, a bit each: three colours, and alpha where it is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Moved(u8);
+
+impl Moved {
+    const RADIANCE: Self = Self(0b0111);
+    const ALPHA: Self = Self(0b1000);
+
+    const fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    const fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The channel, where it is one alone.
+    const fn only(self) -> Option<usize> {
+        if self.0.is_power_of_two() { Some(self.0.trailing_zeros() as usize) } else { None }
+    }
 }
 
 /// A part of the sums, and the shader that yields them.
@@ -132,9 +159,15 @@ impl Fused {
             }
         }
         let chain = Chain::new(&plan, &seeds).map_err(|error| error.to_string())?;
-        let moves =
-            |seed: usize| chain.radiance[seed].is_some() || (fitted.alpha && chain.haze[seed].is_some());
-        columns.retain(|column| column.seed.is_none_or(moves));
+        for column in &mut columns {
+            let none = Moved(0);
+            let moved = column.seed.map_or(Moved::RADIANCE.or(Moved::ALPHA), |seed| {
+                let radiance = if chain.radiance[seed].is_some() { Moved::RADIANCE } else { none };
+                radiance.or(if chain.haze[seed].is_some() { Moved::ALPHA } else { none })
+            });
+            column.channels = column.channels.and(moved).and(compared(&fitted));
+        }
+        columns.retain(|column| column.channels != Moved(0));
         plan.resources.extend(&chain.resources);
         Ok(Self { columns, fitted, chain, plan })
     }
@@ -155,10 +188,7 @@ impl Fused {
     /// The sums of a wish that are not 0 by their nature.
     fn sums(&self, wish: Wish) -> Vec<Sum> {
         let k = self.columns.len();
-        let meet = |i: usize, j: usize| match (self.columns[i].channel, self.columns[j].channel) {
-            (Some(a), Some(b)) => a == b,
-            _ => true,
-        };
+        let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != Moved(0);
         let mut sums = vec![Sum::Loss];
         if wish == Wish::Normal {
             for i in 0..k {
@@ -171,11 +201,20 @@ impl Fused {
         sums
     }
 
+    /// The channels that a column moves; the residual, after the last column, has all that are compared.
+    fn moved(&self, i: usize) -> Moved {
+        self.columns.get(i).map_or_else(|| compared(&self.fitted), |column| column.channels)
+    }
+
     /// Compared channels: three colours, and alpha where it is compared.
     #[must_use]
     pub const fn channels(&self) -> usize {
         if self.fitted.alpha { 4 } else { 3 }
     }
+}
+
+const fn compared(fitted: &Fitted) -> Moved {
+    if fitted.alpha { Moved::RADIANCE.or(Moved::ALPHA) } else { Moved::RADIANCE }
 }
 
 /// What the planner is told of stored samples.
@@ -184,6 +223,7 @@ fn facts(fitted: &Fitted) -> Facts {
         setup: fitted.setup,
         source: fitted.layout.source,
         maps: MapFacts::default(),
+        faces: fitted.faces,
         turned: fitted.turned,
         square_rim: false,
         budget: Budget::Exact,
@@ -200,14 +240,15 @@ fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
             params.push(column.param);
             params.len() - 1
         });
-        let channel = match column.channels {
-            Channels::Tied => None,
-            Channels::One(c) => Some(c),
+        let channels = match column.channels {
+            Channels::Tied => Moved::RADIANCE.or(Moved::ALPHA),
+            Channels::One(c) => Moved(1 << c),
         };
-        columns.push(ColumnOf { unknown: Some(index), seed: Some(seed), channel });
+        columns.push(ColumnOf { unknown: Some(index), seed: Some(seed), channels });
     }
     if unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(_))) {
-        columns.push(ColumnOf { unknown: None, seed: None, channel: None });
+        let channels = Moved::RADIANCE.or(Moved::ALPHA);
+        columns.push(ColumnOf { unknown: None, seed: None, channels });
     }
     (params.into_iter().map(Seed::of_param).collect(), columns)
 }

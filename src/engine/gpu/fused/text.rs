@@ -2,11 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::layout::{fields_read, number};
 use super::reduce::{functions, reduction};
-use super::{BLOCK_PIXELS, ColumnOf, Fused, Sum, WORKGROUP};
+use super::{ColumnOf, Fused, Moved, Sum, WORKGROUP};
 use crate::engine::residual::{HUBER_THRESHOLD, RELATIVE_FLOOR, SMAPE_CORNER, SMAPE_FLOOR};
-use crate::samples::LANES;
 use crate::scene::Loss;
 use crate::shader::emit::{hazy, parts};
 use crate::shader::module::{sample_struct, uniform};
@@ -17,9 +15,9 @@ impl Fused {
     #[must_use]
     pub fn image_module(&self) -> String {
         let mut wgsl = self.declarations(false);
-        wgsl.push_str(&self.head(&[]));
+        wgsl.push_str(&self.head(&[], false));
         wgsl.push_str("        var shown = vec4f();\n");
-        wgsl.push_str(&self.samples(&[]));
+        wgsl.push_str(&self.samples(&[], false));
         for c in 0..self.channels() {
             let _ =
                 writeln!(wgsl, "        partial_sums[{c}u * part.slots + slot] = part.gain * shown[{c}];");
@@ -34,12 +32,12 @@ impl Fused {
         let mut seeds: Vec<usize> = columns.iter().filter_map(|&i| self.columns[i].seed).collect();
         seeds.dedup();
         let mut wgsl = self.declarations(!seeds.is_empty());
-        wgsl.push_str(&self.head(sums));
+        wgsl.push_str(&self.head(sums, true));
         for seed in &seeds {
             let _ = writeln!(wgsl, "        var d{seed} = vec4f();");
         }
         wgsl.push_str("        var shown = vec4f();\n");
-        wgsl.push_str(&self.samples(&seeds));
+        wgsl.push_str(&self.samples(&seeds, true));
         wgsl.push_str(&self.residuals());
         wgsl.push_str(&self.weighted_columns(&columns));
         for (s, sum) in sums.iter().enumerate() {
@@ -73,51 +71,39 @@ impl Fused {
              const SMAPE_FLOOR = {SMAPE_FLOOR:?}f;\nconst SMAPE_CORNER = {SMAPE_CORNER:?}f;\n\n"
         );
         wgsl.push_str(loss_function(self.fitted.loss));
+        wgsl.push_str(&self.pixel_functions());
         wgsl.push('\n');
         wgsl.push_str(&functions());
         wgsl
     }
 
-    /// The entry point up to a pixel's samples.
-    fn head(&self, sums: &[Sum]) -> String {
+    /// The entry point up to a pixel's samples, in a pass that compares with targets or in one that does not.
+    fn head(&self, sums: &[Sum], compares: bool) -> String {
         let mut wgsl = format!(
             "\n@compute @workgroup_size({WORKGROUP})\nfn cs_main(\n    @builtin(local_invocation_index) thread: u32,\n    @builtin(workgroup_id) workgroup: vec3u,\n    @builtin(num_workgroups) workgroups: vec3u,\n) {{\n"
         );
         for s in 0..sums.len() {
             let _ = writeln!(wgsl, "    var sum{s} = 0.0;");
         }
-        let _ = write!(
-            wgsl,
-            "    let step = {WORKGROUP}u * workgroups.x;\n    for (var i = {WORKGROUP}u * workgroup.x + thread; i < part.read; i += step) {{\n\
-             \x20       let slot = (i / {BLOCK_PIXELS}u) * {BLOCK_PIXELS}u * part.stride + i % {BLOCK_PIXELS}u;\n\
-             \x20       if (slot >= part.slots) {{\n            continue;\n        }}\n"
-        );
+        wgsl.push_str(&self.each_pixel(compares));
         wgsl
     }
 
     /// The value and the seeds' tangents of a pixel: over its samples.
-    fn samples(&self, seeds: &[usize]) -> String {
+    fn samples(&self, seeds: &[usize], compares: bool) -> String {
         let mut wgsl = String::new();
-        let _ = writeln!(wgsl, "        let group = slot / {LANES}u;\n        let lane = slot % {LANES}u;");
-        if self.fitted.several {
-            wgsl.push_str("        for (var record = group_start[group]; record < group_start[group + 1u]; record++) {\n");
-        } else {
-            wgsl.push_str("        {\n        let record = group;\n");
-        }
-        let _ = writeln!(wgsl, "        let s = record * {}u + lane;", self.fitted.layout.rows * LANES);
-        let share = self.fitted.layout.share.map_or_else(|| "1.0".to_owned(), number);
-        let _ = writeln!(wgsl, "        let share = {share};\n        var at: Sample;");
-        wgsl.push_str(&fields_read(&self.fitted.layout, &self.fields()));
+        wgsl.push_str(&self.each_sample(compares));
         wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
         seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
         let parts = parts(&self.plan.facts);
         let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
         let haze = if hazy(&self.plan.facts) { "haze" } else { "0.0" };
-        let _ = writeln!(wgsl, "    shown += share * vec4f({radiance}, {haze});");
+        let add = if self.fitted.several { "+= share *" } else { "=" };
+        let _ = writeln!(wgsl, "    shown {add} vec4f({radiance}, {haze});");
         for &seed in seeds {
             let radiance = self.chain.radiance[seed].as_deref().unwrap_or("vec3f()");
             let haze = self.chain.haze[seed].as_deref().unwrap_or("0.0");
-            let _ = writeln!(wgsl, "    d{seed} += share * vec4f({radiance}, {haze});");
+            let _ = writeln!(wgsl, "    d{seed} {add} vec4f({radiance}, {haze});");
         }
         wgsl.push_str("        }\n");
         wgsl
@@ -125,25 +111,13 @@ impl Fused {
 
     /// Residuals and their weights, channel by channel.
     fn residuals(&self) -> String {
-        let channels = self.channels();
-        let mut wgsl = String::new();
-        let weight = if self.fitted.weighted {
-            format!("targets[{channels}u * part.slots + slot]")
-        } else {
-            "1.0".to_owned()
-        };
-        let _ = writeln!(
-            wgsl,
-            "        let weight = {weight};\n        var loss = 0.0;\n        var scale = vec4f();\n        var residual = vec4f();"
+        let mut wgsl = format!(
+            "        let weight = {};\n        var loss = 0.0;\n        var scale = vec4f();\n        var residual = vec4f();\n",
+            self.weight()
         );
-        for c in 0..channels {
-            let _ = writeln!(
-                wgsl,
-                "        {{\n            let observed = targets[{}u * group + {}u + lane];",
-                channels * LANES,
-                c * LANES
-            );
-            let _ = writeln!(wgsl, "            let value = part.gain * shown[{c}];");
+        for c in 0..self.channels() {
+            let _ = writeln!(wgsl, "        {{\n            let observed = {};", self.target(c));
+            let _ = writeln!(wgsl, "            let value = {}shown[{c}];", self.gain());
             let counted = if self.fitted.clipped {
                 // A clipped target only says "at least" or "at most" (MODEL 7).
                 wgsl.push_str("            let beyond = (observed <= part.clip_low && value <= observed) || (observed >= part.clip_high && value >= observed);\n");
@@ -159,12 +133,17 @@ impl Fused {
         wgsl
     }
 
+    /// The factor that a view's gain is, where there is one.
+    const fn gain(&self) -> &'static str {
+        if self.fitted.gained { "part.gain * " } else { "" }
+    }
+
     fn weighted_columns(&self, columns: &[usize]) -> String {
         let mut wgsl = String::new();
         for &i in columns {
-            let ColumnOf { seed, channel, .. } = self.columns[i];
-            let whole = seed.map_or_else(|| "shown".to_owned(), |seed| format!("part.gain * d{seed}"));
-            let _ = match channel {
+            let ColumnOf { seed, channels, .. } = self.columns[i];
+            let whole = seed.map_or_else(|| "shown".to_owned(), |seed| format!("{}d{seed}", self.gain()));
+            let _ = match channels.only() {
                 None => writeln!(wgsl, "        let c{i} = scale * ({whole});"),
                 Some(c) => writeln!(wgsl, "        let c{i} = scale[{c}] * ({whole})[{c}];"),
             };
@@ -172,18 +151,21 @@ impl Fused {
         wgsl
     }
 
-    /// The product of two columns, over the channels.
+    /// The product of two columns (the residual is the one after the last), over the channels that both move.
     fn product(&self, i: usize, j: usize) -> String {
-        let k = self.columns.len();
-        let side = |i: usize| {
-            if i == k { ("residual".to_owned(), None) } else { (format!("c{i}"), self.columns[i].channel) }
+        let both = self.moved(i).and(self.moved(j));
+        let side = |i: usize, c: Option<usize>| {
+            let name = if i == self.columns.len() { "residual".to_owned() } else { format!("c{i}") };
+            match c {
+                // A column of one channel is a number.
+                Some(_) if i < self.columns.len() && self.moved(i).only().is_some() => name,
+                Some(c) => format!("{name}[{c}]"),
+                None if both == Moved::RADIANCE => format!("{name}.xyz"),
+                None => name,
+            }
         };
-        match (side(i), side(j)) {
-            ((a, None), (b, None)) if self.fitted.alpha => format!("dot({a}, {b})"),
-            ((a, None), (b, None)) => format!("dot({a}.xyz, {b}.xyz)"),
-            ((a, Some(_)), (b, Some(_))) => format!("{a} * {b}"),
-            ((a, Some(c)), (b, None)) | ((b, None), (a, Some(c))) => format!("{a} * {b}[{c}]"),
-        }
+        let (a, b) = (side(i, both.only()), side(j, both.only()));
+        if both.only().is_some() { format!("{a} * {b}") } else { format!("dot({a}, {b})") }
     }
 }
 

@@ -5,5 +5,5 @@
 // uses: cube, vector
 // reads: specular_faces
 fn mirror_light_from_faces(reflected_place: vec3f) -> vec4f {
-    return sample_faces(specular_faces, reflected_place).rgba;
+    return sample_faces(specular_faces, specular_faces_size(), reflected_place).rgba;
 }

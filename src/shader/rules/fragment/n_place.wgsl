@@ -1,8 +1,9 @@
-// Where the normal meets the cubes.
+// Where the normal meets the cubes: a unit vector.
 //
 // gives: n_place
+// when: corrected
 // cost: 16
 // uses: vector, cube
 fn place_of_n(n_in_environment: vec3f) -> vec3f {
-    return cube_place(n_in_environment);
+    return cube_place_of_unit(n_in_environment);
 }

@@ -5,5 +5,5 @@
 // uses: cube, vector
 // reads: specular_faces
 fn side_light_from_faces(n_place: vec3f) -> vec3f {
-    return sample_faces(specular_faces, n_place).rgb;
+    return sample_faces(specular_faces, specular_faces_size(), n_place).rgb;
 }

@@ -1,26 +1,38 @@
-// Where a direction of any length from 1e-36 on meets the cube: the face in x (+X -X +Y -Y +Z -Z), then s and
-// t in [0, 1]. A shorter or non-finite direction has no face; +Z stands in. Ties of the major axis go to x
-// before y before z; seamlessness makes the choice immaterial.
+// v in the axes of the cube's face that `direction` meets: along s, along t, and outwards. Linear in v. Ties of
+// the major axis go to x before y before z; seamlessness makes the choice immaterial. Without branches: six of
+// these stand in a pixel's pass.
+fn on_face(v: vec3f, direction: vec3f) -> vec3f {
+    let a = abs(direction);
+    let x_major = (a.x >= a.y) & (a.x >= a.z);
+    let y_major = a.y >= a.z;
+    let major = select(select(direction.z, direction.y, y_major), direction.x, x_major);
+    let side = select(-1.0, 1.0, major >= 0.0);
+    let y_or_z = select(vec3f(side * v.x, -v.y, side * v.z), vec3f(v.x, side * v.z, side * v.y), y_major);
+    return select(y_or_z, vec3f(-side * v.z, -v.y, side * v.x), x_major);
+}
+
+// Where a unit vector meets the cube: the face in x (+X -X +Y -Y +Z -Z), then s and t in [0, 1].
+fn cube_place_of_unit(direction: vec3f) -> vec3f {
+    let a = abs(direction);
+    let x_major = (a.x >= a.y) & (a.x >= a.z);
+    let y_major = a.y >= a.z;
+    let major = select(select(direction.z, direction.y, y_major), direction.x, x_major);
+    let face = select(select(4.0, 2.0, y_major), 0.0, x_major) + select(1.0, 0.0, major >= 0.0);
+    let d = on_face(direction, direction);
+    return vec3f(face, 0.5 * d.xy / d.z + 0.5);
+}
+
+// Where a direction of any length from 1e-36 on meets the cube. A shorter or non-finite direction has no face;
+// +Z stands in.
 fn cube_place(direction: vec3f) -> vec3f {
     let size = abs(direction.x) + abs(direction.y) + abs(direction.z);
     let ok = size >= 1e-36 && is_finite(direction);
-    let d = select(vec3f(0.0, 0.0, 1.0), direction, ok);
-    let a = abs(d);
-    if a.x >= a.y && a.x >= a.z {
-        let sc = select(d.z, -d.z, d.x >= 0.0);
-        return vec3f(select(1.0, 0.0, d.x >= 0.0), 0.5 * vec2f(sc, -d.y) / a.x + 0.5);
-    }
-    if a.y >= a.z {
-        let tc = select(-d.z, d.z, d.y >= 0.0);
-        return vec3f(select(3.0, 2.0, d.y >= 0.0), 0.5 * vec2f(d.x, tc) / a.y + 0.5);
-    }
-    let sc = select(-d.x, d.x, d.z >= 0.0);
-    return vec3f(select(5.0, 4.0, d.z >= 0.0), 0.5 * vec2f(sc, -d.y) / a.z + 0.5);
+    return cube_place_of_unit(select(vec3f(0.0, 0.0, 1.0), direction, ok));
 }
 
-// The seamless bilinear lookup in faces that carry a border of one texel from their neighbours.
-fn sample_faces(faces: texture_2d_array<f32>, place: vec3f) -> vec4f {
-    let size = f32(textureDimensions(faces).x - 2u);
+// The seamless bilinear lookup in faces of `size` texels a side, which carry a border of one texel from their
+// neighbours.
+fn sample_faces(faces: texture_2d_array<f32>, size: f32, place: vec3f) -> vec4f {
     let at = place.yz * size + 0.5;
     let low = clamp(floor(at), vec2f(0.0), vec2f(size));
     let f = at - low;
