@@ -6,7 +6,7 @@
 //! - `graphics`: what to do about an adapter that cannot
 //! - `scene`: how a command finds its scene and its cache
 //! - `maps`: fits of whole maps, where the program is built with them
-//! - `interrupt`: Ctrl-C in a fit; `unfinished`: what goes with it in the other commands
+//! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
 
 mod ablate;

@@ -58,11 +58,12 @@ impl Work {
 }
 
 impl RunFolder {
-    /// Make and lock `output`, or `runs/<name>` after the scene's folder, for a fit.
+    /// Make and lock `output`, or `runs/<name>` after the scene's folder, for a fit; what was made for it goes when
+    /// that is interrupted before it is under way.
     pub(super) fn open(output: Option<&Path>, scene: Option<&Path>) -> Result<Self, Refusal> {
         let folder = Self::locked(output.map_or_else(|| default_folder(scene), Path::to_owned))?;
         folder.check(Work::Fit)?;
-        Ok(folder)
+        Ok(folder.unfinished())
     }
 
     /// Make and lock `output` for a study, which begins anew when it is interrupted.

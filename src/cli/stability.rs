@@ -35,8 +35,8 @@ pub(super) struct Arguments {
     output: Option<PathBuf>,
     /// Random cases. Ten thousand take less than a second; on a graphics adapter that is a program on the CPU, a
     /// thousand take some twenty seconds.
-    #[arg(long, value_name = "N", default_value_t = 1_000)]
-    cases: usize,
+    #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
+    cases: u64,
     /// What the random cases are drawn from.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         lights: LightBox::new(Some(prepared.illumination)),
         kept: cases,
         seed: arguments.seed,
-        cases: arguments.cases,
+        cases: arguments.cases as usize,
         pixels: usize::try_from(arguments.pixels).unwrap_or(usize::MAX),
     };
     study_and_tell(arguments, &study, folder)

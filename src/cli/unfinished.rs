@@ -1,9 +1,10 @@
-//! Ctrl-C in a command that has nothing to go on from: what is unfinished goes, and one line says what stays.
+//! Ctrl-C while a command has nothing to go on from: what is unfinished goes, and one line says what stays.
 
 use std::borrow::Cow;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use tempfile::TempDir;
@@ -23,6 +24,8 @@ struct Unfinished {
     asked: bool,
     /// What is said when it is interrupted before that.
     words: Cow<'static, str>,
+    /// What asks a fit to stop, once it has something to keep.
+    fit: Option<Arc<AtomicBool>>,
 }
 
 static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
@@ -31,6 +34,7 @@ static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
     writing: None,
     asked: false,
     words: Cow::Borrowed("interrupted: no results were written; only bakes in the cache were kept."),
+    fit: None,
 });
 
 /// Change what goes; a thread that panicked has left it whole.
@@ -50,6 +54,12 @@ pub(super) fn install_saying(words: String) {
     install();
 }
 
+/// From now on Ctrl-C sets `flag`, and a second time ends the program at once: a state is at most a second old.
+pub(super) fn asked_through(flag: &Arc<AtomicBool>) {
+    change(|unfinished| unfinished.fit = Some(Arc::clone(flag)));
+    install();
+}
+
 /// Begin something, such as another process, that nobody would end once the program is interrupted: not any more then.
 pub(super) fn begin<T>(work: impl FnOnce() -> T) -> T {
     // Who interrupts it never gives back what is waited for here.
@@ -58,6 +68,12 @@ pub(super) fn begin<T>(work: impl FnOnce() -> T) -> T {
 
 /// Whoever wants to begin writing waits for this to end, and with it the program.
 fn interrupted(unfinished: &mut Unfinished) {
+    if let Some(fit) = &unfinished.fit {
+        if fit.swap(true, Ordering::SeqCst) {
+            std::process::exit(1);
+        }
+        return;
+    }
     if std::io::stderr().is_terminal() {
         // Off the line of the progress bar.
         let _ = writeln!(std::io::stderr());

@@ -16,7 +16,7 @@ use super::interrupt::Interrupt;
 use super::maps::{MapArguments, MapRun};
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, quieten_graphics, tell_warnings};
+use super::{Exit, Refusal, quieten_graphics, tell_warnings, unfinished};
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::scene::Loss;
 use conclude::{Fitted, conclude};
@@ -74,6 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
+    unfinished::install();
     let mut folder = RunFolder::open(arguments.output.as_deref(), arguments.scene.scene.as_deref())?;
     let path = arguments.scene.kept_path(folder.path())?;
     let options = PrepareOptions {

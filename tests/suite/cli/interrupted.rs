@@ -106,6 +106,21 @@ fn slow_bakes() -> Sandbox {
     sandbox
 }
 
+#[cfg(unix)]
+#[test]
+fn a_fit_interrupted_before_it_is_under_way_says_so_and_leaves_nothing() {
+    let sandbox = slow_bakes();
+    let fit = ["fit", "scene.toml", "--no-cache", "-o", "made/run"];
+    let child = started(&sandbox, &fit, || sandbox.path("made/run/.lock").exists());
+    // Into the first bake.
+    std::thread::sleep(Duration::from_millis(50));
+    let ran = interrupt(child);
+    assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
+    let words = "skinfit: interrupted: no results were written; only bakes in the cache were kept.\n";
+    assert_eq!(ran.err, words, "{ran:?}");
+    assert!(!sandbox.path("made").exists(), "its folder is left");
+}
+
 /// What is left of the scratch.
 #[cfg(unix)]
 fn scratch(sandbox: &Sandbox) -> usize {
