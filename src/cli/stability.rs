@@ -81,7 +81,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         lights: LightBox::new(Some(prepared.illumination)),
         kept: cases,
         seed: arguments.seed,
-        cases: arguments.cases as usize,
+        cases: usize::try_from(arguments.cases).unwrap_or(usize::MAX),
         pixels: usize::try_from(arguments.pixels).unwrap_or(usize::MAX),
     };
     study_and_tell(arguments, &study, folder)

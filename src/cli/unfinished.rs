@@ -54,7 +54,8 @@ pub(super) fn install_saying(words: String) {
     install();
 }
 
-/// From now on Ctrl-C sets `flag`, and a second time ends the program at once: a state is at most a second old.
+/// From now on Ctrl-C sets `flag`, and a second time ends the program at once: the state of a fit that keeps one is at
+/// most a second old.
 pub(super) fn asked_through(flag: &Arc<AtomicBool>) {
     change(|unfinished| unfinished.fit = Some(Arc::clone(flag)));
     install();

@@ -33,9 +33,25 @@ fn unit(rng: &mut StdRng) -> [f64; 3] {
 
 /// `groups` groups with 1 to 3 records each; about one sample in ten is padding.
 pub(crate) fn view(groups: usize, seed: u64) -> ObservedView {
+    sampled(groups, seed, |group| 1 + group % 3)
+}
+
+/// `groups` groups with one record each; the last lane is padding.
+#[cfg(feature = "gpu")]
+pub(crate) fn single(groups: usize, seed: u64) -> ObservedView {
+    let mut view = sampled(groups, seed, |_| 1);
+    for group in 0..groups {
+        let slot = group * LANES + LANES - 1;
+        let fragment = view.samples.surface.fragment(slot);
+        view.samples.surface.set(slot, &fragment, 0.0);
+        view.weight[group][LANES - 1] = 0.0;
+    }
+    view
+}
+
+fn sampled(groups: usize, seed: u64, records: impl Fn(usize) -> usize) -> ObservedView {
     let mut rng = StdRng::seed_from_u64(seed);
-    let records = |group: usize| 1 + group % 3;
-    let count = (0..groups).map(records).sum();
+    let count = (0..groups).map(&records).sum();
     let mut samples = ViewSamples { group_start: vec![0], ..ViewSamples::default() };
     samples.surface = SurfaceRecords::new(Asked::EVERYTHING, count);
     let (mut target, mut weight) = (Rows::new(4, groups), vec![Row::ZERO; groups]);

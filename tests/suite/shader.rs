@@ -106,7 +106,7 @@ fn shaders_of_every_effect_set_form_and_silhouette_validate_in_every_kind_of_sce
 fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
     use skinfit::engine::Unknown;
     use skinfit::engine::gpu::fused::{Fitted, Fused, Layout, Wish, gather_module, terms_module};
-    use skinfit::model::params::{Column, Param};
+    use skinfit::model::params::{Channels, Column, Param};
     use skinfit::samples::surface_records::Places;
     use skinfit::scene::Loss;
     let places = Places { base: Some(0), view: Some(3), ..Places::default() };
@@ -120,7 +120,7 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
     // Every effect alone, and of all sets every 61st: sets of forms and silhouettes come in sixes.
     let few = |setup: &Setup| setup.effects.iter().count() <= 1;
     let chosen = setups().into_iter().enumerate().filter(|(i, setup)| i % 61 == 0 || few(setup));
-    chosen.map(|(_, setup)| setup).collect::<Vec<_>>().into_par_iter().for_each(|setup| {
+    chosen.collect::<Vec<_>>().into_par_iter().for_each(|(i, setup)| {
         let free = |param: Param| param.asked_for(setup.effects);
         let lookups = [
             Param::NormalStrength,
@@ -129,32 +129,40 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
             Param::KeyAzimuth,
             Param::KeyElevation,
         ];
-        let all: Vec<Unknown> =
-            Param::all().filter(|&p| free(p)).map(|p| Unknown::Param(Column::tied(p))).collect();
+        let green = free(Param::RimWeight)
+            .then_some(Unknown::Param(Column { param: Param::RimWeight, channels: Channels::One(1) }));
+        let tied = |&p: &Param| free(p) && p != Param::RimWeight;
+        let all: Vec<Unknown> = Param::all()
+            .filter(tied)
+            .map(|p| Unknown::Param(Column::tied(p)))
+            .chain(green)
+            .chain([Unknown::Gain(1)])
+            .collect();
         let held = |u: &Unknown| !matches!(u, Unknown::Param(c) if lookups.contains(&c.param));
         let kept: Vec<Unknown> = all.iter().copied().filter(held).collect();
         let samples = Layout::of_samples(&places, 6);
         let sizes = FaceSizes { irradiance: Some(16), specular: Some(32), hilite: Some(8) };
-        let fitted = |unknowns: Vec<Unknown>, layout: &Layout, plain: bool| Fitted {
+        let fitted = |unknowns: Vec<Unknown>, layout: &Layout, bits: usize| Fitted {
             setup,
             unknowns,
             loss: Loss::RelativeL2,
-            alpha: true,
+            alpha: bits & 1 == 0,
             turned: true,
             layout: layout.clone(),
-            several: !plain,
-            weighted: !plain,
-            clipped: !plain,
-            gained: !plain,
-            faces: if plain { sizes } else { FaceSizes::default() },
+            several: bits & 2 != 0,
+            weighted: bits & 4 != 0,
+            clipped: bits & 8 != 0,
+            gained: bits & 16 != 0,
+            faces: if bits & 32 != 0 { sizes } else { FaceSizes::default() },
         };
         let terms = Layout::of_terms(setup, &samples);
-        check(&terms_module(&fitted(Vec::new(), &samples, false), &terms).unwrap().1);
-        let both = [false, true];
-        for (unknowns, layout, plain) in
-            [(all, &samples), (kept, &terms)].into_iter().flat_map(|(u, l)| both.map(|p| (u.clone(), l, p)))
+        check(&terms_module(&fitted(Vec::new(), &samples, 0), &terms).unwrap().1);
+        // None, all but one, and one alone, in turn.
+        let bits = [0, 63 ^ 1 << (i / 61 % 6), 1 << (i / 61 % 6)];
+        for (unknowns, layout, bits) in
+            [(all, &samples), (kept, &terms)].into_iter().flat_map(|(u, l)| bits.map(|b| (u.clone(), l, b)))
         {
-            let fused = Fused::new(fitted(unknowns, layout, plain)).unwrap();
+            let fused = Fused::new(fitted(unknowns, layout, bits)).unwrap();
             fused.slabs(Wish::Normal).iter().for_each(|slab| check(&slab.wgsl));
             check(&fused.image_module());
         }

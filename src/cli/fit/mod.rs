@@ -74,7 +74,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
-    unfinished::install();
+    unfinished::install_saying(
+        "interrupted before the search began: the run folder is as it was; only bakes in the cache were kept.".into(),
+    );
     let mut folder = RunFolder::open(arguments.output.as_deref(), arguments.scene.scene.as_deref())?;
     let path = arguments.scene.kept_path(folder.path())?;
     let options = PrepareOptions {

@@ -6,7 +6,7 @@
 //! no derivative is kept by hand beside the model that it belongs to. The exceptions are
 //! `rules/tangent/*.wgsl`: taken as they are where the chain rule would be right but inaccurate
 //! (`normalize_or` divides by the largest component), or MODEL 7 asks for another value at a singular
-//! point (`rim_power` at 0, `cube_place` of a tiny direction).
+//! point (`rim_power` at 0, `cube_place_of_unit` of a tiny direction, which `cube_place` may hand it).
 //!
 //! - [`Tangents`]: the functions that were asked for
 //! - `function`: one function's statements; `expression`: the chain rule

@@ -20,8 +20,11 @@ use skinfit::scene::view::Clip;
 
 use super::bench::{built_in, cache, gpu, open};
 use crate::engine::{
-    EVERYTHING, all_unknowns, assert_equal, engine as cpu, illumination, names, params, view,
+    EVERYTHING, all_unknowns, assert_equal, engine as cpu, illumination, names, params, single, view,
 };
+
+/// Views of several records a group, and of one: shaders read the latter a pixel ahead.
+const SAMPLINGS: [fn(usize, u64) -> ObservedView; 2] = [view, single];
 
 fn engine<'g>(
     gpu: &'g Gpu,
@@ -40,42 +43,45 @@ const FULL: Setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumpe
 #[test]
 fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect() {
     let Some(gpu) = gpu() else { return };
-    let views = [view(9, 1), view(4, 2)];
-    let light = illumination();
-    let point = Point { params: params(), gains: vec![1.0, 1.2] };
-    let all = [EVERYTHING];
-    // One effect at a time where the form and the silhouette are the defaults; all of them elsewhere. With the
-    // normal map, as the samples have one.
-    let single: Vec<Effects> =
-        Effect::ALL.into_iter().map(|e| Effects::of(&[e, Effect::NormalMap])).collect();
-    for form in Form::ALL {
-        for silhouette in Silhouette::ALL {
-            let default = form == Form::Corrected && silhouette == Silhouette::Fragment;
-            for &effects in if default { single.as_slice() } else { &all } {
-                let setup = Setup { form, silhouette, effects };
-                if TermName::of(effects).is_empty() && !effects.needs(silhouette).haze {
-                    let task = Task {
-                        setup,
-                        illumination: illumination(),
-                        views: &views,
-                        loss: Loss::L2,
-                        unknowns: Vec::new(),
-                    };
-                    let refused = GpuEngine::new(gpu, task, &point, Memory::default()).map(|_| ());
-                    assert!(matches!(refused, Err(GpuError::NothingShown)), "{effects:?} shows nothing");
-                    continue;
+    for made in SAMPLINGS {
+        let views = [made(9, 1), made(4, 2)];
+        let light = illumination();
+        let point = Point { params: params(), gains: vec![1.0, 1.2] };
+        let all = [EVERYTHING];
+        // One effect at a time where the form and the silhouette are the defaults; all of them elsewhere. With the
+        // normal map, as the samples have one.
+        let single: Vec<Effects> =
+            Effect::ALL.into_iter().map(|e| Effects::of(&[e, Effect::NormalMap])).collect();
+        for form in Form::ALL {
+            for silhouette in Silhouette::ALL {
+                let default = form == Form::Corrected && silhouette == Silhouette::Fragment;
+                for &effects in if default { single.as_slice() } else { &all } {
+                    let setup = Setup { form, silhouette, effects };
+                    if TermName::of(effects).is_empty() && !effects.needs(silhouette).haze {
+                        let task = Task {
+                            setup,
+                            illumination: illumination(),
+                            views: &views,
+                            loss: Loss::L2,
+                            unknowns: Vec::new(),
+                        };
+                        let refused = GpuEngine::new(gpu, task, &point, Memory::default()).map(|_| ());
+                        assert!(matches!(refused, Err(GpuError::NothingShown)), "{effects:?} shows nothing");
+                        continue;
+                    }
+                    // Those that the effects ask for: a fit frees no others.
+                    let asked = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param.asked_for(effects));
+                    let unknowns: Vec<Unknown> = all_unknowns(2)
+                        .into_iter()
+                        .filter(|u| asked(u) || matches!(u, Unknown::Gain(_)))
+                        .collect();
+                    let want =
+                        Reference::new(setup, &light, &views, Loss::L2, &unknowns).normal_equations(&point);
+                    let got =
+                        engine(gpu, setup, &views, Loss::L2, &unknowns, &point).normal_equations(&point);
+                    let what = format!("{form:?} {silhouette:?} {effects:?}");
+                    assert_equal(&got, &want, &names(&unknowns), &what);
                 }
-                // Those that the effects ask for: a fit frees no others.
-                let asked = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param.asked_for(effects));
-                let unknowns: Vec<Unknown> = all_unknowns(2)
-                    .into_iter()
-                    .filter(|u| asked(u) || matches!(u, Unknown::Gain(_)))
-                    .collect();
-                let want =
-                    Reference::new(setup, &light, &views, Loss::L2, &unknowns).normal_equations(&point);
-                let got = engine(gpu, setup, &views, Loss::L2, &unknowns, &point).normal_equations(&point);
-                let what = format!("{form:?} {silhouette:?} {effects:?}");
-                assert_equal(&got, &want, &names(&unknowns), &what);
             }
         }
     }
@@ -98,26 +104,33 @@ fn every_parameter_alone_gives_the_same_answers() {
 #[test]
 fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
     let Some(gpu) = gpu() else { return };
-    let mut views = [view(8, 4)];
-    views[0].clip = Some(Clip { low: 0.1, high: 1.5 });
-    let light = illumination();
-    let unknowns: Vec<Unknown> =
-        [Param::BaseWeight, Param::RimExponent, Param::NormalStrength, Param::HazeWeight]
-            .map(|param| Unknown::Param(Column::tied(param)))
-            .to_vec();
-    let point = Point { params: params(), gains: vec![0.9] };
-    for loss in Loss::ALL {
-        let plain = Reference::new(FULL, &light, &views, loss, &unknowns).normal_equations(&point);
-        let engine = engine(gpu, FULL, &views, loss, &unknowns, &point);
-        assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
-        let (value, gradient) = engine.gradient(&point);
-        // The same sum by two shaders: the same order of additions, but not the same multiply-adds.
-        assert!((value / engine.loss(&point) - 1.0).abs() < 1e-6, "{}", loss.name());
-        for (k, g) in gradient.iter().enumerate() {
-            let want = 2.0 * plain.jtr[k] / plain.weight;
-            let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;
-            // As in `assert_equal`.
-            assert!((g - want).abs() <= 1e-5 * scale, "{} {}: {g} {want}", loss.name(), unknowns[k].name());
+    for made in SAMPLINGS {
+        let mut views = [made(8, 4)];
+        views[0].clip = Some(Clip { low: 0.1, high: 1.5 });
+        let light = illumination();
+        let unknowns: Vec<Unknown> =
+            [Param::BaseWeight, Param::RimExponent, Param::NormalStrength, Param::HazeWeight]
+                .map(|param| Unknown::Param(Column::tied(param)))
+                .to_vec();
+        let point = Point { params: params(), gains: vec![0.9] };
+        for loss in Loss::ALL {
+            let plain = Reference::new(FULL, &light, &views, loss, &unknowns).normal_equations(&point);
+            let engine = engine(gpu, FULL, &views, loss, &unknowns, &point);
+            assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
+            let (value, gradient) = engine.gradient(&point);
+            // The same sum by two shaders: the same order of additions, but not the same multiply-adds.
+            assert!((value / engine.loss(&point) - 1.0).abs() < 1e-6, "{}", loss.name());
+            for (k, g) in gradient.iter().enumerate() {
+                let want = 2.0 * plain.jtr[k] / plain.weight;
+                let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;
+                // As in `assert_equal`.
+                assert!(
+                    (g - want).abs() <= 1e-5 * scale,
+                    "{} {}: {g} {want}",
+                    loss.name(),
+                    unknowns[k].name()
+                );
+            }
         }
     }
 }
@@ -144,25 +157,27 @@ fn sums_are_the_same_to_the_bit_from_run_to_run() {
 #[test]
 fn parts_and_streaming_give_the_same_sums() {
     let Some(gpu) = gpu() else { return };
-    let views = [view(100, 8), view(37, 9)];
-    let unknowns = some_unknowns();
-    let point = Point { params: params(), gains: vec![1.0, 1.1] };
-    let make = |memory| {
-        let (illumination, unknowns) = (illumination(), unknowns.clone());
-        let task = Task { setup: FULL, illumination, views: &views, loss: Loss::L2, unknowns };
-        GpuEngine::new(gpu, task, &point, memory).unwrap()
-    };
-    let whole = make(Memory::default());
-    let want = whole.normal_equations(&point);
-    let (resident, streamed) = whole.bytes();
-    assert_eq!(streamed, 0);
-    let part = Some(resident / 5);
-    for most in [None, Some(resident / 2), Some(0)] {
-        let cut = make(Memory { part, resident: most });
-        assert_eq!(cut.bytes().1 > 0, most.is_some());
-        // The additions are cut elsewhere: a few roundings of f32 sums.
-        assert_close(&cut.normal_equations(&point), &want, 1e-6);
-        assert_eq!(cut.normal_equations(&point), cut.normal_equations(&point));
+    for made in SAMPLINGS {
+        let views = [made(100, 8), made(37, 9)];
+        let unknowns = some_unknowns();
+        let point = Point { params: params(), gains: vec![1.0, 1.1] };
+        let make = |memory| {
+            let (illumination, unknowns) = (illumination(), unknowns.clone());
+            let task = Task { setup: FULL, illumination, views: &views, loss: Loss::L2, unknowns };
+            GpuEngine::new(gpu, task, &point, memory).unwrap()
+        };
+        let whole = make(Memory::default());
+        let want = whole.normal_equations(&point);
+        let (resident, streamed) = whole.bytes();
+        assert_eq!(streamed, 0);
+        let part = Some(resident / 5);
+        for most in [None, Some(resident / 2), Some(0)] {
+            let cut = make(Memory { part, resident: most });
+            assert_eq!(cut.bytes().1 > 0, most.is_some());
+            // The additions are cut elsewhere: a few roundings of f32 sums.
+            assert_close(&cut.normal_equations(&point), &want, 1e-6);
+            assert_eq!(cut.normal_equations(&point), cut.normal_equations(&point));
+        }
     }
 }
 
@@ -265,20 +280,22 @@ fn a_million_and_ten_million_samples_keep_six_digits() {
 #[test]
 fn strides_read_the_pixels_that_the_cpu_engine_reads() {
     let Some(gpu) = gpu() else { return };
-    let views = [view(130, 11)];
-    let unknowns = some_unknowns();
-    let point = Point { params: params(), gains: vec![1.0] };
-    let mut ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
-    let mut theirs = cpu(FULL, &views, Loss::L2, &unknowns, true);
-    for stride in [4, 3, 1] {
-        ours.set_stride(stride);
-        theirs.set_stride(stride);
-        assert_equal(
-            &ours.normal_equations(&point),
-            &theirs.normal_equations(&point),
-            &names(&unknowns),
-            &format!("every {stride}th block"),
-        );
+    for made in SAMPLINGS {
+        let views = [made(130, 11)];
+        let unknowns = some_unknowns();
+        let point = Point { params: params(), gains: vec![1.0] };
+        let mut ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
+        let mut theirs = cpu(FULL, &views, Loss::L2, &unknowns, true);
+        for stride in [4, 3, 1] {
+            ours.set_stride(stride);
+            theirs.set_stride(stride);
+            assert_equal(
+                &ours.normal_equations(&point),
+                &theirs.normal_equations(&point),
+                &names(&unknowns),
+                &format!("every {stride}th block"),
+            );
+        }
     }
 }
 
@@ -312,42 +329,50 @@ fn a_lost_device_ends_a_fit_with_its_reason_and_keeps_the_state() {
 #[test]
 fn kept_terms_follow_the_parameters_that_are_held() {
     let Some(gpu) = gpu() else { return };
-    let views = [view(40, 13)];
-    let light = illumination();
-    let unknowns: Vec<Unknown> = [Param::BaseWeight, Param::RimExponent, Param::Hilite, Param::HazeWeight]
-        .map(|param| Unknown::Param(Column::tied(param)))
-        .to_vec();
-    let mut point = Point { params: params(), gains: vec![1.0] };
-    let ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
-    let plain = Reference::new(FULL, &light, &views, Loss::L2, &unknowns);
-    for strength in [1.3, 0.4, 0.4, 1.3] {
-        point.params.set(Param::NormalStrength, strength);
-        let what = format!("normal_strength {strength}");
-        assert_equal(
-            &ours.normal_equations(&point),
-            &plain.normal_equations(&point),
-            &names(&unknowns),
-            &what,
-        );
+    for made in SAMPLINGS {
+        let views = [made(40, 13)];
+        let light = illumination();
+        let unknowns: Vec<Unknown> =
+            [Param::BaseWeight, Param::RimExponent, Param::Hilite, Param::HazeWeight]
+                .map(|param| Unknown::Param(Column::tied(param)))
+                .to_vec();
+        let mut point = Point { params: params(), gains: vec![1.0] };
+        let ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
+        let plain = Reference::new(FULL, &light, &views, Loss::L2, &unknowns);
+        for strength in [1.3, 0.4, 0.4, 1.3] {
+            point.params.set(Param::NormalStrength, strength);
+            let what = format!("normal_strength {strength}");
+            assert_equal(
+                &ours.normal_equations(&point),
+                &plain.normal_equations(&point),
+                &names(&unknowns),
+                &what,
+            );
+        }
     }
 }
 
 #[test]
 fn images_equal_the_cpu_engines() {
     let Some(gpu) = gpu() else { return };
-    let views = [view(9, 5), view(30, 6)];
-    for form in Form::ALL {
-        let setup = Setup { form, ..FULL };
-        let point = Point { params: params(), gains: vec![1.5, 0.8] };
-        let ours = engine(gpu, setup, &views, Loss::L2, &[], &point);
-        let theirs = cpu(setup, &views, Loss::L2, &[], true);
-        for index in 0..2 {
-            let (got, want) = (ours.image(index, &point).unwrap(), theirs.image(index, &point));
-            assert_eq!(got.len(), want.len());
-            for (c, (got, want)) in got.iter().zip(&want).enumerate() {
-                for (slot, (g, w)) in got.iter().zip(want).enumerate() {
-                    // The vectors' own figures for f32, once for each engine.
-                    assert!((g - w).abs() < 4e-6 + 4e-5 * w.abs(), "{form:?} {index} {c} {slot}: {g} {w}");
+    for made in SAMPLINGS {
+        let views = [made(9, 5), made(30, 6)];
+        for form in Form::ALL {
+            let setup = Setup { form, ..FULL };
+            let point = Point { params: params(), gains: vec![1.5, 0.8] };
+            let ours = engine(gpu, setup, &views, Loss::L2, &[], &point);
+            let theirs = cpu(setup, &views, Loss::L2, &[], true);
+            for index in 0..2 {
+                let (got, want) = (ours.image(index, &point).unwrap(), theirs.image(index, &point));
+                assert_eq!(got.len(), want.len());
+                for (c, (got, want)) in got.iter().zip(&want).enumerate() {
+                    for (slot, (g, w)) in got.iter().zip(want).enumerate() {
+                        // The vectors' own figures for f32, once for each engine.
+                        assert!(
+                            (g - w).abs() < 4e-6 + 4e-5 * w.abs(),
+                            "{form:?} {index} {c} {slot}: {g} {w}"
+                        );
+                    }
                 }
             }
         }

@@ -23,15 +23,16 @@ impl Fused {
             .map(|c| if c < self.channels() { self.stored_target(c) } else { "0.0".to_owned() })
             .collect();
         format!(
-            "\n// A pixel as it is stored.\nstruct Pixel {{\n    at: Sample,\n    observed: vec4f,\n    weight: f32,\n}}\n\n\
+            "\n// A pixel as it is stored.\nstruct Pixel {{\n    at: Sample,\n    share: f32,\n    observed: vec4f,\n    weight: f32,\n}}\n\n\
              // The slot of the i-th pixel that is read, or of the last.\nfn slot_of(i: u32) -> u32 {{\n\
              \x20   let pixel = min(i, part.read - 1u);\n\
              \x20   return min({}, part.slots - 1u);\n}}\n\n\
              fn pixel_at(slot: u32) -> Pixel {{\n{}{}\
-             \x20   return Pixel(at, vec4f({}), {});\n}}\n",
+             \x20   return Pixel(at, {}, vec4f({}), {});\n}}\n",
             slot_of("pixel"),
             group_and_lane(),
             self.read_sample("group"),
+            self.share(),
             observed.join(", "),
             self.stored_weight(),
         )
@@ -61,14 +62,21 @@ impl Fused {
     /// The start of the block over a pixel's samples: `share` and `at`.
     pub(super) fn each_sample(&self, compares: bool) -> String {
         if self.fitted.several {
-            let share = self.fitted.layout.share.map_or_else(|| "1.0".to_owned(), number);
             return format!(
-                "        for (var record = group_start[group]; record < group_start[group + 1u]; record++) {{\n{}    let share = {share};\n",
-                self.read_sample("record")
+                "        for (var record = group_start[group]; record < group_start[group + 1u]; record++) {{\n{}    let share = {};\n",
+                self.read_sample("record"),
+                self.share()
             );
         }
-        let read = if compares { "        let at = now.at;\n".to_owned() } else { self.read_sample("group") };
-        format!("        {{\n{read}")
+        if compares {
+            return "        {\n        let at = now.at;\n        let share = now.share;\n".to_owned();
+        }
+        format!("        {{\n{}    let share = {};\n", self.read_sample("group"), self.share())
+    }
+
+    /// The sample's share of its pixel; 0 in padding.
+    fn share(&self) -> String {
+        self.fitted.layout.share.map_or_else(|| "1.0".to_owned(), number)
     }
 
     /// What the target holds in a channel.

@@ -20,7 +20,7 @@ impl Fused {
         wgsl.push_str(&self.samples(&[], false));
         for c in 0..self.channels() {
             let _ =
-                writeln!(wgsl, "        partial_sums[{c}u * part.slots + slot] = part.gain * shown[{c}];");
+                writeln!(wgsl, "        partial_sums[{c}u * part.slots + slot] = {}shown[{c}];", self.gain());
         }
         wgsl.push_str("    }\n}\n");
         wgsl
@@ -32,6 +32,7 @@ impl Fused {
         let mut seeds: Vec<usize> = columns.iter().filter_map(|&i| self.columns[i].seed).collect();
         seeds.dedup();
         let mut wgsl = self.declarations(!seeds.is_empty());
+        wgsl.push_str(&self.pixel_functions());
         wgsl.push_str(&self.head(sums, true));
         for seed in &seeds {
             let _ = writeln!(wgsl, "        var d{seed} = vec4f();");
@@ -71,7 +72,6 @@ impl Fused {
              const SMAPE_FLOOR = {SMAPE_FLOOR:?}f;\nconst SMAPE_CORNER = {SMAPE_CORNER:?}f;\n\n"
         );
         wgsl.push_str(loss_function(self.fitted.loss));
-        wgsl.push_str(&self.pixel_functions());
         wgsl.push('\n');
         wgsl.push_str(&functions());
         wgsl
@@ -98,7 +98,11 @@ impl Fused {
         let parts = parts(&self.plan.facts);
         let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
         let haze = if hazy(&self.plan.facts) { "haze" } else { "0.0" };
-        let add = if self.fitted.several { "+= share *" } else { "=" };
+        let add = match (self.fitted.several, self.fitted.layout.share) {
+            (true, _) => "+= share *",
+            (false, Some(_)) => "= share *",
+            (false, None) => "=",
+        };
         let _ = writeln!(wgsl, "    shown {add} vec4f({radiance}, {haze});");
         for &seed in seeds {
             let radiance = self.chain.radiance[seed].as_deref().unwrap_or("vec3f()");

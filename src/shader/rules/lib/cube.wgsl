@@ -11,7 +11,8 @@ fn on_face(v: vec3f, direction: vec3f) -> vec3f {
     return select(y_or_z, vec3f(-side * v.z, -v.y, side * v.x), x_major);
 }
 
-// Where a unit vector meets the cube: the face in x (+X -X +Y -Y +Z -Z), then s and t in [0, 1].
+// Where a unit vector meets the cube: the face in x (+X -X +Y -Y +Z -Z), then s and t in [0, 1]. The zero vector
+// meets the middle of a face.
 fn cube_place_of_unit(direction: vec3f) -> vec3f {
     let a = abs(direction);
     let x_major = (a.x >= a.y) & (a.x >= a.z);
@@ -19,7 +20,7 @@ fn cube_place_of_unit(direction: vec3f) -> vec3f {
     let major = select(select(direction.z, direction.y, y_major), direction.x, x_major);
     let face = select(select(4.0, 2.0, y_major), 0.0, x_major) + select(1.0, 0.0, major >= 0.0);
     let d = on_face(direction, direction);
-    return vec3f(face, 0.5 * d.xy / d.z + 0.5);
+    return vec3f(face, 0.5 * d.xy / max(d.z, 1e-36) + 0.5);
 }
 
 // Where a direction of any length from 1e-36 on meets the cube. A shorter or non-finite direction has no face;
