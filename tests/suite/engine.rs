@@ -225,6 +225,27 @@ fn any_subset_of_free_parameters_keeps_the_same_answers() {
     }
 }
 
+/// Loss, gradient and normal equations of an engine, each by its own pass, against the plain model's.
+pub(crate) fn assert_passes_equal(
+    engine: &dyn Objective,
+    plain: &NormalEquations,
+    point: &Point,
+    what: &str,
+) {
+    let unknowns = engine.unknowns();
+    assert_equal(&engine.normal_equations(point), plain, &names(unknowns), what);
+    let (value, gradient) = engine.gradient(point);
+    // The same sum by two kernels, which need not contract the same multiplications and additions: some
+    // roundings of f32 a residual, of either sign.
+    assert!((value / engine.loss(point) - 1.0).abs() < 1e-6, "{what}");
+    for (k, g) in gradient.iter().enumerate() {
+        let want = 2.0 * plain.jtr[k] / plain.weight;
+        let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;
+        // As in `assert_equal`.
+        assert!((g - want).abs() <= 1e-5 * scale, "{what} {}: {g} {want}", unknowns[k].name());
+    }
+}
+
 #[test]
 fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
     let mut views = [view(8, 4)];
@@ -236,17 +257,7 @@ fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
     for loss in Loss::ALL {
         let plain = Reference::new(setup, &light, &views, loss, &unknowns).normal_equations(&point);
         let engine = engine(setup, &views, loss, &unknowns, true);
-        assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
-        let (value, gradient) = engine.gradient(&point);
-        // The same sum by two kernels, which need not contract the same multiplications and additions: some
-        // roundings of f32 a residual, of either sign.
-        assert!((value / engine.loss(&point) - 1.0).abs() < 1e-6, "{}", loss.name());
-        for (k, g) in gradient.iter().enumerate() {
-            let want = 2.0 * plain.jtr[k] / plain.weight;
-            let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;
-            // As in `assert_equal`.
-            assert!((g - want).abs() <= 1e-5 * scale, "{} {}: {g} {want}", loss.name(), unknowns[k].name());
-        }
+        assert_passes_equal(&engine, &plain, &point, loss.name());
     }
 }
 

@@ -106,15 +106,21 @@ fn slow_bakes() -> Sandbox {
     sandbox
 }
 
+/// The program on `arguments`, once it has locked `folder` and begun to bake.
+#[cfg(unix)]
+fn locked(sandbox: &Sandbox, arguments: &[&str], folder: &str) -> Running {
+    let child = started(sandbox, arguments, || sandbox.path(folder).join(".lock").exists());
+    // The lock's file is there a moment before it is locked.
+    std::thread::sleep(Duration::from_millis(50));
+    child
+}
+
 #[cfg(unix)]
 #[test]
 fn a_fit_interrupted_before_it_is_under_way_says_so_and_leaves_nothing() {
     let sandbox = slow_bakes();
     let fit = ["fit", "scene.toml", "--no-cache", "-o", "made/run"];
-    let child = started(&sandbox, &fit, || sandbox.path("made/run/.lock").exists());
-    // Into the first bake.
-    std::thread::sleep(Duration::from_millis(50));
-    let ran = interrupt(child);
+    let ran = interrupt(locked(&sandbox, &fit, "made/run"));
     assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
     let words = "skinfit: interrupted before the search began: the run folder is as it was; ";
     assert!(ran.err.starts_with(words), "{ran:?}");
@@ -201,9 +207,7 @@ fn two_runs_into_one_folder_are_one_too_many() {
 fn two_bakes_into_one_folder_are_one_too_many() {
     let sandbox = slow_bakes();
     let bake = ["bake", "scene.toml", "--no-cache", "-o", "made/baked"];
-    let first = started(&sandbox, &bake, || sandbox.path("made/baked/.lock").exists());
-    // It is there a moment before it is locked.
-    std::thread::sleep(Duration::from_millis(50));
+    let first = locked(&sandbox, &bake, "made/baked");
     let words = ["made/baked: another run is writing to this folder", "choose another with -o"];
     sandbox.run(&bake).refused(&words);
     sandbox.fit("made/baked", &[]).refused(&words);

@@ -20,7 +20,8 @@ use skinfit::scene::view::Clip;
 
 use super::bench::{built_in, cache, gpu, open};
 use crate::engine::{
-    EVERYTHING, all_unknowns, assert_equal, engine as cpu, illumination, names, params, single, view,
+    EVERYTHING, all_unknowns, assert_equal, assert_passes_equal, engine as cpu, illumination, names, params,
+    single, view,
 };
 
 /// Views of several records a group, and of one: shaders read the latter a pixel ahead.
@@ -116,21 +117,7 @@ fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
         for loss in Loss::ALL {
             let plain = Reference::new(FULL, &light, &views, loss, &unknowns).normal_equations(&point);
             let engine = engine(gpu, FULL, &views, loss, &unknowns, &point);
-            assert_equal(&engine.normal_equations(&point), &plain, &names(&unknowns), loss.name());
-            let (value, gradient) = engine.gradient(&point);
-            // The same sum by two shaders: the same order of additions, but not the same multiply-adds.
-            assert!((value / engine.loss(&point) - 1.0).abs() < 1e-6, "{}", loss.name());
-            for (k, g) in gradient.iter().enumerate() {
-                let want = 2.0 * plain.jtr[k] / plain.weight;
-                let scale = 2.0 * (plain.jtj[k * unknowns.len() + k] * plain.residual).sqrt() / plain.weight;
-                // As in `assert_equal`.
-                assert!(
-                    (g - want).abs() <= 1e-5 * scale,
-                    "{} {}: {g} {want}",
-                    loss.name(),
-                    unknowns[k].name()
-                );
-            }
+            assert_passes_equal(&engine, &plain, &point, loss.name());
         }
     }
 }

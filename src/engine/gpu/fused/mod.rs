@@ -96,6 +96,7 @@ pub struct ColumnOf {
     pub unknown: Option<usize>,
     /// The seed whose tangent it is.
     seed: Option<usize>,
+    /// The channels that it moves.
     channels: Moved,
 }
 
@@ -106,6 +107,8 @@ struct Moved(u8);
 impl Moved {
     const RADIANCE: Self = Self(0b0111);
     const ALPHA: Self = Self(0b1000);
+    const ALL: Self = Self(0b1111);
+    const NONE: Self = Self(0);
 
     const fn and(self, other: Self) -> Self {
         Self(self.0 & other.0)
@@ -160,14 +163,13 @@ impl Fused {
         }
         let chain = Chain::new(&plan, &seeds).map_err(|error| error.to_string())?;
         for column in &mut columns {
-            let none = Moved(0);
-            let moved = column.seed.map_or(Moved::RADIANCE.or(Moved::ALPHA), |seed| {
-                let radiance = if chain.radiance[seed].is_some() { Moved::RADIANCE } else { none };
-                radiance.or(if chain.haze[seed].is_some() { Moved::ALPHA } else { none })
+            let moved = column.seed.map_or(Moved::ALL, |seed| {
+                let radiance = if chain.radiance[seed].is_some() { Moved::RADIANCE } else { Moved::NONE };
+                radiance.or(if chain.haze[seed].is_some() { Moved::ALPHA } else { Moved::NONE })
             });
             column.channels = column.channels.and(moved).and(compared(&fitted));
         }
-        columns.retain(|column| column.channels != Moved(0));
+        columns.retain(|column| column.channels != Moved::NONE);
         plan.resources.extend(&chain.resources);
         Ok(Self { columns, fitted, chain, plan })
     }
@@ -188,7 +190,7 @@ impl Fused {
     /// The sums of a wish that are not 0 by their nature.
     fn sums(&self, wish: Wish) -> Vec<Sum> {
         let k = self.columns.len();
-        let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != Moved(0);
+        let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != Moved::NONE;
         let mut sums = vec![Sum::Loss];
         if wish == Wish::Normal {
             for i in 0..k {
@@ -214,7 +216,7 @@ impl Fused {
 }
 
 const fn compared(fitted: &Fitted) -> Moved {
-    if fitted.alpha { Moved::RADIANCE.or(Moved::ALPHA) } else { Moved::RADIANCE }
+    if fitted.alpha { Moved::ALL } else { Moved::RADIANCE }
 }
 
 /// What the planner is told of stored samples.
@@ -241,14 +243,13 @@ fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
             params.len() - 1
         });
         let channels = match column.channels {
-            Channels::Tied => Moved::RADIANCE.or(Moved::ALPHA),
+            Channels::Tied => Moved::ALL,
             Channels::One(c) => Moved(1 << c),
         };
         columns.push(ColumnOf { unknown: Some(index), seed: Some(seed), channels });
     }
     if unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(_))) {
-        let channels = Moved::RADIANCE.or(Moved::ALPHA);
-        columns.push(ColumnOf { unknown: None, seed: None, channels });
+        columns.push(ColumnOf { unknown: None, seed: None, channels: Moved::ALL });
     }
     (params.into_iter().map(Seed::of_param).collect(), columns)
 }

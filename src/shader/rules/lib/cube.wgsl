@@ -1,26 +1,34 @@
-// v in the axes of the cube's face that `direction` meets: along s, along t, and outwards. Linear in v. Ties of
-// the major axis go to x before y before z; seamlessness makes the choice immaterial. Without branches: six of
-// these stand in a pixel's pass.
-fn on_face(v: vec3f, direction: vec3f) -> vec3f {
+// The cube's face that a direction meets: its axis (z where neither x nor y), and the side of it.
+struct CubeFace {
+    x_major: bool,
+    y_major: bool,
+    side: f32,
+}
+
+// Ties of the major axis go to x before y before z; seamlessness makes the choice immaterial. Without branches: with
+// them, a fit's pass on a graphics card takes longer (docs/gpu-engine.md).
+fn face_met(direction: vec3f) -> CubeFace {
     let a = abs(direction);
     let x_major = (a.x >= a.y) & (a.x >= a.z);
     let y_major = a.y >= a.z;
     let major = select(select(direction.z, direction.y, y_major), direction.x, x_major);
-    let side = select(-1.0, 1.0, major >= 0.0);
-    let y_or_z = select(vec3f(side * v.x, -v.y, side * v.z), vec3f(v.x, side * v.z, side * v.y), y_major);
-    return select(y_or_z, vec3f(-side * v.z, -v.y, side * v.x), x_major);
+    return CubeFace(x_major, y_major, select(-1.0, 1.0, major >= 0.0));
+}
+
+// v in the axes of a face: along s, along t, and outwards. Linear in v.
+fn on_face(v: vec3f, face: CubeFace) -> vec3f {
+    let on_y = vec3f(v.x, face.side * v.z, face.side * v.y);
+    let on_z = vec3f(face.side * v.x, -v.y, face.side * v.z);
+    return select(select(on_z, on_y, face.y_major), vec3f(-face.side * v.z, -v.y, face.side * v.x), face.x_major);
 }
 
 // Where a unit vector meets the cube: the face in x (+X -X +Y -Y +Z -Z), then s and t in [0, 1]. The zero vector
 // meets the middle of a face.
 fn cube_place_of_unit(direction: vec3f) -> vec3f {
-    let a = abs(direction);
-    let x_major = (a.x >= a.y) & (a.x >= a.z);
-    let y_major = a.y >= a.z;
-    let major = select(select(direction.z, direction.y, y_major), direction.x, x_major);
-    let face = select(select(4.0, 2.0, y_major), 0.0, x_major) + select(1.0, 0.0, major >= 0.0);
-    let d = on_face(direction, direction);
-    return vec3f(face, 0.5 * d.xy / max(d.z, 1e-36) + 0.5);
+    let face = face_met(direction);
+    let index = select(select(4.0, 2.0, face.y_major), 0.0, face.x_major) + select(1.0, 0.0, face.side > 0.0);
+    let d = on_face(direction, face);
+    return vec3f(index, 0.5 * d.xy / max(d.z, 1e-36) + 0.5);
 }
 
 // Where a direction of any length from 1e-36 on meets the cube. A shorter or non-finite direction has no face;
