@@ -9,6 +9,7 @@
 //! - `program`: a plan as a pipeline
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
 //! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
+//! - `records`: where the numbers of a stored sample stand on the device
 //! - `readback`: images from the device
 //! - [`probe`]: rules evaluated for given numbers
 //! - [`timing`]: GPU time by pass
@@ -27,6 +28,7 @@ pub(crate) mod geometry;
 pub mod probe;
 mod program;
 pub(crate) mod readback;
+pub(crate) mod records;
 pub mod renderer;
 mod resolve;
 mod targets;

@@ -7,7 +7,7 @@ use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeli
 use super::fused::Fused;
 use super::lights::Inputs;
 use super::parts::{PART_BYTES, Parts};
-use super::pipeline::{Uniform, bind, buffer, encoder, part_layout, pipeline};
+use super::pipeline::{Uniform, bind_part, buffer, encoder, part_layout, pipeline};
 use super::{GpuEngine, OnDevice};
 use crate::engine::Point;
 use crate::engine::view::ObservedView;
@@ -33,9 +33,7 @@ impl Images {
             let block = Uniform::new(gpu, "part", PART_BYTES);
             let bytes = 4 * channels * Parts::slots(part);
             let image = buffer(gpu, "image", bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
-            let of = &part.buffers;
-            let bindings =
-                bind(gpu, &layout, &[block.buffer(), &of.samples, &of.group_start, &of.targets, &image]);
+            let bindings = bind_part(gpu, &layout, &block, &part.buffers, &image);
             (block, image, bindings)
         });
         let parts = images.collect();

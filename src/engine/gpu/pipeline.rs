@@ -9,6 +9,7 @@ use wgpu::{
     PipelineCompilationOptions, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
 };
 
+use super::parts::PartBuffers;
 use crate::gpu::Gpu;
 
 /// A uniform block, which is only written when it changes: each write is a copy and a wait on the device.
@@ -98,7 +99,19 @@ pub(super) const UNIFORM: BindingType = buffer_kind(BufferBindingType::Uniform);
 pub(super) const READ: BindingType = buffer_kind(BufferBindingType::Storage { read_only: true });
 pub(super) const WRITE: BindingType = buffer_kind(BufferBindingType::Storage { read_only: false });
 
-/// Group 1 of a shader over a part: counts, samples, group starts, targets, and what is written.
+/// Group 1 of a shader over a part: counts, samples, group starts, targets, what is written; samples and targets
+/// again, to be read four numbers at a time.
 pub(super) fn part_layout(gpu: &Gpu) -> BindGroupLayout {
-    layout(gpu, "part", &[(0, UNIFORM), (1, READ), (2, READ), (3, READ), (4, WRITE)])
+    layout(gpu, "part", &[(0, UNIFORM), (1, READ), (2, READ), (3, READ), (4, WRITE), (5, READ), (6, READ)])
+}
+
+/// What [`part_layout`] asks for.
+pub(super) fn bind_part(
+    gpu: &Gpu,
+    layout: &BindGroupLayout,
+    counts: &Uniform,
+    PartBuffers { samples, group_start, targets }: &PartBuffers,
+    written: &Buffer,
+) -> BindGroup {
+    bind(gpu, layout, &[counts.buffer(), samples, group_start, targets, written, samples, targets])
 }

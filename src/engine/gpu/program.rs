@@ -5,16 +5,12 @@ use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescripto
 use super::fused::{ColumnOf, Fused, PARTS, Slab, Sum, Wish, gather_module};
 use super::lights::Inputs;
 use super::parts::{PART_BYTES, Part, Parts};
-use super::pipeline::{READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, part_layout, pipeline};
+use super::pipeline::{
+    READ, UNIFORM, Uniform, WRITE, bind, bind_part, buffer, encoder, layout, part_layout, pipeline,
+};
 use crate::engine::view::ObservedView;
 use crate::gpu::readback::map;
 use crate::gpu::{Gpu, GpuError};
-
-/// Sums from which a thread's registers are so many that three workgroups share a processor of an H200 (it has
-/// 132), and the most workgroups then: two times three for each processor. With eight for each, as of shorter
-/// lists, a pass takes a tenth longer.
-const MANY_SUMS: usize = 48;
-const FEWER_WORKGROUPS: u32 = 792;
 
 /// The shaders of a wish.
 pub(super) struct Program {
@@ -70,12 +66,7 @@ impl Program {
         let runs = places.into_iter().map(|(slab, part, first_sum, first_result)| {
             let counts = Uniform::new(gpu, "counts", 16);
             let block = Uniform::new(gpu, "part", PART_BYTES);
-            let of = &parts.parts[part].buffers;
-            let bindings = bind(
-                gpu,
-                &of_part,
-                &[block.buffer(), &of.samples, &of.group_start, &of.targets, &partial_sums],
-            );
+            let bindings = bind_part(gpu, &of_part, &block, &parts.parts[part].buffers, &partial_sums);
             let gather = bind(gpu, &of_gather, &[counts.buffer(), &partial_sums, &results_buffer]);
             Run { slab, part, first_sum: first_sum as u32, first_result, block, bindings, gather, counts }
         });
@@ -128,8 +119,7 @@ impl Program {
 
     fn encode(&self, gpu: &Gpu, encoder: &mut CommandEncoder, run: &Run, part: &Part) {
         let (slab, pipeline) = &self.slabs[run.slab];
-        let most = if slab.sums.len() < MANY_SUMS { u32::MAX } else { FEWER_WORKGROUPS };
-        let workgroups = Parts::workgroups(part).min(most);
+        let workgroups = Parts::workgroups(part);
         let counts = [workgroups, run.first_sum, run.first_result as u32, 0];
         run.counts.write(gpu, bytemuck::cast_slice(&counts));
         let Some(lights) = self.inputs.bound() else { return };

@@ -31,7 +31,7 @@ pub(super) fn replace_samples(
 ) -> Result<(), GpuError> {
     let (plan, wgsl) = terms_module(fitted, terms).map_err(GpuError::Plan)?;
     let mut inputs = Inputs::new(gpu, &plan);
-    let of_part = layout(gpu, "samples to terms", &[(0, UNIFORM), (1, READ), (2, WRITE)]);
+    let of_part = layout(gpu, "samples to terms", &[(0, UNIFORM), (1, READ), (2, READ), (3, WRITE)]);
     let made = pipeline(gpu, "samples to terms", &wgsl, &[&inputs.layout, &of_part]);
     lights.set(gpu, params, &mut inputs)?;
     let Some(bound) = inputs.bound() else { return gpu.check() };
@@ -40,7 +40,8 @@ pub(super) fn replace_samples(
         let count = Uniform::new(gpu, "count", 16);
         count.write(gpu, bytemuck::cast_slice(&[samples as u32, 0, 0, 0]));
         let rows = buffer(gpu, "terms", 4 * samples * terms.rows, BufferUsages::STORAGE);
-        let bindings = bind(gpu, &of_part, &[count.buffer(), &part.buffers.samples, &rows]);
+        let read = &part.buffers.samples;
+        let bindings = bind(gpu, &of_part, &[count.buffer(), read, read, &rows]);
         let mut commands = encoder(gpu);
         {
             let mut pass = commands.begin_compute_pass(&ComputePassDescriptor::default());

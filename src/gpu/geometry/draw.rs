@@ -7,6 +7,7 @@
 
 use std::fmt::Write as _;
 
+use crate::gpu::records::StoredRecords;
 use crate::samples::LANES;
 use crate::samples::surface_records::Places;
 use crate::shader::emit::SAMPLE;
@@ -125,21 +126,24 @@ impl Draw {
              \x20   for (var i = id.x; i < counts.x; i += {WORKGROUP}u * workgroups.x) {{\n\
              \x20       let source = sources[i];\n        if (source.x == {ELSEWHERE}u) {{\n            continue;\n        }}\n\
              \x20       let place = vec2u(source.x % counts.y, source.x / counts.y);\n\
-             \x20       let s = (i / {LANES}u) * {}u + i % {LANES}u;\n",
-            rows * LANES
+             \x20       let record = i / {LANES}u;\n        let lane = i % {LANES}u;\n"
         );
+        let stored = StoredRecords { name: "records", rows };
         for i in 0..self.targets() {
             let _ = writeln!(wgsl, "        let texel{i} = textureLoad(target{i}, place, 0);");
         }
         for field in &self.fields {
             for k in 0..field.size {
-                let (row, number) = ((field.row + k) * LANES, field.number + k);
-                let (texel, channel) = (number / CHANNELS, number % CHANNELS);
-                let _ = writeln!(wgsl, "        records[s + {row}u] = texel{texel}[{channel}];");
+                let (texel, channel) = ((field.number + k) / CHANNELS, (field.number + k) % CHANNELS);
+                let _ = writeln!(
+                    wgsl,
+                    "        {} = texel{texel}[{channel}];",
+                    stored.number("record", field.row + k)
+                );
             }
         }
         if let Some(row) = share {
-            let _ = writeln!(wgsl, "        records[s + {}u] = bitcast<f32>(source.y);", row * LANES);
+            let _ = writeln!(wgsl, "        {} = bitcast<f32>(source.y);", stored.number("record", row));
         }
         wgsl.push_str("    }\n}\n");
         wgsl

@@ -244,6 +244,13 @@ impl Writer<'_> {
         arguments: &[Handle<E>],
         d: &[String],
     ) -> Result<Option<String>, TangentError> {
+        // Of a product's two terms those that move.
+        let product = |name: &str, a: &[String]| {
+            let terms =
+                [(0, format!("{name}({}, {})", d[0], a[1])), (1, format!("{name}({}, {})", a[0], d[1]))];
+            let moving = terms.into_iter().filter(|(i, _)| self.tangent(arguments[*i]).is_some());
+            moving.map(|(_, term)| term).collect::<Vec<_>>().join(" + ")
+        };
         let a = arguments.iter().map(|&h| self.value(h)).collect::<Result<Vec<_>, _>>()?;
         let value = self.value(result)?;
         const LN_2: f32 = std::f32::consts::LN_2;
@@ -253,8 +260,8 @@ impl Writer<'_> {
             M::Min => format!("select({}, {}, {} < {})", d[1], d[0], a[0], a[1]),
             M::Max => format!("select({}, {}, {} > {})", d[1], d[0], a[0], a[1]),
             M::Fract => d[0].clone(),
-            M::Dot => format!("dot({}, {}) + dot({}, {})", d[0], a[1], a[0], d[1]),
-            M::Cross => format!("cross({}, {}) + cross({}, {})", d[0], a[1], a[0], d[1]),
+            M::Dot => product("dot", &a),
+            M::Cross => product("cross", &a),
             M::Mix => format!("mix({}, {}, {}) + ({} - {}) * {}", d[0], d[1], a[2], a[1], a[0], d[2]),
             M::Fma => format!("{} * {} + {} * {} + {}", d[0], a[1], a[0], d[1], d[2]),
             M::Sqrt => format!("0.5 * {} / {value}", d[0]),

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::gpu::records::StoredRecords;
 use crate::model::evaluate::Setup;
-use crate::samples::LANES;
 use crate::samples::surface_records::Places;
 use crate::shader::emit::sample_fields;
 use crate::shader::facts::{Facts, Source};
@@ -43,26 +43,31 @@ impl Layout {
         Self { source: Source::Terms, fields, share, rows: rows + usize::from(share.is_some()) }
     }
 
+    /// How the records stand in the buffer `samples`.
+    pub(super) const fn stored(&self) -> StoredRecords {
+        StoredRecords { name: "samples", rows: self.rows }
+    }
+
     pub(super) fn place(&self, field: &str) -> Option<usize> {
         self.fields.iter().find(|(name, _)| *name == field).map(|(_, place)| *place)
     }
 }
 
-/// The number at a row of the record that starts at `s`.
-pub(super) fn number(place: usize) -> String {
-    format!("samples[s + {}u]", place * LANES)
-}
-
-/// A record's fields into `at`.
-pub(super) fn fields_read(layout: &Layout, fields: &[(&'static str, &'static str)]) -> String {
-    let mut wgsl = String::new();
-    for (name, kind) in fields {
-        if let Some(place) = layout.place(name) {
-            let numbers: Vec<String> = (0..components(kind)).map(|k| number(place + k)).collect();
-            let _ = writeln!(wgsl, "        at.{name} = {kind}({});", numbers.join(", "));
+/// The fields of `record` (a name) into `at`; the lines read the quad of the sample's share, too.
+pub(super) fn fields_read(layout: &Layout, fields: &[(&'static str, &'static str)], record: &str) -> String {
+    let stored = layout.stored();
+    let placed = |(name, kind): &(&'static str, &'static str)| {
+        layout.place(name).map(|place| place..place + components(kind))
+    };
+    let mut wgsl = stored.quads_read(record, fields.iter().filter_map(placed).flatten().chain(layout.share));
+    wgsl.push_str("    var at: Sample;\n");
+    for field @ (name, kind) in fields {
+        if let Some(places) = placed(field) {
+            let numbers: Vec<String> = places.map(|place| stored.read(record, place)).collect();
+            let _ = writeln!(wgsl, "    at.{name} = {kind}({});", numbers.join(", "));
         } else if matches!(*name, "open" | "dapple" | "albedo" | "specular" | "attenuator") {
             // What the records lack has its neutral value, as `samples` has it.
-            let _ = writeln!(wgsl, "        at.{name} = {kind}(1.0);");
+            let _ = writeln!(wgsl, "    at.{name} = {kind}(1.0);");
         }
     }
     wgsl

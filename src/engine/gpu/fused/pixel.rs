@@ -5,8 +5,9 @@
 
 use std::fmt::Write as _;
 
-use super::layout::{fields_read, number};
+use super::layout::fields_read;
 use super::{BLOCK_PIXELS, Fused, WORKGROUP};
+use crate::gpu::records::StoredRecords;
 use crate::samples::LANES;
 
 impl Fused {
@@ -14,48 +15,38 @@ impl Fused {
         !self.fitted.several
     }
 
-    /// What [`Self::each_pixel`] calls, for passes that compare with targets.
+    /// What [`Self::each_pixel`] calls: in passes that compare with targets, where pixels are read ahead.
     pub(super) fn pixel_functions(&self) -> String {
         if !self.reads_ahead() {
             return String::new();
         }
-        let observed: Vec<String> = (0..4)
-            .map(|c| if c < self.channels() { self.stored_target(c) } else { "0.0".to_owned() })
-            .collect();
         format!(
             "\n// A pixel as it is stored.\nstruct Pixel {{\n    at: Sample,\n    share: f32,\n    observed: vec4f,\n    weight: f32,\n}}\n\n\
-             // The slot of the i-th pixel that is read, or of the last.\nfn slot_of(i: u32) -> u32 {{\n\
-             \x20   let pixel = min(i, part.read - 1u);\n\
-             \x20   return min({}, part.slots - 1u);\n}}\n\n\
-             fn pixel_at(slot: u32) -> Pixel {{\n{}{}\
-             \x20   return Pixel(at, {}, vec4f({}), {});\n}}\n",
-            slot_of("pixel"),
-            group_and_lane(),
+             // The i-th pixel that is read, or the last.\nfn pixel_at(which: u32) -> Pixel {{\n    let i = min(which, part.read - 1u);\n{}{}{}\
+             \x20   return Pixel(at, {}, {}, {});\n}}\n",
+            slot_group_and_lane(),
             self.read_sample("group"),
-            self.share(),
-            observed.join(", "),
+            self.read_target(),
+            self.share("group"),
+            self.target(),
             self.stored_weight(),
         )
     }
 
-    /// The loop over a thread's pixels, up to a pixel's `slot`, `group` and `lane`; `now` is what is read ahead.
+    /// The loop over a thread's pixels, up to a pixel's `slot`, `group` and `lane` or, where it is read ahead, `now`.
     pub(super) fn each_pixel(&self, compares: bool) -> String {
         let first = format!("{WORKGROUP}u * workgroup.x + thread");
         let mut wgsl = format!("    let step = {WORKGROUP}u * workgroups.x;\n");
         let ahead = compares && self.reads_ahead();
         if ahead {
-            let _ = writeln!(wgsl, "    var next = pixel_at(slot_of({first}));");
+            let _ = writeln!(wgsl, "    var next = pixel_at({first});");
         }
-        let _ = writeln!(
-            wgsl,
-            "    for (var i = {first}; i < part.read; i += step) {{\n        let slot = {};",
-            slot_of("i")
-        );
+        let _ = writeln!(wgsl, "    for (var i = {first}; i < part.read; i += step) {{");
         if ahead {
-            wgsl.push_str("        let now = next;\n        next = pixel_at(slot_of(i + step));\n");
+            wgsl.push_str("    let now = next;\n    next = pixel_at(i + step);\n");
+        } else {
+            wgsl.push_str(&slot_group_and_lane());
         }
-        wgsl.push_str("        if (slot >= part.slots) {\n            continue;\n        }\n");
-        wgsl.push_str(&group_and_lane());
         wgsl
     }
 
@@ -65,32 +56,49 @@ impl Fused {
             return format!(
                 "        for (var record = group_start[group]; record < group_start[group + 1u]; record++) {{\n{}    let share = {};\n",
                 self.read_sample("record"),
-                self.share()
+                self.share("record")
             );
         }
         if compares {
             return "        {\n        let at = now.at;\n        let share = now.share;\n".to_owned();
         }
-        format!("        {{\n{}    let share = {};\n", self.read_sample("group"), self.share())
+        format!("        {{\n{}    let share = {};\n", self.read_sample("group"), self.share("group"))
+    }
+
+    /// What the target holds, as `observed`, and how much the pixel counts, as `weight`.
+    pub(super) fn observed(&self) -> String {
+        if self.reads_ahead() {
+            return "        let observed = now.observed;\n        let weight = now.weight;\n".to_owned();
+        }
+        format!(
+            "{}        let observed = {};\n        let weight = {};\n",
+            self.read_target(),
+            self.target(),
+            self.stored_weight()
+        )
     }
 
     /// The sample's share of its pixel; 0 in padding.
-    fn share(&self) -> String {
-        self.fitted.layout.share.map_or_else(|| "1.0".to_owned(), number)
+    fn share(&self, record: &str) -> String {
+        let layout = &self.fitted.layout;
+        layout.share.map_or_else(|| "1.0".to_owned(), |place| layout.stored().read(record, place))
     }
 
-    /// What the target holds in a channel.
-    pub(super) fn target(&self, channel: usize) -> String {
-        if self.reads_ahead() { format!("now.observed[{channel}]") } else { self.stored_target(channel) }
+    /// How targets stand in their buffer, a record a group.
+    const fn targets(&self) -> StoredRecords {
+        StoredRecords { name: "targets", rows: self.channels() }
     }
 
-    /// How much a pixel counts.
-    pub(super) fn weight(&self) -> String {
-        if self.reads_ahead() { "now.weight".to_owned() } else { self.stored_weight() }
+    /// The lines before [`Self::target`].
+    fn read_target(&self) -> String {
+        self.targets().quads_read("group", 0..self.channels())
     }
 
-    fn stored_target(&self, channel: usize) -> String {
-        format!("targets[{}u * group + {}u + lane]", self.channels() * LANES, channel * LANES)
+    /// A pixel's target; channels that are not compared are 0.
+    fn target(&self) -> String {
+        let number = |c| if c < self.channels() { self.targets().read("group", c) } else { "0.0".to_owned() };
+        let numbers: Vec<String> = (0..4).map(number).collect();
+        format!("vec4f({})", numbers.join(", "))
     }
 
     fn stored_weight(&self) -> String {
@@ -103,19 +111,13 @@ impl Fused {
 
     /// A record's numbers into `at`.
     fn read_sample(&self, record: &str) -> String {
-        format!(
-            "    let s = {record} * {}u + lane;\n    var at: Sample;\n{}",
-            self.fitted.layout.rows * LANES,
-            fields_read(&self.fitted.layout, &self.fields())
-        )
+        fields_read(&self.fitted.layout, &self.fields(), record)
     }
 }
 
-fn group_and_lane() -> String {
-    format!("    let group = slot / {LANES}u;\n    let lane = slot % {LANES}u;\n")
-}
-
-/// Pixels are read by blocks, every so-many-th.
-fn slot_of(i: &str) -> String {
-    format!("({i} / {BLOCK_PIXELS}u) * {BLOCK_PIXELS}u * part.stride + {i} % {BLOCK_PIXELS}u")
+/// Where the i-th pixel that is read stands: pixels are read by blocks, every so-many-th.
+fn slot_group_and_lane() -> String {
+    format!(
+        "    let slot = i + (i / {BLOCK_PIXELS}u) * part.left_out;\n    let group = slot / {LANES}u;\n    let lane = slot % {LANES}u;\n"
+    )
 }

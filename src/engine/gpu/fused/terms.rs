@@ -2,8 +2,9 @@
 
 use std::fmt::Write as _;
 
-use super::layout::{Layout, fields_read, number};
+use super::layout::{Layout, fields_read};
 use super::{Fitted, WORKGROUP, facts};
+use crate::gpu::records::StoredRecords;
 use crate::samples::LANES;
 use crate::shader::emit::{Plan, plan_terms, sample_fields};
 use crate::shader::facts::{Facts, Source};
@@ -12,7 +13,8 @@ use crate::shader::rule::Stage;
 use crate::shader::search::components;
 
 /// The shader that makes records of terms from records of samples, one sample a thread; and its plan, whose
-/// constants and resources are group 0. Bindings of group 1: the count of samples, samples, terms.
+/// constants and resources are group 0. Bindings of group 1: the count of samples, samples (twice: numbers and
+/// quads), terms.
 ///
 /// # Errors
 /// When no rules yield the terms; in words.
@@ -26,14 +28,14 @@ pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), S
         wgsl,
         "\n@group(1) @binding(0) var<uniform> count: vec4u;\n\
          @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
-         @group(1) @binding(2) var<storage, read_write> terms: array<f32>;\n\n\
+         @group(1) @binding(2) var<storage, read> samples_quads: array<vec4f>;\n\
+         @group(1) @binding(3) var<storage, read_write> terms: array<f32>;\n\n\
          @compute @workgroup_size({WORKGROUP})\nfn cs_main(\n    @builtin(global_invocation_id) id: vec3u,\n    @builtin(num_workgroups) workgroups: vec3u,\n) {{\n\
          \x20   for (var i = id.x; i < count.x; i += {WORKGROUP}u * workgroups.x) {{\n\
-         \x20       let lane = i % {LANES}u;\n        let s = (i / {LANES}u) * {}u + lane;\n        let t = (i / {LANES}u) * {}u + lane;\n        var at: Sample;\n",
-        fitted.layout.rows * LANES,
-        terms.rows * LANES
+         \x20   let record = i / {LANES}u;\n    let lane = i % {LANES}u;\n",
     );
-    wgsl.push_str(&fields_read(&fitted.layout, &fields));
+    let stored = StoredRecords { name: "terms", rows: terms.rows };
+    wgsl.push_str(&fields_read(&fitted.layout, &fields, "record"));
     wgsl.push_str(&plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
     for (name, kind) in wanted {
         let Some(place) = terms.place(name) else { continue };
@@ -44,11 +46,16 @@ pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), S
         };
         for k in 0..components(kind) {
             let component = if kind == "f32" { String::new() } else { format!("[{k}]") };
-            let _ = writeln!(wgsl, "        terms[t + {}u] = {value}{component};", (place + k) * LANES);
+            let _ = writeln!(wgsl, "    {} = {value}{component};", stored.number("record", place + k));
         }
     }
     if let (Some(from), Some(to)) = (fitted.layout.share, terms.share) {
-        let _ = writeln!(wgsl, "        terms[t + {}u] = {};", to * LANES, number(from));
+        let _ = writeln!(
+            wgsl,
+            "    {} = {};",
+            stored.number("record", to),
+            fitted.layout.stored().read("record", from)
+        );
     }
     wgsl.push_str("    }\n}\n");
     Ok((plan, wgsl))

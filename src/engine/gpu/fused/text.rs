@@ -62,12 +62,15 @@ impl Fused {
         wgsl.push_str(&sample_struct(&self.fields()));
         let _ = write!(
             wgsl,
-            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Every so-many-th block is read.\n    stride: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
+            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Pixels that are left out after each block.\n    left_out: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
              @group(1) @binding(0) var<uniform> part: Part;\n\
              @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
              @group(1) @binding(2) var<storage, read> group_start: array<u32>;\n\
              @group(1) @binding(3) var<storage, read> targets: array<f32>;\n\
-             @group(1) @binding(4) var<storage, read_write> partial_sums: array<f32>;\n\n\
+             @group(1) @binding(4) var<storage, read_write> partial_sums: array<f32>;\n\
+             // The same buffers, four numbers at a time.\n\
+             @group(1) @binding(5) var<storage, read> samples_quads: array<vec4f>;\n\
+             @group(1) @binding(6) var<storage, read> targets_quads: array<vec4f>;\n\n\
              const RELATIVE_FLOOR = {RELATIVE_FLOOR:?}f;\nconst HUBER_THRESHOLD = {HUBER_THRESHOLD:?}f;\n\
              const SMAPE_FLOOR = {SMAPE_FLOOR:?}f;\nconst SMAPE_CORNER = {SMAPE_CORNER:?}f;\n\n"
         );
@@ -115,23 +118,26 @@ impl Fused {
 
     /// Residuals and their weights, channel by channel.
     fn residuals(&self) -> String {
-        let mut wgsl = format!(
-            "        let weight = {};\n        var loss = 0.0;\n        var scale = vec4f();\n        var residual = vec4f();\n",
-            self.weight()
+        let mut wgsl = self.observed();
+        wgsl.push_str(
+            "        var loss = 0.0;\n        var scale = vec4f();\n        var residual = vec4f();\n",
         );
         for c in 0..self.channels() {
-            let _ = writeln!(wgsl, "        {{\n            let observed = {};", self.target(c));
-            let _ = writeln!(wgsl, "            let value = {}shown[{c}];", self.gain());
+            let _ = writeln!(
+                wgsl,
+                "        {{\n            let value = {}shown[{c}];\n            let wanted = observed[{c}];",
+                self.gain()
+            );
             let counted = if self.fitted.clipped {
                 // A clipped target only says "at least" or "at most" (MODEL 7).
-                wgsl.push_str("            let beyond = (observed <= part.clip_low && value <= observed) || (observed >= part.clip_high && value >= observed);\n");
+                wgsl.push_str("            let beyond = (wanted <= part.clip_low && value <= wanted) || (wanted >= part.clip_high && value >= wanted);\n");
                 "select(weight, 0.0, beyond)"
             } else {
                 "weight"
             };
             let _ = writeln!(
                 wgsl,
-                "            let weighed = weighted_residual(value, observed, {counted});\n            loss += weighed.x;\n            scale[{c}] = weighed.y;\n            residual[{c}] = weighed.z;\n        }}"
+                "            let weighed = weighted_residual(value, wanted, {counted});\n            loss += weighed.x;\n            scale[{c}] = weighed.y;\n            residual[{c}] = weighed.z;\n        }}"
             );
         }
         wgsl

@@ -40,10 +40,10 @@ fn cube_place(direction: vec3f) -> vec3f {
 }
 
 // The seamless bilinear lookup in faces of `size` texels a side, which carry a border of one texel from their
-// neighbours.
+// neighbours: a place in [0, 1] is half a texel or more from where the border ends.
 fn sample_faces(faces: texture_2d_array<f32>, size: f32, place: vec3f) -> vec4f {
     let at = place.yz * size + 0.5;
-    let low = clamp(floor(at), vec2f(0.0), vec2f(size));
+    let low = floor(at);
     let f = at - low;
     let i = vec2i(low);
     let face = i32(place.x);
@@ -51,5 +51,8 @@ fn sample_faces(faces: texture_2d_array<f32>, size: f32, place: vec3f) -> vec4f 
     let b = textureLoad(faces, i + vec2i(1, 0), face, 0);
     let c = textureLoad(faces, i + vec2i(0, 1), face, 0);
     let d = textureLoad(faces, i + vec2i(1, 1), face, 0);
-    return mix(mix(a, b, f.x), mix(c, d, f.x), f.y);
+    // a + (b - a) f in the place of `mix`, as the CPU engine has it: an operation less.
+    let upper = a + (b - a) * f.x;
+    let lower = c + (d - c) * f.x;
+    return upper + (lower - upper) * f.y;
 }
