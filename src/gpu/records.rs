@@ -12,8 +12,8 @@ use crate::samples::rows::Row;
 /// Numbers of a lane that stand together.
 const QUAD: usize = 4;
 
-/// Records of so many rows on an adapter, in a buffer of f32 of a name that shaders know. The buffer `<name>_quads` is
-/// the same one, read four numbers at a time.
+/// Records of so many rows on an adapter, in a buffer of f32 that shaders know by a name. Where they read it four numbers
+/// at a time, it is bound a second time, as `<name>_quads`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct StoredRecords {
     pub name: &'static str,
@@ -62,33 +62,37 @@ impl StoredRecords {
 
 /// Records of `stride` rows as they stand on an adapter.
 pub(crate) fn packed(rows: &[Row], stride: usize) -> Vec<f32> {
-    let mut numbers: Vec<f32> = bytemuck::cast_slice(rows).to_vec();
-    transpose(&mut numbers, stride, true);
-    numbers
+    transposed(bytemuck::cast_slice(rows), stride, |row, quad| (row, quad))
 }
 
-/// Numbers of records of `stride` rows, read from an adapter, back to rows.
-pub(crate) fn unpack(numbers: &mut [f32], stride: usize) {
-    transpose(numbers, stride, false);
+/// Numbers of records of `stride` rows, read from an adapter, as rows.
+pub(crate) fn unpacked(numbers: &[f32], stride: usize) -> Vec<f32> {
+    transposed(numbers, stride, |row, quad| (quad, row))
 }
 
-/// Every four whole rows to a quad, or the other way round.
-fn transpose(numbers: &mut [f32], stride: usize, to_quads: bool) {
-    if stride < QUAD {
-        return;
-    }
-    numbers.par_chunks_exact_mut(stride * LANES).for_each(|record| {
-        for numbers in record.as_chunks_mut::<{ QUAD * LANES }>().0.iter_mut() {
-            let old = *numbers;
+/// Every four whole rows to a quad, or the other way round: for a place among the rows and the one in the quad, from
+/// which to which a number goes.
+fn transposed(
+    numbers: &[f32],
+    stride: usize,
+    from_to: impl Fn(usize, usize) -> (usize, usize) + Sync,
+) -> Vec<f32> {
+    let record = (stride * LANES).max(1);
+    let mut moved = vec![0.0; numbers.len()];
+    moved.par_chunks_mut(record).zip(numbers.par_chunks(record)).for_each(|(moved, numbers)| {
+        let (quads, rest) = moved.as_chunks_mut::<{ QUAD * LANES }>();
+        let (of_quads, of_rest) = numbers.as_chunks::<{ QUAD * LANES }>();
+        rest.copy_from_slice(of_rest);
+        for (moved, numbers) in quads.iter_mut().zip(of_quads) {
             for lane in 0..LANES {
                 for k in 0..QUAD {
-                    let (row, quad) = (k * LANES + lane, lane * QUAD + k);
-                    let (from, to) = if to_quads { (row, quad) } else { (quad, row) };
-                    numbers[to] = old[from];
+                    let (from, to) = from_to(k * LANES + lane, lane * QUAD + k);
+                    moved[to] = numbers[from];
                 }
             }
         }
     });
+    moved
 }
 
 #[cfg(test)]
@@ -102,7 +106,7 @@ mod tests {
             let rows: Vec<Row> = (0..3 * stride)
                 .map(|i| Row::of(std::array::from_fn(|lane| number(i / stride, i % stride, lane))))
                 .collect();
-            let mut numbers = packed(&rows, stride);
+            let numbers = packed(&rows, stride);
             for (record, numbers) in numbers.chunks_exact(stride * LANES).enumerate() {
                 for row in 0..stride {
                     for lane in 0..LANES {
@@ -113,8 +117,24 @@ mod tests {
                     }
                 }
             }
-            unpack(&mut numbers, stride);
-            assert_eq!(numbers, bytemuck::cast_slice::<Row, f32>(&rows));
+            assert_eq!(unpacked(&numbers, stride), bytemuck::cast_slice::<Row, f32>(&rows));
         }
+    }
+
+    #[test]
+    fn shaders_find_what_was_packed() {
+        let stored = StoredRecords { name: "samples", rows: 6 };
+        // Rows 4 and 5 are left over.
+        assert_eq!(stored.number("group", 2), "samples[96u * group + 2u + 4u * lane]");
+        assert_eq!(stored.number("group", 5), "samples[96u * group + 80u + lane]");
+        assert_eq!(stored.read("group", 2), "samples0[2]");
+        assert_eq!(stored.read("group", 5), stored.number("group", 5));
+        let lines = stored.quads_read("group", [5, 1, 3]);
+        assert_eq!(lines, "    let samples0 = samples_quads[24u * group + 0u + lane];\n");
+        let two = StoredRecords { name: "samples", rows: 8 };
+        assert_eq!(two.number("r", 7), "samples[128u * r + 67u + 4u * lane]");
+        assert_eq!(two.quads_read("r", [7]), "    let samples1 = samples_quads[32u * r + 16u + lane];\n");
+        let none = StoredRecords { name: "targets", rows: 3 };
+        assert_eq!((none.quads_read("g", 0..3), none.read("g", 1)), (String::new(), none.number("g", 1)));
     }
 }

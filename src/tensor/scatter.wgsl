@@ -1,4 +1,5 @@
-// Adds what lookups of a cube have gained to the texels that they read: the transpose of `sample_faces`.
+// Adds what lookups of a cube have gained to the texels that they read: the transpose of `sample_faces`
+// (but that a place that is no number is clamped into the cube: here it says where to write).
 //
 // Exact sums are whole numbers of 64 bits, in two words: their additions commute, so that the result does not
 // depend on the order in which threads come. The unit is a power of two, chosen by the largest number that is to be

@@ -107,9 +107,12 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
     use skinfit::engine::Unknown;
     use skinfit::engine::gpu::fused::{Fitted, Fused, Layout, Wish, gather_module, terms_module};
     use skinfit::model::params::{Channels, Column, Param};
-    use skinfit::samples::surface_records::Places;
+    use skinfit::samples::SurfaceRecords;
+    use skinfit::samples::surface_records::{Asked, Places};
     use skinfit::scene::Loss;
     let places = Places { base: Some(0), view: Some(3), ..Places::default() };
+    let records = SurfaceRecords::new(Asked::EVERYTHING, 0);
+    let everything = Layout::of_samples(records.places(), records.rows().stride());
     let check = |wgsl: &str| {
         let module = naga::front::wgsl::parse_str(wgsl)
             .unwrap_or_else(|error| panic!("{}\n{wgsl}", error.emit_to_string(wgsl)));
@@ -140,7 +143,8 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
             .collect();
         let held = |u: &Unknown| !matches!(u, Unknown::Param(c) if lookups.contains(&c.param));
         let kept: Vec<Unknown> = all.iter().copied().filter(held).collect();
-        let samples = Layout::of_samples(&places, 6);
+        // Records shorter than their terms, and longer ones, with shares.
+        let samples = if i % 2 == 0 { Layout::of_samples(&places, 6) } else { everything.clone() };
         let sizes = FaceSizes { irradiance: Some(16), specular: Some(32), hilite: Some(8) };
         let fitted = |unknowns: Vec<Unknown>, layout: &Layout, bits: usize| Fitted {
             setup,

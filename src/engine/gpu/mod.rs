@@ -173,7 +173,9 @@ impl<'g> GpuEngine<'g> {
         engine.made_seconds =
             made.map_or(0.0, |made| made.seconds() + start_of_parts.elapsed().as_secs_f64());
         let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if HELD.contains(&c.param));
-        engine.keeps = !engine.unknowns.iter().any(moves) && parts.all_resident();
+        let samples = Layout::of_samples(&engine.traits.places, engine.traits.rows);
+        let terms = Layout::of_terms(setup, &samples);
+        engine.keeps = !engine.unknowns.iter().any(moves) && parts.all_hold(terms.rows, views);
         engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
         engine.set_stride(1);
         // Whatever the driver refuses shows here, and not in the midst of a fit.

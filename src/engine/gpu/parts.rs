@@ -27,7 +27,7 @@ fn tiles(pixels: usize, most: usize) -> u32 {
     pixels.div_ceil(WORKGROUP as usize * PIXELS_A_THREAD).clamp(1, most) as u32
 }
 
-/// Records that are packed at once: some 15 MB.
+/// Records that are packed at once: 6 to 21 MB.
 const PACKED_RECORDS: usize = 1 << 14;
 
 /// Bytes of a dispatch's uniform block.
@@ -103,6 +103,8 @@ pub(super) struct Parts {
     pub(super) parts: Vec<Part>,
     traits: Traits,
     stride: usize,
+    /// Bytes that a part's samples may take.
+    limit: u64,
 }
 
 impl Parts {
@@ -117,7 +119,7 @@ impl Parts {
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let limit = memory.part.map_or(limit, |part| part.min(limit));
-        let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1 };
+        let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1, limit };
         if let (Some(_), Some(most)) = (made, memory.resident) {
             let bytes = views.iter().map(|view| parts.size(view, &(0..view.samples.groups())).total()).sum();
             if bytes > most {
@@ -206,23 +208,21 @@ impl Parts {
         total
     }
 
-    /// Whether every part stays on the device.
-    pub(super) fn all_resident(&self) -> bool {
-        self.parts.iter().all(|part| part.resident)
+    /// Whether every part stays on the device, and a binding takes its samples as records of so many rows.
+    pub(super) fn all_hold(&self, rows: usize, views: &[ObservedView]) -> bool {
+        let bytes = |part: &Part| (4 * rows * Self::samples(part, views)) as u64;
+        self.parts.iter().all(|part| part.resident && bytes(part) <= self.limit)
     }
 
-    /// Upload every part's samples anew, or have them made anew.
+    /// Upload every part's samples anew, or have them made anew, where their terms stand.
     pub(super) fn reload(
-        &mut self,
+        &self,
         gpu: &Gpu,
         views: &[ObservedView],
         made: Option<&DeviceSamples<'_>>,
     ) -> Result<(), GpuError> {
-        for index in 0..self.parts.len() {
-            let part = &self.parts[index];
-            let size = self.size(&views[part.view], &part.groups);
-            self.parts[index].buffers = PartBuffers::new(gpu, size)?;
-            self.upload(gpu, &views[self.parts[index].view], &self.parts[index], made.is_none())?;
+        for part in &self.parts {
+            self.upload(gpu, &views[part.view], part, made.is_none())?;
         }
         made.map_or(Ok(()), |made| made.fill(&self.parts))
     }

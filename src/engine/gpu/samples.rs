@@ -8,7 +8,7 @@ use super::parts::Part;
 use super::pipeline::buffer;
 use crate::gpu::geometry::{Geometry, Wanted};
 use crate::gpu::readback::read_floats;
-use crate::gpu::records::unpack;
+use crate::gpu::records::unpacked;
 use crate::gpu::upload::Content;
 use crate::gpu::{Gpu, GpuError};
 use crate::samples::covered::Covered;
@@ -113,9 +113,9 @@ impl<'a> DeviceSamples<'a> {
         let wanted = Wanted { groups: 0..groups.groups(), records: records.clone() };
         self.geometry.fill(camera, covered, &[wanted])?;
         let encoder = self.gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
-        let mut numbers = read_floats(self.gpu, encoder, &records)?;
-        unpack(&mut numbers, surface.rows().stride());
-        surface.rows_mut().fill(&numbers);
+        let numbers = read_floats(self.gpu, encoder, &records)?;
+        let stride = surface.rows().stride();
+        surface.rows_mut().fill(&unpacked(&numbers, stride));
         Ok(surface)
     }
 }

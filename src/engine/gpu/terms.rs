@@ -1,6 +1,6 @@
 //! Samples replaced by their terms, where no free parameter needs a lookup: then they are all that a pass reads.
 
-use wgpu::{BufferUsages, ComputePassDescriptor};
+use wgpu::{Buffer, BufferUsages, ComputePassDescriptor};
 
 use super::fused::{Fitted, Layout, WORKGROUP, terms_module};
 use super::lights::{DeviceLights, Inputs};
@@ -31,7 +31,12 @@ pub(super) fn replace_samples(
 ) -> Result<(), GpuError> {
     let (plan, wgsl) = terms_module(fitted, terms).map_err(GpuError::Plan)?;
     let mut inputs = Inputs::new(gpu, &plan);
-    let of_part = layout(gpu, "samples to terms", &[(0, UNIFORM), (1, READ), (2, READ), (3, WRITE)]);
+    let in_place = terms.in_place_of(&fitted.layout);
+    let of_part = if in_place {
+        layout(gpu, "samples to terms", &[(0, UNIFORM), (1, WRITE)])
+    } else {
+        layout(gpu, "samples to terms", &[(0, UNIFORM), (1, READ), (2, WRITE)])
+    };
     let made = pipeline(gpu, "samples to terms", &wgsl, &[&inputs.layout, &of_part]);
     lights.set(gpu, params, &mut inputs)?;
     let Some(bound) = inputs.bound() else { return gpu.check() };
@@ -39,9 +44,11 @@ pub(super) fn replace_samples(
         let samples = Parts::samples(part, views);
         let count = Uniform::new(gpu, "count", 16);
         count.write(gpu, bytemuck::cast_slice(&[samples as u32, 0, 0, 0]));
-        let rows = buffer(gpu, "terms", 4 * samples * terms.rows, BufferUsages::STORAGE);
-        let read = &part.buffers.samples;
-        let bindings = bind(gpu, &of_part, &[count.buffer(), read, read, &rows]);
+        let usage = BufferUsages::STORAGE | BufferUsages::COPY_DST;
+        let longer = (!in_place).then(|| buffer(gpu, "terms", 4 * samples * terms.rows, usage));
+        let buffers: Vec<&Buffer> =
+            [count.buffer(), &part.buffers.samples].into_iter().chain(&longer).collect();
+        let bindings = bind(gpu, &of_part, &buffers);
         let mut commands = encoder(gpu);
         {
             let mut pass = commands.begin_compute_pass(&ComputePassDescriptor::default());
@@ -53,7 +60,9 @@ pub(super) fn replace_samples(
         }
         gpu.queue.submit([commands.finish()]);
         // The samples' memory is given back before the next part takes more.
-        part.buffers.samples = rows;
+        if let Some(longer) = longer {
+            part.buffers.samples = longer;
+        }
         gpu.wait()?;
     }
     gpu.check()

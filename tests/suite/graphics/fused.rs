@@ -13,8 +13,9 @@ use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::{PrepareOptions, Prepared};
-use skinfit::samples::LANES;
 use skinfit::samples::rows::Rows;
+use skinfit::samples::surface_records::Asked;
+use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::scene::Loss;
 use skinfit::scene::view::Clip;
 
@@ -165,6 +166,16 @@ fn parts_and_streaming_give_the_same_sums() {
             assert_close(&cut.normal_equations(&point), &want, 1e-6);
             assert_eq!(cut.normal_equations(&point), cut.normal_equations(&point));
         }
+        // Every third block of each part, short ones at their ends among them: wherever the parts are.
+        let every_third = |most| {
+            let mut cut = make(Memory { part, resident: most });
+            cut.set_stride(3);
+            cut.normal_equations(&point)
+        };
+        let resident_parts = every_third(None);
+        assert!(resident_parts.count < want.count && resident_parts.loss > 0.0);
+        assert_eq!(every_third(Some(resident / 2)), resident_parts);
+        assert_eq!(every_third(Some(0)), resident_parts);
     }
 }
 
@@ -189,6 +200,10 @@ fn bytes_are_those_that_stand_on_the_device_and_that_a_pass_uploads() {
     assert_eq!(bytes(Some(large)), (large + small, small));
     // Both take turns in buffers for the larger one.
     assert_eq!(bytes(Some(0)), (large, large + small));
+    // Terms that are kept take the samples' place.
+    let kept = [Unknown::Param(Column::tied(Param::BaseWeight))];
+    let engine = engine(gpu, FULL, &views, Loss::L2, &kept, &point);
+    assert_eq!(engine.bytes(), (large + small, 0));
 }
 
 fn assert_close(got: &NormalEquations, want: &NormalEquations, tolerance: f64) {
@@ -335,6 +350,57 @@ fn kept_terms_follow_the_parameters_that_are_held() {
                 &names(&unknowns),
                 &what,
             );
+        }
+    }
+}
+
+/// `view` with less of each sample, with its first channels alone, and perhaps with all pixels counting alike.
+fn lean(view: &ObservedView, asked: Asked, channels: usize, weighted: bool) -> ObservedView {
+    let from = &view.samples.surface;
+    let mut surface = SurfaceRecords::new(asked, view.samples.records());
+    (0..from.slots()).for_each(|slot| surface.set(slot, &from.fragment(slot), from.weight(slot)));
+    let mut target = Rows::new(channels, view.samples.groups());
+    for group in 0..view.samples.groups() {
+        target.record_mut(group).copy_from_slice(&view.target.record(group)[..channels]);
+    }
+    let weight = if weighted { view.weight.clone() } else { Vec::new() };
+    ObservedView { samples: ViewSamples { surface, ..view.samples.clone() }, target, weight, clip: view.clip }
+}
+
+#[test]
+fn records_and_targets_of_every_length_are_read_as_they_were_written() {
+    let Some(gpu) = gpu() else { return };
+    let all = Asked::EVERYTHING;
+    let no_dapple = Asked { dapple: false, ..all };
+    let no_specular = Asked { specular: false, ..no_dapple };
+    let no_attenuator = Asked { attenuator: false, ..no_specular };
+    // Rows are read in fours, on an adapter: one left over, none, three, two; of targets none or all.
+    for (rows, asked, channels, weighted) in [
+        (21, all, 4, false),
+        (20, no_dapple, 3, true),
+        (19, no_specular, 3, false),
+        (18, no_attenuator, 4, true),
+    ] {
+        for made in SAMPLINGS {
+            let views = [lean(&made(21, 14), asked, channels, weighted)];
+            assert_eq!(views[0].samples.surface.rows().stride(), rows);
+            let light = illumination();
+            let point = Point { params: params(), gains: vec![1.1] };
+            // Over the samples, and over their terms.
+            for moves in [&[Param::NormalStrength][..], &[]] {
+                let weights = [Param::BaseWeight, Param::RimWeight, Param::SideSpecular, Param::Hilite];
+                let unknowns: Vec<Unknown> =
+                    weights.iter().chain(moves).map(|&param| Unknown::Param(Column::tied(param))).collect();
+                let plain = Reference::new(FULL, &light, &views, Loss::L2, &unknowns);
+                let ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
+                let what = format!("{rows} rows, {channels} channels, {moves:?}");
+                assert_equal(
+                    &ours.normal_equations(&point),
+                    &plain.normal_equations(&point),
+                    &names(&unknowns),
+                    &what,
+                );
+            }
         }
     }
 }

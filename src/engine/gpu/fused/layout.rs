@@ -1,6 +1,7 @@
 //! What records hold, and how a shader reads them.
 
 use std::fmt::Write as _;
+use std::ops::Range;
 
 use crate::gpu::records::StoredRecords;
 use crate::model::evaluate::Setup;
@@ -30,7 +31,8 @@ impl Layout {
         Self { source: Source::Samples, fields, share: places.weight, rows }
     }
 
-    /// Of the terms that `setup` asks for, with the samples' shares where those have them.
+    /// Of the terms that `setup` asks for, with the samples' shares where those have them. Records are as long as the
+    /// samples' at the least, so that terms can take their place.
     #[must_use]
     pub fn of_terms(setup: Setup, samples: &Self) -> Self {
         let mut rows = 0;
@@ -40,7 +42,14 @@ impl Layout {
             rows += components(kind);
         }
         let share = samples.share.map(|_| rows);
-        Self { source: Source::Terms, fields, share, rows: rows + usize::from(share.is_some()) }
+        let rows = rows + usize::from(share.is_some());
+        Self { source: Source::Terms, fields, share, rows: rows.max(samples.rows) }
+    }
+
+    /// Whether records can stand where the samples stood, numbers of the same lane in the same places.
+    #[must_use]
+    pub const fn in_place_of(&self, samples: &Self) -> bool {
+        self.rows == samples.rows
     }
 
     /// How the records stand in the buffer `samples`.
@@ -51,19 +60,27 @@ impl Layout {
     pub(super) fn place(&self, field: &str) -> Option<usize> {
         self.fields.iter().find(|(name, _)| *name == field).map(|(_, place)| *place)
     }
+
+    fn places(&self, (field, kind): &Field) -> Option<Range<usize>> {
+        self.place(field).map(|place| place..place + components(kind))
+    }
 }
 
-/// The fields of `record` (a name) into `at`; the lines read the quad of the sample's share, too.
-pub(super) fn fields_read(layout: &Layout, fields: &[(&'static str, &'static str)], record: &str) -> String {
-    let stored = layout.stored();
-    let placed = |(name, kind): &(&'static str, &'static str)| {
-        layout.place(name).map(|place| place..place + components(kind))
-    };
-    let mut wgsl = stored.quads_read(record, fields.iter().filter_map(placed).flatten().chain(layout.share));
-    wgsl.push_str("    var at: Sample;\n");
+/// A field's name in the planner's words, and its WGSL type.
+type Field = (&'static str, &'static str);
+
+/// The lines that read the quads of `record` (a name) which hold the fields and the sample's share.
+pub(super) fn quads_read(layout: &Layout, fields: &[Field], record: &str) -> String {
+    let places = fields.iter().filter_map(|field| layout.places(field)).flatten();
+    layout.stored().quads_read(record, places.chain(layout.share))
+}
+
+/// The fields into `at`; `read` is the number at a place.
+pub(super) fn fields_read(layout: &Layout, fields: &[Field], read: impl Fn(usize) -> String) -> String {
+    let mut wgsl = "    var at: Sample;\n".to_owned();
     for field @ (name, kind) in fields {
-        if let Some(places) = placed(field) {
-            let numbers: Vec<String> = places.map(|place| stored.read(record, place)).collect();
+        if let Some(places) = layout.places(field) {
+            let numbers: Vec<String> = places.map(&read).collect();
             let _ = writeln!(wgsl, "    at.{name} = {kind}({});", numbers.join(", "));
         } else if matches!(*name, "open" | "dapple" | "albedo" | "specular" | "attenuator") {
             // What the records lack has its neutral value, as `samples` has it.

@@ -1,11 +1,11 @@
 //! How a pass reads a pixel: its samples, its target and its weight.
 //!
 //! Where each pixel has one sample, a thread asks for its next pixel before it shades the present one: a processor
-//! holds so few threads beside so many sums that they would wait for memory together (a seventh of a pass, on an H200).
+//! holds so few threads beside so many sums that they would wait for memory together (a thirtieth to a twentieth of a pass, on an H200).
 
 use std::fmt::Write as _;
 
-use super::layout::fields_read;
+use super::layout::{fields_read, quads_read};
 use super::{BLOCK_PIXELS, Fused, WORKGROUP};
 use crate::gpu::records::StoredRecords;
 use crate::samples::LANES;
@@ -111,7 +111,9 @@ impl Fused {
 
     /// A record's numbers into `at`.
     fn read_sample(&self, record: &str) -> String {
-        fields_read(&self.fitted.layout, &self.fields(), record)
+        let (layout, fields) = (&self.fitted.layout, self.fields());
+        let read = |place| layout.stored().read(record, place);
+        quads_read(layout, &fields, record) + &fields_read(layout, &fields, read)
     }
 }
 

@@ -13,8 +13,8 @@ use crate::shader::rule::Stage;
 use crate::shader::search::components;
 
 /// The shader that makes records of terms from records of samples, one sample a thread; and its plan, whose
-/// constants and resources are group 0. Bindings of group 1: the count of samples, samples (twice: numbers and
-/// quads), terms.
+/// constants and resources are group 0. Bindings of group 1: the count of samples, samples, terms. Terms that are
+/// [in place](Layout::in_place_of) have no binding: each thread puts them where its sample's numbers were.
 ///
 /// # Errors
 /// When no rules yield the terms; in words.
@@ -22,20 +22,32 @@ pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), S
     let facts = facts(fitted);
     let (plan, wanted) = plan_terms(&facts).map_err(|error| error.to_string())?;
     let fields = sample_fields(&Facts { source: Source::Samples, ..facts });
+    let (into, buffers) = if terms.in_place_of(&fitted.layout) {
+        ("samples", "@group(1) @binding(1) var<storage, read_write> samples: array<f32>;")
+    } else {
+        (
+            "terms",
+            "@group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
+             @group(1) @binding(2) var<storage, read_write> terms: array<f32>;",
+        )
+    };
     let mut wgsl = plan.declarations(true);
     wgsl.push_str(&sample_struct(&fields));
     let _ = write!(
         wgsl,
         "\n@group(1) @binding(0) var<uniform> count: vec4u;\n\
-         @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
-         @group(1) @binding(2) var<storage, read> samples_quads: array<vec4f>;\n\
-         @group(1) @binding(3) var<storage, read_write> terms: array<f32>;\n\n\
+         {buffers}\n\n\
          @compute @workgroup_size({WORKGROUP})\nfn cs_main(\n    @builtin(global_invocation_id) id: vec3u,\n    @builtin(num_workgroups) workgroups: vec3u,\n) {{\n\
          \x20   for (var i = id.x; i < count.x; i += {WORKGROUP}u * workgroups.x) {{\n\
          \x20   let record = i / {LANES}u;\n    let lane = i % {LANES}u;\n",
     );
-    let stored = StoredRecords { name: "terms", rows: terms.rows };
-    wgsl.push_str(&fields_read(&fitted.layout, &fields, "record"));
+    let samples = fitted.layout.stored();
+    let stored = StoredRecords { name: into, rows: terms.rows };
+    wgsl.push_str(&fields_read(&fitted.layout, &fields, |place| samples.number("record", place)));
+    // Everything is read before anything is written.
+    if let Some(share) = fitted.layout.share {
+        let _ = writeln!(wgsl, "    let share = {};", samples.number("record", share));
+    }
     wgsl.push_str(&plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
     for (name, kind) in wanted {
         let Some(place) = terms.place(name) else { continue };
@@ -49,13 +61,8 @@ pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), S
             let _ = writeln!(wgsl, "    {} = {value}{component};", stored.number("record", place + k));
         }
     }
-    if let (Some(from), Some(to)) = (fitted.layout.share, terms.share) {
-        let _ = writeln!(
-            wgsl,
-            "    {} = {};",
-            stored.number("record", to),
-            fitted.layout.stored().read("record", from)
-        );
+    if let Some(place) = terms.share {
+        let _ = writeln!(wgsl, "    {} = share;", stored.number("record", place));
     }
     wgsl.push_str("    }\n}\n");
     Ok((plan, wgsl))

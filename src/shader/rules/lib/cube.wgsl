@@ -51,7 +51,7 @@ fn sample_faces(faces: texture_2d_array<f32>, size: f32, place: vec3f) -> vec4f 
     let b = textureLoad(faces, i + vec2i(1, 0), face, 0);
     let c = textureLoad(faces, i + vec2i(0, 1), face, 0);
     let d = textureLoad(faces, i + vec2i(1, 1), face, 0);
-    // a + (b - a) f in the place of `mix`, as the CPU engine has it: an operation less.
+    // a + (b - a) f in the place of `mix`, as the CPU engine's vectors have it: an operation less.
     let upper = a + (b - a) * f.x;
     let lower = c + (d - c) * f.x;
     return upper + (lower - upper) * f.y;
