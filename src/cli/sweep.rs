@@ -285,9 +285,8 @@ fn run_workers(
                     if arguments.bakes.threads.is_none() {
                         command.args(["--threads", &threads.to_string()]);
                     }
-                    // At a terminal, Ctrl-C is for the processes that run, too; one that is begun later would go on.
-                    let child = unfinished::begin(|| command.stdin(Stdio::null()).spawn());
-                    let done = child.and_then(|mut child| child.wait()).is_ok_and(|status| status.success());
+                    let done =
+                        unfinished::run(command.stdin(Stdio::null())).is_ok_and(|status| status.success());
                     failed.fetch_add(usize::from(!done), Ordering::Relaxed);
                     if !done && JobResult::read(&JobResult::path(&plan.results, &ready.identity)).is_none() {
                         // Perhaps it was interrupted, and this process hears of that a moment later.

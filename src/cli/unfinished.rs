@@ -3,6 +3,7 @@
 use std::borrow::Cow;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
+use std::process::{Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -26,6 +27,8 @@ struct Unfinished {
     words: Cow<'static, str>,
     /// What asks a fit to stop, once it has something to keep.
     fit: Option<Arc<AtomicBool>>,
+    /// Processes that work for this one.
+    children: Vec<u32>,
 }
 
 static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
@@ -35,6 +38,7 @@ static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
     asked: false,
     words: Cow::Borrowed("interrupted: no results were written; only bakes in the cache were kept."),
     fit: None,
+    children: Vec::new(),
 });
 
 /// Change what goes; a thread that panicked has left it whole.
@@ -61,11 +65,33 @@ pub(super) fn asked_through(flag: &Arc<AtomicBool>) {
     install();
 }
 
-/// Begin something, such as another process, that nobody would end once the program is interrupted: not any more then.
-pub(super) fn begin<T>(work: impl FnOnce() -> T) -> T {
-    // Who interrupts it never gives back what is waited for here.
-    change(|_| work())
+/// Run another process to its end. It is interrupted together with this one, and none is begun afterwards.
+pub(super) fn run(command: &mut Command) -> std::io::Result<ExitStatus> {
+    // Who interrupts the program never gives back what is waited for here.
+    let mut child = change(|unfinished| {
+        let child = command.spawn()?;
+        unfinished.children.push(child.id());
+        Ok::<_, std::io::Error>(child)
+    })?;
+    let status = child.wait();
+    change(|unfinished| unfinished.children.retain(|&id| id != child.id()));
+    status
 }
+
+/// Interrupt another process. At a terminal Ctrl-C is for that one, too; a signal by its number is not.
+#[cfg(unix)]
+fn interrupt(process: u32) {
+    use nix::sys::signal::{Signal, kill};
+    use nix::unistd::Pid;
+    if let Ok(process) = i32::try_from(process) {
+        // It may have ended.
+        let _ = kill(Pid::from_raw(process), Signal::SIGINT);
+    }
+}
+
+/// Elsewhere only a terminal interrupts, and that is for all of its processes.
+#[cfg(not(unix))]
+const fn interrupt(_: u32) {}
 
 /// Whoever wants to begin writing waits for this to end, and with it the program.
 fn interrupted(unfinished: &mut Unfinished) {
@@ -87,6 +113,7 @@ fn interrupted(unfinished: &mut Unfinished) {
         unfinished.asked = true;
         return;
     }
+    unfinished.children.iter().copied().for_each(interrupt);
     // A bake that is being kept would bring its folder back; a disk that does not answer is not waited for.
     let _halted = output::halt(Duration::from_secs(5));
     for folder in &unfinished.folders {

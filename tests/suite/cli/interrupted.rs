@@ -44,8 +44,18 @@ fn long_fit(sandbox: &Sandbox) -> Running {
 /// Ctrl-C, for the child and what it has started, as a terminal does it.
 #[cfg(unix)]
 fn interrupt(child: Running) -> Ran {
-    let group = format!("-{}", child.0.id());
-    assert!(Command::new("kill").args(["-INT", "--", &group]).status().unwrap().success());
+    interrupt_at(&format!("-{}", child.0.id()), child)
+}
+
+/// For the child alone, as a supervisor does it.
+#[cfg(unix)]
+fn interrupt_alone(child: Running) -> Ran {
+    interrupt_at(&child.0.id().to_string(), child)
+}
+
+#[cfg(unix)]
+fn interrupt_at(target: &str, child: Running) -> Ran {
+    assert!(Command::new("kill").args(["-INT", "--", target]).status().unwrap().success());
     finish(child)
 }
 
@@ -136,10 +146,15 @@ fn scratch(sandbox: &Sandbox) -> usize {
 /// A command that bakes without a cache, interrupted once its scratch is there.
 #[cfg(unix)]
 fn interrupted_in_its_bakes(sandbox: &Sandbox, arguments: &[&str]) -> Ran {
+    interrupt(in_its_bakes(sandbox, arguments))
+}
+
+#[cfg(unix)]
+fn in_its_bakes(sandbox: &Sandbox, arguments: &[&str]) -> Running {
     let child = started(sandbox, arguments, || scratch(sandbox) > 0);
     // Into the first of them.
     std::thread::sleep(Duration::from_millis(50));
-    interrupt(child)
+    child
 }
 
 #[cfg(unix)]
@@ -167,9 +182,15 @@ fn an_interrupted_sweep_keeps_the_results_of_its_jobs_and_leaves_no_scratch() {
         format!("{ablation}[[job]]\nrefit = true\n[[job]]\n[[job]]\npairs = true\n").as_bytes(),
     );
     let go_on = "skinfit: plan.toml: interrupted: jobs that were done have left their results.";
-    for workers in ["1", "2"] {
+    // With two workers the jobs are processes of their own; what is interrupted alone ends those that work for it.
+    for (workers, interrupt) in [
+        ("1", interrupt as fn(Running) -> Ran),
+        ("2", interrupt),
+        ("1", interrupt_alone),
+        ("2", interrupt_alone),
+    ] {
         let sweep = ["sweep", "plan.toml", "--no-cache", "--workers", workers];
-        let ran = interrupted_in_its_bakes(&sandbox, &sweep);
+        let ran = interrupt(in_its_bakes(&sandbox, &sweep));
         assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
         assert!(ran.err.lines().any(|line| line.starts_with(go_on)), "{ran:?}");
         assert_eq!(scratch(&sandbox), 0, "{workers} workers: scratch is left");
