@@ -4,6 +4,7 @@
 //! - [`buffer`]: tensors as ranges of wgpu buffers, both ways without a copy
 //! - [`shade`]: the model as an operation; [`inputs`]: what it takes; `stage`: its passes; `scatter`: what lookups of
 //!   a cube gained, added to its texels
+//! - `drawn`: samples that the adapter drew, as tensors
 //! - [`adjoint`]: the text of those passes: the image of stored samples, and its vector-Jacobian product
 //! - [`footprint`]: the linear maps of a scene: texels, vertices, cube borders
 //! - [`sparse`]: fixed linear maps, forwards and transposed: how maps are sampled, and how pixels are averaged
@@ -11,6 +12,7 @@
 pub mod adjoint;
 pub mod buffer;
 pub mod device;
+mod drawn;
 pub mod footprint;
 pub mod inputs;
 mod pass;

@@ -10,10 +10,12 @@ use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::wgpu::{CubeBackend, CubeTensor};
 use burn::tensor::{Tensor, TensorData};
 
+use super::drawn::Planes;
 use super::inputs::{Input, Inputs, TrackedTensor};
 use super::stage::Stage;
 use super::{SharedDevice, TensorError};
 use crate::bake::Illumination;
+use crate::engine::gpu::DeviceSamples;
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;
@@ -60,12 +62,37 @@ impl Shade {
         views: &[&ViewSamples],
         scatter: Scatter,
     ) -> Result<(Self, Inputs), TensorError> {
+        Self::build(shared, shaded, views, None, scatter)
+    }
+
+    /// As [`Self::new`], over samples that the adapter draws: `views` are the groups that came with them. What the
+    /// geometry pass leaves goes to tensors on the device; none of it passes through the host.
+    ///
+    /// # Errors
+    /// As [`Self::new`], and when they were drawn on another device.
+    pub fn over_device_samples(
+        shared: &SharedDevice,
+        shaded: &Shaded<'_>,
+        samples: &DeviceSamples<'_>,
+        views: &[&ViewSamples],
+        scatter: Scatter,
+    ) -> Result<(Self, Inputs), TensorError> {
+        Self::build(shared, shaded, views, Some(samples), scatter)
+    }
+
+    fn build(
+        shared: &SharedDevice,
+        shaded: &Shaded<'_>,
+        views: &[&ViewSamples],
+        made: Option<&DeviceSamples<'_>>,
+        scatter: Scatter,
+    ) -> Result<(Self, Inputs), TensorError> {
         let lobe = shaded.params.scalar(Param::SpecularLobe);
         let specular = shaded.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
         let cubes =
             [shaded.illumination.irradiance.as_ref(), specular.as_ref(), shaded.illumination.hilite.as_ref()];
-        let stage = Stage::new(shared, shaded, cubes, views, scatter)?;
-        let inputs = inputs(shared, &stage, shaded, cubes, views);
+        let (stage, drawn) = Stage::new(shared, shaded, cubes, views, made, scatter)?;
+        let inputs = inputs(shared, &stage, shaded, cubes, views, drawn.as_ref());
         Ok((Self(Arc::new(stage)), inputs))
     }
 
@@ -143,6 +170,7 @@ fn inputs(
     shaded: &Shaded<'_>,
     cubes: [Option<&Cube<f32>>; 3],
     views: &[&ViewSamples],
+    drawn: Option<&Planes>,
 ) -> Inputs {
     let device = shared.device();
     let matrix = |rows: usize, columns: usize, numbers: Vec<f32>| {
@@ -151,6 +179,9 @@ fn inputs(
     let planes = |input: Input, of: fn(&Fragment<f32>) -> &[f32]| {
         if !stage.adjoint.reads(input) {
             return matrix(1, 1, vec![0.0]);
+        }
+        if let Some(tensor) = drawn.and_then(|drawn| drawn.tensor(input)) {
+            return tensor;
         }
         let width = input.width().unwrap_or(1);
         let mut numbers = Vec::with_capacity(width * stage.samples);

@@ -2,7 +2,7 @@
 
 use std::time::Instant;
 
-use wgpu::{BufferUsages, CommandEncoderDescriptor};
+use wgpu::{Buffer, BufferUsages, CommandEncoderDescriptor};
 
 use super::parts::Part;
 use super::pipeline::buffer;
@@ -100,18 +100,28 @@ impl<'a> DeviceSamples<'a> {
         self.gpu.check()
     }
 
-    /// The surface of view `index`, drawn and read from the device: what the groups that came with it lack.
-    ///
-    /// # Errors
-    /// When the device fails, or a buffer cannot hold them.
-    pub fn read(&self, index: usize, groups: &ViewSamples) -> Result<SurfaceRecords, GpuError> {
+    /// The surface of view `index`, drawn into a buffer, and records that have places for it.
+    pub(crate) fn draw(
+        &self,
+        index: usize,
+        groups: &ViewSamples,
+    ) -> Result<(Buffer, SurfaceRecords), GpuError> {
         let (camera, covered) = &self.views[index];
-        let mut surface = asked_records(self.geometry.content().scene, groups.records());
+        let surface = asked_records(self.geometry.content().scene, groups.records());
         let bytes = 4 * LANES * surface.rows().all().len();
         let records = buffer(self.gpu, "samples", bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
         self.gpu.check()?;
         let wanted = Wanted { groups: 0..groups.groups(), records: records.clone() };
         self.geometry.fill(camera, covered, &[wanted])?;
+        Ok((records, surface))
+    }
+
+    /// The surface of view `index`, drawn and read from the device: what the groups that came with it lack.
+    ///
+    /// # Errors
+    /// When the device fails, or a buffer cannot hold them.
+    pub fn read(&self, index: usize, groups: &ViewSamples) -> Result<SurfaceRecords, GpuError> {
+        let (records, mut surface) = self.draw(index, groups)?;
         let encoder = self.gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
         let numbers = read_floats(self.gpu, encoder, &records)?;
         let stride = surface.rows().stride();

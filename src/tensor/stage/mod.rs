@@ -14,14 +14,16 @@ use wgpu::{
 
 use self::resident::{Constants, Faces, fixed_planes, group_starts};
 use super::buffer::{TensorBuffer, check_shape, lend};
+use super::drawn::Planes;
 use super::inputs::Input;
 use super::scatter::Scattering;
 use super::shade::{Scatter, Shaded};
 use super::{SharedDevice, TensorError, pass};
+use crate::engine::gpu::DeviceSamples;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::cube::Cube;
 use crate::model::params::Param;
-use crate::samples::ViewSamples;
+use crate::samples::{LANES, ViewSamples};
 use crate::tensor::adjoint::{Adjoint, Binding, Module};
 
 /// The operation's part on the device.
@@ -64,13 +66,19 @@ impl Stage {
         shaded: &Shaded<'_>,
         cubes: [Option<&Cube<f32>>; 3],
         views: &[&ViewSamples],
+        made: Option<&DeviceSamples<'_>>,
         scatter: Scatter,
-    ) -> Result<Self, TensorError> {
+    ) -> Result<(Self, Option<Planes>), TensorError> {
         let gpu = shared.gpu();
         let turned = shaded.params.scalar(Param::EnvironmentRotation) != 0.0;
         let adjoint = Adjoint::new(shaded.setup, shaded.columns, turned)?;
+        let drawn = made.map(|made| Planes::draw(shared, &adjoint, made, views)).transpose()?;
+        let fixed = match &drawn {
+            Some(drawn) => drawn.fixed.clone(),
+            None => gpu.storage("samples", bytemuck::cast_slice(&fixed_planes(&adjoint, views)))?,
+        };
         let slots = views.iter().map(|view| view.pixel.len()).sum();
-        let samples = views.iter().map(|view| view.surface.slots()).sum();
+        let samples = views.iter().map(|view| view.records() * LANES).sum();
         let mut faces = [None, None, None];
         for (i, cube) in cubes.into_iter().enumerate() {
             if let Some(cube) = cube.filter(|_| adjoint.reads(CUBES[i])) {
@@ -80,13 +88,13 @@ impl Stage {
         let module = |name: &str, wgsl: &str| -> Result<ComputePipeline, GpuError> {
             pass::pipeline(gpu, &pass::module(gpu, name, wgsl)?, "cs_main")
         };
-        Ok(Self {
+        let stage = Self {
             part: gpu.buffer(
                 "part",
                 bytemuck::cast_slice(&[slots as u32, samples as u32]),
                 BufferUsages::UNIFORM,
             ),
-            fixed: gpu.storage("samples", bytemuck::cast_slice(&fixed_planes(&adjoint, views)))?,
+            fixed,
             group_start: gpu.storage("groups", bytemuck::cast_slice(&group_starts(views)))?,
             constants: Constants::new(gpu, &adjoint, shaded)?,
             faces,
@@ -99,7 +107,8 @@ impl Stage {
             adjoint,
             slots,
             samples,
-        })
+        };
+        Ok((stage, drawn))
     }
 
     /// The shape of an input's tensor.

@@ -1,13 +1,14 @@
 //! The model on burn's tensors, beside the CPU model in f64.
 //!
 //! - `bench`: the shared device, and numbers to try
-//! - `device`: one device, no copies
+//! - `device`: one device, no copies; `drawn`: samples that the adapter drew
 //! - `matrices`: fixed linear maps
 //! - `maps`: fits of whole maps
 //! - `gradients`: the shading operation and its adjoint
 
 mod bench;
 mod device;
+mod drawn;
 mod gradients;
 mod maps;
 mod matrices;

@@ -1,0 +1,101 @@
+//! Samples that the adapter drew, as tensors without a way through the host.
+
+use std::path::Path;
+
+use skinfit::demo;
+use skinfit::engine::gpu::DeviceSamples;
+use skinfit::gpu::upload::Content;
+use skinfit::gpu::{Choice, Gpu};
+use skinfit::model::effects::Effects;
+use skinfit::model::params::{Column, Param};
+use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::samples::ViewSamples;
+use skinfit::tensor::{Input, Inputs, Scatter, Shade, Shaded, TensorError};
+
+use super::bench::{numbers, shared};
+
+/// Two views of the built-in scene, small, with the scene's own effects or others.
+fn small(effects: Option<Effects>) -> Prepared {
+    let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
+    let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
+    let options = PrepareOptions { effects, cache: Some(cache), ..PrepareOptions::default() };
+    let mut prepared = Prepared::baked(&scene, &options).unwrap();
+    prepared.scene.views.truncate(2);
+    for view in &mut prepared.scene.views {
+        (view.camera.width, view.camera.height) = (64, 48);
+    }
+    prepared
+}
+
+fn content(prepared: &Prepared) -> Content<'_> {
+    let Prepared { scene, illumination, occlusion, .. } = prepared;
+    Content { scene, illumination, occlusion: occlusion.as_ref(), params: &scene.params }
+}
+
+#[test]
+fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded() {
+    let Some(shared) = shared() else { return };
+    let columns = [Param::BaseWeight, Param::RimExponent, Param::Occlusion].map(Column::tied);
+    // With every map, and with none: what records lack has its neutral value.
+    for effects in [None, Some(Effects::SURFACE)] {
+        let prepared = small(effects);
+        let (made, groups) = DeviceSamples::new(shared.gpu(), content(&prepared)).unwrap();
+        let read: Vec<ViewSamples> = groups
+            .iter()
+            .enumerate()
+            .map(|(i, view)| ViewSamples { surface: made.read(i, view).unwrap(), ..view.clone() })
+            .collect();
+        let (groups, read): (Vec<_>, Vec<_>) = (groups.iter().collect(), read.iter().collect());
+        let shaded = Shaded {
+            setup: prepared.setup(),
+            params: &prepared.scene.params,
+            columns: &columns,
+            illumination: &prepared.illumination,
+        };
+        let image_and_gradients = |(shade, mut inputs): (Shade, Inputs)| {
+            let track = |tensor: burn::tensor::Tensor<2>| tensor.autodiff().require_grad();
+            inputs.columns = inputs.columns.autodiff().require_grad();
+            let [albedo, open] = [track(inputs.albedo), track(inputs.open)];
+            (inputs.albedo, inputs.open) = (albedo.clone(), open.clone());
+            let columns = inputs.columns.clone();
+            let image = shade.image(inputs).unwrap();
+            let gradients = (image.clone() * image.clone()).sum().backward();
+            let mut all = vec![numbers(image)];
+            all.push(numbers(columns.grad(&gradients).unwrap()));
+            for (input, tensor) in [(Input::Albedo, albedo), (Input::Open, open)] {
+                if shade.reads(input) {
+                    all.push(numbers(tensor.grad(&gradients).unwrap()));
+                }
+            }
+            all
+        };
+        let drawn = Shade::over_device_samples(shared, &shaded, &made, &groups, Scatter::Exact).unwrap();
+        let uploaded = Shade::new(shared, &shaded, &read, Scatter::Exact).unwrap();
+        assert_eq!(
+            (drawn.0.slots(), drawn.0.samples()),
+            (uploaded.0.slots(), uploaded.0.samples()),
+            "{effects:?}"
+        );
+        let (got, want) = (image_and_gradients(drawn), image_and_gradients(uploaded));
+        assert!(want[0].iter().any(|x| *x > 0.0) && want[1].iter().all(|x| *x != 0.0), "{effects:?}");
+        // The same numbers, by the same shaders: to the bit.
+        assert!(got == want, "{effects:?}");
+    }
+}
+
+#[test]
+fn samples_of_another_device_are_refused_in_words() {
+    let Some(shared) = shared() else { return };
+    let prepared = small(Some(Effects::SURFACE));
+    let other = Gpu::open(&Choice::default()).unwrap();
+    let (made, groups) = DeviceSamples::new(&other, content(&prepared)).unwrap();
+    let shaded = Shaded {
+        setup: prepared.setup(),
+        params: &prepared.scene.params,
+        columns: &[],
+        illumination: &prepared.illumination,
+    };
+    let groups: Vec<_> = groups.iter().collect();
+    let refused = Shade::over_device_samples(shared, &shaded, &made, &groups, Scatter::Exact).map(|_| ());
+    assert!(matches!(refused, Err(TensorError::Foreign { what: "the samples", .. })), "{refused:?}");
+}
