@@ -9,7 +9,7 @@ use burn::tensor::{Tensor, TensorData};
 use wgpu::{Buffer, BufferUsages, CommandEncoderDescriptor};
 
 use super::adjoint::Adjoint;
-use super::buffer::{lend, plain};
+use super::buffer::{TensorBuffer, lend, plain};
 use super::inputs::Input;
 use super::{SharedDevice, TensorError, pass};
 use crate::engine::gpu::DeviceSamples;
@@ -73,7 +73,7 @@ impl Planes {
             gpu.check()?;
             first += slots;
         }
-        let tensors = tensors.into_iter().map(|tensor| tensor.into_tensor());
+        let tensors = tensors.into_iter().map(TensorBuffer::into_tensor);
         Ok(Self { fixed, inputs: read.into_iter().zip(tensors).collect() })
     }
 
