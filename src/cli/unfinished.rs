@@ -3,10 +3,10 @@
 use std::borrow::Cow;
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Command, ExitStatus};
+use std::process::{Child, Command, ExitStatus};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use tempfile::TempDir;
 
@@ -28,7 +28,7 @@ struct Unfinished {
     /// What asks a fit to stop, once it has something to keep.
     fit: Option<Arc<AtomicBool>>,
     /// Processes that work for this one.
-    children: Vec<u32>,
+    children: Vec<Child>,
 }
 
 static UNFINISHED: Mutex<Unfinished> = Mutex::new(Unfinished {
@@ -68,15 +68,30 @@ pub(super) fn asked_through(flag: &Arc<AtomicBool>) {
 /// Run another process to its end. It is interrupted together with this one, and none is begun afterwards.
 pub(super) fn run(command: &mut Command) -> std::io::Result<ExitStatus> {
     // Who interrupts the program never gives back what is waited for here.
-    let mut child = change(|unfinished| {
+    let id = change(|unfinished| {
         let child = command.spawn()?;
-        unfinished.children.push(child.id());
-        Ok::<_, std::io::Error>(child)
+        let id = child.id();
+        unfinished.children.push(child);
+        Ok::<_, std::io::Error>(id)
     })?;
-    let status = child.wait();
-    change(|unfinished| unfinished.children.retain(|&id| id != child.id()));
-    status
+    loop {
+        // Its number is another's once it has ended and was waited for: both at once.
+        let ended = change(|unfinished| {
+            let at = unfinished.children.iter().position(|child| child.id() == id)?;
+            let runs = matches!(unfinished.children[at].try_wait(), Ok(None));
+            (!runs).then(|| unfinished.children.swap_remove(at).wait())
+        });
+        if let Some(status) = ended {
+            return status;
+        }
+        std::thread::sleep(POLL);
+    }
 }
+
+/// How often it is asked whether a process has ended.
+const POLL: Duration = Duration::from_millis(10);
+/// How long processes that were interrupted are waited for: they wait for a disk as long as this one does, and more.
+const LAST_WORDS: Duration = Duration::from_secs(6);
 
 /// Interrupt another process. At a terminal Ctrl-C is for that one, too; a signal by its number is not.
 #[cfg(unix)]
@@ -113,9 +128,15 @@ fn interrupted(unfinished: &mut Unfinished) {
         unfinished.asked = true;
         return;
     }
-    unfinished.children.iter().copied().for_each(interrupt);
+    unfinished.children.iter().for_each(|child| interrupt(child.id()));
     // A bake that is being kept would bring its folder back; a disk that does not answer is not waited for.
     let _halted = output::halt(Duration::from_secs(5));
+    let since = Instant::now();
+    while unfinished.children.iter_mut().any(|child| matches!(child.try_wait(), Ok(None)))
+        && since.elapsed() < LAST_WORDS
+    {
+        std::thread::sleep(POLL);
+    }
     for folder in &unfinished.folders {
         let _ = std::fs::remove_dir_all(folder);
     }

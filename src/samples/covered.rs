@@ -99,6 +99,12 @@ impl Covered {
         (Self { width: camera.width, axis, pixels, places, order }, samples)
     }
 
+    /// Groups of pixels.
+    #[must_use]
+    pub fn groups(&self) -> usize {
+        self.order.len().div_ceil(LANES)
+    }
+
     /// Samples that show the mesh.
     #[must_use]
     pub fn count(&self) -> usize {

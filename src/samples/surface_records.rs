@@ -21,6 +21,21 @@ pub const NEUTRAL: Fragment<f32> = Fragment {
     attenuator: 1.0,
 };
 
+/// What stands in for each number of a field that records lack, by the planner's name; `None` for base, view and the
+/// smooth normal.
+pub(crate) fn neutral(field: &str) -> Option<f32> {
+    Some(match field {
+        "bump" => NEUTRAL.bump[0],
+        "open" => NEUTRAL.occlusion,
+        "silhouette" => NEUTRAL.silhouette,
+        "dapple" => NEUTRAL.dapple,
+        "albedo" => NEUTRAL.albedo[0],
+        "specular" => NEUTRAL.specular,
+        "attenuator" => NEUTRAL.attenuator,
+        _ => return None,
+    })
+}
+
 /// Which numbers are kept of each sample, beside its base and its view vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs, reason = "named as the fragment's fields")]

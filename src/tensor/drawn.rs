@@ -14,7 +14,7 @@ use super::inputs::Input;
 use super::{SharedDevice, TensorError, pass};
 use crate::engine::gpu::DeviceSamples;
 use crate::gpu::records::StoredRecords;
-use crate::samples::surface_records::Places;
+use crate::samples::surface_records::{Places, neutral};
 use crate::samples::{LANES, ViewSamples};
 
 /// The inputs that samples hold.
@@ -32,7 +32,7 @@ impl Planes {
     /// Draw the samples of `views`, which came with `made`, and take their numbers to where an operation reads them.
     ///
     /// # Errors
-    /// When they are of another device, or it has no room.
+    /// When they are of another device or with other views, or it has no room.
     pub(super) fn draw(
         shared: &SharedDevice,
         adjoint: &Adjoint,
@@ -40,9 +40,12 @@ impl Planes {
         views: &[&ViewSamples],
     ) -> Result<Self, TensorError> {
         let gpu = shared.gpu();
+        let foreign = |reason: &str| TensorError::Foreign { what: "the samples", reason: reason.to_owned() };
         if !std::ptr::eq(made.gpu(), &**gpu) {
-            let reason = "they were drawn on another device".to_owned();
-            return Err(TensorError::Foreign { what: "the samples", reason });
+            return Err(foreign("they were drawn on another device"));
+        }
+        if !made.came_with(views) {
+            return Err(foreign("the views are not those that came with them, all and in their order"));
         }
         let samples: usize = views.iter().map(|view| view.records() * LANES).sum();
         let read: Vec<Input> = OF_SAMPLES.into_iter().filter(|&input| adjoint.reads(input)).collect();
@@ -87,12 +90,11 @@ impl Planes {
 /// The module that takes a view's records to the planes and the tensors, a sample a thread.
 fn text(adjoint: &Adjoint, read: &[Input], places: &Places, rows: usize) -> String {
     let stored = StoredRecords { name: "records", rows };
-    // What the records lack has its neutral value, as `samples` has it.
     let number = |field: &str, c: usize| {
         let row = |name: &str| places.fields().find(|(field, ..)| *field == name).map(|(_, row, _)| row + c);
         let row = row(field).or_else(|| if field == "normal" { row("base") } else { None });
-        let neutral = if matches!(field, "bump" | "silhouette") { "0.0" } else { "1.0" };
-        row.map_or_else(|| neutral.to_owned(), |row| stored.number("record", row))
+        let neutral = || format!("{:?}", neutral(field).unwrap_or(0.0));
+        row.map_or_else(neutral, |row| stored.number("record", row))
     };
     let mut wgsl = String::from(
         "// The first sample of the view, how many it has, and how many there are.\n\

@@ -96,6 +96,8 @@ struct OnDevice {
     programs: BTreeMap<(Wish, Written), Program>,
     /// What the terms were made with that stand in the samples' place.
     terms: Option<[f64; 5]>,
+    /// Whether terms stand there, perhaps in some parts only.
+    replaced: bool,
     /// The forward pass, and what is written into its text.
     images: Option<(Written, Images)>,
 }
@@ -163,6 +165,7 @@ impl<'g> GpuEngine<'g> {
                 lights: DeviceLights::new(illumination),
                 programs: BTreeMap::new(),
                 terms: None,
+                replaced: false,
                 images: None,
             }),
             fault: Mutex::new(None),
@@ -274,8 +277,9 @@ impl<'g> GpuEngine<'g> {
         if !self.keeps || device.terms == Some(key) {
             return Ok(());
         }
-        let OnDevice { parts, lights, programs, images, terms } = device;
-        if terms.take().is_some() {
+        let OnDevice { parts, lights, programs, images, terms, replaced } = device;
+        *terms = None;
+        if std::mem::replace(replaced, true) {
             parts.reload(self.gpu, self.views, self.made)?;
         }
         // Their bindings are to the buffers before.

@@ -27,7 +27,7 @@ fn tiles(pixels: usize, most: usize) -> u32 {
     pixels.div_ceil(WORKGROUP as usize * PIXELS_A_THREAD).clamp(1, most) as u32
 }
 
-/// Records that are packed at once: 6 to 21 MB.
+/// Records that are packed at once: 3 to 21 MB.
 const PACKED_RECORDS: usize = 1 << 14;
 
 /// Bytes of a dispatch's uniform block.
@@ -103,8 +103,9 @@ pub(super) struct Parts {
     pub(super) parts: Vec<Part>,
     traits: Traits,
     stride: usize,
-    /// Bytes that a part's samples may take.
+    /// Bytes that a part's samples may take, or their terms.
     limit: u64,
+    memory: Memory,
 }
 
 impl Parts {
@@ -119,7 +120,7 @@ impl Parts {
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let limit = memory.part.map_or(limit, |part| part.min(limit));
-        let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1, limit };
+        let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1, limit, memory };
         if let (Some(_), Some(most)) = (made, memory.resident) {
             let bytes = views.iter().map(|view| parts.size(view, &(0..view.samples.groups())).total()).sum();
             if bytes > most {
@@ -208,20 +209,29 @@ impl Parts {
         total
     }
 
-    /// Whether every part stays on the device, and a binding takes its samples as records of so many rows.
+    /// Whether every part stays on the device, and there is room for records of so many rows of each. Longer ones than
+    /// the samples' stand beside these while they are made: not where memory is limited.
     pub(super) fn all_hold(&self, rows: usize, views: &[ObservedView]) -> bool {
         let bytes = |part: &Part| (4 * rows * Self::samples(part, views)) as u64;
-        self.parts.iter().all(|part| part.resident && bytes(part) <= self.limit)
+        let room = |part: &Part| self.memory.resident.is_none() && bytes(part) <= self.limit;
+        self.parts.iter().all(|part| part.resident && (rows <= self.traits.rows || room(part)))
     }
 
     /// Upload every part's samples anew, or have them made anew, where their terms stand.
     pub(super) fn reload(
-        &self,
+        &mut self,
         gpu: &Gpu,
         views: &[ObservedView],
         made: Option<&DeviceSamples<'_>>,
     ) -> Result<(), GpuError> {
-        for part in &self.parts {
+        for index in 0..self.parts.len() {
+            let part = &self.parts[index];
+            let size = self.size(&views[part.view], &part.groups);
+            // Longer records than the samples' had a buffer of their own.
+            if part.buffers.samples.size() > size.samples.max(16) {
+                self.parts[index].buffers = PartBuffers::new(gpu, size)?;
+            }
+            let part = &self.parts[index];
             self.upload(gpu, &views[part.view], part, made.is_none())?;
         }
         made.map_or(Ok(()), |made| made.fill(&self.parts))

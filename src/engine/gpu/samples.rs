@@ -74,6 +74,14 @@ impl<'a> DeviceSamples<'a> {
         self.gpu
     }
 
+    /// Whether these are the groups that came with the samples, all of them and in their order.
+    #[cfg(feature = "burn")]
+    pub(crate) fn came_with(&self, groups: &[&ViewSamples]) -> bool {
+        let alike =
+            |((_, covered), groups): (&(Camera, Covered), &&ViewSamples)| covered.groups() == groups.groups();
+        self.views.len() == groups.len() && self.views.iter().zip(groups).all(alike)
+    }
+
     /// How many samples there are, padding aside.
     #[must_use]
     pub fn count(&self) -> usize {

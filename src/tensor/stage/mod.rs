@@ -72,6 +72,10 @@ impl Stage {
         let gpu = shared.gpu();
         let turned = shaded.params.scalar(Param::EnvironmentRotation) != 0.0;
         let adjoint = Adjoint::new(shaded.setup, shaded.columns, turned)?;
+        if made.is_none() && views.iter().any(|view| view.surface.slots() != view.records() * LANES) {
+            let reason = "the views hold groups without a surface".to_owned();
+            return Err(TensorError::Foreign { what: "the samples", reason });
+        }
         let drawn = made.map(|made| Planes::draw(shared, &adjoint, made, views)).transpose()?;
         let fixed = match &drawn {
             Some(drawn) => drawn.fixed.clone(),

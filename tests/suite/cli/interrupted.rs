@@ -47,7 +47,7 @@ fn interrupt(child: Running) -> Ran {
     interrupt_at(&format!("-{}", child.0.id()), child)
 }
 
-/// For the child alone, as a supervisor does it.
+/// For the child alone, as `kill` does it.
 #[cfg(unix)]
 fn interrupt_alone(child: Running) -> Ran {
     interrupt_at(&child.0.id().to_string(), child)

@@ -55,14 +55,16 @@ fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded()
         let image_and_gradients = |(shade, mut inputs): (Shade, Inputs)| {
             let track = |tensor: burn::tensor::Tensor<2>| tensor.autodiff().require_grad();
             inputs.columns = inputs.columns.autodiff().require_grad();
-            let [albedo, open] = [track(inputs.albedo), track(inputs.open)];
-            (inputs.albedo, inputs.open) = (albedo.clone(), open.clone());
+            let tracked =
+                [inputs.albedo, inputs.specular, inputs.attenuator, inputs.open, inputs.bump].map(track);
+            [inputs.albedo, inputs.specular, inputs.attenuator, inputs.open, inputs.bump] = tracked.clone();
             let columns = inputs.columns.clone();
             let image = shade.image(inputs).unwrap();
             let gradients = (image.clone() * image.clone()).sum().backward();
             let mut all = vec![numbers(image)];
             all.push(numbers(columns.grad(&gradients).unwrap()));
-            for (input, tensor) in [(Input::Albedo, albedo), (Input::Open, open)] {
+            let of_samples = [Input::Albedo, Input::Specular, Input::Attenuator, Input::Open, Input::Bump];
+            for (input, tensor) in of_samples.into_iter().zip(tracked) {
                 if shade.reads(input) {
                     all.push(numbers(tensor.grad(&gradients).unwrap()));
                 }
@@ -84,7 +86,7 @@ fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded()
 }
 
 #[test]
-fn samples_of_another_device_are_refused_in_words() {
+fn samples_of_another_device_and_other_views_are_refused_in_words() {
     let Some(shared) = shared() else { return };
     let prepared = small(Some(Effects::SURFACE));
     let other = Gpu::open(&Choice::default()).unwrap();
@@ -96,6 +98,16 @@ fn samples_of_another_device_are_refused_in_words() {
         illumination: &prepared.illumination,
     };
     let groups: Vec<_> = groups.iter().collect();
-    let refused = Shade::over_device_samples(shared, &shaded, &made, &groups, Scatter::Exact).map(|_| ());
-    assert!(matches!(refused, Err(TensorError::Foreign { what: "the samples", .. })), "{refused:?}");
+    let refused = |refused: Result<(), TensorError>, words: &str| {
+        let error = refused.unwrap_err();
+        assert!(matches!(error, TensorError::Foreign { what: "the samples", .. }), "{error:?}");
+        assert!(error.to_string().contains(words), "{error}");
+    };
+    let over = |made: &DeviceSamples<'_>, groups: &[&ViewSamples]| {
+        Shade::over_device_samples(shared, &shaded, made, groups, Scatter::Exact).map(|_| ())
+    };
+    refused(over(&made, &groups), "another device");
+    let (made, _) = DeviceSamples::new(shared.gpu(), content(&prepared)).unwrap();
+    refused(over(&made, &groups[..1]), "came with them");
+    refused(Shade::new(shared, &shaded, &groups, Scatter::Exact).map(|_| ()), "without a surface");
 }

@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use crate::gpu::records::StoredRecords;
 use crate::model::evaluate::Setup;
-use crate::samples::surface_records::Places;
+use crate::samples::surface_records::{Places, neutral};
 use crate::shader::emit::sample_fields;
 use crate::shader::facts::{Facts, Source};
 use crate::shader::search::components;
@@ -82,9 +82,8 @@ pub(super) fn fields_read(layout: &Layout, fields: &[Field], read: impl Fn(usize
         if let Some(places) = layout.places(field) {
             let numbers: Vec<String> = places.map(&read).collect();
             let _ = writeln!(wgsl, "    at.{name} = {kind}({});", numbers.join(", "));
-        } else if matches!(*name, "open" | "dapple" | "albedo" | "specular" | "attenuator") {
-            // What the records lack has its neutral value, as `samples` has it.
-            let _ = writeln!(wgsl, "    at.{name} = {kind}(1.0);");
+        } else if let Some(neutral) = neutral(name) {
+            let _ = writeln!(wgsl, "    at.{name} = {kind}({neutral:?});");
         }
     }
     wgsl
