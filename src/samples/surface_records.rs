@@ -23,6 +23,7 @@ pub const NEUTRAL: Fragment<f32> = Fragment {
 
 /// What stands in for each number of a field that records lack, by the planner's name; `None` for base, view and the
 /// smooth normal.
+#[cfg(feature = "gpu")]
 pub(crate) fn neutral(field: &str) -> Option<f32> {
     Some(match field {
         "bump" => NEUTRAL.bump[0],

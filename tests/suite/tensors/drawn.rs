@@ -6,7 +6,7 @@ use skinfit::demo;
 use skinfit::engine::gpu::DeviceSamples;
 use skinfit::gpu::upload::Content;
 use skinfit::gpu::{Choice, Gpu};
-use skinfit::model::effects::Effects;
+use skinfit::model::effects::{Effect, Effects};
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::{PrepareOptions, Prepared};
 use skinfit::samples::ViewSamples;
@@ -35,10 +35,12 @@ fn content(prepared: &Prepared) -> Content<'_> {
 #[test]
 fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded() {
     let Some(shared) = shared() else { return };
-    let columns = [Param::BaseWeight, Param::RimExponent, Param::Occlusion].map(Column::tied);
-    // With every map, and with none: what records lack has its neutral value.
-    for effects in [None, Some(Effects::SURFACE)] {
+    // With all that the scene shows, and with little: records and tensors hold what is asked for alone.
+    for effects in [None, Some(Effects::of(&[Effect::Diffuse, Effect::Rim]))] {
         let prepared = small(effects);
+        let asked = |param: &Param| param.asked_for(prepared.setup().effects);
+        let free = [Param::BaseWeight, Param::RimExponent, Param::Occlusion].into_iter().filter(asked);
+        let columns: Vec<Column> = free.map(Column::tied).collect();
         let (made, groups) = DeviceSamples::new(shared.gpu(), content(&prepared)).unwrap();
         let read: Vec<ViewSamples> = groups
             .iter()
