@@ -1,50 +1,26 @@
 //! **skinfit**: a differentiable shading-fit tool for real-time skin.
 //!
-//! Data flows one way through the modules, as `docs/architecture.md` draws it:
+//! The library is the members of the workspace; its modules stand here under one name:
 //!
-//! - [`model`]: the skin model of *Skin in the "Dawn" Demo* (GPU Gems, chapter 3), generic over
-//!   the scalar; its parameter table and its effects. Knows nothing of files or meshes.
-//! - [`scene`]: scene files, meshes, maps, cameras: everything that is read.
-//! - [`builtin`]: the scene that the program makes by itself.
-//! - [`bake`]: environment to cube maps, ambient occlusion, and their cache.
-//! - [`samples`]: the visible surface of each view, as records of sixteen pixels.
-//! - [`engine`]: loss, gradient and normal equations over samples.
-//! - [`fit`]: the solvers, and what is known of the answer afterwards.
-//! - [`render`]: images from samples, and image files.
-//! - `gpu`: the production renderer, planned shaders on a graphics adapter (feature `gpu`).
-//! - [`prepare`]: the stages up to the samples, run once and timed.
-//! - [`demo`]: the built-in scene as files, its targets rendered.
-//! - [`report`]: metrics, pictures and pages that show how good a fit is.
-//! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
-//! - `tensor`: the model on burn's tensors, differentiable (feature `burn`).
-//! - `maps`: fits of whole maps (feature `burn`).
-//! - [`export`]: constants and shaders as text for other engines.
-//! - [`study`]: what is measured about the model and the fits.
-//! - [`cli`]: the command line.
-//! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
-//!   instructions kernels are compiled for.
+//! - `skinfit_core`: from a scene to fitted constants, images and shaders, on the CPU
+//! - `skinfit_gpu`: the production renderer and the engine on a graphics adapter
+//! - `skinfit_tensor`: the model on burn's tensors, and fits of whole maps (feature `burn`)
+//! - `skinfit_report`: metrics, pictures and pages that show how good a fit is
+//! - `skinfit_study`: what is measured about the model and the fits
+//! - `skinfit_host`: the command line
 
-pub mod bake;
-pub mod builtin;
-pub mod cli;
-pub mod demo;
-pub mod engine;
-pub mod export;
-pub mod fit;
-#[cfg(feature = "gpu")]
-pub mod gpu;
+pub use skinfit_core::{
+    bake, builtin, demo, export, fit, model, output, prepare, progress, render, samples, scene, shader, simd,
+};
+pub use skinfit_gpu as gpu;
+pub use skinfit_host::cli;
+pub use skinfit_report as report;
+pub use skinfit_study as study;
 #[cfg(feature = "burn")]
-pub mod maps;
-pub mod model;
-pub mod output;
-pub mod prepare;
-pub mod progress;
-pub mod render;
-pub mod report;
-pub mod samples;
-pub mod scene;
-pub mod shader;
-pub mod simd;
-pub mod study;
-#[cfg(feature = "burn")]
-pub mod tensor;
+pub use skinfit_tensor::{self as tensor, maps};
+
+/// Loss, gradient and normal equations over samples.
+pub mod engine {
+    pub use skinfit_core::engine::*;
+    pub use skinfit_gpu::engine as gpu;
+}

@@ -21,10 +21,12 @@ const LONGEST_SLEEP: Duration = Duration::from_millis(2);
 /// An adapter's device, open for work.
 #[derive(Debug)]
 pub struct Gpu {
-    pub(crate) device: Device,
-    pub(crate) queue: Queue,
-    #[cfg(feature = "burn")]
-    pub(crate) adapter: Adapter,
+    /// The device, for passes of other libraries of the project.
+    pub device: Device,
+    /// Its queue.
+    pub queue: Queue,
+    /// The adapter that it is of.
+    pub adapter: Adapter,
     info: AdapterInfo,
     /// The first thing that went wrong; errors after it are its consequences.
     fault: Arc<Mutex<Option<GpuError>>>,
@@ -49,21 +51,14 @@ impl Gpu {
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
             GpuError::NoDevice { adapter: info.name.clone(), reason: sentence(&error.to_string()) }
         })?;
-        let gpu = Self {
-            device,
-            queue,
-            #[cfg(feature = "burn")]
-            adapter,
-            info,
-            fault: Arc::default(),
-        };
+        let gpu = Self { device, queue, adapter, info, fault: Arc::default() };
         gpu.listen();
         Ok(gpu)
     }
 
     /// Keep the first error, instead of wgpu's panic. A library that shares the device may have put its own
     /// listeners in their place.
-    pub(crate) fn listen(&self) {
+    pub fn listen(&self) {
         let (fault, adapter) = (self.fault.clone(), self.info.name.clone());
         self.device.on_uncaptured_error(Arc::new(move |error| {
             let adapter = adapter.clone();
@@ -97,7 +92,7 @@ impl Gpu {
     }
 
     /// A buffer that holds `contents`. (wgpu's own helper panics where the device is lost.)
-    pub(crate) fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
+    pub fn buffer(&self, label: &str, contents: &[u8], usage: BufferUsages) -> Buffer {
         let buffer = self.device.create_buffer(&BufferDescriptor {
             label: Some(label),
             size: contents.len() as u64,
@@ -112,8 +107,7 @@ impl Gpu {
     ///
     /// # Errors
     /// When it is larger than a binding may be, or the device does not take it.
-    #[cfg(feature = "burn")]
-    pub(crate) fn storage(&self, what: &str, contents: &[u8]) -> Result<Buffer, GpuError> {
+    pub fn storage(&self, what: &str, contents: &[u8]) -> Result<Buffer, GpuError> {
         self.check_binding(what, contents.len() as u64)?;
         let made = self.buffer(what, contents, BufferUsages::STORAGE);
         self.check()?;
@@ -124,8 +118,7 @@ impl Gpu {
     ///
     /// # Errors
     /// When it is larger than a binding may be, or the device has no room for it.
-    #[cfg(feature = "burn")]
-    pub(crate) fn scratch(&self, what: &str, bytes: u64) -> Result<Buffer, GpuError> {
+    pub fn scratch(&self, what: &str, bytes: u64) -> Result<Buffer, GpuError> {
         self.check_binding(what, bytes)?;
         let made = self.device.create_buffer(&BufferDescriptor {
             label: Some(what),
@@ -138,8 +131,7 @@ impl Gpu {
     }
 
     /// Refuse what a binding cannot hold.
-    #[cfg(feature = "burn")]
-    pub(crate) fn check_binding(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
+    pub fn check_binding(&self, what: &str, bytes: u64) -> Result<(), GpuError> {
         let limits = self.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         if bytes <= limit {
@@ -150,13 +142,12 @@ impl Gpu {
     }
 
     /// Keep what went wrong where nothing can be returned, for [`check`](Self::check) to tell.
-    #[cfg(feature = "burn")]
-    pub(crate) fn fail(&self, error: GpuError) {
+    pub fn fail(&self, error: GpuError) {
         keep(&self.fault, error);
     }
 
     /// Wait until all submitted work is done.
-    pub(crate) fn wait(&self) -> Result<(), GpuError> {
+    pub fn wait(&self) -> Result<(), GpuError> {
         let (send, told) = std::sync::mpsc::channel();
         self.queue.on_submitted_work_done(move || {
             // The receiver may have given up.
@@ -168,7 +159,7 @@ impl Gpu {
     /// Wait for the word of something that the device does. The device is asked again and again: a card answers
     /// sooner than the system would wake a thread that sleeps in the driver, and threads that share a device take
     /// one another's word.
-    pub(crate) fn until<T>(&self, told: &Receiver<T>) -> Result<T, GpuError> {
+    pub fn until<T>(&self, told: &Receiver<T>) -> Result<T, GpuError> {
         let start = Instant::now();
         loop {
             let polled = self.device.poll(PollType::Poll);
@@ -190,7 +181,7 @@ impl Gpu {
     }
 
     /// That the device does not answer, in the driver's words.
-    pub(crate) fn lost(&self, reason: &str) -> GpuError {
+    pub fn lost(&self, reason: &str) -> GpuError {
         match self.check() {
             Err(error) => error,
             Ok(()) => GpuError::Lost { adapter: self.info.name.clone(), reason: sentence(reason) },

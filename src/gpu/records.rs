@@ -15,8 +15,10 @@ const QUAD: usize = 4;
 /// Records of so many rows on an adapter, in a buffer of f32 that shaders know by a name. Where they read it four numbers
 /// at a time, it is bound a second time, as `<name>_quads`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct StoredRecords {
+pub struct StoredRecords {
+    /// What shaders call it.
     pub name: &'static str,
+    /// Numbers of a record, each of sixteen lanes.
     pub rows: usize,
 }
 
@@ -27,7 +29,7 @@ impl StoredRecords {
     }
 
     /// WGSL: the number of a row of `record` (a name), at `lane`.
-    pub(crate) fn number(self, record: &str, row: usize) -> String {
+    pub fn number(self, record: &str, row: usize) -> String {
         let (start, apart) = if row < self.in_quads() {
             (row / QUAD * QUAD * LANES + row % QUAD, format!("{QUAD}u * lane"))
         } else {
@@ -37,7 +39,7 @@ impl StoredRecords {
     }
 
     /// WGSL: the lines that read the quads of `record`, at `lane`, that hold some of the rows.
-    pub(crate) fn quads_read(self, record: &str, rows: impl IntoIterator<Item = usize>) -> String {
+    pub fn quads_read(self, record: &str, rows: impl IntoIterator<Item = usize>) -> String {
         let mut quads: Vec<usize> =
             rows.into_iter().filter(|&row| row < self.in_quads()).map(|row| row / QUAD).collect();
         quads.sort_unstable();
@@ -51,7 +53,7 @@ impl StoredRecords {
     }
 
     /// WGSL: the same, to be read after [`Self::quads_read`] with that row among others.
-    pub(crate) fn read(self, record: &str, row: usize) -> String {
+    pub fn read(self, record: &str, row: usize) -> String {
         if row < self.in_quads() {
             format!("{}{}[{}]", self.name, row / QUAD, row % QUAD)
         } else {
@@ -61,12 +63,12 @@ impl StoredRecords {
 }
 
 /// Records of `stride` rows as they stand on an adapter.
-pub(crate) fn packed(rows: &[Row], stride: usize) -> Vec<f32> {
+pub fn packed(rows: &[Row], stride: usize) -> Vec<f32> {
     transposed(bytemuck::cast_slice(rows), stride, |row, quad| (row, quad))
 }
 
 /// Numbers of records of `stride` rows, read from an adapter, as rows.
-pub(crate) fn unpacked(numbers: &[f32], stride: usize) -> Vec<f32> {
+pub fn unpacked(numbers: &[f32], stride: usize) -> Vec<f32> {
     transposed(numbers, stride, |row, quad| (quad, row))
 }
 

@@ -12,7 +12,7 @@ use super::adjoint::Adjoint;
 use super::buffer::{TensorBuffer, lend, plain};
 use super::inputs::Input;
 use super::{SharedDevice, TensorError, pass};
-use crate::engine::gpu::DeviceSamples;
+use crate::gpu::engine::DeviceSamples;
 use crate::gpu::records::StoredRecords;
 use crate::samples::surface_records::{Places, neutral};
 use crate::samples::{LANES, ViewSamples};

@@ -7,7 +7,7 @@ use burn::tensor::Tensor;
 use super::TensorError;
 use super::buffer::{plain, tracked};
 
-pub use crate::tensor::adjoint::Input;
+pub use crate::adjoint::Input;
 
 /// What the shading operation takes, on the shared device. What the enabled effects do not read is not looked at, and
 /// may have any shape.

@@ -15,7 +15,7 @@ use super::inputs::{Input, Inputs, TrackedTensor};
 use super::stage::Stage;
 use super::{SharedDevice, TensorError};
 use crate::bake::Illumination;
-use crate::engine::gpu::DeviceSamples;
+use crate::gpu::engine::DeviceSamples;
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;

@@ -462,7 +462,7 @@ fn vectors_hold_in_f32() {
 }
 
 fn run_lanes(level: Level) {
-    skinfit::with_simd!(level, simd => run(Lanes::splat(simd, 0.0)));
+    skinfit_core::with_simd!(level, simd => run(Lanes::splat(simd, 0.0)));
 }
 
 #[test]

@@ -8,10 +8,10 @@ use wgpu::{
 
 use super::draw::WORKGROUP;
 use super::surfaces::Surfaces;
-use crate::gpu::MOST_OF_A_DISPATCH;
-use crate::gpu::device::Gpu;
-use crate::gpu::error::GpuError;
-use crate::gpu::readback::read_words;
+use crate::MOST_OF_A_DISPATCH;
+use crate::device::Gpu;
+use crate::error::GpuError;
+use crate::readback::read_words;
 
 /// Threads of a workgroup of `coverage.wgsl`.
 const COVERAGE_THREADS: u32 = 64;

@@ -7,7 +7,7 @@
 
 use std::fmt::Write as _;
 
-use crate::gpu::records::StoredRecords;
+use crate::records::StoredRecords;
 use crate::samples::LANES;
 use crate::samples::surface_records::Places;
 use crate::shader::emit::SAMPLE;

@@ -6,9 +6,9 @@ use wgpu::{
     TextureFormat, TextureUsages, TextureView, TextureViewDescriptor,
 };
 
-use crate::gpu::device::Gpu;
-use crate::gpu::error::{GpuError, Oversized};
-use crate::gpu::targets::{DEPTH, Tile};
+use crate::device::Gpu;
+use crate::error::{GpuError, Oversized};
+use crate::targets::{DEPTH, Tile};
 
 /// The formats of so many targets.
 pub(super) fn formats(targets: usize) -> Vec<TextureFormat> {

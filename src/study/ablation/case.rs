@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Column, Param, Params};
-use crate::study::subject::hold;
+use crate::subject::hold;
 
 /// A part of the model that can be left out.
 ///

@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::{Ablation, Row, ViewRow, page};
+use crate::StudyError;
+use crate::leftovers::Leftovers;
 use crate::output::{self, OutputError};
+use crate::reference::{psnr_in_csv, psnr_in_words};
 use crate::render::files::write_png_bytes;
 use crate::render::image::Image;
 use crate::report::file_stem;
 use crate::report::metrics::PSNR_OF_EQUALS;
 use crate::report::pictures::{Picture, strip};
-use crate::study::StudyError;
-use crate::study::leftovers::Leftovers;
-use crate::study::reference::{psnr_in_csv, psnr_in_words};
-use crate::study::significance::Change;
-use crate::study::timing::Timed;
+use crate::significance::Change;
+use crate::timing::Timed;
 
 /// Write `results.csv`, `results.json`, `report.html` and, for each part and view, `<view>_without_<part>.png`
 /// (reference, what is left, FLIP error); what an earlier ablation left there and this one does not write anew goes.
@@ -138,7 +138,7 @@ fn json(scene: &str, ablation: &Ablation, files: &[String]) -> Result<String, se
     #[derive(Serialize)]
     struct File<'a> {
         scene: &'a str,
-        reference: crate::study::reference::Source,
+        reference: crate::reference::Source,
         constants: &'a str,
         refitted: bool,
         loss: &'static str,

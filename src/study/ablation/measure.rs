@@ -1,11 +1,11 @@
 //! The time of a case, taken in turns with the whole model's.
 
 use super::GpuTiming;
+use crate::StudyError;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::{Objective, Point};
-use crate::study::StudyError;
-use crate::study::subject::Subject;
-use crate::study::timing::{Rounds, Timed, interleaved, seconds_of};
+use crate::subject::Subject;
+use crate::timing::{Rounds, Timed, interleaved, seconds_of};
 
 /// The whole model, ready to be timed beside a case.
 pub struct Clocks<'a> {
@@ -51,15 +51,15 @@ impl<'a> Clocks<'a> {
 
 #[cfg(feature = "gpu")]
 mod gpu {
+    use crate::StudyError;
     use crate::engine::Point;
     use crate::gpu::upload::Content;
     use crate::gpu::{Choice, Gpu, RenderOptions, Renderer};
     use crate::model::params::Params;
     use crate::render::antialias::Antialias;
     use crate::shader::Budget;
-    use crate::study::StudyError;
-    use crate::study::subject::Subject;
-    use crate::study::timing::{Rounds, Spread, Timed, interleaved};
+    use crate::subject::Subject;
+    use crate::timing::{Rounds, Spread, Timed, interleaved};
 
     /// Frames between two turns.
     const FRAMES: usize = 5;
@@ -141,10 +141,10 @@ mod gpu {
 mod gpu {
     use std::marker::PhantomData;
 
+    use crate::StudyError;
     use crate::engine::Point;
-    use crate::study::StudyError;
-    use crate::study::subject::Subject;
-    use crate::study::timing::Timed;
+    use crate::subject::Subject;
+    use crate::timing::Timed;
 
     /// There is none.
     pub(super) struct Clock<'a>(PhantomData<&'a ()>);

@@ -6,14 +6,14 @@ use rayon::prelude::*;
 
 use super::{Ablation, Row};
 use crate::model::effects::Effect;
+use crate::reference::{Source, psnr_in_words};
 use crate::report::figures::triple;
 use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
 use crate::report::pictures::Picture;
 use crate::report::plot::{Dot, Joined, Plot};
 use crate::report::{number, seconds};
-use crate::study::reference::{Source, psnr_in_words};
-use crate::study::timing::Timed;
-use crate::study::titles::title;
+use crate::timing::Timed;
+use crate::titles::title;
 
 /// `report.html` of an ablation of the scene of that name.
 ///

@@ -173,7 +173,7 @@ pub fn to_toml(found: &[Found]) -> Result<String, toml::ser::Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::study::stability::random::batch;
+    use crate::stability::random::batch;
 
     #[test]
     fn cases_read_back_as_they_were_written_nan_and_signed_zeros_included() {

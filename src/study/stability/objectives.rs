@@ -5,12 +5,12 @@ use super::evaluate::{Answer, Evaluator, Sums, TARGET};
 use super::lights::LightBox;
 use crate::bake::Illumination;
 use crate::engine::cpu::CpuEngine;
-#[cfg(feature = "gpu")]
-use crate::engine::gpu::{GpuEngine, Memory, Task};
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Unknown};
 #[cfg(feature = "gpu")]
 use crate::gpu::Gpu;
+#[cfg(feature = "gpu")]
+use crate::gpu::engine::{GpuEngine, Memory, Task};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
 use crate::samples::rows::{Row, Rows};

@@ -4,7 +4,7 @@ use toml::Value;
 
 use crate::fit::SolverKind;
 use crate::scene::suggestion;
-use crate::study::tradeoff::axes;
+use crate::tradeoff::axes;
 
 /// What a job runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,6 +8,7 @@ use super::command::Command;
 use super::job::Job;
 use super::result::{Figures, Findings, number};
 use super::studies;
+use crate::StudyError;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::{Objective as _, Unknown};
 use crate::fit::outcome::Outcome;
@@ -15,10 +16,9 @@ use crate::fit::{FitError, FitOptions, SolverKind, fit};
 use crate::prepare::{PrepareError, PrepareOptions, Prepared};
 use crate::scene::Loss;
 use crate::scene::error::SceneError;
-use crate::study::StudyError;
-use crate::study::stability::lights::LightBox;
-use crate::study::stability::scene::{batches, sweepable};
-use crate::study::stability::{Study, evaluators, kept};
+use crate::stability::lights::LightBox;
+use crate::stability::scene::{batches, sweepable};
+use crate::stability::{Study, evaluators, kept};
 
 /// A job could not be done.
 #[derive(Debug, thiserror::Error)]

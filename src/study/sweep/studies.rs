@@ -7,10 +7,10 @@ use serde_json::Value;
 use super::job::Job;
 use super::result::{Figures, Findings, number};
 use super::run::{Inputs, JobError, add_constant};
-use crate::study::ablation::{self, AblationOptions, GpuTiming, ablate};
-use crate::study::timing::Timed;
-use crate::study::tradeoff::axis::{Setting, Sweep};
-use crate::study::tradeoff::{TradeoffOptions, tradeoff};
+use crate::ablation::{self, AblationOptions, GpuTiming, ablate};
+use crate::timing::Timed;
+use crate::tradeoff::axis::{Setting, Sweep};
+use crate::tradeoff::{TradeoffOptions, tradeoff};
 
 /// Where a study keeps its bakes.
 fn cache(inputs: &Inputs<'_>) -> Option<PathBuf> {

@@ -3,11 +3,11 @@
 use serde::Serialize;
 
 use super::bench::Bench;
+use crate::StudyError;
 use crate::model::effects::Silhouette;
+use crate::reference::Difference;
 use crate::scene::Quality;
-use crate::study::StudyError;
-use crate::study::reference::Difference;
-use crate::study::timing::Timed;
+use crate::timing::Timed;
 
 /// An approximation.
 pub trait Axis: Sync {

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::StudyError;
 use crate::bake::{self, Illumination};
 use crate::engine::Point;
 use crate::engine::cpu::CpuEngine;
@@ -15,8 +16,7 @@ use crate::render::shade::Shader;
 use crate::samples::rows::Rows;
 use crate::samples::{self, ViewSamples};
 use crate::scene::{Loss, Quality, Scene};
-use crate::study::StudyError;
-use crate::study::subject::shaded;
+use crate::subject::shaded;
 
 /// The settings that a scene file can have.
 #[derive(Clone, Copy, Debug, PartialEq)]

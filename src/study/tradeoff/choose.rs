@@ -9,9 +9,9 @@ use serde::Serialize;
 
 use super::axis::{Choose, Setting, Sweep};
 use super::bench::{Bench, Settings};
+use crate::StudyError;
+use crate::reference::Difference;
 use crate::report::number;
-use crate::study::StudyError;
-use crate::study::reference::Difference;
 
 /// What is looked for.
 #[derive(Clone, Copy, Debug, PartialEq)]

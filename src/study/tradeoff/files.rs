@@ -8,11 +8,11 @@ use serde::Serialize;
 use super::axis::{Setting, Sweep};
 use super::choose::{Choice, Missed};
 use super::{Tradeoff, page};
+use crate::StudyError;
+use crate::leftovers::Leftovers;
 use crate::output::{self, OutputError};
-use crate::study::StudyError;
-use crate::study::leftovers::Leftovers;
-use crate::study::reference::{psnr_in_csv, psnr_in_words};
-use crate::study::timing::Timed;
+use crate::reference::{psnr_in_csv, psnr_in_words};
+use crate::timing::Timed;
 
 /// What the CLI adds: the scene with what was chosen.
 pub const CHOSEN: &str = "scene.toml";

@@ -8,8 +8,8 @@ use super::choose::Choice;
 use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
 use crate::report::plot::{Dot, Joined, Plot};
 use crate::report::{count, number, seconds};
-use crate::study::timing::Timed;
-use crate::study::titles::title;
+use crate::timing::Timed;
+use crate::titles::title;
 
 /// Errors of so much of the image's root mean square are told of each axis.
 const TOLD: [f64; 2] = [0.01, 0.001];

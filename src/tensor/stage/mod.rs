@@ -19,12 +19,12 @@ use super::inputs::Input;
 use super::scatter::Scattering;
 use super::shade::{Scatter, Shaded};
 use super::{SharedDevice, TensorError, pass};
-use crate::engine::gpu::DeviceSamples;
+use crate::adjoint::{Adjoint, Binding, Module};
+use crate::gpu::engine::DeviceSamples;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::cube::Cube;
 use crate::model::params::Param;
 use crate::samples::{LANES, ViewSamples};
-use crate::tensor::adjoint::{Adjoint, Binding, Module};
 
 /// The operation's part on the device.
 #[derive(Debug)]

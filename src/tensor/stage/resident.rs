@@ -5,14 +5,14 @@ use wgpu::{
     TextureDimension, TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, TextureViewDimension,
 };
 
+use crate::adjoint::Adjoint;
+use crate::buffer::TensorBuffer;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::fragment::Fragment;
 use crate::model::params::Param;
+use crate::pass;
 use crate::samples::ViewSamples;
-use crate::tensor::adjoint::Adjoint;
-use crate::tensor::buffer::TensorBuffer;
-use crate::tensor::pass;
-use crate::tensor::shade::Shaded;
+use crate::shade::Shaded;
 
 /// The block of constants, and the pass that fills it.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use super::{FACING, HardCase, Holds, ORDINARY, case, only, with};
 use crate::model::effects::{Effect, Silhouette};
 use crate::model::params::Param;
-use crate::study::stability::case::FragmentInputs;
+use crate::stability::case::FragmentInputs;
 
 pub(super) fn bounds() -> Vec<HardCase> {
     let closed = FragmentInputs { occlusion: 0.0, silhouette: 0.75, ..ORDINARY };

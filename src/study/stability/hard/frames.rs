@@ -1,6 +1,6 @@
 //! Vertices: N, T or both without a direction, parallel, or not finite.
 
-use crate::study::stability::case::VertexInputs;
+use crate::stability::case::VertexInputs;
 
 /// A named case of a vertex.
 pub struct HardFrame {

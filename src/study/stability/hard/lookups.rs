@@ -4,8 +4,8 @@ use super::{FLAT, HardCase, Holds, case, only, with};
 use crate::model::cube::face_direction;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
-use crate::study::stability::case::FragmentInputs;
-use crate::study::stability::lights::LightKind;
+use crate::stability::case::FragmentInputs;
+use crate::stability::lights::LightKind;
 
 pub(super) fn lookups() -> Vec<HardCase> {
     let towards = |normal: [f64; 3]| FragmentInputs { normal, ..FLAT };

@@ -3,7 +3,7 @@
 use super::{FACING, FLAT, HardCase, Holds, ORDINARY, case, with};
 use crate::model::effects::{Form, Silhouette};
 use crate::model::params::Param;
-use crate::study::stability::case::FragmentInputs;
+use crate::stability::case::FragmentInputs;
 
 pub(super) fn normals() -> Vec<HardCase> {
     let texel = |texel: [f64; 3]| FragmentInputs { texel, ..FLAT };

@@ -3,7 +3,7 @@
 use super::{HardCase, Holds, ORDINARY, case, only, with};
 use crate::model::effects::{Effect, Effects, Silhouette};
 use crate::model::params::Param;
-use crate::study::stability::case::FragmentInputs;
+use crate::stability::case::FragmentInputs;
 
 /// Exponents from bound to bound.
 const EXPONENTS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 16.0];

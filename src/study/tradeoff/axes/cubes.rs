@@ -1,10 +1,10 @@
 //! How many texels a cube's face needs.
 
 use super::quality::{Swept, bake_seconds};
+use crate::StudyError;
 use crate::model::effects::{Effect, Effects, Needs};
-use crate::study::StudyError;
-use crate::study::tradeoff::axis::{Axis, Knob, Sweep};
-use crate::study::tradeoff::bench::Bench;
+use crate::tradeoff::axis::{Axis, Knob, Sweep};
+use crate::tradeoff::bench::Bench;
 
 /// The size of one kind of cube.
 pub(super) struct CubeSize {

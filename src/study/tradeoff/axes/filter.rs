@@ -1,11 +1,11 @@
 //! What coarser filtering of the cubes costs in accuracy.
 
 use super::format::images_in;
+use crate::StudyError;
 use crate::model::formats::{Emulated, Format, HardwareFilter, NearestTexel};
-use crate::study::StudyError;
-use crate::study::reference::Difference;
-use crate::study::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
-use crate::study::tradeoff::bench::Bench;
+use crate::reference::Difference;
+use crate::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
+use crate::tradeoff::bench::Bench;
 
 /// Filters of cube lookups.
 pub(super) struct Filters;

@@ -1,13 +1,13 @@
 //! What a number format costs in accuracy.
 
+use crate::StudyError;
 use crate::engine::Objective;
 use crate::model::formats::{Declared, Emulated, Fixed, Format, Half, Single};
+use crate::reference::Difference;
 use crate::render::image::Image;
-use crate::study::StudyError;
-use crate::study::reference::Difference;
-use crate::study::timing::{Rounds, interleaved, seconds_of};
-use crate::study::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
-use crate::study::tradeoff::bench::{Bench, Evaluated};
+use crate::timing::{Rounds, interleaved, seconds_of};
+use crate::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
+use crate::tradeoff::bench::{Bench, Evaluated};
 
 /// Number formats.
 pub(super) struct Formats;

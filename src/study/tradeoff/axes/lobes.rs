@@ -1,13 +1,13 @@
 //! How densely the stack of specular cubes must stand over the exponent.
 
 use super::quality::Swept;
+use crate::StudyError;
 use crate::bake;
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::Param;
 use crate::prepare::PrepareError;
-use crate::study::StudyError;
-use crate::study::tradeoff::axis::{Axis, Knob, Sweep};
-use crate::study::tradeoff::bench::Bench;
+use crate::tradeoff::axis::{Axis, Knob, Sweep};
+use crate::tradeoff::bench::Bench;
 
 /// The number of specular cubes an octave.
 pub(super) struct Density;

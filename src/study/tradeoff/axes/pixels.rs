@@ -1,10 +1,10 @@
 //! How many pixels a fit needs.
 
 use super::solver::Fits;
+use crate::StudyError;
 use crate::fit::SolverKind;
-use crate::study::StudyError;
-use crate::study::tradeoff::axis::{Axis, Sweep};
-use crate::study::tradeoff::bench::Bench;
+use crate::tradeoff::axis::{Axis, Sweep};
+use crate::tradeoff::bench::Bench;
 
 /// Pixels used in a fit: every n-th block of them, or a coarse fit first and finer ones from there.
 pub(super) struct Pixels;

@@ -1,12 +1,12 @@
 //! What the axes of the `[quality]` table share: a number swept, the greatest being the reference.
 
+use crate::StudyError;
 use crate::engine::Point;
+use crate::reference::Difference;
 use crate::scene::Scene;
-use crate::study::StudyError;
-use crate::study::reference::Difference;
-use crate::study::timing::{Job, Rounds, interleaved};
-use crate::study::tradeoff::axis::{Choose, Knob, Setting, Sweep, mark_front};
-use crate::study::tradeoff::bench::{Bench, Settings, baked};
+use crate::timing::{Job, Rounds, interleaved};
+use crate::tradeoff::axis::{Choose, Knob, Setting, Sweep, mark_front};
+use crate::tradeoff::bench::{Bench, Settings, baked};
 
 /// How bakes, traces and fits are timed. What takes longer than a few seconds is run once: what disturbs it for a
 /// moment does not show in it. Of the others three rounds are the fewest with a middle.

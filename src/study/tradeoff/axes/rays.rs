@@ -1,10 +1,10 @@
 //! How many rays a vertex ambient occlusion needs.
 
 use super::quality::{Swept, bake_seconds};
+use crate::StudyError;
 use crate::model::effects::{Effect, Effects};
-use crate::study::StudyError;
-use crate::study::tradeoff::axis::{Axis, Knob, Sweep};
-use crate::study::tradeoff::bench::Bench;
+use crate::tradeoff::axis::{Axis, Knob, Sweep};
+use crate::tradeoff::bench::Bench;
 
 /// The number of occlusion rays.
 pub(super) struct Rays;

@@ -4,12 +4,12 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use glam::Vec3;
 
+use crate::StudyError;
 use crate::bake::VertexOcclusion;
 use crate::prepare::PrepareError;
 use crate::samples;
 use crate::scene::mesh::{Mesh, PosedMesh};
-use crate::study::StudyError;
-use crate::study::tradeoff::bench::{Bench, Evaluated, Settings};
+use crate::tradeoff::bench::{Bench, Evaluated, Settings};
 
 /// A mesh in the world, cut finer or coarser, with the occlusion of its vertices.
 pub(super) struct Remeshed {

@@ -1,11 +1,11 @@
 //! How many samples a pixel needs.
 
 use super::quality::Swept;
+use crate::StudyError;
 use crate::engine::Objective;
-use crate::study::StudyError;
-use crate::study::timing::seconds_of;
-use crate::study::tradeoff::axis::{Axis, Knob, Sweep};
-use crate::study::tradeoff::bench::Bench;
+use crate::timing::seconds_of;
+use crate::tradeoff::axis::{Axis, Knob, Sweep};
+use crate::tradeoff::bench::Bench;
 
 /// Samples along a pixel's side.
 pub(super) struct Samples;

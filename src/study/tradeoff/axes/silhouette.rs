@@ -1,13 +1,13 @@
 //! How finely a mesh must be tessellated for silhouettes that are interpolated from its vertices.
 
 use super::remeshed::Remeshed;
+use crate::StudyError;
 use crate::model::effects::Silhouette;
+use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::shader::{Budget, Facts, facts::tessellation_error, plan};
-use crate::study::StudyError;
-use crate::study::reference::Difference;
-use crate::study::tradeoff::axis::{Axis, Choose, Setting, Sweep, mark_front};
-use crate::study::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::axis::{Axis, Choose, Setting, Sweep, mark_front};
+use crate::tradeoff::bench::{Bench, Settings};
 
 /// Where the silhouette is evaluated, against how fine the mesh is.
 pub(super) struct Silhouettes;

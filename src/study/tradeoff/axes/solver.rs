@@ -3,16 +3,16 @@
 use std::cell::RefCell;
 
 use super::quality::ROUNDS;
+use crate::StudyError;
 use crate::engine::Point;
 use crate::engine::cpu::CpuEngine;
 use crate::fit::outcome::Outcome;
 use crate::fit::{self, FitOptions, SolverKind};
-use crate::study::StudyError;
-use crate::study::reference::Difference;
-use crate::study::subject::Subject;
-use crate::study::timing::{Job, interleaved};
-use crate::study::tradeoff::axis::{Axis, Setting, Sweep, Trace, mark_front};
-use crate::study::tradeoff::bench::Bench;
+use crate::reference::Difference;
+use crate::subject::Subject;
+use crate::timing::{Job, interleaved};
+use crate::tradeoff::axis::{Axis, Setting, Sweep, Trace, mark_front};
+use crate::tradeoff::bench::Bench;
 
 /// The solvers.
 pub(super) struct Solvers;

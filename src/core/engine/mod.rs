@@ -1,0 +1,167 @@
+//! Loss, gradient and normal equations over samples.
+//!
+//! - [`Objective`]: all that the solvers see of an engine
+//! - [`cpu`]: the CPU engine; its parts are `plan` (what a pass computes), `kernel` (groups of pixels
+//!   to columns), `window` (where these stand), `gram` (columns to products) and [`residual`] (the losses)
+//! - [`lanes`]: sixteen f32 lanes as one number of the model; `corners`: their lookups in cubes
+//! - [`mod@reference`]: the same in f64, plainly: what both are held against
+//! - [`view`]: samples beside what was observed; `records`: the same as the kernel reads them
+
+mod corners;
+pub mod cpu;
+mod gram;
+mod kernel;
+pub mod lanes;
+mod plan;
+mod records;
+pub mod reference;
+pub mod residual;
+pub mod view;
+mod window;
+
+use crate::model::params::{Column, Params};
+
+/// Groups of a block of pixels: a coarse pass reads every so-many-th block.
+pub const BLOCK: usize = 16;
+
+/// What one pass over the samples yields for a list of free columns at one point.
+///
+/// With residuals r_i (each weighted, over pixels and channels) the sums are over all i; `jtj` is
+/// row-major and symmetric, in the order of the columns.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NormalEquations {
+    /// The loss: mean of the weighted per-residual losses.
+    pub loss: f64,
+    /// Sum of weights times squared residuals (of a robust loss: its reweighted quadratic).
+    pub residual: f64,
+    /// Sum of the residuals' weights (the loss' denominator).
+    pub weight: f64,
+    /// How many residuals have a weight above 0.
+    pub count: u64,
+    /// J^T r.
+    pub jtr: Vec<f64>,
+    /// J^T J, K x K.
+    pub jtj: Vec<f64>,
+}
+
+impl NormalEquations {
+    /// The loss and its gradient: the loss is a mean of rho, and J^T r sums d rho / 2.
+    #[must_use]
+    pub fn loss_and_gradient(&self) -> (f64, Vec<f64>) {
+        let factor = if self.weight > 0.0 { 2.0 / self.weight } else { 0.0 };
+        (self.loss, self.jtr.iter().map(|x| factor * x).collect())
+    }
+}
+
+/// Something that can be fitted: the solvers see no more of an engine than this.
+pub trait Objective: Sync {
+    /// The unknowns, in the order of every vector below: parameters' columns, then gains.
+    fn unknowns(&self) -> &[Unknown];
+    /// Whether the loss is exactly quadratic in the linear unknowns, as l2 and relative_l2 are when
+    /// no target pixel is clipped: a solver then knows the loss at other linear unknowns without a
+    /// pass. `false` is always safe.
+    fn is_quadratic(&self) -> bool {
+        false
+    }
+    /// The sum of weighted squared residuals that the roundings of the engine's numbers may leave at
+    /// the best of fits: `sum(w (e t)^2)` over targets t held to within a share e. 0 is for exact
+    /// numbers.
+    fn rounding(&self) -> f64 {
+        0.0
+    }
+    /// Why passes cannot be made any more, as when a device is lost; what they yielded since is void.
+    fn fault(&self) -> Option<String> {
+        None
+    }
+    /// Loss and normal equations at `point` (parameters and gains), for all unknowns.
+    fn normal_equations(&self, point: &Point) -> NormalEquations;
+    /// The loss alone.
+    fn loss(&self, point: &Point) -> f64;
+    /// The loss and its gradient with respect to the unknowns.
+    fn gradient(&self, point: &Point) -> (f64, Vec<f64>);
+}
+
+/// Half a unit in the last place of an f32, as a share of the number.
+const HALF_UNIT: f64 = 1.0 / (1 << 24) as f64;
+
+/// [`Objective::rounding`] of an engine that computes in f32 and reads every `stride`-th block of each view.
+pub fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: usize) -> f64 {
+    use rayon::prelude::*;
+    // A fixed number of blocks a sum, so that it does not depend on threads.
+    const BLOCKS: usize = 512;
+    let power = |view: &view::ObservedView| {
+        let groups = view.samples.groups();
+        let read: Vec<usize> = (0..groups.div_ceil(BLOCK)).step_by(stride).collect();
+        let sums = read.par_chunks(BLOCKS).map(|blocks| {
+            let groups = blocks.iter().flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK));
+            view.power(groups, loss)
+        });
+        sums.collect::<Vec<f64>>().iter().sum::<f64>()
+    };
+    HALF_UNIT * HALF_UNIT * views.iter().map(power).sum::<f64>()
+}
+
+/// One unknown of a fit.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Unknown {
+    /// A parameter of the model (tied, or one channel of it).
+    Param(Column),
+    /// The gain of a view, by its index.
+    Gain(usize),
+}
+
+/// Where an objective is evaluated.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Point {
+    /// The model's parameters.
+    pub params: Params,
+    /// A factor on each view's image.
+    pub gains: Vec<f64>,
+}
+
+impl Unknown {
+    /// This unknown's value at `point`.
+    #[must_use]
+    pub fn get(&self, point: &Point) -> f64 {
+        match self {
+            Self::Param(column) => column.get(&point.params),
+            Self::Gain(view) => point.gains[*view],
+        }
+    }
+
+    /// Set this unknown's value at `point`.
+    pub fn set(&self, point: &mut Point, value: f64) {
+        match self {
+            Self::Param(column) => column.set(&mut point.params, value),
+            Self::Gain(view) => point.gains[*view] = value,
+        }
+    }
+
+    /// Least and greatest allowed value.
+    #[must_use]
+    pub fn bounds(&self) -> (f64, f64) {
+        match self {
+            Self::Param(column) => (column.param.info().lower, column.param.info().upper),
+            // A gain of 0 would explain any image by darkness.
+            Self::Gain(_) => (1e-3, 1e3),
+        }
+    }
+
+    /// Whether the model is linear in it once the non-linear unknowns are fixed.
+    #[must_use]
+    pub fn linear(&self) -> bool {
+        match self {
+            Self::Param(column) => column.param.info().linear,
+            Self::Gain(_) => false,
+        }
+    }
+
+    /// The name in reports.
+    #[must_use]
+    pub fn name(&self) -> String {
+        match self {
+            Self::Param(column) => column.name(),
+            Self::Gain(view) => format!("gain.{view}"),
+        }
+    }
+}

@@ -1,0 +1,59 @@
+//! One view as the engine sees it: its samples beside what was observed there.
+
+use super::residual::weighted_residual;
+use crate::samples::rows::{Row, Rows};
+use crate::samples::{LANES, ViewSamples};
+use crate::scene::Loss;
+use crate::scene::view::Clip;
+
+/// Samples of a view, and the target at its pixel slots.
+#[derive(Clone, Debug, Default)]
+pub struct ObservedView {
+    /// The visible surface.
+    pub samples: ViewSamples,
+    /// For each group: three rows of the target's colour, not premultiplied, and where the haze is
+    /// compared too a fourth of its alpha.
+    pub target: Rows,
+    /// For each group what its pixels count; 0 for padding. Empty: every pixel counts 1.
+    pub weight: Vec<Row>,
+    /// Where an 8-bit target is clipped.
+    pub clip: Option<Clip>,
+}
+
+impl ObservedView {
+    /// Whether the target has an alpha that the haze is compared with.
+    #[must_use]
+    pub const fn compares_alpha(&self) -> bool {
+        self.target.stride() == 4
+    }
+
+    /// What the pixel at `slot` counts.
+    #[must_use]
+    pub fn pixel_weight(&self, slot: usize) -> f32 {
+        self.weight.get(slot / LANES).map_or(1.0, |row| row[slot % LANES])
+    }
+
+    /// Sum of the squared target, weighted as the residuals of a perfect fit are.
+    pub(super) fn power(&self, groups: impl Iterator<Item = usize>, loss: Loss) -> f64 {
+        let of = |slot: usize| {
+            let weight = f64::from(self.pixel_weight(slot));
+            let square = |channel: usize| {
+                let target = f64::from(self.target.number(channel, slot));
+                (weighted_residual(loss, self.clip, target, target, weight).scale * target).powi(2)
+            };
+            (0..self.target.stride()).map(square).sum::<f64>()
+        };
+        slots(groups).map(of).sum()
+    }
+
+    /// Sum of the pixels' weights, and how many count at all.
+    pub fn weight_and_count(&self, groups: impl Iterator<Item = usize>) -> (f64, u64) {
+        slots(groups)
+            .map(|slot| self.pixel_weight(slot))
+            .fold((0.0, 0), |(sum, count), weight| (sum + f64::from(weight), count + u64::from(weight > 0.0)))
+    }
+}
+
+fn slots(groups: impl Iterator<Item = usize>) -> impl Iterator<Item = usize> {
+    groups.flat_map(|group| group * LANES..(group + 1) * LANES)
+}

@@ -1,0 +1,35 @@
+//! skinfit's library: from a scene to fitted constants, images and shaders, on the CPU.
+//!
+//! Data flows one way through the modules, as `docs/architecture.md` draws it:
+//!
+//! - [`model`]: the skin model of *Skin in the "Dawn" Demo* (GPU Gems, chapter 3), generic over
+//!   the scalar; its parameter table and its effects. Knows nothing of files or meshes.
+//! - [`scene`]: scene files, meshes, maps, cameras: everything that is read.
+//! - [`builtin`]: the scene that the program makes by itself.
+//! - [`bake`]: environment to cube maps, ambient occlusion, and their cache.
+//! - [`samples`]: the visible surface of each view, as records of sixteen pixels.
+//! - [`engine`]: loss, gradient and normal equations over samples.
+//! - [`fit`]: the solvers, and what is known of the answer afterwards.
+//! - [`render`]: images from samples, and image files.
+//! - [`prepare`]: the stages up to the samples, run once and timed.
+//! - [`demo`]: the built-in scene as files, its targets rendered.
+//! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
+//! - [`export`]: constants and shaders as text for other engines.
+//! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
+//!   instructions kernels are compiled for.
+
+pub mod bake;
+pub mod builtin;
+pub mod demo;
+pub mod engine;
+pub mod export;
+pub mod fit;
+pub mod model;
+pub mod output;
+pub mod prepare;
+pub mod progress;
+pub mod render;
+pub mod samples;
+pub mod scene;
+pub mod shader;
+pub mod simd;

@@ -1,0 +1,250 @@
+//! What the model reads of each sample, record by record.
+
+use std::ops::Range;
+
+use super::LANES;
+use super::rows::{Row, Rows};
+use crate::model::fragment::Fragment;
+
+/// What stands in for a number that no enabled effect asks for. The smooth normal's stand-in is the
+/// sample's own base.
+pub const NEUTRAL: Fragment<f32> = Fragment {
+    base: [0.0; 3],
+    bump: [0.0; 3],
+    normal: [0.0; 3],
+    view: [0.0; 3],
+    occlusion: 1.0,
+    silhouette: 0.0,
+    dapple: 1.0,
+    albedo: [1.0; 3],
+    specular: 1.0,
+    attenuator: 1.0,
+};
+
+/// What stands in for each number of a field that records lack, by the planner's name; `None` for base, view and the
+/// smooth normal.
+pub fn neutral(field: &str) -> Option<f32> {
+    Some(match field {
+        "bump" => NEUTRAL.bump[0],
+        "open" => NEUTRAL.occlusion,
+        "silhouette" => NEUTRAL.silhouette,
+        "dapple" => NEUTRAL.dapple,
+        "albedo" => NEUTRAL.albedo[0],
+        "specular" => NEUTRAL.specular,
+        "attenuator" => NEUTRAL.attenuator,
+        _ => return None,
+    })
+}
+
+/// Which numbers are kept of each sample, beside its base and its view vector.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs, reason = "named as the fragment's fields")]
+pub struct Asked {
+    pub bump: bool,
+    pub normal: bool,
+    pub albedo: bool,
+    pub occlusion: bool,
+    pub silhouette: bool,
+    pub dapple: bool,
+    pub specular: bool,
+    pub attenuator: bool,
+    /// The sample's share of its pixel; without it, each counts 1.
+    pub weight: bool,
+}
+
+impl Asked {
+    /// Every number.
+    pub const EVERYTHING: Self = Self {
+        bump: true,
+        normal: true,
+        albedo: true,
+        occlusion: true,
+        silhouette: true,
+        dapple: true,
+        specular: true,
+        attenuator: true,
+        weight: true,
+    };
+}
+
+/// Where a record's numbers stand: of a vector, the first of its three rows. `None` where no enabled
+/// effect asks for them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[allow(missing_docs, reason = "named as the fragment's fields")]
+pub struct Places {
+    pub base: Option<usize>,
+    pub bump: Option<usize>,
+    pub view: Option<usize>,
+    pub normal: Option<usize>,
+    pub albedo: Option<usize>,
+    pub occlusion: Option<usize>,
+    pub silhouette: Option<usize>,
+    pub dapple: Option<usize>,
+    pub specular: Option<usize>,
+    pub attenuator: Option<usize>,
+    /// The sample's share of its pixel.
+    pub weight: Option<usize>,
+}
+
+impl Places {
+    /// The places of what is asked for, and how many rows a record has.
+    fn new(asked: Asked) -> (Self, usize) {
+        let mut rows = 0;
+        let mut place = |wanted: bool, size: usize| {
+            wanted.then(|| {
+                rows += size;
+                rows - size
+            })
+        };
+        let places = Self {
+            base: place(true, 3),
+            bump: place(asked.bump, 3),
+            view: place(true, 3),
+            normal: place(asked.normal, 3),
+            albedo: place(asked.albedo, 3),
+            occlusion: place(asked.occlusion, 1),
+            silhouette: place(asked.silhouette, 1),
+            dapple: place(asked.dapple, 1),
+            specular: place(asked.specular, 1),
+            attenuator: place(asked.attenuator, 1),
+            weight: place(asked.weight, 1),
+        };
+        (places, rows)
+    }
+
+    /// The fields that are kept: name in the planner's words, first row, and how many rows.
+    pub fn fields(&self) -> impl Iterator<Item = (&'static str, usize, usize)> {
+        let fields = [
+            ("base", self.base, 3),
+            ("bump", self.bump, 3),
+            ("normal", self.normal, 3),
+            ("view", self.view, 3),
+            ("open", self.occlusion, 1),
+            ("silhouette", self.silhouette, 1),
+            ("dapple", self.dapple, 1),
+            ("albedo", self.albedo, 3),
+            ("specular", self.specular, 1),
+            ("attenuator", self.attenuator, 1),
+        ];
+        fields.into_iter().filter_map(|(name, place, rows)| Some((name, place?, rows)))
+    }
+
+    fn vectors(&self, f: &Fragment<f32>) -> [(Option<usize>, [f32; 3]); 5] {
+        [
+            (self.base, f.base),
+            (self.bump, f.bump),
+            (self.view, f.view),
+            (self.normal, f.normal),
+            (self.albedo, f.albedo),
+        ]
+    }
+
+    fn scalars(&self, f: &Fragment<f32>) -> [(Option<usize>, f32); 5] {
+        [
+            (self.occlusion, f.occlusion),
+            (self.silhouette, f.silhouette),
+            (self.dapple, f.dapple),
+            (self.specular, f.specular),
+            (self.attenuator, f.attenuator),
+        ]
+    }
+
+    /// Write one lane of a record.
+    pub(super) fn put(&self, record: &mut [Row], lane: usize, fragment: &Fragment<f32>, weight: f32) {
+        for (place, value) in self.vectors(fragment) {
+            let Some(at) = place else { continue };
+            for c in 0..3 {
+                record[at + c][lane] = value[c];
+            }
+        }
+        for (place, value) in self.scalars(fragment).into_iter().chain([(self.weight, weight)]) {
+            if let Some(at) = place {
+                record[at][lane] = value;
+            }
+        }
+    }
+}
+
+/// The samples of a view: a record holds one sample of each of a group's pixels.
+///
+/// The shading normal is the direction of `base + normal_strength * bump`. A sample is named by its
+/// slot, `record * LANES + lane`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SurfaceRecords {
+    places: Places,
+    rows: Rows,
+}
+
+impl SurfaceRecords {
+    /// `count` records of what is asked for, all zero.
+    #[must_use]
+    pub fn new(asked: Asked, count: usize) -> Self {
+        let (places, stride) = Places::new(asked);
+        Self { places, rows: Rows::new(stride, count) }
+    }
+
+    /// A range of records.
+    #[must_use]
+    pub(super) fn part(&self, records: Range<usize>) -> Self {
+        Self { places: self.places, rows: self.rows.part(records) }
+    }
+
+    /// Where a record's numbers stand.
+    #[must_use]
+    pub const fn places(&self) -> &Places {
+        &self.places
+    }
+
+    /// The records' rows.
+    #[must_use]
+    pub const fn rows(&self) -> &Rows {
+        &self.rows
+    }
+
+    /// The records' rows.
+    pub fn rows_mut(&mut self) -> &mut Rows {
+        &mut self.rows
+    }
+
+    /// How many slots there are, padding included.
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.rows.all().len() / self.rows.stride().max(1) * LANES
+    }
+
+    /// The sample at `slot`.
+    #[must_use]
+    pub fn fragment(&self, slot: usize) -> Fragment<f32> {
+        let record = self.rows.record(slot / LANES);
+        let scalar =
+            |place: Option<usize>, neutral: f32| place.map_or(neutral, |at| record[at][slot % LANES]);
+        let vector = |place: Option<usize>, neutral: [f32; 3]| {
+            place.map_or(neutral, |at| [0, 1, 2].map(|c| record[at + c][slot % LANES]))
+        };
+        let at = &self.places;
+        let base = vector(at.base, NEUTRAL.base);
+        Fragment {
+            base,
+            bump: vector(at.bump, NEUTRAL.bump),
+            normal: vector(at.normal, base),
+            view: vector(at.view, NEUTRAL.view),
+            occlusion: scalar(at.occlusion, NEUTRAL.occlusion),
+            silhouette: scalar(at.silhouette, NEUTRAL.silhouette),
+            dapple: scalar(at.dapple, NEUTRAL.dapple),
+            albedo: vector(at.albedo, NEUTRAL.albedo),
+            specular: scalar(at.specular, NEUTRAL.specular),
+            attenuator: scalar(at.attenuator, NEUTRAL.attenuator),
+        }
+    }
+
+    /// The share that the sample at `slot` has of its pixel's covered area; padding has 0.
+    #[must_use]
+    pub fn weight(&self, slot: usize) -> f32 {
+        self.places.weight.map_or(1.0, |at| self.rows.number(at, slot))
+    }
+
+    /// Set the sample at `slot`.
+    pub fn set(&mut self, slot: usize, fragment: &Fragment<f32>, weight: f32) {
+        self.places.put(self.rows.record_mut(slot / LANES), slot % LANES, fragment, weight);
+    }
+}

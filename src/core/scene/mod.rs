@@ -1,0 +1,147 @@
+//! Everything that is read: scene files, meshes, maps, environments, cameras, targets.
+//!
+//! - [`mesh`]: the mesh as loaded, and posed
+//! - [`view`]: cameras and targets
+//! - [`maps`]: texture maps and the panorama
+//! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
+//!   `settings` and `cameras`
+//! - [`map_fit`]: how whole maps are fitted
+//! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
+//! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
+//! - [`error`]: what is refused, and what is mended with a warning
+//!
+//! [`Scene`] is what the later stages see: validated, in memory, and holding only what the enabled
+//! effects ask for.
+
+pub mod animation;
+mod cameras;
+pub mod error;
+mod file;
+mod gltf;
+pub mod images;
+pub mod load;
+pub mod map_fit;
+pub mod maps;
+pub mod mesh;
+mod normals;
+pub mod pose;
+mod settings;
+mod tangents;
+pub mod view;
+
+pub use error::{SceneError, Warning};
+pub use file::suggestion;
+pub use file::{Source, check_text};
+pub use load::LoadOptions;
+pub use load::check_values;
+pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
+pub use settings::short;
+pub use settings::{interval, read_params};
+
+use std::path::PathBuf;
+
+use crate::model::effects::{Effects, Form, Silhouette};
+use crate::model::params::{Column, Params};
+
+/// A scene that was read and checked.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The scene file, for messages and provenance.
+    pub path: PathBuf,
+    /// The mesh, not yet posed; targets and bones only when `morph` or `skin` is enabled.
+    pub mesh: mesh::Mesh,
+    /// Metres in one unit of the mesh.
+    pub metres_per_unit: f64,
+    /// The maps that the effects ask for.
+    pub maps: maps::Maps,
+    /// The environment; absent when no effect asks for it.
+    pub environment: Option<maps::Environment>,
+    /// Which reading of the listings.
+    pub form: Form,
+    /// Where S.z is evaluated.
+    pub silhouette: Silhouette,
+    /// What is switched on.
+    pub effects: Effects,
+    /// Start values.
+    pub params: Params,
+    /// The cameras, with their targets where the scene names them.
+    pub views: Vec<view::View>,
+    /// How the fit is to be done.
+    pub fit: FitSettings,
+    /// How finely bakes and samples are made.
+    pub quality: Quality,
+}
+
+/// The scene's `[fit]` table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FitSettings {
+    /// The unknowns: one tied column a parameter, or three when its start value has three channels
+    /// or the scene's `per_channel` list names it.
+    pub free: Vec<Column>,
+    /// What is minimised.
+    pub loss: Loss,
+    /// Whether each view has a gain of its own (the first view's is held at 1).
+    pub free_gains: bool,
+    /// How whole maps are fitted, when they are asked for.
+    pub maps: MapSettings,
+}
+
+/// What a fit minimises, over the residual r = model - target of each pixel and channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Loss {
+    /// r^2
+    L2,
+    /// r^2 / (target^2 + 0.01): errors count in proportion, down to a tenth of unit radiance.
+    #[default]
+    RelativeL2,
+    /// r^2 within 0.05, then linear (Huber): outliers count less.
+    Huber,
+    /// |r| / (|model| + |target| + 0.01), by reweighting.
+    Smape,
+}
+
+impl Loss {
+    /// Every loss, in the order of documentation.
+    pub const ALL: [Self; 4] = [Self::L2, Self::RelativeL2, Self::Huber, Self::Smape];
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::L2 => "l2",
+            Self::RelativeL2 => "relative_l2",
+            Self::Huber => "huber",
+            Self::Smape => "smape",
+        }
+    }
+}
+
+/// The scene's `[quality]` table: accuracy against time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Quality {
+    /// Samples along a pixel's side: n x n samples a pixel.
+    pub samples_per_axis: u32,
+    /// Texels along a face of the irradiance cube.
+    pub irradiance_size: u32,
+    /// Texels along a face of each specular cube.
+    pub lobe_size: u32,
+    /// Texels along a face of the hilite cube.
+    pub hilite_size: u32,
+    /// Specular cubes for each doubling of the exponent.
+    pub lobes_per_octave: u32,
+    /// Rays a vertex for ambient occlusion.
+    pub occlusion_rays: u32,
+}
+
+impl Default for Quality {
+    fn default() -> Self {
+        Self {
+            samples_per_axis: 2,
+            irradiance_size: 32,
+            lobe_size: 64,
+            hilite_size: 128,
+            lobes_per_octave: 1,
+            occlusion_rays: 256,
+        }
+    }
+}

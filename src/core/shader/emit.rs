@@ -1,0 +1,374 @@
+//! A plan: the chosen rules as one WGSL module, and what it reads.
+
+use std::fmt::Write as _;
+
+use super::facts::{Facts, Source};
+use super::quantity::{Attribute, Constant, Kind, Resource};
+use super::rule::{LIBRARY, RULES, Rule, Stage};
+use super::search::{INTERPOLATION_COST, PlanError, VERTEX_SHARE, components, search};
+use crate::model::compose::TermName;
+use crate::model::effects::Effect;
+
+/// The shader that a scene gets.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What it was made for.
+    pub facts: Facts,
+    /// The chosen rules, in the order of their evaluation, the vertex stage first.
+    pub steps: Vec<Step>,
+    /// Vertex attributes; the shader location is the place in this list.
+    pub attributes: Vec<Attribute>,
+    /// What is bound in group 0; the binding is 1 + the place in this list.
+    pub resources: Vec<Resource>,
+    /// The members of the uniform block at binding 0, in its order.
+    pub constants: Vec<Constant>,
+    /// Quantities that the rasteriser interpolates, with their WGSL types.
+    pub varyings: Vec<(&'static str, &'static str)>,
+    /// The module; `vs_main` and `fs_main` are its entry points, or `shade` its function.
+    pub wgsl: String,
+    /// Operations a fragment, about, vertices counted by [`VERTEX_SHARE`].
+    pub cost: f64,
+    /// How far the output may be off, relative to white.
+    pub error: f64,
+}
+
+/// One chosen rule.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// The rule.
+    pub rule: &'static Rule,
+    /// Operations.
+    pub cost: f64,
+    /// How far it is off, relative to white.
+    pub error: f64,
+}
+
+/// What the fragment stage reads of a stored sample, `model::fragment::Fragment`'s fields, with their WGSL
+/// types.
+pub const SAMPLE: [(&str, &str); 10] = [
+    ("base", "vec3f"),
+    ("bump", "vec3f"),
+    ("normal", "vec3f"),
+    ("view", "vec3f"),
+    ("open", "f32"),
+    ("silhouette", "f32"),
+    ("dapple", "f32"),
+    ("albedo", "vec3f"),
+    ("specular", "f32"),
+    ("attenuator", "f32"),
+];
+
+/// The cheapest shader that yields what `facts` call for.
+///
+/// # Errors
+/// When no rules yield it within the budget.
+pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
+    let parts = parts(facts);
+    let mut goals = parts.clone();
+    if hazy(facts) {
+        goals.push("haze");
+    }
+    match facts.source {
+        Source::Raster => {
+            let plan = Plan::search(facts, &["clip"], &goals, &[])?;
+            let wgsl = plan.raster_module(&parts);
+            Ok(Plan { wgsl, ..plan })
+        }
+        Source::Samples | Source::Terms => {
+            let given: Vec<&'static str> = sample_fields(facts).iter().map(|(name, _)| *name).collect();
+            let plan = Plan::search(facts, &[], &goals, &given)?;
+            let wgsl = plan.sample_module(&parts);
+            Ok(Plan { wgsl, ..plan })
+        }
+    }
+}
+
+/// Fields of a stored sample, with their WGSL types.
+pub type Fields = Vec<(&'static str, &'static str)>;
+
+/// What is kept of a stored sample's terms, with WGSL types.
+pub const TERMS: [(&str, &str); 8] = [
+    ("diffuse_term", "vec3f"),
+    ("side_term", "vec3f"),
+    ("hilite_term", "vec3f"),
+    ("mirror_term", "vec3f"),
+    ("haze_term", "f32"),
+    ("key_term", "vec3f"),
+    ("silhouette", "f32"),
+    ("open", "f32"),
+];
+
+/// The fields of a stored sample, or of its terms, that a scene's effects ask for.
+#[must_use]
+pub fn sample_fields(facts: &Facts) -> Fields {
+    let needs = facts.needs();
+    let bumped_silhouette = facts.holds("bumped_silhouette") == Some(true);
+    let of_terms = facts.source == Source::Terms;
+    let part = |name: &str| parts(facts).contains(&name);
+    let wanted = |name: &str| match name {
+        "bump" => needs.normal_map,
+        "normal" => needs.key_light,
+        "open" => needs.occlusion,
+        "silhouette" => needs.rim && (of_terms || !bumped_silhouette),
+        "dapple" => needs.dapple,
+        "albedo" => needs.color_map,
+        "specular" => needs.specular_map,
+        "attenuator" => needs.attenuator_map,
+        "diffuse_term" => part("diffuse_part"),
+        "side_term" => part("side_part"),
+        "hilite_term" => part("hilite_part"),
+        "mirror_term" => part("mirror_part"),
+        "key_term" => part("key_part"),
+        "haze_term" => hazy(facts),
+        _ => true,
+    };
+    let all: &[_] = if of_terms { &TERMS } else { &SAMPLE };
+    all.iter().copied().filter(|(name, _)| wanted(name)).collect()
+}
+
+/// The rules that yield a stored sample's terms: a plan whose goals are the fields of [`Source::Terms`].
+///
+/// # Errors
+/// When no rules yield them.
+pub fn plan_terms(facts: &Facts) -> Result<(Plan, Fields), PlanError> {
+    let facts = Facts { source: Source::Samples, ..*facts };
+    let given: Vec<&'static str> = sample_fields(&facts).iter().map(|(name, _)| *name).collect();
+    let terms = sample_fields(&Facts { source: Source::Terms, ..facts });
+    let goals: Vec<&'static str> =
+        terms.iter().map(|(name, _)| *name).filter(|t| !given.contains(t)).collect();
+    Ok((Plan::search(&facts, &[], &goals, &given)?, terms))
+}
+
+/// Whether the haze goes to alpha.
+pub fn hazy(facts: &Facts) -> bool {
+    facts.needs().haze && facts.output.is_none()
+}
+
+/// The parts that add up to the output.
+pub fn parts(facts: &Facts) -> Vec<&'static str> {
+    let has = |effect| facts.setup.effects.has(effect);
+    let (diffuse, rim) = (has(Effect::Diffuse), has(Effect::Rim));
+    let all = match facts.output {
+        None => vec![
+            (diffuse, "diffuse_part"),
+            (has(Effect::SideSpecular), "side_part"),
+            (has(Effect::Hilite), "hilite_part"),
+            (has(Effect::Reflection), "mirror_part"),
+            (has(Effect::KeyLight), "key_part"),
+        ],
+        Some(TermName::Diffuse) => vec![(diffuse, "base_part")],
+        Some(TermName::Rim) => vec![(diffuse && rim, "rim_part")],
+        Some(TermName::SideSpecular) => vec![(has(Effect::SideSpecular), "side_part")],
+        Some(TermName::Hilite) => vec![(has(Effect::Hilite), "hilite_part")],
+        Some(TermName::Reflection) => vec![(has(Effect::Reflection), "mirror_part")],
+        Some(TermName::KeyLight) => vec![(has(Effect::KeyLight), "key_part")],
+    };
+    all.into_iter().filter(|(wanted, _)| *wanted).map(|(_, part)| part).collect()
+}
+
+impl Plan {
+    /// Search for the rules, and list what they read; the module is left empty.
+    pub fn search(
+        facts: &Facts,
+        vertex_goals: &[&'static str],
+        goals: &[&'static str],
+        given: &[&'static str],
+    ) -> Result<Self, PlanError> {
+        let rules = search(facts, vertex_goals, goals, given)?;
+        let of_vertex =
+            |q: &str| rules.iter().any(|r| r.stage == Stage::Vertex && r.gives.iter().any(|g| g.0 == q));
+        let mut varyings: Vec<(&'static str, &'static str)> = Vec::new();
+        for (quantity, kind) in
+            rules.iter().filter(|r| r.stage == Stage::Fragment).flat_map(|r| r.needs.iter().copied())
+        {
+            if of_vertex(quantity) && !given.contains(&quantity) && !varyings.iter().any(|v| v.0 == quantity)
+            {
+                varyings.push((quantity, kind));
+            }
+        }
+        let needed = |name: &str| rules.iter().any(|rule| rule.needs.iter().any(|(q, _)| *q == name));
+        let read = |name: &str| rules.iter().any(|rule| rule.reads.contains(&name));
+        let params = crate::model::params::Param::all().map(Constant::Param);
+        let constants: Vec<Constant> = Constant::OWN
+            .into_iter()
+            .chain(params)
+            .filter(|constant| needed(constant.name()) || read(constant.name()))
+            .collect();
+        let steps: Vec<Step> = rules
+            .iter()
+            .map(|&rule| Step { rule, cost: rule.cost(facts), error: rule.error(facts) })
+            .collect();
+        let interpolated: usize = varyings.iter().map(|(_, kind)| components(kind)).sum();
+        let share = |step: &Step| if step.rule.stage == Stage::Vertex { VERTEX_SHARE } else { 1.0 };
+        Ok(Self {
+            facts: *facts,
+            attributes: Attribute::ALL.into_iter().filter(|a| needed(a.name())).collect(),
+            resources: Resource::ALL.into_iter().filter(|r| read(r.name())).collect(),
+            constants,
+            varyings,
+            wgsl: String::new(),
+            cost: steps.iter().map(|step| share(step) * step.cost).sum::<f64>()
+                + INTERPOLATION_COST * interpolated as f64,
+            error: steps.iter().map(|step| step.error).sum(),
+            steps,
+        })
+    }
+
+    /// Whether the module computes in 16 bits.
+    #[must_use]
+    pub fn uses_f16(&self) -> bool {
+        self.steps.iter().any(|step| step.rule.when.contains(&"f16"))
+    }
+
+    /// Every rule that was left out, and why.
+    #[must_use]
+    pub fn left_out(&self) -> Vec<(&'static Rule, String)> {
+        let chosen = |rule: &Rule| self.steps.iter().any(|step| step.rule.name == rule.name);
+        let given = |rule: &Rule| {
+            rule.gives.iter().any(|(q, _)| self.steps.iter().any(|s| s.rule.gives.iter().any(|g| g.0 == *q)))
+        };
+        let why = |rule: &Rule| match rule.refusal(&self.facts) {
+            Some(reason) => reason,
+            None if given(rule) => "dearer".to_owned(),
+            None => "nothing asks for it".to_owned(),
+        };
+        RULES.iter().filter(|rule| !chosen(rule)).map(|rule| (rule, why(rule))).collect()
+    }
+
+    /// Declarations that every module shares: extensions, constants, resources, functions. The block of
+    /// uniform constants is left out where they stand in the text.
+    pub fn declarations(&self, uniform: bool) -> String {
+        let mut wgsl = String::new();
+        if self.uses_f16() {
+            wgsl.push_str("enable f16;\n\n");
+        }
+        if self.facts.morphs > 0 && self.constants.contains(&Constant::MorphWeights) {
+            let _ = writeln!(wgsl, "const MORPHS = {}u;\n", self.facts.morphs);
+        }
+        if uniform && !self.constants.is_empty() {
+            wgsl.push_str("struct Constants {\n");
+            for constant in &self.constants {
+                let kind = match constant {
+                    Constant::ViewProjection => "mat4x4f",
+                    Constant::MorphWeights => "array<vec4f, MORPHS>",
+                    _ => "vec4f",
+                };
+                let _ = writeln!(wgsl, "    {}: {kind},", constant.name());
+            }
+            wgsl.push_str("}\n\n@group(0) @binding(0) var<uniform> constants: Constants;\n");
+        }
+        for (i, resource) in self.resources.iter().enumerate() {
+            let (space, kind) = resource.kind().wgsl();
+            let _ = writeln!(wgsl, "@group(0) @binding({}) {space} {}: {kind};", i + 1, resource.name());
+        }
+        wgsl.push_str(&self.functions(&[Stage::Vertex, Stage::Fragment]));
+        wgsl
+    }
+
+    /// The functions of the stages' rules, and those that they call.
+    pub(super) fn functions(&self, stages: &[Stage]) -> String {
+        let mut wgsl = String::new();
+        let steps = || self.steps.iter().filter(|step| stages.contains(&step.rule.stage));
+        let used = |name: &str| steps().any(|step| step.rule.uses.contains(&name));
+        for (_, text) in LIBRARY.iter().filter(|(name, _)| used(name)) {
+            let _ = write!(wgsl, "\n{text}");
+        }
+        if stages.contains(&Stage::Fragment) {
+            wgsl.push_str(&self.face_sizes());
+        }
+        for step in steps().filter(|step| step.rule.plain_value().is_none()) {
+            if !step.rule.about.is_empty() {
+                wgsl.push('\n');
+                wrapped_comment(&mut wgsl, &step.rule.about);
+                wgsl.push_str(step.rule.body);
+            } else {
+                let _ = write!(wgsl, "\n{}", step.rule.body);
+            }
+        }
+        wgsl
+    }
+
+    /// `NAME_size()` for each resource of faces, which rules hand to `sample_faces`: texels along a side, without the
+    /// border.
+    fn face_sizes(&self) -> String {
+        let faces = self.resources.iter().filter(|resource| resource.kind() == Kind::Faces);
+        let function = |resource: &Resource| {
+            let name = resource.name();
+            let size = match self.facts.faces.of(*resource) {
+                Some(size) => format!("{:?}", size as f32),
+                None => format!("f32(textureDimensions({name}).x - 2u)"),
+            };
+            format!("\nfn {name}_size() -> f32 {{\n    return {size};\n}}\n")
+        };
+        faces.map(function).collect()
+    }
+
+    /// The rules of a stage, in the order of their evaluation.
+    pub(super) fn rules(&self, stage: Stage) -> impl Iterator<Item = &'static Rule> {
+        self.steps.iter().map(|step| step.rule).filter(move |rule| rule.stage == stage)
+    }
+
+    /// What a rule's function is called with; see [`Self::calls`].
+    pub(super) fn arguments(
+        &self,
+        rule: &Rule,
+        constant: &impl Fn(Constant, &str) -> String,
+        leaf: &impl Fn(&'static str) -> String,
+    ) -> Vec<String> {
+        let local = |q: &str| self.rules(rule.stage).any(|r| r.gives.iter().any(|(given, _)| *given == q));
+        let argument = |&(name, kind): &(&'static str, &'static str)| match Constant::from_name(name) {
+            Some(known) => constant(known, kind),
+            None if local(name) => name.to_owned(),
+            None => leaf(name),
+        };
+        rule.needs.iter().map(argument).collect()
+    }
+
+    /// The calls of a stage's rules, one a line; `constant` and `leaf` write what is there without a rule,
+    /// by its name and WGSL type.
+    pub fn calls(
+        &self,
+        stage: Stage,
+        constant: impl Fn(Constant, &str) -> String,
+        leaf: impl Fn(&'static str) -> String,
+    ) -> String {
+        let mut wgsl = String::new();
+        for rule in self.rules(stage) {
+            let arguments = self.arguments(rule, &constant, &leaf);
+            let call = match rule.plain_value() {
+                Some("") => arguments.concat(),
+                Some(value) => value.to_owned(),
+                None => format!("{}({})", rule.function, arguments.join(", ")),
+            };
+            match rule.gives.as_slice() {
+                [(quantity, "")] => {
+                    let _ = writeln!(wgsl, "    let {quantity}: {} = {call};", rule.returns);
+                }
+                several => {
+                    let both = format!("{}_and_more", several[0].0);
+                    let _ = writeln!(wgsl, "    let {both}: {} = {call};", rule.returns);
+                    for (quantity, swizzle) in several {
+                        let kind = ["f32", "f32", "vec2f", "vec3f"][swizzle.len()];
+                        let _ = writeln!(wgsl, "    let {quantity}: {kind} = {both}.{swizzle};");
+                    }
+                }
+            }
+        }
+        wgsl
+    }
+}
+
+fn wrapped_comment(wgsl: &mut String, words: &str) {
+    let mut line = String::from("//");
+    for word in words.split_whitespace() {
+        if line.len() + word.len() > 108 {
+            wgsl.push_str(&line);
+            wgsl.push('\n');
+            line = String::from("//");
+        }
+        line.push(' ');
+        line.push_str(word);
+    }
+    wgsl.push_str(&line);
+    wgsl.push('\n');
+}

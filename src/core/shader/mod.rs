@@ -1,0 +1,29 @@
+//! The shader planner: from what a scene calls for to the WGSL that computes just that.
+//!
+//! The paper's vertex shaders were generated: a rules file, the character's set-up and what the
+//! fragment shader asks for went in, a search gave the cheapest shader. Here both stages are.
+//!
+//! - [`facts`]: what a scene calls for, and the accuracy that it allows
+//! - [`quantity`]: what shaders compute, bind and read: quantities, [`Resource`]s, [`Constant`]s
+//! - `rules/*.wgsl`: the rules, a file each; [`rule`] reads them
+//! - [`search`]: the cheapest set of rules within the accuracy budget (A*)
+//! - [`emit`]: the plan: the chosen rules, and what they read; `module`: its WGSL, for rasterised
+//!   fragments, for stored samples, or as a function for other engines
+//! - [`probe`]: its rules one by one, for given numbers
+//! - [`tangent`]: the rules' derivatives, made from their own text
+//!
+//! Nothing that the [`Plan`] does not name is uploaded, bound or compiled.
+
+pub mod emit;
+pub mod facts;
+pub mod module;
+pub mod probe;
+pub mod quantity;
+pub mod rule;
+pub mod search;
+pub mod tangent;
+
+pub use emit::{Plan, Step, plan};
+pub use facts::{Budget, Facts, Source};
+pub use quantity::{Attribute, Constant, Resource};
+pub use search::PlanError;

@@ -1,0 +1,209 @@
+//! The modules that a plan's rules make up: shaders for the rasteriser, a function over stored samples, and
+//! the fragment stage as a function to be built into another engine.
+
+use std::fmt::Write as _;
+
+use super::emit::{Plan, hazy, parts, sample_fields};
+use super::quantity::{Constant, Kind, Resource};
+use super::rule::Stage;
+use crate::model::lights::KeyLight;
+use crate::model::params::{Param, Params};
+
+impl Plan {
+    /// Declarations, and the vertex stage; its position has these attributes.
+    pub fn vertex_module(&self, position: &str) -> String {
+        let mut wgsl = self.declarations(true);
+        wgsl.push_str("\nstruct Vertex {\n    @builtin(vertex_index) vertex_index: u32,\n");
+        for (i, attribute) in self.attributes.iter().enumerate() {
+            let _ = writeln!(wgsl, "    @location({i}) {}: {},", attribute.name(), attribute.wgsl());
+        }
+        let _ = write!(wgsl, "}}\n\nstruct Varyings {{\n    {position}@builtin(position) clip: vec4f,\n");
+        for (i, (name, kind)) in self.varyings.iter().enumerate() {
+            let _ = writeln!(wgsl, "    @location({i}) {name}: {kind},");
+        }
+        wgsl.push_str("}\n\n@vertex\nfn vs_main(vertex: Vertex) -> Varyings {\n");
+        wgsl.push_str(&self.calls(Stage::Vertex, uniform, |name| format!("vertex.{name}")));
+        let varyings: String = self.varyings.iter().map(|(name, _)| format!(", {name}")).collect();
+        let _ = write!(wgsl, "    return Varyings(clip{varyings});\n}}\n");
+        wgsl
+    }
+
+    pub(super) fn raster_module(&self, parts: &[&str]) -> String {
+        let mut wgsl = self.vertex_module("");
+        if hazy(&self.facts) {
+            wgsl.push_str(
+                "\nstruct Fragment {\n    @location(0) color: vec4f,\n    @location(1) coverage: f32,\n}\n",
+            );
+            wgsl.push_str("\n@fragment\nfn fs_main(at: Varyings) -> Fragment {\n");
+        } else {
+            wgsl.push_str("\n@fragment\nfn fs_main(at: Varyings) -> @location(0) vec4f {\n");
+        }
+        wgsl.push_str(&self.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        let sum = sum(parts);
+        let returned = if hazy(&self.facts) {
+            format!("Fragment(vec4f({sum}, haze), 1.0)")
+        } else {
+            format!("vec4f({sum}, 1.0)")
+        };
+        let _ = write!(wgsl, "    return {returned};\n}}\n");
+        wgsl
+    }
+
+    /// This plan with a fragment stage that fetches the same textures, as often, and does nothing else:
+    /// what a frame costs at the least.
+    #[must_use]
+    pub fn fetches_alone(&self) -> Self {
+        let fetches: Vec<String> = self
+            .steps
+            .iter()
+            .filter(|step| step.rule.stage == Stage::Fragment)
+            .filter_map(|step| {
+                let read = |kind| {
+                    let found = |r: &&Resource| step.rule.reads.contains(&r.name()) && r.kind() == kind;
+                    self.resources.iter().find(found).map(|r| r.name())
+                };
+                let direction = if step.rule.needs.iter().any(|(name, _)| name.starts_with("reflected")) {
+                    "at.vertex_normal.zxy"
+                } else {
+                    "at.vertex_normal"
+                };
+                let fetch = |kind, lookup: &str| Some(lookup.replace("{t}", read(kind)?));
+                fetch(Kind::Cube, &format!("textureSampleLevel({{t}}, cube_sampler, {direction}, 0.0)"))
+                    .or_else(|| fetch(Kind::Map, "textureSampleLevel({t}, map_sampler, at.vertex_uv, 0.0)"))
+                    .or_else(|| {
+                        fetch(
+                            Kind::Faces,
+                            &format!("sample_faces({{t}}, {{t}}_size(), cube_place({direction}))"),
+                        )
+                    })
+                    .or_else(|| fetch(Kind::Texels, "sample_texels({t}, at.vertex_uv)"))
+            })
+            .collect();
+        let whole = self.raster_module(&[]);
+        let end = whole.find("\n@fragment\n").unwrap_or(whole.len());
+        let sum = if fetches.is_empty() { "vec4f(0.0)".to_owned() } else { fetches.join(" + ") };
+        let (output, value) = if hazy(&self.facts) {
+            ("Fragment", format!("Fragment({sum}, 1.0)"))
+        } else {
+            ("@location(0) vec4f", sum)
+        };
+        let wgsl = format!(
+            "{}\n@fragment\nfn fs_main(at: Varyings) -> {output} {{\n    return {value};\n}}\n",
+            &whole[..end]
+        );
+        Self { wgsl, ..self.clone() }
+    }
+
+    pub(super) fn sample_module(&self, parts: &[&str]) -> String {
+        let mut wgsl = self.declarations(true);
+        wgsl.push_str(&sample_struct(&sample_fields(&self.facts)));
+        wgsl.push_str("\n// Radiance, and the haze in alpha.\nfn shade(at: Sample) -> vec4f {\n");
+        wgsl.push_str(&self.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        let haze = if hazy(&self.facts) { "haze" } else { "0.0" };
+        let _ = write!(wgsl, "    return vec4f({}, {haze});\n}}\n", sum(parts));
+        wgsl
+    }
+
+    /// The fragment stage as a function `skinfit_shade` of what the vertex stage hands over (and the eye).
+    /// It names parameters in capitals ([`literals`](Self::literals)) and resources as they are.
+    #[must_use]
+    pub fn function(&self) -> String {
+        let mut wgsl = self.functions(&[Stage::Fragment]).trim_start().to_owned();
+        let eye = self.in_fragment(Constant::Eye);
+        wgsl.push_str(
+            "\n// What the vertex stage hands over: world space, interpolated.\nstruct Surface {\n",
+        );
+        for (name, kind) in self.surface() {
+            let _ = writeln!(wgsl, "    {name}: {kind},");
+        }
+        let alpha = if hazy(&self.facts) { "haze" } else { "1.0" };
+        let what = if hazy(&self.facts) { "the haze" } else { "1" };
+        let _ = write!(
+            wgsl,
+            "}}\n\n// Linear Rec.709 radiance, and {what} in alpha.\nfn skinfit_shade(at: Surface) -> vec4f {{\n"
+        );
+        let constant = |constant: Constant, _: &str| match constant {
+            Constant::Eye if eye => "at.eye".to_owned(),
+            other => literal_name(other),
+        };
+        wgsl.push_str(&self.calls(Stage::Fragment, constant, |name| format!("at.{name}")));
+        let _ = write!(wgsl, "    return vec4f({}, {alpha});\n}}\n", sum(&parts(&self.facts)));
+        wgsl
+    }
+
+    /// The fields of the function's `Surface`, with their WGSL types.
+    #[must_use]
+    pub fn surface(&self) -> Vec<(&'static str, &'static str)> {
+        let eye = self.in_fragment(Constant::Eye).then_some(("eye", "vec3f"));
+        self.varyings.iter().copied().chain(eye).collect()
+    }
+
+    /// The constants of the function: name in capitals, WGSL type, and value.
+    #[must_use]
+    pub fn literals(&self, params: &Params) -> Vec<(String, &'static str, Vec<f64>)> {
+        let used = self.constants.iter().filter(|constant| self.in_fragment(**constant));
+        used.filter_map(|&constant| {
+            let (kind, value) = literal(constant, params)?;
+            Some((literal_name(constant), kind, value))
+        })
+        .collect()
+    }
+
+    /// Whether a rule of the fragment stage reads a constant.
+    fn in_fragment(&self, constant: Constant) -> bool {
+        let fragment = self.steps.iter().filter(|step| step.rule.stage == Stage::Fragment);
+        fragment.map(|step| step.rule).any(|rule| rule.needs.iter().any(|(name, _)| *name == constant.name()))
+    }
+}
+
+/// The name of a constant that is written into the text.
+fn literal_name(constant: Constant) -> String {
+    constant.name().to_uppercase()
+}
+
+/// WGSL type and value of a constant that is known before a frame is drawn.
+fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64>)> {
+    match constant {
+        Constant::Param(param) if param.info().rgb => Some(("vec3f", params.rgb(param).to_vec())),
+        Constant::Param(param) => Some(("f32", vec![params.scalar(param)])),
+        Constant::Turn => {
+            let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
+            Some(("vec2f", vec![cos, sin]))
+        }
+        Constant::KeyDirection => Some(("vec3f", KeyLight::new(params, 0.0_f64).direction.to_vec())),
+        Constant::Eye
+        | Constant::ViewProjection
+        | Constant::KeyByAzimuth
+        | Constant::KeyByElevation
+        | Constant::MorphWeights => None,
+    }
+}
+
+/// The declaration of a stored sample.
+pub fn sample_struct(fields: &[(&str, &str)]) -> String {
+    let mut wgsl = String::from("\nstruct Sample {\n");
+    for (name, kind) in fields {
+        let _ = writeln!(wgsl, "    {name}: {kind},");
+    }
+    if fields.is_empty() {
+        // WGSL knows no empty structures.
+        wgsl.push_str("    nothing: f32,\n");
+    }
+    wgsl.push_str("}\n");
+    wgsl
+}
+
+fn sum(parts: &[&str]) -> String {
+    if parts.is_empty() { "vec3f(0.0)".to_owned() } else { parts.join(" + ") }
+}
+
+/// A member of the uniform block as a value of the type that a rule's parameter has.
+pub fn uniform(constant: Constant, kind: &str) -> String {
+    let swizzle = match kind {
+        "f32" => ".x",
+        "vec2f" => ".xy",
+        "vec3f" => ".xyz",
+        _ => "",
+    };
+    format!("constants.{}{swizzle}", constant.name())
+}

@@ -1,0 +1,255 @@
+//! The fused pass: stored samples in; loss, gradient and normal equations out, in one compute shader.
+//!
+//! A thread shades pixels of its own one after another (the planner's rules for stored samples, and their
+//! [`tangents`](crate::shader::tangent)), weighs the residuals, and adds the products of the Jacobian's columns to
+//! sums in registers. A workgroup adds up its threads' sums in a fixed tree and writes them; a second
+//! shader adds up those of all workgroups to [`PARTS`] numbers a sum, which the CPU adds in f64. So the order
+//! of additions is fixed, and the rounding error stays that of short sums however many samples there are.
+//!
+//! Only enabled effects and free parameters leave a trace in the text. Where there are more sums than
+//! registers, they are cut into [`Slab`]s, each with a shader of its own.
+//!
+//! - `layout`: where a record's numbers stand; `pixel`: how a pixel is read
+//! - `text`: the pass, line by line; `loss/*.wgsl`: the losses
+//! - `reduce`: sums of threads and workgroups; `terms`: the shader that keeps terms
+
+mod layout;
+mod pixel;
+mod reduce;
+mod terms;
+mod text;
+
+pub use self::layout::Layout;
+pub use self::reduce::gather_module;
+pub use self::terms::terms_module;
+
+use crate::model::evaluate::Setup;
+use crate::model::params::{Channels, Param};
+use crate::samples::LANES;
+use crate::scene::Loss;
+use crate::shader::emit::{Plan, plan, sample_fields};
+use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts};
+use crate::shader::quantity::Constant;
+use crate::shader::tangent::chain::{Chain, Seed};
+use skinfit_core::engine::{BLOCK, Unknown};
+
+/// Threads of a workgroup.
+pub const WORKGROUP: u32 = 128;
+/// Numbers that a sum is left in for the CPU.
+pub const PARTS: usize = 16;
+/// Pixels of a block: a coarse pass reads every so-many-th.
+const BLOCK_PIXELS: usize = BLOCK * LANES;
+/// Sums that a thread keeps: they and the columns should fit 255 registers.
+const MOST_SUMS: usize = 112;
+
+/// What a pass yields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Wish {
+    /// The loss.
+    Loss,
+    /// The loss, J^T r and r^T r.
+    Gradient,
+    /// The loss, J^T J, J^T r and r^T r.
+    Normal,
+}
+
+/// What is the same for every view of a fit.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The switches of the model.
+    pub setup: Setup,
+    /// The unknowns.
+    pub unknowns: Vec<Unknown>,
+    /// What is minimised.
+    pub loss: Loss,
+    /// Whether the haze is compared with the targets' alpha.
+    pub alpha: bool,
+    /// Whether the environment is turned, or will be.
+    pub turned: bool,
+    /// What records hold.
+    pub layout: Layout,
+    /// Whether a pixel may have several samples.
+    pub several: bool,
+    /// Whether pixels count differently.
+    pub weighted: bool,
+    /// Whether targets are clipped.
+    pub clipped: bool,
+    /// Whether views have gains other than 1, or will.
+    pub gained: bool,
+    /// The cubes' sizes.
+    pub faces: FaceSizes,
+}
+
+/// One sum over pixels and channels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sum {
+    /// Of the losses.
+    Loss,
+    /// Of the products of two columns; the residual is the column after the last.
+    Product(usize, usize),
+}
+
+/// A column of the Jacobian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ColumnOf {
+    /// The unknown's index; `None` for the view's gain.
+    pub unknown: Option<usize>,
+    /// The seed whose tangent it is.
+    seed: Option<usize>,
+    /// The channels that it moves.
+    channels: Moved,
+}
+
+/// Channels that a column moves, a bit each: three colours, and alpha where it is compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Moved(u8);
+
+impl Moved {
+    const RADIANCE: Self = Self(0b0111);
+    const ALPHA: Self = Self(0b1000);
+    const ALL: Self = Self(0b1111);
+    const NONE: Self = Self(0);
+
+    const fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
+    const fn or(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+
+    /// The channel, where it is one alone.
+    const fn only(self) -> Option<usize> {
+        if self.0.is_power_of_two() { Some(self.0.trailing_zeros() as usize) } else { None }
+    }
+}
+
+/// A part of the sums, and the shader that yields them.
+#[derive(Clone, Debug)]
+pub struct Slab {
+    /// What it sums, in the order of its output.
+    pub sums: Vec<Sum>,
+    /// The module; its entry point is `cs_main`, in workgroups of [`WORKGROUP`].
+    pub wgsl: String,
+}
+
+/// The shaders of a fit.
+#[derive(Clone, Debug)]
+pub struct Fused {
+    /// The rules; its constants and resources are group 0.
+    pub plan: Plan,
+    /// The columns.
+    pub columns: Vec<ColumnOf>,
+    fitted: Fitted,
+    chain: Chain,
+}
+
+impl Fused {
+    /// Plan the rules and follow the free parameters through them.
+    ///
+    /// # Errors
+    /// When no rules yield the output, or one has no derivative; in words.
+    pub fn new(fitted: Fitted) -> Result<Self, String> {
+        let facts = facts(&fitted);
+        let mut plan = plan(&facts).map_err(|error| error.to_string())?;
+        let (seeds, mut columns) = columns(&fitted.unknowns);
+        for seed in &seeds {
+            let Seed::Named { tangent, .. } = seed else { continue };
+            for constant in [Constant::KeyByAzimuth, Constant::KeyByElevation] {
+                if tangent.contains(constant.name()) && !plan.constants.contains(&constant) {
+                    plan.constants.push(constant);
+                }
+            }
+        }
+        let chain = Chain::new(&plan, &seeds).map_err(|error| error.to_string())?;
+        for column in &mut columns {
+            let moved = column.seed.map_or(Moved::ALL, |seed| {
+                let radiance = if chain.radiance[seed].is_some() { Moved::RADIANCE } else { Moved::NONE };
+                radiance.or(if chain.haze[seed].is_some() { Moved::ALPHA } else { Moved::NONE })
+            });
+            column.channels = column.channels.and(moved).and(compared(&fitted));
+        }
+        columns.retain(|column| column.channels != Moved::NONE);
+        plan.resources.extend(&chain.resources);
+        Ok(Self { columns, fitted, chain, plan })
+    }
+
+    /// The shaders that yield a wish; most fits have one.
+    #[must_use]
+    pub fn slabs(&self, wish: Wish) -> Vec<Slab> {
+        let sums = self.sums(wish);
+        sums.chunks(MOST_SUMS).map(|sums| Slab { sums: sums.to_vec(), wgsl: self.module(sums) }).collect()
+    }
+
+    /// The fields of a stored sample, with their WGSL types.
+    #[must_use]
+    pub fn fields(&self) -> Vec<(&'static str, &'static str)> {
+        sample_fields(&self.plan.facts)
+    }
+
+    /// The sums of a wish that are not 0 by their nature.
+    fn sums(&self, wish: Wish) -> Vec<Sum> {
+        let k = self.columns.len();
+        let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != Moved::NONE;
+        let mut sums = vec![Sum::Loss];
+        if wish == Wish::Normal {
+            for i in 0..k {
+                sums.extend((i..k).filter(|&j| meet(i, j)).map(|j| Sum::Product(i, j)));
+            }
+        }
+        if wish != Wish::Loss {
+            sums.extend((0..=k).map(|i| Sum::Product(i, k)));
+        }
+        sums
+    }
+
+    /// The channels that a column moves; the residual, after the last column, has all that are compared.
+    fn moved(&self, i: usize) -> Moved {
+        self.columns.get(i).map_or_else(|| compared(&self.fitted), |column| column.channels)
+    }
+
+    /// Compared channels: three colours, and alpha where it is compared.
+    #[must_use]
+    pub const fn channels(&self) -> usize {
+        if self.fitted.alpha { 4 } else { 3 }
+    }
+}
+
+const fn compared(fitted: &Fitted) -> Moved {
+    if fitted.alpha { Moved::ALL } else { Moved::RADIANCE }
+}
+
+/// What the planner is told of stored samples.
+fn facts(fitted: &Fitted) -> Facts {
+    Facts {
+        setup: fitted.setup,
+        source: fitted.layout.source,
+        maps: MapFacts::default(),
+        faces: fitted.faces,
+        turned: fitted.turned,
+        square_rim: false,
+        budget: Budget::Exact,
+        ..Facts::default()
+    }
+}
+
+/// The seeds of the unknowns, each once, and the columns that they give; the gains' comes last.
+fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
+    let (mut params, mut columns): (Vec<Param>, Vec<ColumnOf>) = (Vec::new(), Vec::new());
+    for (index, unknown) in unknowns.iter().enumerate() {
+        let Unknown::Param(column) = unknown else { continue };
+        let seed = params.iter().position(|&param| param == column.param).unwrap_or_else(|| {
+            params.push(column.param);
+            params.len() - 1
+        });
+        let channels = match column.channels {
+            Channels::Tied => Moved::ALL,
+            Channels::One(c) => Moved(1 << c),
+        };
+        columns.push(ColumnOf { unknown: Some(index), seed: Some(seed), channels });
+    }
+    if unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(_))) {
+        columns.push(ColumnOf { unknown: None, seed: None, channels: Moved::ALL });
+    }
+    (params.into_iter().map(Seed::of_param).collect(), columns)
+}

@@ -1,0 +1,172 @@
+//! The forward pass: images, left on the device.
+
+use std::time::Instant;
+
+use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeline};
+
+use super::fused::Fused;
+use super::lights::Inputs;
+use super::parts::{PART_BYTES, Parts};
+use super::pipeline::{Uniform, bind_part, buffer, encoder, part_layout, pipeline};
+use super::{GpuEngine, OnDevice};
+use crate::readback::read_floats;
+use crate::timing::Timer;
+use crate::{Gpu, GpuError};
+use skinfit_core::engine::Point;
+use skinfit_core::engine::view::ObservedView;
+
+/// The forward pass and its images, a buffer a part.
+pub(super) struct Images {
+    pub(super) inputs: Inputs,
+    pipeline: ComputePipeline,
+    channels: usize,
+    /// For each part its uniform block, its image and their bindings.
+    parts: Vec<(Uniform, Buffer, BindGroup)>,
+}
+
+impl Images {
+    pub(super) fn new(gpu: &Gpu, fused: &Fused, parts: &Parts) -> Result<Self, GpuError> {
+        let (inputs, layout) = (Inputs::new(gpu, &fused.plan), part_layout(gpu));
+        let pipeline = pipeline(gpu, "forward pass", &fused.image_module(), &[&inputs.layout, &layout]);
+        let channels = fused.channels();
+        let images = parts.parts.iter().map(|part| {
+            let block = Uniform::new(gpu, "part", PART_BYTES);
+            let bytes = 4 * channels * Parts::slots(part);
+            let image = buffer(gpu, "image", bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+            let bindings = bind_part(gpu, &layout, &block, &part.buffers, &image);
+            (block, image, bindings)
+        });
+        let parts = images.collect();
+        gpu.check()?;
+        Ok(Self { inputs, pipeline, channels, parts })
+    }
+
+    /// Shade every part; nothing is waited for. A part's time goes to a timer of its own, where they are wanted.
+    pub(super) fn run(
+        &self,
+        gpu: &Gpu,
+        parts: &Parts,
+        views: &[ObservedView],
+        gains: &[f64],
+        mut timers: Option<&mut Vec<Timer>>,
+    ) -> Result<(), GpuError> {
+        let Some(lights) = self.inputs.bound() else { return gpu.check() };
+        for (part, (block, _, bindings)) in parts.parts.iter().zip(&self.parts) {
+            let gain = gains.get(part.view).copied().unwrap_or(1.0);
+            if Parts::is_streamed(part) {
+                gpu.wait()?;
+                parts.stream(gpu, views, part)?;
+            }
+            block.write(gpu, &parts.block(views, part, gain, 0));
+            let mut commands = encoder(gpu);
+            let mut timer = timers.is_some().then(|| Timer::new(gpu));
+            {
+                let timestamp_writes = timer.as_mut().and_then(|timer| timer.around_compute("shade"));
+                let mut pass =
+                    commands.begin_compute_pass(&ComputePassDescriptor { label: None, timestamp_writes });
+                pass.set_pipeline(&self.pipeline);
+                pass.set_bind_group(0, lights, &[]);
+                pass.set_bind_group(1, bindings, &[]);
+                pass.dispatch_workgroups(Parts::image_workgroups(part), 1, 1);
+            }
+            if let Some(timer) = &timer {
+                timer.finish(&mut commands);
+            }
+            gpu.queue.submit([commands.finish()]);
+            if let Some(timers) = &mut timers {
+                timers.extend(timer);
+            }
+        }
+        gpu.check()
+    }
+
+    /// The planes of a view's image.
+    pub(super) fn read(&self, gpu: &Gpu, parts: &Parts, view: usize) -> Result<Vec<Vec<f32>>, GpuError> {
+        let mut planes = vec![Vec::new(); self.channels];
+        for (part, (_, image, _)) in parts.parts.iter().zip(&self.parts).filter(|(part, _)| part.view == view)
+        {
+            let numbers = read_floats(gpu, encoder(gpu), image)?;
+            let slots = Parts::slots(part);
+            for (plane, numbers) in planes.iter_mut().zip(numbers.chunks_exact(slots)) {
+                plane.extend_from_slice(numbers);
+            }
+        }
+        Ok(planes)
+    }
+}
+
+impl GpuEngine<'_> {
+    /// The image of view `index` at `point`, as the CPU engine's: for each pixel slot the mean over its
+    /// samples, colour and (where the haze is compared) alpha, times the view's gain.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn image(&self, index: usize, point: &Point) -> Result<Vec<Vec<f32>>, GpuError> {
+        self.with_images(point, |images, parts| images.read(self.gpu, parts, index))
+    }
+
+    /// Shade every view and wait for it; the images stay on the device. To be timed.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn shade(&self, point: &Point) -> Result<(), GpuError> {
+        self.with_images(point, |_, _| self.gpu.wait())
+    }
+
+    /// Milliseconds of each of so many forward passes over all views with nothing read back. On the GPU's clock, one
+    /// right after another; a program on the CPU stamps a compute pass before its threads have run it, so there it is
+    /// the host's clock, around each. Empty where a card has no timestamps.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn shade_times(&self, point: &Point, passes: usize) -> Result<Vec<f64>, GpuError> {
+        let (gpu, gains) = (self.gpu, point.gains.as_slice());
+        if !gpu.timestamps() && !gpu.is_software() {
+            return Ok(Vec::new());
+        }
+        if gpu.is_software() {
+            return self.with_images(point, |images, parts| {
+                gpu.wait()?;
+                let timed = || {
+                    let start = Instant::now();
+                    images.run(gpu, parts, self.views, gains, None)?;
+                    gpu.wait()?;
+                    Ok(1e3 * start.elapsed().as_secs_f64())
+                };
+                (0..passes).map(|_| timed()).collect()
+            });
+        }
+        let timers = self.with_images(point, |images, parts| {
+            let timed = || {
+                let mut timers = Vec::new();
+                images.run(gpu, parts, self.views, gains, Some(&mut timers))?;
+                Ok(timers)
+            };
+            (0..passes).map(|_| timed()).collect::<Result<Vec<Vec<Timer>>, GpuError>>()
+        })?;
+        let milliseconds = |mut timer: Timer| {
+            timer.collect(gpu)?;
+            Ok(timer.times.iter().map(|time| time.milliseconds).sum::<f64>())
+        };
+        timers.into_iter().map(|timers| timers.into_iter().map(milliseconds).sum()).collect()
+    }
+
+    fn with_images<T>(
+        &self,
+        point: &Point,
+        then: impl FnOnce(&Images, &Parts) -> Result<T, GpuError>,
+    ) -> Result<T, GpuError> {
+        let written = self.written(point);
+        let mut device = self.lock();
+        self.keep(point, &mut device)?;
+        let OnDevice { parts, lights, images, .. } = &mut *device;
+        if images.as_ref().is_none_or(|(of, _)| *of != written) {
+            let fused = self.fused(written, lights.face_sizes())?;
+            *images = Some((written, Images::new(self.gpu, &fused, parts)?));
+        }
+        let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
+        lights.set(self.gpu, &point.params, &mut images.inputs)?;
+        images.run(self.gpu, parts, self.views, &point.gains, None)?;
+        then(images, parts)
+    }
+}

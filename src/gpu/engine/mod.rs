@@ -1,0 +1,406 @@
+//! The GPU engine: the fused pass ([`fused`]) over samples on a graphics adapter.
+//!
+//! - [`GpuEngine`]: the objective; what it is made of and how sums become normal equations
+//! - [`fused`]: the text of that pass
+//! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
+//!   memory allowed is uploaded anew in each pass
+//! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
+//! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
+//! - `lights`: the cubes and the uniform block, as shaders are given them
+//! - `program`: the shaders of a wish, and one run of them
+//! - `images`: the forward pass: images, and how long they take
+//! - `pipeline`: what both make pipelines and bindings with
+
+pub mod fused;
+mod images;
+mod lights;
+mod parts;
+mod pipeline;
+mod program;
+mod samples;
+mod terms;
+
+use std::collections::BTreeMap;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
+
+use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
+use self::images::Images;
+use self::lights::DeviceLights;
+use self::parts::{Parts, Traits};
+use self::program::Program;
+pub use self::samples::{DeviceSampleError, DeviceSamples};
+use self::terms::{HELD, replace_samples};
+use crate::bake::Illumination;
+use crate::model::compose::TermName;
+use crate::model::evaluate::Setup;
+use crate::model::params::Param;
+use crate::scene::Loss;
+use crate::shader::facts::FaceSizes;
+use crate::{Gpu, GpuError};
+use skinfit_core::engine::view::ObservedView;
+use skinfit_core::engine::{BLOCK, NormalEquations, Objective, Point, Unknown};
+
+/// How much of the device is used.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Memory {
+    /// Most bytes of a part: the adapter's limit for a binding, unless this is lower.
+    pub part: Option<u64>,
+    /// Most bytes that stay on the device; parts beyond it are uploaded in each pass. Without: all stay.
+    pub resident: Option<u64>,
+}
+
+/// What is fitted.
+#[derive(Clone, Debug)]
+pub struct Task<'v> {
+    /// The switches of the model.
+    pub setup: Setup,
+    /// The cubes that its effects ask for.
+    pub illumination: Illumination,
+    /// Samples and targets.
+    pub views: &'v [ObservedView],
+    /// What is minimised.
+    pub loss: Loss,
+    /// What is free.
+    pub unknowns: Vec<Unknown>,
+}
+
+/// Loss, gradient and normal equations on a graphics adapter.
+pub struct GpuEngine<'g> {
+    gpu: &'g Gpu,
+    /// What makes the samples, where they are not uploaded.
+    made: Option<&'g DeviceSamples<'g>>,
+    /// What making them took.
+    made_seconds: f64,
+    setup: Setup,
+    views: &'g [ObservedView],
+    loss: Loss,
+    unknowns: Vec<Unknown>,
+    stride: usize,
+    /// Sum of weights over the pixels that a pass reads, and how many of them count.
+    weight: (f64, u64),
+    alpha: bool,
+    traits: Traits,
+    /// Whether terms stand in the place of samples.
+    keeps: bool,
+    /// What changes between passes; a pass at a time.
+    device: Mutex<OnDevice>,
+    fault: Mutex<Option<GpuError>>,
+}
+
+/// What is on the device.
+struct OnDevice {
+    parts: Parts,
+    lights: DeviceLights,
+    /// By wish, and by what is written into the text.
+    programs: BTreeMap<(Wish, Written), Program>,
+    /// What the terms were made with that stand in the samples' place.
+    terms: Option<[f64; 5]>,
+    /// Whether terms stand there, perhaps in some parts only.
+    replaced: bool,
+    /// The forward pass, and what is written into its text.
+    images: Option<(Written, Images)>,
+}
+
+/// What of a point is written into shaders' text.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+struct Written {
+    /// Whether the environment is turned, or will be.
+    turned: bool,
+    /// Whether a view's gain is not 1, or will not be.
+    gained: bool,
+}
+
+impl<'g> GpuEngine<'g> {
+    /// An engine for a task; the shaders for passes at `start` are compiled.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn new(gpu: &'g Gpu, task: Task<'g>, start: &Point, memory: Memory) -> Result<Self, GpuError> {
+        Self::build(gpu, None, task, start, memory)
+    }
+
+    /// As [`Self::new`], over samples that the adapter makes: the task's views hold the groups that came with them,
+    /// in their order, and no surface. All of them stay on the device.
+    ///
+    /// # Errors
+    /// When the device does not take it, or may not keep as much.
+    pub fn over_device_samples(
+        samples: &'g DeviceSamples<'g>,
+        task: Task<'g>,
+        start: &Point,
+        memory: Memory,
+    ) -> Result<Self, GpuError> {
+        Self::build(samples.gpu(), Some(samples), task, start, memory)
+    }
+
+    fn build(
+        gpu: &'g Gpu,
+        made: Option<&'g DeviceSamples<'g>>,
+        task: Task<'g>,
+        start: &Point,
+        memory: Memory,
+    ) -> Result<Self, GpuError> {
+        let Task { setup, illumination, views, loss, unknowns } = task;
+        // Mesa's software driver loses its device over a pass that looks nothing up and weighs nothing.
+        if TermName::of(setup.effects).is_empty() && !setup.effects.needs(setup.silhouette).haze {
+            return Err(GpuError::NothingShown);
+        }
+        let alpha = views.iter().any(ObservedView::compares_alpha);
+        let traits = Traits::of(gpu, views)?;
+        let mut engine = Self {
+            gpu,
+            made,
+            made_seconds: 0.0,
+            setup,
+            loss,
+            unknowns,
+            stride: 1,
+            weight: (0.0, 0),
+            alpha,
+            traits,
+            keeps: false,
+            device: Mutex::new(OnDevice {
+                parts: Parts::default(),
+                lights: DeviceLights::new(illumination),
+                programs: BTreeMap::new(),
+                terms: None,
+                replaced: false,
+                images: None,
+            }),
+            fault: Mutex::new(None),
+            views,
+        };
+        let start_of_parts = Instant::now();
+        let parts = Parts::new(gpu, views, &engine.traits, memory, made)?;
+        engine.made_seconds =
+            made.map_or(0.0, |made| made.seconds() + start_of_parts.elapsed().as_secs_f64());
+        let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if HELD.contains(&c.param));
+        let samples = Layout::of_samples(&engine.traits.places, engine.traits.rows);
+        let terms = Layout::of_terms(setup, &samples);
+        engine.keeps = !engine.unknowns.iter().any(moves) && parts.all_hold(terms.rows, views);
+        engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
+        engine.set_stride(1);
+        // Whatever the driver refuses shows here, and not in the midst of a fit.
+        engine.sums(start, Wish::Normal)?;
+        Ok(engine)
+    }
+
+    /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
+    pub fn set_stride(&mut self, stride: usize) {
+        self.stride = stride.max(1);
+        let device = self.device.get_mut().unwrap_or_else(PoisonError::into_inner);
+        self.weight = device.parts.set_stride(self.stride);
+    }
+
+    /// The views.
+    #[must_use]
+    pub const fn views(&self) -> &'g [ObservedView] {
+        self.views
+    }
+
+    /// Bytes of the buffers that hold samples, targets and weights on the device, and bytes that each pass for the
+    /// normal equations uploads: once for each of its shaders.
+    #[must_use]
+    pub fn bytes(&self) -> (u64, u64) {
+        let device = self.lock();
+        let (held, streamed) = device.parts.bytes();
+        let normal = device.programs.iter().find(|((wish, _), _)| *wish == Wish::Normal);
+        (held, streamed * normal.map_or(1, |(_, program)| program.shaders()))
+    }
+
+    /// What made the samples where they were not uploaded, and the seconds that it took.
+    #[must_use]
+    pub fn device_samples(&self) -> Option<(&'g DeviceSamples<'g>, f64)> {
+        Some((self.made?, self.made_seconds))
+    }
+
+    /// The adapter's name.
+    #[must_use]
+    pub fn adapter(&self) -> &str {
+        self.gpu.name()
+    }
+
+    /// How many blocks of pixels there are in all views.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.views.iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
+    }
+
+    /// Why no pass can be made any more, if so.
+    #[must_use]
+    pub fn device_fault(&self) -> Option<GpuError> {
+        self.fault.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, OnDevice> {
+        self.device.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn written(&self, point: &Point) -> Written {
+        let turns = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
+        let gains = |u: &Unknown| matches!(u, Unknown::Gain(_));
+        Written {
+            turned: point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.unknowns.iter().any(turns),
+            gained: point.gains.iter().any(|gain| *gain != 1.0) || self.unknowns.iter().any(gains),
+        }
+    }
+
+    /// What is the same for every view, over samples.
+    fn fitted(&self, written: Written, faces: FaceSizes) -> Fitted {
+        Fitted {
+            setup: self.setup,
+            unknowns: self.unknowns.clone(),
+            loss: self.loss,
+            alpha: self.alpha,
+            turned: written.turned,
+            gained: written.gained,
+            faces,
+            layout: Layout::of_samples(&self.traits.places, self.traits.rows),
+            several: self.traits.several,
+            weighted: self.traits.weighted,
+            clipped: self.traits.clipped,
+        }
+    }
+
+    fn fused(&self, written: Written, faces: FaceSizes) -> Result<Fused, GpuError> {
+        let mut fitted = self.fitted(written, faces);
+        if self.keeps {
+            fitted.layout = Layout::of_terms(self.setup, &fitted.layout);
+        }
+        Fused::new(fitted).map_err(GpuError::Plan)
+    }
+
+    /// Have the terms at `point` in the place of the samples, where that is how passes are made.
+    fn keep(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
+        let key = HELD.map(|param| point.params.scalar(param));
+        if !self.keeps || device.terms == Some(key) {
+            return Ok(());
+        }
+        let OnDevice { parts, lights, programs, images, terms, replaced } = device;
+        *terms = None;
+        if std::mem::replace(replaced, true) {
+            parts.reload(self.gpu, self.views, self.made)?;
+        }
+        // Their bindings are to the buffers before.
+        programs.clear();
+        *images = None;
+        let fitted = self.fitted(self.written(point), lights.face_sizes());
+        let layout = Layout::of_terms(self.setup, &fitted.layout);
+        replace_samples(self.gpu, &fitted, &layout, &point.params, lights, parts, self.views)?;
+        *terms = Some(key);
+        Ok(())
+    }
+
+    /// One pass: for each part of each view its sums.
+    fn sums(&self, point: &Point, wish: Wish) -> Result<Passed, GpuError> {
+        let written = self.written(point);
+        let mut device = self.lock();
+        self.keep(point, &mut device)?;
+        let OnDevice { parts, lights, programs, .. } = &mut *device;
+        let program = match programs.entry((wish, written)) {
+            std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
+            std::collections::btree_map::Entry::Vacant(entry) => {
+                let fused = self.fused(written, lights.face_sizes())?;
+                entry.insert(Program::new(self.gpu, fused, wish, parts)?)
+            }
+        };
+        lights.set(self.gpu, &point.params, &mut program.inputs)?;
+        let sums = program.run(self.gpu, parts, self.views, &point.gains)?;
+        Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
+    }
+
+    /// A pass as normal equations; after a fault, numbers that no solver takes.
+    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+        let channels: u32 = if self.alpha { 4 } else { 3 };
+        let k = self.unknowns.len();
+        let mut total = NormalEquations {
+            loss: 0.0,
+            residual: 0.0,
+            weight: self.weight.0 * f64::from(channels),
+            count: self.weight.1 * u64::from(channels),
+            jtr: vec![0.0; k],
+            jtj: vec![0.0; k * k],
+        };
+        match self.sums(point, wish) {
+            Ok(passed) => passed.add_to(&mut total, &self.unknowns),
+            Err(error) => {
+                self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                total.loss = f64::NAN;
+            }
+        }
+        if total.weight > 0.0 {
+            total.loss /= total.weight;
+        }
+        total
+    }
+}
+
+/// What a pass yielded.
+struct Passed {
+    /// For each part, its sums.
+    sums: Vec<Vec<(Sum, f64)>>,
+    columns: Vec<ColumnOf>,
+    /// For each part, its view.
+    view_of: Vec<usize>,
+}
+
+impl Passed {
+    /// Add the parts' sums, in their order.
+    fn add_to(&self, total: &mut NormalEquations, unknowns: &[Unknown]) {
+        let k = unknowns.len();
+        for (sums, &view) in self.sums.iter().zip(&self.view_of) {
+            let gain = unknowns.iter().position(|u| *u == Unknown::Gain(view));
+            let unknown = |i: usize| self.columns[i].unknown.or(gain);
+            let last = self.columns.len();
+            for &(sum, value) in sums {
+                match sum {
+                    Sum::Loss => total.loss += value,
+                    Sum::Product(i, j) if i == last && j == last => total.residual += value,
+                    Sum::Product(i, j) if j == last => {
+                        if let Some(a) = unknown(i) {
+                            total.jtr[a] += value;
+                        }
+                    }
+                    Sum::Product(i, j) => {
+                        let (Some(a), Some(b)) = (unknown(i), unknown(j)) else { continue };
+                        total.jtj[a * k + b] += value;
+                        if a != b {
+                            total.jtj[b * k + a] += value;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+impl Objective for GpuEngine<'_> {
+    fn unknowns(&self) -> &[Unknown] {
+        &self.unknowns
+    }
+
+    fn is_quadratic(&self) -> bool {
+        matches!(self.loss, Loss::L2 | Loss::RelativeL2) && !self.traits.clipped
+    }
+
+    fn rounding(&self) -> f64 {
+        skinfit_core::engine::rounding(self.views, self.loss, self.stride)
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.device_fault().map(|error| error.to_string())
+    }
+
+    fn normal_equations(&self, point: &Point) -> NormalEquations {
+        self.pass(point, Wish::Normal)
+    }
+
+    fn loss(&self, point: &Point) -> f64 {
+        self.pass(point, Wish::Loss).loss
+    }
+
+    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
+        self.pass(point, Wish::Gradient).loss_and_gradient()
+    }
+}

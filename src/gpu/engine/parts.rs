@@ -1,0 +1,430 @@
+//! Samples and targets on the device, view by view, in parts that fit a binding.
+
+use std::ops::Range;
+
+use wgpu::{Buffer, BufferDescriptor, BufferUsages};
+
+use super::Memory;
+use super::fused::WORKGROUP;
+use super::samples::DeviceSamples;
+use crate::records::packed;
+use crate::samples::LANES;
+use crate::samples::rows::{Row, Rows};
+use crate::samples::surface_records::Places;
+use crate::{Gpu, GpuError, MOST_OF_A_DISPATCH};
+use skinfit_core::engine::BLOCK;
+use skinfit_core::engine::view::ObservedView;
+
+/// Pixels that a thread shades, about: fewer leave processors idle, more leave sums long.
+const PIXELS_A_THREAD: usize = 4;
+/// Most workgroups of a part: eight for each of the 132 processors of an H200, which the largest adapters resemble.
+/// With the 56 sums of the race, a processor holds four at a time; six for each take 7% longer, as the second turn leaves
+/// processors half empty.
+const MOST_WORKGROUPS: usize = 1056;
+
+/// Workgroups for so many pixels, of which each thread shades a few.
+fn tiles(pixels: usize, most: usize) -> u32 {
+    pixels.div_ceil(WORKGROUP as usize * PIXELS_A_THREAD).clamp(1, most) as u32
+}
+
+/// Records that are packed at once: 3 to 21 MB.
+const PACKED_RECORDS: usize = 1 << 14;
+
+/// Bytes of a dispatch's uniform block.
+pub(super) const PART_BYTES: usize = 32;
+
+/// What is the same for all views.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Traits {
+    /// Where a sample's numbers stand, and how many rows a record has.
+    pub(super) places: Places,
+    pub(super) rows: usize,
+    /// Rows of a group's target.
+    channels: usize,
+    /// Whether a pixel has several samples.
+    pub(super) several: bool,
+    /// Whether pixels count differently.
+    pub(super) weighted: bool,
+    /// Whether targets are clipped.
+    pub(super) clipped: bool,
+}
+
+impl Traits {
+    pub(super) fn of(gpu: &Gpu, views: &[ObservedView]) -> Result<Self, GpuError> {
+        let single = |view: &ObservedView| view.samples.records() == view.samples.groups();
+        let first = views.first();
+        let traits = Self {
+            places: first.map(|view| *view.samples.surface.places()).unwrap_or_default(),
+            rows: first.map_or(0, |view| view.samples.surface.rows().stride()),
+            channels: first.map_or(0, |view| view.target.stride()),
+            several: !views.iter().all(single),
+            weighted: views.iter().any(|view| !view.weight.is_empty()),
+            clipped: views.iter().any(|view| view.clip.is_some()),
+        };
+        let alike = |view: &ObservedView| {
+            *view.samples.surface.places() == traits.places && view.target.stride() == traits.channels
+        };
+        if views.iter().all(alike) {
+            return Ok(traits);
+        }
+        Err(GpuError::Refused {
+            adapter: gpu.name().to_owned(),
+            reason: "the views' samples or targets hold different numbers".to_owned(),
+        })
+    }
+}
+
+/// One part of a view.
+pub(super) struct Part {
+    pub(super) view: usize,
+    pub(super) groups: Range<usize>,
+    /// Whether its buffers are its own.
+    resident: bool,
+    /// Bytes that an upload writes.
+    uploaded: u64,
+    pub(super) buffers: PartBuffers,
+    /// Weight and count of each block of pixels.
+    blocks: Vec<(f64, u64)>,
+    /// Pixels that a pass reads.
+    pub(super) read: u32,
+}
+
+/// The buffers of group 1, the sums apart.
+#[derive(Clone)]
+pub(super) struct PartBuffers {
+    pub(super) samples: Buffer,
+    pub(super) group_start: Buffer,
+    pub(super) targets: Buffer,
+}
+
+/// The parts of all views.
+#[derive(Default)]
+pub(super) struct Parts {
+    pub(super) parts: Vec<Part>,
+    traits: Traits,
+    stride: usize,
+    /// Bytes that a part's samples may take, or their terms.
+    limit: u64,
+    memory: Memory,
+}
+
+impl Parts {
+    /// The parts of `views`; their samples are `made` on the device, or else uploaded.
+    pub(super) fn new(
+        gpu: &Gpu,
+        views: &[ObservedView],
+        traits: &Traits,
+        memory: Memory,
+        made: Option<&DeviceSamples<'_>>,
+    ) -> Result<Self, GpuError> {
+        let limits = gpu.device.limits();
+        let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let limit = memory.part.map_or(limit, |part| part.min(limit));
+        let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1, limit, memory };
+        if let (Some(_), Some(most)) = (made, memory.resident) {
+            let bytes = views.iter().map(|view| parts.size(view, &(0..view.samples.groups())).total()).sum();
+            if bytes > most {
+                return Err(GpuError::SamplesStay { adapter: gpu.name().to_owned(), bytes, most });
+            }
+        }
+        let (mut used, mut shared) = (0, None);
+        for (index, view) in views.iter().enumerate() {
+            for groups in cut(view, limit) {
+                let size = parts.size(view, &groups);
+                let resident = memory.resident.is_none_or(|most| used + size.total() <= most);
+                let buffers = if resident {
+                    used += size.total();
+                    PartBuffers::new(gpu, size)?
+                } else {
+                    // The largest that any streamed part can be: a cut's limit.
+                    let buffers = match shared.take() {
+                        Some((buffers, most)) if size.within(most) => (buffers, most),
+                        Some((_, most)) => (PartBuffers::new(gpu, size.max(most))?, size.max(most)),
+                        None => (PartBuffers::new(gpu, size)?, size),
+                    };
+                    shared.insert(buffers).0.clone()
+                };
+                let part = Part {
+                    view: index,
+                    resident,
+                    uploaded: size.total(),
+                    buffers,
+                    blocks: blocks(view, &groups),
+                    read: (groups.len() * LANES) as u32,
+                    groups,
+                };
+                if resident {
+                    parts.upload(gpu, view, &part, made.is_none())?;
+                }
+                parts.parts.push(part);
+            }
+        }
+        // A later streamed part may have needed larger shared buffers: all use the last ones.
+        if let Some((buffers, _)) = shared {
+            parts
+                .parts
+                .iter_mut()
+                .filter(|part| !part.resident)
+                .for_each(|part| part.buffers = buffers.clone());
+        }
+        if let Some(made) = made {
+            made.fill(&parts.parts)?;
+        }
+        gpu.check()?;
+        Ok(parts)
+    }
+
+    /// For each part, its view.
+    pub(super) fn views(&self) -> Vec<usize> {
+        self.parts.iter().map(|part| part.view).collect()
+    }
+
+    /// Bytes of the buffers on the device, and bytes that are uploaded to visit each part once.
+    pub(super) fn bytes(&self) -> (u64, u64) {
+        let bytes = |part: &Part| {
+            part.buffers.samples.size() + part.buffers.group_start.size() + part.buffers.targets.size()
+        };
+        let own: u64 = self.parts.iter().filter(|part| part.resident).map(bytes).sum();
+        let mut streamed = self.parts.iter().filter(|part| !part.resident);
+        let uploaded = streamed.clone().map(|part| part.uploaded).sum();
+        // All that are streamed take turns in the same buffers.
+        (own + streamed.next().map_or(0, bytes), uploaded)
+    }
+
+    /// Read every `stride`-th block; returns the weight of the pixels that are read, and how many count.
+    pub(super) fn set_stride(&mut self, stride: usize) -> (f64, u64) {
+        self.stride = stride;
+        let mut total = (0.0, 0);
+        for part in &mut self.parts {
+            let read = part.blocks.iter().step_by(stride);
+            // Whole blocks, but for the last, which may be a part's short one.
+            let whole = read.len().saturating_sub(1);
+            let last = part.groups.len().saturating_sub(whole * stride * BLOCK).min(BLOCK);
+            part.read = ((whole * BLOCK + last) * LANES) as u32;
+            for &(weight, count) in read {
+                total.0 += weight;
+                total.1 += count;
+            }
+        }
+        total
+    }
+
+    /// Whether every part stays on the device, and there is room for records of so many rows of each. Longer ones than
+    /// the samples' stand beside these while they are made: not where memory is limited.
+    pub(super) fn all_hold(&self, rows: usize, views: &[ObservedView]) -> bool {
+        let bytes = |part: &Part| (4 * rows * Self::samples(part, views)) as u64;
+        let room = |part: &Part| self.memory.resident.is_none() && bytes(part) <= self.limit;
+        self.parts.iter().all(|part| part.resident && (rows <= self.traits.rows || room(part)))
+    }
+
+    /// Upload every part's samples anew, or have them made anew, where their terms stand.
+    pub(super) fn reload(
+        &mut self,
+        gpu: &Gpu,
+        views: &[ObservedView],
+        made: Option<&DeviceSamples<'_>>,
+    ) -> Result<(), GpuError> {
+        for index in 0..self.parts.len() {
+            let part = &self.parts[index];
+            let size = self.size(&views[part.view], &part.groups);
+            // Longer records than the samples' had a buffer of their own.
+            if part.buffers.samples.size() > size.samples.max(16) {
+                self.parts[index].buffers = PartBuffers::new(gpu, size)?;
+            }
+            let part = &self.parts[index];
+            self.upload(gpu, &views[part.view], part, made.is_none())?;
+        }
+        made.map_or(Ok(()), |made| made.fill(&self.parts))
+    }
+
+    /// Samples of a part, padding included.
+    pub(super) fn samples(part: &Part, views: &[ObservedView]) -> usize {
+        records(&views[part.view], &part.groups).len() * LANES
+    }
+
+    /// Pixels of a part.
+    pub(super) fn slots(part: &Part) -> usize {
+        part.groups.len() * LANES
+    }
+
+    /// Workgroups of a part's dispatch.
+    pub(super) fn workgroups(part: &Part) -> u32 {
+        tiles(part.read as usize, MOST_WORKGROUPS)
+    }
+
+    /// Most workgroups that a part's dispatch may have, at any stride.
+    pub(super) fn most_workgroups(part: &Part) -> u32 {
+        tiles(Self::slots(part), MOST_WORKGROUPS)
+    }
+
+    /// Workgroups of a part's image. Where nothing is added up a workgroup costs nothing, and an image takes a tenth
+    /// less time than with [`MOST_WORKGROUPS`] (4 to 16 million pixels on an H200).
+    pub(super) fn image_workgroups(part: &Part) -> u32 {
+        tiles(Self::slots(part), MOST_OF_A_DISPATCH as usize)
+    }
+
+    /// The uniform block of a part's dispatch: its counts and gain, and where its sums go.
+    pub(super) fn block(
+        &self,
+        views: &[ObservedView],
+        part: &Part,
+        gain: f64,
+        first_sum: u32,
+    ) -> [u8; PART_BYTES] {
+        // A target without a clip lies between the largest numbers; WGSL promises nothing about infinities.
+        let clip = views[part.view].clip.map_or((f32::MIN, f32::MAX), |clip| (clip.low, clip.high));
+        let slots = part.groups.len() * LANES;
+        let left_out = (self.stride - 1) * BLOCK * LANES;
+        let counts = [part.read, slots as u32, left_out as u32, first_sum];
+        let numbers = [gain as f32, clip.0, clip.1].map(f32::to_bits);
+        let words = counts.into_iter().chain(numbers);
+        let mut block = [0; PART_BYTES];
+        for (bytes, word) in block.chunks_exact_mut(4).zip(words) {
+            bytes.copy_from_slice(&word.to_ne_bytes());
+        }
+        block
+    }
+
+    /// Upload a part that does not stay on the device.
+    pub(super) fn stream(&self, gpu: &Gpu, views: &[ObservedView], part: &Part) -> Result<(), GpuError> {
+        self.upload(gpu, &views[part.view], part, true)
+    }
+
+    /// Whether each pass uploads the part.
+    pub(super) const fn is_streamed(part: &Part) -> bool {
+        !part.resident
+    }
+
+    fn size(&self, view: &ObservedView, groups: &Range<usize>) -> Size {
+        let rows = |count: usize| (count * size_of::<Row>()) as u64;
+        Size {
+            samples: rows(records(view, groups).len() * self.traits.rows),
+            starts: (4 * (groups.len() + 1)) as u64,
+            targets: rows(groups.len() * (self.traits.channels + usize::from(self.traits.weighted))),
+        }
+    }
+
+    /// Upload what a part's buffers hold, with or without its samples.
+    fn upload(
+        &self,
+        gpu: &Gpu,
+        view: &ObservedView,
+        part: &Part,
+        with_samples: bool,
+    ) -> Result<(), GpuError> {
+        let PartBuffers { samples, group_start, targets } = &part.buffers;
+        let records = records(view, &part.groups);
+        if with_samples {
+            write(gpu, samples, view.samples.surface.rows(), &records);
+        }
+        let starts: Vec<u32> = view.samples.group_start[part.groups.start..=part.groups.end]
+            .iter()
+            .map(|&start| start - records.start as u32)
+            .collect();
+        gpu.queue.write_buffer(group_start, 0, bytemuck::cast_slice(&starts));
+        let observed = write(gpu, targets, &view.target, &part.groups);
+        if self.traits.weighted {
+            let ones;
+            let weights = match view.weight.get(part.groups.clone()) {
+                Some(weights) => weights,
+                None => {
+                    ones = vec![Row::of([1.0; LANES]); part.groups.len()];
+                    &ones
+                }
+            };
+            gpu.queue.write_buffer(targets, observed, bytemuck::cast_slice(weights));
+        }
+        gpu.check()
+    }
+}
+
+/// Bytes of a part's buffers.
+#[derive(Clone, Copy, Debug)]
+struct Size {
+    samples: u64,
+    starts: u64,
+    targets: u64,
+}
+
+impl Size {
+    const fn total(self) -> u64 {
+        self.samples + self.starts + self.targets
+    }
+
+    const fn within(self, other: Self) -> bool {
+        self.samples <= other.samples && self.starts <= other.starts && self.targets <= other.targets
+    }
+
+    fn max(self, other: Self) -> Self {
+        Self {
+            samples: self.samples.max(other.samples),
+            starts: self.starts.max(other.starts),
+            targets: self.targets.max(other.targets),
+        }
+    }
+}
+
+impl PartBuffers {
+    fn new(gpu: &Gpu, size: Size) -> Result<Self, GpuError> {
+        let buffer = |label, bytes: u64, usage| {
+            gpu.device.create_buffer(&BufferDescriptor {
+                label: Some(label),
+                size: bytes.max(16),
+                usage: usage | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let made = Self {
+            samples: buffer("samples", size.samples, BufferUsages::STORAGE),
+            group_start: buffer("group starts", size.starts, BufferUsages::STORAGE),
+            targets: buffer("targets", size.targets, BufferUsages::STORAGE),
+        };
+        gpu.check()?;
+        Ok(made)
+    }
+}
+
+/// Ranges of groups, whole blocks each, whose samples stay within the limit. A block that is beyond it on its
+/// own is left to the adapter to refuse.
+fn cut(view: &ObservedView, limit: u64) -> Vec<Range<usize>> {
+    let groups = view.samples.groups();
+    let rows = view.samples.surface.rows().stride();
+    let bytes = |range: &Range<usize>| (size_of::<Row>() * rows * records(view, range).len()) as u64;
+    let (mut ranges, mut start, mut end) = (Vec::new(), 0, 0);
+    while end < groups {
+        let next = groups.min(end + BLOCK);
+        if bytes(&(start..next)) > limit && end > start {
+            ranges.push(start..end);
+            start = end;
+        }
+        end = next;
+    }
+    if end > start {
+        ranges.push(start..end);
+    }
+    ranges
+}
+
+fn records(view: &ObservedView, groups: &Range<usize>) -> Range<usize> {
+    let starts = &view.samples.group_start;
+    starts[groups.start] as usize..starts[groups.end] as usize
+}
+
+/// Weight and count of each block of pixels.
+fn blocks(view: &ObservedView, groups: &Range<usize>) -> Vec<(f64, u64)> {
+    let block = |first: usize| view.weight_and_count(first..groups.end.min(first + BLOCK));
+    groups.clone().step_by(BLOCK).map(block).collect()
+}
+
+/// Write a range of records to a buffer, as they stand on an adapter; returns how many bytes they take.
+fn write(gpu: &Gpu, buffer: &Buffer, rows: &Rows, range: &Range<usize>) -> u64 {
+    let stride = rows.stride();
+    let rows = &rows.all()[range.start * stride..range.end * stride];
+    // Some at a time: they are packed in the host's memory.
+    let mut offset = 0;
+    for some in rows.chunks(PACKED_RECORDS * stride.max(1)) {
+        gpu.queue.write_buffer(buffer, offset, bytemuck::cast_slice(&packed(some, stride)));
+        offset += size_of_val(some) as u64;
+    }
+    offset
+}

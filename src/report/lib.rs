@@ -1,0 +1,355 @@
+//! Metrics, pictures and pages that show how good a fit is.
+//!
+//! - [`metrics`], [`flip`]: PSNR, SSIM and FLIP of a view
+//! - [`json`]: the file `report.json`
+//! - [`pictures`]: target | fit | error side by side
+//! - [`page`], [`plot`]: what all pages share: sortable tables, scatter plots, pictures that wipe
+//! - [`maps`]: what whole maps gained, where they were fitted
+//! - [`html`]: the page `report.html`, with its `figures`, `charts`, `tables` and `words`
+//!
+//! [`write_run`] leaves all of it in a run's folder, with an EXR of the terms for each view.
+
+mod charts;
+pub mod figures;
+mod filter;
+pub mod flip;
+pub mod html;
+pub mod json;
+mod lettering;
+pub mod maps;
+pub mod metrics;
+pub mod page;
+pub mod pictures;
+pub mod plot;
+mod tables;
+mod words;
+
+pub use words::{count, number, seconds};
+
+// What other members of the workspace hold stands under the names that it has there.
+use skinfit_core::{engine, fit, model, output, prepare, progress, render, scene};
+
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+use crate::fit::outcome::Outcome;
+use crate::output::OutputError;
+pub use crate::prepare::StageSeconds;
+use crate::render::files::{self, Image, ImageFileError, ImageOptions};
+use crate::scene::Loss;
+use json::{Summary, ViewSummary};
+use maps::MapEvidence;
+use metrics::Comparison;
+use pictures::Picture;
+
+/// The folder of fitted maps in a run folder.
+pub const MAPS: &str = "maps";
+/// What was found of fitted maps, in numbers.
+pub const MAPS_JSON: &str = "maps.json";
+
+/// What a report says of a run beside the fit's outcome.
+#[derive(Clone, Debug)]
+pub struct RunInfo {
+    /// The scene's file, or what the built-in scene is called.
+    pub scene: String,
+    /// What was minimised.
+    pub loss: Loss,
+    /// Which engine evaluated the model: `cpu` or `gpu`.
+    pub engine: String,
+    /// Surface samples over all views.
+    pub samples: u64,
+    /// Seconds spent in each stage.
+    pub seconds: StageSeconds,
+    /// The images, in the order of the scene's views.
+    pub views: Vec<ViewEvidence>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+    /// Further (name, text) to tell where the numbers come from: effects, seed, threads.
+    pub provenance: Vec<(String, String)>,
+    /// What whole maps gained, where they were fitted.
+    pub maps: Option<MapEvidence>,
+    /// Files that the run's scene names: where one is what an earlier run left, it stays.
+    pub named: Vec<PathBuf>,
+}
+
+/// The images of one view; all of one size.
+#[derive(Clone, Debug)]
+pub struct ViewEvidence {
+    /// The view's name.
+    pub name: String,
+    /// What was to be matched.
+    pub target: Image,
+    /// The model's image at the end of the fit, the view's gain included.
+    pub fit: Image,
+    /// What share of each pixel the mesh covers (and target and mask let count), in [0, 1]; scores
+    /// are taken where it is at least [`metrics::COVERED`].
+    pub coverage: Vec<f32>,
+    /// The model's terms by name, the gain included; they add up to `fit`.
+    pub terms: Vec<(String, Image)>,
+}
+
+/// What [`write_run`] wrote.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// The content of `report.json`.
+    pub summary: Summary,
+    /// Its text.
+    pub json: String,
+    /// Every file written.
+    pub files: Vec<PathBuf>,
+}
+
+/// A report could not be written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// An image.
+    #[error(transparent)]
+    Image(#[from] ImageFileError),
+    /// Another file.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// The images of a view are not of one size.
+    #[error(
+        "view '{view}': {what} does not have the {width} x {height} pixels of the fitted image. Give the target, the coverage and every term the view's size."
+    )]
+    Sizes {
+        /// The view.
+        view: String,
+        /// What differs.
+        what: String,
+        /// Pixels across.
+        width: usize,
+        /// Pixels down.
+        height: usize,
+    },
+}
+
+/// Write `report.json`, `report.html` and, for each view, `<view>.png` and `<view>_terms.exr` into
+/// `folder`, which is made if need be; pictures that an earlier run of other views left there go, and its fitted maps,
+/// unless the scene names them.
+/// Characters of a view's name that a file name should not hold become `_`.
+///
+/// # Errors
+/// When sizes differ or a file cannot be written; each file is whole or not there.
+pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Report, ReportError> {
+    for view in &run.views {
+        view.check()?;
+    }
+    let mut warnings = run.warnings.clone();
+    let mut written = Vec::new();
+    let (mut views, mut shown) = (Vec::new(), Vec::new());
+    let options = ImageOptions { attributes: run.attributes(outcome), ..ImageOptions::default() };
+    let bar = progress::bar("report", run.views.len() as u64);
+    for (view, stem) in run.views.iter().zip(file_stems(&run.views)) {
+        let comparison = Comparison::new(&view.target, &view.fit, &view.coverage);
+        let scores = comparison.scores();
+        warnings.extend(view.warnings(scores.is_some()));
+        let png = folder.join(format!("{stem}.png"));
+        let sheet = pictures::side_by_side(&view.name, &view.target, &view.fit, &comparison, scores);
+        files::write_png_bytes(&png, sheet.width, sheet.height, &sheet.bytes)?;
+        let exr = folder.join(format!("{stem}_terms.exr"));
+        files::write_exr_layers(&exr, &view.fit, &view.terms, &options)?;
+        written.extend([png, exr]);
+        views.push(ViewSummary::new(scores, comparison.pixels()));
+        shown.push(Picture::of_error(&comparison, view.fit.width));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+
+    let path = folder.join("report.json");
+    let mut left = file_names(&written);
+    left.extend(run.maps.iter().flat_map(|maps| maps.files.iter().cloned()));
+    let kept = remove_stale(folder, &path, &left, &run.named)?;
+    left.extend(kept);
+    let summary = Summary::new(run, outcome, &views, left, warnings);
+    let json = summary.to_json().map_err(|e| OutputError::new(&path, &e))?;
+    output::write(&path, json.as_bytes())?;
+    written.push(path);
+    let path = folder.join("report.html");
+    let page = html::page(&title(folder), run, &summary, &shown).map_err(|e| OutputError::new(&path, &e))?;
+    output::write(&path, page.as_bytes())?;
+    written.push(path);
+    Ok(Report { summary, json, files: written })
+}
+
+/// A run's name: its folder's.
+fn title(folder: &Path) -> String {
+    let absolute = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    absolute.file_name().unwrap_or(absolute.as_os_str()).to_string_lossy().into_owned()
+}
+
+fn file_names(paths: &[PathBuf]) -> Vec<String> {
+    paths.iter().filter_map(|path| Some(path.file_name()?.to_str()?.to_owned())).collect()
+}
+
+/// Remove the pictures and maps that an earlier run says in its `report.json` that it left in `folder`, and that this
+/// one has not written anew. Returns those that stay as they are `named` by the scene.
+fn remove_stale(
+    folder: &Path,
+    report: &Path,
+    written: &[String],
+    named: &[PathBuf],
+) -> Result<Vec<String>, OutputError> {
+    #[derive(serde::Deserialize)]
+    struct Earlier {
+        files: Vec<String>,
+    }
+    // Without a report, or with one that is not ours, nothing in the folder is known to be ours.
+    let earlier = std::fs::read(report).ok().and_then(|bytes| serde_json::from_slice::<Earlier>(&bytes).ok());
+    let named: Vec<PathBuf> = named.iter().filter_map(|path| path.canonicalize().ok()).collect();
+    let (mut kept, mut maps) = (Vec::new(), false);
+    for name in earlier.map(|earlier| earlier.files).unwrap_or_default() {
+        if !is_ours(&name) || written.contains(&name) {
+            continue;
+        }
+        let path = folder.join(&name);
+        if path.canonicalize().is_ok_and(|path| named.contains(&path)) {
+            kept.push(name);
+            continue;
+        }
+        match std::fs::remove_file(&path) {
+            Err(error) if error.kind() != ErrorKind::NotFound => return Err(OutputError::new(&path, &error)),
+            _ => maps |= name != MAPS_JSON && name.starts_with(MAPS),
+        }
+    }
+    if maps {
+        // A folder that still holds something stays.
+        let _ = std::fs::remove_dir(folder.join(MAPS));
+    }
+    Ok(kept)
+}
+
+/// Whether a run could have left a file of that name, by its path from the run folder: one that leads elsewhere is
+/// never removed.
+fn is_ours(name: &str) -> bool {
+    let stem = match name.strip_prefix(MAPS).and_then(|name| name.strip_prefix('/')) {
+        Some(map) => [".png", ".exr", ".csv"].iter().find_map(|ending| map.strip_suffix(ending)),
+        None if name == MAPS_JSON => return true,
+        None => name.strip_suffix("_terms.exr").or(name.strip_suffix(".png")),
+    };
+    stem.is_some_and(is_file_stem)
+}
+
+impl RunInfo {
+    /// Where the numbers come from, as (name, text).
+    fn provenance(&self) -> Vec<(String, String)> {
+        let own = [("software", software()), ("scene", self.scene.clone())];
+        own.into_iter().map(|(name, text)| (name.to_owned(), text)).chain(self.provenance.clone()).collect()
+    }
+
+    /// The provenance that image files carry: as the report's, and the fitted parameters.
+    fn attributes(&self, outcome: &Outcome) -> Vec<(String, String)> {
+        let values: Vec<String> =
+            outcome.unknowns.iter().map(|u| format!("{} = {}", u.unknown.name(), u.value)).collect();
+        let mut attributes = self.provenance();
+        attributes.push(("parameters".to_owned(), values.join("; ")));
+        attributes
+    }
+}
+
+/// The program's name and version.
+fn software() -> String {
+    format!("skinfit {}", env!("CARGO_PKG_VERSION"))
+}
+
+impl ViewEvidence {
+    fn check(&self) -> Result<(), ReportError> {
+        let (width, height) = (self.fit.width, self.fit.height);
+        let fits = |image: &Image| {
+            let planes = [image.rgb.len(), image.alpha.len()];
+            (image.width, image.height) == (width, height) && planes == [width * height; 2]
+        };
+        let wrong = |what: &str| {
+            let (view, what) = (self.name.clone(), what.to_owned());
+            Err(ReportError::Sizes { view, what, width, height })
+        };
+        match () {
+            () if !fits(&self.fit) => wrong("the fitted image"),
+            () if !fits(&self.target) => wrong("the target"),
+            () if self.coverage.len() != width * height => wrong("the coverage"),
+            () => match self.terms.iter().find(|(_, image)| !fits(image)) {
+                Some((name, _)) => wrong(&format!("the term '{name}'")),
+                None => Ok(()),
+            },
+        }
+    }
+
+    fn warnings(&self, compared: bool) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if !compared {
+            let name = &self.name;
+            warnings.push(format!("View '{name}': no pixel is fully covered, so there are no scores."));
+        }
+        let apart = self.terms_apart();
+        // f32 sums of a handful of terms agree to a few 1e-7 of their size.
+        if apart > 1e-4 {
+            let name = &self.name;
+            warnings.push(format!("View '{name}': its terms differ from the whole by up to {apart:.2e}."));
+        }
+        warnings
+    }
+
+    /// The greatest difference of the terms' sum from the whole, relative to 1 + the terms' size.
+    fn terms_apart(&self) -> f32 {
+        if self.terms.is_empty() {
+            return 0.0;
+        }
+        let apart = |i: usize, c: usize| {
+            let terms = self.terms.iter().map(|(_, image)| image.rgb[i][c]);
+            let (sum, size) = terms.fold((0.0, 0.0), |(sum, size), t| (sum + t, size + t.abs()));
+            (sum - self.fit.rgb[i][c]).abs() / (1.0 + size)
+        };
+        (0..3 * self.fit.rgb.len()).map(|k| apart(k / 3, k % 3)).fold(0.0, f32::max)
+    }
+}
+
+fn is_safe(c: char) -> bool {
+    c.is_alphanumeric() || c == '-' || c == '_'
+}
+
+/// Whether [`file_stems`] could have made it; in particular it leads to no other folder.
+fn is_file_stem(stem: &str) -> bool {
+    !stem.is_empty() && stem.chars().all(is_safe)
+}
+
+/// A file name's stem for a view: safe characters alone.
+#[must_use]
+pub fn file_stem(view: &str) -> String {
+    // File names have room for 255 bytes, of which a letter may take four.
+    let stem: String = view.chars().take(50).map(|c| if is_safe(c) { c } else { '_' }).collect();
+    if stem.is_empty() { "view".to_owned() } else { stem }
+}
+
+/// A file name's stem for each view, no two the same.
+fn file_stems(views: &[ViewEvidence]) -> Vec<String> {
+    let mut stems: Vec<String> = Vec::new();
+    for view in views {
+        let base = file_stem(&view.name);
+        let numbered = (2..).map(|n| format!("{base}_{n}"));
+        let taken = |stem: &String| stems.iter().any(|s| s.to_lowercase() == stem.to_lowercase());
+        let stem = std::iter::once(base.clone()).chain(numbered).find(|stem| !taken(stem));
+        stems.push(stem.unwrap_or(base));
+    }
+    stems
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn file_names_are_safe_and_no_two_views_share_one() {
+        let view = |name: &str| ViewEvidence {
+            name: name.to_owned(),
+            target: Image::default(),
+            fit: Image::default(),
+            coverage: Vec::new(),
+            terms: Vec::new(),
+        };
+        let views = ["front", "Front", "../up", "", "a/b", "a:b", "größe"].map(view);
+        let stems = file_stems(&views);
+        assert!(stems.iter().all(|stem| is_file_stem(stem)));
+        assert!(!["", "..", "a/b", "a.b"].into_iter().any(is_file_stem));
+        assert_eq!(stems, ["front", "Front_2", "___up", "view", "a_b", "a_b_2", "größe"]);
+    }
+}

@@ -1,0 +1,100 @@
+//! Fits of whole maps: every texel of the skin maps, every vertex's occlusion, every texel of the cubes.
+//!
+//! The image is linear in each map while the others are held, so that a map is the answer of a large, sparse,
+//! bounded least-squares problem: conjugate gradients solve it, whose products are forward and backward passes of
+//! the shading operation ([`crate::tensor`]). The maps are taken one after the other, and the constants are solved
+//! again after each round. burn's Adam stands beside it, for comparison.
+//!
+//! - [`layer`]: a map as an unknown: texels, how samples see them, priors
+//! - [`problem`]: the loss of the images and the priors, and its slope by a layer's texels
+//! - [`cg`]: projected conjugate gradients; [`adam`]: burn's Adam
+//! - [`layers`]: the maps that a fit begins with, and what they show; [`parts`]: samples in parts that fit a buffer
+//! - [`task`]: what is asked for; [`fit`]: the rounds over maps and constants
+//! - [`pictures`]: maps as images
+
+pub mod adam;
+pub mod cg;
+pub mod fit;
+pub mod layer;
+pub mod layers;
+pub mod parts;
+pub mod pictures;
+pub mod problem;
+pub mod task;
+
+pub use fit::{FittedMaps, fit_maps};
+pub use layer::{Grid, Layer};
+pub use task::MapTask;
+
+use crate::TensorError;
+use crate::fit::FitError;
+use crate::gpu::GpuError;
+
+/// A fit of maps that cannot be done.
+#[derive(Debug, thiserror::Error)]
+pub enum MapError {
+    /// The device does not take it.
+    #[error(transparent)]
+    Tensor(TensorError),
+    /// A map, or what is looked up for it, is beyond what one buffer of the device holds.
+    #[error(
+        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there. Scale the maps down, lower samples_per_axis in [quality], or choose an adapter with larger buffers (--adapter)."
+    )]
+    TooLarge {
+        /// The adapter.
+        adapter: String,
+        /// What the buffer holds.
+        what: String,
+        /// Its bytes.
+        bytes: u64,
+        /// The limit.
+        limit: u64,
+    },
+    /// The device has no room for all samples and maps.
+    #[error(
+        "adapter {adapter}: out of memory. A fit of maps keeps all samples on the adapter: lower samples_per_axis in [quality], give fewer or smaller views and maps, or choose another adapter (--adapter)."
+    )]
+    OutOfMemory {
+        /// The adapter.
+        adapter: String,
+    },
+    /// The constants cannot be fitted.
+    #[error(transparent)]
+    Constants(#[from] FitError),
+    /// A map that no enabled effect reads.
+    #[error(
+        "no enabled effect reads {map}: it cannot be fitted. Leave it out of --maps, or enable {effects}."
+    )]
+    Unread {
+        /// The map's name.
+        map: &'static str,
+        /// Effects that read it.
+        effects: &'static str,
+    },
+    /// A texture of a mesh on which no texel has a place.
+    #[error(
+        "the mesh has no texture coordinates (or only one), so no texel of {map} has a place on it. Unwrap the mesh, or leave {map} out of --maps."
+    )]
+    NotUnwrapped {
+        /// The map's name.
+        map: &'static str,
+    },
+    /// The loss became no number.
+    #[error("the loss is not finite after a step of {map}: its values or its priors are too large.")]
+    NotFinite {
+        /// The map's name.
+        map: &'static str,
+    },
+}
+
+impl From<TensorError> for MapError {
+    fn from(error: TensorError) -> Self {
+        match error {
+            TensorError::Gpu(GpuError::BufferSize { adapter, what, bytes, limit, .. }) => {
+                Self::TooLarge { adapter, what, bytes, limit }
+            }
+            TensorError::Gpu(GpuError::OutOfMemory { adapter }) => Self::OutOfMemory { adapter },
+            other => Self::Tensor(other),
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! The loss of images and priors as a function of one layer's texels, and its slope.
+//!
+//! The loss is the engine's: the mean of weighted squared residuals, where a robust loss is fitted by reweighting.
+//! Weights and working targets are taken on the CPU from the very functions that the engine uses.
+
+use burn::tensor::{Tensor, TensorData};
+
+use super::MapError;
+use super::layer::Layer;
+use crate::engine::residual::weighted_residual;
+use crate::engine::view::ObservedView;
+use crate::samples::LANES;
+use crate::scene::Loss;
+use crate::{Input, Inputs, Shade, SharedDevice, TensorError};
+
+/// Images to be matched, and the layers that may move for it.
+pub struct Problem {
+    /// The views' pixels, in parts.
+    parts: Vec<Part>,
+    /// The layers.
+    pub layers: Vec<Layer>,
+}
+
+/// Some of the pixels.
+struct Part {
+    /// The shading operation over them.
+    shade: Shade,
+    /// What it takes; layers' own inputs follow their values.
+    inputs: Inputs,
+    /// What each pixel slot's image is multiplied with: \[slots, 1\].
+    gain: Tensor<2>,
+    /// Working targets and their weights (which add up to 1 over all parts): \[slots, 4\].
+    target: Tensor<2>,
+    weight: Tensor<2>,
+}
+
+/// A view's part in the loss.
+pub struct Observed<'a> {
+    /// Samples and target.
+    pub view: &'a ObservedView,
+    /// A factor on its image.
+    pub gain: f64,
+    /// Whether it counts: a view that is held out does not.
+    pub counts: bool,
+}
+
+impl Problem {
+    /// The problem at the layers' values; [`reweight`](Self::reweight) is to be called before it is solved.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn new(
+        shared: &SharedDevice,
+        parts: Vec<(Shade, Inputs)>,
+        layers: Vec<Layer>,
+    ) -> Result<Self, TensorError> {
+        let device = shared.device();
+        let part = |(index, (shade, mut inputs)): (usize, (Shade, Inputs))| {
+            for layer in &layers {
+                layer.show(index, layer.value.clone(), &mut inputs)?;
+            }
+            let slots = shade.slots();
+            Ok::<_, TensorError>(Part {
+                gain: Tensor::ones([slots, 1], device),
+                target: Tensor::zeros([slots, 4], device),
+                weight: Tensor::zeros([slots, 4], device),
+                shade,
+                inputs,
+            })
+        };
+        Ok(Self { parts: parts.into_iter().enumerate().map(part).collect::<Result<_, _>>()?, layers })
+    }
+
+    /// Take other constants: the columns of the parameters and, where no layer is the specular cube, that cube.
+    pub fn set_constants(&mut self, columns: &Tensor<1>, lobe: Option<&Tensor<2>>) {
+        let own = self.layers.iter().any(|layer| layer.input == Input::Lobe);
+        for part in &mut self.parts {
+            part.inputs.columns = columns.clone();
+            if let Some(lobe) = lobe.filter(|_| !own) {
+                part.inputs.lobe = lobe.clone();
+            }
+        }
+    }
+
+    /// Take gains, weights and working targets anew, at the present image.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn reweight(
+        &mut self,
+        shared: &SharedDevice,
+        views: &[Observed<'_>],
+        loss: Loss,
+    ) -> Result<(), TensorError> {
+        let mut image = Vec::new();
+        for part in &self.parts {
+            image.extend(read(part.shade.image(part.inputs.clone())?)?);
+        }
+        let (mut gains, mut targets, mut weights) = (Vec::new(), Vec::new(), Vec::new());
+        let mut total = 0.0;
+        for Observed { view, gain, counts } in views {
+            let channels = view.target.stride();
+            for slot in 0..view.samples.groups() * LANES {
+                let pixel = if *counts { f64::from(view.pixel_weight(slot)) } else { 0.0 };
+                total += pixel * channels as f64;
+                for c in 0..4 {
+                    let shown = gain * f64::from(image[4 * gains.len() + c]);
+                    let (target, weight) = if c < channels && pixel > 0.0 {
+                        let target = f64::from(view.target.number(c, slot));
+                        let row = weighted_residual(loss, view.clip, shown, target, pixel);
+                        // Where the slope of a robust loss is not its weight times the residual, the target gives way.
+                        let residual = if row.scale > 0.0 { row.residual / row.scale } else { 0.0 };
+                        (shown - residual, row.scale * row.scale)
+                    } else {
+                        (0.0, 0.0)
+                    };
+                    targets.push(target as f32);
+                    weights.push(weight);
+                }
+                gains.push(*gain as f32);
+            }
+        }
+        let weights: Vec<f32> =
+            weights.into_iter().map(|w| (w / total.max(f64::MIN_POSITIVE)) as f32).collect();
+        let mut first = 0;
+        for part in &mut self.parts {
+            let slots = part.shade.slots();
+            let matrix = |numbers: &[f32], columns: usize| {
+                let numbers = numbers[first * columns..(first + slots) * columns].to_vec();
+                Tensor::<2>::from_data(TensorData::new(numbers, [slots, columns]), shared.device())
+            };
+            (part.gain, part.target, part.weight) =
+                (matrix(&gains, 1), matrix(&targets, 4), matrix(&weights, 4));
+            first += slots;
+        }
+        Ok(())
+    }
+
+    /// The loss, and its slope by the texels of a layer, at `texels`.
+    ///
+    /// # Errors
+    /// When the device does not take it, or the loss is not finite.
+    pub fn slope(&self, index: usize, texels: &Tensor<2>) -> Result<(f64, Tensor<2>), MapError> {
+        let layer = &self.layers[index];
+        let (mut value, mut slope) = (0.0, None);
+        for part in 0..self.parts.len() {
+            let texels = texels.clone().autodiff().require_grad();
+            let mut loss = self.image_loss(part, layer, texels.clone())?;
+            if part == 0 {
+                loss = loss + layer.penalty(texels.clone())?;
+            }
+            value += f64::from(read(loss.clone().inner())?[0]);
+            let gradients = loss.backward();
+            let one = texels.grad(&gradients).ok_or(MapError::NotFinite { map: layer.name })?;
+            slope = Some(match slope {
+                None => one,
+                Some(sum) => sum + one,
+            });
+        }
+        match slope {
+            Some(slope) if value.is_finite() => Ok((value, slope)),
+            _ => Err(MapError::NotFinite { map: layer.name }),
+        }
+    }
+
+    /// A part's share of the images' loss.
+    fn image_loss(&self, index: usize, layer: &Layer, texels: Tensor<2>) -> Result<Tensor<1>, TensorError> {
+        let part = &self.parts[index];
+        let mut inputs = part.inputs.clone();
+        layer.show(index, texels, &mut inputs)?;
+        let image = part.shade.image(inputs)?;
+        let residual = image * part.gain.clone().autodiff() - part.target.clone().autodiff();
+        Ok((residual.square() * part.weight.clone().autodiff()).sum())
+    }
+
+    /// What a layer's priors say against its values: their share of the loss.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn prior(&self, index: usize) -> Result<f64, TensorError> {
+        let layer = &self.layers[index];
+        Ok(f64::from(read(layer.penalty(layer.value.clone())?)?[0]))
+    }
+
+    /// Give a layer other texels.
+    ///
+    /// # Errors
+    /// When the device does not take it.
+    pub fn set(&mut self, index: usize, texels: Tensor<2>) -> Result<(), TensorError> {
+        for (part, Part { inputs, .. }) in self.parts.iter_mut().enumerate() {
+            self.layers[index].show(part, texels.clone(), inputs)?;
+        }
+        self.layers[index].value = texels;
+        Ok(())
+    }
+}
+
+/// A tensor's numbers.
+///
+/// # Errors
+/// When the device does not give them.
+pub fn read<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, TensorError> {
+    let unread = |reason: String| TensorError::Foreign { what: "what is read back", reason };
+    let data = tensor.try_into_data().map_err(|error| unread(error.to_string()))?;
+    data.try_to_vec::<f32>().map_err(|error| unread(format!("{error:?}")))
+}
