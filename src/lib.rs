@@ -1,25 +1,93 @@
 //! **skinfit**: a differentiable shading-fit tool for real-time skin.
 //!
-//! The library is the members of the workspace; its modules stand here under one name:
+//! The shader is the one of NVIDIA's *Dawn* demo (GPU Gems, chapter 3). A scene holds a mesh, its maps, the light, and
+//! views with target images; a fit finds the constants that match the targets best. All of a program that fits the
+//! built-in scene, reads a constant with its standard error, renders a view and exports the constants:
 //!
-//! - `skinfit_core`: from a scene to fitted constants, images and shaders, on the CPU
-//! - `skinfit_gpu`: the production renderer and the engine on a graphics adapter
-//! - `skinfit_tensor`: the model on burn's tensors, and fits of whole maps (feature `burn`)
-//! - `skinfit_report`: metrics, pictures and pages that show how good a fit is
-//! - `skinfit_study`: what is measured about the model and the fits
-//! - `skinfit_host`: the command line
+//! ```
+//! use skinfit::{ExportTarget, FitOptions, PrepareOptions, Prepared, Shader};
+//! use skinfit::{built_in_scene, export_constants, fit, write_exr};
+//!
+//! fn main() -> Result<(), Box<dyn std::error::Error>> {
+//!     let folder = std::env::temp_dir().join("skinfit-example");
+//!     let scene = built_in_scene(&folder)?; // or the path of your own scene file
+//!
+//!     // Read it, bake its light and occlusion, and sample the visible surface.
+//!     let options = PrepareOptions { fit: true, cache: Some(folder.clone()), ..PrepareOptions::default() };
+//!     let mut prepared = Prepared::new(&scene, &options)?;
+//!     let engine = prepared.engine()?;
+//!     let outcome = fit(&engine, &prepared.start(), &FitOptions::default(), &mut |_| {})?;
+//!
+//!     let base = outcome.constant("base_weight").ok_or("base_weight is not free in this scene")?;
+//!     println!("base_weight = {:.4}, standard error {:?}", base.value, base.std_error);
+//!     assert!((base.value - 0.85).abs() < 1e-5); // the targets' own, but for roundings to 32 bits
+//!
+//!     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
+//!     let (view, observed) = (&prepared.scene.views[0], &engine.views()[0]);
+//!     let image = shader.shade(&observed.samples, &view.camera, 1.0).image;
+//!     write_exr(&folder.join("front.exr"), &image, &Default::default())?;
+//!
+//!     let (effects, params) = (prepared.scene.effects, &outcome.end.params);
+//!     println!("{}", export_constants(ExportTarget::Glsl, effects, params, &Default::default()));
+//!     Ok(())
+//! }
+//! ```
+//!
+//! | to | |
+//! | --- | --- |
+//! | read, bake and sample a scene | [`Prepared`], by [`PrepareOptions`]; [`built_in_scene`] writes one |
+//! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`]: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] |
+//! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name |
+//! | render | [`Shader`] on the CPU, [`Renderer`] on a graphics adapter; [`write_exr`] |
+//! | take it to another engine | [`export_constants`], [`export_function`] |
+//! | differentiate it on burn's tensors | `skinfit_tensor::Shade` (feature `burn`) |
+//!
+//! `experiments/library` has runnable programs: a fit, a rendering, gradients on tensors.
+//!
+//! Images are linear Rec.709, premultiplied by their coverage; lengths are the scene's own; angles are degrees in
+//! files and radians in the library. Library errors say file, place, what is wrong and what to do. The library has no
+//! signals, no progress bars and no command line: long work tells [`progress`] how far it is, and the program
+//! `skinfit` (feature `host`, on by default) shows it.
+//!
+//! What stands here are a few names of the members of the workspace, which follow the data's one way: `skinfit_core`
+//! (everything on the CPU), `skinfit_gpu` (the renderer and the engine on an adapter),
+//! `skinfit_tensor`, `skinfit_report` (metrics, pictures and pages), `skinfit_study`, and `skinfit_host`, the command
+//! line. Their modules are the interface for whoever needs more; it changes as they do.
 
-pub use skinfit_core::{
-    bake, builtin, demo, export, fit, model, output, prepare, progress, render, samples, scene, shader, simd,
+pub use skinfit_core::demo::built_in_scene;
+pub use skinfit_core::engine::cpu::CpuEngine;
+pub use skinfit_core::engine::{Objective, Point, Unknown};
+pub use skinfit_core::export::{
+    Target as ExportTarget, constants as export_constants, function as export_function,
 };
+pub use skinfit_core::fit::outcome::Outcome;
+pub use skinfit_core::fit::{FitOptions, fit};
+pub use skinfit_core::model::params::{Param, Params};
+pub use skinfit_core::prepare::{PrepareOptions, Prepared};
+pub use skinfit_core::progress;
+pub use skinfit_core::render::files::write_exr;
+pub use skinfit_core::render::shade::Shader;
+pub use skinfit_gpu::engine::GpuEngine;
+pub use skinfit_gpu::{Gpu, RenderOptions, Renderer};
+
+// The members' modules under one name, for the tests and experiments of the project.
+#[doc(hidden)]
+pub use skinfit_core::{
+    bake, builtin, demo, export, fit, model, output, prepare, render, samples, scene, shader, simd,
+};
+#[doc(hidden)]
 pub use skinfit_gpu as gpu;
-pub use skinfit_host::cli;
+#[doc(hidden)]
 pub use skinfit_report as report;
+#[cfg(feature = "host")]
+#[doc(hidden)]
 pub use skinfit_study as study;
 #[cfg(feature = "burn")]
+#[doc(hidden)]
 pub use skinfit_tensor::{self as tensor, maps};
 
-/// Loss, gradient and normal equations over samples.
+/// Loss, gradient and normal equations over samples, on the CPU and on an adapter.
+#[doc(hidden)]
 pub mod engine {
     pub use skinfit_core::engine::*;
     pub use skinfit_gpu::engine as gpu;

@@ -1,5 +1,5 @@
 //! The `skinfit` command.
 
 fn main() -> std::process::ExitCode {
-    skinfit::cli::main()
+    skinfit_host::cli::main()
 }

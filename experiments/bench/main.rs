@@ -49,7 +49,7 @@ fn sample(c: &mut Criterion) {
         lobe_slope: Some(&slope),
         hilite: prepared.illumination.hilite.as_ref(),
     };
-    let (setup, params) = (prepared.setup(), prepared.scene.params);
+    let (setup, params) = (prepared.setup(), prepared.scene.params.clone());
     let lights = Lights::new(setup, &params, cubes, false, like);
     let fragment = Fragment {
         base: [0.1, 0.2, 0.9],

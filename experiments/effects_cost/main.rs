@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let full = Prepared::baked(&arguments.scene, &options(None))?.scene.effects;
     let mut rows = Vec::new();
     if !arguments.full {
-        for effect in Effect::ALL.into_iter().filter(|effect| *effect != Effect::Bloom) {
+        for effect in Effect::BUILT_IN.into_iter().filter(|effect| *effect != Effect::Bloom) {
             rows.push(measure(&arguments, &gpu, effect.name(), Effects::of(&[effect]), Plan::clone)?);
         }
         for effect in full.iter() {

@@ -14,6 +14,8 @@ use data::{Manifest, Result};
 use racer::Racer;
 use serde_json::{Value, json};
 use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::gpu::{GpuEngine, Memory, Task};
+use skinfit::engine::planned::PlannedEngine;
 use skinfit::engine::{Point, Unknown};
 use skinfit::fit::coordinates::Coordinates;
 use skinfit::fit::{FitOptions, bounded, fit};
@@ -32,7 +34,7 @@ struct Arguments {
     #[arg(long, default_value = "sampled", value_parser = ["sampled", "pre"])]
     mode: String,
     /// What makes the passes.
-    #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
+    #[arg(long, default_value = "cpu", value_parser = ["cpu", "planned", "gpu"])]
     engine: String,
     /// Where the row is written; standard output when left out.
     #[arg(short, long)]
@@ -87,20 +89,21 @@ fn with_engine<T>(
         let target = engine.views()[0].target.clone();
         return then(&mut engine, &target);
     }
-    #[cfg(feature = "gpu")]
-    {
-        use skinfit::engine::gpu::{GpuEngine, Memory, Task};
-        let words = |error: skinfit::gpu::GpuError| error.to_string();
-        let gpu = skinfit::gpu::Gpu::open(&skinfit::gpu::Choice::default()).map_err(words)?;
-        let task = Task { setup: SETUP, illumination, views: &views, loss: Loss::L2, unknowns };
-        let start = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };
-        let mut engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(words)?;
-        let (resident, _) = engine.bytes();
-        eprintln!("race: {:.1} bytes a pixel on the device", resident as f64 / manifest.pixels as f64);
-        then(&mut engine, &views[0].target)
+    if arguments.engine == "planned" {
+        let made = PlannedEngine::new(SETUP, illumination, views, Loss::L2, unknowns);
+        let mut engine = made.map_err(|error| error.to_string())?;
+        engine.set_keep(keep);
+        let target = engine.views()[0].target.clone();
+        return then(&mut engine, &target);
     }
-    #[cfg(not(feature = "gpu"))]
-    Err("built without the feature gpu".to_owned())
+    let words = |error: skinfit::gpu::GpuError| error.to_string();
+    let gpu = skinfit::gpu::Gpu::open(&skinfit::gpu::Choice::default()).map_err(words)?;
+    let task = Task { setup: SETUP, illumination, views: &views, loss: Loss::L2, unknowns };
+    let start = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };
+    let mut engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(words)?;
+    let (resident, _) = engine.bytes();
+    eprintln!("race: {:.1} bytes a pixel on the device", resident as f64 / manifest.pixels as f64);
+    then(&mut engine, &views[0].target)
 }
 
 /// Pixels that the coarse stage of a fit reads, about.

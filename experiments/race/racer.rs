@@ -1,6 +1,7 @@
 //! Both engines, as the race drives them.
 
 use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::planned::PlannedEngine;
 use skinfit::engine::{Objective, Point};
 
 /// An engine over one view.
@@ -36,7 +37,25 @@ impl Racer for CpuEngine {
     }
 }
 
-#[cfg(feature = "gpu")]
+impl Racer for PlannedEngine {
+    fn read_every(&mut self, stride: usize) {
+        self.set_stride(stride);
+    }
+    fn forward(&self, point: &Point, planes: &mut Vec<Vec<f32>>) {
+        self.image_into(0, point, planes);
+        std::hint::black_box(planes);
+    }
+    fn image_planes(&self, point: &Point) -> Vec<Vec<f32>> {
+        self.image(0, point)
+    }
+    fn device(&self) -> &'static str {
+        "cpu"
+    }
+    fn version(&self) -> String {
+        "rustc, planned rules, f32 lanes".to_owned()
+    }
+}
+
 impl Racer for skinfit::engine::gpu::GpuEngine<'_> {
     fn read_every(&mut self, stride: usize) {
         self.set_stride(stride);

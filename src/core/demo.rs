@@ -25,22 +25,52 @@ pub enum DemoError {
     Output(#[from] OutputError),
 }
 
-/// The built-in scene below `folder`, made if it is not there yet or was damaged. Returns its scene
-/// file.
+/// The built-in scene below `folder`, made there with its bakes the first time. Returns its scene file.
+///
+/// # Errors
+/// When it cannot be written.
+pub fn built_in_scene(folder: &Path) -> Result<PathBuf, DemoError> {
+    kept_scene(folder, Some(folder))
+}
+
+/// The built-in scene below `folder`, made if it is not there yet, was damaged, or was made by another build of the
+/// program, whose model may have been another. Returns its scene file.
 ///
 /// # Errors
 /// When it cannot be written.
 pub fn kept_scene(folder: &Path, cache: Option<&Path>) -> Result<PathBuf, DemoError> {
     let folder = folder.join(builtin::version());
-    // Written last, with a hash of every file: a scene for which it still holds is whole.
+    kept(&folder, program().as_deref(), |folder| write_scene(folder, cache).map(drop))?;
+    Ok(folder.join("scene.toml"))
+}
+
+/// Have `folder` hold what `make` writes of this `program`.
+fn kept(
+    folder: &Path,
+    program: Option<&str>,
+    make: impl FnOnce(&Path) -> Result<(), DemoError>,
+) -> Result<(), DemoError> {
+    // Written last, with the program and a hash of every file: a scene for which it still holds is whole and ours.
     let seal = folder.join("complete");
     let sealed = std::fs::read_to_string(&seal).unwrap_or_default();
-    if !sealed.is_empty() && sealed == hashes(&folder) {
-        return Ok(folder.join("scene.toml"));
+    let wanted = || program.map(|program| format!("{program}\n{}", hashes(folder)));
+    if wanted().is_some_and(|wanted| wanted == sealed) {
+        return Ok(());
     }
-    let scene = write_scene(&folder, cache)?;
-    output::write(&seal, hashes(&folder).as_bytes())?;
-    Ok(scene)
+    make(folder)?;
+    if let Some(text) = wanted() {
+        output::write(&seal, text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// A line for the running program's build: the targets are what all of it makes of the scene, from the model to the
+/// libraries. The size and the time of its file tell builds apart, as `make` does it. `None`, so that nothing is
+/// taken for its own, where there is no such file to ask.
+fn program() -> Option<String> {
+    let file = std::env::current_exe().and_then(std::fs::metadata).ok()?;
+    let modified = file.modified().ok()?.duration_since(std::time::UNIX_EPOCH).ok()?;
+    Some(format!("skinfit {}, {} bytes, {}", env!("CARGO_PKG_VERSION"), file.len(), modified.as_nanos()))
 }
 
 /// A line for each file below `folder`, but for the seal: its hash and its name, in order.
@@ -83,4 +113,42 @@ pub fn write_scene(folder: &Path, cache: Option<&Path>) -> Result<PathBuf, DemoE
     }
     bar.finish_and_clear();
     Ok(scene)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_that_is_whole_and_of_this_build_is_kept_and_any_other_is_made_anew() {
+        let folder = tempfile::tempdir().unwrap();
+        let target = folder.path().join("targets/front.exr");
+        let made_by = |program: Option<&str>| {
+            let mut made = false;
+            kept(folder.path(), program, |_| {
+                made = true;
+                Ok(output::write(&target, b"a target")?)
+            })
+            .unwrap();
+            made
+        };
+        assert!(made_by(Some("one")), "nothing is there yet");
+        assert!(!made_by(Some("one")));
+        assert!(made_by(Some("another")), "targets of another build's model");
+        assert!(!made_by(Some("another")));
+        std::fs::write(&target, b"damaged").unwrap();
+        assert!(made_by(Some("another")));
+        std::fs::remove_file(&target).unwrap();
+        assert!(made_by(Some("another")));
+        assert!(made_by(None) && made_by(None), "a program that is not known keeps nothing");
+        // As builds before this one sealed theirs.
+        std::fs::write(folder.path().join("complete"), hashes(folder.path())).unwrap();
+        assert!(made_by(Some("another")));
+    }
+
+    #[test]
+    fn this_build_is_known_and_the_same_each_time() {
+        assert!(program().is_some_and(|name| name.starts_with("skinfit ")));
+        assert_eq!(program(), program());
+    }
 }

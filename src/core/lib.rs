@@ -14,6 +14,7 @@
 //! - [`prepare`]: the stages up to the samples, run once and timed.
 //! - [`demo`]: the built-in scene as files, its targets rendered.
 //! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
+//! - [`program`]: planned rules as arithmetic on numbers, for the processor.
 //! - [`export`]: constants and shaders as text for other engines.
 //! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
 //!   instructions kernels are compiled for.
@@ -27,6 +28,7 @@ pub mod fit;
 pub mod model;
 pub mod output;
 pub mod prepare;
+pub mod program;
 pub mod progress;
 pub mod render;
 pub mod samples;

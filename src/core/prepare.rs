@@ -2,7 +2,7 @@
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use web_time::Instant;
 
 use crate::bake::rays::any_can_be_hit;
 use crate::bake::{self, BakeError, BakeStats, Illumination, VertexOcclusion};
@@ -14,11 +14,11 @@ use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::samples::{self, SampleError, TargetRows, ViewSamples};
-use crate::scene::Scene;
 use crate::scene::error::SceneError;
 use crate::scene::load::LoadOptions;
 use crate::scene::suggestion;
-use crate::scene::view::View;
+use crate::scene::view::{Background, View};
+use crate::scene::{Assignment, Scene};
 
 /// What a command asks of the stages.
 #[derive(Clone, Debug, Default)]
@@ -32,10 +32,25 @@ pub struct PrepareOptions {
     pub views: Views,
     /// A parameter file to take parameters and gains from, instead of the scene's start values.
     pub params: Option<PathBuf>,
+    /// Values instead of the scene's and the parameter file's.
+    pub set: Vec<Assignment>,
     /// Where bakes are kept between runs.
     pub cache: Option<PathBuf>,
     /// Seconds into animation 0, instead of the scene's.
     pub time: Option<f64>,
+    /// That the mesh will go through animation 0, and how its occlusion follows.
+    pub clip: Option<ClipOcclusion>,
+    /// Instead of the views' backgrounds.
+    pub background: Option<Background>,
+}
+
+/// How ambient occlusion follows an animation.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ClipOcclusion {
+    /// By what is baked once for each morph target that the animation moves (the paper's way).
+    Targets,
+    /// By a bake of every frame, which its caller makes (`bake::bake_pose`).
+    Frames,
 }
 
 /// Seconds spent in each stage of a run.
@@ -68,10 +83,12 @@ pub enum Views {
 }
 
 /// A scene that is ready to be evaluated.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Prepared {
     /// The scene; its params are those to start from.
     pub scene: Scene,
+    /// The effects that the parameter file's values were fitted with, where it says.
+    pub fitted: Option<Effects>,
     /// A factor on each view's image.
     pub gains: Vec<f64>,
     /// The cubes that its effects ask for.
@@ -146,25 +163,33 @@ impl Prepared {
     /// The first stage's that refuses its input.
     pub fn baked(path: &Path, options: &PrepareOptions) -> Result<Self, PrepareError> {
         let start = Instant::now();
-        let load = LoadOptions { effects: options.effects, targets: options.fit, time: options.time };
+        let load = LoadOptions {
+            effects: options.effects,
+            targets: options.fit,
+            time: options.time,
+            clip: options.clip == Some(ClipOcclusion::Targets),
+            background: options.background,
+        };
         let (mut scene, warnings) = Scene::load(path, &load)?;
         // An animation may begin with nothing and go on with something.
         if options.time.is_none() {
             check_area(&scene)?;
         }
         choose_views(&mut scene, &options.views)?;
-        let mut gains = vec![1.0; scene.views.len()];
+        let (mut gains, mut fitted) = (vec![1.0; scene.views.len()], None);
         if let Some(path) = &options.params {
             let file = ParamsFile::read(path, scene.form, &scene.params)?;
-            scene.params = file.params;
-            scene.fit.free = untied(&scene.fit.free, &scene.params);
+            (scene.params, fitted) = (file.params, file.effects);
             for (gain, view) in gains.iter_mut().zip(&scene.views) {
                 let given = file.gains.iter().find(|(name, _)| *name == view.name);
                 *gain = given.map_or(1.0, |&(_, gain)| gain);
             }
         }
+        options.set.iter().for_each(|assignment| assignment.apply(&mut scene.params));
+        scene.fit.free = untied(&scene.fit.free, &scene.params, &options.set);
         let mut prepared = Self {
             scene,
+            fitted,
             gains,
             illumination: Illumination::default(),
             occlusion: None,
@@ -177,7 +202,11 @@ impl Prepared {
         let free = prepared.scene.fit.free.iter().any(|column| column.param == lobe.param);
         let start = prepared.scene.params.scalar(lobe.param);
         let exponents = if options.fit && free { lobe.lower..=lobe.upper } else { start..=start };
-        prepared.bake(exponents, options.cache.as_deref())?;
+        if options.clip == Some(ClipOcclusion::Frames) {
+            prepared.bake_light(exponents, options.cache.as_deref())?;
+        } else {
+            prepared.bake(exponents, options.cache.as_deref())?;
+        }
         Ok(prepared)
     }
 
@@ -190,18 +219,33 @@ impl Prepared {
         let mesh = &self.scene.mesh;
         let pose = |weights: &[f32]| mesh.pose_with_weights(weights);
         let (bake, baked) = bake::bake(&self.scene, &pose, exponents, cache)?;
+        self.occlusion = bake.occlusion;
+        self.take_light(bake.illumination, baked, start);
+        Ok(())
+    }
+
+    fn bake_light(
+        &mut self,
+        exponents: RangeInclusive<f64>,
+        cache: Option<&Path>,
+    ) -> Result<(), PrepareError> {
+        let start = Instant::now();
+        let (illumination, baked) = bake::bake_light(&self.scene, exponents, cache)?;
+        self.take_light(illumination, baked, start);
+        Ok(())
+    }
+
+    fn take_light(&mut self, illumination: Illumination, baked: BakeStats, start: Instant) {
         self.warnings.extend(baked.warnings.iter().cloned());
         self.baked = baked;
-        self.illumination = bake.illumination;
-        self.occlusion = bake.occlusion;
+        self.illumination = illumination;
         self.seconds.bake += start.elapsed().as_secs_f64();
-        Ok(())
     }
 
     /// Where a fit starts.
     #[must_use]
     pub fn start(&self) -> Point {
-        Point { params: self.scene.params, gains: self.gains.clone() }
+        Point { params: self.scene.params.clone(), gains: self.gains.clone() }
     }
 
     /// The switches of the model.
@@ -300,14 +344,18 @@ fn retain<T>(list: &mut Vec<T>, kept: &[bool]) {
 }
 
 fn observe(samples: ViewSamples, target: TargetRows) -> ObservedView {
-    ObservedView { samples, target: target.rgb, weight: target.weight, clip: target.clip }
+    ObservedView { samples, target: target.channels, weight: target.weight, clip: target.clip }
 }
 
-/// The free columns, with one a channel for each parameter whose start has three different values: a
-/// tied column would begin by throwing two of them away.
-fn untied(free: &[Column], start: &Params) -> Vec<Column> {
-    let split = |column: &Column| match (column.channels, start.rgb(column.param)) {
-        (Channels::Tied, [r, g, b]) if r != g || g != b => Column::per_channel(column.param).to_vec(),
+/// The free columns, with one a channel for each parameter whose start has three different values (a tied column would
+/// begin by throwing two of them away), or that was set to three.
+fn untied(free: &[Column], start: &Params, set: &[Assignment]) -> Vec<Column> {
+    let coloured = |param: Param| {
+        let [r, g, b] = start.rgb(param);
+        r != g || g != b || set.iter().any(|assignment| assignment.param == param && assignment.coloured)
+    };
+    let split = |column: &Column| match column.channels {
+        Channels::Tied if coloured(column.param) => Column::per_channel(column.param).to_vec(),
         _ => vec![*column],
     };
     free.iter().flat_map(split).collect()

@@ -20,23 +20,38 @@ pub struct Choice {
 }
 
 /// Every adapter, the one that is taken by default first.
-#[must_use]
-pub fn adapters() -> Vec<Adapter> {
+pub async fn find_adapters() -> Vec<Adapter> {
     // Another crate may have OpenGL compiled in, which cannot draw into 32-bit targets.
     let mut descriptor = InstanceDescriptor::new_without_display_handle_from_env();
     descriptor.backends &= Backends::PRIMARY;
     let instance = Instance::new(descriptor);
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(Backends::PRIMARY));
+    let mut adapters = instance.enumerate_adapters(Backends::PRIMARY).await;
     adapters.sort_by_key(|adapter| rank(adapter.get_info().device_type));
     adapters
+}
+
+/// As [`find_adapters`]; waits for them, which a browser does not allow.
+#[cfg(not(target_family = "wasm"))]
+#[must_use]
+pub fn adapters() -> Vec<Adapter> {
+    pollster::block_on(find_adapters())
+}
+
+/// As [`find`]; waits for it, which a browser does not allow.
+///
+/// # Errors
+/// As of [`find`].
+#[cfg(not(target_family = "wasm"))]
+pub fn choose(choice: &Choice) -> Result<Adapter, GpuError> {
+    pollster::block_on(find(choice))
 }
 
 /// The adapter of that choice.
 ///
 /// # Errors
 /// When there is none at all, or none of that name.
-pub fn choose(choice: &Choice) -> Result<Adapter, GpuError> {
-    let adapters = adapters();
+pub async fn find(choice: &Choice) -> Result<Adapter, GpuError> {
+    let adapters = find_adapters().await;
     let from_environment = || std::env::var(ADAPTER_VARIABLE).ok().filter(|name| !name.is_empty());
     let Some(wanted) = choice.name.clone().or_else(from_environment) else {
         return adapters.into_iter().next().ok_or(GpuError::NoAdapter);
@@ -77,6 +92,6 @@ pub const fn kind_in_words(kind: DeviceType) -> &'static str {
 
 /// Features that are used where an adapter has them, with what for.
 pub const WELCOME: [(Features, &str, &str); 2] = [
-    (Features::TIMESTAMP_QUERY, "timestamps", "GPU time by pass in --stats"),
+    (Features::TIMESTAMP_QUERY, "timestamps", "GPU time by pass"),
     (Features::SHADER_F16, "16-bit arithmetic", "cheaper rules where the accuracy allows"),
 ];

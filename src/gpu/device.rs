@@ -2,14 +2,15 @@
 
 use std::sync::mpsc::{Receiver, TryRecvError};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use web_time::Instant;
 use wgpu::{
     Adapter, AdapterInfo, Buffer, BufferDescriptor, BufferUsages, Device, DeviceDescriptor, DeviceType,
     Features, Limits, MemoryHints, PollType, Queue,
 };
 
-use super::adapter::{Choice, WELCOME, choose};
+use super::adapter::{Choice, WELCOME, find};
 use super::error::GpuError;
 
 /// How long a card is asked without a pause.
@@ -37,8 +38,8 @@ impl Gpu {
     ///
     /// # Errors
     /// When there is no such adapter, or it gives no device.
-    pub fn open(choice: &Choice) -> Result<Self, GpuError> {
-        let adapter = choose(choice)?;
+    pub async fn request(choice: &Choice) -> Result<Self, GpuError> {
+        let adapter = find(choice).await?;
         let info = adapter.get_info();
         let descriptor = DeviceDescriptor {
             label: Some("skinfit"),
@@ -48,12 +49,29 @@ impl Gpu {
             memory_hints: MemoryHints::MemoryUsage,
             ..DeviceDescriptor::default()
         };
-        let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).map_err(|error| {
+        let (device, queue) = adapter.request_device(&descriptor).await.map_err(|error| {
             GpuError::NoDevice { adapter: info.name.clone(), reason: sentence(&error.to_string()) }
         })?;
+        Ok(Self::adopt(adapter, device, queue))
+    }
+
+    /// As [`Self::request`]; waits for it, which a browser does not allow.
+    ///
+    /// # Errors
+    /// As of [`Self::request`].
+    #[cfg(not(target_family = "wasm"))]
+    pub fn open(choice: &Choice) -> Result<Self, GpuError> {
+        pollster::block_on(Self::request(choice))
+    }
+
+    /// A device that the program has already, as of a window. Errors of all that is done on it are told by
+    /// [`Self::check`] from now on.
+    #[must_use]
+    pub fn adopt(adapter: Adapter, device: Device, queue: Queue) -> Self {
+        let info = adapter.get_info();
         let gpu = Self { device, queue, adapter, info, fault: Arc::default() };
         gpu.listen();
-        Ok(gpu)
+        gpu
     }
 
     /// Keep the first error, instead of wgpu's panic. A library that shares the device may have put its own
@@ -160,6 +178,9 @@ impl Gpu {
     /// sooner than the system would wake a thread that sleeps in the driver, and threads that share a device take
     /// one another's word.
     pub fn until<T>(&self, told: &Receiver<T>) -> Result<T, GpuError> {
+        if cfg!(target_family = "wasm") {
+            return Err(self.lost("a browser does not let a program wait for it: read it asynchronously"));
+        }
         let start = Instant::now();
         loop {
             let polled = self.device.poll(PollType::Poll);

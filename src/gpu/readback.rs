@@ -1,9 +1,13 @@
 //! Images from the device.
 
+use std::future::poll_fn;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::task::{Poll, Waker};
+
 use exr::prelude::f16;
 use wgpu::{
     Buffer, BufferDescriptor, BufferSlice, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, CommandEncoder,
-    Extent3d, MapMode, TexelCopyBufferInfo, TexelCopyBufferLayout, TextureView,
+    Extent3d, MapMode, PollType, TexelCopyBufferInfo, TexelCopyBufferLayout, TextureView,
 };
 
 use super::device::Gpu;
@@ -51,8 +55,19 @@ impl Copy {
 
     /// The numbers, row by row and texel by texel; waits until they are there.
     pub(super) fn read(&self, gpu: &Gpu) -> Result<Vec<f32>, GpuError> {
+        map(gpu, &self.buffer.slice(..))?;
+        self.numbers(gpu)
+    }
+
+    /// As [`Self::read`], without waiting.
+    pub(super) async fn arrived(&self, gpu: &Gpu) -> Result<Vec<f32>, GpuError> {
+        mapped(gpu, &self.buffer.slice(..)).await?;
+        self.numbers(gpu)
+    }
+
+    /// The numbers, once the buffer is mapped.
+    fn numbers(&self, gpu: &Gpu) -> Result<Vec<f32>, GpuError> {
         let slice = self.buffer.slice(..);
-        map(gpu, &slice)?;
         let view = slice.get_mapped_range().map_err(|error| gpu.lost(&error.to_string()))?;
         let bytes: &[u8] = &view;
         let row = |y: usize| {
@@ -81,6 +96,37 @@ pub(crate) fn map(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
         let _ = send.send(result);
     });
     gpu.until(&told)?.map_err(|error| gpu.lost(&error.to_string()))
+}
+
+/// As [`map`], without waiting.
+pub(super) async fn mapped(gpu: &Gpu, slice: &BufferSlice<'_>) -> Result<(), GpuError> {
+    let answer = Arc::new(Mutex::new((None, None::<Waker>)));
+    let told = Arc::clone(&answer);
+    slice.map_async(MapMode::Read, move |result| {
+        let mut told = told.lock().unwrap_or_else(PoisonError::into_inner);
+        told.0 = Some(result);
+        if let Some(waker) = told.1.take() {
+            waker.wake();
+        }
+    });
+    let result = poll_fn(|context| {
+        // A browser tells by itself; elsewhere the device tells when it is asked, again and again.
+        let polled = gpu.device.poll(PollType::Poll);
+        let mut answer = answer.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(result) = answer.0.take() {
+            return Poll::Ready(result.map_err(|error| gpu.lost(&error.to_string())));
+        }
+        if let Err(error) = polled {
+            return Poll::Ready(Err(gpu.lost(&error.to_string())));
+        }
+        answer.1 = Some(context.waker().clone());
+        if cfg!(not(target_family = "wasm")) {
+            context.waker().wake_by_ref();
+        }
+        Poll::Pending
+    });
+    result.await?;
+    gpu.check()
 }
 
 /// Run the encoder's commands, and read the floats that they leave in `buffer`.

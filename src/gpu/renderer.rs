@@ -5,7 +5,7 @@ use wgpu::{
     RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPassTimestampWrites, StoreOp, TextureView,
 };
 
-use super::bloom::Bloom;
+use super::bloom::Finish;
 use super::constants::Values;
 use super::device::Gpu;
 use super::error::GpuError;
@@ -15,12 +15,14 @@ use super::resolve::Resolve;
 use super::targets::{Key, Planes, Precision, Targets, Tile};
 use super::timing::{PassTime, Timer};
 use super::upload::{Content, Uploads};
+use crate::bake::VertexOcclusion;
 use crate::model::compose::TermName;
 use crate::model::effects::Effect;
 use crate::render::antialias::Antialias;
+use crate::render::backdrop::Backdrop;
 use crate::render::image::Image;
 use crate::scene::mesh::Mesh;
-use crate::scene::view::Camera;
+use crate::scene::view::{Background, Camera};
 use crate::shader::{Budget, Facts, Plan, plan};
 
 /// A budget that is at least this is drawn into 16-bit targets, which round to 2^-11.
@@ -42,7 +44,8 @@ pub struct RenderOptions {
 /// An image, and what it took.
 #[derive(Clone, Debug)]
 pub struct Frame {
-    /// Radiance premultiplied by coverage, alpha being the coverage.
+    /// Radiance premultiplied by coverage, alpha being the coverage; or the whole picture and 1, where something
+    /// stands behind the mesh.
     pub image: Image,
     /// Pixels that reached the end of 16-bit targets' range.
     pub clipped: usize,
@@ -61,13 +64,16 @@ pub struct Renderer<'a> {
     /// The whole, and terms that were asked for.
     programs: Vec<Program>,
     stages: Vec<Stage>,
+    background: Background,
+    /// What stands behind the mesh, as the camera of the last frame sees it.
+    backdrop: Option<(Camera, Backdrop)>,
 }
 
 /// Targets, and the passes after the mesh's.
 struct Stage {
     targets: Targets,
     resolve: Option<Resolve>,
-    bloom: Option<Bloom>,
+    finish: Option<Finish>,
 }
 
 impl<'a> Renderer<'a> {
@@ -85,8 +91,17 @@ impl<'a> Renderer<'a> {
             ..Facts::of_scene(content.scene, content.params, options.budget, gpu.f16())
         };
         let uploads = Uploads::new(gpu, content, targets)?;
-        let (programs, stages) = (Vec::new(), Vec::new());
-        let mut renderer = Self { gpu, uploads, options, facts, morph_weights, programs, stages };
+        let mut renderer = Self {
+            gpu,
+            uploads,
+            options,
+            facts,
+            morph_weights,
+            programs: Vec::new(),
+            stages: Vec::new(),
+            background: Background::None,
+            backdrop: None,
+        };
         renderer.program(None)?;
         Ok(renderer)
     }
@@ -122,9 +137,29 @@ impl<'a> Renderer<'a> {
         self.uploads.bytes()
     }
 
-    /// Move the mesh to another pose: the scene's at another time. Only with [`RenderOptions::animated`].
-    pub fn set_mesh(&mut self, mesh: &Mesh) {
-        self.uploads.set_mesh(self.gpu, mesh);
+    /// Directions along a pixel's side of which the backdrop is the mean.
+    #[must_use]
+    pub fn backdrop_samples(&self) -> u32 {
+        self.options.antialias.grid().max(self.options.antialias.multisamples() / 2)
+    }
+
+    /// Texels of the cubes that are brighter than 65504, where the shader reads them in 16 bits: they were cut there.
+    #[must_use]
+    pub const fn clipped_texels(&self) -> usize {
+        self.uploads.clipped()
+    }
+
+    /// Put something behind the mesh in the frames to come.
+    pub fn set_background(&mut self, background: Background) {
+        self.background = background;
+        self.backdrop = None;
+        self.stages.clear();
+    }
+
+    /// Move the mesh to another pose: the scene's at another time, with the occlusion of that pose where it has one of
+    /// its own. Only with [`RenderOptions::animated`].
+    pub fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
+        self.uploads.set_mesh(self.gpu, mesh, occlusion);
         let weights = mesh.morphs.iter().map(|morph| morph.weight);
         self.morph_weights.iter_mut().zip(weights).for_each(|(old, new)| *old = new);
     }
@@ -134,15 +169,73 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// When the image is too large, or the device fails.
     pub fn render(&mut self, camera: &Camera, gain: f64) -> Result<Frame, GpuError> {
-        self.draw(None, camera, gain)
+        self.show_behind(camera);
+        let drawn = self.draw(None, camera, gain, true)?;
+        let (image, clipped) = self.stages[drawn.stage].finished_image(&drawn.planes, gain);
+        Ok(Frame { image, clipped, times: drawn.times })
     }
 
-    /// One term of the image alone, without bloom; the terms add up to the image without it.
+    /// As [`Self::render`], without waiting and without times, as a browser wants it.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub async fn render_async(&mut self, camera: &Camera, gain: f64) -> Result<Frame, GpuError> {
+        self.show_behind(camera);
+        let (stage, copies) = self.submit(None, camera, gain, true, None)?;
+        let mut planes = Vec::with_capacity(copies.len());
+        for copy in &copies {
+            planes.push(copy.arrived(self.gpu).await?);
+        }
+        let (image, clipped) = self.stages[stage].finished_image(&planes, gain);
+        Ok(Frame { image, clipped, times: Vec::new() })
+    }
+
+    /// One term of the image alone, without bloom and backdrop; the terms add up to the image without them.
     ///
     /// # Errors
     /// As of [`Self::render`].
     pub fn render_term(&mut self, term: TermName, camera: &Camera, gain: f64) -> Result<Image, GpuError> {
-        self.draw(Some(term), camera, gain).map(|frame| frame.image)
+        let drawn = self.draw(Some(term), camera, gain, false)?;
+        Ok(self.stages[drawn.stage].image(&drawn.planes, gain as f32).0)
+    }
+
+    /// The haze of each pixel, premultiplied by its coverage and times the gain; empty where no effect makes one.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub fn render_haze(&mut self, camera: &Camera, gain: f64) -> Result<Vec<f32>, GpuError> {
+        if !hazy(self.plan()) {
+            return Ok(Vec::new());
+        }
+        let drawn = self.draw(None, camera, gain, false)?;
+        let largest = self.stages[drawn.stage].targets.key.precision.largest();
+        let haze = drawn.planes[0].chunks_exact(4).map(|texel| texel[3].clamp(-largest, largest));
+        Ok(haze.map(|haze| gain as f32 * haze).collect())
+    }
+
+    /// What stands behind the mesh for `camera`, made anew when that has moved.
+    fn show_behind(&mut self, camera: &Camera) {
+        if self.background == Background::None
+            || self.backdrop.as_ref().is_some_and(|(seen, _)| seen == camera)
+        {
+            return;
+        }
+        let (content, n) = (self.uploads.content(), self.backdrop_samples());
+        let backdrop = Backdrop::new(content.scene, content.params, self.background, camera, n);
+        if self.backdrop.is_none() {
+            // Terms may have been drawn before, with nothing behind them.
+            self.stages.clear();
+        }
+        self.backdrop = backdrop.map(|backdrop| (*camera, backdrop));
+        let size = (camera.width, camera.height);
+        for stage in &self.stages {
+            let key = &stage.targets.key;
+            if let (Some(finish), Some((_, backdrop))) = (&stage.finish, &self.backdrop)
+                && (key.width, key.height) == size
+            {
+                finish.set_backdrop(self.gpu, backdrop);
+            }
+        }
     }
 
     /// GPU milliseconds of each of so many frames, drawn one right after another with nothing read back: an
@@ -203,7 +296,8 @@ impl<'a> Renderer<'a> {
                 Budget::Within(error) => error >= HALF_ERROR,
             };
         let precision = if half { Precision::Half } else { Precision::Full };
-        Key { width, height, antialias, precision, hazy }
+        let blooms = hazy && self.facts.setup.effects.has(Effect::Bloom);
+        Key { width, height, antialias, precision, hazy, blooms }
     }
 
     /// The place of the targets for such images; those of another size give way to them.
@@ -216,19 +310,41 @@ impl<'a> Renderer<'a> {
         }
         let targets = Targets::new(self.gpu, key)?;
         let resolve = targets.samples.as_ref().map(|samples| Resolve::new(self.gpu, &targets, samples));
-        let blooms = self.facts.setup.effects.has(Effect::Bloom);
-        let coverage = targets.pixels.coverage.as_ref().filter(|_| blooms);
-        let bloom = coverage.map(|coverage| Bloom::new(self.gpu, &targets, coverage));
+        let sigma = self.uploads.content().scene.bloom.sigma;
+        let backdrop = self.backdrop.as_ref().map(|(_, backdrop)| backdrop);
+        let finish = Finish::new(self.gpu, &targets, sigma, backdrop);
         self.gpu.check()?;
-        self.stages.push(Stage { targets, resolve, bloom });
+        self.stages.push(Stage { targets, resolve, finish });
         Ok(self.stages.len() - 1)
     }
 
-    fn draw(&mut self, output: Option<TermName>, camera: &Camera, gain: f64) -> Result<Frame, GpuError> {
+    /// Draw the whole or a term; what follows the mesh's passes where it is to be `finished`.
+    fn draw(
+        &mut self,
+        output: Option<TermName>,
+        camera: &Camera,
+        gain: f64,
+        finished: bool,
+    ) -> Result<Drawn, GpuError> {
+        let mut timer = self.options.timed.then(|| Timer::new(self.gpu));
+        let (stage, copies) = self.submit(output, camera, gain, finished, timer.as_mut())?;
+        let planes = copies.iter().map(|copy| copy.read(self.gpu)).collect::<Result<Vec<_>, _>>()?;
+        Ok(Drawn { stage, planes, times: timer.map(|timer| timer.times).unwrap_or_default() })
+    }
+
+    /// Have an image drawn: the place of the targets that it is drawn into, and copies of what it is made of. Waits
+    /// only where it is timed.
+    fn submit(
+        &mut self,
+        output: Option<TermName>,
+        camera: &Camera,
+        gain: f64,
+        finished: bool,
+        mut timer: Option<&mut Timer>,
+    ) -> Result<(usize, Vec<Copy>), GpuError> {
         let program = self.program(output)?;
-        let stage = self.stage(camera, hazy(&self.programs[program].plan))?;
-        let (gpu, program, stage) = (self.gpu, &self.programs[program], &self.stages[stage]);
-        let mut timer = self.options.timed.then(|| Timer::new(gpu));
+        let place = self.stage(camera, hazy(&self.programs[program].plan))?;
+        let (gpu, program, stage) = (self.gpu, &self.programs[program], &self.stages[place]);
         let mut copies = Vec::new();
         let tiles = &stage.targets.tiles;
         for (i, &tile) in tiles.iter().enumerate() {
@@ -236,9 +352,9 @@ impl<'a> Renderer<'a> {
             program.set(gpu, &Values { params, camera, tile, morph_weights });
             let mut encoder =
                 gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
-            stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, timer.as_mut());
+            stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, timer.as_deref_mut());
             if i + 1 == tiles.len() {
-                copies = stage.encode_end(gpu, &mut encoder, gain, timer.as_mut());
+                copies = stage.encode_end(gpu, &mut encoder, gain, finished, timer.as_deref_mut());
             }
             if let Some(timer) = &timer {
                 timer.finish(&mut encoder);
@@ -249,12 +365,16 @@ impl<'a> Renderer<'a> {
             }
             gpu.check()?;
         }
-        let planes = copies.iter().map(|copy| copy.read(gpu)).collect::<Result<Vec<_>, _>>()?;
-        // The bloom's passes have the gain in them already.
-        let gain = if stage.bloom.is_some() { 1.0 } else { gain as f32 };
-        let (image, clipped) = stage.image(&planes, gain);
-        Ok(Frame { image, clipped, times: timer.map(|timer| timer.times).unwrap_or_default() })
+        Ok((place, copies))
     }
+}
+
+/// What was drawn and read back.
+struct Drawn {
+    /// The place of its targets.
+    stage: usize,
+    planes: Vec<Vec<f32>>,
+    times: Vec<PassTime>,
 }
 
 /// Whether a plan's alpha is the haze.
@@ -263,6 +383,11 @@ fn hazy(plan: &Plan) -> bool {
 }
 
 impl Stage {
+    /// The image of a frame that is finished: the last passes have the gain in them already.
+    fn finished_image(&self, planes: &[Vec<f32>], gain: f64) -> (Image, usize) {
+        self.image(planes, if self.finish.is_some() { 1.0 } else { gain as f32 })
+    }
+
     /// Draw the mesh into a tile, and its samples into the image.
     fn encode_tile(
         &self,
@@ -309,25 +434,36 @@ impl Stage {
             });
             resolve.draw(&mut pass, tile);
         }
+        if let (Some(resolve), Some(glow)) = (&self.resolve, &targets.glow) {
+            let times = timer.as_mut().and_then(|timer| timer.around("resolve, glow"));
+            let load = if first { LoadOp::Clear(Color::TRANSPARENT) } else { LoadOp::Load };
+            over(encoder, glow, load, times, |pass| resolve.draw_glow(pass, tile));
+        }
     }
 
-    /// After the last tile: the bloom, and copies of what the image is made of.
+    /// After the last tile: what stands behind the mesh and the bloom, where it is to be `finished`, and copies of what
+    /// the image is made of.
     fn encode_end(
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
         gain: f64,
+        finished: bool,
         mut timer: Option<&mut Timer>,
     ) -> Vec<Copy> {
-        let Some(bloom) = &self.bloom else {
+        let Some(finish) = self.finish.as_ref().filter(|_| finished) else {
             return self.targets.pixels.views().map(|view| Copy::new(gpu, encoder, view)).collect();
         };
-        bloom.set(gpu, gain);
-        let times = timer.as_mut().and_then(|timer| timer.around("bloom, rows"));
-        over(encoder, &bloom.blurred, times, |pass| bloom.draw_across(pass));
-        let times = timer.as_mut().and_then(|timer| timer.around("bloom, columns"));
-        over(encoder, &bloom.whole, times, |pass| bloom.draw_down(pass));
-        vec![Copy::new(gpu, encoder, &bloom.whole)]
+        finish.set(gpu, gain);
+        let clear = LoadOp::Clear(Color::TRANSPARENT);
+        if let Some(blurred) = finish.blurred() {
+            let times = timer.as_mut().and_then(|timer| timer.around("bloom, rows"));
+            over(encoder, blurred, clear, times, |pass| finish.draw_across(pass));
+        }
+        let last = if finish.blurred().is_some() { "bloom, columns" } else { "backdrop" };
+        let times = timer.as_mut().and_then(|timer| timer.around(last));
+        over(encoder, &finish.whole, clear, times, |pass| finish.draw_last(pass));
+        vec![Copy::new(gpu, encoder, &finish.whole)]
     }
 
     /// The image of those planes, and how many of its pixels reached the end of the targets' range.
@@ -372,10 +508,11 @@ fn attached<'a>(
 fn over(
     encoder: &mut CommandEncoder,
     view: &TextureView,
+    load: LoadOp<Color>,
     timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
     draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
 ) {
-    let ops = Operations { load: LoadOp::Clear(Color::TRANSPARENT), store: StoreOp::Store };
+    let ops = Operations { load, store: StoreOp::Store };
     let attachment = RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops };
     let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
         color_attachments: &[Some(attachment)],

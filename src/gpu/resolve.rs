@@ -11,6 +11,8 @@ pub(super) struct Resolve {
     filter: Filter,
     origin: Buffer,
     bound: BindGroup,
+    /// Those of radiance times haze.
+    glow: Option<(Filter, BindGroup)>,
 }
 
 impl Resolve {
@@ -27,10 +29,16 @@ impl Resolve {
         let wgsl = include_str!("wgsl/resolve.wgsl");
         let filter = Filter::new(gpu, (wgsl, entry), &constants, inputs, &key.formats());
         let origin = gpu.buffer("origin", &[0; 16], BufferUsages::UNIFORM);
-        let mut inputs = vec![origin.as_entire_binding()];
-        inputs.extend(samples.views().map(BindingResource::TextureView));
-        let bound = filter.bind(gpu, inputs);
-        Self { filter, origin, bound }
+        let views = || samples.views().map(BindingResource::TextureView);
+        let bound = filter.bind(gpu, std::iter::once(origin.as_entire_binding()).chain(views()).collect());
+        let glow = targets.glow.as_ref().map(|_| {
+            let (inputs, formats) = ([Input::Uniform, Input::Texels], [key.precision.color()]);
+            let filter = Filter::new(gpu, (wgsl, "resolve_glow"), &constants, &inputs, &formats);
+            let inputs = std::iter::once(origin.as_entire_binding()).chain(views().take(1));
+            let bound = filter.bind(gpu, inputs.collect());
+            (filter, bound)
+        });
+        Self { filter, origin, bound, glow }
     }
 
     /// Set the tile that is resolved next.
@@ -42,5 +50,13 @@ impl Resolve {
     pub(super) fn draw(&self, pass: &mut RenderPass<'_>, tile: Tile) {
         pass.set_scissor_rect(tile.x, tile.y, tile.width, tile.height);
         self.filter.draw(pass, &self.bound);
+    }
+
+    /// Draw what blooms of the tile's pixels.
+    pub(super) fn draw_glow(&self, pass: &mut RenderPass<'_>, tile: Tile) {
+        pass.set_scissor_rect(tile.x, tile.y, tile.width, tile.height);
+        if let Some((filter, bound)) = &self.glow {
+            filter.draw(pass, bound);
+        }
     }
 }

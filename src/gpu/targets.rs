@@ -69,6 +69,8 @@ pub(super) struct Targets {
     pub(super) depth: TextureView,
     /// Colour (and coverage) of the image's pixels.
     pub(super) pixels: Planes,
+    /// The mean over each pixel's samples of radiance times haze; absent where a pixel is one sample.
+    pub(super) glow: Option<TextureView>,
 }
 
 /// What targets are made for.
@@ -80,6 +82,8 @@ pub(super) struct Key {
     pub(super) precision: Precision,
     /// Whether alpha is the haze, and coverage stands in a plane of its own.
     pub(super) hazy: bool,
+    /// Whether the image blooms.
+    pub(super) blooms: bool,
 }
 
 /// Colour, and coverage where colour's alpha holds something else.
@@ -127,7 +131,9 @@ impl Targets {
         let (width, height) = (n * tiles[0].width, n * tiles[0].height);
         let planes = |width, height, multisamples| planes(gpu, &key, width, height, multisamples);
         let multisamples = key.antialias.multisamples();
+        let glow = || texture(gpu, "glow", key.width, key.height, key.precision.color(), 1);
         let targets = Self {
+            glow: (key.blooms && n > 1).then(glow),
             samples: key.resolves(tiles.len()).then(|| planes(width, height, 1)),
             multisampled: (multisamples > 1).then(|| planes(width, height, multisamples)),
             depth: texture(gpu, "depth", width, height, DEPTH, multisamples),
@@ -168,7 +174,7 @@ fn planes(gpu: &Gpu, key: &Key, width: u32, height: u32, multisamples: u32) -> P
     }
 }
 
-/// A texture to draw into, and to read where it has one sample a texel.
+/// A texture to draw into, and to read and write where it has one sample a texel.
 pub(super) fn texture(
     gpu: &Gpu,
     label: &str,
@@ -177,7 +183,7 @@ pub(super) fn texture(
     format: TextureFormat,
     multisamples: u32,
 ) -> TextureView {
-    let read = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
+    let read = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC | TextureUsages::COPY_DST;
     let extra = if multisamples == 1 && format != DEPTH { read } else { TextureUsages::empty() };
     let texture = gpu.device.create_texture(&TextureDescriptor {
         label: Some(label),

@@ -17,7 +17,12 @@ pub(crate) struct Texels {
     pub(super) format: TextureFormat,
     pub(super) dimension: TextureViewDimension,
     pub(super) bytes: Vec<u8>,
+    /// Texels that were cut at the end of the format's range.
+    pub(super) clipped: usize,
 }
+
+/// The largest number of 16-bit floats.
+const LARGEST_HALF: f32 = 65504.0;
 
 /// Six padded faces in 32 bits: the texels that the CPU filters.
 pub(crate) fn faces(cube: &Cube<f32>) -> Texels {
@@ -29,17 +34,23 @@ pub(crate) fn faces(cube: &Cube<f32>) -> Texels {
         format: TextureFormat::Rgba32Float,
         dimension: TextureViewDimension::D2Array,
         bytes: bytemuck::cast_slice(cube.padded()).to_vec(),
+        clipped: 0,
     }
 }
 
-/// Six faces in 16 bits, whose borders the hardware bridges. Radiance beyond their range is cut at it.
+/// Six faces in 16 bits, whose borders the hardware bridges. Radiance beyond their range is cut at it, and counted.
 pub(super) fn cube(cube: &Cube<f32>) -> Texels {
     let size = cube.size();
     let places = (0..6)
         .flat_map(|face| (0..size).flat_map(move |row| (0..size).map(move |column| (face, column, row))));
-    let half = |x: f32| f16::from_f32(x.clamp(-65504.0, 65504.0)).to_bits();
-    let halves: Vec<u16> =
-        places.flat_map(|(face, column, row)| cube.texel(face, column, row).map(half)).collect();
+    let half = |x: f32| f16::from_f32(x.clamp(-LARGEST_HALF, LARGEST_HALF)).to_bits();
+    let mut halves: Vec<u16> = Vec::with_capacity(24 * size * size);
+    let mut clipped = 0;
+    for (face, column, row) in places {
+        let texel = cube.texel(face, column, row);
+        clipped += usize::from(texel.iter().any(|x| x.abs() > LARGEST_HALF));
+        halves.extend(texel.map(half));
+    }
     Texels {
         width: size as u32,
         height: size as u32,
@@ -47,6 +58,7 @@ pub(super) fn cube(cube: &Cube<f32>) -> Texels {
         format: TextureFormat::Rgba16Float,
         dimension: TextureViewDimension::Cube,
         bytes: bytemuck::cast_slice(&halves).to_vec(),
+        clipped,
     }
 }
 
@@ -116,5 +128,25 @@ fn single<const N: usize>(map: &Map<1>, format: TextureFormat, encode: fn(f32) -
 
 fn plane<const C: usize>(map: &Map<C>, format: TextureFormat, bytes: Vec<u8>) -> Texels {
     let (width, height) = (map.width as u32, map.height as u32);
-    Texels { width, height, layers: 1, format, dimension: TextureViewDimension::D2, bytes }
+    Texels { width, height, layers: 1, format, dimension: TextureViewDimension::D2, bytes, clipped: 0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texels_beyond_16_bits_are_cut_and_counted() {
+        let bright = Cube::from_fn(2, |face, column, row| match (face, column, row) {
+            (0, 0, 0) => [7e4, 1.0, 1.0, 1.0],
+            (3, 1, 0) => [1.0, 65504.0, 1.0, 1e6],
+            (5, 1, 1) => [65504.0; 4],
+            _ => [0.5; 4],
+        });
+        let texels = cube(&bright);
+        assert_eq!(texels.clipped, 2);
+        let first = f16::from_bits(u16::from_ne_bytes([texels.bytes[0], texels.bytes[1]]));
+        assert_eq!(first.to_f32(), 65504.0);
+        assert_eq!(faces(&bright).clipped, 0);
+    }
 }

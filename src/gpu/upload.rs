@@ -45,6 +45,8 @@ pub(super) struct Uploads<'a> {
     indices: Buffer,
     /// Bytes that were uploaded.
     bytes: u64,
+    /// Texels that were cut at the end of their format's range.
+    clipped: usize,
 }
 
 /// A resource as it is bound.
@@ -74,7 +76,7 @@ impl<'a> Uploads<'a> {
         let specular = content.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
         let bytes = triangles.len() as u64;
         let (attributes, resources) = (HashMap::new(), HashMap::new());
-        Ok(Self { content, targets, specular, attributes, resources, indices, bytes })
+        Ok(Self { content, targets, specular, attributes, resources, indices, bytes, clipped: 0 })
     }
 
     pub(super) const fn content(&self) -> &Content<'a> {
@@ -87,6 +89,10 @@ impl<'a> Uploads<'a> {
 
     pub(super) const fn bytes(&self) -> u64 {
         self.bytes
+    }
+
+    pub(super) const fn clipped(&self) -> usize {
+        self.clipped
     }
 
     /// An attribute's vertex buffer.
@@ -137,6 +143,7 @@ impl<'a> Uploads<'a> {
             reason: format!("the shader reads {}, which the scene does not have", resource.name()),
         })?;
         self.bytes += texels.bytes.len() as u64;
+        self.clipped += texels.clipped;
         Ok(Bound::Texture(texture(gpu, resource.name(), &texels)?))
     }
 
@@ -149,18 +156,21 @@ impl<'a> Uploads<'a> {
     }
 
     /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the
-    /// device.
-    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh) {
+    /// device; and `occlusion`, where that pose has one of its own, in place of the scene's.
+    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
+        let own = occlusion.is_some();
+        let occlusion = occlusion.or(self.content.occlusion);
         for (&attribute, buffer) in &self.attributes {
-            if matches!(attribute, Attribute::Position | Attribute::Normal | Attribute::Tangent) {
-                let bytes = vertices::attribute(attribute, mesh, self.content.occlusion);
+            let moves = matches!(attribute, Attribute::Position | Attribute::Normal | Attribute::Tangent);
+            if moves || own && attribute == Attribute::Occlusion {
+                let bytes = vertices::attribute(attribute, mesh, occlusion);
                 gpu.queue.write_buffer(buffer, 0, &bytes);
             }
         }
         for (&resource, bound) in &self.resources {
             let rows = match resource {
                 Resource::Bones => vertices::bones(&mesh.bones),
-                Resource::MorphDeltas => vertices::morph_deltas(mesh, &self.targets, self.content.occlusion),
+                Resource::MorphDeltas => vertices::morph_deltas(mesh, &self.targets, occlusion),
                 _ => continue,
             };
             if let Bound::Buffer(buffer) = bound {

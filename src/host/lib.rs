@@ -1,10 +1,11 @@
-//! The program around the library: its command line.
+//! The program around the library: its command line, progress bars and signals.
 
 pub mod cli;
+mod progress;
 
 // What other members of the workspace hold stands under the names that it has there.
 use skinfit_core::{
-    bake, demo, engine, export, fit, model, output, prepare, progress, render, samples, scene, shader, simd,
+    bake, demo, engine, export, fit, model, output, prepare, render, samples, scene, shader, simd,
 };
 use skinfit_gpu as gpu;
 use skinfit_report as report;

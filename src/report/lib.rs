@@ -86,6 +86,8 @@ pub struct ViewEvidence {
     pub coverage: Vec<f32>,
     /// The model's terms by name, the gain included; they add up to `fit`.
     pub terms: Vec<(String, Image)>,
+    /// The haze of each pixel, premultiplied by coverage, the gain included; empty where no effect makes one.
+    pub haze: Vec<f32>,
 }
 
 /// What [`write_run`] wrote.
@@ -148,7 +150,9 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
         let sheet = pictures::side_by_side(&view.name, &view.target, &view.fit, &comparison, scores);
         files::write_png_bytes(&png, sheet.width, sheet.height, &sheet.bytes)?;
         let exr = folder.join(format!("{stem}_terms.exr"));
-        files::write_exr_layers(&exr, &view.fit, &view.terms, &options)?;
+        let haze = ("haze".to_owned(), view.haze.as_slice());
+        let planes = if view.haze.is_empty() { &[][..] } else { std::slice::from_ref(&haze) };
+        files::write_exr_layers(&exr, &view.fit, &view.terms, planes, &options)?;
         written.extend([png, exr]);
         views.push(ViewSummary::new(scores, comparison.pixels()));
         shown.push(Picture::of_error(&comparison, view.fit.width));
@@ -345,6 +349,7 @@ mod tests {
             fit: Image::default(),
             coverage: Vec::new(),
             terms: Vec::new(),
+            haze: Vec::new(),
         };
         let views = ["front", "Front", "../up", "", "a/b", "a:b", "größe"].map(view);
         let stems = file_stems(&views);

@@ -1,8 +1,8 @@
 //! How a study may fail.
 
 use crate::fit::FitError;
-#[cfg(feature = "gpu")]
 use crate::gpu::GpuError;
+use crate::model::evaluate::AddedEffect;
 use crate::output::OutputError;
 use crate::prepare::PrepareError;
 use crate::render::files::ImageFileError;
@@ -17,9 +17,10 @@ pub enum StudyError {
     /// A fit, and the scene that it was of.
     #[error("{scene}: {error}")]
     Fit { scene: String, error: FitError },
+    #[error("{0}.")]
+    Added(#[from] AddedEffect),
     #[error(transparent)]
     Plan(#[from] PlanError),
-    #[cfg(feature = "gpu")]
     #[error("{0} Update its driver, or choose another adapter with WGPU_ADAPTER_NAME.")]
     Gpu(#[from] GpuError),
     /// An axis was named that the scene does not ask for.

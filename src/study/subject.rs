@@ -44,7 +44,16 @@ impl Subject {
         change: &dyn Fn(&mut Prepared),
     ) -> Result<Self, StudyError> {
         let mut prepared = Prepared::new(scene, options)?;
+        prepared.setup().built_in()?;
         change(&mut prepared);
+        Self::of(prepared, references)
+    }
+
+    /// As [`Self::new`], of a scene that is prepared.
+    ///
+    /// # Errors
+    /// When a stage refuses its input.
+    pub fn of(mut prepared: Prepared, references: Option<&[Image]>) -> Result<Self, StudyError> {
         let own: Vec<Image>;
         let made = match references {
             Some(images) => Some(images),
@@ -56,7 +65,7 @@ impl Subject {
         };
         for (view, image) in prepared.scene.views.iter_mut().zip(made.into_iter().flatten()) {
             let (rgb, alpha) = (image.rgb.clone(), Some(image.alpha.clone()));
-            view.target = Some(Target { rgb, alpha, mask: None, clipped_at: None });
+            view.target = Some(Target { rgb, alpha, haze: None, mask: None, clipped_at: None });
         }
         let source = if made.is_some() { Source::Model } else { Source::Targets };
         let engine = prepared.engine()?;
@@ -101,7 +110,7 @@ pub fn shaded(scene: &Scene, shader: &Shader, samples: &[&ViewSamples], gains: &
     let image = |(i, (view, samples)): (usize, (&View, &&ViewSamples))| {
         let mut shaded = shader.shade(samples, &view.camera, gains.get(i).copied().unwrap_or(1.0));
         if scene.effects.has(Effect::Bloom) {
-            add_bloom(&mut shaded.image, &shaded.haze);
+            add_bloom(&mut shaded.image, &shaded.glow, scene.bloom.sigma);
         }
         shaded.image
     };

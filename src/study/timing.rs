@@ -73,6 +73,16 @@ impl Default for Rounds {
     }
 }
 
+impl Rounds {
+    /// The seconds that [`interleaved`] takes for jobs of these seconds, warm-up and all.
+    #[must_use]
+    pub fn expected(&self, jobs: &[f64]) -> f64 {
+        let short: f64 = jobs.iter().filter(|&&job| job <= self.long).sum();
+        let wanted = (self.seconds / short.max(1e-9)).ceil().min(self.most as f64) as usize;
+        jobs.iter().sum::<f64>() + short * wanted.max(self.least) as f64
+    }
+}
+
 /// The seconds that `work` takes.
 pub fn seconds_of<T>(work: impl FnOnce() -> T) -> f64 {
     let clock = Instant::now();
@@ -137,6 +147,16 @@ mod tests {
             Some(Spread { median: 3.0, lower: 2.0, upper: 4.0 })
         );
         assert_eq!(Spread::of(&[2.0, 1.0]), Some(Spread { median: 1.5, lower: 1.25, upper: 1.75 }));
+    }
+
+    #[test]
+    fn rounds_are_foretold_as_they_are_run() {
+        let rounds = Rounds { long: 3.0, least: 3, most: 7, seconds: 1.0 };
+        // Once to warm up and three times; a long one once.
+        assert_eq!(rounds.expected(&[1.0, 0.5, 4.0]), 5.5 + 3.0 * 1.5);
+        // Until a second is over, and seven times at most.
+        assert!((rounds.expected(&[0.2]) - (0.2 + 5.0 * 0.2)).abs() < 1e-12);
+        assert!((rounds.expected(&[0.01]) - 8.0 * 0.01).abs() < 1e-12);
     }
 
     #[test]

@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use std::path::Path;
 use std::time::Instant;
 
 use glam::{DMat4, DVec3, Vec3};
@@ -18,69 +17,58 @@ use skinfit::scene::mesh::PosedMesh;
 use skinfit::scene::view::Camera;
 
 use crate::common;
-use crate::fixtures::{
-    assert_close, bare_scene, correlation, environment, json, numbers, quantile, read_exr, vectors_of,
-};
+use crate::fixtures::{bare_scene, correlation, environment, json, numbers, quantile, read_exr};
+use crate::vectors;
+use crate::vectors::reader::{Node, Tolerance, Vectors};
 
 #[test]
 fn latlong_lookup_and_resampling_meet_the_vectors() {
-    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
-    for (_, file) in vectors_of(&folder, "latlong") {
-        latlong_vector(&file);
-    }
+    Vectors::read(&common::vectors()).of_kind("latlong").iter().for_each(latlong_vector);
 }
 
-fn latlong_vector(file: &serde_json::Value) {
-    let rel = file["tolerance"]["f64_rel"].as_f64().unwrap();
-    let (inputs, expected) = (&file["inputs"], &file["expected"]);
-    let height = inputs["image"].as_array().unwrap().len();
-    let image = numbers(&inputs["image"]);
+pub(crate) fn latlong_vector(file: &Node<'_>) {
+    let tolerance = file.vector.tolerances().double;
+    let (inputs, expected) = (file.at("inputs"), file.at("expected"));
+    let height = inputs.at("image").items().len();
+    let image = inputs.at("image").numbers();
     let width = image.len() / height / 3;
     let texel = |x: usize, y: usize| std::array::from_fn(|c| image[(y * width + x) * 3 + c]);
     let lookup = |d: [f64; 3]| sample_latlong::<3>(width, height, texel, d);
-    for (d, want) in
-        inputs["directions"].as_array().unwrap().iter().zip(expected["samples"].as_array().unwrap())
-    {
-        let d: [f64; 3] = numbers(d).try_into().unwrap();
-        assert_close(&lookup(d), &numbers(want), rel, rel, "samples");
-    }
+    let samples = inputs.at("directions").items().into_iter().flat_map(|d| lookup(d.three()));
+    tolerance.check("samples", &samples.collect::<Vec<_>>(), &expected.at("samples"));
     for (name, sub) in [("cube_3", 1), ("cube_3_sub4", 4)] {
         let cube = to_cube(3, sub, lookup);
         let got: Vec<f64> = (0..54).flat_map(|i| cube.texel(i / 9, i % 3, i / 3 % 3)[..3].to_vec()).collect();
-        assert_close(&got, &numbers(&expected[name]), rel, rel, name);
+        tolerance.check(name, &got, &expected.at(name));
     }
-}
-
-fn read_cube(file: &serde_json::Value, name: &str) -> Cube<f64> {
-    let size = file["inputs"]["size"].as_u64().unwrap() as usize;
-    let values = numbers(&file["inputs"][name]);
-    Cube::from_fn(size, |face, column, row| {
-        std::array::from_fn(|c| values[((face * size + row) * size + column) * 4 + c])
-    })
 }
 
 #[test]
 fn the_brute_force_filter_meets_the_vectors_and_the_fast_one_meets_it() {
-    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
-    for (_, file) in vectors_of(&folder, "prefilter") {
-        prefilter_vector(&folder, &file);
-    }
+    let vectors = Vectors::read(&common::vectors());
+    vectors.of_kind("prefilter").iter().for_each(|file| prefilter_vector(&vectors, file));
 }
 
-fn prefilter_vector(folder: &Path, file: &serde_json::Value) {
-    let cube = read_cube(&json(&folder.join(file["cubes_file"].as_str().unwrap())), "spec");
-    let rel = file["tolerance"]["f64_rel"].as_f64().unwrap();
-    let directions = file["inputs"]["directions"].as_array().unwrap();
-    for (k, exponent) in numbers(&file["inputs"]["exponents"]).into_iter().enumerate() {
-        for (name, splits) in [("texel_centres", 1), ("converged", 16)] {
-            for (d, want) in directions.iter().zip(file["expected"][name][k].as_array().unwrap()) {
-                let d: [f64; 3] = numbers(d).try_into().unwrap();
-                let got = by_brute_force(&cube, d, exponent, splits);
-                // Sums of 24576 terms may round in another order.
-                assert_close(&got, &numbers(want), 100.0 * rel, rel, name);
-            }
-        }
+pub(crate) fn prefilter_vector(vectors: &Vectors, file: &Node<'_>) {
+    let cube = vectors::cube::<f64>(vectors, file, "spec");
+    let directions: Vec<[f64; 3]> =
+        file.at("inputs").at("directions").items().iter().map(Node::three).collect();
+    let exponents = file.at("inputs").at("exponents").numbers();
+    let filtered = |cube: &Cube<f64>, splits: usize| -> Vec<f64> {
+        let by = |&exponent: &f64| {
+            directions
+                .iter()
+                .flat_map(move |&d| by_brute_force(cube, d, exponent, splits))
+                .collect::<Vec<_>>()
+        };
+        exponents.iter().flat_map(by).collect()
+    };
+    // Sums of 24576 terms may round in another order.
+    let tolerance = file.vector.tolerances().double.times(100.0);
+    for (name, splits) in [("texel_centres", 1), ("converged", 16)] {
+        tolerance.check(name, &filtered(&cube, splits), &file.at("expected").at(name));
     }
+    linear_vector(&file.at("expected").at("linear_env"), &filtered);
     // The fast filter takes the cells of a finer cube with the same light.
     let fine = Cube::from_fn(64, |face, column, row| cube.texel(face, column / 16, row / 16));
     let prefilter = Prefilter::new(&fine);
@@ -96,6 +84,23 @@ fn prefilter_vector(folder: &Path, file: &serde_json::Value) {
             }
         }
     }
+}
+
+/// Light that grows linearly along a direction: its texels, and its lobes in closed form.
+fn linear_vector(file: &Node<'_>, filtered: &impl Fn(&Cube<f64>, usize) -> Vec<f64>) {
+    let (a, b) = (file.at("a").wanted()[0], file.at("b").wanted());
+    let light = |d: [f64; 3]| a + (0..3).map(|i| b[i] * d[i]).sum::<f64>();
+    let cube = |size: usize| {
+        Cube::from_fn(size, |face, column, row| {
+            [light(texel_direction(face, column, row, size)), 0.0, 0.0, 0.0]
+        })
+    };
+    let texels = cube(4);
+    let red: Vec<f64> = (0..96).map(|i| texels.texel(i / 16, i % 4, i / 4 % 4)[0]).collect();
+    file.vector.tolerances().double.check("texels", &red, &file.at("cube_texels_red"));
+    let red: Vec<f64> = filtered(&cube(64), 1).into_iter().step_by(4).collect();
+    // Texels of 1/64 of a face, each taken at its centre: (1/32)^2 / 24 of the light's slope and of the lobe's.
+    Tolerance { abs: 2e-4, rel: 0.0 }.check("lobes", &red, &file.at("closed_form"));
 }
 
 #[test]
@@ -114,6 +119,7 @@ fn a_linear_environment_is_filtered_to_its_closed_form() {
             worst = worst.max((f64::from(cube.texel(face, column, row)[0]) - want).abs());
         }
         println!("exponent {exponent}: worst error {worst:.1e}");
+        crate::figures::measured("bakes linear", worst);
         // Half a standard deviation a cell, corrected to second order; at exponents below 4 the
         // horizon cuts through cells.
         assert!(worst < 5e-4, "exponent {exponent}: {worst}");
@@ -179,6 +185,8 @@ fn real_environments_are_filtered_close_to_convergence() {
                 .collect();
             let (rms, worst) = errors(&cube, &truth, &texels);
             println!("  exponent {exponent}: {seconds:.3} s, error rms {rms:.1e}, worst {worst:.1e}");
+            crate::figures::measured("bakes prefilter rms", rms);
+            crate::figures::measured("bakes prefilter worst", worst);
             // A cell may err by 3e-5 of the mean radiance; a thousand cells add up at random.
             assert!(rms < 5e-4 && worst < 2e-3, "{name}, exponent {exponent}: {rms} {worst}");
         }
@@ -219,6 +227,9 @@ fn the_cube_has_the_flux_of_the_panorama() {
             }
             let errors = [0, 1, 2].map(|c| got[c] / want[c] - 1.0);
             println!("{name}, cube of {size}: flux {errors:.5?}");
+            for error in errors {
+                crate::figures::measured(&format!("bakes flux {size}"), error.abs());
+            }
             // Three samples a texel, bilinear: parts in a thousand where a sun holds half the flux.
             assert!(errors.iter().all(|e| e.abs() < 2e-3), "{name}, {size}: {errors:?}");
         }
@@ -229,7 +240,8 @@ fn the_cube_has_the_flux_of_the_panorama() {
 fn between_its_cubes_the_stack_is_near_a_cube_baked_for_that_exponent() {
     let Some(data) = common::data() else { return };
     for (name, bounds) in [("forest", [0.01, 6e-4]), ("sunrise", [0.02, 1.5e-3])] {
-        let radiance = Radiance::new(&environment(&data.join(format!("env/{name}.exr")), 0.0));
+        let light = environment(&data.join(format!("env/{name}.exr")), 0.0);
+        let radiance = Radiance::new(&light);
         let prefilter = Prefilter::of(&radiance);
         for (per_octave, bound) in [(1, bounds[0]), (2, bounds[1])] {
             let exponents = skinfit::bake::lobes::knots(&(1.0..=2048.0), per_octave);
@@ -246,6 +258,7 @@ fn between_its_cubes_the_stack_is_near_a_cube_baked_for_that_exponent() {
                 println!(
                     "{name}, {per_octave} an octave, exponent {exponent}: {error:.1e} rms of the cube's"
                 );
+                crate::figures::measured(&format!("bakes between {name} {per_octave}"), error);
                 // Around a sun the lobe's value is (e+1) cos^e, far from a cubic over an octave; over
                 // half of one the error is 2^4 times smaller.
                 assert!(error < bound, "{name} {per_octave} {exponent}: {error}");
@@ -315,7 +328,8 @@ fn the_calibration_balls_look_as_the_independent_renderer_shows_them() {
     for (calib, (name, rotation)) in
         calib.as_array().unwrap().iter().zip([("forest", 170.0), ("sunrise", -4.0)])
     {
-        let radiance = Radiance::new(&environment(&data.join(format!("env/{name}.exr")), rotation));
+        let light = environment(&data.join(format!("env/{name}.exr")), rotation);
+        let radiance = Radiance::new(&light);
         let read = |kind: &str| read_exr(&data.join(format!("calib/{kind}_{name}.exr"))).rgb(["R", "G", "B"]);
         // Towards the limb a pixel's footprint in the mirror grows without bound.
         let mirror = ball(calib, &read("mirror"), 0.9, &filter, |n, d| {
@@ -336,6 +350,8 @@ fn the_calibration_balls_look_as_the_independent_renderer_shows_them() {
             println!(
                 "{name} {kind}: median ratio {median:.4} +- {spread:.4}, correlation of logs {correlation:.4}"
             );
+            crate::figures::measured(&format!("bakes {kind} ball {name} ratio"), median);
+            crate::figures::measured(&format!("bakes {kind} ball {name} correlation"), correlation);
             // 64 and 128 rays a pixel in an HDR environment; leaves finer than a pixel in the forest.
             assert!((median - 1.0).abs() < 0.01, "{name} {kind}: {median}");
             assert!(correlation > 0.99, "{name} {kind}: {correlation}");

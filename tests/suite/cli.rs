@@ -1,14 +1,17 @@
 //! The program as its users meet it: every test here runs the binary.
 
 mod ablation;
+mod added_term;
 mod browser;
 mod built_in;
+mod constants;
+mod damaged;
 mod exported;
-#[cfg(feature = "gpu")]
 mod graphics;
 mod interrupted;
 mod maps;
 mod outputs;
+mod pinned;
 mod refusals;
 mod refused_files;
 mod runs;

@@ -1,6 +1,16 @@
 //! Arbitrary scene files and damaged bytes are thrown at the readers: nothing panics.
+//!
+//! - [`tree`]: damage to what a file says; [`tables`]: constants, plans, results, cases; [`meshes`]: buffers beside a
+//!   glTF file, morph targets, animations, masks
+//!
+//! What the program makes of damaged files, and what it leaves behind, is in `cli::damaged`; states of fits are in
+//! `fits::damaged`.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
+
+mod meshes;
+mod tables;
+pub(crate) mod tree;
 
 use std::fmt::Write as _;
 
@@ -15,7 +25,7 @@ use super::scene_folder::{SCENE, SceneFolder, base64, encode, exr_with, quad, qu
 
 /// What may happen to a file on its way.
 #[derive(Clone, Debug)]
-enum Damage {
+pub(crate) enum Damage {
     Cut(usize),
     Flip(Vec<(usize, u8)>),
     Overwrite(usize, Vec<u8>),
@@ -24,7 +34,7 @@ enum Damage {
 }
 
 impl Damage {
-    fn apply(&self, mut bytes: Vec<u8>) -> Vec<u8> {
+    pub(crate) fn apply(&self, mut bytes: Vec<u8>) -> Vec<u8> {
         let size = bytes.len().max(1);
         match self {
             Self::Cut(at) => bytes.truncate(at % size),
@@ -44,7 +54,7 @@ impl Damage {
     }
 }
 
-fn damage() -> impl Strategy<Value = Damage> {
+pub(crate) fn damage() -> impl Strategy<Value = Damage> {
     // Headers are where sizes stand: half of all damage is done to the first 400 bytes.
     let place = || prop_oneof![0..400_usize, any::<usize>()];
     let bytes = |most: usize| prop::collection::vec(any::<u8>(), 0..most);
@@ -160,7 +170,11 @@ fn every_kind_of_file_is_read_when_it_is_whole() {
 }
 
 /// Run `check` on `cases` arbitrary values.
-fn throw<S: Strategy>(cases: u32, values: &S, check: impl Fn(S::Value) -> Result<(), TestCaseError>) {
+pub(crate) fn throw<S: Strategy>(
+    cases: u32,
+    values: &S,
+    check: impl Fn(S::Value) -> Result<(), TestCaseError>,
+) {
     let config = ProptestConfig { cases, failure_persistence: None, ..ProptestConfig::default() };
     TestRunner::new(config).run(values, check).unwrap();
 }

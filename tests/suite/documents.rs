@@ -3,6 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+#[path = "../../experiments/figures/pages.rs"]
+mod pages;
+#[path = "../../experiments/figures/strays.rs"]
+mod strays;
+
 fn root() -> &'static Path {
     Path::new(env!("CARGO_MANIFEST_DIR"))
 }
@@ -14,33 +19,78 @@ fn the_page_of_parameters_holds_the_programs_table() {
     assert!(table.lines().count() > 10, "{table}");
     let page = std::fs::read_to_string(root().join("docs/parameters.md")).unwrap();
     // To mend it: replace the page's table by what `skinfit params --format markdown` prints.
-    assert!(page.ends_with(&table), "docs/parameters.md has drifted from the table in src/model/params.rs");
+    assert!(
+        page.ends_with(&table),
+        "docs/parameters.md has drifted from the table in src/core/model/params.rs"
+    );
 }
 
-/// The project's pages.
-fn pages() -> Vec<PathBuf> {
-    let mut pages = Vec::new();
-    for folder in [
-        "",
-        "data",
-        "docs",
-        "experiments",
-        "experiments/ablation",
-        "experiments/accuracy_vs_time",
-        "experiments/bench",
-        "experiments/network",
-        "experiments/race",
-        "experiments/scaling",
-        "experiments/stability",
-    ] {
-        for entry in std::fs::read_dir(root().join(folder)).unwrap() {
-            let path = entry.unwrap().path();
-            if path.extension().is_some_and(|ending| ending == "md") {
-                pages.push(path);
+/// The project's pages, by their paths in it.
+fn pages_of_the_project() -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut folders = ["data", "docs", "experiments"].map(PathBuf::from).to_vec();
+    let top = std::fs::read_dir(root()).unwrap().map(|entry| PathBuf::from(entry.unwrap().file_name()));
+    found.extend(top.filter(|name| name.extension().is_some_and(|ending| ending == "md")));
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(root().join(&folder)).unwrap() {
+            let path = folder.join(entry.unwrap().file_name());
+            if root().join(&path).is_dir() {
+                folders.push(path);
+            } else if path.extension().is_some_and(|ending| ending == "md") {
+                found.push(path);
             }
         }
     }
-    pages
+    found
+}
+
+#[test]
+fn every_figure_of_a_page_is_that_of_its_raw_file() {
+    let mut quoting = 0;
+    for page in pages_of_the_project() {
+        let text = std::fs::read_to_string(root().join(&page)).unwrap();
+        quoting += usize::from(!pages::quoted(&text).unwrap().is_empty());
+        let filled =
+            pages::filled(&root().join(&page), &text).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
+        for (line, (is, should)) in text.lines().zip(filled.lines()).enumerate() {
+            // To mend it: cargo run --release --example figures
+            assert_eq!(is, should, "{}, line {}", page.display(), line + 1);
+        }
+        assert_eq!(text.len(), filled.len(), "{}", page.display());
+    }
+    assert!(quoting > 5, "only {quoting} pages quote raw files");
+}
+
+#[test]
+fn every_raw_file_says_how_it_came_about() {
+    let mut files = Vec::new();
+    for page in pages_of_the_project() {
+        let text = std::fs::read_to_string(root().join(&page)).unwrap();
+        files.extend(
+            pages::quoted(&text).unwrap().into_iter().map(|file| root().join(&page).with_file_name(file)),
+        );
+    }
+    assert!(!files.is_empty());
+    for file in files {
+        let raw: serde_json::Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+        assert_eq!(pages::head_lacks(&raw), None, "{}", file.display());
+    }
+    let raw =
+        serde_json::json!({"head": {"command": "c", "commit": "", "date": "2026-01-01", "machine": {}}});
+    assert_eq!(pages::head_lacks(&raw), Some("commit"));
+}
+
+#[test]
+fn no_page_has_a_figure_that_no_raw_file_gives() {
+    let mut found = Vec::new();
+    for page in pages_of_the_project() {
+        let text = std::fs::read_to_string(root().join(&page)).unwrap();
+        let strays = strays::strays(&page, &text).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
+        found.extend(strays.into_iter().map(|words| format!("{}: {words}", page.display())));
+    }
+    // To mend it: quote the figure from a raw file (experiments/figures/README.md says how); or, if it was never
+    // measured, name it in `DEFINITIONS` of experiments/figures/strays.rs, with the reason.
+    assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
 #[test]
@@ -64,8 +114,8 @@ fn no_page_holds_a_placeholder() {
     // Names of a number or a date that is still to be filled in.
     let left_over = ["TODO", "FIXME", "XXX", "TBD", "???", "TIME", "DATE", "RESULT", "NUMBER", "VALUE"];
     let mut words = 0;
-    for page in pages() {
-        let text = std::fs::read_to_string(&page).unwrap();
+    for page in pages_of_the_project() {
+        let text = std::fs::read_to_string(root().join(&page)).unwrap();
         // Code and commands have their own capitals: variables, places of files.
         let prose: String = text.split("```").step_by(2).collect();
         let prose: Vec<&str> = prose.split('`').step_by(2).collect();
@@ -84,15 +134,15 @@ fn no_page_holds_a_placeholder() {
 #[test]
 fn every_relative_link_of_a_page_leads_to_a_file() {
     let mut links = 0;
-    for page in pages() {
-        let text = std::fs::read_to_string(&page).unwrap();
+    for page in pages_of_the_project() {
+        let text = std::fs::read_to_string(root().join(&page)).unwrap();
         for link in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
             let file = link.split('#').next().unwrap_or_default();
             if file.is_empty() || file.contains("://") {
                 continue;
             }
             links += 1;
-            assert!(page.with_file_name(file).exists(), "{}: {link}", page.display());
+            assert!(root().join(&page).with_file_name(file).exists(), "{}: {link}", page.display());
         }
     }
     assert!(links > 20, "only {links} links were found");

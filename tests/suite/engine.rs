@@ -37,7 +37,6 @@ pub(crate) fn view(groups: usize, seed: u64) -> ObservedView {
 }
 
 /// `groups` groups with one record each; the last lane is padding.
-#[cfg(feature = "gpu")]
 pub(crate) fn single(groups: usize, seed: u64) -> ObservedView {
     let mut view = sampled(groups, seed, |_| 1);
     for group in 0..groups {
@@ -122,7 +121,7 @@ pub(crate) fn params() -> Params {
 }
 
 pub(crate) fn all_unknowns(gains: usize) -> Vec<Unknown> {
-    let columns = Param::all().flat_map(|p| match p {
+    let columns = Param::built_in().flat_map(|p| match p {
         Param::RimWeight => Column::per_channel(p).to_vec(),
         _ => vec![Column::tied(p)],
     });
@@ -175,7 +174,7 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
     let views = [view(9, 1), view(4, 2)];
     let light = illumination();
     let unknowns = all_unknowns(2);
-    let mut sets: Vec<Effects> = Effect::ALL.into_iter().map(|e| Effects::of(&[e])).collect();
+    let mut sets: Vec<Effects> = Effect::BUILT_IN.into_iter().map(|e| Effects::of(&[e])).collect();
     sets.extend([EVERYTHING, EVERYTHING.without(Effect::Rim), EVERYTHING.without(Effect::Occlusion)]);
     for form in Form::ALL {
         for silhouette in Silhouette::ALL {
@@ -341,16 +340,32 @@ fn sums_are_the_same_to_the_bit_for_any_number_of_threads() {
 }
 
 #[test]
-fn strides_read_a_share_of_the_pixels_and_together_all_of_them() {
-    let views = [view(128, 8)];
+fn a_stride_reads_every_nth_block_of_pixels_and_no_other() {
+    let whole = view(128, 8);
     let unknowns = all_unknowns(1);
     let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: EVERYTHING };
     let point = Point { params: params(), gains: vec![1.0] };
-    let mut coarse = engine(setup, &views, Loss::L2, &unknowns, true);
+    let groups = whole.samples.groups();
+    let mut coarse = engine(setup, std::slice::from_ref(&whole), Loss::L2, &unknowns, true);
     let full = coarse.normal_equations(&point);
-    coarse.set_stride(4);
-    let quarter = coarse.normal_equations(&point);
-    assert_eq!(quarter.count * 4, full.count);
-    // A quarter of 2048 random pixels: their mean loss scatters by a few per cent.
-    assert!((quarter.loss / full.loss - 1.0).abs() < 0.2, "{} {}", quarter.loss, full.loss);
+    let (blocks, names, light) = (coarse.blocks(), names(&unknowns), illumination());
+    assert!(blocks >= 8 && groups.is_multiple_of(blocks), "{groups} groups in {blocks} blocks");
+    for stride in [2, 3, 4, blocks + 1] {
+        // The same view, of which the blocks that are read are all that counts.
+        let mut read = whole.clone();
+        for group in (0..groups).filter(|group| !(group / (groups / blocks)).is_multiple_of(stride)) {
+            read.weight[group] = Row::ZERO;
+        }
+        coarse.set_stride(stride);
+        let got = coarse.normal_equations(&point);
+        let read = [read];
+        let want = Reference::new(setup, &light, &read, Loss::L2, &unknowns).normal_equations(&point);
+        assert_equal(&got, &want, &names, &format!("stride {stride}"));
+        assert!(got.count < full.count);
+        // The same pixels summed without their columns: f32 products in another order.
+        let loss = coarse.loss(&point);
+        assert!((loss - got.loss).abs() <= 1e-6 * got.loss, "{loss} {}", got.loss);
+    }
+    coarse.set_stride(1);
+    assert_eq!(coarse.normal_equations(&point), full, "every block again");
 }

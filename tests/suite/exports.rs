@@ -1,10 +1,11 @@
-//! Exported shaders are compiled by their languages' own compilers; what has none here is held against a
-//! text that was read.
+//! Exported shaders are compiled by their languages' own compilers. What has none here is taken back to a sibling
+//! language that has one by the few words in which they differ, compiled there, and held against a text that was read.
 
 use std::path::Path;
 use std::process::Command;
 
-use skinfit::export::{self, Provenance, Target};
+use skinfit::export::{self, Constants, Provenance, Target};
+use skinfit::fit::params_file::ParamsFile;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
@@ -13,18 +14,24 @@ use skinfit::shader::{Budget, Facts, plan};
 
 pub(crate) fn provenance() -> Provenance {
     Provenance {
-        scene: "scene.toml".to_owned(),
+        scene: Some("scene.toml".to_owned()),
         params: "params.toml".to_owned(),
         loss: Some(("relative_l2".to_owned(), 0.0123)),
+        set: Vec::new(),
         std_errors: vec![(Param::RimExponent, vec![0.004])],
     }
 }
 
-/// Scenes that differ in all that changes a fragment stage.
-fn scenes() -> Vec<(&'static str, Facts)> {
+/// What an engine's scene calls for.
+pub(crate) fn engine_facts() -> Facts {
     let maps =
         MapFacts { color: true, normal: true, specular: true, attenuator: true, ..MapFacts::default() };
-    let exact = Facts { maps, budget: Budget::Within(0.05), tessellation: 1.0, ..Facts::default() };
+    Facts { maps, budget: Budget::Within(0.05), tessellation: 1.0, ..Facts::default() }
+}
+
+/// Scenes that differ in all that changes a fragment stage.
+fn scenes() -> Vec<(&'static str, Facts)> {
+    let exact = engine_facts();
     let setup = |form, silhouette, effects| Setup { form, silhouette, effects };
     let all = Effects::SURFACE.with(Effect::KeyLight).with(Effect::Haze);
     let corrected =
@@ -73,47 +80,181 @@ fn inputs(facts: &Facts, spell: impl Fn(usize, &str, &str) -> String) -> String 
     fields.iter().enumerate().map(|(i, (name, kind))| spell(i, name, kind)).collect()
 }
 
+/// A fragment shader in a sibling of GLSL that hands its inputs to the exported function.
+fn glsl_shader(head: &str, facts: &Facts, exported: &str) -> String {
+    let kind = |wgsl: &str| match wgsl {
+        "f32" => "float",
+        "vec2f" => "vec2",
+        _ => "vec3",
+    };
+    let declared =
+        inputs(facts, |i, field, wgsl| format!("layout(location = {i}) in {} in_{field};\n", kind(wgsl)));
+    let set = inputs(facts, |_, field, _| format!("    at.{field} = in_{field};\n"));
+    format!(
+        "{head}\n{exported}\n{declared}layout(location = 0) out vec4 color;\nvoid main() {{\n    SkinfitSurface at;\n{set}    color = skinfit_shade(at);\n}}\n"
+    )
+}
+
+/// As [`glsl_shader`], in a sibling of HLSL.
+fn hlsl_shader(head: &str, facts: &Facts, exported: &str) -> String {
+    let kind = |wgsl: &str| match wgsl {
+        "f32" => "float",
+        "vec2f" => "float2",
+        _ => "float3",
+    };
+    let declared = inputs(facts, |i, field, wgsl| format!("    {} {field} : TEXCOORD{i};\n", kind(wgsl)));
+    let set = inputs(facts, |_, field, _| format!("    at.{field} = input.{field};\n"));
+    format!(
+        "{head}\n{exported}\nstruct Input {{\n{declared}}};\nfloat4 main(Input input) : SV_Target {{\n    SkinfitSurface at;\n{set}    return skinfit_shade(at);\n}}\n"
+    )
+}
+
+fn compile_glsl(text: &str) -> Result<(), String> {
+    compile("glslangValidator", &["-V", "-S", "frag"], "frag", text)
+}
+
+fn compile_hlsl(text: &str) -> Result<(), String> {
+    compile(
+        "glslangValidator",
+        &["-D", "-V", "-S", "frag", "-e", "main", "--auto-map-bindings"],
+        "hlsl",
+        text,
+    )
+}
+
+/// A text that a compiler has taken, and must not take with any of `faults` in it: so that what it says is worth
+/// something.
+fn assert_taken(compile: fn(&str) -> Result<(), String>, name: &str, text: &str, faults: &[(&str, &str)]) {
+    compile(text).unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
+    for (right, wrong) in faults {
+        assert!(text.contains(right), "{name} holds no {right}\n{text}");
+        let spoilt = text.replacen(right, wrong, 1);
+        assert!(compile(&spoilt).is_err(), "{name}: {wrong} is taken for {right}");
+    }
+}
+
 #[test]
 fn exported_glsl_is_taken_by_glslang_and_its_code_is_valid() {
     for (name, facts) in scenes() {
-        let kind = |wgsl: &str| match wgsl {
-            "f32" => "float",
-            "vec2f" => "vec2",
-            _ => "vec3",
-        };
-        let declared = inputs(&facts, |i, field, wgsl| {
-            format!("layout(location = {i}) in {} in_{field};\n", kind(wgsl))
-        });
-        let set = inputs(&facts, |_, field, _| format!("    at.{field} = in_{field};\n"));
-        let text = format!(
-            "#version 450\n{}\n{declared}layout(location = 0) out vec4 color;\nvoid main() {{\n    Surface at;\n{set}    color = skinfit_shade(at);\n}}\n",
-            exported(Target::Glsl, &facts)
-        );
-        compile("glslangValidator", &["-V", "-S", "frag"], "frag", &text)
-            .unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
+        compiled_glsl(name, &facts);
     }
+}
+
+/// The exported GLSL of a scene, which glslang takes.
+pub(crate) fn compiled_glsl(name: &str, facts: &Facts) -> String {
+    let text = glsl_shader("#version 450", facts, &exported(Target::Glsl, facts));
+    assert_taken(compile_glsl, name, &text, &[]);
+    text
 }
 
 #[test]
 fn exported_hlsl_is_taken_by_glslang_and_its_code_is_valid_for_unity_too() {
     for target in [Target::Hlsl, Target::Unity] {
         for (name, facts) in scenes() {
-            let kind = |wgsl: &str| match wgsl {
-                "f32" => "float",
-                "vec2f" => "float2",
-                _ => "float3",
-            };
-            let declared =
-                inputs(&facts, |i, field, wgsl| format!("    {} {field} : TEXCOORD{i};\n", kind(wgsl)));
-            let set = inputs(&facts, |_, field, _| format!("    at.{field} = input.{field};\n"));
-            let text = format!(
-                "{}\nstruct Input {{\n{declared}}};\nfloat4 main(Input input) : SV_Target {{\n    Surface at;\n{set}    return skinfit_shade(at);\n}}\n",
-                exported(target, &facts)
-            );
-            let arguments = ["-D", "-V", "-S", "frag", "-e", "main", "--auto-map-bindings"];
-            compile("glslangValidator", &arguments, "hlsl", &text)
-                .unwrap_or_else(|error| panic!("{} {name}: {error}\n{text}", target.name()));
+            let text = hlsl_shader("", &facts, &exported(target, &facts));
+            assert_taken(compile_hlsl, &format!("{} {name}", target.name()), &text, &[]);
         }
+    }
+}
+
+/// What Cg is to HLSL: samplers that are one with their textures, and other names of lookups.
+const CG_IN_HLSL: &str = "SamplerState map_sampler;
+SamplerState cube_sampler;
+#define sampler2D Texture2D<float4>
+#define samplerCUBE TextureCube<float4>
+#define tex2Dlod(t, c) t.SampleLevel(map_sampler, (c).xy, (c).w)
+#define texCUBElod(t, c) t.SampleLevel(cube_sampler, (c).xyz, (c).w)";
+
+#[test]
+fn exported_cg_is_hlsl_but_for_its_lookups() {
+    for (name, facts) in scenes() {
+        let exported = exported(Target::Cg, &facts);
+        // Words of its siblings that Cg has not: `bits` of floats came with later profiles.
+        for word in
+            ["SampleLevel", "Texture2D", "register(", "asuint", "vec3", "mix(", "fract(", "textureLod"]
+        {
+            assert!(!exported.contains(word), "{name}: {word}\n{exported}");
+        }
+        let text = hlsl_shader(CG_IN_HLSL, &facts, &exported);
+        assert_taken(compile_hlsl, name, &text, &[("float4 skinfit_shade(", "vec4 skinfit_shade(")]);
+    }
+}
+
+/// Godot's language in GLSL ES, which it is a dialect of and which converts as few types by itself: its uniforms have
+/// hints in place of bindings.
+fn godot_in_glsl(exported: &str) -> String {
+    let mut bindings = 0;
+    let mut line = |line: &str| {
+        let Some(declared) = line.strip_prefix("uniform ") else { return line.to_owned() + "\n" };
+        let (what, hints) = declared.trim_end_matches(';').split_once(" : ").unwrap_or((declared, ""));
+        for hint in hints.split(", ") {
+            // Those of Godot 4's shading language.
+            assert!(["source_color", "filter_linear", "repeat_enable"].contains(&hint), "{line}");
+        }
+        bindings += 1;
+        format!("layout(binding = {bindings}) uniform {what};\n")
+    };
+    exported.lines().map(&mut line).collect()
+}
+
+#[test]
+fn exported_godot_is_glsl_es_but_for_its_hints() {
+    const HEAD: &str = "#version 310 es\nprecision highp float;\nprecision highp int;";
+    for (name, facts) in scenes() {
+        let exported = exported(Target::Godot, &facts);
+        assert!(!exported.contains("layout(") && !exported.contains("#version"), "{name}\n{exported}");
+        // Colours are decoded from sRGB by the engine, and nothing else is.
+        let decoded = exported.lines().filter(|line| line.contains("source_color")).collect::<Vec<_>>();
+        let color = if facts.maps.color { 1 } else { 0 };
+        assert!(
+            decoded.len() == color && decoded.iter().all(|line| line.contains(" skinfit_color_map ")),
+            "{decoded:?}"
+        );
+        let text = glsl_shader(HEAD, &facts, &godot_in_glsl(&exported));
+        assert_taken(
+            compile_glsl,
+            name,
+            &text,
+            &[("largest : 1.0", "largest : 1"), ("vec4 skinfit_shade(", "float4 skinfit_shade(")],
+        );
+    }
+}
+
+/// Metal's language in HLSL. There a struct holds the textures, of which HLSL has none: it is opened.
+fn metal_in_hlsl(exported: &str) -> String {
+    let (before, inside) = exported.split_once("struct Skinfit {\n").expect("a struct of textures");
+    let inside = inside.trim_end().strip_suffix("};").expect("the struct's end");
+    let before = before.replace("#include <metal_stdlib>", "").replace("using namespace metal;", "");
+    let text = before + inside;
+    let text = text.replace("<float>", "<float4>").replace("as_type<uint3>", "asuint");
+    let defined = [
+        ("constant", "static const"),
+        ("texture2d", "Texture2D"),
+        ("texturecube", "TextureCube"),
+        ("sampler", "SamplerState"),
+        ("sample", "SampleLevel"),
+        ("level(x)", "x"),
+        ("mix", "lerp"),
+        ("fract", "frac"),
+    ];
+    defined.iter().map(|(metal, hlsl)| format!("#define {metal} {hlsl}\n")).collect::<String>() + &text
+}
+
+#[test]
+fn exported_metal_is_hlsl_but_for_its_struct_and_lookups() {
+    for (name, facts) in scenes() {
+        let exported = exported(Target::Msl, &facts);
+        for word in ["SampleLevel", "static const", "asuint", "lerp(", "frac(", "vec3", "uniform"] {
+            assert!(!exported.contains(word), "{name}: {word}\n{exported}");
+        }
+        // Constants stand outside the struct, in the one address space that Metal allows there.
+        let (constants, functions) = exported.split_once("struct Skinfit {").unwrap();
+        assert!(
+            constants.contains("\nconstant float") && !functions.contains("constant float"),
+            "{exported}"
+        );
+        let text = hlsl_shader("", &facts, &metal_in_hlsl(&exported));
+        assert_taken(compile_hlsl, name, &text, &[("float4 skinfit_shade(", "vec4 skinfit_shade(")]);
     }
 }
 
@@ -147,51 +288,151 @@ fn exports_that_no_compiler_here_takes_are_as_they_were_when_read() {
     }
 }
 
+/// Constants of the paper's fragment program, fitted to two views.
+fn constants(target: Target, params: &Params) -> String {
+    let gains = [("front".to_owned(), 1.0), ("side.2".to_owned(), 0.1 + 0.2)];
+    let loss = Some("relative_l2");
+    let constants =
+        Constants { form: Form::Corrected, effects: Effects::SURFACE, params, loss, gains: &gains };
+    export::constants(target, constants, &provenance())
+}
+
 #[test]
 fn constants_alone_read_back_as_they_were() {
     let effects = Effects::SURFACE;
     let mut params = Params::defaults(Form::Corrected);
-    params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e20]);
+    params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e8]);
     params.set(Param::RimExponent, 1.0 / 3.0);
-    let text = |target| export::constants(target, effects, &params, &provenance());
-    let json: serde_json::Value = serde_json::from_str(&text(Target::Json)).unwrap();
-    let toml: toml::Table = text(Target::Toml).parse().unwrap();
-    for param in Param::all() {
+    let json: serde_json::Value = serde_json::from_str(&constants(Target::Json, &params)).unwrap();
+    let toml: toml::Table = constants(Target::Toml, &params).parse().unwrap();
+    for param in Param::built_in() {
         let asked = param.asked_for(effects);
         assert_eq!(json["constants"].get(param.name()).is_some(), asked, "{}", param.name());
-        assert_eq!(toml.contains_key(param.name()), asked, "{}", param.name());
+        assert_eq!(toml["params"].get(param.name()).is_some(), asked, "{}", param.name());
     }
     assert_eq!(json["constants"]["rim_exponent"].as_f64(), Some(1.0 / 3.0));
-    assert_eq!(toml["rim_exponent"].as_float(), Some(1.0 / 3.0));
     for (c, want) in params.rgb(Param::Hilite).into_iter().enumerate() {
         assert_eq!(json["constants"]["hilite"][c].as_f64(), Some(want));
-        assert_eq!(toml["hilite"][c].as_float(), Some(want));
     }
-    assert!(text(Target::C).contains("static const float skinfit_occlusion = 1.0f;"));
+    assert!(constants(Target::C, &params).contains("static const float skinfit_occlusion = 1.0f;"));
     assert_eq!(json["std_errors"]["rim_exponent"].as_f64(), Some(0.004));
+    assert_eq!((json["form"].as_str(), json["effects"][0].as_str()), (Some("corrected"), Some("diffuse")));
 }
 
 #[test]
-fn a_c_header_compiles() {
-    let text =
-        export::constants(Target::C, Effects::SURFACE, &Params::defaults(Form::Corrected), &provenance());
+fn constants_as_toml_are_a_file_of_parameters() {
+    let mut params = Params::defaults(Form::Corrected);
+    params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e8]);
+    params.set(Param::RimExponent, 1.0 / 3.0);
     let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("skin.h");
-    std::fs::write(&file, text).unwrap();
+    let path = folder.path().join("skin.toml");
+    std::fs::write(&path, constants(Target::Toml, &params)).unwrap();
+    let file = ParamsFile::read(&path, Form::Corrected, &Params::defaults(Form::Corrected)).unwrap();
+    // To the bit.
+    assert_eq!((file.params, file.form, file.effects), (params, Form::Corrected, Some(Effects::SURFACE)));
+    assert_eq!(file.loss.map(skinfit::scene::Loss::name), Some("relative_l2"));
+    assert_eq!(file.gains, [("front".to_owned(), 1.0), ("side.2".to_owned(), 0.1 + 0.2)]);
+}
+
+#[test]
+fn a_c_header_compiles_however_often_it_is_included() {
+    let folder = tempfile::tempdir().unwrap();
+    let header = constants(Target::C, &Params::defaults(Form::Corrected));
+    std::fs::write(folder.path().join("skin.h"), &header).unwrap();
+    let file = folder.path().join("main.c");
+    std::fs::write(
+        &file,
+        "#include \"skin.h\"\n#include \"skin.h\"\nfloat hilite(void) { return skinfit_hilite[2]; }\n",
+    )
+    .unwrap();
     let made = Command::new("cc")
-        .args([
-            "-fsyntax-only",
-            "-x",
-            "c",
-            "-Wall",
-            "-Wno-unused-const-variable",
-            "-Wno-unused-variable",
-            "-Werror",
-        ])
+        .args(["-fsyntax-only", "-Wall", "-Wno-unused-const-variable", "-Wno-unused-variable", "-Werror"])
         .arg(&file)
         .status()
         .unwrap();
     assert!(made.success());
+    // Whatever it defines has the prefix.
+    let code = header.lines().filter(|line| !line.starts_with("//"));
+    for line in code.filter(|line| line.starts_with("static") || line.starts_with("#define")) {
+        assert!(line.to_lowercase().contains(" skinfit_"), "{line}");
+    }
+}
+
+/// The names that `text` defines at its top level, as each language writes it.
+fn defined(text: &str) -> Vec<String> {
+    let mut names = Vec::new();
+    for line in text.lines().filter(|line| !line.starts_with("//")) {
+        let line = line.trim_start_matches("    ");
+        let before = |end: char| line.split(end).next().unwrap_or_default();
+        let last = |words: &str| words.split([' ', '>']).rfind(|word| !word.is_empty()).map(str::to_owned);
+        let constant = ["const ", "static const ", "constant "].iter().any(|word| line.starts_with(word));
+        let resource = ["uniform ", "layout(", "Texture", "Sampler", "texture", "sampler ", "@group"]
+            .iter()
+            .any(|word| line.starts_with(word));
+        names.extend(match () {
+            () if line.starts_with("struct ") => last(before('{')),
+            () if line.starts_with("#define ") => last(line),
+            // `const NAME: f32 = 1.0;` or `const float NAME = 1.0;`
+            () if constant => last(before('=').split(':').next().unwrap_or_default().trim_end()),
+            () if line.starts_with("@group") => last(line.split(": ").next().unwrap_or_default()),
+            () if line.starts_with("layout(") || resource => {
+                last(before(';').split(" : ").next().unwrap_or_default())
+            }
+            () if line.starts_with("fn ") => last(before('(')),
+            // `float3 name(float2 a) {`, and neither a call nor an `if`.
+            () if line.ends_with(") {") && !line.starts_with("if ") => last(before('(')),
+            () => None,
+        });
+    }
+    names
+}
+
+#[test]
+fn whatever_an_export_defines_has_its_prefix() {
+    for target in Target::ALL.into_iter().filter(|target| target.dialect().is_some()) {
+        for (name, facts) in scenes() {
+            let text = exported(target, &facts);
+            let names = defined(&text);
+            // Functions, at least one constant, the input and its shader.
+            assert!(names.len() > 4, "{} {name}: {names:?}", target.name());
+            let bare = names.iter().find(|defined| !defined.to_lowercase().starts_with("skinfit"));
+            assert!(bare.is_none(), "{} {name}: {bare:?} has no prefix\n{text}", target.name());
+            assert!(names.iter().any(|defined| defined == "skinfit_shade"), "{names:?}");
+            assert!(names.iter().any(|defined| defined == "SkinfitSurface"), "{names:?}");
+        }
+    }
+}
+
+#[test]
+fn an_export_cites_what_its_reader_can_find() {
+    for (name, facts) in scenes() {
+        let text = exported(Target::Glsl, &facts);
+        assert!(!text.contains("MODEL "), "{name}: {text}");
+        assert!(text.contains("docs/model.md"), "{name}");
+    }
+}
+
+#[test]
+fn terms_without_weight_are_left_out_and_said_to_be() {
+    let (_, facts) = scenes()[0];
+    let mut params = Params::defaults(Form::Corrected);
+    let whole = export::function(Target::Glsl, &facts, &params, &provenance()).unwrap();
+    assert!(!whole.contains("Left out"), "{whole}");
+    params.set(Param::Reflection, 0.0);
+    params.set(Param::Hilite, 0.0);
+    let less = export::function(Target::Glsl, &facts, &params, &provenance()).unwrap();
+    assert!(less.contains("// Left out, as their weight is 0: hilite, reflection. "), "{less}");
+    for name in ["SKINFIT_REFLECTION", "SKINFIT_HILITE", "hilite_cube", "attenuator"] {
+        assert!(whole.contains(name) && !less.contains(name), "{name}: {less}");
+    }
+    // What is left is what is planned without the two, which costs less.
+    let setup = Setup {
+        effects: Effects::SURFACE.without(Effect::Hilite).without(Effect::Reflection),
+        ..facts.setup
+    };
+    let planned = plan(&Facts { setup, ..facts }).unwrap();
+    assert!(planned.cost < 0.9 * plan(&facts).unwrap().cost, "{}", planned.cost);
+    assert!(less.lines().count() < whole.lines().count());
 }
 
 #[test]
@@ -201,7 +442,7 @@ fn data_formats_hold_no_shader_and_say_so() {
         let error = export::function(target, &facts, &Params::defaults(Form::Corrected), &provenance());
         let words = error.unwrap_err().to_string();
         assert!(
-            words.contains(target.name()) && words.contains("--constants") && words.contains("glsl"),
+            words.contains(target.name()) && words.contains("the constants alone") && words.contains("glsl"),
             "{words}"
         );
     }

@@ -12,8 +12,8 @@ use skinfit::model::effects::{Effects, Form, Silhouette};
 use skinfit::model::params::Params;
 use skinfit::scene::maps::{Environment, Map, Maps};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
-use skinfit::scene::view::{Camera, View};
-use skinfit::scene::{FitSettings, Loss, MapSettings, Quality, Scene};
+use skinfit::scene::view::{Background, Camera, View};
+use skinfit::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene};
 
 /// The named planes of an EXR file, and its width and height.
 pub(crate) struct Planes {
@@ -58,30 +58,11 @@ pub(crate) fn json(path: &Path) -> Value {
     serde_json::from_slice(&std::fs::read(path).unwrap()).unwrap()
 }
 
-/// Every vector of that kind, in the order of their files' names; none is a failure.
-pub(crate) fn vectors_of(folder: &Path, kind: &str) -> BTreeMap<String, Value> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let files = entries.filter(|path| path.extension().is_some_and(|ending| ending == "json"));
-    let read = files.map(|path| (path.file_name().unwrap().to_string_lossy().into_owned(), json(&path)));
-    let found: BTreeMap<_, _> = read.filter(|(_, file)| file["kind"] == kind).collect();
-    assert!(!found.is_empty(), "{} holds no vector of kind {kind}", folder.display());
-    found
-}
-
 /// Nested arrays of numbers, flattened.
 pub(crate) fn numbers(value: &Value) -> Vec<f64> {
     match value {
         Value::Array(items) => items.iter().flat_map(numbers).collect(),
         number => vec![number.as_f64().unwrap()],
-    }
-}
-
-/// |got - want| <= abs max(1, max |want|) + rel |want|, as the vectors' files say.
-pub(crate) fn assert_close(got: &[f64], want: &[f64], rel: f64, abs: f64, what: &str) {
-    assert_eq!(got.len(), want.len(), "{what}");
-    let scale = want.iter().fold(1.0, |a: f64, x| a.max(x.abs()));
-    for (i, (g, w)) in got.iter().zip(want).enumerate() {
-        assert!((g - w).abs() <= abs * scale + rel * w.abs(), "{what}[{i}]: {g} is not {w}");
     }
 }
 
@@ -163,6 +144,7 @@ pub(crate) fn head_views(folder: &Path) -> Vec<View> {
                 name: view["name"].as_str().unwrap().to_owned(),
                 camera: camera(rows.try_into().unwrap(), number(&view["fov_y_degrees"]), size),
                 target: None,
+                background: Background::None,
             }
         })
         .collect()
@@ -188,6 +170,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
             maps: MapSettings::default(),
         },
         quality: Quality::default(),
+        bloom: Bloom::default(),
     }
 }
 

@@ -3,18 +3,23 @@
 
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
+mod added_term;
+mod animated;
 mod bakes;
+mod borders;
 mod builtin;
 mod cli;
 mod common;
 mod damage;
 mod documents;
 mod engine;
+mod evaluators;
 mod exports;
+mod figures;
 mod fits;
 mod fixtures;
-#[cfg(feature = "gpu")]
 mod graphics;
+mod instructions;
 mod meshes;
 mod occlusion;
 mod refusals;
@@ -28,3 +33,4 @@ mod shader;
 #[cfg(feature = "burn")]
 mod tensors;
 mod vectors;
+mod witness;

@@ -12,23 +12,20 @@ use skinfit::scene::mesh::Mesh;
 use skinfit::scene::{LoadOptions, Scene, Warning};
 
 use super::common;
-use super::fixtures::vectors_of;
-
-fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Array(list) => list.iter().flat_map(numbers).collect(),
-        Value::Number(number) => vec![number.as_f64().unwrap()],
-        other => panic!("not a number: {other}"),
-    }
-}
+use super::vectors::reader::{Node, Vectors};
 
 /// Every output of listing 3-3 for a vector file's inputs, evaluated in `R`.
-fn vertex_stage<R: Real>(inputs: &Value, zero: R, wide: impl Fn(R) -> f64) -> Vec<(&'static str, Vec<f64>)> {
-    let list = |name: &str| -> Vec<R> { numbers(&inputs[name]).iter().map(|&x| zero.lit(x)).collect() };
+fn vertex_stage<R: Real>(
+    inputs: &Node<'_>,
+    zero: R,
+    wide: impl Fn(R) -> f64,
+) -> [(&'static str, Vec<f64>); 7] {
+    let lit = |numbers: &[f64]| -> Vec<R> { numbers.iter().map(|&x| zero.lit(x)).collect() };
+    let list = |name: &str| lit(&inputs.at(name).numbers());
     let three = |v: &[R]| [v[0], v[1], v[2]];
-    let (coord, normal, tangent) = (list("coord"), list("normal"), list("tangent"));
+    let (normal, tangent) = (list("normal"), list("tangent"));
     let vertex = Vertex {
-        position: three(&coord),
+        position: inputs.at("coord").three().map(|x| zero.lit(x)),
         normal: three(&normal),
         tangent: three(&tangent),
         handedness: tangent[3],
@@ -45,27 +42,25 @@ fn vertex_stage<R: Real>(inputs: &Value, zero: R, wide: impl Fn(R) -> f64) -> Ve
     let row = |m: &[R], i: usize| std::array::from_fn(|j| m[4 * i + j]);
     let bones: Vec<Bone<R>> =
         matrices.chunks(16).map(|m| Bone::new([row(m, 0), row(m, 1), row(m, 2)])).collect();
-    let indices = numbers(&inputs["boneIndex"]);
+    let indices = inputs.at("boneIndex").numbers();
     let influences = list("boneWeight").into_iter().zip(indices.iter().map(|&i| &bones[i as usize]));
     let surface = deform(&vertex, deltas, influences);
-    let dapple = list("dapple");
-    let seen = sight(&surface, three(&list("cam_pos")), three(&dapple[8..]));
+    let dapple = inputs.at("dapple").item(2).three().map(|x| zero.lit(x));
+    let seen = sight(&surface, inputs.at("cam_pos").three().map(|x| zero.lit(x)), dapple);
     // The vectors' view matrix stands elsewhere than their cam_pos, and the listing takes |N.V| there.
-    let eye = DMat4::from_cols_array(&<[f64; 16]>::try_from(numbers(&inputs["view"])).unwrap()).transpose();
-    let w: f64 = numbers(&inputs["boneWeight"]).iter().sum();
-    // Weights that do not sum to 1 scale the listing's view translation by their sum.
-    let eye = (eye.inverse().w_axis.truncate() * w).to_array().map(|x| zero.lit(x));
-    let silhouette = sight(&surface, eye, three(&dapple[8..])).silhouette;
-    let out = |v: &[R]| -> Vec<f64> { v.iter().map(|&x| wide(x)).collect() };
     let matrix = |name: &str| {
-        DMat4::from_cols_array(&<[f64; 16]>::try_from(numbers(&inputs[name])).unwrap()).transpose()
+        DMat4::from_cols_array(&<[f64; 16]>::try_from(inputs.at(name).numbers()).unwrap()).transpose()
     };
+    let w: f64 = inputs.at("boneWeight").numbers().iter().sum();
+    // Weights that do not sum to 1 scale the listing's view translation by their sum.
+    let eye = (matrix("view").inverse().w_axis.truncate() * w).to_array().map(|x| zero.lit(x));
+    let silhouette = sight(&surface, eye, dapple).silhouette;
+    let out = |v: &[R]| -> Vec<f64> { v.iter().map(|&x| wide(x)).collect() };
     let world = DVec3::from(surface.position.map(&wide)).extend(w);
     let tbn = |i: usize| out(&[surface.tangent[i], surface.bitangent[i], surface.normal[i]]);
     let place: DVec4 = matrix("proj") * (matrix("view") * world);
-    vec![
+    [
         ("HPOS", place.to_array().to_vec()),
-        ("SkinUVST", numbers(&inputs["uv"])),
         ("WorldEyeDir", out(&seen.view)),
         ("SkinSilhouetteVec", out(&silhouette)),
         ("WorldTanMatrixX", tbn(0)),
@@ -75,27 +70,24 @@ fn vertex_stage<R: Real>(inputs: &Value, zero: R, wide: impl Fn(R) -> f64) -> Ve
     ]
 }
 
-#[test]
-fn the_vertex_stage_is_the_oracles() {
-    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
-    for (name, vector) in vectors_of(&folder, "vertex") {
-        // The vectors' own tolerances: roundings of each format through some fifty operations.
-        let runs = [
-            (vertex_stage(&vector["inputs"], 0.0_f64, |x| x), 1e-12, 1e-12),
-            (vertex_stage(&vector["inputs"], 0.0_f32, f64::from), 2e-5, 2e-6),
-        ];
-        for (outputs, relative, absolute) in runs {
-            for (what, got) in outputs {
-                let want = numbers(&vector["expected"][what]);
-                let largest = want.iter().fold(1.0, |m: f64, x| m.max(x.abs()));
-                assert_eq!(got.len(), want.len());
-                for (g, w) in got.iter().zip(&want) {
-                    let bound = absolute * largest + relative * w.abs();
-                    assert!((g - w).abs() <= bound, "{name} {what}: {g} instead of {w}");
-                }
-            }
+pub(crate) fn vertex_vector(file: &Node<'_>) {
+    // The vectors' own tolerances: roundings of each format through some fifty operations.
+    let tolerances = file.vector.tolerances();
+    let inputs = file.at("inputs");
+    let runs = [
+        (vertex_stage(&inputs, 0.0_f64, |x| x), tolerances.double),
+        (vertex_stage(&inputs, 0.0_f32, f64::from), tolerances.single),
+    ];
+    for (outputs, tolerance) in runs {
+        for (what, got) in outputs {
+            tolerance.check(what, &got, &file.at("expected").at(what));
         }
     }
+}
+
+#[test]
+fn the_vertex_stage_is_the_oracles() {
+    Vectors::read(&common::vectors()).of_kind("vertex").iter().for_each(vertex_vector);
 }
 
 /// Load `mesh` through a scene without maps; `lines` stand in its `[mesh]` table.
@@ -143,6 +135,7 @@ fn poses_are_those_of_another_programs_importer() {
                     vertex += 1;
                 }
                 println!("{file} {} at {time}: {worst:e}", pose["node"]);
+                crate::figures::measured("poses", worst);
                 // The other program's own rounding, against a third, is 3e-7 of the model's size.
                 assert!(worst < 1e-5, "{file} {} at {time}: {worst}", pose["node"]);
             }

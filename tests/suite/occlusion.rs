@@ -171,8 +171,15 @@ fn the_scanned_heads_occlusion_agrees_with_the_independent_renderers_bake() {
     let bias = ours.iter().zip(&theirs).map(|(a, b)| a - b).sum::<f64>() / ours.len() as f64;
     let correlation = correlation(&ours, &theirs);
     println!("{} vertices: correlation {correlation:.4}, mean error {error:.4}, bias {bias:+.4}", ours.len());
-    // Both are noisy (256 rays), theirs is flat-shaded between texels, and ends at 10 units.
-    assert!(correlation > 0.97 && error < 0.04, "{correlation} {error}");
+    crate::figures::measured("occlusion vertices", ours.len() as f64);
+    crate::figures::measured("occlusion correlation", correlation);
+    crate::figures::measured("occlusion error", error);
+    crate::figures::measured("occlusion bias", bias);
+    // Both are noisy: 256 rays of one are off by 0.3 / 256^(3/4), 0.005, and theirs are rounded to 1/255 and end at 10
+    // units, which makes them brighter by a thousandth (0.0042 and -0.0010 were found).
+    assert!(error < 0.006 && bias.abs() < 0.002, "{error} {bias}");
+    // Occlusion varies by 0.2 over the head: the correlation that such errors leave is 1 - (0.005 / 0.2)^2 / 2.
+    assert!(correlation > 0.9995, "{correlation}");
 }
 
 #[test]
@@ -185,6 +192,8 @@ fn low_discrepancy_rays_are_far_less_noisy_than_random_ones() {
     let ours = square(&mut open.iter().zip(&truth).map(|(a, b)| f64::from(a - b).powi(2)));
     let random = square(&mut truth.iter().map(|&p| f64::from(p * (1.0 - p)) / 64.0));
     println!("64 rays: error {:.4} rms, random rays {:.4}", ours.sqrt(), random.sqrt());
-    // A (0, 2)-sequence's n^(-3/4) for silhouettes against n^(-1/2): about half at 64 rays.
-    assert!(ours.sqrt() < 0.6 * random.sqrt());
+    crate::figures::measured("occlusion 64 rays", ours.sqrt());
+    crate::figures::measured("occlusion 64 random rays", random.sqrt());
+    // A (0, 2)-sequence's n^(-3/4) for silhouettes against n^(-1/2): 64^(-1/4), 0.35 of it (0.38 was found).
+    assert!(ours.sqrt() < 0.42 * random.sqrt());
 }

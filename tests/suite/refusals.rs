@@ -55,6 +55,11 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         ("[fit]", "[fit]\nfree = [\"shine\"]".into(), &["unknown parameter `shine`"]),
         ("[fit]", "[fit]\nper_channel = [\"occlusion\"]".into(), &["occlusion", "one value"]),
         ("[fit]", "[fit]\nfree=[]\nper_channel = [\"hilite\"]".into(), &["hilite", "not free"]),
+        (
+            "[fit]",
+            "[fit.maps.color]\nlower = 1.5\n[fit]".into(),
+            &["lower = 1.5 is not below upper, which is 1 by default"],
+        ),
         ("[fit]", "[fit]\nloss = \"l1\"".into(), &["unknown loss `l1`", "`l2`"]),
         ("[quality]", "[quality]\nlobe_size = 1".into(), &["lobe_size = 1", "[4, 1024]"]),
         ("[environment]\nfile = \"env.exr\"", String::new(), &["no [environment]"]),
@@ -79,6 +84,26 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         ("\"quad.glb\"", "\"quad.glb\"\nmetres_per_unit = 0".into(), &["metres_per_unit = 0"]),
         ("\"quad.glb\"", "\"quad.glb\"\ntime = nan".into(), &["time = NaN"]),
         ("[fit]", "[fit\n".into(), &["line 20"]),
+        (
+            "[fit]",
+            "background = \"sky\"\n[fit]".into(),
+            &["line 20", "unknown background `sky`", "none, environment"],
+        ),
+        ("[fit]", "background = 1\n[fit]".into(), &["line 20", "\"none\", \"environment\" or [r, g, b]"]),
+        ("[fit]", "background = [1, 2]\n[fit]".into(), &["line 20", "[r, g, b]"]),
+        (
+            "[fit]",
+            "background = [0, -1, 0]\n[fit]".into(),
+            &["line 20", "background holds -1", "[0, 1000000000]"],
+        ),
+        ("[fit]", "background = [0, nan, 0]\n[fit]".into(), &["background holds NaN"]),
+        ("[fit]", "[bloom]\nsigma = 0.3\n[fit]".into(), &["line 21", "sigma = 0.3", "[0, 0.25]"]),
+        ("[fit]", "[bloom]\nwidth = 0.3\n[fit]".into(), &["line 21", "unknown key `width`", "sigma"]),
+        (
+            "[fit]",
+            view.replace("front", "left").replace("[[view]]", "haze = \"haze.exr\"\n[[view]]") + "[fit]",
+            &["line 22", "`left` has a target but names no haze", "`front` does", "Give every view"],
+        ),
     ];
     let mut failures = String::new();
     for (from, to, words) in &cases {
@@ -93,6 +118,36 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
     assert!(failures.is_empty(), "{failures}");
     scene_folder.write("scene.toml", &[0xff, 0xfe, 0x00]);
     assert!(scene_folder.load().unwrap_err().to_string().contains("UTF-8"));
+}
+
+#[test]
+fn refusals_of_haze_name_the_file_and_the_remedy() {
+    let scene_folder = SceneFolder::new();
+    let scene = SCENE
+        .replace("[model]\n", "[model]\neffects = [\"reflection\", \"bloom\"]\n")
+        .replace("[fit]", "haze = \"haze.exr\"\n[fit]");
+    scene_folder.write("scene.toml", scene.as_bytes());
+    let cases: Vec<(Vec<u8>, &[&str])> = vec![
+        (
+            exr(4, 4, &["R", "G", "B"], |_, _| 1.0),
+            &["haze.exr", "no channel haze.Y", "it has B, G, R", "--layers"],
+        ),
+        (exr(5, 4, &["haze.Y"], |_, _| 1.0), &["haze.exr", "5 x 4", "its view is 4 x 4"]),
+        (exr(4, 4, &["haze.Y"], |_, i| if i == 5 { f32::NAN } else { 0.0 }), &["x = 1, y = 1", "NaN"]),
+        (exr(4, 4, &["Y"], |_, i| if i == 5 { 1e20 } else { 0.0 }), &["pixel (1, 1)", "no square"]),
+        (png(4, 4, [1, 1, 1]), &["no EXR file", "haze.Y"]),
+        (b"nothing".to_vec(), &["no EXR file"]),
+    ];
+    for (bytes, words) in cases {
+        scene_folder.write("haze.exr", &bytes);
+        let message = scene_folder.load().map(drop).unwrap_err().to_string();
+        assert!(words.iter().all(|word| message.contains(word)), "{message} lacks one of {words:?}");
+    }
+    scene_folder.write("haze.exr", &exr(4, 4, &["haze.Y"], |_, _| 1.0));
+    assert!(scene_folder.load().is_ok());
+    scene_folder.write("target.exr", &png(4, 4, [1, 1, 1]));
+    let message = scene_folder.load().map(drop).unwrap_err().to_string();
+    assert!(message.contains("haze.exr") && message.contains("8 or 16 bits"), "{message}");
 }
 
 #[test]

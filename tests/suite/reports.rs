@@ -56,7 +56,7 @@ fn ball(name: &str, side: usize, light: [f32; 3]) -> ViewEvidence {
         (fit.alpha[i], target.alpha[i]) = (alpha, alpha);
     }
     let coverage = fit.alpha.clone();
-    ViewEvidence { name: name.to_owned(), target, fit, coverage, terms: terms.to_vec() }
+    ViewEvidence { name: name.to_owned(), target, fit, coverage, terms: terms.to_vec(), haze: Vec::new() }
 }
 
 fn run() -> RunInfo {

@@ -9,7 +9,7 @@ use skinfit::samples::{LANES, TargetRows, ViewSamples, sample_views};
 use skinfit::scene::Scene;
 use skinfit::scene::maps::Map;
 use skinfit::scene::mesh::PosedMesh;
-use skinfit::scene::view::{Clip, Target};
+use skinfit::scene::view::{Background, Clip, Target};
 
 use crate::common;
 use crate::fixtures::{Planes, bare_scene, camera, head, head_views, quantile, read_exr};
@@ -39,6 +39,9 @@ fn compare(view: &ViewSamples, aov: &Planes, read: impl Fn(usize, usize) -> f64)
 fn report(what: &str, name: &str, errors: &[f64], unit: &str) -> (f64, f64) {
     let (median, most) = (quantile(errors, 0.5), quantile(errors, 0.99));
     println!("{name}: {what} error median {median:.2e}, 99% {most:.2e} {unit} ({} pixels)", errors.len());
+    crate::figures::measured(&format!("samples {what} median"), median);
+    crate::figures::measured(&format!("samples {what} most"), most);
+    crate::figures::measured("samples pixels", errors.len() as f64);
     (median, most)
 }
 
@@ -62,18 +65,19 @@ fn the_scanned_head_lies_where_the_independent_renderer_sees_it() {
             f64::from(base(positions, sample).distance(Vec3::from(want[pixel])))
         });
         let (median, most) = report("position", &view.name, &errors, "units");
-        // The renderer's own f32 rays: a few ten-thousandths of a pixel of 0.018 units; the farthest
-        // 1% lie where the surface is seen at a slant.
-        assert!(median < 2e-5 && most < 2e-3, "{}", view.name);
+        // The renderer's own f32 rays: a thousandth of a pixel of 0.018 units (1.2 to 1.5e-5 were found); the farthest
+        // 1% lie where the surface is seen at a slant, up to five times that (3.8 to 7.3e-5).
+        assert!(median < 2e-5 && most < 1e-4, "{}", view.name);
         assert!(missing <= 2, "{}: {missing} pixels that should be covered", view.name);
 
         let (u, v) = (&aov.planes["UV.U"], &aov.planes["UV.V"]);
         let (errors, _) = compare(uvs, &aov, |sample, pixel| {
             f64::from(base(uvs, sample).truncate().distance(Vec2::new(u[pixel], v[pixel])))
         });
-        let (median, _) = report("UV", &view.name, &errors, "");
-        // The file's UVs are filtered over a pixel, which is about 0.002 wide.
-        assert!(median < 2e-4, "{}", view.name);
+        let (median, most) = report("UV", &view.name, &errors, "");
+        // The file's UVs are filtered over a pixel, which is about 0.002 wide: what is left of that where the surface
+        // is even is a hundredth of it (2.5 to 2.9e-5 were found), and beside seams and folds a pixel's whole width.
+        assert!(median < 4e-5 && most < 4e-3, "{}", view.name);
     }
 }
 
@@ -90,10 +94,11 @@ fn the_scanned_heads_shading_normals_agree_with_the_independent_renderer() {
     let mut scene = bare_scene(Effects::of(&[Effect::Diffuse, Effect::NormalMap]));
     scene.quality.samples_per_axis = 1;
     scene.views = head_views(&data);
-    let mut medians = Vec::new();
+    let (mut medians, mut tails) = (Vec::new(), Vec::new());
     for map in [Some(normal_map(&data)), None] {
         scene.maps.normal = map;
         let samples = sample_views(&scene, &mesh, None).unwrap();
+        let what = if scene.maps.normal.is_some() { "normal" } else { "normal without map" };
         for (view, samples) in scene.views.iter().zip(&samples) {
             let aov = read_exr(&data.join(format!("targets/aov_{}.exr", view.name)));
             let want = aov.rgb(["N.X", "N.Y", "N.Z"]);
@@ -103,13 +108,15 @@ fn the_scanned_heads_shading_normals_agree_with_the_independent_renderer() {
                 let n = Vec3::from(f.base) + Vec3::from(f.bump);
                 f64::from(n.normalize().angle_between(Vec3::from(want[pixel]).normalize())).to_degrees()
             });
-            medians.push(report("normal", &view.name, &errors, "degrees").0);
+            let (median, most) = report(what, &view.name, &errors, "degrees");
+            medians.push(median);
+            tails.push(most);
         }
     }
     for i in 0..3 {
-        // The renderer filters its normals over 1.5 pixels and stores halves: 1.1 degrees was found
-        // with exact geometry, 3.0 with the map upside down.
-        assert!(medians[i] < 1.3, "{medians:?}");
+        // The renderer filters its normals over 1.5 pixels and stores halves: 0.45 to 0.57 degrees were found, and 4.9
+        // to 7.1 where the map is steepest; with the map upside down the median is 3.0.
+        assert!(medians[i] < 0.7 && tails[i] < 8.0, "{medians:?} {tails:?}");
         assert!(medians[i] < 0.6 * medians[i + 3], "without the map it should be worse: {medians:?}");
     }
 }
@@ -142,10 +149,13 @@ fn coverage_is_that_of_the_independent_renderer_but_for_its_wider_filter() {
             view.name,
             edges.len()
         );
-        // Both estimate the same area, to 1/16 of a pixel at each of some thousand edge pixels.
-        assert!(area.abs() < 1e-3, "{}: {area}", view.name);
-        // A box of one pixel against a bell of 1.5 pixels.
-        assert!(mean < 0.1, "{}: {mean}", view.name);
+        crate::figures::measured("samples area", area.abs());
+        crate::figures::measured("samples edges", mean);
+        // Both estimate the same area. Each of some thousand edge pixels is off by up to 1/16 of itself, at random: of
+        // 60,000 pixels that is 1/16 x 1000^(1/2), 3e-5 (4e-5 was found).
+        assert!(area.abs() < 8e-5, "{}: {area}", view.name);
+        // A box of one pixel against a bell of 1.5 pixels, whose coverage of a straight edge differs by 0.05 on average.
+        assert!(mean < 0.06, "{}: {mean}", view.name);
     }
 }
 
@@ -177,6 +187,7 @@ fn sheet_scene(effects: Effects) -> Scene {
         name: "front".to_owned(),
         camera: camera(rows, 40.0, 50),
         target: None,
+        background: Background::None,
     }];
     scene
 }
@@ -343,12 +354,56 @@ fn padding_is_below_a_hundredth_of_the_samples() {
     assert!(slots < samples + samples / 100);
 }
 
+#[test]
+fn a_texel_of_the_listing_that_is_no_direction_is_the_smooth_normal() {
+    let mut scene = sheet_scene(Effects::of(&[Effect::Diffuse, Effect::NormalMap]));
+    scene.form = Form::Listing;
+    scene.quality.samples_per_axis = 1;
+    let mesh = sheet();
+    let mut of = |texel: [f32; 3]| {
+        scene.maps.normal = Some(Map { width: 1, height: 1, texels: vec![texel] });
+        sample_views(&scene, &mesh, None).unwrap().remove(0)
+    };
+    // (0, 0, 1) is N as printed.
+    let smooth = of([0.0, 0.0, 1.0]);
+    let (zero, nan) = (f32::from_bits(0), f32::NAN);
+    for texel in [[zero; 3], [-0.0; 3], [0.5, nan, 1.0], [f32::INFINITY, 0.5, 1.0]] {
+        let view = of(texel);
+        for slot in (0..view.pixel.len()).filter(|&slot| view.pixel[slot] != u32::MAX) {
+            let (got, want) = (view.surface.fragment(slot), smooth.surface.fragment(slot));
+            assert_eq!((got.base, got.bump), (want.base, want.bump), "{texel:?}");
+        }
+    }
+    // With x and y alone n is along them but for a trace of N, not along the view.
+    let flat = of([1.0, 0.0, 0.0]);
+    for slot in (0..flat.pixel.len()).filter(|&slot| flat.pixel[slot] != u32::MAX) {
+        let f = flat.surface.fragment(slot);
+        assert!(Vec3::from(f.base).length() < 2e-6 && Vec3::from(f.bump).length() > 0.9, "{f:?}");
+    }
+}
+
+#[test]
+fn a_target_with_haze_has_a_fourth_channel_over_its_coverage() {
+    let (mut scene, samples) = with_target([0.2, 0.4, 0.8], Some(0.5), None);
+    scene.views[0].target.as_mut().unwrap().haze = Some(vec![0.3; 2500]);
+    let target = TargetRows::new(&scene.views[0], &samples).unwrap().unwrap();
+    assert_eq!(target.channels.stride(), 4);
+    for i in 0..samples.pixel.len() {
+        let weight = target.weight[i / LANES][i % LANES];
+        let want = if weight > 0.0 { 0.6 } else { 0.0 };
+        assert_eq!(target.channels.number(3, i), want);
+    }
+    scene.views[0].target.as_mut().unwrap().haze = Some(vec![0.3; 2499]);
+    assert!(TargetRows::new(&scene.views[0], &samples).unwrap_err().to_string().contains("2499"));
+}
+
 fn with_target(rgb: [f32; 3], alpha: Option<f32>, mask: Option<f32>) -> (Scene, ViewSamples) {
     let mut scene = sheet_scene(Effects::of(&[Effect::Diffuse]));
     let view = sample_views(&scene, &sheet(), None).unwrap().remove(0);
     scene.views[0].target = Some(Target {
         rgb: vec![rgb; 2500],
         alpha: alpha.map(|a| vec![a; 2500]),
+        haze: None,
         mask: mask.map(|m| vec![m; 2500]),
         clipped_at: Some(Clip { low: 0.0, high: 1.0 }),
     });
@@ -364,7 +419,7 @@ fn targets_are_divided_by_their_alpha_and_count_by_the_smaller_coverage() {
         let want = if samples.pixel[i] == u32::MAX { 0.0 } else { 0.25 * coverage.min(0.5) };
         assert_eq!(target.weight[i / LANES][i % LANES], want);
         if want > 0.0 {
-            assert_eq!([0, 1, 2].map(|c| target.rgb.number(c, i)), [0.4, 0.8, 1.6]);
+            assert_eq!([0, 1, 2].map(|c| target.channels.number(c, i)), [0.4, 0.8, 1.6]);
         }
     }
     // Without alpha only full pixels count.

@@ -6,10 +6,14 @@ use image::{ImageFormat, Rgb, Rgba, RgbaImage};
 use serde_json::{Value, json};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::params::{Column, Param};
+use skinfit::render::backdrop::Backdrop;
+use skinfit::scene::maps::{Environment, Map};
+use skinfit::scene::view::Background;
 use skinfit::scene::{LoadOptions, Loss, Scene};
 
 use super::common;
-use super::scene_folder::{SceneFolder, base64, encode, exr, png, quad, quad_parts, tampered};
+use super::fixtures::{bare_scene, camera};
+use super::scene_folder::{SCENE, SceneFolder, base64, encode, exr, png, quad, quad_parts, tampered};
 
 #[test]
 fn the_small_scene_is_read_as_it_stands() {
@@ -56,19 +60,186 @@ fn keys_of_a_scene_do_what_they_say() {
 }
 
 #[test]
+fn what_is_free_by_default_may_have_a_value_a_channel_without_a_list_of_what_is_free() {
+    let scene_folder = SceneFolder::new();
+    // As README.md has it.
+    let fit =
+        |line: &str| scene_folder.edited("[fit]", &format!("[fit]\n{line}")).map(|(scene, _)| scene.fit.free);
+    let default = fit("").unwrap();
+    let free = fit("per_channel = [\"hilite\"]").unwrap();
+    for column in Column::per_channel(Param::Hilite) {
+        assert!(free.contains(&column), "{free:?}");
+    }
+    assert!(!free.contains(&Column::tied(Param::Hilite)));
+    assert_eq!(free.len(), default.len() + 2, "all else is as without it");
+    // All that is coloured of the default, at once.
+    let coloured: Vec<&str> =
+        default.iter().map(|column| column.param).filter(|p| p.info().rgb).map(Param::name).collect();
+    let free = fit(&format!("per_channel = {coloured:?}")).unwrap();
+    assert_eq!(free.len(), default.len() + 2 * coloured.len());
+    // Not free by default, and no list makes it so.
+    let refused = fit("per_channel = [\"key_color\"]").unwrap_err().to_string();
+    assert!(refused.contains("not free") && refused.contains("these are fitted: base_weight,"), "{refused}");
+    let refused = fit("per_channel = [\"hilite\", \"hilite\"]").unwrap_err().to_string();
+    assert!(refused.contains("listed twice in per_channel"), "{refused}");
+}
+
+#[test]
+fn a_scene_with_a_value_a_channel_is_one_with_any_of_its_effects_left_out() {
+    let scene_folder = SceneFolder::new();
+    let fit = "[fit]\nper_channel = [\"base_weight\", \"rim_weight\", \"hilite\", \"reflection\", \"side_specular\"]";
+    scene_folder.edited("[fit]", fit).unwrap();
+    let path = scene_folder.path("scene.toml");
+    for effect in Effects::SURFACE.iter() {
+        let effects = Some(Effects::SURFACE.without(effect));
+        let (scene, _) = Scene::load(&path, &LoadOptions { effects, ..LoadOptions::default() })
+            .unwrap_or_else(|error| panic!("without {}: {error}", effect.name()));
+        assert!(scene.fit.free.iter().all(|column| column.param.asked_for(scene.effects)));
+    }
+}
+
+#[test]
 fn only_what_the_effects_ask_for_is_read() {
     let scene_folder = SceneFolder::new();
     for name in ["color.png", "normal.png", "data.png", "target.exr"] {
         scene_folder.write(name, b"nothing that could be read");
     }
-    let options =
-        LoadOptions { effects: Some(Effects::of(&[Effect::Reflection])), targets: false, time: None };
+    let options = LoadOptions {
+        effects: Some(Effects::of(&[Effect::Reflection])),
+        targets: false,
+        ..LoadOptions::default()
+    };
     let (scene, _) = Scene::load(&scene_folder.path("scene.toml"), &options).unwrap();
     assert!(scene.mesh.uvs.is_empty() && scene.mesh.tangents.is_empty() && scene.views[0].target.is_none());
     std::fs::remove_file(scene_folder.path("env.exr")).unwrap();
-    let options = LoadOptions { effects: Some(Effects::of(&[Effect::KeyLight])), targets: false, time: None };
+    let key_light = Some(Effects::of(&[Effect::KeyLight]));
+    let options = LoadOptions { effects: key_light, targets: false, ..LoadOptions::default() };
     scene_folder.write("color.png", &png(1, 1, [1, 2, 3]));
     assert!(Scene::load(&scene_folder.path("scene.toml"), &options).unwrap().0.environment.is_none());
+}
+
+#[test]
+fn the_normal_maps_alpha_is_the_specular_map_where_the_scene_names_none() {
+    let scene_folder = SceneFolder::new();
+    let packed = |alpha: [u8; 2]| {
+        let pixel = |x: u32, _| Rgba([128, 64, 255, alpha[x as usize % 2]]);
+        scene_folder.write("normal.png", &encode(RgbaImage::from_fn(4, 4, pixel), ImageFormat::Png));
+    };
+    packed([51, 102]);
+    let (scene, warnings) = scene_folder.edited("specular = \"data.png\"\n", "").unwrap();
+    assert_eq!(scene.maps.specular.as_ref().unwrap().texels[..2], [[0.2], [0.4]]);
+    let [warning] = &warnings[..] else { panic!("{warnings:?}") };
+    let words = warning.to_string();
+    assert!(
+        ["normal.png", "0.200 to 0.400", "specular map"].iter().all(|word| words.contains(word)),
+        "{words}"
+    );
+    // A map of its own counts, and without a word.
+    let (scene, warnings) = scene_folder.edited("[fit]", "[fit]").unwrap();
+    assert_eq!((scene.maps.specular.unwrap().texels[1], warnings.len()), ([0.2], 0));
+    // Nothing looks at it.
+    let no_specular = "[model]\neffects = [\"diffuse\", \"normal_map\"]";
+    scene_folder.write(
+        "scene.toml",
+        SCENE
+            .replace("specular = \"data.png\"\n", "")
+            .replace("[model]\n", &format!("{no_specular}\n"))
+            .as_bytes(),
+    );
+    let (scene, warnings) = scene_folder.load().unwrap();
+    assert!(scene.maps.specular.is_none() && warnings.is_empty(), "{warnings:?}");
+    // Side-specular without the bumps still reads it.
+    let no_bumps = "[model]\neffects = [\"diffuse\", \"side_specular\"]";
+    scene_folder.write(
+        "scene.toml",
+        SCENE
+            .replace("specular = \"data.png\"\n", "")
+            .replace("[model]\n", &format!("{no_bumps}\n"))
+            .as_bytes(),
+    );
+    let scene = scene_folder.load().unwrap().0;
+    assert!(scene.maps.specular.is_some() && scene.maps.normal.is_none() && !scene.mesh.uvs.is_empty());
+    // Alpha that is only there.
+    packed([255, 255]);
+    let (scene, warnings) = scene_folder.edited("specular = \"data.png\"\n", "").unwrap();
+    assert!(scene.maps.specular.is_none() && warnings.is_empty(), "{warnings:?}");
+}
+
+#[test]
+fn a_views_haze_is_read_from_its_channel_or_from_a_grey_image() {
+    let scene_folder = SceneFolder::new();
+    let hazy = "[model]\neffects = [\"diffuse\", \"reflection\", \"haze\"]";
+    let scene = SCENE.replace("[model]\n", &format!("{hazy}\n"));
+    let named = |key: &str| scene.replace("[fit]", &format!("{key}\n[fit]"));
+    let read = |text: &str| {
+        scene_folder.write("scene.toml", text.as_bytes());
+        let (scene, warnings) = scene_folder.load().unwrap();
+        (scene.views[0].target.clone().unwrap().haze, warnings)
+    };
+    scene_folder.write("haze.exr", &exr(4, 4, &["R", "G", "B", "A", "haze.Y"], |c, i| (10 * c + i) as f32));
+    assert_eq!(read(&named("haze = \"haze.exr\"")).0.unwrap()[3], 43.0);
+    scene_folder.write("haze.exr", &exr(4, 4, &["Y"], |_, i| -(i as f32)));
+    assert_eq!(read(&named("haze = \"haze.exr\"")), (Some((0..16).map(|i| -(i as f32)).collect()), vec![]));
+    // Named, but nothing makes one: not read, with a word.
+    let (haze, warnings) = read(&SCENE.replace("[fit]", "haze = \"no_such.exr\"\n[fit]"));
+    assert!(haze.is_none() && warnings[0].to_string().contains("neither `haze` nor `bloom`"), "{warnings:?}");
+    // Free, but nothing tells of it.
+    let (_, warnings) = read(&scene.replace("[fit]", "[fit]\nfree = [\"haze_weight\"]"));
+    assert!(warnings[0].to_string().contains("haze_weight is free, but no view"), "{warnings:?}");
+}
+
+#[test]
+fn backgrounds_and_bloom_are_read_and_the_environment_only_for_pictures() {
+    let scene_folder = SceneFolder::new();
+    let edit = |from: &str, to: &str| scene_folder.edited(from, to).unwrap().0;
+    let plain = edit("[fit]", "[fit]");
+    assert_eq!((plain.views[0].background, plain.bloom.sigma), (Background::None, 0.02));
+    assert_eq!(edit("[fit]", "[bloom]\nsigma = 0.1\n[fit]").bloom.sigma, 0.1);
+    assert_eq!(
+        edit("[fit]", "background = [1, 0.5, 0]\n[fit]").views[0].background,
+        Background::Color([1.0, 0.5, 0.0])
+    );
+    let shown = edit("[fit]", "background = \"environment\"\n[fit]");
+    assert_eq!(shown.views[0].background, Background::Environment);
+    let load = |targets: bool, background: Option<Background>| {
+        let effects = Some(Effects::of(&[Effect::KeyLight]));
+        let options = LoadOptions { effects, targets, background, ..LoadOptions::default() };
+        Scene::load(&scene_folder.path("scene.toml"), &options).unwrap().0
+    };
+    // No effect asks for it: a picture does, a fit does not.
+    assert!(load(false, None).environment.is_some());
+    assert!(load(true, None).environment.is_none());
+    let none = load(false, Some(Background::None));
+    assert!(none.environment.is_none() && none.views[0].background == Background::None);
+}
+
+#[test]
+fn the_camera_sees_the_environment_turned_by_both_rotations() {
+    // Bright where -Z is, the panorama's middle, and nowhere else.
+    let bright = |i: usize| if (14..18).contains(&(i % 32)) { [5.0, 1.0, 0.0] } else { [0.0; 3] };
+    let panorama = Map { width: 32, height: 16, texels: (0..32 * 16).map(bright).collect() };
+    let mut scene = bare_scene(Effects::of(&[Effect::Bloom]));
+    scene.environment = Some(Environment { panorama, rotation_degrees: 0.0, intensity: 2.0 });
+    let identity = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
+    let camera = camera(identity, 60.0, 8);
+    let middle = |scene: &Scene, turn: f64| {
+        let mut params = scene.params.clone();
+        params.set(Param::EnvironmentRotation, turn);
+        params.set(Param::HazeWeight, 0.125);
+        let backdrop = Backdrop::new(scene, &params, Background::Environment, &camera, 2).unwrap();
+        (backdrop.rgb[4 * 8 + 4], backdrop.glow[4 * 8 + 4])
+    };
+    let (rgb, glow) = middle(&scene, 0.0);
+    assert_eq!(rgb, [10.0, 2.0, 0.0]);
+    // 0.125 (0.2126 10 + 0.7152 2) = 0.44455, of which the mean over four equal samples is the same.
+    assert!((glow[0] - 4.4455).abs() < 1e-5 && (glow[1] - 0.8891).abs() < 1e-5, "{glow:?}");
+    assert_eq!(middle(&scene, 90.0).0, [0.0; 3]);
+    scene.environment.as_mut().unwrap().rotation_degrees = -90.0;
+    assert_eq!(middle(&scene, 90.0).0, [10.0, 2.0, 0.0]);
+    let flat = |background| Backdrop::new(&scene, &scene.params, background, &camera, 1);
+    assert_eq!(flat(Background::None), None);
+    // With a weight of 1, all of what is brighter than 1 glows, and no more.
+    assert_eq!(flat(Background::Color([1.0, 2.0, 3.0])).unwrap().glow, vec![[1.0, 2.0, 3.0]; 64]);
 }
 
 #[test]

@@ -64,7 +64,7 @@ impl Slurm {
                  Debian and Ubuntu); SKINFIT_NO_SCHEDULER_TESTS=1 leaves the tests under a scheduler out."
             );
             if std::env::var_os("SKINFIT_NO_SCHEDULER_TESTS").is_some() {
-                eprintln!("NOT CHECKED, as SKINFIT_NO_SCHEDULER_TESTS is set: {words}");
+                crate::common::not_checked(&format!("SKINFIT_NO_SCHEDULER_TESTS is set: {words}"));
                 return None;
             }
             panic!("{words}");

@@ -101,7 +101,6 @@ fn shaders_of_every_effect_set_form_and_silhouette_validate_in_every_kind_of_sce
 }
 
 /// What a fit of everything that an effect set asks for compiles, over samples and over their terms.
-#[cfg(feature = "gpu")]
 #[test]
 fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
     use skinfit::engine::Unknown;
@@ -135,7 +134,7 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
         let green = free(Param::RimWeight)
             .then_some(Unknown::Param(Column { param: Param::RimWeight, channels: Channels::One(1) }));
         let tied = |&p: &Param| free(p) && p != Param::RimWeight;
-        let all: Vec<Unknown> = Param::all()
+        let all: Vec<Unknown> = Param::built_in()
             .filter(tied)
             .map(|p| Unknown::Param(Column::tied(p)))
             .chain(green)
@@ -148,6 +147,7 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
         let sizes = FaceSizes { irradiance: Some(16), specular: Some(32), hilite: Some(8) };
         let fitted = |unknowns: Vec<Unknown>, layout: &Layout, bits: usize| Fitted {
             setup,
+            output: None,
             unknowns,
             loss: Loss::RelativeL2,
             alpha: bits & 1 == 0,
@@ -214,7 +214,7 @@ fn each_term_alone_validates_and_costs_less_than_the_whole() {
     let effects = Effects::SURFACE.with(Effect::KeyLight);
     let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects };
     let whole = must_plan(&Facts { setup, ..Facts::default() });
-    for term in TermName::ALL {
+    for term in TermName::BUILT_IN {
         let alone = must_plan(&Facts { setup, output: Some(term), ..Facts::default() });
         validate(&alone);
         assert!(alone.cost < whole.cost, "{}: {} of {}", term.name(), alone.cost, whole.cost);

@@ -1,11 +1,8 @@
-//! The conformance vectors of an independent float64 oracle, run through every evaluator: the model
-//! in f64, in f32 and in SIMD lanes.
+//! The conformance vectors of an independent float64 oracle (tests/vectors), run through every evaluator: the model
+//! in f64, in f32 and in SIMD lanes here, the engines by way of the witness' scenes. Nothing in them may go unread.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+pub(crate) mod reader;
 
-use fearless_simd::Level;
-use serde_json::Value;
 use skinfit::engine::lanes::Lanes;
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
@@ -17,129 +14,37 @@ use skinfit::model::params::{Param, Params};
 use skinfit::model::real::Real;
 use skinfit::model::rim::rim;
 
+use self::reader::{Node, Tolerance, Vectors};
 use crate::common;
+use crate::evaluators::{self, Number, derivative, shade};
+use crate::{bakes, meshes, witness};
 
-/// JSON doubles; non-finite ones are strings, null is "nothing to compare".
-pub(crate) fn number(value: &Value) -> Option<f64> {
-    match value {
-        Value::Number(n) => n.as_f64(),
-        Value::String(s) if s == "NaN" => Some(f64::NAN),
-        Value::String(s) if s == "Infinity" => Some(f64::INFINITY),
-        Value::String(s) if s == "-Infinity" => Some(f64::NEG_INFINITY),
-        Value::Null => None,
-        other => panic!("not a number: {other}"),
-    }
-}
-
-pub(crate) fn numbers(value: &Value) -> Vec<f64> {
-    match value {
-        Value::Array(items) => items.iter().flat_map(numbers).collect(),
-        other => number(other).into_iter().collect(),
-    }
-}
-
-pub(crate) fn three(value: &Value) -> [f64; 3] {
-    numbers(value)[..3].try_into().unwrap()
-}
-
-/// One evaluator: how it makes numbers, and the files' tolerance for it.
-pub(crate) trait Evaluator: Real {
-    fn texel(x: f64) -> Self::Texel;
-    fn value(self) -> f64;
-    fn tolerance(file: &Value) -> (f64, f64);
-}
-
-fn f32_tolerance(file: &Value) -> (f64, f64) {
-    let t = &file["tolerance"];
-    (t["f32_abs"].as_f64().unwrap(), t["f32_rel"].as_f64().unwrap())
-}
-
-impl Evaluator for f64 {
-    fn texel(x: f64) -> f64 {
-        x
-    }
-    fn value(self) -> f64 {
-        self
-    }
-    fn tolerance(file: &Value) -> (f64, f64) {
-        // The files give f64 a relative figure alone; the same, absolutely, where a sum cancels.
-        let rel = file["tolerance"]["f64_rel"].as_f64().unwrap();
-        (rel, rel)
-    }
-}
-
-impl Evaluator for f32 {
-    fn texel(x: f64) -> f32 {
-        x as f32
-    }
-    fn value(self) -> f64 {
-        f64::from(self)
-    }
-    fn tolerance(file: &Value) -> (f64, f64) {
-        f32_tolerance(file)
-    }
-}
-
-impl<S: fearless_simd::Simd> Evaluator for Lanes<S> {
-    fn texel(x: f64) -> f32 {
-        x as f32
-    }
-    fn value(self) -> f64 {
-        let lanes = self.to_array();
-        assert!(lanes.iter().all(|x| x.to_bits() == lanes[0].to_bits()), "lanes differ: {lanes:?}");
-        f64::from(lanes[0])
-    }
-    fn tolerance(file: &Value) -> (f64, f64) {
-        f32_tolerance(file)
-    }
-}
-
+/// Numbers as the vectors are compared with: how each evaluator makes them, and the files' tolerance for it.
 #[track_caller]
-fn check<R: Evaluator>(file: &Value, what: &str, got: &[R], want: &Value) {
-    let want: Vec<f64> = numbers(want);
-    if want.is_empty() {
-        return;
-    }
-    let got: Vec<f64> = got.iter().map(|x| x.value()).collect();
-    assert_eq!(got.len(), want.len(), "{} {what}: lengths", file["name"]);
-    let (abs, rel) = R::tolerance(file);
-    let largest = want.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-    for (i, (g, w)) in got.iter().zip(&want).enumerate() {
-        let bound = abs * largest + rel * w.abs();
-        assert!((g - w).abs() <= bound, "{} {what}[{i}]: got {g}, want {w}, bound {bound:e}", file["name"]);
-    }
+fn check<R: Number>(what: &str, got: &[R], want: &Node<'_>) {
+    let got: Vec<f64> = got.iter().map(|&x| value(x)).collect();
+    tolerance::<R>(want).check(what, &got, want);
 }
 
-pub(crate) struct Vectors {
-    pub(crate) files: BTreeMap<String, Value>,
+fn tolerance<R: Number>(want: &Node<'_>) -> Tolerance {
+    let tolerances = want.vector.tolerances();
+    if size_of::<R>() == size_of::<f64>() { tolerances.double } else { tolerances.single }
 }
 
-impl Vectors {
-    pub(crate) fn read(folder: &Path) -> Self {
-        let mut files = BTreeMap::new();
-        for entry in std::fs::read_dir(folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.extension().is_some_and(|e| e == "json") {
-                let text = std::fs::read_to_string(&path).unwrap();
-                let name = path.file_name().unwrap().to_string_lossy().into_owned();
-                files.insert(name, serde_json::from_str(&text).unwrap());
-            }
-        }
-        assert!(!files.is_empty(), "{} holds no vectors", folder.display());
-        Self { files }
-    }
+/// The number; every lane of it the same.
+fn value<R: Number>(x: R) -> f64 {
+    let lanes = x.unpack();
+    assert!(lanes.iter().all(|lane| lane.to_bits() == lanes[0].to_bits()), "lanes differ: {lanes:?}");
+    lanes[0]
+}
 
-    pub(crate) fn cube<R: Evaluator>(&self, file: &Value, which: &str) -> Cube<R::Texel>
-    where
-        R::Texel: skinfit::model::cube::Channel,
-    {
-        let inputs = &self.files[file["cubes_file"].as_str().unwrap()]["inputs"];
-        let size = inputs["size"].as_u64().unwrap() as usize;
-        Cube::from_fn(size, |face, column, row| {
-            let texel = numbers(&inputs[which][face][row][column]);
-            std::array::from_fn(|c| R::texel(texel[c]))
-        })
-    }
+pub(crate) fn cube<R: Number>(vectors: &Vectors, file: &Node<'_>, which: &str) -> Cube<R::Texel> {
+    let inputs = vectors.cubes(file);
+    let (size, texels) = (inputs.at("size").number() as usize, inputs.at(which).numbers());
+    Cube::from_fn(size, |face, column, row| {
+        let at = ((face * size + row) * size + column) * 4;
+        std::array::from_fn(|c| R::texel(texels[at + c]))
+    })
 }
 
 fn lights<'a, R: Real>(
@@ -161,8 +66,8 @@ fn lights<'a, R: Real>(
 const ALL_TERMS: Effects = Effects::SURFACE.with(Effect::Haze);
 
 /// The parameters of a vector, under the oracle's names.
-pub(crate) fn params(constants: &Value) -> Params {
-    let mut params = Params::defaults(Form::Corrected);
+pub(crate) fn params(form: Form, constants: &Node<'_>) -> Params {
+    let mut params = Params::defaults(form);
     for (name, param) in [
         ("base_weight", Param::BaseWeight),
         ("rim_weight", Param::RimWeight),
@@ -174,10 +79,10 @@ pub(crate) fn params(constants: &Value) -> Params {
         ("bump", Param::NormalStrength),
         ("haze", Param::HazeWeight),
     ] {
-        match &constants[name] {
-            Value::Null => {}
-            Value::Array(_) => params.set_rgb(param, three(&constants[name])),
-            value => params.set(param, number(value).unwrap()),
+        match constants.get(name) {
+            None => {}
+            Some(list) if list.is_list() => params.set_rgb(param, list.three()),
+            Some(value) => params.set(param, value.number()),
         }
     }
     params
@@ -198,10 +103,10 @@ const ORACLE_COLUMNS: [(&str, Param, Option<usize>); 10] = [
 ];
 
 /// The parameters of a point that is given column by column, under the oracle's names.
-pub(crate) fn column_params(values: &Value) -> Params {
+pub(crate) fn column_params(values: &Node<'_>) -> Params {
     let mut params = Params::defaults(Form::Corrected);
     for (name, param, channel) in ORACLE_COLUMNS {
-        let value = number(&values[name]).unwrap();
+        let value = values.at(name).number();
         match channel {
             None => params.set(param, value),
             Some(c) => {
@@ -214,27 +119,9 @@ pub(crate) fn column_params(values: &Value) -> Params {
     params
 }
 
-// The model is inlined wherever it is called; here, where speed is nothing, once for each evaluator.
-
-#[inline(never)]
-fn shade<R: Real>(setup: Setup, lights: &Lights<'_, R>, f: &Fragment<R>, params: &Params) -> [R; 4] {
-    evaluate::shade(setup, lights, f, params)
-}
-
 #[inline(never)]
 fn rim_of<R: Real>(setup: Setup, lights: &Lights<'_, R>, f: &Fragment<R>, params: &Params) -> R {
     evaluate::compose(setup, lights, f, params).rim()
-}
-
-#[inline(never)]
-fn derivative<R: Real>(
-    setup: Setup,
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    params: &Params,
-    param: Param,
-) -> [R; 4] {
-    evaluate::derivative(setup, lights, f, params, param)
 }
 
 #[inline(never)]
@@ -255,105 +142,111 @@ fn jacobian<R: Real>(setup: Setup, lights: &Lights<'_, R>, f: &Fragment<R>, para
     rows
 }
 
-fn fragment_at<R: Evaluator>(form: Form, inputs: &Value, like: R) -> Fragment<R> {
+fn fragment_at<R: Real>(form: Form, inputs: &Node<'_>, like: R) -> Fragment<R> {
     let lit = |x: [f64; 3]| x.map(|x| like.lit(x));
-    let rows = ["X", "Y", "Z"].map(|row| three(&inputs[format!("WorldTanMatrix{row}")]));
+    let rows = ["X", "Y", "Z"].map(|row| inputs.at(&format!("WorldTanMatrix{row}")).three());
     let column = |i: usize| lit([rows[0][i], rows[1][i], rows[2][i]]);
     let (t, b, n) = (column(0), column(1), column(2));
-    let texel = numbers(&inputs["normSideSpec"]);
-    let (base, bump) = decode_normal(form, lit([texel[0], texel[1], texel[2]]), t, b, n);
-    let silhouette = numbers(&inputs["SkinSilhouetteVec"]);
-    let view = lit(three(&inputs["WorldEyeDir"]));
+    let texel = inputs.at("normSideSpec");
+    let (base, bump) = decode_normal(form, lit(texel.three()), t, b, n);
+    let silhouette = |i: usize| inputs.at("SkinSilhouetteVec").item(i).number();
+    let view = lit(inputs.at("WorldEyeDir").three());
     let (view, dapple) = match form {
-        Form::Listing => (view, silhouette[3]),
-        Form::Corrected => (unit_view(view), silhouette[3].max(0.0)),
+        Form::Listing => (view, silhouette(3)),
+        Form::Corrected => (unit_view(view), silhouette(3).max(0.0)),
     };
     Fragment {
         base,
         bump,
         normal: n,
         view,
-        occlusion: like.lit(silhouette[0]),
-        silhouette: like.lit(silhouette[2]),
+        occlusion: like.lit(silhouette(0)),
+        silhouette: like.lit(silhouette(2)),
         dapple: like.lit(dapple),
-        albedo: lit(three(&inputs["skinColor"])),
-        specular: like.lit(texel[3]),
-        attenuator: like.lit(number(&inputs["hiLightAttenuator"]).unwrap()),
+        albedo: lit(inputs.at("skinColor").three()),
+        specular: like.lit(texel.item(3).number()),
+        attenuator: like.lit(inputs.at("hiLightAttenuator").number()),
     }
 }
 
-fn fragment_vector<R: Evaluator>(vectors: &Vectors, file: &Value, like: R)
-where
-    R::Texel: skinfit::model::cube::Channel,
-{
-    let cubes = ["diffuse", "spec", "hilite"].map(|which| vectors.cube::<R>(file, which));
+fn fragment_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
+    let cubes = ["diffuse", "spec", "hilite"].map(|which| cube::<R>(vectors, file, which));
     let lights = lights::<R>(&cubes[0], &cubes[1], &cubes[2]);
-    let expected = &file["expected"];
-
-    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: ALL_TERMS };
-    let p = params(&file["constants"]["corrected"]);
-    let f = fragment_at(setup.form, &file["inputs"], like);
-    let s = shading(setup, &f, like.lit(p.scalar(Param::NormalStrength)));
-    let want = &expected["corrected"];
-    check(file, "corrected n", &s.n, &want["n"]);
-    check(file, "corrected n.V", &[s.n_dot_v], &want["nDotV"]);
-    check(file, "corrected reflection", &s.reflection, &want["reflVect"]);
-    check(file, "corrected rim", &[rim_of(setup, &lights, &f, &p)], &want["rim"]);
-    check(file, "corrected rgba", &shade(setup, &lights, &f, &p), &want["rgba"]);
-    let j = &expected["corrected_jacobian"];
-    for (k, name) in j["columns"].as_array().unwrap().iter().enumerate() {
-        assert_eq!(name, ORACLE_COLUMNS[k].0);
+    let expected = file.at("expected");
+    for (form, silhouette, name) in
+        [(Form::Corrected, Silhouette::Bumped, "corrected"), (Form::Listing, Silhouette::Vertex, "literal")]
+    {
+        let want = expected.at(name);
+        let p = params(form, &file.at("constants").at(name));
+        if want.is_null() {
+            continue;
+        }
+        let setup = Setup { form, silhouette, effects: ALL_TERMS };
+        let f = fragment_at(form, &file.at("inputs"), like);
+        let s = shading(setup, &f, like.lit(p.scalar(Param::NormalStrength)));
+        check("n", &s.n, &want.at("n"));
+        check("n.V", &[s.n_dot_v], &want.at("nDotV"));
+        check("reflection", &s.reflection, &want.at("reflVect"));
+        let places = [("D", 0, s.n), ("S_n", 1, s.n), ("S_r", 1, s.reflection), ("H", 2, f.view)];
+        for (name, which, along) in places {
+            check(name, &look_up(&cubes[which], along), &want.at(name));
+        }
+        check("rgba", &shade(setup, &lights, &f, &p), &want.at("rgba"));
+        if form == Form::Corrected {
+            check("rim", &[rim_of(setup, &lights, &f, &p)], &want.at("rim"));
+            let j = expected.at("corrected_jacobian");
+            j.at("rows").assert_text("rgba");
+            let names = j.at("columns").items();
+            names.iter().zip(ORACLE_COLUMNS).for_each(|(name, (want, ..))| name.assert_text(want));
+            check("Jacobian", &jacobian(setup, &lights, &f, &p).concat(), &j.at("J"));
+        }
     }
-    check(file, "corrected Jacobian", &jacobian(setup, &lights, &f, &p).concat(), &j["J"]);
-
-    if !expected["literal"].is_null() {
-        let setup = Setup { form: Form::Listing, silhouette: Silhouette::Vertex, effects: ALL_TERMS };
-        let mut p = Params::defaults(Form::Listing);
-        p.set(Param::Hilite, number(&file["constants"]["literal"]["hilite"]).unwrap());
-        p.set(Param::Reflection, number(&file["constants"]["literal"]["reflection"]).unwrap());
-        let f = fragment_at(setup.form, &file["inputs"], like);
-        let s = shading(setup, &f, like.lit(1.0));
-        let want = &expected["literal"];
-        check(file, "listing n", &s.n, &want["n"]);
-        check(file, "listing reflection", &s.reflection, &want["reflVect"]);
-        check(file, "listing rgba", &shade(setup, &lights, &f, &p), &want["rgba"]);
-    }
+    // S.y is S.z to the power of 2, the listing's exponent.
+    let silhouette = file.at("inputs").at("SkinSilhouetteVec");
+    let squared = rim(like.lit(silhouette.item(2).number()), like.lit(2.0)).value;
+    check("S.y", &[squared], &silhouette.item(1));
 }
 
-fn rim_vector<R: Evaluator>(file: &Value, like: R) {
-    let (z, exponents) = (numbers(&file["inputs"]["f"]), numbers(&file["inputs"]["exponent"]));
+#[inline(never)]
+fn look_up<R: Real>(cube: &Cube<R::Texel>, along: [R; 3]) -> [R; 4] {
+    cube.sample(along.map(|x| x))
+}
+
+fn rim_vector<R: Number>(file: &Node<'_>, like: R) {
+    let list = |name: &str| file.at("inputs").at(name).numbers();
+    let (z, exponents) = (list("f"), list("exponent"));
     let table = |pick: fn(skinfit::model::rim::Rim<R>) -> R| -> Vec<R> {
         let each = |z: f64, e: f64| pick(rim(like.lit(z), like.lit(e)));
         z.iter().flat_map(|&z| exponents.iter().map(move |&e| each(z, e))).collect()
     };
-    check(file, "rim", &table(|r| r.value), &file["expected"]["rim"]);
-    check(file, "d rim / d exponent", &table(|r| r.by_exponent), &file["expected"]["d_exponent"]);
+    check("rim", &table(|r| r.value), &file.at("expected").at("rim"));
+    check("d rim / d exponent", &table(|r| r.by_exponent), &file.at("expected").at("d_exponent"));
 }
 
-fn cube_sample_vector<R: Evaluator>(vectors: &Vectors, file: &Value, like: R)
-where
-    R::Texel: skinfit::model::cube::Channel,
-{
-    let cube = vectors.cube::<R>(file, "spec");
-    let directions = file["inputs"]["directions"].as_array().unwrap();
-    let got: Vec<R> =
-        directions.iter().flat_map(|d| cube.sample::<R>(three(d).map(|x| like.lit(x)))).collect();
-    check(file, "seamless lookups", &got, &file["expected"]["seamless"]);
+fn cube_sample_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
+    let cube = cube::<R>(vectors, file, "spec");
+    let along = |d: Node<'_>| look_up(&cube, d.three().map(|x| like.lit(x)));
+    let got: Vec<R> = file.at("inputs").at("directions").items().into_iter().flat_map(along).collect();
+    check("seamless lookups", &got, &file.at("expected").at("seamless"));
 }
 
-fn bench_vector<R: Evaluator>(vectors: &Vectors, file: &Value, like: R)
-where
-    R::Texel: skinfit::model::cube::Channel,
-{
-    let cubes = ["diffuse", "spec", "hilite"].map(|which| vectors.cube::<R>(file, which));
+/// A face with its border from the neighbours; in f64, as cubes are built of texels and not of lanes.
+fn border_vector(vectors: &Vectors, file: &Node<'_>) {
+    let cube = cube::<f64>(vectors, file, "spec");
+    let face = cube.padded()[..(cube.size() + 2).pow(2)].concat();
+    check("a face with its border", &face, &file.at("expected").at("padded_face0_seamless"));
+}
+
+fn bench_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
+    let cubes = ["diffuse", "spec", "hilite"].map(|which| cube::<R>(vectors, file, which));
     let lights = lights::<R>(&cubes[0], &cubes[1], &cubes[2]);
     let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: ALL_TERMS };
-    let g = &file["inputs"]["gbuffer"];
-    let [truth, start] = ["params", "params_init"].map(|which| column_params(&file["inputs"][which]));
+    let g = file.at("inputs").at("gbuffer");
+    let [truth, start] = ["params", "params_init"].map(|which| column_params(&file.at("inputs").at(which)));
     let (mut forward, mut at_start, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..16 {
-        let v = |name: &str| three(&g[name][i]).map(|x| like.lit(x));
-        let s = |name: &str| like.lit(number(&g[name][i]).unwrap());
+        let v = |name: &str| g.at(name).item(i).three().map(|x| like.lit(x));
+        let s = |name: &str| like.lit(g.at(name).item(i).number());
         let f = Fragment {
             base: v("A"),
             bump: v("B"),
@@ -370,61 +263,41 @@ where
         at_start.extend(shade(setup, &lights, &f, &start));
         rows.extend(jacobian(setup, &lights, &f, &start).concat());
     }
-    check(file, "forward", &forward, &file["expected"]["forward"]);
-    check(file, "forward at the start", &at_start, &file["expected"]["at_init"]["forward"]);
-    check(file, "Jacobian at the start", &rows, &file["expected"]["at_init"]["jacobian"]);
+    let expected = file.at("expected");
+    check("forward", &forward, &expected.at("forward"));
+    check("forward at the start", &at_start, &expected.at("at_init").at("forward"));
+    check("Jacobian at the start", &rows, &expected.at("at_init").at("jacobian"));
 }
 
-/// Every file of the folder through one evaluator. A kind that nobody knows is a failure.
-fn run<R: Evaluator>(like: R)
-where
-    R::Texel: skinfit::model::cube::Channel,
-{
-    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
-    let vectors = Vectors::read(&folder);
-    let mut counts: BTreeMap<&str, usize> = BTreeMap::new();
-    for (name, file) in &vectors.files {
-        let kind = file["kind"].as_str().unwrap_or_else(|| panic!("{name} has no kind"));
-        match kind {
-            "fragment" => fragment_vector(&vectors, file, like),
-            "rim" => rim_vector(file, like),
-            "cube_sample" => cube_sample_vector(&vectors, file, like),
-            "bench" => bench_vector(&vectors, file, like),
-            // Read by the others.
-            "cubes" => {}
-            // Tested where the baking and the meshes are.
-            "latlong" | "prefilter" | "vertex" => {}
-            // Number formats have a test of their own; texture-space diffusion is not yet built.
-            "formats" | "study" | "diffusion" => {}
-            other => panic!("{name}: unknown kind of vector: {other}"),
-        }
-        *counts.entry(kind).or_default() += 1;
-    }
-    eprintln!("vectors: {counts:?}");
+/// The vectors of the fragment stage through one kind of number.
+fn run<R: Number>(vectors: &Vectors, like: R) {
+    vectors.of_kind("fragment").iter().for_each(|file| fragment_vector(vectors, file, like));
+    rim_vector(&vectors.one("rim"), like);
+    cube_sample_vector(vectors, &vectors.one("cube_sample"), like);
+    bench_vector(vectors, &vectors.one("bench"), like);
 }
 
 /// Fragments of form `listing` in a format that rounds, within what its roundings may do: `step` relative
 /// to the greatest channel, and `floor`.
-fn reduced<F: Format>(want: &str, step: f64, floor: f64) {
-    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
-    let vectors = Vectors::read(&folder);
+fn reduced<F: Format>(vectors: &Vectors, want: &str, step: f64, floor: f64) {
     let (mut compared, mut exact) = (0, 0);
-    for file in vectors.files.values().filter(|file| file["kind"] == "fragment") {
-        let expected: Vec<f64> = numbers(&file["expected"][want]);
-        let has_frame = file["name"] != "frag_09_tiny_frame";
+    for file in vectors.of_kind("fragment") {
+        let want = file.at("expected").at(want);
         // Of a frame of 1e-20 nothing is left in 16 bits: the oracle's numbers there are noise, it says.
-        if expected.is_empty() || !has_frame {
+        if want.is_null() || file.vector.name == TINY {
             continue;
         }
-        let cubes = ["diffuse", "spec", "hilite"].map(|which| vectors.cube::<f64>(file, which));
+        let expected = want.wanted();
+        let cubes = ["diffuse", "spec", "hilite"].map(|which| cube::<f64>(vectors, &file, which));
         let lights = lights::<Emulated<F>>(&cubes[0], &cubes[1], &cubes[2]);
         let setup = Setup { form: Form::Listing, silhouette: Silhouette::Vertex, effects: ALL_TERMS };
-        let f = fragment_at(setup.form, &file["inputs"], 0.0_f64).in_format(Emulated::<F>::new(0.0));
+        let f = fragment_at(setup.form, &file.at("inputs"), 0.0_f64).in_format(Emulated::<F>::new(0.0));
         let got = evaluate::shade(setup, &lights, &f, &Params::defaults(Form::Listing)).map(f64::from);
         let scale = expected.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         for (c, (got, want)) in got.iter().zip(&expected).enumerate() {
             let bound = step * scale + floor;
-            assert!((got - want).abs() <= bound, "{} {}[{c}]: {got}, not {want}", file["name"], F::NAME);
+            let off = (got - want).abs();
+            assert!(off <= bound, "{} {}[{c}]: {got}, not {want}", file.vector.name, F::NAME);
             exact += usize::from(got == want);
             compared += 1;
         }
@@ -432,45 +305,145 @@ fn reduced<F: Format>(want: &str, step: f64, floor: f64) {
     assert!(compared >= 40 && 2 * exact > compared, "{}: {exact} of {compared} are exact", F::NAME);
 }
 
+fn formats(vectors: &Vectors) {
+    // The hilite is attenuated before it is rounded, the sum has five roundings of half a step: 2 steps of 1/1024.
+    reduced::<Declared>(vectors, "literal_fx12_rgba", 0.0, 2.0 / 1024.0);
+    // The sum is taken in another order: its handful of roundings, each half a unit of 2^-10 of what it rounds.
+    reduced::<Half>(vectors, "literal_half_rgba", 3.0 / 1024.0, 1e-4);
+}
+
+fn formats_vector(file: &Node<'_>) {
+    file.at("tolerance").at("rule").assert_text("exact");
+    let x = file.at("inputs").at("x").numbers();
+    let rounded = |format: fn(f64) -> f64| x.iter().map(|&x| format(x)).collect::<Vec<_>>();
+    assert_eq!(rounded(to_fixed), file.at("expected").at("fx12").wanted());
+    assert_eq!(rounded(to_half), file.at("expected").at("half").wanted());
+}
+
 #[test]
 fn the_listing_holds_in_its_declared_types_and_in_binary16() {
-    // The hilite is attenuated before it is rounded, the sum has five roundings of half a step: 2 steps of 1/1024.
-    reduced::<Declared>("literal_fx12_rgba", 0.0, 2.0 / 1024.0);
-    // The sum is taken in another order: its handful of roundings, each half a unit of 2^-10 of what it rounds.
-    reduced::<Half>("literal_half_rgba", 3.0 / 1024.0, 1e-4);
+    formats(&Vectors::read(&common::vectors()));
 }
 
 #[test]
 fn number_formats_round_as_the_vectors_say() {
-    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
-    let vectors = Vectors::read(&folder);
-    let file = &vectors.files["number_formats.json"];
-    let x = numbers(&file["inputs"]["x"]);
-    let rounded = |format: fn(f64) -> f64| x.iter().map(|&x| format(x)).collect::<Vec<_>>();
-    assert_eq!(rounded(to_fixed), numbers(&file["expected"]["fx12"]));
-    assert_eq!(rounded(to_half), numbers(&file["expected"]["half"]));
+    formats_vector(&Vectors::read(&common::vectors()).one("formats"));
 }
 
 #[test]
 fn vectors_hold_in_f64() {
-    run(0.0_f64);
+    run(&Vectors::read(&common::vectors()), 0.0_f64);
 }
 
 #[test]
 fn vectors_hold_in_f32() {
-    run(0.0_f32);
-}
-
-fn run_lanes(level: Level) {
-    skinfit_core::with_simd!(level, simd => run(Lanes::splat(simd, 0.0)));
+    run(&Vectors::read(&common::vectors()), 0.0_f32);
 }
 
 #[test]
-fn vectors_hold_in_simd_lanes() {
-    run_lanes(Level::new());
+fn vectors_hold_in_simd_lanes_with_every_instruction_set_that_there_is() {
+    let vectors = Vectors::read(&common::vectors());
+    let levels = skinfit::simd::levels();
+    #[cfg(target_arch = "x86_64")]
+    if levels.len() < 3 {
+        common::not_checked(&format!("this machine runs no more than {levels:?}"));
+    }
+    for level in levels {
+        skinfit_core::with_simd!(level, simd => run(&vectors, Lanes::splat(simd, 0.0)));
+    }
+}
+
+const TINY: &str = "frag_09_tiny_frame";
+
+/// What is compared with nothing: a vector's name or kind, what its paths begin with, and why.
+const LEFT_OUT: [(&str, &str, &str); 12] = [
+    ("", "note", "a sentence for people"),
+    ("fragment", "inputs.skinColor[3]", "the colour map's alpha, which listing 3-4 does not read"),
+    (
+        "fragment",
+        "expected.literal_scalar_reflVect_rgba",
+        "the print's scalar reflection vector: it is read as three",
+    ),
+    (TINY, "expected.literal_fx12_rgba", "noise, the note says: a frame of 1e-20 in 12 bits"),
+    (TINY, "expected.literal_half_rgba", "noise, the note says: a frame of 1e-20 in 16 bits"),
+    ("cube_sample", "expected.clamp", "lookups clamped at each face's edge: the model's are seamless"),
+    (
+        "study",
+        "expected",
+        "errors of formats over pixels that are not in the file; experiments measure their own",
+    ),
+    ("vertex", "inputs.uv", "texture coordinates pass through the vertex stage as they are"),
+    ("vertex", "expected.SkinUVST", "texture coordinates pass through the vertex stage as they are"),
+    ("vertex", "inputs.cam_pos[3]", "the 1 of a point"),
+    ("vertex", "inputs.coord[3]", "the 1 of a point"),
+    ("vertex", "inputs.dapple", "S.w is the z of (DappleXf N): of the matrix a row of three"),
+];
+
+/// Kinds that another folder of the oracle's may hold, of what is not built.
+const NOT_BUILT: [&str; 1] = ["diffusion"];
+
+/// Every comparison that there is, in f64 or on the CPU, and then what of the files was never looked at.
+#[test]
+fn every_number_of_every_vector_is_compared() {
+    let folder = common::vectors();
+    let vectors = Vectors::read(&folder);
+    run(&vectors, 0.0_f64);
+    border_vector(&vectors, &vectors.one("cube_sample"));
+    formats(&vectors);
+    formats_vector(&vectors.one("formats"));
+    vectors.of_kind("latlong").iter().for_each(bakes::latlong_vector);
+    vectors.of_kind("prefilter").iter().for_each(|file| bakes::prefilter_vector(&vectors, file));
+    vectors.of_kind("vertex").iter().for_each(meshes::vertex_vector);
+    witness::bench_on(&vectors, &evaluators::on_cpu()[..2]);
+    witness::fit_of_the_bench(&vectors);
+    witness::fragments_on(&vectors, &evaluators::on_cpu()[..2]);
+
+    let mut used = [false; LEFT_OUT.len()];
+    let mut left = Vec::new();
+    for vector in vectors.files.values() {
+        let root = vector.root();
+        root.at("name").assert_text(&vector.name);
+        let kind = root.at("kind").text();
+        if NOT_BUILT.contains(&kind) && folder != common::own_vectors() {
+            common::not_checked(&format!("{} is of {kind}, which is not built", vector.name));
+            continue;
+        }
+        for path in vector.left() {
+            let reason = LEFT_OUT.iter().position(|(of, beginning, _)| {
+                (of.is_empty() || *of == kind || *of == vector.name) && path.starts_with(beginning)
+            });
+            match reason {
+                Some(reason) => used[reason] = true,
+                None => left.push(format!("{} ({kind}): {path}", vector.name)),
+            }
+        }
+    }
+    let (count, first) = (left.len(), left.iter().take(20).cloned().collect::<Vec<_>>().join("\n"));
+    assert!(
+        left.is_empty(),
+        "{count} numbers of the vectors are compared with nothing, nor in LEFT_OUT:\n{first}"
+    );
+    if folder == common::own_vectors() {
+        let stale: Vec<_> = LEFT_OUT.iter().zip(used).filter(|(_, used)| !used).collect();
+        assert!(stale.is_empty(), "these are compared after all: {stale:?}");
+    }
 }
 
 #[test]
-fn vectors_hold_in_simd_lanes_without_instructions_beyond_the_baseline() {
-    run_lanes(Level::baseline());
+fn a_number_that_nothing_is_compared_with_is_noticed() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = r#"{"name": "a", "kind": "rim", "inputs": {"x": [1, [2, null]]}, "expected": {"y": [3, "NaN"], "z": 4}}"#;
+    std::fs::write(folder.path().join("a.json"), text).unwrap();
+    let vectors = Vectors::read(folder.path());
+    let root = vectors.one("rim");
+    let left = || root.vector.left().join(" ");
+    assert_eq!(left(), "expected.y[0] expected.y[1] expected.z inputs.x[0] inputs.x[1][0] name");
+    root.at("inputs").at("x").item(0).number();
+    // To read what is expected is not to compare with it.
+    root.at("expected").at("z").number();
+    root.at("expected").at("y").wanted();
+    root.at("name").assert_text("a");
+    assert_eq!(left(), "expected.z inputs.x[1][0]");
+    let of_its_kind = std::panic::catch_unwind(|| Vectors::read(folder.path()).one("bench").is_null());
+    assert!(of_its_kind.is_err(), "a kind without a file is a failure");
 }

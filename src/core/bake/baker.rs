@@ -1,7 +1,7 @@
 //! Single bakes, each through the cache.
 
 use std::path::Path;
-use std::time::Instant;
+use web_time::Instant;
 
 use super::cache::{self, Found, Key};
 use super::panorama::Radiance;
@@ -116,10 +116,11 @@ impl<'a> EnvironmentBaker<'a> {
 
     /// The environment's mean over each texel.
     pub(super) fn hilite(&mut self, baker: &mut Baker<'_>, size: usize) -> Cube<f32> {
-        let key = self.key.clone().with(&[size as u64]);
+        // Version 2: cubes of more than 512 texels a side keep a fine panorama's detail.
+        let key = self.key.clone().with(&[2, size as u64]);
         let floats = baker.through_cache("hilite".to_owned(), "hilite", &key, 24 * size * size, |stats| {
             let shared = self.prefilter(stats).means(size);
-            let cube = shared.unwrap_or_else(|| Radiance::new(self.environment).to_cube(size));
+            let cube = shared.unwrap_or_else(|| Radiance::for_cube(self.environment, size).to_cube(size));
             cube_to_floats(&cube.map(|texel| {
                 let [r, g, b, _] = texel.map(|x| x as f32);
                 [r, g, b, luminance([r, g, b])]

@@ -5,11 +5,25 @@
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::sync::LazyLock;
 
 use crate::output;
 
-/// Changes whenever a bake's algorithm does, so that old files are left alone.
-const VERSION: u32 = 1;
+/// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
+const SOURCES: [&str; 12] = [
+    include_str!("baker.rs"),
+    include_str!("cache.rs"),
+    include_str!("lobe_kernel.rs"),
+    include_str!("lobes.rs"),
+    include_str!("low_discrepancy.rs"),
+    include_str!("mod.rs"),
+    include_str!("occlusion.rs"),
+    include_str!("panorama.rs"),
+    include_str!("prefilter.rs"),
+    include_str!("pyramid.rs"),
+    include_str!("rays.rs"),
+    crate::model::cube::SOURCE,
+];
 const MAGIC: &[u8; 8] = b"SKINBAKE";
 const HEADER: usize = MAGIC.len() + 32 + 8 + 32;
 
@@ -31,8 +45,15 @@ pub(super) struct Key(blake3::Hasher);
 impl Key {
     /// The key of a kind of bake, without inputs yet.
     pub(super) fn new(kind: &str) -> Self {
+        static VERSION: LazyLock<blake3::Hash> = LazyLock::new(|| {
+            let mut hasher = blake3::Hasher::new();
+            for source in SOURCES {
+                hasher.update(source.as_bytes());
+            }
+            hasher.finalize()
+        });
         let mut hasher = blake3::Hasher::new();
-        hasher.update(&VERSION.to_le_bytes()).update(kind.as_bytes());
+        hasher.update(VERSION.as_bytes()).update(kind.as_bytes());
         Self(hasher)
     }
 
@@ -82,8 +103,7 @@ pub(super) fn read(folder: &Path, kind: &str, key: &Key, count: usize) -> Found 
 /// Write the bake of `key`; what went wrong, if anything, is only worth a warning.
 pub(super) fn write(folder: &Path, kind: &str, key: &Key, floats: &[f32]) -> Result<(), String> {
     let path = path(folder, kind, key);
-    output::write(&path, &encode(key, floats))
-        .map_err(|error| format!("{error} The bake is not kept (--no-cache keeps none)."))
+    output::write(&path, &encode(key, floats)).map_err(|error| format!("{error} The bake is not kept."))
 }
 
 fn encode(key: &Key, floats: &[f32]) -> Vec<u8> {
@@ -152,6 +172,20 @@ mod tests {
         ];
         for i in 0..keys.len() {
             assert!(keys[..i].iter().all(|other| other.hash() != keys[i].hash()));
+        }
+    }
+
+    #[test]
+    fn every_file_that_has_a_part_in_bakes_is_in_their_keys() {
+        let package = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let folder =
+            ["src/bake", "bake"].map(|folder| package.join(folder)).into_iter().find(|path| path.is_dir());
+        let folder = folder.unwrap();
+        let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+        assert!(files.len() > 9, "{files:?}");
+        for file in files {
+            let text = std::fs::read_to_string(&file).unwrap();
+            assert!(SOURCES.contains(&text.as_str()), "{} is missing", file.display());
         }
     }
 

@@ -39,8 +39,9 @@ impl LobeStack {
     /// The cube at `exponent` and its derivative with respect to the exponent.
     ///
     /// Between the stack's cubes runs a Catmull-Rom spline in log2(exponent), with the end slopes of
-    /// the parabola through three cubes: exact at each cube, the derivative continuous. A stack of
-    /// two is joined by a line, one cube holds everywhere. Beyond its ends the stack is constant.
+    /// the parabola through three cubes: exact at each cube, the derivative continuous. Slopes are cut where
+    /// the curve could fall below 0 (see `slopes`). A stack of two is joined by a line, one cube holds
+    /// everywhere. Beyond its ends the stack is constant.
     ///
     /// # Panics
     /// When the stack is empty, which no bake makes.
@@ -57,51 +58,58 @@ impl LobeStack {
         let inside = (0.0..=(count - 1) as f64).contains(&position);
         let position = position.clamp(0.0, (count - 1) as f64);
         let i = (position as usize).min(count - 2);
-        let (value, slope) = self.spline(i, position - i as f64);
+        let t = position - i as f64;
+        let s = 1.0 - t;
+        let value = self.combine(i, |[a, b, c, d]| {
+            s * s * s * a + 3.0 * s * s * t * b + 3.0 * s * t * t * c + t * t * t * d
+        });
         // d position / d exponent.
         let rate = if inside { 1.0 / (step * exponent * std::f64::consts::LN_2) } else { 0.0 };
-        (self.combine(i, 1.0, value), self.combine(i, 0.0, slope.map(|w| w * rate)))
+        let slope = self.combine(i, |[a, b, c, d]| {
+            3.0 * rate * (s * s * (b - a) + 2.0 * s * t * (c - b) + t * t * (d - c))
+        });
+        (value, slope)
     }
 
-    /// Weights of the *differences* between neighbouring cubes i-1..i, i..i+1 and i+1..i+2, for the
-    /// value above cube i and for its derivative, at x in [0, 1] of interval i.
-    fn spline(&self, i: usize, x: f64) -> ([f64; 3], [f64; 3]) {
-        let last = self.exponents.len() - 1;
-        // The slope at a cube, from the differences before and behind it.
-        let left = match (i > 0, i + 1 < last) {
-            (true, _) => [0.5, 0.5, 0.0],
-            (false, true) => [0.0, 1.5, -0.5],
-            (false, false) => [0.0, 1.0, 0.0],
-        };
-        let right = match (i + 1 < last, i > 0) {
-            (true, _) => [0.0, 0.5, 0.5],
-            (false, true) => [-0.5, 1.5, 0.0],
-            (false, false) => [0.0, 1.0, 0.0],
-        };
-        // Cubic Hermite basis and its derivative.
-        let (x2, x3) = (x * x, x * x * x);
-        let hermite = |h01: f64, h10: f64, h11: f64| {
-            std::array::from_fn(|k| f64::from(u8::from(k == 1)) * h01 + h10 * left[k] + h11 * right[k])
-        };
-        (
-            hermite(3.0 * x2 - 2.0 * x3, x3 - 2.0 * x2 + x, x3 - x2),
-            hermite(6.0 * x - 6.0 * x2, 3.0 * x2 - 4.0 * x + 1.0, 3.0 * x2 - 2.0 * x),
-        )
-    }
-
-    /// Cube i times `own`, plus the weighted differences of neighbouring cubes.
-    fn combine(&self, i: usize, own: f64, weights: [f64; 3]) -> Cube<f32> {
-        let last = self.cubes.len() - 1;
-        let four = [i.saturating_sub(1), i, i + 1, (i + 2).min(last)].map(|k| &self.cubes[k]);
-        Cube::from_fn(four[1].size(), |face, column, row| {
-            let [a, b, c, d] = four.map(|cube| cube.texel(face, column, row).map(f64::from));
-            std::array::from_fn(|k| {
-                let differences = [b[k] - a[k], c[k] - b[k], d[k] - c[k]];
-                let sum: f64 = (0..3).map(|n| weights[n] * differences[n]).sum();
-                (own * b[k] + sum) as f32
+    /// A cube of what `combine` makes of the Bezier points of interval i, texel by texel.
+    fn combine(&self, i: usize, combine: impl Fn([f64; 4]) -> f64) -> Cube<f32> {
+        let (before, after) = (i.checked_sub(1), (i + 2 < self.cubes.len()).then_some(i + 2));
+        let (own, next) = (&self.cubes[i], &self.cubes[i + 1]);
+        Cube::from_fn(own.size(), |face, column, row| {
+            let texel = |cube: &Cube<f32>| cube.texel(face, column, row).map(f64::from);
+            let (low, high) = (texel(own), texel(next));
+            let outer = [before, after].map(|k| k.map(|k| texel(&self.cubes[k])));
+            std::array::from_fn(|c| {
+                let [start, end] = slopes(outer.map(|texel| texel.map(|t| t[c])), [low[c], high[c]]);
+                combine([low[c], low[c] + start / 3.0, high[c] - end / 3.0, high[c]]) as f32
             })
         })
     }
+}
+
+/// The slopes at both ends of the interval between two values, from the values before and behind it.
+///
+/// A cubic stays at or above 0 where its four Bezier points do: a slope of at most three times the value on
+/// either side (Schmidt and Hess, *Positivity of cubic polynomials on intervals and positive spline
+/// interpolation*, BIT 28, 1988). Beside a sun the free slopes would undershoot. Both intervals at a cube
+/// cut its slope alike, so that the derivative stays continuous; values below 0, which no bake makes, are
+/// left alone.
+fn slopes([before, after]: [Option<f64>; 2], [low, high]: [f64; 2]) -> [f64; 2] {
+    let own = high - low;
+    let (first, last) = (before.map(|value| low - value), after.map(|value| value - high));
+    let at_least = |slope: f64, value: f64| if value < 0.0 { slope } else { slope.max(-3.0 * value) };
+    let at_most = |slope: f64, value: f64| if value < 0.0 { slope } else { slope.min(3.0 * value) };
+    let start = match (first, last) {
+        (Some(first), _) => at_most(0.5 * (first + own), low),
+        (None, Some(last)) => 1.5 * own - 0.5 * last,
+        (None, None) => own,
+    };
+    let end = match (first, last) {
+        (_, Some(last)) => at_least(0.5 * (own + last), high),
+        (Some(first), None) => 1.5 * own - 0.5 * first,
+        (None, None) => own,
+    };
+    [at_least(start, low), at_most(end, high)]
 }
 
 #[cfg(test)]
@@ -180,5 +188,51 @@ mod tests {
         assert!((read(&make(2), 2_f64.sqrt()) - 0.5).abs() < 1e-6);
         assert!((read(&make(3), 8_f64.sqrt()) - 1.5).abs() < 1e-6);
         assert_eq!((read(&make(3), 0.1), read(&make(3), 1e9)), (0.0, 2.0));
+    }
+
+    /// The mean of a Phong lobe of that exponent over a round sun of that radius (radians), seen from `angle`
+    /// beside its middle; (n + 1) / 2 pi, what all lobes have in common, is left out but for n + 1.
+    fn sun(exponent: f64, angle: f64, radius: f64) -> f64 {
+        let lobe = |r: usize, p: usize| {
+            let (length, turn) =
+                (radius * ((r as f64 + 0.5) / 6.0).sqrt(), (p as f64 + 0.5) / 8.0 * std::f64::consts::TAU);
+            let beside = (angle + length * turn.cos()).hypot(length * turn.sin());
+            if beside < std::f64::consts::FRAC_PI_2 { beside.cos().powf(exponent) } else { 0.0 }
+        };
+        let sum: f64 = (0..6).flat_map(|r| (0..8).map(move |p| lobe(r, p))).sum();
+        (exponent + 1.0) * sum / 48.0
+    }
+
+    #[test]
+    fn beside_a_sun_the_curve_stays_above_0_and_is_no_less_exact() {
+        // The most that is allowed of the sun's peak; and what was measured. Free slopes reached the same
+        // errors (0.0170, 0.0017), and -0.0012 of the peak; monotone slopes (Fritsch and Carlson) 0.0179 and 0.0041.
+        for (per_octave, most) in [(1, 0.018), (2, 0.0022)] {
+            for radius in [0.005, 0.02, 0.1] {
+                for angle in [0.0, 0.03, 0.09, 0.15, 0.21, 0.3, 0.42, 0.6, 1.0, 1.4] {
+                    let stack = stack(1.0..=2048.0, per_octave, |x| sun(x.exp2(), angle, radius));
+                    for k in 0..=110 {
+                        let e = (f64::from(k) / 10.0).exp2();
+                        let value = read(&stack, e).0;
+                        let off = (value - sun(e, angle, radius)).abs() / sun(e, 0.0, radius);
+                        assert!(value >= 0.0, "{per_octave} {radius} {angle} {e}: {value}");
+                        assert!(off < most, "{per_octave} {radius} {angle} {e}: {off}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_derivative_is_the_curve_s_own_where_slopes_are_cut() {
+        // Nothing, a peak, nothing: the slopes at both zeros are cut.
+        let stack = stack(1.0..=2048.0, 1, |x| if x == 5.0 { 1.0 } else { 0.0 });
+        for e in [17.0, 24.0, 30.0, 33.0, 50.0, 63.0, 70.0] {
+            let h = 1e-3 * e;
+            let (above, below) = (read(&stack, e + h).0, read(&stack, e - h).0);
+            // Central differences: values in f32 over a step of 2e-3 e, and the third derivative times h^2.
+            assert!((read(&stack, e).1 - (above - below) / (2.0 * h)).abs() * e < 2e-4, "{e}");
+            assert!(above >= 0.0 && below >= 0.0, "{e}");
+        }
     }
 }

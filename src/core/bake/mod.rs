@@ -56,7 +56,7 @@ pub struct VertexOcclusion {
     /// At rest, one a vertex.
     pub base: Vec<f32>,
     /// What each morph target at weight 1 adds, as many as the mesh has targets; empty for one that
-    /// the scene gives no weight.
+    /// neither the scene nor its animation gives a weight.
     pub morphs: Vec<Vec<f32>>,
 }
 
@@ -142,14 +142,15 @@ pub enum BakeError {
     },
 }
 
-/// Ambient occlusion, with a set for each morph target that the scene gives a weight.
+/// Ambient occlusion, with a set for each morph target that the scene or its animation gives a weight.
 fn occlusion_of_used(
     scene: &Scene,
     pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
     baker: &mut Baker<'_>,
 ) -> VertexOcclusion {
     let morphs = &scene.mesh.morphs;
-    let used: Vec<usize> = (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0).collect();
+    let moved = |&i: &usize| morphs[i].weight != 0.0 || morphs[i].animated;
+    let used: Vec<usize> = (0..morphs.len()).filter(moved).collect();
     let pose_used = |weights: &[f32]| {
         let mut all = vec![0.0; morphs.len()];
         used.iter().zip(weights).for_each(|(&target, &weight)| all[target] = weight);
@@ -176,32 +177,54 @@ pub fn bake(
     exponents: RangeInclusive<f64>,
     cache: Option<&Path>,
 ) -> Result<(Bake, BakeStats), BakeError> {
+    let (illumination, stats) = bake_light(scene, exponents, cache)?;
+    let mut baker = Baker { cache, stats };
+    let needs = scene.effects.needs(scene.silhouette);
+    let occlusion = needs.occlusion.then(|| occlusion_of_used(scene, pose, &mut baker));
+    Ok((Bake { illumination, occlusion }, baker.stats))
+}
+
+/// The environment's part of [`bake`].
+///
+/// # Errors
+/// As of [`bake`].
+pub fn bake_light(
+    scene: &Scene,
+    exponents: RangeInclusive<f64>,
+    cache: Option<&Path>,
+) -> Result<(Illumination, BakeStats), BakeError> {
     let needs = scene.effects.needs(scene.silhouette);
     let mut baker = Baker { cache, stats: BakeStats::default() };
-    let mut bake = Bake::default();
+    let mut light = Illumination::default();
     if needs.environment() {
         let environment = checked_environment(scene)?;
         let mut cubes = EnvironmentBaker::new(environment);
         let quality = &scene.quality;
         if needs.irradiance {
             let size = quality.irradiance_size as usize;
-            bake.illumination.irradiance = Some(cubes.lobe(&mut baker, "irradiance".to_owned(), size, 1.0));
+            light.irradiance = Some(cubes.lobe(&mut baker, "irradiance".to_owned(), size, 1.0));
         }
         if needs.lobes {
             let exponents = lobes::knots(&exponents, quality.lobes_per_octave);
             let size = quality.lobe_size as usize;
             let cube = |&e: &f64| cubes.lobe(&mut baker, format!("lobe {e:.4}"), size, e);
             let stack = exponents.iter().map(cube).collect();
-            bake.illumination.lobes = Some(LobeStack { exponents, cubes: stack });
+            light.lobes = Some(LobeStack { exponents, cubes: stack });
         }
         if needs.hilite {
-            bake.illumination.hilite = Some(cubes.hilite(&mut baker, quality.hilite_size as usize));
+            light.hilite = Some(cubes.hilite(&mut baker, quality.hilite_size as usize));
         }
     }
-    if needs.occlusion {
-        bake.occlusion = Some(occlusion_of_used(scene, pose, &mut baker));
-    }
-    Ok((bake, baker.stats))
+    Ok((light, baker.stats))
+}
+
+/// Ambient occlusion of one pose of the scene's mesh, morphed and skinned, for that pose alone: what an animation
+/// has per frame where sums over morph targets are not enough. Kept in the folder `cache` too.
+#[must_use]
+pub fn bake_pose(scene: &Scene, posed: &PosedMesh, cache: Option<&Path>) -> (VertexOcclusion, BakeStats) {
+    let mut baker = Baker { cache, stats: BakeStats::default() };
+    let occlusion = baker.occlusion(&|_| posed.clone(), 0, scene.quality.occlusion_rays);
+    (occlusion, baker.stats)
 }
 
 fn checked_environment(scene: &Scene) -> Result<&Environment, BakeError> {

@@ -1,12 +1,14 @@
 //! The lat-long panorama: its lookup, and its resampling to cubes (MODEL 1, 4).
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use crate::model::cube::{Cube, face_direction, texel_direction, texel_solid_angle};
 use crate::scene::maps::{Environment, Map};
 
-/// Panoramas wider than this are first reduced: a texel of 0.18 degrees is finer than any cube
-/// that is made of it.
+/// Panoramas wider than this are first reduced, unless the cube that is made of them is finer: a texel of 0.18
+/// degrees is a tenth of the sharpest lobe's width.
 const FINEST_WIDTH: usize = 2048;
 
 /// Samples within a texel are taken as even when they differ by less than this share of the sphere's
@@ -98,28 +100,47 @@ fn cell_direction(face: usize, column: usize, row: usize, size: usize) -> [f64; 
 }
 
 /// An environment in world orientation, its rotation and intensity applied.
-pub struct Radiance {
-    map: Map<3>,
+pub struct Radiance<'a> {
+    map: Cow<'a, Map<3>>,
     /// Cosine and sine of the rotation.
     turn: (f64, f64),
     intensity: f64,
 }
 
-impl Radiance {
-    /// The radiance of `environment`; a very fine panorama is reduced first.
+impl<'a> Radiance<'a> {
+    /// The radiance of `environment` for the lobes; a very fine panorama is reduced first.
     #[must_use]
-    pub fn new(environment: &Environment) -> Self {
-        let mut map = environment.panorama.clone();
-        while map.width > FINEST_WIDTH && map.width.is_multiple_of(2) && map.height.is_multiple_of(2) {
-            map = halve(&map);
+    pub fn new(environment: &'a Environment) -> Self {
+        Self::for_cube(environment, 1)
+    }
+
+    /// The same for a cube of `size` texels a side: its four faces around the equator keep a column of the
+    /// panorama a texel, where the panorama has as many.
+    #[must_use]
+    pub fn for_cube(environment: &'a Environment, size: usize) -> Self {
+        let mut map = Cow::Borrowed(&environment.panorama);
+        let halves = |map: &Map<3>| map.width.is_multiple_of(2) && map.height.is_multiple_of(2);
+        while map.width > FINEST_WIDTH && map.width / 2 >= 4 * size && halves(&map) {
+            map = Cow::Owned(halve(&map));
         }
-        let turn = environment.rotation_degrees.to_radians();
+        Self::of(map, environment, environment.rotation_degrees)
+    }
+
+    /// The radiance of `environment` as fine as its file, turned by so many degrees about +Y instead of its own
+    /// rotation: what a camera sees of it.
+    #[must_use]
+    pub fn whole(environment: &'a Environment, rotation_degrees: f64) -> Self {
+        Self::of(Cow::Borrowed(&environment.panorama), environment, rotation_degrees)
+    }
+
+    fn of(map: Cow<'a, Map<3>>, environment: &Environment, rotation_degrees: f64) -> Self {
+        let turn = rotation_degrees.to_radians();
         Self { map, turn: (turn.cos(), turn.sin()), intensity: environment.intensity }
     }
 
     /// Columns of the (reduced) panorama.
     #[must_use]
-    pub const fn width(&self) -> usize {
+    pub fn width(&self) -> usize {
         self.map.width
     }
 
@@ -128,7 +149,7 @@ impl Radiance {
     pub fn along(&self, d: [f64; 3]) -> [f64; 3] {
         let (cos, sin) = self.turn;
         let d = [cos * d[0] - sin * d[2], d[1], sin * d[0] + cos * d[2]];
-        let Map { width, height, texels } = &self.map;
+        let Map { width, height, texels } = self.map.as_ref();
         let texel = |column: usize, row: usize| texels[row * width + column].map(f64::from);
         sample_latlong(*width, *height, texel, d).map(|x| x * self.intensity)
     }
@@ -155,7 +176,7 @@ impl Radiance {
 
     /// The mean radiance over the sphere, the brightest channel's.
     fn brightness(&self) -> f64 {
-        let Map { width, height, texels } = &self.map;
+        let Map { width, height, texels } = self.map.as_ref();
         let (mut sum, mut weights) = ([0.0; 3], 0.0);
         for (y, row) in texels.chunks_exact(*width).enumerate() {
             let sine = ((y as f64 + 0.5) / *height as f64 * std::f64::consts::PI).sin();
@@ -231,6 +252,28 @@ mod tests {
             // a curved one.
             assert!((got / want - 1.0).abs() < 0.01, "({x}, {y}): {got} {want}");
         }
+    }
+
+    #[test]
+    fn a_fine_cube_keeps_what_a_fine_panorama_shows() {
+        // Columns by turns dark and bright, which reducing makes grey.
+        let (width, height) = (4096, 4);
+        let texels = (0..width * height).map(|i| [(i % 2) as f32; 3]).collect();
+        let panorama = Map { width, height, texels };
+        let environment = Environment { panorama, rotation_degrees: 0.0, intensity: 1.0 };
+        let contrast = |radiance: &Radiance<'_>| {
+            let along = |column: usize| {
+                let phi = ((column as f64 + 0.5) / width as f64 - 0.5) * std::f64::consts::TAU;
+                radiance.along([phi.sin(), 0.0, -phi.cos()])[0]
+            };
+            (0..64).map(|i| along(2 * i + 1) - along(2 * i)).sum::<f64>() / 64.0
+        };
+        // Columns to the bit but for atan2's rounding of a few 1e-16, times 4096 columns.
+        assert!(contrast(&Radiance::for_cube(&environment, 1024)) > 1.0 - 1e-9);
+        assert!(contrast(&Radiance::whole(&environment, 0.0)) > 1.0 - 1e-9);
+        assert!(contrast(&Radiance::for_cube(&environment, 512)).abs() < 1e-9);
+        assert_eq!(Radiance::for_cube(&environment, 513).width(), 4096);
+        assert_eq!(Radiance::new(&environment).width(), 2048);
     }
 
     #[test]

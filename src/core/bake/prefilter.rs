@@ -50,7 +50,7 @@ impl Prefilter {
     /// Prepare `radiance`, on a cube that is fine enough for its panorama and for every exponent
     /// of the parameter table.
     #[must_use]
-    pub fn of(radiance: &Radiance) -> Self {
+    pub fn of(radiance: &Radiance<'_>) -> Self {
         let size = (radiance.width() / 2).next_power_of_two().clamp(16, FINEST);
         Self::new(&radiance.to_cube(size))
     }
@@ -67,10 +67,21 @@ impl Prefilter {
     /// done since the last call.
     #[must_use]
     pub fn lobe(&self, size: usize, exponent: f64, progress: impl Fn(u64) + Sync) -> Cube<f32> {
+        self.lobe_at(Level::new(), size, exponent, progress)
+    }
+
+    /// As [`Self::lobe`], with the instructions of `level`.
+    #[must_use]
+    pub fn lobe_at(
+        &self,
+        level: Level,
+        size: usize,
+        exponent: f64,
+        progress: impl Fn(u64) + Sync,
+    ) -> Cube<f32> {
         let tiles = size.div_ceil(TILE);
         let blocks = self.blocks(exponent);
         let lobe = Lobe::new(exponent);
-        let level = Level::new();
         let filtered: Vec<Vec<[f32; 4]>> = (0..6 * tiles * tiles)
             .into_par_iter()
             .map(|tile| {

@@ -7,6 +7,16 @@ use super::window::{Window, row};
 use crate::samples::rows::Row;
 use crate::simd::Simd;
 
+/// Columns of numbers, a row a group of pixels.
+pub(super) trait Source: Copy {
+    /// How many columns there are.
+    fn columns(&self) -> usize;
+    /// How many rows each has.
+    fn groups(&self) -> usize;
+    /// A group's row of a column.
+    fn load<S: Simd>(&self, simd: S, group: usize, column: usize) -> f32x16<S>;
+}
+
 /// Columns within the scratch: the rows that are meant of each group's window.
 #[derive(Clone, Copy)]
 pub(super) struct Columns<'a> {
@@ -14,12 +24,25 @@ pub(super) struct Columns<'a> {
     pub rows: &'a [usize],
 }
 
+impl Source for Columns<'_> {
+    fn columns(&self) -> usize {
+        self.rows.len()
+    }
+    fn groups(&self) -> usize {
+        self.windows.len()
+    }
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S, group: usize, column: usize) -> f32x16<S> {
+        f32x16::load_array_ref(simd, row(&self.windows[group], self.rows[column]))
+    }
+}
+
 /// Add the upper triangle of the Gram matrix of the columns to `sums`, lane by lane.
 ///
 /// Entry (i, j), i <= j, stands at [`pair`]`(i, j, count)` of `sums`. A function of its own, with
 /// registers of its own: as part of a kernel that needs them all, it takes half as long again.
 #[inline(never)]
-pub(super) fn add_gram<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
+pub(super) fn add_gram<S: Simd>(simd: S, columns: impl Source, sums: &mut [Row]) {
     simd.vectorize(
         #[inline(always)]
         || add_tiles(simd, columns, sums),
@@ -27,8 +50,8 @@ pub(super) fn add_gram<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row])
 }
 
 #[inline(always)]
-fn add_tiles<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
-    let count = columns.rows.len();
+fn add_tiles<S: Simd>(simd: S, columns: impl Source, sums: &mut [Row]) {
+    let count = columns.columns();
     // Tiles of 4 x 4 columns: 16 products for 8 loads.
     let mut i = 0;
     while i < count {
@@ -55,13 +78,13 @@ fn add_tiles<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
 
 /// Add the products of each column with the last one to `sums` (entry i at i): J^T r and r^T r.
 #[inline(always)]
-pub(super) fn add_last<S: Simd>(simd: S, columns: Columns<'_>, sums: &mut [Row]) {
-    let Some(&last) = columns.rows.last() else { return };
-    for (&column, sum) in columns.rows.iter().zip(sums) {
+pub(super) fn add_last<S: Simd>(simd: S, columns: impl Source, sums: &mut [Row]) {
+    let Some(last) = columns.columns().checked_sub(1) else { return };
+    for (column, sum) in (0..=last).zip(sums) {
         let mut products = f32x16::load_array_ref(simd, sum);
-        for window in columns.windows {
-            let factor = f32x16::load_array_ref(simd, row(window, last));
-            products = f32x16::load_array_ref(simd, row(window, column)).mul_add(factor, products);
+        for group in 0..columns.groups() {
+            let factor = columns.load(simd, group, last);
+            products = columns.load(simd, group, column).mul_add(factor, products);
         }
         products.store_array(sum);
     }
@@ -73,30 +96,28 @@ pub(super) const fn pair(i: usize, j: usize, count: usize) -> usize {
 }
 
 /// A rectangle of the Gram matrix: rows from `i`, columns from `j`.
-struct Tile<'a> {
-    columns: Columns<'a>,
+struct Tile<C: Source> {
+    columns: C,
     i: usize,
     j: usize,
 }
 
-impl Tile<'_> {
+impl<C: Source> Tile<C> {
     #[inline(always)]
     fn add<S: Simd, const ROWS: usize, const ACROSS: usize, const DIAGONAL: bool>(
         &self,
         simd: S,
         sums: &mut [Row],
     ) {
-        let Self { columns: Columns { windows, rows }, i, j } = *self;
-        let down: [usize; ROWS] = std::array::from_fn(|r| rows[i + r]);
-        let across: [usize; ACROSS] = std::array::from_fn(|k| rows[j + k]);
+        let Self { columns, i, j } = *self;
         let mut products = [[f32x16::splat(simd, 0.0); ACROSS]; ROWS];
-        for window in windows {
+        for group in 0..columns.groups() {
             let mut b = [f32x16::splat(simd, 0.0); ACROSS];
             for k in 0..ACROSS {
-                b[k] = f32x16::load_array_ref(simd, row(window, across[k]));
+                b[k] = columns.load(simd, group, j + k);
             }
             for r in 0..ROWS {
-                let a = f32x16::load_array_ref(simd, row(window, down[r]));
+                let a = columns.load(simd, group, i + r);
                 let start = if DIAGONAL { r } else { 0 };
                 for k in start..ACROSS {
                     products[r][k] = a.mul_add(b[k], products[r][k]);
@@ -106,7 +127,7 @@ impl Tile<'_> {
         for r in 0..ROWS {
             let start = if DIAGONAL { r } else { 0 };
             for k in start..ACROSS {
-                let sum = &mut sums[pair(i + r, j + k, rows.len())];
+                let sum = &mut sums[pair(i + r, j + k, columns.columns())];
                 (f32x16::load_array_ref(simd, sum) + products[r][k]).store_array(sum);
             }
         }
@@ -117,11 +138,15 @@ impl Tile<'_> {
 mod tests {
     use super::*;
     use crate::samples::LANES;
+    use crate::simd::{Level, levels, name};
     use crate::with_simd;
-    use fearless_simd::Level;
 
     #[test]
     fn every_entry_equals_the_plain_product_for_any_number_of_columns() {
+        levels().into_iter().for_each(every_entry_equals_the_plain_product);
+    }
+
+    fn every_entry_equals_the_plain_product(level: Level) {
         let number = |window: usize, place: usize, lane: usize| {
             ((window * 911 + place * 37 + lane * 13) % 101) as f32 / 50.0 - 1.0
         };
@@ -133,9 +158,9 @@ mod tests {
             let rows: Vec<usize> = (0..count).map(|i| 4 * i + 2).collect();
             let columns = Columns { windows: &windows, rows: &rows };
             let mut sums = vec![Row::ZERO; count * (count + 1) / 2];
-            with_simd!(Level::new(), simd => add_gram(simd, columns, &mut sums));
+            with_simd!(level, simd => add_gram(simd, columns, &mut sums));
             let mut last = vec![Row::ZERO; count];
-            with_simd!(Level::new(), simd => add_last(simd, columns, &mut last));
+            with_simd!(level, simd => add_last(simd, columns, &mut last));
             for i in 0..count {
                 for j in i..count {
                     let at = |column: usize, k: usize| f64::from(number(k / LANES, rows[column], k % LANES));
@@ -143,7 +168,7 @@ mod tests {
                     let total = |sum: &Row| -> f64 { sum.iter().map(|&x| f64::from(x)).sum() };
                     let got = total(&sums[pair(i, j, count)]);
                     // 48 products of at most 1, each rounded to 6e-8.
-                    assert!((got - want).abs() < 3e-6, "{count}: ({i}, {j}) {got} {want}");
+                    assert!((got - want).abs() < 3e-6, "{}: {count}: ({i}, {j}) {got} {want}", name(level));
                     if j == count - 1 {
                         assert!((total(&last[i]) - want).abs() < 3e-6);
                     }

@@ -13,6 +13,7 @@ mod gram;
 mod kernel;
 pub mod lanes;
 mod plan;
+pub mod planned;
 mod records;
 pub mod reference;
 pub mod residual;
@@ -99,6 +100,19 @@ pub fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: 
         sums.collect::<Vec<f64>>().iter().sum::<f64>()
     };
     HALF_UNIT * HALF_UNIT * views.iter().map(power).sum::<f64>()
+}
+
+/// The sizes of the cubes that are looked up.
+#[must_use]
+pub fn face_sizes(illumination: &crate::bake::Illumination) -> crate::shader::facts::FaceSizes {
+    use crate::model::cube::Cube;
+    let crate::bake::Illumination { irradiance, lobes, hilite } = illumination;
+    let specular = lobes.as_ref().and_then(|stack| stack.cubes.first());
+    crate::shader::facts::FaceSizes {
+        irradiance: irradiance.as_ref().map(Cube::size),
+        specular: specular.map(Cube::size),
+        hilite: hilite.as_ref().map(Cube::size),
+    }
 }
 
 /// One unknown of a fit.

@@ -152,7 +152,8 @@ impl Plan {
 
 /// Whether the unknown moves output channel `c` at all.
 fn moves(column: &Column, c: usize, enabled: Wanted, setup: Setup) -> bool {
-    if !column.param.asked_for(setup.effects) {
+    // What was added has no row in a window.
+    if !column.param.asked_for(setup.effects) || !column.param.is_built_in() {
         return false;
     }
     let alpha = c == 3;

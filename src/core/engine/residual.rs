@@ -14,6 +14,22 @@ pub const SMAPE_FLOOR: f64 = 0.01;
 /// SMAPE's residuals below this are treated as quadratic, so that their weight stays finite.
 pub const SMAPE_CORNER: f64 = 1e-4;
 
+/// The loss as WGSL: `weighted_residual(shown, observed, weight)`, and the constants that it names. Both engines' passes
+/// are made from it.
+#[must_use]
+pub fn loss_text(loss: Loss) -> String {
+    let function = match loss {
+        Loss::L2 => include_str!("loss/l2.wgsl"),
+        Loss::RelativeL2 => include_str!("loss/relative_l2.wgsl"),
+        Loss::Huber => include_str!("loss/huber.wgsl"),
+        Loss::Smape => include_str!("loss/smape.wgsl"),
+    };
+    format!(
+        "const RELATIVE_FLOOR = {RELATIVE_FLOOR:?}f;\nconst HUBER_THRESHOLD = {HUBER_THRESHOLD:?}f;\n\
+         const SMAPE_FLOOR = {SMAPE_FLOOR:?}f;\nconst SMAPE_CORNER = {SMAPE_CORNER:?}f;\n\n{function}"
+    )
+}
+
 /// One residual as the normal equations see it.
 #[derive(Clone, Copy, Debug)]
 pub struct Weighted<R> {

@@ -28,7 +28,7 @@ pub(super) const EMPTY: Window = [Row::ZERO; ROWS + 1];
 /// The row of a parameter's column.
 #[inline(always)]
 pub(super) const fn column(channel: usize, param: Param) -> usize {
-    channel * CHANNEL + param as usize
+    channel * CHANNEL + param.index()
 }
 
 /// The row of the gain's column.

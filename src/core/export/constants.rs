@@ -1,23 +1,62 @@
 //! The constants alone.
 
+use std::fmt::Write as _;
+
 use serde_json::{Map, Value, json};
 
-use super::Provenance;
+use super::dialect::PREFIX;
 use super::target::Target;
-use crate::model::effects::Effects;
+use super::{Constants, Provenance, names};
+use crate::fit::params_file::quoted;
+use crate::model::effects::Effect;
 use crate::model::params::{Param, Params};
 
-/// The constants that `effects` read.
-pub(super) fn text(target: Target, effects: Effects, params: &Params, from: &Provenance) -> String {
-    let used: Vec<Param> = Param::all().filter(|param| param.asked_for(effects)).collect();
+/// The constants that their effects read.
+pub(super) fn text(target: Target, constants: Constants<'_>, from: &Provenance) -> String {
+    let used: Vec<Param> = Param::all().filter(|param| param.asked_for(constants.effects)).collect();
     if target == Target::Json {
-        return json_text(&used, params, from);
+        return json_text(&used, constants, from);
     }
-    let mut lines: Vec<String> =
-        from.lines().iter().map(|line| format!("{} {line}", target.comment())).collect();
-    lines.push(String::new());
-    lines.extend(used.iter().map(|&param| line(target, param, params)));
-    lines.join("\n") + "\n"
+    let mut text = String::new();
+    for line in from.lines() {
+        let _ = writeln!(text, "{} {line}", target.comment());
+    }
+    let (head, tail) = match target {
+        Target::C => guard(),
+        Target::Toml => (parameter_file_head(constants), gains(constants)),
+        _ => ("\n".to_owned(), String::new()),
+    };
+    text += &head;
+    for &param in &used {
+        text += &line(target, param, constants.params);
+        text.push('\n');
+    }
+    text + &tail
+}
+
+/// What keeps a header from being read twice.
+fn guard() -> (String, String) {
+    let name = format!("{PREFIX}constants_h").to_uppercase();
+    (format!("\n#ifndef {name}\n#define {name}\n\n"), format!("\n#endif /* {name} */\n"))
+}
+
+/// What stands in a parameter file before the constants.
+fn parameter_file_head(constants: Constants<'_>) -> String {
+    let effects: Vec<&str> = constants.effects.iter().map(Effect::name).collect();
+    let mut text = format!("form = \"{}\"\neffects = {effects:?}\n", constants.form.name());
+    if let Some(loss) = constants.loss {
+        let _ = writeln!(text, "loss = \"{loss}\"");
+    }
+    text + "\n[params]\n"
+}
+
+/// The views' gains, after them.
+fn gains(constants: Constants<'_>) -> String {
+    if constants.gains.is_empty() {
+        return String::new();
+    }
+    let gain = |(view, gain): &(String, f64)| format!("{} = {gain:?}\n", quoted(view));
+    format!("\n[gains]\n{}", constants.gains.iter().map(gain).collect::<String>())
 }
 
 /// A constant's value: three numbers of what may differ by channel, else one.
@@ -32,26 +71,31 @@ fn line(target: Target, param: Param, params: &Params) -> String {
     let definition = match (target, target.dialect()) {
         (_, Some(dialect)) => {
             let kind = if numbers.len() == 3 { "vec3f" } else { "f32" };
-            dialect.definition(&format!("SKINFIT_{}", param.name().to_uppercase()), kind, &numbers)
+            dialect.definition(&names::constant(param.identifier()), kind, &numbers)
         }
         (Target::C, None) => {
-            let name = param.name();
+            let name = names::function(param.identifier());
             let floats = numbers.iter().map(|x| format!("{x:?}f")).collect::<Vec<_>>().join(", ");
             match numbers.len() {
-                1 => format!("static const float skinfit_{name} = {floats};"),
-                n => format!("static const float skinfit_{name}[{n}] = {{{floats}}};"),
+                1 => format!("static const float {name} = {floats};"),
+                n => format!("static const float {name}[{n}] = {{{floats}}};"),
             }
         }
-        _ if numbers.len() == 1 => format!("{} = {}", param.name(), list()),
-        _ => format!("{} = [{}]", param.name(), list()),
+        _ if numbers.len() == 1 => format!("{} = {}", key(param), list()),
+        _ => format!("{} = [{}]", key(param), list()),
     };
     format!("{definition} {about}")
 }
 
-fn json_text(used: &[Param], params: &Params, from: &Provenance) -> String {
+/// The name as a key of TOML: quoted where it has dots.
+fn key(param: Param) -> String {
+    if param.name().contains('.') { format!("\"{}\"", param.name()) } else { param.name().to_owned() }
+}
+
+fn json_text(used: &[Param], all: Constants<'_>, from: &Provenance) -> String {
     let number = |numbers: Vec<f64>| if numbers.len() == 1 { json!(numbers[0]) } else { json!(numbers) };
     let constants: Map<String, Value> =
-        used.iter().map(|&param| (param.name().to_owned(), number(value(param, params)))).collect();
+        used.iter().map(|&param| (param.name().to_owned(), number(value(param, all.params)))).collect();
     let errors: Map<String, Value> =
         from.std_errors.iter().map(|(param, e)| (param.name().to_owned(), number(e.clone()))).collect();
     let loss = from.loss.as_ref().map(|(name, value)| json!({"name": name, "end": value}));
@@ -59,6 +103,9 @@ fn json_text(used: &[Param], params: &Params, from: &Provenance) -> String {
         "tool": format!("skinfit {}", env!("CARGO_PKG_VERSION")),
         "scene": from.scene,
         "params_file": from.params,
+        "form": all.form.name(),
+        "effects": all.effects.iter().map(Effect::name).collect::<Vec<_>>(),
+        "set": from.set,
         "loss": loss,
         "std_errors": errors,
         "constants": constants,

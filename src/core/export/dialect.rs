@@ -1,6 +1,10 @@
 //! How each shading language spells what the shader rules say in WGSL.
 
+use super::names::function;
 use crate::shader::quantity::{Kind, Resource};
+
+/// What the names of all that an export defines begin with, in whatever capitals its language wants.
+pub const PREFIX: &str = "skinfit_";
 
 /// Families that share most of their grammar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +53,7 @@ const BASE: Dialect = Dialect {
     cube_lookup: "textureLod({t}, {c}, 0.0)",
     declarations: [""; 3],
     colour_hint: "",
-    samplers: ["map_sampler", "cube_sampler"],
+    samplers: ["skinfit_map_sampler", "skinfit_cube_sampler"],
     bits: "",
     prologue: "",
     epilogue: "",
@@ -109,7 +113,7 @@ pub const HLSL: Dialect = Dialect {
 /// Unity, as an include of an HLSLPROGRAM.
 pub const UNITY: Dialect = Dialect {
     declarations: ["Texture2D<float4> {n};", "TextureCube<float4> {n};", "SamplerState {n};"],
-    samplers: ["sampler_linear_repeat", "sampler_linear_clamp"],
+    samplers: ["skinfit_linear_repeat_sampler", "skinfit_linear_clamp_sampler"],
     prologue: "#ifndef SKINFIT_INCLUDED\n#define SKINFIT_INCLUDED\n",
     epilogue: "\n#endif\n",
     ..HLSL
@@ -178,12 +182,12 @@ impl Dialect {
         }
     }
 
-    /// A resource's name. Unity finds a sampler's filter and wrapping in its name.
+    /// A resource's name, by that which it has with the prefix. Unity finds a sampler's filter and wrapping in its name.
     #[must_use]
     pub fn resource<'a>(&self, name: &'a str) -> &'a str {
-        match name {
-            "map_sampler" => self.samplers[0],
-            "cube_sampler" => self.samplers[1],
+        match name.strip_prefix(PREFIX) {
+            Some("map_sampler") => self.samplers[0],
+            Some("cube_sampler") => self.samplers[1],
             _ => name,
         }
     }
@@ -197,7 +201,7 @@ impl Dialect {
             _ => self.declarations[0],
         };
         let hint = if resource == Resource::ColorMap { self.colour_hint } else { "" };
-        let name = self.resource(resource.name());
-        text.replace("{n}", name).replace("{b}", &binding.to_string()).replace("{h}", hint)
+        let name = function(resource.name());
+        text.replace("{n}", self.resource(&name)).replace("{b}", &binding.to_string()).replace("{h}", hint)
     }
 }

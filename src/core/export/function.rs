@@ -3,8 +3,11 @@
 use std::fmt::Write as _;
 
 use super::dialect::{Dialect, Family};
+use super::idle::idle;
 use super::translate::translate;
-use super::{ExportError, Provenance, Target};
+use super::{ExportError, Provenance, Target, names};
+use crate::model::effects::{Effect, Effects};
+use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::shader::Resource;
 use crate::shader::quantity::Kind;
@@ -22,32 +25,22 @@ pub(super) fn text(
             Target::ALL.into_iter().filter(|t| t.dialect().is_some()).map(Target::name).collect();
         return Err(ExportError::NoFunction { target: target.name(), languages: languages.join(", ") });
     };
+    let idle = idle(facts.setup.effects, params);
+    let effects = facts.setup.effects.iter().filter(|&effect| !idle.has(effect)).collect();
     // Not every language has 16-bit numbers, nor every engine's adapter.
-    let plan = plan(&Facts { f16: false, ..*facts })?;
-    let mut text = String::new();
-    for line in from.lines() {
-        let _ = writeln!(text, "// {line}");
-    }
-    let _ =
-        writeln!(text, "//\n// Call skinfit_shade with what the vertex stage hands over, in world space:");
-    for (name, _) in plan.surface() {
-        let _ = writeln!(text, "// - {name}: {}", meaning(name));
-    }
-    let _ = writeln!(
-        text,
-        "//\n// It reads what `skinfit bake --params` writes of the scene, seamless and without mip levels:"
-    );
-    for resource in &plan.resources {
-        if let Some(words) = what_to_bind(*resource, params) {
-            let _ = writeln!(text, "// - {}: {words}", resource.name());
-        }
-    }
+    let plan = plan(&Facts { setup: Setup { effects, ..facts.setup }, f16: false, ..*facts })?;
+    let mut text = header(&plan, idle, params, from);
     let _ = write!(text, "\n{}", dialect.prologue);
-    for (name, kind, value) in plan.literals(params) {
-        let _ = writeln!(text, "{}", dialect.definition(&name, kind, &value));
+    let literals = plan.literals(params);
+    for (name, kind, value) in &literals {
+        let _ = writeln!(text, "{}", dialect.definition(&names::constant(name), kind, value));
     }
     let declared = declarations(dialect, &plan);
-    let functions = translate(dialect, &plan.function());
+    let constants: Vec<String> = literals.into_iter().map(|(name, ..)| name).collect();
+    let resources: Vec<&str> = plan.resources.iter().map(|resource| resource.name()).collect();
+    let fields: Vec<&str> = plan.surface().iter().map(|(name, _)| *name).collect();
+    let wgsl = names::prefixed(&plan.function(), &constants, &resources, &fields);
+    let functions = translate(dialect, &names::cited(&wgsl));
     if dialect.family == Family::Msl {
         let body = indented(&format!("{declared}\n{functions}"));
         let _ = write!(
@@ -59,6 +52,40 @@ pub(super) fn text(
     }
     text.push_str(dialect.epilogue);
     Ok(text)
+}
+
+/// What it is, what it is called with, and what it reads.
+fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> String {
+    let mut lines = from.lines();
+    if idle != Effects::default() {
+        let names: Vec<&str> = idle.iter().map(Effect::name).collect();
+        lines.push(format!(
+            "Left out, as their weight is 0: {}. With another weight they have to be exported again.",
+            names.join(", ")
+        ));
+    }
+    lines.extend([
+        String::new(),
+        "Comments cite the listings of GPU Gems, chapter 3, and sections of docs/model.md, a page of skinfit."
+            .to_owned(),
+        String::new(),
+        "Call skinfit_shade with what the vertex stage hands over, in world space:".to_owned(),
+    ]);
+    lines.extend(plan.surface().iter().map(|(name, _)| format!("- {name}: {}", meaning(name))));
+    let bound = |resource: &Resource| {
+        Some(format!("- {}: {}", names::function(resource.name()), what_to_bind(*resource, params)?))
+    };
+    let bound: Vec<String> = plan.resources.iter().filter_map(bound).collect();
+    if !bound.is_empty() {
+        lines.extend([
+            String::new(),
+            "It reads what `skinfit bake --params` writes of the scene, seamless and without mip levels:"
+                .to_owned(),
+        ]);
+        lines.extend(bound);
+    }
+    let comment = |line: String| if line.is_empty() { "//\n".to_owned() } else { format!("// {line}\n") };
+    lines.into_iter().map(comment).collect()
 }
 
 fn declarations(dialect: &Dialect, plan: &Plan) -> String {

@@ -4,6 +4,8 @@
 //! - [`dialect`]: how each language spells what the shader rules say in WGSL
 //! - `translate`: the rules' WGSL, in another language
 //! - [`provenance`]: where the constants come from
+//! - `names`: the prefix of all that an export defines, and its citations
+//! - `idle`: terms without a weight, which no shader need compute
 //! - `constants`, `function`: the texts
 //!
 //! The shader is written once, as the planner's rules; every exported function is a translation of them.
@@ -11,6 +13,8 @@
 mod constants;
 pub mod dialect;
 mod function;
+mod idle;
+mod names;
 pub mod provenance;
 pub mod target;
 mod translate;
@@ -18,7 +22,7 @@ mod translate;
 pub use provenance::Provenance;
 pub use target::Target;
 
-use crate::model::effects::Effects;
+use crate::model::effects::{Effects, Form};
 use crate::model::params::Params;
 use crate::shader::{Facts, PlanError};
 
@@ -27,7 +31,7 @@ use crate::shader::{Facts, PlanError};
 pub enum ExportError {
     /// The target holds constants alone.
     #[error(
-        "{target} holds data, no shader: export the constants alone with --constants, or the shader to one of {languages}."
+        "{target} holds data, no shader: export the constants alone, or the shader to one of {languages}."
     )]
     NoFunction {
         /// The target's name.
@@ -40,10 +44,25 @@ pub enum ExportError {
     Plan(#[from] PlanError),
 }
 
-/// The constants that `effects` read, as text.
+/// Constants, and what they belong to.
+#[derive(Clone, Copy, Debug)]
+pub struct Constants<'a> {
+    /// The form of the model.
+    pub form: Form,
+    /// The effects that read them; others' constants are left out.
+    pub effects: Effects,
+    /// Their values.
+    pub params: &'a Params,
+    /// The name of the loss that they minimise, where it is known.
+    pub loss: Option<&'a str>,
+    /// The factor on each view's image, by the view's name.
+    pub gains: &'a [(String, f64)],
+}
+
+/// Constants as text. As TOML they are a parameter file, which reads back.
 #[must_use]
-pub fn constants(target: Target, effects: Effects, params: &Params, from: &Provenance) -> String {
-    constants::text(target, effects, params, from)
+pub fn constants(target: Target, constants: Constants<'_>, from: &Provenance) -> String {
+    constants::text(target, constants, from)
 }
 
 /// The shader of a scene with its constants, as text: one function, and what it reads.

@@ -5,12 +5,14 @@ use crate::model::params::Param;
 /// Where constants come from, as an export tells it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Provenance {
-    /// The scene's file.
-    pub scene: String,
+    /// The scene's file, where it is known.
+    pub scene: Option<String>,
     /// The parameter file.
     pub params: String,
     /// The loss that was minimised, and its value at the end.
     pub loss: Option<(String, f64)>,
+    /// What was set instead of the file's values: a name and a value each.
+    pub set: Vec<String>,
     /// Standard errors of fitted parameters, one or three of each.
     pub std_errors: Vec<(Param, Vec<f64>)>,
 }
@@ -24,9 +26,12 @@ impl Provenance {
             env!("CARGO_PKG_VERSION"),
             one_line(&self.params)
         )];
-        lines.push(format!("Scene: {}", one_line(&self.scene)));
+        lines.extend(self.scene.as_ref().map(|scene| format!("Scene: {}", one_line(scene))));
         if let Some((name, value)) = &self.loss {
             lines.push(format!("Loss: {name}, {value:.6e} at the end of the fit"));
+        }
+        if !self.set.is_empty() {
+            lines.push(format!("Set for this export: {}", self.set.join(", ")));
         }
         for (param, errors) in &self.std_errors {
             let errors: Vec<String> = errors.iter().map(|e| format!("{e:.2e}")).collect();

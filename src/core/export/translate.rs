@@ -87,7 +87,7 @@ impl<'a> Translation<'a> {
             .collect();
         // Of one line each, as WGSL's long ones are broken with a comma at their end.
         self.text.push_str(&format!("{kind} {name}({}) {{", parameters.join(", ")));
-        if name == "is_finite" && self.dialect.bits.is_empty() {
+        if name.ends_with("is_finite") && self.dialect.bits.is_empty() {
             self.take_to("\n}");
             self.text.push_str("\n    return all(isfinite(v));\n}");
         }

@@ -15,6 +15,10 @@ const EPSILON: f64 = 1e-8;
 /// The step falls as 1 / (1 + iteration / this), so that it settles at all.
 const COOLING: f64 = 60.0;
 
+/// So many steps in a row without a lower loss end it: far more than the means of gradients remember, and enough for
+/// cooling to shorten the first steps to a quarter.
+const IDLE: u32 = 200;
+
 /// The state of Adam's steps.
 pub(super) type AdamState = IterState<Vec<f64>, Vec<f64>, (), (), (), f64>;
 
@@ -26,12 +30,36 @@ pub(super) struct Adam {
     /// Converged once the gradient is below this.
     tolerance: f64,
     length: f64,
+    /// What a loss must be lower by to count.
+    gain: f64,
+    lowest: f64,
+    /// Steps since it was.
+    idle: u32,
 }
 
 impl Adam {
-    /// With steps of a share of `scale`, the variables' natural size; `tolerance` of the gradient ends it.
-    pub(super) fn new(scale: f64, tolerance: f64) -> Self {
-        Self { rate: RATE * scale, mean: Vec::new(), square: Vec::new(), tolerance, length: f64::INFINITY }
+    /// With steps of a share of `scale`, the variables' natural size. A gradient below `tolerance` ends it, or losses that
+    /// fall by less than `gain` for long: of sums in f32 a gradient is never quite 0.
+    pub(super) fn new(scale: f64, tolerance: f64, gain: f64) -> Self {
+        Self {
+            rate: RATE * scale,
+            mean: Vec::new(),
+            square: Vec::new(),
+            tolerance,
+            length: f64::INFINITY,
+            gain,
+            lowest: f64::INFINITY,
+            idle: 0,
+        }
+    }
+
+    /// Take note of a step's loss.
+    fn note(&mut self, cost: f64) {
+        if cost < self.lowest - self.gain {
+            (self.lowest, self.idle) = (cost, 0);
+        } else {
+            self.idle += 1;
+        }
     }
 }
 
@@ -51,6 +79,7 @@ where
         let at = state.take_param().unwrap_or_default();
         (self.mean, self.square) = (vec![0.0; at.len()], vec![0.0; at.len()]);
         let cost = problem.cost(&at)?;
+        self.note(cost);
         let gradient = problem.gradient(&at)?;
         Ok((state.param(at).cost(cost).gradient(gradient), None))
     }
@@ -79,13 +108,14 @@ where
             let cost = state.get_cost();
             return Ok((state.param(at).cost(cost).gradient(gradient), None));
         };
+        self.note(cost);
         let gradient = problem.gradient(&moved)?;
         self.length = gradient.iter().map(|g| g * g).sum::<f64>().sqrt();
         Ok((state.param(moved).cost(cost).gradient(gradient), None))
     }
 
     fn terminate(&mut self, _: &AdamState) -> TerminationStatus {
-        if self.length <= self.tolerance {
+        if self.length <= self.tolerance || self.idle >= IDLE {
             return TerminationStatus::Terminated(TerminationReason::SolverConverged);
         }
         TerminationStatus::NotTerminated

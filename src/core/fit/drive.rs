@@ -6,7 +6,7 @@
 
 use std::path::Path;
 use std::sync::atomic::Ordering;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use argmin::core::{
     Error, Executor, IterState, KV, Problem, Solver, State, TerminationReason, TerminationStatus,
@@ -14,6 +14,7 @@ use argmin::core::{
 use argmin::solver::linesearch::MoreThuenteLineSearch;
 use argmin::solver::neldermead::NelderMead;
 use argmin::solver::quasinewton::LBFGS;
+use web_time::Instant;
 
 use super::adam::{Adam, AdamState};
 use super::bounded;
@@ -271,7 +272,7 @@ fn run_once(kind: SolverKind, log: &mut Log<'_>) -> Result<Ending, FitError> {
         let watched = Watched { solver, log, coordinates };
         execute(Executor::new(problem, watched).configure(configure), kind)
     } else if kind == SolverKind::Adam {
-        let solver = Adam::new(scale.sqrt(), GRADIENT_TOLERANCE * scale.sqrt());
+        let solver = Adam::new(scale.sqrt(), GRADIENT_TOLERANCE * scale.sqrt(), COST_TOLERANCE * scale);
         let start = transform.start().to_vec();
         let configure = |s: AdamState| s.param(start).max_iters(left);
         let watched = Watched { solver, log, coordinates };

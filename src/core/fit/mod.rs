@@ -13,7 +13,7 @@
 //! - [`outcome`]: what a fit yields
 //! - [`params_file`]: what was fitted, as `params.toml`
 
-use std::time::Instant;
+use web_time::Instant;
 
 mod adam;
 pub mod bounded;

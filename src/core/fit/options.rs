@@ -171,10 +171,10 @@ pub enum FitError {
     #[error(transparent)]
     State(#[from] StateError),
     /// The engine failed.
-    #[error("{0} What was found up to then is kept: go on with --resume.")]
+    #[error("{0} What was found up to then is kept, and the fit can go on from there.")]
     Engine(#[from] EngineFault),
     /// The solver failed.
-    #[error("the solver {solver} failed: {reason}. Try another one (--solver varpro).")]
+    #[error("the solver {solver} failed: {reason}. Try another one.")]
     Solver {
         /// Its name.
         solver: &'static str,

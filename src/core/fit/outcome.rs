@@ -37,6 +37,15 @@ pub struct Outcome {
     pub ending: Ending,
 }
 
+impl Outcome {
+    /// What is known of the unknown of that name, as reports have it: `base_weight`, of a parameter that is free in
+    /// each channel `hilite.r`, of a view's factor `gain.1`. `None` where it was not free.
+    #[must_use]
+    pub fn constant(&self, name: &str) -> Option<&UnknownOutcome> {
+        self.unknowns.iter().find(|outcome| outcome.unknown.name() == name)
+    }
+}
+
 /// How one of several starts fared.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StartOutcome {

@@ -17,12 +17,16 @@
 //!
 //! Reading is strict: an unknown name, a value outside its parameter's bounds or another form than the
 //! scene's is refused with its line. A parameter that the file does not name keeps the scene's value.
+//!
+//! `foreign`: what is said of constants that were fitted with other effects
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
+mod foreign;
 mod parse;
 
+pub use foreign::Foreign;
 use parse::{Problem, parse};
 
 use crate::engine::Unknown;
@@ -30,7 +34,7 @@ use crate::fit::outcome::{Outcome, UnknownOutcome};
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Channels, Param, Params};
 use crate::output::{self, OutputError};
-use crate::scene::Loss;
+use crate::scene::{Assignment, Loss};
 
 /// What a `params.toml` holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +51,17 @@ pub struct ParamsFile {
     pub gains: Vec<(String, f64)>,
 }
 
+/// Where the values of a `params.toml` come from, for its comments.
+#[derive(Clone, Copy, Debug)]
+pub struct Origin<'a> {
+    /// The scene's file.
+    pub scene: &'a Path,
+    /// How the fit ended; none where nothing was fitted.
+    pub outcome: Option<&'a Outcome>,
+    /// What was set instead of the scene's values.
+    pub set: &'a [Assignment],
+}
+
 /// A `params.toml` cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[error("{}{}: {problem}", path.display(), line.map(|n| format!(", line {n}")).unwrap_or_default())]
@@ -57,16 +72,17 @@ pub struct ParamsFileError {
 }
 
 impl ParamsFile {
-    /// The file's text; with an `outcome`, comments tell what it came from, of the scene `scene`.
+    /// The file's text, with comments that tell what it comes from.
     #[must_use]
-    pub fn to_toml(&self, scene: &Path, outcome: Option<&Outcome>) -> String {
+    pub fn to_toml(&self, origin: Origin<'_>) -> String {
         let mut text = String::new();
         // Writing to a string cannot fail.
-        let _ = self.write_text(&mut text, scene, outcome);
+        let _ = self.write_text(&mut text, origin);
         text
     }
 
-    fn write_text(&self, text: &mut String, scene: &Path, outcome: Option<&Outcome>) -> std::fmt::Result {
+    fn write_text(&self, text: &mut String, origin: Origin<'_>) -> std::fmt::Result {
+        let Origin { scene, outcome, set } = origin;
         // A line break in a path must not end the comment.
         let scene: String =
             scene.display().to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
@@ -79,6 +95,10 @@ impl ParamsFile {
                 writeln!(text, "# Loss {start:.6e} at the start, {end:.6e} at the end.")?;
             }
         }
+        if !set.is_empty() {
+            let set: Vec<String> = set.iter().map(ToString::to_string).collect();
+            writeln!(text, "# Set on the command line before the fit: {}.", set.join(", "))?;
+        }
         writeln!(text, "form = \"{}\"", self.form.name())?;
         if let Some(effects) = self.effects {
             let names: Vec<&str> = effects.iter().map(Effect::name).collect();
@@ -89,8 +109,8 @@ impl ParamsFile {
         }
         writeln!(text, "\n[params]")?;
         let known = outcome.map_or(&[][..], |outcome| &outcome.unknowns);
-        for param in Param::all() {
-            let line = format!("{} = {}", param.name(), value(self.params.rgb(param)));
+        for param in Param::of(self.effects.unwrap_or_default()) {
+            let line = format!("{} = {}", key(param), value(self.params.rgb(param)));
             line_with_comment(text, &line, &comment(known, |unknown| param_channel(unknown, param)))?;
         }
         if !self.gains.is_empty() {
@@ -108,8 +128,8 @@ impl ParamsFile {
     ///
     /// # Errors
     /// When it cannot be written.
-    pub fn write(&self, path: &Path, scene: &Path, outcome: Option<&Outcome>) -> Result<(), OutputError> {
-        output::write(path, self.to_toml(scene, outcome).as_bytes())
+    pub fn write(&self, path: &Path, origin: Origin<'_>) -> Result<(), OutputError> {
+        output::write(path, self.to_toml(origin).as_bytes())
     }
 
     /// Read a file for a scene of `form`; what it does not name is as in `base`.
@@ -118,6 +138,19 @@ impl ParamsFile {
     /// When it cannot be read, is no TOML, names what there is not, has values of the wrong kind or
     /// outside their bounds, or is of another form.
     pub fn read(path: &Path, form: Form, base: &Params) -> Result<Self, ParamsFileError> {
+        Self::parsed(path, Some((form, base)))
+    }
+
+    /// Read a file for itself: it is of the form that it says, or corrected, and what it does not name is that form's
+    /// default.
+    ///
+    /// # Errors
+    /// As of [`Self::read`].
+    pub fn read_alone(path: &Path) -> Result<Self, ParamsFileError> {
+        Self::parsed(path, None)
+    }
+
+    fn parsed(path: &Path, scene: Option<(Form, &Params)>) -> Result<Self, ParamsFileError> {
         let error = |line, problem| ParamsFileError { path: path.to_owned(), line, problem };
         let text = std::fs::read_to_string(path).map_err(|e| {
             error(
@@ -125,7 +158,9 @@ impl ParamsFile {
                 format!("the parameters cannot be read: {e}. Name a params.toml that a fit has left."),
             )
         })?;
-        parse(&text, form, base).map_err(|Problem { place, problem }| {
+        parse(&text, scene).map_err(|Problem { place, problem }| {
+            // What is said quotes the file, whose words may hold anything: one paragraph it stays.
+            let problem = problem.replace(char::is_control, " ");
             let breaks = |at: usize| text.bytes().take(at).filter(|&byte| byte == b'\n').count();
             let line = place.map(|at| breaks(at.start) + 1);
             error(line, problem)
@@ -138,8 +173,13 @@ fn value(rgb: [f64; 3]) -> String {
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] { format!("{:?}", rgb[0]) } else { format!("{rgb:?}") }
 }
 
+/// A parameter's name as a key: quoted where it has dots.
+fn key(param: Param) -> String {
+    if param.name().contains('.') { quoted(param.name()) } else { param.name().to_owned() }
+}
+
 /// A basic string: JSON's escapes are TOML's too, but for DEL, which JSON leaves bare.
-fn quoted(name: &str) -> String {
+pub(crate) fn quoted(name: &str) -> String {
     serde_json::Value::from(name).to_string().replace('\u{7f}', "\\u007f")
 }
 
@@ -186,7 +226,7 @@ mod tests {
     fn what_is_written_reads_back_to_the_bit() {
         for form in Form::ALL {
             let mut params = Params::defaults(form);
-            for (i, param) in Param::all().enumerate() {
+            for (i, param) in Param::built_in().enumerate() {
                 // Values with long decimals, within all bounds.
                 params.set(
                     param,
@@ -197,8 +237,14 @@ mod tests {
             let gains = vec![("front \"left\"".to_owned(), 0.7), ("b\nc\u{7f}\u{1}".to_owned(), 1.0 / 3.0)];
             let effects = Some(Effects::SURFACE);
             let file = ParamsFile { form, effects, loss: Some(Loss::Huber), params, gains };
-            let text = file.to_toml(Path::new("a\nform = 1"), None);
+            let set = ["hilite=1,2,3".parse().unwrap()];
+            let text = file.to_toml(Origin { scene: Path::new("a\nform = 1"), outcome: None, set: &set });
             assert_eq!(read(&text, form).unwrap(), file, "{text}");
+            assert!(text.contains("\n# Set on the command line before the fit: hilite=1,2,3.\n"), "{text}");
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("params.toml");
+            std::fs::write(&path, &text).unwrap();
+            assert_eq!(ParamsFile::read_alone(&path).unwrap(), file, "{text}");
         }
     }
 

@@ -27,7 +27,7 @@ pub enum StateError {
     /// It cannot be read.
     #[error(
         "{}: the state of the interrupted fit cannot be read: {reason}. Name a run folder that a fit was \
-         interrupted in, or start afresh without --resume.", path.display()
+         interrupted in, or start afresh.", path.display()
     )]
     Unreadable {
         /// The file.
@@ -36,7 +36,7 @@ pub enum StateError {
         reason: String,
     },
     /// It is not a state, or a damaged one.
-    #[error("{}: this is not a state that a fit has left: {reason}. Start afresh without --resume.", path.display())]
+    #[error("{}: this is not a state that a fit has left: {reason}. Start afresh.", path.display())]
     Corrupt {
         /// The file.
         path: PathBuf,
@@ -46,8 +46,7 @@ pub enum StateError {
     /// It is another fit's.
     #[error(
         "{}: this state belongs to another fit: its {what} differs ({found}; now {expected}). Resume with the \
-         scene and options that the fit was started with, name another run folder, or start afresh without \
-         --resume.", path.display()
+         scene and options that the fit was started with, name another run folder, or start afresh.", path.display()
     )]
     Different {
         /// The file.
@@ -223,7 +222,9 @@ impl Saved {
         {
             return Err(different(path, "format", format.to_string(), FORMAT.to_string()));
         }
-        serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))
+        // Keys of the file stand in what is said of it: what they hold must not break the paragraph.
+        let said = |e: serde_json::Error| e.to_string().replace(char::is_control, " ");
+        serde_json::from_slice(&bytes).map_err(|e| corrupt(said(e)))
     }
 
     fn belongs_to(&self, now: &Self, path: &Path) -> Result<(), StateError> {
@@ -266,7 +267,7 @@ fn different(path: &Path, what: &str, found: String, expected: String) -> StateE
 /// The first of two points' values that differs, named.
 fn first_difference(was: &[f64], is: &[f64]) -> (String, String) {
     let at = was.iter().zip(is).position(|(a, b)| a != b).unwrap_or(was.len().min(is.len()));
-    let name = Param::all().nth(at / 3).map_or("gain", Param::name);
+    let name = Param::built_in().nth(at / 3).map_or("gain or added parameter", Param::name);
     let say = |values: &[f64]| match values.get(at) {
         Some(value) => format!("{name} {value}"),
         None => format!("{} views", values.len().saturating_sub(3 * Param::COUNT)),
@@ -274,8 +275,10 @@ fn first_difference(was: &[f64], is: &[f64]) -> (String, String) {
     (say(was), say(is))
 }
 
-/// Every number of a point, in order.
+/// Every number of a point, in order. Of added parameters those alone that are not at their defaults: which of them
+/// there are depends on what else the process has read.
 fn values(point: &Point) -> Vec<f64> {
-    let params = Param::all().flat_map(|param| point.params.rgb(param));
+    let said = |param: &Param| param.is_built_in() || point.params.rgb(*param) != [param.info().corrected; 3];
+    let params = Param::all().filter(said).flat_map(|param| point.params.rgb(param));
     params.chain(point.gains.iter().copied()).collect()
 }

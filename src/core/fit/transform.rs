@@ -8,7 +8,7 @@ const MOST: f64 = 30.0;
 /// A start on a bound is taken this share of the interval (or of 1) inside: on the bound itself
 /// the transform has no slope, and a solver would never leave it.
 const NUDGE: f64 = 0.05;
-/// Starts this near to a bound count as on it.
+/// Starts this near to a bound, as a share of the interval (or of 1), count as on it.
 const NEAR: f64 = 1e-3;
 
 #[derive(Clone, Copy, Debug)]
@@ -116,12 +116,14 @@ impl Shape {
                 inside => inside.ln(),
             },
             Self::Logistic { lower, width } => {
-                let share = match (at - lower) / width {
-                    share if share < NEAR => NUDGE,
-                    share if share > 1.0 - NEAR => 1.0 - NUDGE,
-                    share => share,
+                // A gain's interval is a thousand wide, and 1 is in the midst of it: there 1 is what counts.
+                let reach = width.min(1.0);
+                let above = match at - lower {
+                    above if above < NEAR * reach => NUDGE * reach,
+                    above if width - above < NEAR * reach => width - NUDGE * reach,
+                    above => above,
                 };
-                (share / (1.0 - share)).ln()
+                (above / (width - above)).ln()
             }
         }
     }
@@ -130,6 +132,7 @@ impl Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::Unknown;
 
     #[test]
     fn values_stay_within_bounds_and_slopes_are_their_derivatives() {
@@ -146,6 +149,13 @@ mod tests {
                 // exp(ln x), ln and two additions: a few roundings.
                 assert!((shape.value(shape.inverse(inside)) - inside).abs() < 1e-14);
             }
+        }
+        // A gain starts where it is, not at a share of its interval, which is a thousand wide.
+        let gain = Unknown::Gain(1).bounds();
+        let gain = Shape::within(gain.0, gain.1);
+        for inside in [0.01, 0.5, 1.0, 1.3, 50.0] {
+            // The width, by which ratios are rounded, is a thousand times 1.
+            assert!((gain.value(gain.inverse(inside)) - inside).abs() < 1e-12, "{inside}");
         }
         // A start on a bound is nudged off it.
         let half = Shape::within(0.0, f64::INFINITY);

@@ -8,9 +8,12 @@
 //! alpha  = haze_weight haze
 //! ```
 
+use std::fmt;
+
 use super::effects::{Effect, Effects};
 use super::params::{Param, Params};
 use super::real::Real;
+use super::registry::{Added, RegistryError};
 use super::rim::{Rim, rim};
 use super::terms::Terms;
 use super::vector::V3;
@@ -171,12 +174,8 @@ impl<R: Real> Composition<R> {
             Param::KeyColor => t.key[c],
             Param::RimExponent => self.rim_light(c) * self.occ_rim_slope,
             Param::Occlusion => -self.blocked * self.occluded(c),
-            Param::HazeWeight
-            | Param::NormalStrength
-            | Param::SpecularLobe
-            | Param::EnvironmentRotation
-            | Param::KeyAzimuth
-            | Param::KeyElevation => self.occ.lit(0.0),
+            // The haze's weight, what moves lookups, and what was added to the table.
+            _ => self.occ.lit(0.0),
         }
     }
 
@@ -200,49 +199,101 @@ impl<R: Real> Composition<R> {
     }
 }
 
-/// The parts that add up to the result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs, reason = "named as the effects")]
-pub enum TermName {
-    Diffuse,
-    Rim,
-    SideSpecular,
-    Hilite,
-    Reflection,
-    KeyLight,
+/// A part of the result, an image layer of its own: the place of its row among the built-in ones, which stand first in
+/// the order of the sum, and those that [`register`](TermName::register) has added.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct TermName(u16);
+
+/// One row of the table of terms.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TermInfo {
+    /// The name of the term's layer in image files.
+    pub name: &'static str,
+    /// It is there when all of these effects are enabled.
+    pub effects: &'static [Effect],
 }
 
+/// The built-in terms, named as the effects that they belong to.
+#[allow(missing_docs, reason = "named as the effects")]
+#[allow(non_upper_case_globals, reason = "they are the values that a term may have, as variants would be")]
 impl TermName {
-    /// Every term, in the order of the sum.
-    pub const ALL: [Self; 6] =
+    pub const Diffuse: Self = Self(0);
+    pub const Rim: Self = Self(1);
+    pub const SideSpecular: Self = Self(2);
+    pub const Hilite: Self = Self(3);
+    pub const Reflection: Self = Self(4);
+    pub const KeyLight: Self = Self(5);
+}
+
+static TABLE: [TermInfo; TermName::BUILT_IN.len()] = [
+    TermInfo { name: "diffuse", effects: &[Effect::Diffuse] },
+    TermInfo { name: "rim", effects: &[Effect::Diffuse, Effect::Rim] },
+    TermInfo { name: "side_specular", effects: &[Effect::SideSpecular] },
+    TermInfo { name: "hilite", effects: &[Effect::Hilite] },
+    TermInfo { name: "reflection", effects: &[Effect::Reflection] },
+    TermInfo { name: "key_light", effects: &[Effect::KeyLight] },
+];
+
+/// What was added to the table.
+static ADDED: Added<TermInfo> = Added::new();
+
+impl TermName {
+    /// The built-in terms, in the order of the sum.
+    pub const BUILT_IN: [Self; 6] =
         [Self::Diffuse, Self::Rim, Self::SideSpecular, Self::Hilite, Self::Reflection, Self::KeyLight];
+
+    /// Add a row. A row that is there already is not added again.
+    ///
+    /// # Errors
+    /// When another term has its name.
+    pub fn register(row: TermInfo) -> Result<Self, RegistryError> {
+        let taken = || RegistryError::Taken { kind: "term", name: row.name.to_owned() };
+        if TABLE.iter().any(|other| other.name == row.name) {
+            return Err(taken());
+        }
+        let full = |_| RegistryError::Full { kind: "term", most: 1 << 16 };
+        let make = |place: usize| u16::try_from(TABLE.len() + place).map(|_| row).map_err(full);
+        ADDED.add(|other| other.name == row.name, |other| *other == row, make, taken)?;
+        Self::from_name(row.name).ok_or_else(taken)
+    }
+
+    /// Every term: the built-in ones, then what was added.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..TABLE.len() + ADDED.len()).map(|place| Self(place as u16))
+    }
 
     /// The terms that `effects` have.
     #[must_use]
     pub fn of(effects: Effects) -> Vec<Self> {
-        let has = |effect| effects.has(effect);
-        let enabled = |name: &Self| match name {
-            Self::Diffuse => has(Effect::Diffuse),
-            Self::Rim => has(Effect::Diffuse) && has(Effect::Rim),
-            Self::SideSpecular => has(Effect::SideSpecular),
-            Self::Hilite => has(Effect::Hilite),
-            Self::Reflection => has(Effect::Reflection),
-            Self::KeyLight => has(Effect::KeyLight),
-        };
-        Self::ALL.into_iter().filter(enabled).collect()
+        Self::all().filter(|term| term.info().effects.iter().all(|&effect| effects.has(effect))).collect()
+    }
+
+    /// The term of that name.
+    #[must_use]
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::all().find(|term| term.name() == name)
+    }
+
+    /// Its place in the table.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    fn info(self) -> &'static TermInfo {
+        TABLE.get(self.index()).unwrap_or_else(|| ADDED.row(self.index() - TABLE.len()))
     }
 
     /// The name of the term's layer in image files.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Diffuse => "diffuse",
-            Self::Rim => "rim",
-            Self::SideSpecular => "side_specular",
-            Self::Hilite => "hilite",
-            Self::Reflection => "reflection",
-            Self::KeyLight => "key_light",
-        }
+    pub fn name(self) -> &'static str {
+        self.info().name
+    }
+}
+
+impl fmt::Debug for TermName {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 

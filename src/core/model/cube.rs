@@ -7,6 +7,9 @@
 use super::real::Real;
 use super::vector::{V3, select};
 
+/// This file, for caches of what is made of cubes.
+pub(crate) const SOURCE: &str = include_str!("cube.rs");
+
 /// A cube map, RGBA, with a border of one texel around each face.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cube<T> {
@@ -191,12 +194,24 @@ impl<T: Copy> Cube<T> {
     /// The texels around a point.
     #[inline(always)]
     pub fn footprint<R: Real>(&self, point: &CubePoint<R>) -> Footprint<R> {
-        let (zero, half) = (point.s.lit(0.0), point.s.lit(0.5));
+        self.footprint_at(point.face, point.s, point.t)
+    }
+
+    /// The texels around (`s`, `t`) in [0, 1]^2 of a face.
+    #[inline(always)]
+    pub fn footprint_at<R: Real>(&self, face: R, s: R, t: R) -> Footprint<R> {
+        let (zero, half) = (s.lit(0.0), s.lit(0.5));
         let (size, side) = (half.lit(self.size as f64), half.lit((self.size + 2) as f64));
-        let (x, y) = (point.s.mul_add(size, half), point.t.mul_add(size, half));
+        let (x, y) = (s.mul_add(size, half), t.mul_add(size, half));
         let (column, row) = (x.floor().max(zero).min(size), y.floor().max(zero).min(size));
-        let first = point.face.mul_add(side, row).mul_add(side, column);
+        let first = face.mul_add(side, row).mul_add(side, column);
         Footprint { first, place: [x - column, y - row] }
+    }
+
+    /// The lookup at a footprint, and how it moves across and down, a texel.
+    #[inline(always)]
+    pub fn sample_with_gradient<R: Real<Texel = T>>(&self, at: &Footprint<R>) -> [[R; 4]; 3] {
+        R::bilinear_with_gradient(&self.padded, self.size + 2, at.first, at.place)
     }
 
     /// How footprints move, in texels, when their point moves along `tangent`.

@@ -2,6 +2,8 @@
 
 use std::fmt;
 
+use super::registry::{Added, RegistryError};
+
 /// Which of the two readings of the paper's listings is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Form {
@@ -61,39 +63,105 @@ impl Silhouette {
     }
 }
 
-/// One switchable part of the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
-pub enum Effect {
+/// One switchable part of the model: the place of its row among the built-in ones, which stand first, and those that
+/// [`register`](Effect::register) has added.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Effect(u8);
+
+/// The built-in effects.
+#[allow(non_upper_case_globals, reason = "they are the values that an effect may have, as variants would be")]
+impl Effect {
     /// Albedo times irradiance.
-    Diffuse,
+    pub const Diffuse: Self = Self(0);
     /// Tangent-space normal map; without it n is the smooth normal.
-    NormalMap,
+    pub const NormalMap: Self = Self(1);
     /// Ambient occlusion; without it everything is open.
-    Occlusion,
+    pub const Occlusion: Self = Self(2);
     /// The diffuse rim weight; without it only `base_weight` is left of the diffuse factor.
-    Rim,
+    pub const Rim: Self = Self(3);
     /// Specular map times the specular cube along the normal.
-    SideSpecular,
+    pub const SideSpecular: Self = Self(4);
     /// Back light seen through the rim: the hilite cube along the view vector.
-    Hilite,
+    pub const Hilite: Self = Self(5);
     /// The specular cube along the reflection vector, dappled.
-    Reflection,
+    pub const Reflection: Self = Self(6);
     /// The reflection's alpha to the output alpha.
-    Haze,
+    pub const Haze: Self = Self(7);
     /// A blur pass over alpha-weighted colour, driven by the haze.
-    Bloom,
+    pub const Bloom: Self = Self(8);
     /// The paper's second version: one key light gives the bump map's contribution.
-    KeyLight,
+    pub const KeyLight: Self = Self(9);
     /// Morph targets.
-    Morph,
+    pub const Morph: Self = Self(10);
     /// Skinning by bones.
-    Skin,
+    pub const Skin: Self = Self(11);
 }
 
+/// One row of the table of effects.
+#[derive(Clone, Copy, Debug)]
+pub struct EffectInfo {
+    /// The name in scene files and on the command line.
+    pub name: &'static str,
+    /// What it shows, in one line.
+    pub meaning: &'static str,
+    /// What it asks of the stages before the model beside what the built-in effects do, when it is one of a set;
+    /// `None` of a built-in one, whose needs [`Effects::needs`] knows.
+    pub needs: Option<fn(Effect, Effects, Silhouette) -> Needs>,
+}
+
+const TABLE: [EffectInfo; Effect::BUILT_IN.len()] = [
+    EffectInfo { name: "diffuse", meaning: "Albedo times irradiance", needs: None },
+    EffectInfo {
+        name: "normal_map",
+        meaning: "Tangent-space normal map; without it n is the smooth normal",
+        needs: None,
+    },
+    EffectInfo {
+        name: "occlusion",
+        meaning: "Ambient occlusion; without it everything is open",
+        needs: None,
+    },
+    EffectInfo {
+        name: "rim",
+        meaning: "The diffuse rim weight; without it only `base_weight` is left of the diffuse factor",
+        needs: None,
+    },
+    EffectInfo {
+        name: "side_specular",
+        meaning: "Specular map times the specular cube along the normal",
+        needs: None,
+    },
+    EffectInfo {
+        name: "hilite",
+        meaning: "Back light seen through the rim: the hilite cube along the view vector",
+        needs: None,
+    },
+    EffectInfo {
+        name: "reflection",
+        meaning: "The specular cube along the reflection vector, dappled",
+        needs: None,
+    },
+    EffectInfo { name: "haze", meaning: "The reflection's alpha to the output alpha", needs: None },
+    EffectInfo {
+        name: "bloom",
+        meaning: "A blur pass over alpha-weighted colour, driven by the haze",
+        needs: None,
+    },
+    EffectInfo {
+        name: "key_light",
+        meaning: "The paper's second version: one key light gives the bump map's contribution",
+        needs: None,
+    },
+    EffectInfo { name: "morph", meaning: "Morph targets", needs: None },
+    EffectInfo { name: "skin", meaning: "Skinning by bones", needs: None },
+];
+
+/// What was added to the table.
+static ADDED: Added<EffectInfo> = Added::new();
+
 impl Effect {
-    /// Every effect, in the order of documentation.
-    pub const ALL: [Self; 12] = [
+    /// The built-in effects, in the order of documentation.
+    pub const BUILT_IN: [Self; 12] = [
         Self::Diffuse,
         Self::NormalMap,
         Self::Occlusion,
@@ -108,37 +176,74 @@ impl Effect {
         Self::Skin,
     ];
 
+    /// Every effect: the built-in ones, then what was added.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let most = Self::BUILT_IN.len() + ADDED.len();
+        (0..most).map(|place| Self(place as u8))
+    }
+
+    /// Add a row. A row of the same name and meaning is not added again.
+    ///
+    /// # Errors
+    /// When another effect has its name, or a set holds no more.
+    pub fn register(row: EffectInfo) -> Result<Self, RegistryError> {
+        let taken = || RegistryError::Taken { kind: "effect", name: row.name.to_owned() };
+        if TABLE.iter().any(|other| other.name == row.name) {
+            return Err(taken());
+        }
+        let make = |place: usize| {
+            if Self::BUILT_IN.len() + place < Effects::MOST {
+                Ok(row)
+            } else {
+                Err(RegistryError::Full { kind: "effect", most: Effects::MOST })
+            }
+        };
+        let same = |other: &EffectInfo| other.meaning == row.meaning;
+        ADDED.add(|other| other.name == row.name, same, make, taken)?;
+        Self::from_name(row.name).ok_or_else(taken)
+    }
+
+    /// Its row.
+    #[must_use]
+    pub fn info(self) -> &'static EffectInfo {
+        static ROWS: [EffectInfo; Effect::BUILT_IN.len()] = TABLE;
+        let place = usize::from(self.0);
+        ROWS.get(place).unwrap_or_else(|| ADDED.row(place - ROWS.len()))
+    }
+
+    /// Whether its row is built in.
+    #[must_use]
+    pub const fn is_built_in(self) -> bool {
+        (self.0 as usize) < Self::BUILT_IN.len()
+    }
+
     /// The name in scene files and on the command line.
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Diffuse => "diffuse",
-            Self::NormalMap => "normal_map",
-            Self::Occlusion => "occlusion",
-            Self::Rim => "rim",
-            Self::SideSpecular => "side_specular",
-            Self::Hilite => "hilite",
-            Self::Reflection => "reflection",
-            Self::Haze => "haze",
-            Self::Bloom => "bloom",
-            Self::KeyLight => "key_light",
-            Self::Morph => "morph",
-            Self::Skin => "skin",
-        }
+    pub fn name(self) -> &'static str {
+        self.info().name
     }
 
     /// The effect of that name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|effect| effect.name() == name)
+        Self::all().find(|effect| effect.name() == name)
+    }
+}
+
+impl fmt::Debug for Effect {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 
 /// A set of enabled effects.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Effects(u16);
+pub struct Effects([u64; 4]);
 
 impl Effects {
+    /// How many effects there may be.
+    pub const MOST: usize = 256;
+
     /// What a scene gets when it names no effects: the paper's fragment program.
     pub const SURFACE: Self = Self::of(&[
         Effect::Diffuse,
@@ -153,19 +258,19 @@ impl Effects {
     /// The set of the listed effects.
     #[must_use]
     pub const fn of(effects: &[Effect]) -> Self {
-        let mut bits = 0;
+        let mut set = Self([0; 4]);
         let mut i = 0;
         while i < effects.len() {
-            bits |= 1 << effects[i] as u16;
+            set = set.with(effects[i]);
             i += 1;
         }
-        Self(bits)
+        set
     }
 
     /// Whether `effect` is enabled.
     #[must_use]
     pub const fn has(self, effect: Effect) -> bool {
-        self.0 & (1 << effect as u16) != 0
+        self.0[effect.0 as usize / 64] & (1 << (effect.0 % 64)) != 0
     }
 
     /// Whether any of `effects` is enabled.
@@ -177,18 +282,27 @@ impl Effects {
     /// This set and `effect`.
     #[must_use]
     pub const fn with(self, effect: Effect) -> Self {
-        Self(self.0 | 1 << effect as u16)
+        let mut bits = self.0;
+        bits[effect.0 as usize / 64] |= 1 << (effect.0 % 64);
+        Self(bits)
     }
 
     /// This set without `effect`.
     #[must_use]
     pub const fn without(self, effect: Effect) -> Self {
-        Self(self.0 & !(1 << effect as u16))
+        let mut bits = self.0;
+        bits[effect.0 as usize / 64] &= !(1 << (effect.0 % 64));
+        Self(bits)
     }
 
     /// The enabled effects in the order of documentation.
     pub fn iter(self) -> impl Iterator<Item = Effect> {
-        Effect::ALL.into_iter().filter(move |&e| self.has(e))
+        (0..=u8::MAX).map(Effect).filter(move |&effect| self.has(effect))
+    }
+
+    /// Those of them that are not built in: evaluators that know the built-in model alone cannot show them.
+    pub fn added(self) -> impl Iterator<Item = Effect> {
+        self.iter().filter(|effect| !effect.is_built_in())
     }
 
     /// What the enabled effects ask for, with the silhouette evaluated as `silhouette` says.
@@ -204,7 +318,7 @@ impl Effects {
         let normal_map = self.has(E::NormalMap) && shaded_by_n;
         let albedo = self.has_any(&[E::Diffuse, E::KeyLight]);
         let attenuator = self.has_any(&[E::Hilite, E::Haze, E::Bloom]);
-        Needs {
+        let built_in = Needs {
             color_map: albedo,
             normal_map,
             specular_map: self.has(E::SideSpecular),
@@ -217,8 +331,11 @@ impl Effects {
             rim,
             dapple: reflection,
             haze: self.has_any(&[E::Haze, E::Bloom]),
+            smooth_normal: self.has(E::KeyLight),
             key_light: self.has(E::KeyLight),
-        }
+        };
+        let added = self.added().filter_map(|effect| Some(effect.info().needs?(effect, self, silhouette)));
+        added.fold(built_in, Needs::or)
     }
 }
 
@@ -261,11 +378,34 @@ pub struct Needs {
     pub dapple: bool,
     /// The output's alpha.
     pub haze: bool,
+    /// The smooth normal, beside the bumped one.
+    pub smooth_normal: bool,
     /// The key light's direction and colour.
     pub key_light: bool,
 }
 
 impl Needs {
+    /// What either asks for.
+    #[must_use]
+    pub const fn or(self, other: Self) -> Self {
+        Self {
+            color_map: self.color_map || other.color_map,
+            normal_map: self.normal_map || other.normal_map,
+            specular_map: self.specular_map || other.specular_map,
+            attenuator_map: self.attenuator_map || other.attenuator_map,
+            tangents: self.tangents || other.tangents,
+            irradiance: self.irradiance || other.irradiance,
+            lobes: self.lobes || other.lobes,
+            hilite: self.hilite || other.hilite,
+            occlusion: self.occlusion || other.occlusion,
+            rim: self.rim || other.rim,
+            dapple: self.dapple || other.dapple,
+            haze: self.haze || other.haze,
+            smooth_normal: self.smooth_normal || other.smooth_normal,
+            key_light: self.key_light || other.key_light,
+        }
+    }
+
     /// Whether any map is sampled, and so texture coordinates are needed.
     #[must_use]
     pub const fn maps(self) -> bool {
@@ -283,11 +423,23 @@ impl Needs {
 mod tests {
     use super::*;
 
+    /// Every 37th of all subsets of the built-in effects: 37 divides no power of two, so each effect is met beside
+    /// each other one, switched on and off.
+    fn sampled() -> impl Iterator<Item = Effects> {
+        (0..1_u32 << Effect::BUILT_IN.len()).step_by(37).map(|bits| {
+            Effect::BUILT_IN
+                .into_iter()
+                .enumerate()
+                .filter(|(i, _)| bits & (1 << i) != 0)
+                .map(|(_, e)| e)
+                .collect()
+        })
+    }
+
     #[test]
     fn turning_an_effect_off_never_asks_for_more() {
         let count = |needs: Needs| format!("{needs:?}").matches("true").count();
-        for bits in 0..(1_u16 << Effect::ALL.len()) {
-            let set = Effects(bits);
+        for set in sampled() {
             for silhouette in Silhouette::ALL {
                 let all = count(set.needs(silhouette));
                 for effect in set.iter() {
@@ -299,8 +451,17 @@ mod tests {
 
     #[test]
     fn names_are_unique_and_found_again() {
-        for effect in Effect::ALL {
+        for effect in Effect::BUILT_IN {
             assert_eq!(Effect::from_name(effect.name()), Some(effect));
+        }
+    }
+
+    #[test]
+    fn a_set_keeps_every_effect_that_there_may_be_apart() {
+        for place in 0..=u8::MAX {
+            let set = Effects::default().with(Effect(place));
+            assert_eq!(set.iter().map(|effect| effect.0).collect::<Vec<_>>(), [place]);
+            assert_eq!(set.without(Effect(place)), Effects::default());
         }
     }
 }

@@ -2,7 +2,7 @@
 //! the same pieces; this is the plain composition of them, for single fragments and for tests.
 
 use super::compose::{Composition, Weights};
-use super::effects::{Effects, Form, Silhouette};
+use super::effects::{Effect, Effects, Form, Silhouette};
 use super::fragment::{Fragment, shading};
 use super::lights::Lights;
 use super::params::{Param, Params};
@@ -18,6 +18,24 @@ pub struct Setup {
     pub silhouette: Silhouette,
     /// What is switched on.
     pub effects: Effects,
+}
+
+/// An effect that an evaluator does not know which was written for the built-in ones alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "the effect {} comes from a file of its own, which the hand-written evaluator on the CPU does not know. Use the \
+     graphics adapter, or leave the effect out", .0.name()
+)]
+pub struct AddedEffect(pub Effect);
+
+impl Setup {
+    /// Refuse what evaluators that are written for the built-in effects alone do not know.
+    ///
+    /// # Errors
+    /// When an effect is enabled that was added.
+    pub fn built_in(&self) -> Result<(), AddedEffect> {
+        self.effects.added().next().map_or(Ok(()), |effect| Err(AddedEffect(effect)))
+    }
 }
 
 impl LookupParam {

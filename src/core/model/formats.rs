@@ -258,6 +258,16 @@ macro_rules! as_f64 {
             let (value, slope) = f64::bilinear_with_slope(texels, row, index.0, f, d.map(|d| d.0));
             (value.map(Self::new), slope.map(Self::new))
         }
+        #[inline(always)]
+        fn bilinear_with_gradient(
+            texels: &[[f64; 4]],
+            row: usize,
+            index: Self,
+            f: [Self; 2],
+        ) -> [[Self; 4]; 3] {
+            let f = f.map(|f| F::between(f.0));
+            f64::bilinear_with_gradient(texels, row, index.0, f).map(|part| part.map(Self::new))
+        }
     };
 }
 

@@ -38,15 +38,15 @@ pub struct Fragment<R> {
 /// The two parts of the shading normal from a normal map's texel in [0, 1] and the rows of the
 /// tangent-to-world matrix: n is the direction of `base + normal_strength bump`.
 ///
-/// `listing` takes the texel as it is (oddity 5). `corrected` decodes it; a texel that is not finite
-/// or decodes to nothing gives the smooth normal (MODEL 7).
+/// `listing` takes the texel as it is (oddity 5), `corrected` decodes it; one that is not finite or is nothing then
+/// gives the smooth normal (MODEL 7).
 #[inline(always)]
 pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V3<R>) -> (V3<R>, V3<R>) {
-    if form == Form::Listing {
-        return (scale(texel[2], n), scale_add(texel[0], t, scale(texel[1], b)));
-    }
     let (zero, one, two) = (n[0].lit(0.0), n[0].lit(1.0), n[0].lit(2.0));
-    let d = texel.map(|x| two * x - one);
+    let d = match form {
+        Form::Listing => texel,
+        Form::Corrected => texel.map(|x| two * x - one),
+    };
     let size = d[0].abs() + d[1].abs() + d[2].abs();
     let ok = R::and(size.is_finite(), zero.lt(size));
     let d = select::<R>(ok, d, [zero, zero, one]);

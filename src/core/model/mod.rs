@@ -5,6 +5,7 @@
 //! - [`vector`]: the few 3-vector operations that the formulas use
 //! - [`params`]: the one table of parameters
 //! - [`effects`]: what can be switched on, and what each effect asks for
+//! - [`registry`]: how tables of parameters, effects and terms grow
 //! - [`rim`]: the silhouette and its power
 //! - [`fragment`]: the fragment stage: shading normal and reflection
 //! - [`terms`]: the light's terms along them
@@ -23,6 +24,7 @@ pub mod fragment;
 pub mod lights;
 pub mod params;
 pub mod real;
+pub mod registry;
 pub mod rim;
 pub mod terms;
 pub mod vector;

@@ -1,27 +1,40 @@
 //! The one table of the model's parameters. Command line, documents, solvers and exporters
 //! derive from it; nothing about a parameter is written anywhere else.
+//!
+//! Its first rows are built in ([`TABLE`]); terms and scenes add others ([`Param::register`]), which stay for as long
+//! as the process runs.
+
+use std::fmt;
 
 use super::effects::{Effect, Effects, Form};
+use super::registry::{Added, RegistryError};
 
-/// A parameter of the model; its row in [`TABLE`] is `TABLE[param as usize]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-#[repr(u8)]
-#[allow(missing_docs, reason = "each variant is documented by its row in TABLE")]
-pub enum Param {
-    BaseWeight,
-    RimWeight,
-    RimExponent,
-    Hilite,
-    Reflection,
-    SideSpecular,
-    Occlusion,
-    NormalStrength,
-    SpecularLobe,
-    EnvironmentRotation,
-    HazeWeight,
-    KeyAzimuth,
-    KeyElevation,
-    KeyColor,
+/// A parameter of the model: the place of its row among the built-in ones, which stand first, and those that
+/// [`register`](Param::register) has added.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Param(u16);
+
+/// The built-in parameters, each documented by its row in [`TABLE`].
+#[allow(missing_docs, reason = "each is documented by its row in TABLE")]
+#[allow(
+    non_upper_case_globals,
+    reason = "they are the values that a parameter may have, as variants would be"
+)]
+impl Param {
+    pub const BaseWeight: Self = Self(0);
+    pub const RimWeight: Self = Self(1);
+    pub const RimExponent: Self = Self(2);
+    pub const Hilite: Self = Self(3);
+    pub const Reflection: Self = Self(4);
+    pub const SideSpecular: Self = Self(5);
+    pub const Occlusion: Self = Self(6);
+    pub const NormalStrength: Self = Self(7);
+    pub const SpecularLobe: Self = Self(8);
+    pub const EnvironmentRotation: Self = Self(9);
+    pub const HazeWeight: Self = Self(10);
+    pub const KeyAzimuth: Self = Self(11);
+    pub const KeyElevation: Self = Self(12);
+    pub const KeyColor: Self = Self(13);
 }
 
 /// How a solver steps through a parameter.
@@ -34,12 +47,14 @@ pub enum Scale {
 }
 
 /// One row of the table.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParamInfo {
     /// Which parameter.
     pub param: Param,
-    /// The name in scene files, on the command line, in reports and exports.
+    /// The name in scene files, on the command line and in reports: a word, or several with dots between them.
     pub name: &'static str,
+    /// The name in shaders and exports: the same with `_` for each dot.
+    pub identifier: &'static str,
     /// The value that reproduces the printed listing.
     pub listing: f64,
     /// The default of the corrected form.
@@ -88,16 +103,16 @@ macro_rules! row {
     ($param:ident $name:literal, $listing:expr, $corrected:expr, [$lower:expr, $upper:expr], $unit:literal,
      $rgb:literal, $linear:literal, $scale:ident, [$($effect:ident),*], $source:literal, $meaning:literal) => {
         ParamInfo {
-            param: Param::$param, name: $name, listing: $listing, corrected: $corrected, lower: $lower, upper: $upper,
+            param: Param::$param, name: $name, identifier: $name, listing: $listing, corrected: $corrected, lower: $lower, upper: $upper,
             unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, effects: &[$(Effect::$effect),*],
             source: $source, meaning: $meaning,
         }
     };
 }
 
-/// Every parameter, in the order of [`Param`].
+/// The built-in parameters, in their order.
 #[rustfmt::skip]
-pub const TABLE: [ParamInfo; 14] = [
+pub static TABLE: [ParamInfo; Param::COUNT] = [
     //  param               name                   listing corrected  bounds        unit  rgb   linear scale  asked for by
     row!(BaseWeight          "base_weight",          0.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [Diffuse],
          "MODEL 3 (corrected form)", "share of the diffuse light seen from any angle"),
@@ -129,25 +144,76 @@ pub const TABLE: [ParamInfo; 14] = [
          "GPU Gems ch. 3, last page", "key light's colour"),
 ];
 
-impl Param {
-    /// How many parameters there are.
-    pub const COUNT: usize = TABLE.len();
+/// What was added to the table.
+static ADDED: Added<ParamInfo> = Added::new();
 
-    /// Every parameter, in the order of the table.
-    pub fn all() -> impl Iterator<Item = Self> {
+impl Param {
+    /// How many parameters are built in.
+    pub const COUNT: usize = 14;
+
+    /// The built-in parameters, in their order.
+    pub fn built_in() -> impl Iterator<Item = Self> {
         TABLE.iter().map(|row| row.param)
+    }
+
+    /// Every parameter: the built-in ones, then what was added, in the order of the table.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::built_in().chain(ADDED.rows().into_iter().map(|row| row.param))
+    }
+
+    /// The parameters that a scene with these effects has: the built-in ones, and what is added by its effects.
+    pub fn of(effects: Effects) -> impl Iterator<Item = Self> {
+        Self::all().filter(move |param| param.is_built_in() || param.asked_for(effects))
+    }
+
+    /// Add a row, whose `param` is set here. A row that is there already is not added again.
+    ///
+    /// # Errors
+    /// When another parameter has its name.
+    pub fn register(row: ParamInfo) -> Result<Self, RegistryError> {
+        let taken = |other: &ParamInfo| other.name == row.name || other.identifier == row.identifier;
+        if TABLE.iter().any(taken) {
+            return Err(RegistryError::Taken { kind: "parameter", name: row.name.to_owned() });
+        }
+        let make = |place: usize| {
+            let place = u16::try_from(Self::COUNT + place);
+            let place = place.map_err(|_| RegistryError::Full { kind: "parameter", most: 1 << 16 })?;
+            Ok(ParamInfo { param: Self(place), ..row })
+        };
+        let same = |other: &ParamInfo| ParamInfo { param: other.param, ..row } == *other;
+        ADDED
+            .add(taken, same, make, || RegistryError::Taken { kind: "parameter", name: row.name.to_owned() })
+            .map(|row| row.param)
+    }
+
+    /// Its place in the table.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self.0 as usize
+    }
+
+    /// Whether its row is built in.
+    #[must_use]
+    pub const fn is_built_in(self) -> bool {
+        self.index() < Self::COUNT
     }
 
     /// This parameter's row.
     #[must_use]
-    pub const fn info(self) -> &'static ParamInfo {
-        &TABLE[self as usize]
+    pub fn info(self) -> &'static ParamInfo {
+        TABLE.get(self.index()).unwrap_or_else(|| ADDED.row(self.index() - Self::COUNT))
     }
 
     /// The name in scene files.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         self.info().name
+    }
+
+    /// The name in shaders and exports.
+    #[must_use]
+    pub fn identifier(self) -> &'static str {
+        self.info().identifier
     }
 
     /// The parameter of that name.
@@ -156,9 +222,15 @@ impl Param {
         Self::all().find(|p| p.name() == name)
     }
 
+    /// The parameter of that name in shaders.
+    #[must_use]
+    pub fn from_identifier(name: &str) -> Option<Self> {
+        Self::all().find(|p| p.identifier() == name)
+    }
+
     /// The default in `form`.
     #[must_use]
-    pub const fn default(self, form: Form) -> f64 {
+    pub fn default(self, form: Form) -> f64 {
         match form {
             Form::Listing => self.info().listing,
             Form::Corrected => self.info().corrected,
@@ -174,41 +246,58 @@ impl Param {
     }
 }
 
-/// One value a parameter and channel. A parameter that is not `rgb` holds three equal values.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Params([[f64; 3]; Param::COUNT]);
+impl fmt::Debug for Param {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// One value a parameter and channel. A parameter that is not `rgb` holds three equal values; one that was added
+/// to the table later has its default.
+#[derive(Clone, Debug)]
+pub struct Params {
+    form: Form,
+    values: Vec<[f64; 3]>,
+}
 
 impl Params {
     /// The defaults of `form`.
     #[must_use]
     pub fn defaults(form: Form) -> Self {
-        let mut values = [[0.0; 3]; Param::COUNT];
-        for param in Param::all() {
-            values[param as usize] = [param.default(form); 3];
-        }
-        Self(values)
+        Self { form, values: Param::all().map(|param| [param.default(form); 3]).collect() }
     }
 
     /// The value of a scalar parameter (the red value of a coloured one).
     #[must_use]
-    pub const fn scalar(&self, param: Param) -> f64 {
-        self.0[param as usize][0]
+    pub fn scalar(&self, param: Param) -> f64 {
+        self.rgb(param)[0]
     }
 
     /// The three channels' values.
     #[must_use]
-    pub const fn rgb(&self, param: Param) -> [f64; 3] {
-        self.0[param as usize]
+    pub fn rgb(&self, param: Param) -> [f64; 3] {
+        self.values.get(param.index()).copied().unwrap_or_else(|| [param.default(self.form); 3])
     }
 
     /// Set all channels to `value`.
-    pub const fn set(&mut self, param: Param, value: f64) {
-        self.0[param as usize] = [value; 3];
+    pub fn set(&mut self, param: Param, value: f64) {
+        self.set_rgb(param, [value; 3]);
     }
 
     /// Set each channel.
-    pub const fn set_rgb(&mut self, param: Param, value: [f64; 3]) {
-        self.0[param as usize] = value;
+    pub fn set_rgb(&mut self, param: Param, value: [f64; 3]) {
+        while self.values.len() <= param.index() {
+            let next = Param(self.values.len() as u16);
+            self.values.push([next.default(self.form); 3]);
+        }
+        self.values[param.index()] = value;
+    }
+}
+
+impl PartialEq for Params {
+    fn eq(&self, other: &Self) -> bool {
+        let most = self.values.len().max(other.values.len());
+        (0..most as u16).map(Param).all(|param| self.rgb(param) == other.rgb(param))
     }
 }
 
@@ -265,7 +354,7 @@ impl Column {
 
     /// This column's value in `params`.
     #[must_use]
-    pub const fn get(&self, params: &Params) -> f64 {
+    pub fn get(&self, params: &Params) -> f64 {
         match self.channels {
             Channels::Tied => params.scalar(self.param),
             Channels::One(c) => params.rgb(self.param)[c],
@@ -273,10 +362,14 @@ impl Column {
     }
 
     /// Set this column's value in `params`.
-    pub const fn set(&self, params: &mut Params, value: f64) {
+    pub fn set(&self, params: &mut Params, value: f64) {
         match self.channels {
             Channels::Tied => params.set(self.param, value),
-            Channels::One(c) => params.0[self.param as usize][c] = value,
+            Channels::One(c) => {
+                let mut rgb = params.rgb(self.param);
+                rgb[c] = value;
+                params.set_rgb(self.param, rgb);
+            }
         }
     }
 }
@@ -288,7 +381,7 @@ mod tests {
     #[test]
     fn table_rows_stand_in_the_order_of_the_enum_with_defaults_within_bounds() {
         for (i, row) in TABLE.iter().enumerate() {
-            assert_eq!(row.param as usize, i, "{}", row.name);
+            assert_eq!(row.param.index(), i, "{}", row.name);
             for value in [row.listing, row.corrected] {
                 assert!((row.lower..=row.upper).contains(&value), "{}", row.name);
             }
@@ -299,7 +392,7 @@ mod tests {
     #[test]
     fn columns_read_back_what_they_set() {
         let mut params = Params::defaults(Form::Corrected);
-        for column in Param::all().map(Column::tied).chain(Column::per_channel(Param::Hilite)) {
+        for column in Param::built_in().map(Column::tied).chain(Column::per_channel(Param::Hilite)) {
             column.set(&mut params, 0.375);
             assert_eq!(column.get(&params), 0.375, "{}", column.name());
         }

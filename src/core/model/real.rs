@@ -84,6 +84,14 @@ pub trait Real:
         f: [Self; 2],
         d: [Self; 2],
     ) -> ([Self; 4], [Self; 4]);
+
+    /// As [`Real::bilinear`], with the blend's derivatives by `fx` and by `fy`.
+    fn bilinear_with_gradient(
+        texels: &[[Self::Texel; 4]],
+        row: usize,
+        index: Self,
+        f: [Self; 2],
+    ) -> [[Self; 4]; 3];
 }
 
 macro_rules! real_for_float {
@@ -187,6 +195,17 @@ macro_rules! real_for_float {
                     slope[channel] = dx * ((b - a) * gy + (d - c) * fy) + dy * (lower - upper);
                 }
                 (value, slope)
+            }
+            #[inline(always)]
+            fn bilinear_with_gradient(
+                texels: &[[Self; 4]],
+                row: usize,
+                index: Self,
+                f: [Self; 2],
+            ) -> [[Self; 4]; 3] {
+                let (value, across) = Self::bilinear_with_slope(texels, row, index, f, [1.0, 0.0]);
+                let (_, down) = Self::bilinear_with_slope(texels, row, index, f, [0.0, 1.0]);
+                [value, across, down]
             }
         }
     };

@@ -101,11 +101,12 @@ pub fn write_image(path: &Path, image: &Image, options: &ImageOptions) -> Result
 /// # Errors
 /// [`ImageFileError`]; the old file, if any, then stays.
 pub fn write_exr(path: &Path, image: &Image, options: &ImageOptions) -> Result<(), ImageFileError> {
-    write_exr_layers(path, image, &[], options)
+    write_exr_layers(path, image, &[], &[], options)
 }
 
 /// Write one EXR with the whole image as its unnamed layer (`R`, `G`, `B`, `A`: what ordinary
-/// viewers show) and a named layer for each of `layers` (`diffuse.R` and so on, premultiplied).
+/// viewers show), a named layer for each of `layers` (`diffuse.R` and so on, premultiplied), and one of a single
+/// channel for each of `planes` (`haze.Y`; one number a pixel).
 ///
 /// # Errors
 /// [`ImageFileError`]; the old file, if any, then stays.
@@ -113,6 +114,7 @@ pub fn write_exr_layers(
     path: &Path,
     whole: &Image,
     layers: &[(String, Image)],
+    planes: &[(String, &[f32])],
     options: &ImageOptions,
 ) -> Result<(), ImageFileError> {
     whole.check(path)?;
@@ -137,6 +139,10 @@ pub fn write_exr_layers(
         }
         add(&format!("{name}."), layer);
     }
+    for (name, plane) in planes {
+        check_plane(path, whole, name, plane)?;
+        channels.push(AnyChannel::new(latin1(&format!("{name}.Y")), samples(plane.to_vec())));
+    }
     let layer = Layer::new(
         (whole.width, whole.height),
         layer_attributes(&options.attributes),
@@ -145,6 +151,19 @@ pub fn write_exr_layers(
     );
     let exr = exr::image::Image::from_layer(layer);
     Ok(output::write_with(path, |file| exr.write().to_buffered(file))?)
+}
+
+/// Refuse a plane that does not hold a finite number for each of the image's pixels.
+fn check_plane(path: &Path, whole: &Image, name: &str, plane: &[f32]) -> Result<(), ImageFileError> {
+    let (path, width, height) = (path.to_owned(), whole.width, whole.height);
+    if plane.len() != width * height {
+        let found = format!("the layer '{name}' of {} numbers", plane.len());
+        return Err(ImageFileError::Shape { path, width, height, found });
+    }
+    match plane.iter().position(|x| !x.is_finite()) {
+        Some(i) => Err(ImageFileError::NotFinite { path, x: i % width, y: i / width }),
+        None => Ok(()),
+    }
 }
 
 /// The provenance as EXR attributes; `software` is a standard one.
@@ -231,7 +250,9 @@ mod tests {
         let path = folder.path().join("new/whole.exr");
         let (whole, mut rim) = (ramp(), ramp());
         rim.rgb.iter_mut().for_each(|rgb| *rgb = rgb.map(|c| 0.5 * c));
-        write_exr_layers(&path, &whole, &[("rim".to_owned(), rim.clone())], &options()).unwrap();
+        let haze: Vec<f32> = (0..15).map(|i| i as f32 - 3.5).collect();
+        let layers = [("rim".to_owned(), rim.clone())];
+        write_exr_layers(&path, &whole, &layers, &[("haze".to_owned(), &haze)], &options()).unwrap();
 
         let read = exr::prelude::read_first_flat_layer_from_file(&path).unwrap().layer_data;
         let plane = |name: &str| -> Vec<f32> {
@@ -299,7 +320,7 @@ mod tests {
         broken.rgb[7][1] = f32::NAN;
         assert!(refused("a.exr", &broken).contains("pixel (2, 1)"));
         let layers = [("rim".to_owned(), Image::new(2, 2))];
-        let error = write_exr_layers(&at("a.exr"), &ramp(), &layers, &options()).unwrap_err();
+        let error = write_exr_layers(&at("a.exr"), &ramp(), &layers, &[], &options()).unwrap_err();
         assert!(error.to_string().contains("layer 'rim' of 2 x 2"));
         std::fs::write(at("file"), b"").unwrap();
         assert!(refused("file/a.png", &ramp()).contains("cannot be written"));

@@ -22,8 +22,12 @@ pub struct Shaded {
     pub image: Image,
     /// An image for each enabled term; they add up to the whole.
     pub terms: Vec<(TermName, Image)>,
-    /// The haze of each pixel, premultiplied by its coverage; empty unless an effect asks for it.
+    /// The haze of each pixel, premultiplied by its coverage and times the gain, as radiance is; empty unless an
+    /// effect asks for it.
     pub haze: Vec<f32>,
+    /// What of each pixel blooms: the mean over its samples of radiance times haze, premultiplied by coverage and
+    /// times the gain, both once; empty unless the effect `bloom` is on.
+    pub glow: Vec<[f32; 3]>,
 }
 
 /// The light of a scene in f64, at the lobe of one set of parameters.
@@ -43,7 +47,7 @@ impl Shader {
         let lobe = |stack: &crate::bake::LobeStack| stack.at(params.scalar(Param::SpecularLobe)).0;
         Self {
             setup,
-            params: *params,
+            params: params.clone(),
             irradiance: illumination.irradiance.as_ref().map(wide),
             specular: illumination.lobes.as_ref().map(lobe).as_ref().map(wide),
             hilite: illumination.hilite.as_ref().map(wide),
@@ -120,21 +124,25 @@ impl Shader {
             image: Image::new(width, height),
             terms: names.iter().map(|&name| (name, Image::new(width, height))).collect(),
             haze: vec![0.0; if self.hazy() { width * height } else { 0 }],
+            glow: vec![[0.0; 3]; if self.setup.effects.has(Effect::Bloom) { width * height } else { 0 }],
         };
         let groups: Vec<Vec<Pixel>> =
             (0..samples.groups()).into_par_iter().map(|group| self.group(samples, group, gain)).collect();
         for pixel in groups.into_iter().flatten() {
             let at = pixel.index;
             for (name, (_, image)) in names.iter().zip(&mut shaded.terms) {
-                let term = pixel.terms[*name as usize];
+                let term = pixel.terms[name.index()];
                 image.rgb[at] = term.map(|x| x as f32);
                 image.alpha[at] = pixel.coverage;
             }
             shaded.image.rgb[at] =
-                [0, 1, 2].map(|c| names.iter().map(|n| pixel.terms[*n as usize][c]).sum::<f64>() as f32);
+                [0, 1, 2].map(|c| names.iter().map(|n| pixel.terms[n.index()][c]).sum::<f64>() as f32);
             shaded.image.alpha[at] = pixel.coverage;
             if let Some(haze) = shaded.haze.get_mut(at) {
                 *haze = pixel.haze as f32;
+            }
+            if let Some(glow) = shaded.glow.get_mut(at) {
+                *glow = pixel.glow.map(|x| x as f32);
             }
         }
         shaded
@@ -155,7 +163,13 @@ impl Shader {
                 return None;
             }
             let coverage = samples.coverage[slot];
-            let mut pixel = Pixel { index: index as usize, coverage, terms: [[0.0; 3]; 6], haze: 0.0 };
+            let mut pixel = Pixel {
+                index: index as usize,
+                coverage,
+                terms: [[0.0; 3]; TermName::BUILT_IN.len()],
+                haze: 0.0,
+                glow: [0.0; 3],
+            };
             for record in records.clone() {
                 let at = record * LANES + lane;
                 let share = f64::from(samples.surface.weight(at)) * f64::from(coverage) * gain;
@@ -164,12 +178,14 @@ impl Shader {
                 }
                 let composition =
                     compose(self.setup, &lights, &wide(&samples.surface.fragment(at)), &self.params);
+                let haze = share * composition.alpha();
                 for c in 0..3 {
                     for (name, value) in composition.each_term(c) {
-                        pixel.terms[name as usize][c] += share * value;
+                        pixel.terms[name.index()][c] += share * value;
+                        pixel.glow[c] += haze * value;
                     }
                 }
-                pixel.haze += share * composition.alpha();
+                pixel.haze += haze;
             }
             Some(pixel)
         };
@@ -177,11 +193,24 @@ impl Shader {
     }
 }
 
+/// The planes of a view (for each pixel slot the mean over its samples, times the gain) as an image.
+#[must_use]
+pub fn image_of_planes(samples: &ViewSamples, planes: &[Vec<f32>], camera: &Camera) -> Image {
+    let mut image = Image::new(camera.width as usize, camera.height as usize);
+    for (slot, &pixel) in samples.pixel.iter().enumerate().filter(|(_, pixel)| **pixel != u32::MAX) {
+        let (at, coverage) = (pixel as usize, samples.coverage[slot]);
+        image.rgb[at] = [0, 1, 2].map(|c| coverage * planes[c][slot]);
+        image.alpha[at] = coverage;
+    }
+    image
+}
+
 struct Pixel {
     index: usize,
     coverage: f32,
-    terms: [[f64; 3]; 6],
+    terms: [[f64; 3]; TermName::BUILT_IN.len()],
     haze: f64,
+    glow: [f64; 3],
 }
 
 fn wide(f: &Fragment<f32>) -> Fragment<f64> {

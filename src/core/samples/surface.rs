@@ -31,7 +31,7 @@ pub(super) fn asked_of(scene: &Scene) -> Asked {
 fn asked(needs: &Needs, silhouette: Silhouette, bumped: bool) -> Asked {
     Asked {
         bump: bumped,
-        normal: needs.key_light,
+        normal: needs.smooth_normal,
         albedo: needs.color_map,
         occlusion: needs.occlusion,
         silhouette: needs.rim && silhouette != Silhouette::Bumped,
@@ -135,10 +135,10 @@ impl<'a> Surface<'a> {
     fn bumped(&self, uv: Vec2, n: Vec3, t: Vec3, b: Vec3) -> (Vec3, Vec3) {
         let texel = self.maps.normal.as_ref().map_or([0.5, 0.5, 1.0], |map| map.sample(uv.x, uv.y));
         let texel = Vec3::from(texel);
-        if self.form == Form::Listing {
-            return (texel.z * n, texel.x * t + texel.y * b);
-        }
-        let d = 2.0 * texel - 1.0;
+        let d = match self.form {
+            Form::Listing => texel,
+            Form::Corrected => 2.0 * texel - 1.0,
+        };
         if d == Vec3::ZERO || !d.is_finite() {
             return (n, Vec3::ZERO);
         }

@@ -12,8 +12,8 @@ const LEAST_COVERAGE: f32 = 0.05;
 #[derive(Clone, Debug, Default)]
 pub struct TargetRows {
     /// For each group three rows: linear radiance of the surface, no longer premultiplied; 0 where the
-    /// weight is 0.
-    pub rgb: Rows,
+    /// weight is 0. Where the target has a haze, that is a fourth.
+    pub channels: Rows,
     /// For each group what its pixels count: mask times coverage; 0 for padding.
     pub weight: Vec<Row>,
     /// The values at and beyond which residuals are one-sided.
@@ -32,16 +32,17 @@ impl TargetRows {
     pub fn new(view: &View, samples: &ViewSamples) -> Result<Option<Self>, SampleError> {
         let Some(target) = &view.target else { return Ok(None) };
         let pixels = view.camera.width as usize * view.camera.height as usize;
-        let lengths =
-            [Some(target.rgb.len()), target.alpha.as_ref().map(Vec::len), target.mask.as_ref().map(Vec::len)];
-        if let Some(found) = lengths.into_iter().flatten().find(|&length| length != pixels) {
+        let planes = [&target.alpha, &target.mask, &target.haze].map(|plane| plane.as_ref().map(Vec::len));
+        let lengths = planes.into_iter().chain([Some(target.rgb.len())]);
+        if let Some(found) = lengths.flatten().find(|&length| length != pixels) {
             return Err(SampleError::TargetSize { view: view.name.clone(), found, pixels });
         }
         let groups = samples.groups();
-        let (mut colours, mut weights) = (Rows::new(3, groups), vec![Row::ZERO; groups]);
+        let count = if target.haze.is_some() { 4 } else { 3 };
+        let (mut channels, mut weights) = (Rows::new(count, groups), vec![Row::ZERO; groups]);
         for (slot, (&pixel, &coverage)) in samples.pixel.iter().zip(&samples.coverage).enumerate() {
-            let (rgb, weight) = if pixel == u32::MAX {
-                ([0.0; 3], 0.0)
+            let (asked, weight) = if pixel == u32::MAX {
+                ([0.0; 4], 0.0)
             } else {
                 let i = pixel as usize;
                 let mask = target.mask.as_ref().map_or(1.0, |mask| mask[i]);
@@ -50,20 +51,22 @@ impl TargetRows {
                     None => (1.0, if coverage >= 1.0 { 1.0 } else { 0.0 }),
                 };
                 // The readers refuse what is not finite; should it get here, it does not count.
-                let sound = target.rgb[i].iter().all(|x| x.is_finite());
+                let [r, g, b] = target.rgb[i];
+                let asked = [r, g, b, target.haze.as_ref().map_or(0.0, |haze| haze[i])];
+                let sound = asked.iter().all(|x| x.is_finite());
                 if alpha >= LEAST_COVERAGE && shared >= LEAST_COVERAGE && mask > 0.0 && sound {
-                    (target.rgb[i].map(|x| x / alpha), mask * shared.min(1.0))
+                    (asked.map(|x| x / alpha), mask * shared.min(1.0))
                 } else {
-                    ([0.0; 3], 0.0)
+                    ([0.0; 4], 0.0)
                 }
             };
             let (group, lane) = (slot / LANES, slot % LANES);
-            colours.record_mut(group).iter_mut().zip(rgb).for_each(|(row, x)| row[lane] = x);
+            channels.record_mut(group).iter_mut().zip(asked).for_each(|(row, x)| row[lane] = x);
             weights[group][lane] = weight;
         }
         if weights.iter().all(|row| *row == Row::ZERO) {
             return Err(SampleError::EmptyMask { view: view.name.clone() });
         }
-        Ok(Some(Self { rgb: colours, weight: weights, clip: target.clipped_at }))
+        Ok(Some(Self { channels, weight: weights, clip: target.clipped_at }))
     }
 }

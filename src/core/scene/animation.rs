@@ -8,6 +8,7 @@ use super::Scene;
 use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
 use super::gltf::{Ask, Document, Tangents, Uvs};
+use super::maps::Maps;
 use super::mesh::Mesh;
 use super::settings::{interval, number, short};
 use crate::model::effects::{Effect, Effects, Form, Needs};
@@ -32,7 +33,7 @@ impl Animation {
         let folder = scene.path.parent().unwrap_or(Path::new(""));
         let document = Document::open(&folder.join(&file.mesh.file))?;
         let needs = scene.effects.needs(scene.silhouette);
-        let ask = ask(&file, scene.form, scene.effects, needs, &pose);
+        let ask = ask(&scene.maps, scene.form, scene.effects, needs, &pose);
         let seconds = document.animation_seconds()?;
         Ok(seconds.map(|seconds| Self { document, ask, seconds }))
     }
@@ -105,19 +106,16 @@ impl Pose {
     }
 }
 
-/// What the effects want of the mesh.
-pub(super) fn ask(file: &SceneFile, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
-    let maps = &file.maps;
-    let looked_up = needs.color_map && maps.color.is_some()
-        || needs.normal_map && maps.normal.is_some()
-        || needs.specular_map && maps.specular.is_some()
-        || needs.attenuator_map && maps.attenuator.is_some();
+/// What the effects want of the mesh, `maps` being those that they look up.
+pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
+    let Maps { color, normal, specular, attenuator } = maps;
+    let looked_up = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
     let uvs = match (needs.maps(), looked_up) {
         (false, _) => Uvs::None,
         (true, false) => Uvs::Optional,
         (true, true) => Uvs::Required,
     };
-    let tangents = match (needs.tangents, maps.normal.is_some()) {
+    let tangents = match (needs.tangents, normal.is_some()) {
         (false, _) => Tangents::None,
         (true, true) => Tangents::Exact,
         // Decoded, a missing normal map is N itself; read as printed it leans along T and B.
@@ -131,6 +129,7 @@ pub(super) fn ask(file: &SceneFile, form: Form, effects: Effects, needs: Needs, 
         morph_weights: pose.morph_weights.clone(),
         bones: effects.has(Effect::Skin),
         time: pose.time.filter(|_| effects.has_any(&[Effect::Morph, Effect::Skin])),
+        clip: false,
     }
 }
 

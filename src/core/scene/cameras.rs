@@ -6,9 +6,10 @@ use glam::{DMat3, DMat4, DVec3};
 use toml::Spanned;
 
 use super::error::SceneError;
-use super::file::{Source, ViewTable};
-use super::settings::number;
-use super::view::Camera;
+use super::file::{BackgroundValue, Source, ViewTable};
+use super::settings::{interval, number, short};
+use super::view::{Background, Camera};
+use crate::model::params::LARGEST;
 
 /// Degrees; seen through less, the rays of a thousand pixels are no longer a hundred different f32.
 const NARROWEST_FOV: f64 = 1e-3;
@@ -21,6 +22,8 @@ pub(super) struct ViewPlan {
     pub camera: Camera,
     pub target: Option<PathBuf>,
     pub mask: Option<PathBuf>,
+    pub haze: Option<PathBuf>,
+    pub background: Background,
 }
 
 /// All views of a scene; there must be one.
@@ -48,9 +51,51 @@ pub(super) fn plan(source: &Source, tables: &[Spanned<ViewTable>]) -> Result<Vec
             camera: camera(source, table)?,
             target: table.target.clone(),
             mask: table.mask.clone(),
+            haze: table.haze.clone(),
+            background: background(source, table.background.as_ref())?,
         });
     }
+    check_haze(source, tables)?;
     Ok(plans)
+}
+
+/// Haze is compared in every view that has a target, or in none: a fit has one set of channels.
+fn check_haze(source: &Source, tables: &[Spanned<ViewTable>]) -> Result<(), SceneError> {
+    let targets = || tables.iter().map(Spanned::get_ref).filter(|table| table.target.is_some());
+    let with = targets().find(|table| table.haze.is_some());
+    let without = targets().find(|table| table.haze.is_none());
+    match (with, without) {
+        (Some(with), Some(without)) => Err(source.error(
+            &without.name,
+            format!(
+                "the view `{}` has a target but names no haze, and the view `{}` does",
+                without.name.get_ref(),
+                with.name.get_ref()
+            ),
+            "Give every view that has a target a haze, or none",
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// What stands behind the mesh.
+fn background(source: &Source, value: Option<&Spanned<BackgroundValue>>) -> Result<Background, SceneError> {
+    let Some(value) = value else { return Ok(Background::None) };
+    match value.get_ref() {
+        BackgroundValue::Name(name) => {
+            let name = Spanned::new(value.span(), name.clone());
+            let known = [("none", Background::None), ("environment", Background::Environment)];
+            source.choose("background", &name, &known)
+        }
+        BackgroundValue::Color(rgb) => match rgb.iter().find(|c| !(0.0..=LARGEST).contains(*c)) {
+            None => Ok(Background::Color(*rgb)),
+            Some(&c) => Err(source.error(
+                value,
+                format!("background holds {}", short(c)),
+                format!("Give three linear radiances in {}", interval(0.0, LARGEST)),
+            )),
+        },
+    }
 }
 
 /// A view's name becomes part of file names.

@@ -19,12 +19,16 @@ impl std::error::Error for SceneError {}
 
 impl fmt::Display for SceneError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: ", self.path.display())?;
-        if let Some(place) = &self.place {
-            write!(f, "{place}: ")?;
-        }
-        write!(f, "{}. {}.", self.what, self.remedy)
+        let place = self.place.as_ref().map_or_else(String::new, |place| format!("{place}: "));
+        let Self { path, what, remedy, .. } = self;
+        f.write_str(&one_line(&format!("{}: {place}{what}. {remedy}.", path.display())))
     }
+}
+
+/// Without line breaks and other control characters: words quote the file, whose own may hold anything, even what a
+/// terminal obeys.
+fn one_line(text: &str) -> String {
+    text.replace(char::is_control, " ")
 }
 
 impl SceneError {
@@ -64,7 +68,7 @@ pub struct Warning {
 
 impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}: {}", self.path.display(), self.message)
+        f.write_str(&one_line(&format!("{}: {}", self.path.display(), self.message)))
     }
 }
 
@@ -132,6 +136,15 @@ pub(super) fn read_bytes(path: &Path, limit: u64) -> Result<Vec<u8>, SceneError>
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_of_a_file_neither_break_the_paragraph_nor_reach_the_terminal() {
+        let error = SceneError::new(Path::new("a\tb.toml"), "unknown key `a\nb\u{1b}[2J`", "Leave it out")
+            .at("line\r1");
+        assert_eq!(error.to_string(), "a b.toml: line 1: unknown key `a b [2J`. Leave it out.");
+        let warning = Warning { path: "a.glb".into(), message: "mesh `a\nb`".to_owned() };
+        assert_eq!(warning.to_string(), "a.glb: mesh `a b`");
+    }
 
     #[test]
     fn a_panicking_decoder_is_an_error_and_later_panics_are_heard_again() {

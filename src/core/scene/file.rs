@@ -26,6 +26,8 @@ pub(super) struct SceneFile {
     pub fit: FitTable,
     #[serde(default)]
     pub quality: QualityTable,
+    #[serde(default)]
+    pub bloom: BloomTable,
 }
 
 /// `[mesh]`
@@ -66,10 +68,12 @@ pub(super) struct ModelTable {
     pub silhouette: Option<Spanned<String>>,
     pub effects: Option<Vec<Spanned<String>>>,
     #[serde(default)]
+    pub terms: Vec<PathBuf>,
+    #[serde(default)]
     pub params: ParamsTable,
 }
 
-/// `[model.params]`, and the whole of a file of parameters.
+/// `[model.params]`
 pub(super) type ParamsTable = BTreeMap<Spanned<String>, Spanned<ParamValue>>;
 
 /// `[[view]]`
@@ -83,6 +87,23 @@ pub(super) struct ViewTable {
     pub height: Spanned<i64>,
     pub target: Option<PathBuf>,
     pub mask: Option<PathBuf>,
+    pub haze: Option<PathBuf>,
+    pub background: Option<Spanned<BackgroundValue>>,
+}
+
+/// What stands behind the mesh: a name, or a colour.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(untagged, expecting = "invalid type: expected \"none\", \"environment\" or [r, g, b]")]
+pub(super) enum BackgroundValue {
+    Name(String),
+    Color([f64; 3]),
+}
+
+/// `[bloom]`
+#[derive(Clone, Debug, Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct BloomTable {
+    pub sigma: Option<Spanned<f64>>,
 }
 
 /// `[fit]`

@@ -8,12 +8,14 @@ use super::animation::{Pose, ask, idle_effects};
 use super::cameras::{self, ViewPlan};
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, SceneFile, Source};
-use super::gltf::Document;
-use super::maps::{Environment, Maps};
+use super::gltf::{Ask, Document};
+use super::maps::{Environment, Map, Maps};
 use super::settings::{self, interval, number};
-use super::view::View;
-use super::{Scene, images};
+use super::terms::terms;
+use super::view::{Background, View};
+use super::{FitSettings, Scene, images};
 use crate::model::effects::{Effects, Needs};
+use crate::model::params::Param;
 use crate::progress;
 
 /// What a command wants of a scene beyond what its file says.
@@ -25,11 +27,15 @@ pub struct LoadOptions {
     pub targets: bool,
     /// Seconds into animation 0, instead of the file's `time`.
     pub time: Option<f64>,
+    /// Whether the mesh will go through animation 0: then the targets are marked that it moves.
+    pub clip: bool,
+    /// Instead of the views' `background`.
+    pub background: Option<Background>,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { effects: None, targets: true, time: None }
+        Self { effects: None, targets: true, time: None, clip: false, background: None }
     }
 }
 
@@ -37,7 +43,7 @@ impl Scene {
     /// Read a scene file and what its effects ask for; paths in it are relative to it.
     ///
     /// Effects are those of `options`, else the file's, else [`Effects::SURFACE`] with `morph` and
-    /// `skin` where the mesh carries them. The keys `morph_weights` and `time` ask for `morph` and
+    /// `skin` where the mesh carries them, and the effects of the terms that the file names. The keys `morph_weights` and `time` ask for `morph` and
     /// `skin` by themselves.
     ///
     /// # Errors
@@ -47,33 +53,47 @@ impl Scene {
         let source = Source::read(path)?;
         let file: SceneFile = source.parse()?;
         let mut warnings = Warnings::new();
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let terms = terms(&file.model, folder)?;
         let (form, silhouette) = settings::form(&source, &file.model)?;
         let params = settings::params(&source, &file.model.params, form)?;
-        let plans = cameras::plan(&source, &file.view)?;
+        let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
+        let bloom = settings::bloom(&source, &file.bloom)?;
         let pose = Pose::check(&source, &file)?.at(options.time);
         let metres_per_unit = metres(&source, &file)?;
         let given = settings::effects(&source, &file.model)?;
 
+        if let Some(background) = options.background {
+            plans.iter_mut().for_each(|plan| plan.background = background);
+        }
+
         let bar = progress::bar("loading", 3 + plans.len() as u64);
-        let folder = path.parent().unwrap_or(Path::new(""));
         let document = Document::open(&folder.join(&file.mesh.file))?;
-        let effects = pose.effects(options.effects.or(given), &document)?;
+        let listed = options.effects.or(given);
+        let mut effects = pose.effects(listed, &document)?;
+        if listed.is_none() {
+            effects = terms.iter().fold(effects, |effects, term| effects.with(term.effect));
+        }
         let needs = effects.needs(silhouette);
         let mut idle = Warnings::new();
         let fit = settings::fit(&source, &file.fit, &file.model.params, effects, &mut idle)?;
         if options.targets {
             // What is free concerns a fit alone.
             warnings.append(&mut idle);
+            check_haze(&source, &mut plans, &fit, needs, &mut warnings);
         }
-        let mesh = document.mesh(&ask(&file, form, effects, needs, &pose), &mut warnings)?;
+        let maps = read_maps(&source, &file, folder, needs, &mut warnings)?;
+        bar.inc(1);
+        let ask = Ask { clip: options.clip, ..ask(&maps, form, effects, needs, &pose) };
+        let mesh = document.mesh(&ask, &mut warnings)?;
         idle_effects(&document, effects, &mesh, &mut warnings)?;
         drop(document);
         bar.inc(1);
-        let maps = read_maps(&source, &file, folder, needs)?;
-        bar.inc(1);
-        let environment = if needs.environment() {
-            Some(read_environment(&source, &file, folder, &mut warnings)?)
+        // Targets have a background of their own; it is a picture that shows the environment.
+        let shown = !options.targets && plans.iter().any(|plan| plan.background == Background::Environment);
+        let environment = if needs.environment() || shown {
+            Some(read_environment(&source, &file, folder, shown, &mut warnings)?)
         } else {
             None
         };
@@ -94,12 +114,41 @@ impl Scene {
             views,
             fit,
             quality,
+            bloom,
         };
         Ok((scene, warnings))
     }
 }
 
-fn read_maps(source: &Source, file: &SceneFile, folder: &Path, needs: Needs) -> Result<Maps, SceneError> {
+/// What a fit is to know of haze: it is not read where no enabled effect makes one, and nothing but it tells of
+/// `haze_weight`.
+fn check_haze(
+    source: &Source,
+    plans: &mut [ViewPlan],
+    fit: &FitSettings,
+    needs: Needs,
+    warnings: &mut Warnings,
+) {
+    let compared = plans.iter().any(|plan| plan.haze.is_some() && plan.target.is_some());
+    if compared && !needs.haze {
+        let message = "names the haze of its views, but neither `haze` nor `bloom` is enabled: not read";
+        warn(warnings, &source.path, message);
+        plans.iter_mut().for_each(|plan| plan.haze = None);
+    }
+    let free = fit.free.iter().any(|column| column.param == Param::HazeWeight);
+    if free && needs.haze && !compared {
+        let message = "haze_weight is free, but no view that has a target names a `haze` to compare with";
+        warn(warnings, &source.path, message);
+    }
+}
+
+fn read_maps(
+    source: &Source,
+    file: &SceneFile,
+    folder: &Path,
+    needs: Needs,
+    warnings: &mut Warnings,
+) -> Result<Maps, SceneError> {
     let maps = &file.maps;
     let flip = normal_flip(source, file)?;
     let wanted =
@@ -107,11 +156,14 @@ fn read_maps(source: &Source, file: &SceneFile, folder: &Path, needs: Needs) -> 
     let (color, normal) = (wanted(&maps.color, needs.color_map), wanted(&maps.normal, needs.normal_map));
     let specular = wanted(&maps.specular, needs.specular_map);
     let attenuator = wanted(&maps.attenuator, needs.attenuator_map);
-    let ((color, normal), (specular, attenuator)) = rayon::join(
+    // The paper keeps the side-specular intensity in the normal map's alpha (listing 3-4).
+    let packed = wanted(&maps.normal, needs.specular_map && maps.specular.is_none());
+    let ((color, normals), (specular, attenuator)) = rayon::join(
         || {
+            let normals = normal.as_ref().or(packed.as_ref());
             (
                 color.map(|path| images::color_map(&path)).transpose(),
-                normal.map(|path| images::normal_map(&path, flip)).transpose(),
+                normals.map(|path| images::normal_map(path, flip)).transpose(),
             )
         },
         || {
@@ -121,20 +173,47 @@ fn read_maps(source: &Source, file: &SceneFile, folder: &Path, needs: Needs) -> 
             )
         },
     );
-    Ok(Maps { color: color?, normal: normal?, specular: specular?, attenuator: attenuator? })
+    let (color, normals, attenuator) = (color?, normals?, attenuator?);
+    let (normals, alpha) = normals.map_or((None, None), |(map, alpha)| (Some(map), alpha));
+    let specular = match (specular?, packed, alpha) {
+        (None, Some(path), Some(alpha)) => packed_specular(&path, alpha, warnings),
+        (specular, ..) => specular,
+    };
+    Ok(Maps { color, normal: normals.filter(|_| normal.is_some()), specular, attenuator })
+}
+
+/// The specular map that a normal map's alpha holds; none where that is 1 everywhere, as in files that only have
+/// the channel.
+fn packed_specular(path: &Path, alpha: Map<1>, warnings: &mut Warnings) -> Option<Map<1>> {
+    let ends = |(low, high): (f32, f32), &[a]: &[f32; 1]| (low.min(a), high.max(a));
+    let (low, high) = alpha.texels.iter().fold((f32::INFINITY, f32::NEG_INFINITY), ends);
+    if (low, high) == (1.0, 1.0) {
+        return None;
+    }
+    let message = format!(
+        "its alpha, {low:.3} to {high:.3}, is taken as the specular map, which the scene does not name: \
+         `specular` in [maps] names another"
+    );
+    warn(warnings, path, message);
+    Some(alpha)
 }
 
 fn read_environment(
     source: &Source,
     file: &SceneFile,
     folder: &Path,
+    shown: bool,
     warnings: &mut Warnings,
 ) -> Result<Environment, SceneError> {
     let Some(table) = &file.environment else {
+        let (what, otherwise) = match shown {
+            false => ("the enabled effects look it up", "enable other effects"),
+            true => ("a view's background shows it", "choose another background"),
+        };
         return Err(SceneError::new(
             &source.path,
-            "has no [environment], but the enabled effects look it up",
-            "Add [environment] with a lat-long EXR or HDR file, or enable other effects",
+            format!("has no [environment], but {what}"),
+            format!("Add [environment] with a lat-long EXR or HDR file, or {otherwise}"),
         ));
     };
     let (rotation_degrees, intensity) = light(source, table)?;
@@ -163,18 +242,22 @@ fn light(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneE
     Ok((turn, intensity))
 }
 
-/// Refuse the text of a scene file for whatever [`Scene::load`] would refuse before it reads another file.
+/// Refuse the text of a scene file for whatever [`Scene::load`] would refuse before it reads another file than those of
+/// its terms.
 pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let source = Source::of(path, text.to_owned());
     let file: SceneFile = source.parse()?;
+    let terms = terms(&file.model, path.parent().unwrap_or(Path::new("")))?;
     let (form, _) = settings::form(&source, &file.model)?;
     settings::params(&source, &file.model.params, form)?;
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
+    settings::bloom(&source, &file.bloom)?;
     Pose::check(&source, &file)?;
     metres(&source, &file)?;
     // What the mesh adds to the effects concerns no value here.
-    let effects = settings::effects(&source, &file.model)?.unwrap_or(Effects::SURFACE);
+    let every = || terms.iter().fold(Effects::SURFACE, |effects, term| effects.with(term.effect));
+    let effects = settings::effects(&source, &file.model)?.unwrap_or_else(every);
     settings::fit(&source, &file.fit, &file.model.params, effects, &mut Warnings::new())?;
     normal_flip(&source, &file)?;
     file.environment.as_ref().map_or(Ok(()), |table| light(&source, table).map(drop))
@@ -197,22 +280,30 @@ fn read_views(
     plans: Vec<ViewPlan>,
     folder: &Path,
     targets: bool,
-    bar: &indicatif::ProgressBar,
+    bar: &progress::Work,
     warnings: &mut Warnings,
 ) -> Result<Vec<View>, SceneError> {
     let read = |plan: ViewPlan| {
         let mut warnings = Warnings::new();
-        if let (Some(mask), None) = (&plan.mask, &plan.target) {
-            warn(&mut warnings, &folder.join(mask), "masks a view without a target: not read");
+        for (file, what) in [(&plan.mask, "masks"), (&plan.haze, "is the haze of")] {
+            if let (Some(file), None) = (file, &plan.target) {
+                warn(&mut warnings, &folder.join(file), format!("{what} a view without a target: not read"));
+            }
         }
         let size = (plan.camera.width, plan.camera.height);
         let mask = plan.mask.map(|mask| folder.join(mask));
+        let haze = plan.haze.map(|haze| folder.join(haze));
         let target = match plan.target.filter(|_| targets) {
-            Some(target) => Some(images::target(&folder.join(target), mask.as_deref(), size, &mut warnings)?),
+            Some(target) => {
+                let mut target = images::target(&folder.join(target), mask.as_deref(), size, &mut warnings)?;
+                target.haze = haze.map(|haze| images::haze(&haze, &target, size)).transpose()?;
+                Some(target)
+            }
             None => None,
         };
         bar.inc(1);
-        Ok((View { name: plan.name, camera: plan.camera, target }, warnings))
+        let view = View { name: plan.name, camera: plan.camera, target, background: plan.background };
+        Ok((view, warnings))
     };
     // Collected in order, so that the first error and the warnings are the same for any thread count.
     let views: Vec<Result<_, SceneError>> = plans.into_par_iter().map(read).collect();

@@ -4,7 +4,7 @@ use toml::Spanned;
 
 use super::error::SceneError;
 use super::file::{MapFitTable, MapPriorTable, Source};
-use super::settings::{number, whole};
+use super::settings::{number, short, whole};
 
 /// A map that can be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -146,6 +146,16 @@ fn read(source: &Source, table: &MapPriorTable, default: MapPrior) -> Result<Map
     };
     let lower = at_least_0(&table.lower, default.lower, "lower")?;
     let above = |x: f64| x > lower;
+    if let (Some(given), None) = (&table.lower, &table.upper)
+        && !above(default.upper)
+    {
+        let what = format!(
+            "lower = {} is not below upper, which is {} by default",
+            short(lower),
+            short(default.upper)
+        );
+        return Err(source.error(given, what, "Give a lesser number, or name upper too"));
+    }
     Ok(MapPrior {
         smoothness: at_least_0(&table.smoothness, default.smoothness, "smoothness")?,
         closeness: at_least_0(&table.closeness, default.closeness, "closeness")?,

@@ -34,6 +34,8 @@ pub struct Morph {
     pub name: String,
     /// Its weight in this scene.
     pub weight: f32,
+    /// Whether the mesh will go through an animation that gives it another weight than 0.
+    pub animated: bool,
     /// Position deltas, one a vertex.
     pub positions: Vec<Vec3>,
     /// Normal deltas, one a vertex; empty when the file has none.

@@ -5,8 +5,10 @@
 //! - [`maps`]: texture maps and the panorama
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings` and `cameras`
-//! - [`map_fit`]: how whole maps are fitted
+//! - `terms`: files of shader rules that a scene brings with it
+//! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
+//! - [`facts`]: what a scene calls for of the shader planner
 //! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
 //! - [`error`]: what is refused, and what is mended with a warning
 //!
@@ -14,8 +16,10 @@
 //! effects ask for.
 
 pub mod animation;
+pub mod assignment;
 mod cameras;
 pub mod error;
+pub mod facts;
 mod file;
 mod gltf;
 pub mod images;
@@ -27,16 +31,19 @@ mod normals;
 pub mod pose;
 mod settings;
 mod tangents;
+mod terms;
 pub mod view;
 
+pub use assignment::Assignment;
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub use file::{Source, check_text};
 pub use load::LoadOptions;
 pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
+pub use settings::interval;
 pub use settings::short;
-pub use settings::{interval, read_params};
+pub use terms::register_terms;
 
 use std::path::PathBuf;
 
@@ -70,6 +77,22 @@ pub struct Scene {
     pub fit: FitSettings,
     /// How finely bakes and samples are made.
     pub quality: Quality,
+    /// How far the bloom reaches.
+    pub bloom: Bloom,
+}
+
+/// The scene's `[bloom]` table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bloom {
+    /// The blur's standard deviation, as a share of the image's height.
+    pub sigma: f64,
+}
+
+impl Default for Bloom {
+    fn default() -> Self {
+        // About the softness of the paper's pictures.
+        Self { sigma: 0.02 }
+    }
 }
 
 /// The scene's `[fit]` table.

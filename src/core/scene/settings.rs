@@ -1,12 +1,10 @@
 //! What the values of a scene file mean: form, effects, parameters, fit and quality, each checked.
 
-use std::path::Path;
-
 use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
-use super::file::{FitTable, ModelTable, ParamsTable, QualityTable, Source};
-use super::{FitSettings, Loss, Quality, map_fit};
+use super::file::{BloomTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
+use super::{Bloom, FitSettings, Loss, Quality, map_fit};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::params::{Column, Param, Params};
 
@@ -25,7 +23,7 @@ pub(super) fn form(source: &Source, model: &ModelTable) -> Result<(Form, Silhoue
 
 /// The `effects` key, where there is one.
 pub(super) fn effects(source: &Source, model: &ModelTable) -> Result<Option<Effects>, SceneError> {
-    let all = Effect::ALL.map(|effect| (effect.name(), effect));
+    let all: Vec<_> = Effect::all().map(|effect| (effect.name(), effect)).collect();
     let parse = |names: &Vec<Spanned<String>>| {
         let mut effects = Effects::default();
         for name in names {
@@ -44,43 +42,29 @@ pub(super) fn effects(source: &Source, model: &ModelTable) -> Result<Option<Effe
 /// Start values on top of the defaults of `form`.
 pub(super) fn params(source: &Source, table: &ParamsTable, form: Form) -> Result<Params, SceneError> {
     let mut params = Params::defaults(form);
-    apply(source, table, &mut params)?;
+    for (name, value) in table {
+        let param = param(source, name)?;
+        let values = value.get_ref().channels();
+        check_value(param, values).map_err(|(what, remedy)| source.error(value, what, remedy))?;
+        params.set_rgb(param, values);
+    }
     Ok(params)
 }
 
-/// Read a file of parameters, one `name = value` (or `name = [r, g, b]`) a line, over `params`.
+/// Whether a parameter may have these values in its three channels.
 ///
 /// # Errors
-/// When the file cannot be read, names an unknown parameter, or a value is out of bounds.
-pub fn read_params(path: &Path, params: &mut Params) -> Result<(), SceneError> {
-    let source = Source::read(path)?;
-    let table: ParamsTable = source.parse()?;
-    apply(&source, &table, params)
-}
-
-fn apply(source: &Source, table: &ParamsTable, params: &mut Params) -> Result<(), SceneError> {
-    for (name, value) in table {
-        let param = param(source, name)?;
-        let info = param.info();
-        let values = value.get_ref().channels();
-        for number in values {
-            if !info.admits(number) {
-                let (lower, upper) = info.range();
-                return Err(source.error(
-                    value,
-                    format!("{} = {} is out of bounds", info.name, short(number)),
-                    format!("Give a finite number in {}", interval(lower, upper)),
-                ));
-            }
-        }
-        if !info.rgb && values != [values[0]; 3] {
-            return Err(source.error(
-                value,
-                format!("{} takes one value, not one a channel", info.name),
-                "Give a single number",
-            ));
-        }
-        params.set_rgb(param, values);
+/// What is wrong, and what to do.
+pub(super) fn check_value(param: Param, values: [f64; 3]) -> Result<(), (String, String)> {
+    let info = param.info();
+    if let Some(&number) = values.iter().find(|&&number| !info.admits(number)) {
+        let (lower, upper) = info.range();
+        let what = format!("{} = {} is out of bounds", info.name, short(number));
+        return Err((what, format!("Give a finite number in {}", interval(lower, upper))));
+    }
+    if !info.rgb && values != [values[0]; 3] {
+        let what = format!("{} takes one value, not one a channel", info.name);
+        return Err((what, "Give a single number".to_owned()));
     }
     Ok(())
 }
@@ -123,54 +107,13 @@ pub(super) fn fit(
     effects: Effects,
     warnings: &mut Warnings,
 ) -> Result<FitSettings, SceneError> {
-    let mut coloured = Vec::new();
-    for name in &table.per_channel {
-        let param = param(source, name)?;
-        if !param.info().rgb {
-            return Err(source.error(
-                name,
-                format!("{} takes one value, not one a channel", param.name()),
-                "Take it out of per_channel",
-            ));
-        }
-        if !table.free.iter().flatten().any(|free| free.get_ref() == param.name()) {
-            return Err(source.error(
-                name,
-                format!("{} is in per_channel but not free", param.name()),
-                "Add it to free, or take it out of per_channel",
-            ));
-        }
-        coloured.push(param);
-    }
+    let params = free(source, table, effects, warnings)?;
+    let mut coloured = per_channel(source, table, &params, effects)?;
     let is_triple = |value: &super::file::ParamValue| matches!(value, super::file::ParamValue::Rgb(_));
     for (name, value) in triples {
         let param = param(source, name)?;
         if param.info().rgb && is_triple(value.get_ref()) {
             coloured.push(param);
-        }
-    }
-    let mut params: Vec<Param> = Vec::new();
-    match &table.free {
-        None => params.extend(DEFAULT_FREE.into_iter().filter(|param| param.asked_for(effects))),
-        Some(names) => {
-            for name in names {
-                let param = param(source, name)?;
-                if params.contains(&param) {
-                    return Err(source.error(
-                        name,
-                        format!("{} is listed twice in free", param.name()),
-                        "Take one of them out",
-                    ));
-                }
-                if !param.asked_for(effects) {
-                    let message = format!(
-                        "{} is free, but no enabled effect asks for it: it will be reported as unidentifiable",
-                        param.name()
-                    );
-                    warn(warnings, &source.path, message);
-                }
-                params.push(param);
-            }
         }
     }
     let columns = params.into_iter().flat_map(|param| {
@@ -188,6 +131,80 @@ pub(super) fn fit(
     Ok(FitSettings { free: columns.collect(), loss, free_gains: table.gains, maps })
 }
 
+/// The free parameters: the names in `free`, or the default ones that an enabled effect asks for.
+fn free(
+    source: &Source,
+    table: &FitTable,
+    effects: Effects,
+    warnings: &mut Warnings,
+) -> Result<Vec<Param>, SceneError> {
+    let Some(names) = &table.free else {
+        return Ok(DEFAULT_FREE.into_iter().filter(|param| param.asked_for(effects)).collect());
+    };
+    let mut params: Vec<Param> = Vec::new();
+    for name in names {
+        let param = param(source, name)?;
+        if params.contains(&param) {
+            return Err(listed_twice(source, name, "free"));
+        }
+        if !param.asked_for(effects) {
+            let message = format!(
+                "{} is free, but no enabled effect asks for it: it will be reported as unidentifiable",
+                param.name()
+            );
+            warn(warnings, &source.path, message);
+        }
+        params.push(param);
+    }
+    Ok(params)
+}
+
+/// The parameters in `per_channel`, each of which must be free. One that is free by default counts as such where its
+/// effect is switched off, so that a scene stays one with any of its effects left out.
+fn per_channel(
+    source: &Source,
+    table: &FitTable,
+    free: &[Param],
+    effects: Effects,
+) -> Result<Vec<Param>, SceneError> {
+    let mut coloured = Vec::new();
+    for name in &table.per_channel {
+        let param = param(source, name)?;
+        if !param.info().rgb {
+            return Err(source.error(
+                name,
+                format!("{} takes one value, not one a channel", param.name()),
+                "Take it out of per_channel",
+            ));
+        }
+        if coloured.contains(&param) {
+            return Err(listed_twice(source, name, "per_channel"));
+        }
+        let idle = table.free.is_none() && DEFAULT_FREE.contains(&param) && !param.asked_for(effects);
+        if !free.contains(&param) && !idle {
+            let remedy = match &table.free {
+                Some(_) => "Add it to free, or take it out of per_channel".to_owned(),
+                None => format!(
+                    "Name what is fitted in free, this one among it, or take it out of per_channel. Without free, \
+                     these are fitted: {}",
+                    DEFAULT_FREE.map(Param::name).join(", ")
+                ),
+            };
+            return Err(source.error(
+                name,
+                format!("{} is in per_channel but not free", param.name()),
+                remedy,
+            ));
+        }
+        coloured.push(param);
+    }
+    Ok(coloured)
+}
+
+fn listed_twice(source: &Source, name: &Spanned<String>, key: &str) -> SceneError {
+    source.error(name, format!("{} is listed twice in {key}", name.get_ref()), "Take one of them out")
+}
+
 /// The `[quality]` table over the defaults.
 pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, SceneError> {
     let pick = |value: &Option<Spanned<i64>>, name: &str, least: i64, most: i64, default: u32| {
@@ -202,6 +219,17 @@ pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, 
         lobes_per_octave: pick(&table.lobes_per_octave, "lobes_per_octave", 1, 8, default.lobes_per_octave)?,
         occlusion_rays: pick(&table.occlusion_rays, "occlusion_rays", 1, 1 << 16, default.occlusion_rays)?,
     })
+}
+
+/// A wider blur than a quarter of the image is a veil over all of it.
+const WIDEST_BLOOM: f64 = 0.25;
+
+/// The `[bloom]` table over the defaults.
+pub(super) fn bloom(source: &Source, table: &BloomTable) -> Result<Bloom, SceneError> {
+    let wanted = format!("a share of the image's height in {}", interval(0.0, WIDEST_BLOOM));
+    let within = |sigma: f64| (0.0..=WIDEST_BLOOM).contains(&sigma);
+    let sigma = number(source, table.sigma.as_ref(), Bloom::default().sigma, "sigma", &wanted, within)?;
+    Ok(Bloom { sigma })
 }
 
 /// A whole number within bounds, or `default` when it is not given.

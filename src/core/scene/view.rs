@@ -11,6 +11,20 @@ pub struct View {
     pub camera: Camera,
     /// The image to be matched.
     pub target: Option<Target>,
+    /// What pictures of it show behind the mesh.
+    pub background: Background,
+}
+
+/// What pictures show behind the mesh.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Background {
+    /// Nothing: pictures end at the silhouette.
+    #[default]
+    None,
+    /// The environment, as the camera sees it.
+    Environment,
+    /// One colour: linear radiance, Rec.709.
+    Color([f64; 3]),
 }
 
 /// A perspective camera that looks down its own -Z.
@@ -66,6 +80,9 @@ pub struct Target {
     /// Coverage in [0, 1]; `None` when the file has no alpha: then only pixels that the mesh covers
     /// fully are compared.
     pub alpha: Option<Vec<f32>>,
+    /// The haze (`haze_weight` dapple a E_s(R).a), premultiplied by coverage, row by row from the top; `None`:
+    /// none is compared.
+    pub haze: Option<Vec<f32>>,
     /// What each pixel counts, in [0, 1]; `None`: 1 everywhere.
     pub mask: Option<Vec<f32>>,
     /// Whether the file holds 8-bit values, of which 0 and 255 may be clipped: there the residual

@@ -3,11 +3,11 @@
 use std::fmt::Write as _;
 
 use super::facts::{Facts, Source};
+use super::kept::kept_fields;
 use super::quantity::{Attribute, Constant, Kind, Resource};
-use super::rule::{LIBRARY, RULES, Rule, Stage};
+use super::rule::{LIBRARY, Rule, Stage, rules};
 use super::search::{INTERPOLATION_COST, PlanError, VERTEX_SHARE, components, search};
 use crate::model::compose::TermName;
-use crate::model::effects::Effect;
 
 /// The shader that a scene gets.
 #[derive(Clone, Debug)]
@@ -86,57 +86,26 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
 /// Fields of a stored sample, with their WGSL types.
 pub type Fields = Vec<(&'static str, &'static str)>;
 
-/// What is kept of a stored sample's terms, with WGSL types.
-pub const TERMS: [(&str, &str); 8] = [
-    ("diffuse_term", "vec3f"),
-    ("side_term", "vec3f"),
-    ("hilite_term", "vec3f"),
-    ("mirror_term", "vec3f"),
-    ("haze_term", "f32"),
-    ("key_term", "vec3f"),
-    ("silhouette", "f32"),
-    ("open", "f32"),
-];
-
 /// The fields of a stored sample, or of its terms, that a scene's effects ask for.
 #[must_use]
 pub fn sample_fields(facts: &Facts) -> Fields {
+    if facts.source == Source::Terms {
+        return kept_fields(facts);
+    }
     let needs = facts.needs();
     let bumped_silhouette = facts.holds("bumped_silhouette") == Some(true);
-    let of_terms = facts.source == Source::Terms;
-    let part = |name: &str| parts(facts).contains(&name);
     let wanted = |name: &str| match name {
         "bump" => needs.normal_map,
-        "normal" => needs.key_light,
+        "normal" => needs.smooth_normal,
         "open" => needs.occlusion,
-        "silhouette" => needs.rim && (of_terms || !bumped_silhouette),
+        "silhouette" => needs.rim && !bumped_silhouette,
         "dapple" => needs.dapple,
         "albedo" => needs.color_map,
         "specular" => needs.specular_map,
         "attenuator" => needs.attenuator_map,
-        "diffuse_term" => part("diffuse_part"),
-        "side_term" => part("side_part"),
-        "hilite_term" => part("hilite_part"),
-        "mirror_term" => part("mirror_part"),
-        "key_term" => part("key_part"),
-        "haze_term" => hazy(facts),
         _ => true,
     };
-    let all: &[_] = if of_terms { &TERMS } else { &SAMPLE };
-    all.iter().copied().filter(|(name, _)| wanted(name)).collect()
-}
-
-/// The rules that yield a stored sample's terms: a plan whose goals are the fields of [`Source::Terms`].
-///
-/// # Errors
-/// When no rules yield them.
-pub fn plan_terms(facts: &Facts) -> Result<(Plan, Fields), PlanError> {
-    let facts = Facts { source: Source::Samples, ..*facts };
-    let given: Vec<&'static str> = sample_fields(&facts).iter().map(|(name, _)| *name).collect();
-    let terms = sample_fields(&Facts { source: Source::Terms, ..facts });
-    let goals: Vec<&'static str> =
-        terms.iter().map(|(name, _)| *name).filter(|t| !given.contains(t)).collect();
-    Ok((Plan::search(&facts, &[], &goals, &given)?, terms))
+    SAMPLE.iter().copied().filter(|(name, _)| wanted(name)).collect()
 }
 
 /// Whether the haze goes to alpha.
@@ -144,26 +113,22 @@ pub fn hazy(facts: &Facts) -> bool {
     facts.needs().haze && facts.output.is_none()
 }
 
-/// The parts that add up to the output.
+/// The parts that add up to the output, in the order of their terms.
 pub fn parts(facts: &Facts) -> Vec<&'static str> {
-    let has = |effect| facts.setup.effects.has(effect);
-    let (diffuse, rim) = (has(Effect::Diffuse), has(Effect::Rim));
-    let all = match facts.output {
-        None => vec![
-            (diffuse, "diffuse_part"),
-            (has(Effect::SideSpecular), "side_part"),
-            (has(Effect::Hilite), "hilite_part"),
-            (has(Effect::Reflection), "mirror_part"),
-            (has(Effect::KeyLight), "key_part"),
-        ],
-        Some(TermName::Diffuse) => vec![(diffuse, "base_part")],
-        Some(TermName::Rim) => vec![(diffuse && rim, "rim_part")],
-        Some(TermName::SideSpecular) => vec![(has(Effect::SideSpecular), "side_part")],
-        Some(TermName::Hilite) => vec![(has(Effect::Hilite), "hilite_part")],
-        Some(TermName::Reflection) => vec![(has(Effect::Reflection), "mirror_part")],
-        Some(TermName::KeyLight) => vec![(has(Effect::KeyLight), "key_part")],
+    let terms = TermName::of(facts.setup.effects);
+    // What holds several terms is shown term by term by other rules.
+    let holds = |rule: &Rule| match facts.output {
+        None => rule.adds.iter().filter_map(|name| terms.iter().position(|term| term.name() == *name)).min(),
+        Some(term) => {
+            let alone = rule.shows == Some(term.name()) || rule.adds.as_slice() == [term.name()];
+            (alone && terms.contains(&term)).then_some(0)
+        }
     };
-    all.into_iter().filter(|(wanted, _)| *wanted).map(|(_, part)| part).collect()
+    let mut parts: Vec<(usize, &'static str)> =
+        rules(facts.setup.effects).filter_map(|rule| Some((holds(rule)?, rule.gives[0].0))).collect();
+    parts.sort_by_key(|(place, _)| *place);
+    parts.dedup();
+    parts.into_iter().map(|(_, part)| part).collect()
 }
 
 impl Plan {
@@ -232,7 +197,7 @@ impl Plan {
             None if given(rule) => "dearer".to_owned(),
             None => "nothing asks for it".to_owned(),
         };
-        RULES.iter().filter(|rule| !chosen(rule)).map(|rule| (rule, why(rule))).collect()
+        rules(self.facts.setup.effects).filter(|rule| !chosen(rule)).map(|rule| (rule, why(rule))).collect()
     }
 
     /// Declarations that every module shares: extensions, constants, resources, functions. The block of

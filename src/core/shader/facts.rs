@@ -3,8 +3,6 @@
 use crate::model::compose::TermName;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
-use crate::model::params::{Param, Params};
-use crate::scene::Scene;
 use crate::shader::quantity::Resource;
 
 /// How far the output may be off, relative to white diffuse light of unit irradiance.
@@ -137,43 +135,32 @@ impl Default for Facts {
 }
 
 impl Facts {
-    /// Of a scene at `params`, within `budget`, on an adapter with or without 16-bit arithmetic.
-    #[must_use]
-    pub fn of_scene(scene: &Scene, params: &Params, budget: Budget, f16: bool) -> Self {
-        let Scene { form, silhouette, effects, maps, mesh, .. } = scene;
-        let same = |a: Option<(usize, usize)>, b: Option<(usize, usize)>| a.is_some() && a == b;
-        let color = maps.color.as_ref().map(|map| (map.width, map.height));
-        let normal = maps.normal.as_ref().map(|map| (map.width, map.height));
-        let specular = maps.specular.as_ref().map(|map| (map.width, map.height));
-        let attenuator = maps.attenuator.as_ref().map(|map| (map.width, map.height));
-        Self {
-            setup: Setup { form: *form, silhouette: *silhouette, effects: *effects },
-            source: Source::Raster,
-            maps: MapFacts {
-                color: color.is_some(),
-                normal: normal.is_some(),
-                specular: specular.is_some(),
-                attenuator: attenuator.is_some(),
-                color_specular: same(color, specular),
-                normal_attenuator: same(normal, attenuator),
-            },
-            faces: FaceSizes::default(),
-            morphs: mesh.morphs.iter().filter(|morph| morph.weight != 0.0).count() as u32,
-            bones: !mesh.bones.is_empty() && !mesh.joints.is_empty(),
-            turned: params.scalar(Param::EnvironmentRotation) != 0.0,
-            square_rim: params.scalar(Param::RimExponent) == 2.0,
-            f16,
-            tessellation: tessellation_error(scene),
-            budget,
-            output: None,
-        }
-    }
-
     /// What the enabled effects ask for.
     #[must_use]
     pub fn needs(&self) -> Needs {
         self.setup.effects.needs(self.setup.silhouette)
     }
+
+    /// Conditions of a rule's `when` line that are neither effects nor forms.
+    pub const CONDITIONS: [&'static str; 17] = [
+        "vertex_silhouette",
+        "fragment_silhouette",
+        "bumped_silhouette",
+        "raster",
+        "terms",
+        "bumped",
+        "has_color_map",
+        "has_normal_map",
+        "has_specular_map",
+        "has_attenuator_map",
+        "color_specular_one_size",
+        "normal_attenuator_one_size",
+        "morphs",
+        "bones",
+        "turned",
+        "square_rim",
+        "f16",
+    ];
 
     /// Whether a condition of a rule's `when` line holds; `None` for one that is not known.
     #[must_use]
@@ -214,26 +201,7 @@ impl Facts {
     /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads
     /// its neutral value, which it does not decode.
     fn bumped(&self) -> bool {
-        let normal_map = self.needs().normal_map;
+        let normal_map = self.setup.effects.has(Effect::NormalMap);
         normal_map && (self.source != Source::Raster || self.maps.normal || self.setup.form == Form::Listing)
     }
-}
-
-/// The 99th percentile over a mesh's triangles of how far an interpolated 1 - |N.V| is off: where the
-/// normals of a triangle differ by an angle a, a cosine between two vertices sags by up to a^2 / 8.
-#[must_use]
-pub fn tessellation_error(scene: &Scene) -> f64 {
-    let normals = &scene.mesh.normals;
-    let sag = |a: u32, b: u32| {
-        let (a, b) = (normals[a as usize].as_dvec3(), normals[b as usize].as_dvec3());
-        let angle = a.cross(b).length().atan2(a.dot(b));
-        angle * angle / 8.0
-    };
-    let mut sags: Vec<f64> =
-        scene.mesh.triangles.iter().map(|&[a, b, c]| sag(a, b).max(sag(b, c)).max(sag(c, a))).collect();
-    if sags.is_empty() {
-        return 0.0;
-    }
-    let at = (sags.len() - 1) * 99 / 100;
-    *sags.select_nth_unstable_by(at, f64::total_cmp).1
 }

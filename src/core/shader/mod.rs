@@ -9,19 +9,24 @@
 //! - [`search`]: the cheapest set of rules within the accuracy budget (A*)
 //! - [`emit`]: the plan: the chosen rules, and what they read; `module`: its WGSL, for rasterised
 //!   fragments, for stored samples, or as a function for other engines
+//! - [`kept`]: what of stored samples need not be computed anew in each pass
+//! - [`term`]: effects, parameters and rules that a file adds
 //! - [`probe`]: its rules one by one, for given numbers
 //! - [`tangent`]: the rules' derivatives, made from their own text
 //!
 //! Nothing that the [`Plan`] does not name is uploaded, bound or compiled.
 
+mod bits;
 pub mod emit;
 pub mod facts;
+pub mod kept;
 pub mod module;
 pub mod probe;
 pub mod quantity;
 pub mod rule;
 pub mod search;
 pub mod tangent;
+pub mod term;
 
 pub use emit::{Plan, Step, plan};
 pub use facts::{Budget, Facts, Source};

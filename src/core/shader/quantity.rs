@@ -275,14 +275,17 @@ impl Constant {
     /// The constant of that name in rules.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::OWN.into_iter().find(|c| c.name() == name).or_else(|| Param::from_name(name).map(Self::Param))
+        Self::OWN
+            .into_iter()
+            .find(|c| c.name() == name)
+            .or_else(|| Param::from_identifier(name).map(Self::Param))
     }
 
     /// Its name in rules and in WGSL.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
-            Self::Param(param) => param.name(),
+            Self::Param(param) => param.identifier(),
             Self::Eye => "eye",
             Self::ViewProjection => "view_projection",
             Self::Turn => "turn",

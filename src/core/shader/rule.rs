@@ -1,7 +1,7 @@
 //! The rules: what each gives, from what, where, at what cost and with what error.
 //!
-//! A rule is a WGSL file under `rules/`, in the folder of its stage: comments that say what it is for,
-//! header lines, and one function.
+//! A rule is a WGSL function in a file under `rules/`, in the folder of its stage, or in a file of a scene
+//! ([`term`]): comments that say what it is for, header lines, and the function.
 //!
 //! ```wgsl
 //! // R = V - 2 n (n.V) (MODEL 3, corrected form).
@@ -17,11 +17,15 @@
 //! Its parameters are the quantities that it needs. A quantity of the vertex stage that a fragment rule
 //! names is interpolated. Other header lines: `reads` (resources and constants that the body names),
 //! `uses` (files of `rules/lib`), `error` (relative to white; a number or `tessellation`), `paper: yes`
-//! (the paper's own programs made this approximation).
+//! (the paper's own programs made this approximation), `adds` (the quantity is a part of the sum that the
+//! radiance is, and holds these terms), `shows` (it is that term alone), `fallback` (quantities that it takes where
+//! others fail, and for which nothing needs to be stored).
 
 use std::sync::LazyLock;
 
 use super::facts::{Budget, Facts};
+use super::term::{self, declaration};
+use crate::model::effects::Effects;
 
 /// Where a rule is evaluated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -35,26 +39,34 @@ pub enum Stage {
 /// One rule.
 #[derive(Clone, Debug)]
 pub struct Rule {
-    /// The file's name without its ending.
+    /// The file's name without its ending; the function's where a file has several.
     pub name: &'static str,
+    /// The line of its function in its file.
+    pub line: usize,
     /// Where it is evaluated.
     pub stage: Stage,
     /// What it is, in words.
     pub about: String,
     /// Quantities that it gives, each with the components of the function's value that hold it.
     pub gives: Vec<(&'static str, &'static str)>,
+    /// Terms that its quantity holds, where it is a part of the sum.
+    pub adds: Vec<&'static str>,
+    /// The term that its quantity is.
+    pub shows: Option<&'static str>,
     /// Conditions on the [`Facts`], all of which must hold.
     pub when: Vec<&'static str>,
     /// Operations, about; and how many more for each morph target.
     cost: f64,
     cost_a_morph: f64,
-    error: Error,
+    pub(super) error: Error,
     /// Whether the paper's own programs made this approximation.
     pub paper: bool,
     /// Library files that it calls.
     pub uses: Vec<&'static str>,
     /// Resources and constants that the body names.
     pub reads: Vec<&'static str>,
+    /// Quantities that it takes where others fail.
+    pub fallback: Vec<&'static str>,
     /// The function's name.
     pub function: &'static str,
     /// The function's parameters: quantity and WGSL type.
@@ -66,7 +78,7 @@ pub struct Rule {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Error {
+pub(super) enum Error {
     Fixed(f64),
     Tessellation,
 }
@@ -122,14 +134,21 @@ impl Rule {
         }
     }
 
-    fn parse(stage: Stage, name: &'static str, text: &'static str) -> Result<Self, String> {
-        let start = text.find("fn ").filter(|&at| at == 0 || text.as_bytes()[at - 1] == b'\n');
-        let (header, body) = text.split_at(start.ok_or("no function")?);
-        let mut rule = Self {
-            name,
+    /// A function without what its header says; `None` where its head is not that of one. `line` is its first.
+    pub(super) fn bare(stage: Stage, line: usize, body: &'static str) -> Option<Self> {
+        let (function, rest) = body.strip_prefix("fn ")?.split_once('(')?;
+        let (parameters, rest) = rest.split_once(')')?;
+        let (returns, _) = rest.trim_start().strip_prefix("->")?.split_once('{')?;
+        let parameters = parameters.split(',').map(str::trim).filter(|p| !p.is_empty());
+        let typed = |p: &'static str| p.split_once(':').map(|(name, kind)| (name.trim(), kind.trim()));
+        Some(Self {
+            name: function.trim(),
             stage,
+            line,
             about: String::new(),
             gives: Vec::new(),
+            adds: Vec::new(),
+            shows: None,
             when: Vec::new(),
             cost: f64::NAN,
             cost_a_morph: 0.0,
@@ -137,100 +156,43 @@ impl Rule {
             paper: false,
             uses: Vec::new(),
             reads: Vec::new(),
-            function: "",
-            needs: Vec::new(),
-            returns: "",
+            fallback: Vec::new(),
+            function: function.trim(),
+            needs: parameters.map(typed).collect::<Option<_>>()?,
+            returns: returns.trim(),
             body,
-        };
-        for line in header.lines() {
-            rule.header_line(line.trim_start_matches('/').trim())?;
-        }
-        rule.signature()?;
-        if rule.gives.is_empty() || !rule.cost.is_finite() {
-            return Err("it needs `gives` and `cost`".to_owned());
-        }
-        Ok(rule)
+        })
     }
 
-    fn header_line(&mut self, line: &'static str) -> Result<(), String> {
-        let list = |value: &'static str| value.split(',').map(str::trim).filter(|v| !v.is_empty());
-        let number = |text: &str| text.trim().parse::<f64>().map_err(|e| format!("{text}: {e}"));
-        match line.split_once(": ") {
-            Some(("gives", value)) => {
-                self.gives = list(value).map(|q| q.split_once('.').unwrap_or((q, ""))).collect();
-            }
-            Some(("when", value)) => self.when = list(value).collect(),
-            Some(("uses", value)) => self.uses = list(value).collect(),
-            Some(("reads", value)) => self.reads = list(value).collect(),
-            Some(("paper", value)) => self.paper = value == "yes",
-            Some(("error", "tessellation")) => self.error = Error::Tessellation,
-            Some(("error", value)) => self.error = Error::Fixed(number(value)?),
-            Some(("cost", value)) => match value.strip_suffix(" a morph") {
-                Some(costs) => {
-                    let (fixed, each) = costs.split_once(" and ").unwrap_or(("0", costs));
-                    (self.cost, self.cost_a_morph) = (number(fixed)?, number(each)?);
-                }
-                None => self.cost = number(value)?,
-            },
-            _ if line.is_empty() => {}
-            _ => {
-                if !self.about.is_empty() {
-                    self.about.push(' ');
-                }
-                self.about.push_str(line);
-            }
-        }
-        Ok(())
+    /// Set the operations that it takes, and those for each morph target.
+    pub(super) const fn set_cost(&mut self, (fixed, each): (f64, f64)) {
+        (self.cost, self.cost_a_morph) = (fixed, each);
     }
 
-    /// Name, parameters and value of the function.
-    fn signature(&mut self) -> Result<(), String> {
-        let open = self.body.find('(').ok_or("no parameter list")?;
-        let close = self.body.find(") -> ").ok_or("no value")?;
-        let end = self.body.find(" {").ok_or("no body")?;
-        self.function = self.body["fn ".len()..open].trim();
-        self.returns = self.body[close + ") -> ".len()..end].trim();
-        let parameters = self.body[open + 1..close].split(',').map(str::trim).filter(|p| !p.is_empty());
-        self.needs = parameters
-            .map(|p| p.split_once(": ").ok_or_else(|| format!("parameter {p}")))
-            .collect::<Result<_, _>>()?;
-        Ok(())
+    pub(super) const fn has_cost(&self) -> bool {
+        self.cost.is_finite()
+    }
+
+    /// Whether it is off by nothing but rounding.
+    #[must_use]
+    pub fn is_exact(&self) -> bool {
+        self.error == Error::Fixed(0.0)
+    }
+
+    /// The WGSL type of a quantity that it gives.
+    #[must_use]
+    pub fn given_type(&self, components: &str) -> &'static str {
+        match components.len() {
+            0 => self.returns,
+            1 => "f32",
+            2 => "vec2f",
+            _ => "vec3f",
+        }
     }
 }
 
-macro_rules! rules {
-    ($stage:ident in $folder:literal: $($name:ident)*) => {
-        [$((Stage::$stage, stringify!($name), include_str!(concat!("rules/", $folder, "/", stringify!($name), ".wgsl")))),*]
-    };
-}
-
-#[rustfmt::skip]
-const VERTEX: [(Stage, &str, &str); 19] = rules! { Vertex in "vertex":
-    unmorphed_position morph_position unskinned_position skin_position clip
-    unmorphed_normal morph_normal unskinned_normal skin_normal
-    morphed_tangent unskinned_tangent skin_tangent vertex_tangent vertex_bitangent
-    unmorphed_occlusion morph_occlusion vertex_uv vertex_view vertex_silhouette
-};
-
-#[rustfmt::skip]
-const FRAGMENT: [(Stage, &str, &str); 80] = rules! { Fragment in "fragment":
-    view_exact view_interpolated smooth_normal smooth_normal_unguarded normal_of_base
-    color_texels color_map color_neutral specular_texels specular_map specular_neutral
-    attenuator_texels attenuator_map attenuator_neutral normal_texels normal_map normal_neutral
-    color_specular_texels color_specular_map normal_attenuator_texels normal_attenuator_map
-    decoded decoded_as_listed base_bumped bump n_bumped n_bumped_as_listed n_smooth n_smooth_as_listed
-    n_of_base n_of_base_as_listed reflected reflected_as_listed dapple dapple_as_listed
-    silhouette_interpolated silhouette_approximated silhouette_smooth silhouette_bumped
-    rim rim_squared open occ occ_open
-    n_turned n_unturned n_place n_place_as_listed
-    reflected_turned reflected_unturned reflected_place reflected_place_as_listed
-    view_turned view_unturned view_place view_place_as_listed
-    irradiance_faces irradiance_cube side_light_faces side_light_cube
-    mirror_light_faces mirror_light_cube hilite_light_faces hilite_light_cube
-    diffuse_term side_term hilite_term mirror_term haze_term key_term
-    base_part rim_part diffuse_part diffuse_part_f16 diffuse_part_without_rim
-    side_part hilite_part mirror_part key_part haze
-};
+/// Every file of rules: stage, name and text.
+const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
 pub const LIBRARY: [(&str, &str); 4] = [
@@ -240,29 +202,26 @@ pub const LIBRARY: [(&str, &str); 4] = [
     ("texels", include_str!("rules/lib/texels.wgsl")),
 ];
 
-/// Every rule.
+/// The built-in rules.
 pub static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
-    let read = |&(stage, name, text): &(Stage, &'static str, &'static str)| {
-        Rule::parse(stage, name, text).unwrap_or_else(|error| panic!("rules/{name}.wgsl: {error}"))
+    let read = |&(folder, name, text): &(&str, &'static str, &'static str)| {
+        let stage = if folder == "vertex" { Stage::Vertex } else { Stage::Fragment };
+        let read = declaration::parse(stage, name, text);
+        read.unwrap_or_else(|error| panic!("rules/{folder}/{name}.wgsl: {error}")).rules
     };
-    VERTEX.iter().chain(&FRAGMENT).map(read).collect()
+    FILES.iter().flat_map(read).collect()
 });
+
+/// The rules that a scene with these effects has: the built-in ones, and those of the terms that its effects are of.
+pub fn rules(effects: Effects) -> impl Iterator<Item = &'static Rule> {
+    let added = term::terms().into_iter().filter(move |term| effects.has(term.effect));
+    RULES.iter().chain(added.flat_map(|term| &term.rules))
+}
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::shader::quantity::{Attribute, Constant, Resource};
-
-    #[test]
-    fn every_file_is_a_rule() {
-        for (folder, stage) in [("vertex", Stage::Vertex), ("fragment", Stage::Fragment)] {
-            let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("shader/rules").join(folder);
-            for entry in std::fs::read_dir(path).unwrap() {
-                let name = entry.unwrap().path().file_stem().unwrap().to_string_lossy().into_owned();
-                assert!(RULES.iter().any(|rule| rule.name == name && rule.stage == stage), "{name}");
-            }
-        }
-    }
 
     #[test]
     fn whatever_a_rule_names_exists() {
@@ -297,12 +256,7 @@ mod tests {
         }
         for rule in RULES.iter() {
             for (quantity, components) in &rule.gives {
-                let given = match (components.len(), rule.returns) {
-                    (0, whole) => whole,
-                    (1, _) => "f32",
-                    (2, _) => "vec2f",
-                    _ => "vec3f",
-                };
+                let given = rule.given_type(components);
                 assert_eq!(*types.get(quantity).unwrap_or(&given), given, "{}: {quantity}", rule.name);
             }
         }

@@ -11,9 +11,10 @@ use std::collections::BTreeMap;
 
 use pathfinding::directed::astar::astar;
 
+use super::bits::Bits;
 use super::facts::{Budget, Facts};
 use super::quantity::{Attribute, Constant};
-use super::rule::{RULES, Rule, Stage};
+use super::rule::{Rule, Stage, rules};
 
 /// How much work a vertex counts beside a fragment: a character's mesh has about a vertex for every four
 /// pixels that it covers.
@@ -34,6 +35,24 @@ pub enum PlanError {
     )]
     NoPlan {
         /// What was wanted.
+        goals: String,
+    },
+    /// More quantities than a search tells apart.
+    #[error(
+        "{quantities} shader quantities are more than the {most} that a search tells apart. Enable fewer effects."
+    )]
+    TooMany {
+        /// Quantities of the scene's rules.
+        quantities: usize,
+        /// What the search tells apart.
+        most: usize,
+    },
+    /// Quantities that need one another.
+    #[error(
+        "shader rules need one another in a circle, among {goals}. This is a fault of skinfit: please report it."
+    )]
+    Circle {
+        /// Among which.
         goals: String,
     },
 }
@@ -62,9 +81,9 @@ struct Graph<'a> {
 #[derive(Clone, PartialEq, Eq, Hash)]
 struct State {
     /// Wants that are open, a bit each.
-    open: u128,
+    open: Bits,
     /// Wants that a rule with several quantities has given already.
-    have: u128,
+    have: Bits,
     /// Error so far.
     error: u64,
 }
@@ -82,16 +101,20 @@ pub fn search(
     goals: &[&'static str],
     given: &[&'static str],
 ) -> Result<Vec<&'static Rule>, PlanError> {
-    let graph = Graph::new(facts, given);
+    let graph = Graph::new(facts, given)?;
     let no_plan = || PlanError::NoPlan { goals: [vertex_goals, goals].concat().join(", ") };
-    let mut start = State { open: 0, have: 0, error: 0 };
+    let mut start = State { open: Bits::default(), have: Bits::default(), error: 0 };
     let wanted = vertex_goals.iter().map(|q| (Stage::Vertex, *q));
     for want in wanted.chain(goals.iter().map(|q| (Stage::Fragment, *q))) {
-        start.open |= graph.bit(want).ok_or_else(no_plan)?;
+        start.open = start.open.or(graph.bit(want).ok_or_else(no_plan)?);
     }
-    let (path, _) =
-        astar(&start, |state| graph.successors(state), |state| graph.least(state.open), |s| s.open == 0)
-            .ok_or_else(no_plan)?;
+    let (path, _) = astar(
+        &start,
+        |state| graph.successors(state),
+        |state| graph.least(state.open),
+        |s| s.open.is_empty(),
+    )
+    .ok_or_else(no_plan)?;
     let mut rules: Vec<&'static Rule> = path.windows(2).filter_map(|pair| graph.between(pair)).collect();
     rules.reverse();
     rules.sort_by_key(|rule| rule.stage);
@@ -116,9 +139,9 @@ pub fn components(wgsl: &str) -> usize {
 }
 
 impl<'a> Graph<'a> {
-    fn new(facts: &'a Facts, given: &'a [&'static str]) -> Self {
+    fn new(facts: &'a Facts, given: &'a [&'static str]) -> Result<Self, PlanError> {
         let mut means: BTreeMap<Want, Vec<Means>> = BTreeMap::new();
-        let usable = || RULES.iter().filter(|rule| rule.refusal(facts).is_none());
+        let usable = || rules(facts.setup.effects).filter(|rule| rule.refusal(facts).is_none());
         for rule in usable() {
             for (quantity, swizzle) in &rule.gives {
                 means.entry((rule.stage, quantity)).or_default().push(Means::Rule(rule));
@@ -131,17 +154,19 @@ impl<'a> Graph<'a> {
                 }
             }
         }
-        let ranks = ranks(&means, given);
+        let ranks = ranks(&means, given)?;
         let mut wants: Vec<Want> = means.keys().copied().collect();
         wants.retain(|want| ranks.contains_key(want));
         wants.sort_by_key(|want| (ranks[want], *want));
-        assert!(wants.len() <= 128, "a state holds 128 quantities");
+        if wants.len() > Bits::MOST {
+            return Err(PlanError::TooMany { quantities: wants.len(), most: Bits::MOST });
+        }
         let means = wants.iter().map(|want| means.remove(want).unwrap_or_default()).collect();
-        Self { facts, wants, means, given }
+        Ok(Self { facts, wants, means, given })
     }
 
-    fn bit(&self, want: Want) -> Option<u128> {
-        self.wants.iter().position(|&w| w == want).map(|i| 1 << i)
+    fn bit(&self, want: Want) -> Option<Bits> {
+        self.wants.iter().position(|&w| w == want).map(Bits::one)
     }
 
     fn is_given(&self, (stage, quantity): Want) -> bool {
@@ -149,7 +174,7 @@ impl<'a> Graph<'a> {
     }
 
     /// The wants of a means; `None` when one of them cannot be met.
-    fn needs(&self, means: &Means) -> Option<u128> {
+    fn needs(&self, means: &Means) -> Option<Bits> {
         let needs: Vec<Want> = match means {
             Means::Rule(rule) => rule.needs.iter().map(|(q, _)| (rule.stage, *q)).collect(),
             Means::Interpolate(quantity, _) => vec![(Stage::Vertex, *quantity)],
@@ -157,7 +182,7 @@ impl<'a> Graph<'a> {
         needs
             .into_iter()
             .filter(|&want| !self.is_given(want))
-            .try_fold(0, |bits, want| Some(bits | self.bit(want)?))
+            .try_fold(Bits::default(), |bits, want| Some(bits.or(self.bit(want)?)))
     }
 
     fn cost(&self, means: &Means) -> u64 {
@@ -170,10 +195,10 @@ impl<'a> Graph<'a> {
     }
 
     /// All that a means gives.
-    fn gives(&self, means: &Means, want: u128) -> u128 {
+    fn gives(&self, means: &Means, want: Bits) -> Bits {
         match means {
             Means::Rule(rule) => {
-                rule.gives.iter().filter_map(|(q, _)| self.bit((rule.stage, q))).fold(want, |a, b| a | b)
+                rule.gives.iter().filter_map(|(q, _)| self.bit((rule.stage, q))).fold(want, Bits::or)
             }
             Means::Interpolate(..) => want,
         }
@@ -181,7 +206,7 @@ impl<'a> Graph<'a> {
 
     /// The open want that lies furthest from the inputs.
     fn next(&self, state: &State) -> Option<usize> {
-        (state.open != 0).then(|| 127 - state.open.leading_zeros() as usize)
+        state.open.greatest()
     }
 
     fn successors(&self, state: &State) -> Vec<(State, u64)> {
@@ -190,11 +215,11 @@ impl<'a> Graph<'a> {
     }
 
     fn step(&self, state: &State, at: usize, means: &Means) -> Option<(State, u64)> {
-        let gives = self.gives(means, 1 << at);
-        let have = state.have | gives;
-        let open = (state.open | self.needs(means)?) & !have;
+        let gives = self.gives(means, Bits::one(at));
+        let have = state.have.or(gives);
+        let open = state.open.or(self.needs(means)?).without(have);
         // What lies beyond is never wanted again: forgetting it makes more states alike.
-        let have = have & ((1 << at) - 1);
+        let have = have.below(at);
         let error = match means {
             Means::Rule(rule) => (rule.error(self.facts) * ERROR_STEPS).ceil() as u64,
             Means::Interpolate(..) => 0,
@@ -211,12 +236,13 @@ impl<'a> Graph<'a> {
     }
 
     /// A bound on what the open wants cost at the least.
-    fn least(&self, open: u128) -> u64 {
+    fn least(&self, open: Bits) -> u64 {
         let cheapest = |at: usize| {
-            let share = |means: &Means| self.cost(means) / u64::from(self.gives(means, 1 << at).count_ones());
+            let share =
+                |means: &Means| self.cost(means) / u64::from(self.gives(means, Bits::one(at)).count());
             self.means[at].iter().map(share).min().unwrap_or(0)
         };
-        (0..self.wants.len()).filter(|at| open & (1 << at) != 0).map(cheapest).sum()
+        open.iter().map(cheapest).sum()
     }
 
     /// The rule that leads from one state of a path to the next.
@@ -235,7 +261,10 @@ impl<'a> Graph<'a> {
 
 /// How far each want lies from the inputs: one more than the furthest of its needs, over all means. Wants
 /// that cannot be met have no rank.
-fn ranks(means: &BTreeMap<Want, Vec<Means>>, given: &[&'static str]) -> BTreeMap<Want, usize> {
+fn ranks(
+    means: &BTreeMap<Want, Vec<Means>>,
+    given: &[&'static str],
+) -> Result<BTreeMap<Want, usize>, PlanError> {
     let mut ranks: BTreeMap<Want, usize> = BTreeMap::new();
     let there = |(stage, q): Want| is_input(q) || (stage == Stage::Fragment && given.contains(&q));
     // Each round settles at least one more; cycles would never end, so rounds are counted.
@@ -260,8 +289,9 @@ fn ranks(means: &BTreeMap<Want, Vec<Means>>, given: &[&'static str]) -> BTreeMap
             }
         }
         if !changed {
-            return ranks;
+            return Ok(ranks);
         }
     }
-    panic!("the rules need one another in a circle");
+    let goals = means.keys().map(|(_, quantity)| *quantity).collect::<Vec<_>>().join(", ");
+    Err(PlanError::Circle { goals })
 }

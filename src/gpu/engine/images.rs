@@ -1,6 +1,6 @@
 //! The forward pass: images, left on the device.
 
-use std::time::Instant;
+use web_time::Instant;
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeline};
 
@@ -9,6 +9,7 @@ use super::lights::Inputs;
 use super::parts::{PART_BYTES, Parts};
 use super::pipeline::{Uniform, bind_part, buffer, encoder, part_layout, pipeline};
 use super::{GpuEngine, OnDevice};
+use crate::model::compose::TermName;
 use crate::readback::read_floats;
 use crate::timing::Timer;
 use crate::{Gpu, GpuError};
@@ -102,7 +103,15 @@ impl GpuEngine<'_> {
     /// # Errors
     /// When the device fails.
     pub fn image(&self, index: usize, point: &Point) -> Result<Vec<Vec<f32>>, GpuError> {
-        self.with_images(point, |images, parts| images.read(self.gpu, parts, index))
+        self.with_images(point, None, |images, parts| images.read(self.gpu, parts, index))
+    }
+
+    /// As [`Self::image`], of one term alone, without alpha.
+    ///
+    /// # Errors
+    /// When the device fails.
+    pub fn term_image(&self, index: usize, point: &Point, term: TermName) -> Result<Vec<Vec<f32>>, GpuError> {
+        self.with_images(point, Some(term), |images, parts| images.read(self.gpu, parts, index))
     }
 
     /// Shade every view and wait for it; the images stay on the device. To be timed.
@@ -110,7 +119,7 @@ impl GpuEngine<'_> {
     /// # Errors
     /// When the device fails.
     pub fn shade(&self, point: &Point) -> Result<(), GpuError> {
-        self.with_images(point, |_, _| self.gpu.wait())
+        self.with_images(point, None, |_, _| self.gpu.wait())
     }
 
     /// Milliseconds of each of so many forward passes over all views with nothing read back. On the GPU's clock, one
@@ -125,7 +134,7 @@ impl GpuEngine<'_> {
             return Ok(Vec::new());
         }
         if gpu.is_software() {
-            return self.with_images(point, |images, parts| {
+            return self.with_images(point, None, |images, parts| {
                 gpu.wait()?;
                 let timed = || {
                     let start = Instant::now();
@@ -136,7 +145,7 @@ impl GpuEngine<'_> {
                 (0..passes).map(|_| timed()).collect()
             });
         }
-        let timers = self.with_images(point, |images, parts| {
+        let timers = self.with_images(point, None, |images, parts| {
             let timed = || {
                 let mut timers = Vec::new();
                 images.run(gpu, parts, self.views, gains, Some(&mut timers))?;
@@ -154,15 +163,16 @@ impl GpuEngine<'_> {
     fn with_images<T>(
         &self,
         point: &Point,
+        term: Option<TermName>,
         then: impl FnOnce(&Images, &Parts) -> Result<T, GpuError>,
     ) -> Result<T, GpuError> {
         let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
         let OnDevice { parts, lights, images, .. } = &mut *device;
-        if images.as_ref().is_none_or(|(of, _)| *of != written) {
-            let fused = self.fused(written, lights.face_sizes())?;
-            *images = Some((written, Images::new(self.gpu, &fused, parts)?));
+        if images.as_ref().is_none_or(|(of, _)| *of != (written, term)) {
+            let fused = self.fused(written, lights.face_sizes(), term)?;
+            *images = Some(((written, term), Images::new(self.gpu, &fused, parts)?));
         }
         let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
         lights.set(self.gpu, &point.params, &mut images.inputs)?;

@@ -32,13 +32,7 @@ impl DeviceLights {
 
     /// The cubes' sizes.
     pub(super) fn face_sizes(&self) -> FaceSizes {
-        let Illumination { irradiance, lobes, hilite } = &self.illumination;
-        let specular = lobes.as_ref().and_then(|stack| stack.cubes.first());
-        FaceSizes {
-            irradiance: irradiance.as_ref().map(Cube::size),
-            specular: specular.map(Cube::size),
-            hilite: hilite.as_ref().map(Cube::size),
-        }
+        skinfit_core::engine::face_sizes(&self.illumination)
     }
 
     /// Have what a program reads ready for a pass at `params`.

@@ -22,17 +22,18 @@ mod terms;
 
 use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use web_time::Instant;
 
-use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish};
+use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish, held_parameters};
 use self::images::Images;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
 use self::program::Program;
 pub use self::samples::{DeviceSampleError, DeviceSamples};
-use self::terms::{HELD, replace_samples};
+use self::terms::replace_samples;
 use crate::bake::Illumination;
 use crate::model::compose::TermName;
+use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::scene::Loss;
@@ -81,8 +82,8 @@ pub struct GpuEngine<'g> {
     weight: (f64, u64),
     alpha: bool,
     traits: Traits,
-    /// Whether terms stand in the place of samples.
-    keeps: bool,
+    /// The parameters that terms are made with, where terms stand in the place of samples.
+    held: Option<Vec<Param>>,
     /// What changes between passes; a pass at a time.
     device: Mutex<OnDevice>,
     fault: Mutex<Option<GpuError>>,
@@ -95,11 +96,11 @@ struct OnDevice {
     /// By wish, and by what is written into the text.
     programs: BTreeMap<(Wish, Written), Program>,
     /// What the terms were made with that stand in the samples' place.
-    terms: Option<[f64; 5]>,
+    terms: Option<Vec<[f64; 3]>>,
     /// Whether terms stand there, perhaps in some parts only.
     replaced: bool,
-    /// The forward pass, and what is written into its text.
-    images: Option<(Written, Images)>,
+    /// The forward pass, and what is written into its text: with a term, that one alone.
+    images: Option<((Written, Option<TermName>), Images)>,
 }
 
 /// What of a point is written into shaders' text.
@@ -159,7 +160,7 @@ impl<'g> GpuEngine<'g> {
             weight: (0.0, 0),
             alpha,
             traits,
-            keeps: false,
+            held: None,
             device: Mutex::new(OnDevice {
                 parts: Parts::default(),
                 lights: DeviceLights::new(illumination),
@@ -175,10 +176,15 @@ impl<'g> GpuEngine<'g> {
         let parts = Parts::new(gpu, views, &engine.traits, memory, made)?;
         engine.made_seconds =
             made.map_or(0.0, |made| made.seconds() + start_of_parts.elapsed().as_secs_f64());
-        let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if HELD.contains(&c.param));
         let samples = Layout::of_samples(&engine.traits.places, engine.traits.rows);
         let terms = Layout::of_terms(setup, &samples);
-        engine.keeps = !engine.unknowns.iter().any(moves) && parts.all_hold(terms.rows, views);
+        if parts.all_hold(terms.rows, views) {
+            let faces = engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).lights.face_sizes();
+            let held =
+                held_parameters(&engine.fitted(engine.written(start), faces)).map_err(GpuError::Plan)?;
+            let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if held.contains(&c.param));
+            engine.held = (!engine.unknowns.iter().any(moves)).then_some(held);
+        }
         engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
         engine.set_stride(1);
         // Whatever the driver refuses shows here, and not in the midst of a fit.
@@ -213,6 +219,12 @@ impl<'g> GpuEngine<'g> {
     #[must_use]
     pub fn device_samples(&self) -> Option<(&'g DeviceSamples<'g>, f64)> {
         Some((self.made?, self.made_seconds))
+    }
+
+    /// What is switched on.
+    #[must_use]
+    pub const fn effects(&self) -> Effects {
+        self.setup.effects
     }
 
     /// The adapter's name.
@@ -250,6 +262,7 @@ impl<'g> GpuEngine<'g> {
     fn fitted(&self, written: Written, faces: FaceSizes) -> Fitted {
         Fitted {
             setup: self.setup,
+            output: None,
             unknowns: self.unknowns.clone(),
             loss: self.loss,
             alpha: self.alpha,
@@ -263,9 +276,9 @@ impl<'g> GpuEngine<'g> {
         }
     }
 
-    fn fused(&self, written: Written, faces: FaceSizes) -> Result<Fused, GpuError> {
-        let mut fitted = self.fitted(written, faces);
-        if self.keeps {
+    fn fused(&self, written: Written, faces: FaceSizes, output: Option<TermName>) -> Result<Fused, GpuError> {
+        let mut fitted = Fitted { output, ..self.fitted(written, faces) };
+        if self.held.is_some() {
             fitted.layout = Layout::of_terms(self.setup, &fitted.layout);
         }
         Fused::new(fitted).map_err(GpuError::Plan)
@@ -273,8 +286,9 @@ impl<'g> GpuEngine<'g> {
 
     /// Have the terms at `point` in the place of the samples, where that is how passes are made.
     fn keep(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
-        let key = HELD.map(|param| point.params.scalar(param));
-        if !self.keeps || device.terms == Some(key) {
+        let Some(held) = &self.held else { return Ok(()) };
+        let key: Vec<[f64; 3]> = held.iter().map(|&param| point.params.rgb(param)).collect();
+        if device.terms.as_ref() == Some(&key) {
             return Ok(());
         }
         let OnDevice { parts, lights, programs, images, terms, replaced } = device;
@@ -301,7 +315,7 @@ impl<'g> GpuEngine<'g> {
         let program = match programs.entry((wish, written)) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
-                let fused = self.fused(written, lights.face_sizes())?;
+                let fused = self.fused(written, lights.face_sizes(), None)?;
                 entry.insert(Program::new(self.gpu, fused, wish, parts)?)
             }
         };

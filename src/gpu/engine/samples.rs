@@ -1,6 +1,6 @@
 //! Samples that the adapter makes itself: the production renderer's geometry pass, in the place of rays and uploads.
 
-use std::time::Instant;
+use web_time::Instant;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoderDescriptor};
 

@@ -6,18 +6,9 @@ use super::fused::{Fitted, Layout, WORKGROUP, terms_module};
 use super::lights::{DeviceLights, Inputs};
 use super::parts::Parts;
 use super::pipeline::{READ, UNIFORM, Uniform, WRITE, bind, buffer, encoder, layout, pipeline};
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::{Gpu, GpuError, MOST_OF_A_DISPATCH};
 use skinfit_core::engine::view::ObservedView;
-
-/// The parameters that terms are made with.
-pub(super) const HELD: [Param; 5] = [
-    Param::NormalStrength,
-    Param::SpecularLobe,
-    Param::EnvironmentRotation,
-    Param::KeyAzimuth,
-    Param::KeyElevation,
-];
 
 /// Put terms in the place of every part's samples.
 pub(super) fn replace_samples(

@@ -28,6 +28,21 @@ fn mean_color(first: vec2u) -> vec4f {
     return sum / f32(n * n);
 }
 
+// What blooms: radiance times haze, sample by sample.
+@fragment
+fn resolve_glow(@builtin(position) position: vec4f) -> @location(0) vec4f {
+    let first = first_sample(position);
+    var sum = vec3f(0.0);
+    for (var y = 0u; y < n; y++) {
+        for (var x = 0u; x < n; x++) {
+            let texel = textureLoad(color_samples, first + vec2u(x, y), 0);
+            let held = clamp(texel, vec4f(-largest), vec4f(largest));
+            sum += clamp(held.a * held.rgb, vec3f(-largest), vec3f(largest));
+        }
+    }
+    return vec4f(sum / f32(n * n), 0.0);
+}
+
 @fragment
 fn resolve(@builtin(position) position: vec4f) -> @location(0) vec4f {
     return mean_color(first_sample(position));

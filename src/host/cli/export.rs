@@ -2,19 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{Exit, Refusal, tell, tell_warnings, write_or_say};
-use crate::export::{self, Provenance, Target};
-use crate::fit::params_file::ParamsFile;
-use crate::model::effects::{Effect, Effects, Form};
-use crate::model::params::{Param, Params};
+use super::set::SetArguments;
+use super::{Exit, Refusal, tell_warnings, write_or_say};
+use crate::export::{self, Constants, Provenance, Target};
+use crate::fit::params_file::{Foreign, ParamsFile};
+use crate::model::params::Param;
 use crate::scene::load::LoadOptions;
-use crate::scene::{Scene, suggestion};
+use crate::scene::{Loss, Scene, register_terms, suggestion};
 use crate::shader::{Budget, Facts};
 
 /// Write tuned constants, alone or with their shader, for another engine
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot and unity hold the shader; c, json and toml constants alone."
+    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot and unity hold the shader; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
 )]
 pub(super) struct Arguments {
     /// The parameters: params.toml of a run folder.
@@ -25,9 +25,11 @@ pub(super) struct Arguments {
     /// The constants alone, without the shader.
     #[arg(long)]
     constants: bool,
-    /// The scene that the parameters belong to [default: scene.toml beside them].
+    /// The scene that the parameters belong to [default: scene.toml beside them; constants alone need none].
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArguments,
     /// A file to write instead of standard output.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -38,44 +40,82 @@ pub(super) struct Arguments {
 const ENGINE_BUDGET: Budget = Budget::Within(0.05);
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    if !arguments.params.is_file() {
-        ParamsFile::read(&arguments.params, Form::Corrected, &Params::defaults(Form::Corrected))?;
-    }
+    arguments.set.values()?;
+    // Some targets hold nothing else.
+    let alone = arguments.constants || arguments.to.dialect().is_none();
     let beside = |name: &str| arguments.params.parent().unwrap_or(Path::new("")).join(name);
     let path = arguments.scene.clone().unwrap_or_else(|| beside("scene.toml"));
-    if arguments.scene.is_none() && arguments.params.exists() && !path.exists() {
-        return Err(Refusal::new(format!(
-            "{}: no scene.toml lies beside it, so it is not known which effects its constants belong to. Name the scene with --scene.",
-            arguments.params.display()
-        )));
+    let there = arguments.scene.is_some() || path.exists();
+    if there {
+        // Constants may be of terms that the scene brings along. What is wrong with it is told where it is needed.
+        let _ = register_terms(&path);
     }
-    let (scene, warnings) = Scene::load(&path, &LoadOptions { targets: false, ..LoadOptions::default() })?;
-    let file = ParamsFile::read(&arguments.params, scene.form, &scene.params)?;
-    tell_foreign(arguments, &path, &scene, &file);
-    let from = provenance(arguments, &path, &file, &beside("report.json"));
-    // Some targets hold nothing else.
-    let text = if arguments.constants || arguments.to.dialect().is_none() {
-        export::constants(arguments.to, scene.effects, &file.params, &from)
-    } else {
-        tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
-        export::function(arguments.to, &facts(&scene, &file), &file.params, &from)?
+    let mut file = ParamsFile::read_alone(&arguments.params)?;
+    let scene = match (alone && arguments.scene.is_none(), file.effects) {
+        (true, Some(_)) => None,
+        _ if !there => return Err(no_scene(arguments, alone)),
+        _ => Some(loaded(arguments, &path, &mut file)?),
+    };
+    arguments.set.apply(&mut file.params);
+    let effects = scene.as_ref().map(|scene| scene.effects).or(file.effects).unwrap_or_default();
+    arguments.set.tell_idle(effects);
+    if let Some(scene) = &scene {
+        tell_foreign(arguments, &path, scene, &file);
+    }
+    let from = provenance(arguments, there.then_some(&path), &file, &beside("report.json"));
+    let text = match &scene {
+        Some(scene) if !alone => export::function(arguments.to, &facts(scene, &file), &file.params, &from)?,
+        _ => {
+            let constants = Constants {
+                form: file.form,
+                effects,
+                params: &file.params,
+                loss: file.loss.map(Loss::name),
+                gains: &file.gains,
+            };
+            export::constants(arguments.to, constants, &from)
+        }
     };
     write_or_say(arguments.output.as_deref(), &text)?;
     Ok(Exit::Done)
 }
 
+/// The scene, with the parameters over its own.
+fn loaded(arguments: &Arguments, path: &Path, file: &mut ParamsFile) -> Result<Scene, Refusal> {
+    let (scene, warnings) = Scene::load(path, &LoadOptions { targets: false, ..LoadOptions::default() })?;
+    *file = ParamsFile::read(&arguments.params, scene.form, &scene.params)?;
+    if !arguments.constants && arguments.to.dialect().is_some() {
+        tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
+    }
+    Ok(scene)
+}
+
+fn no_scene(arguments: &Arguments, alone: bool) -> Refusal {
+    let what = match alone {
+        true => {
+            "it names no effects and no scene.toml lies beside it, so it is not known which constants are meant"
+        }
+        false => {
+            "no scene.toml lies beside it, and the shader depends on the scene's maps, silhouette and effects"
+        }
+    };
+    let other = if alone { "" } else { ", or export the constants alone with --constants" };
+    Refusal::new(format!("{}: {what}. Name the scene with --scene{other}.", arguments.params.display()))
+}
+
 /// Say so when the parameters were fitted with other effects than the scene has.
 fn tell_foreign(arguments: &Arguments, path: &Path, scene: &Scene, file: &ParamsFile) {
-    let Some(fitted) = file.effects.filter(|&effects| effects != scene.effects) else { return };
-    let names = |effects: Effects| effects.iter().map(Effect::name).collect::<Vec<_>>().join(", ");
-    tell(&format!(
-        "{}: was fitted with the effects {}, but {} has {}. What is exported is the latter's, with constants that \
-         were not tuned for it. If that is not meant, name the scene that was fitted with --scene.",
-        arguments.params.display(),
-        names(fitted),
-        path.display(),
-        names(scene.effects)
-    ));
+    let foreign = Foreign {
+        file: &arguments.params,
+        fitted: file.effects,
+        scene: path,
+        effects: scene.effects,
+        params: &file.params,
+        chosen: &arguments.set.params(),
+    };
+    let remedy = "If that is not meant, name the scene that was fitted with --scene.";
+    let words = foreign.words("exported", remedy, true);
+    tell_warnings(&words.into_iter().collect::<Vec<_>>());
 }
 
 /// What the scene calls for in an engine: maps stay apart, the mesh is not known.
@@ -93,7 +133,12 @@ fn parse_target(name: &str) -> Result<Target, String> {
 }
 
 /// What the files beside the parameters tell; without a report, less is told.
-fn provenance(arguments: &Arguments, scene: &Path, file: &ParamsFile, report: &Path) -> Provenance {
+fn provenance(
+    arguments: &Arguments,
+    scene: Option<&PathBuf>,
+    file: &ParamsFile,
+    report: &Path,
+) -> Provenance {
     let text = std::fs::read_to_string(report).unwrap_or_default();
     let report: serde_json::Value = serde_json::from_str(&text).unwrap_or_default();
     let numbers = |value: &serde_json::Value| -> Vec<f64> {
@@ -107,9 +152,10 @@ fn provenance(arguments: &Arguments, scene: &Path, file: &ParamsFile, report: &P
         .filter(|(_, errors)| !errors.is_empty());
     let loss = file.loss.zip(report["loss"]["end"].as_f64());
     Provenance {
-        scene: scene.display().to_string(),
+        scene: scene.map(|scene| scene.display().to_string()),
         params: arguments.params.display().to_string(),
         loss: loss.map(|(loss, end)| (loss.name().to_owned(), end)),
+        set: arguments.set.words(),
         std_errors: errors.collect(),
     }
 }

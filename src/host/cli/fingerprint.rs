@@ -26,6 +26,13 @@ pub(super) fn fingerprint(scene: &Scene) -> Fingerprint {
         .with("environment", environment(scene.environment.as_ref()))
         .with("mesh or its pose", mesh(&scene.mesh, scene.metres_per_unit))
         .with("quality", quality(scene.quality));
+    let terms = crate::shader::term::terms().into_iter().filter(|term| scene.effects.has(term.effect));
+    let all = terms.fold(all, |all, term| {
+        all.with(
+            format!("rules of the effect {}", term.effect.name()),
+            Hash::default().words(&term.text).done(),
+        )
+    });
     scene.views.iter().fold(all, |all, view| {
         let camera = Hash::default().words(&view.camera).done();
         all.with(format!("camera of view {}", view.name), camera)
@@ -112,9 +119,9 @@ fn quality(quality: Quality) -> String {
 }
 
 fn target(target: Option<&Target>) -> String {
-    let Some(Target { rgb, alpha, mask, clipped_at }) = target else { return NONE.to_owned() };
+    let Some(Target { rgb, alpha, haze, mask, clipped_at }) = target else { return NONE.to_owned() };
     let of = Hash::default().words(clipped_at).numbers(rgb.as_flattened());
-    [alpha, mask]
+    [alpha, mask, haze]
         .into_iter()
         .fold(of, |all, plane| all.words(&plane.is_some()).numbers(plane.as_deref().unwrap_or_default()))
         .done()

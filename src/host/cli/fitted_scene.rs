@@ -46,7 +46,15 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
             make_absolute(table, keys, folder);
         }
     }
-    let keys = ["target", "mask"];
+    let model = scene.get_mut("model").and_then(Item::as_table_like_mut);
+    if let Some(terms) = model.and_then(|model| model.get_mut("terms")).and_then(Item::as_array_mut) {
+        for term in terms.iter_mut() {
+            if let Some(path) = term.as_str() {
+                *term = folder.join(path).display().to_string().into();
+            }
+        }
+    }
+    let keys = ["target", "mask", "haze"];
     match scene.get_mut("view") {
         Some(Item::ArrayOfTables(views)) => {
             views.iter_mut().for_each(|view| make_absolute(view, &keys, folder));
@@ -151,9 +159,10 @@ mod tests {
             "# kept\n[mesh]\nfile = '/sc\"ene/a b.glb' # here too\n[maps]\ncolor = \"/c.png\"\n\
              [[view]]\ntarget = '/sc\"ene/tA.exr'\n"
         );
-        let inline = "view = [{ target = \"a.exr\", mask = \"b.png\" }] # views\n";
+        let inline = "view = [{ target = \"a.exr\", mask = \"b.png\", haze = \"c.exr\" }] # views\n";
         let text = as_fitted(inline, Path::new("/s"), Changes::default()).unwrap();
-        assert_eq!(text, "view = [{ target = \"/s/a.exr\", mask = \"/s/b.png\" }] # views\n");
+        let wanted = "view = [{ target = \"/s/a.exr\", mask = \"/s/b.png\", haze = \"/s/c.exr\" }] # views\n";
+        assert_eq!(text, wanted);
     }
 
     #[test]

@@ -25,7 +25,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     Ok(Exit::Done)
 }
 
-/// What there is.
+/// The program, the processor and the graphics adapters.
 #[derive(serde::Serialize)]
 struct Report {
     version: &'static str,
@@ -108,7 +108,6 @@ impl Report {
     }
 }
 
-#[cfg(feature = "gpu")]
 mod graphics {
     use super::super::graphics::Task;
     use super::{Adapter, Feature};
@@ -148,13 +147,5 @@ mod graphics {
             max_storage_binding_bytes: limits.max_storage_buffer_binding_size,
             features: WELCOME.iter().map(feature).collect(),
         }
-    }
-}
-
-#[cfg(not(feature = "gpu"))]
-mod graphics {
-    /// None: the GPU renderer was left out of this program.
-    pub(super) fn adapters(_wanted: Option<&str>) -> (Vec<super::Adapter>, Result<(String, String), String>) {
-        (Vec::new(), Err("this skinfit was built without its GPU renderer".to_owned()))
     }
 }

@@ -4,7 +4,7 @@
 //!   `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit; `fingerprint`: what its state belongs to
 //! - `graphics`: what to do about an adapter that cannot
-//! - `scene`: how a command finds its scene and its cache
+//! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
 //! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
@@ -17,7 +17,6 @@ mod fingerprint;
 mod fit;
 mod fit_engine;
 mod fitted_scene;
-#[cfg(feature = "gpu")]
 mod graphics;
 mod info;
 mod interrupt;
@@ -26,6 +25,7 @@ mod params;
 mod render;
 mod run_folder;
 mod scene;
+mod set;
 mod shader;
 mod stability;
 mod sweep;
@@ -38,7 +38,8 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
-use crate::output;
+use crate::scene::register_terms;
+use crate::{output, progress};
 
 /// How a command ended, as an exit code; `EXIT_CODES` says what each means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,8 +130,10 @@ enum Command {
 /// Run the program on the process' arguments.
 #[must_use]
 pub fn main() -> ExitCode {
+    know_terms();
     // A word that is not understood ends here, with exit code 2.
     let arguments = Arguments::parse();
+    progress::show();
     let done = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Ablate(arguments) => ablate::run(&arguments),
@@ -152,6 +155,17 @@ pub fn main() -> ExitCode {
         Err(Refusal { words, failed }) => {
             tell(&words);
             ExitCode::from(if failed { 1 } else { 2 })
+        }
+    }
+}
+
+/// Know the effects of the scenes that the command line names before it is understood, as options name them. What is
+/// wrong with a scene is told when it is read.
+fn know_terms() {
+    for argument in std::env::args_os().skip(1) {
+        let path = Path::new(&argument);
+        if path.extension().is_some_and(|ending| ending == "toml") && path.is_file() {
+            let _ = register_terms(path);
         }
     }
 }
@@ -196,7 +210,7 @@ fn tell_warnings(warnings: &[String]) {
 /// variable, which a process can only have from its start; so the program starts anew with it, in the same
 /// process.
 fn quieten_graphics() {
-    #[cfg(all(unix, feature = "gpu"))]
+    #[cfg(unix)]
     {
         use std::os::unix::process::CommandExt as _;
         const VARIABLE: &str = "NODEVICE_SELECT";

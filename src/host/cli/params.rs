@@ -1,27 +1,33 @@
 //! `skinfit params`: the parameter table.
 
 use std::fmt::Write as _;
+use std::path::PathBuf;
 
 use super::{Exit, Refusal, say};
 use crate::model::params::{ParamInfo, Scale, TABLE};
-use crate::scene::interval;
+use crate::scene::{interval, register_terms};
 
 /// Print the parameter table: name, defaults, bounds, unit, kind, source
 #[derive(clap::Args)]
 #[command(
-    after_help = "`corrected` and `listing` are the defaults of the two forms.\n\nExamples:\n  skinfit params\n  skinfit params --format markdown > parameters.md"
+    after_help = "`corrected` and `listing` are the defaults of the two forms.\n\nExamples:\n  skinfit params\n  skinfit params scene.toml\n  skinfit params --format markdown > parameters.md"
 )]
 pub(super) struct Arguments {
+    /// A scene file, whose terms' parameters are listed too.
+    scene: Option<PathBuf>,
     /// How it is printed.
     #[arg(long, default_value = "text", value_parser = ["text", "markdown", "json"])]
     format: String,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let terms = arguments.scene.as_deref().map(register_terms).transpose()?.unwrap_or_default();
+    let added = terms.iter().flat_map(|term| &term.params).map(|param| param.info());
+    let rows: Vec<&ParamInfo> = TABLE.iter().chain(added).collect();
     let text = match arguments.format.as_str() {
-        "json" => json(),
-        "markdown" => markdown(),
-        _ => plain(),
+        "json" => json(&rows),
+        "markdown" => markdown(&rows),
+        _ => plain(&rows),
     };
     say(text.trim_end())?;
     Ok(Exit::Done)
@@ -52,9 +58,9 @@ fn cells(row: &ParamInfo) -> [String; 8] {
     ]
 }
 
-fn plain() -> String {
+fn plain(rows: &[&ParamInfo]) -> String {
     let rows: Vec<[String; 8]> =
-        std::iter::once(HEAD.map(str::to_owned)).chain(TABLE.iter().map(cells)).collect();
+        std::iter::once(HEAD.map(str::to_owned)).chain(rows.iter().map(|row| cells(row))).collect();
     let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..8).map(width).collect();
     let mut text = String::new();
@@ -68,19 +74,19 @@ fn plain() -> String {
 
 /// The table as Markdown; docs/parameters.md holds exactly this.
 #[must_use]
-fn markdown() -> String {
+fn markdown(rows: &[&ParamInfo]) -> String {
     let mut text = format!("| {} |\n|{}\n", HEAD.join(" | "), " --- |".repeat(8));
-    for row in &TABLE {
+    for row in rows {
         let cells = cells(row).map(|cell| cell.replace('|', "\\|"));
         let _ = writeln!(text, "| {} |", cells.join(" | "));
     }
     text
 }
 
-fn json() -> String {
+fn json(rows: &[&ParamInfo]) -> String {
     // JSON knows no infinity: null is "no bound".
     let finite = |x: f64| if x.is_finite() { serde_json::json!(x) } else { serde_json::Value::Null };
-    let rows: Vec<serde_json::Value> = TABLE
+    let rows: Vec<serde_json::Value> = rows
         .iter()
         .map(|row| {
             let effects: Vec<&str> = row.effects.iter().map(|effect| effect.name()).collect();

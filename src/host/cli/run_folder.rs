@@ -58,7 +58,7 @@ impl Work {
 }
 
 impl RunFolder {
-    /// Make and lock `output`, or `runs/<name>` after the scene's folder, for a fit; what was made for it goes when
+    /// Make and lock `output`, or the [`default_folder`], for a fit; what was made for it goes when
     /// that is interrupted before it is under way.
     pub(super) fn open(output: Option<&Path>, scene: Option<&Path>) -> Result<Self, Refusal> {
         let folder = Self::locked(output.map_or_else(|| default_folder(scene), Path::to_owned))?;
@@ -160,9 +160,41 @@ impl Drop for RunFolder {
     }
 }
 
-/// `runs/<the name of the scene's folder>`, or `runs/builtin`.
+/// `runs/<the name of the scene's folder>`, with the file's own name after a full stop unless it is `scene.toml`; the
+/// built-in scene's is `runs/builtin`.
 fn default_folder(scene: Option<&Path>) -> PathBuf {
-    let absolute = scene.and_then(|scene| std::path::absolute(scene).ok());
-    let name = absolute.as_deref().and_then(Path::parent).and_then(Path::file_name);
-    Path::new("runs").join(name.map_or_else(|| "builtin".into(), PathBuf::from))
+    let named = scene.map(|scene| {
+        let absolute = std::path::absolute(scene).unwrap_or_else(|_| scene.to_owned());
+        let words = |part: Option<&std::ffi::OsStr>| part.map(|name| name.to_string_lossy().into_owned());
+        let folder = words(absolute.parent().and_then(Path::file_name));
+        let file = words(absolute.file_stem()).filter(|name| folder.is_none() || name != "scene");
+        folder.into_iter().chain(file).collect::<Vec<_>>().join(".")
+    });
+    Path::new("runs").join(named.unwrap_or_else(|| "builtin".to_owned()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scene_files_of_one_folder_have_run_folders_of_their_own() {
+        let of = |scene: &str| default_folder(Some(Path::new(scene))).display().to_string();
+        assert_eq!(of("data/head/scene.toml"), "runs/head");
+        assert_eq!(of("data/head/night.toml"), "runs/head.night");
+        assert_eq!(of("data/head/night.v2.toml"), "runs/head.night.v2");
+        // By the folder that it lies in, wherever that is told from.
+        let here = std::env::current_dir().unwrap();
+        let here = here.file_name().unwrap().to_string_lossy().into_owned();
+        assert_eq!(
+            (of("scene.toml"), of("night.toml")),
+            (format!("runs/{here}"), format!("runs/{here}.night"))
+        );
+        // What lies in no folder is not the built-in scene.
+        assert_eq!(
+            (of("/scene.toml"), of("/night.toml")),
+            ("runs/scene".to_owned(), "runs/night".to_owned())
+        );
+        assert_eq!(default_folder(None), Path::new("runs/builtin"));
+    }
 }

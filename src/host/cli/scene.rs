@@ -105,7 +105,7 @@ impl BakeArguments {
 
 /// `diffuse,rim,...` as a set of effects.
 pub(super) fn parse_effects(list: &str) -> Result<Effects, String> {
-    let known: Vec<&str> = Effect::ALL.iter().map(|effect| effect.name()).collect();
+    let known: Vec<&str> = Effect::all().map(Effect::name).collect();
     let parse = |name: &str| {
         Effect::from_name(name)
             .ok_or_else(|| format!("unknown effect `{name}`. {}.", suggestion(name, &known)))

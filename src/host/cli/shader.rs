@@ -1,11 +1,11 @@
 //! `skinfit shader`: the shader that a scene gets, and the plan behind it.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use super::scene::{SceneArguments, parse_effects};
 use super::{Exit, Refusal, tell_warnings, write_or_say};
-use crate::fit::params_file::ParamsFile;
+use crate::fit::params_file::{Foreign, ParamsFile};
 use crate::model::effects::Effects;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
@@ -47,8 +47,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let (scene, warnings) = Scene::load(&path, &load)?;
     tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
     let params = match &arguments.params {
-        Some(file) => ParamsFile::read(file, scene.form, &scene.params)?.params,
-        None => scene.params,
+        Some(path) => {
+            let file = ParamsFile::read(path, scene.form, &scene.params)?;
+            tell_foreign(arguments, path, &file, &scene);
+            file.params
+        }
+        None => scene.params.clone(),
     };
     let plan = plan(&Facts::of_scene(&scene, &params, arguments.accuracy, arguments.f16))?;
     let text = match arguments.show.as_str() {
@@ -58,6 +62,22 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     write_or_say(arguments.output.as_deref(), &text)?;
     Ok(Exit::Done)
+}
+
+/// Say so where the parameters were fitted with other effects than the shader computes.
+fn tell_foreign(arguments: &Arguments, path: &Path, file: &ParamsFile, scene: &Scene) {
+    let foreign = Foreign {
+        file: path,
+        fitted: file.effects,
+        scene: if arguments.effects.is_some() { Path::new("--effects") } else { &scene.path },
+        effects: scene.effects,
+        params: &file.params,
+        chosen: &[],
+    };
+    let remedy =
+        "To have that of what was fitted, name the scene that was fitted, or its effects with --effects.";
+    let words = foreign.words("computed", remedy, arguments.effects.is_none());
+    tell_warnings(&words.into_iter().collect::<Vec<_>>());
 }
 
 /// `exact`, `paper` or a number.

@@ -1,10 +1,8 @@
 //! `skinfit stability`: hard cases on every evaluator, and a random search for new ones.
 
 use std::path::PathBuf;
-#[cfg(feature = "gpu")]
 use std::rc::Rc;
 
-#[cfg(feature = "gpu")]
 use super::graphics::Task;
 use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
@@ -15,10 +13,8 @@ use crate::progress;
 use crate::scene::{LoadOptions, Scene};
 use crate::study::stability::evaluate::Evaluators;
 use crate::study::stability::lights::LightBox;
-#[cfg(feature = "gpu")]
 use crate::study::stability::objectives::{EngineEvaluator, OnAdapter};
 use crate::study::stability::scene::{batches, sweepable};
-#[cfg(feature = "gpu")]
 use crate::study::stability::shader::{Adapter, Rules};
 use crate::study::stability::{Study, evaluators, kept};
 
@@ -50,7 +46,6 @@ pub(super) struct Arguments {
     #[arg(long)]
     no_gpu: bool,
     /// Part of a graphics adapter's name, in any case [default: $WGPU_ADAPTER_NAME, or the fastest].
-    #[cfg(feature = "gpu")]
     #[arg(long, value_name = "NAME", conflicts_with = "no_gpu")]
     adapter: Option<String>,
 }
@@ -119,24 +114,16 @@ fn add_gpu(arguments: &Arguments, evaluators: &mut Evaluators) -> Result<Option<
     if arguments.no_gpu {
         return without("--no-gpu leaves them out.");
     }
-    #[cfg(not(feature = "gpu"))]
-    {
-        let _ = evaluators;
-        without("skinfit was built without the feature gpu.")
-    }
-    #[cfg(feature = "gpu")]
-    {
-        let choice = crate::gpu::Choice { name: arguments.adapter.clone(), ..crate::gpu::Choice::default() };
-        match Adapter::open(choice) {
-            Ok(adapter) => {
-                say(&format!("adapter: {}\n", adapter.name()))?;
-                let adapter = Rc::new(adapter);
-                evaluators.own.push(Box::new(Rules(Rc::clone(&adapter))));
-                evaluators.own.push(Box::new(EngineEvaluator(OnAdapter(adapter))));
-                Ok(None)
-            }
-            Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => Err(Task::Study.refusal(&error)),
-            Err(error) => without(&Task::Study.words(&error)),
+    let choice = crate::gpu::Choice { name: arguments.adapter.clone(), ..crate::gpu::Choice::default() };
+    match Adapter::open(choice) {
+        Ok(adapter) => {
+            say(&format!("adapter: {}\n", adapter.name()))?;
+            let adapter = Rc::new(adapter);
+            evaluators.own.push(Box::new(Rules(Rc::clone(&adapter))));
+            evaluators.own.push(Box::new(EngineEvaluator(OnAdapter(adapter))));
+            Ok(None)
         }
+        Err(error @ crate::gpu::GpuError::NoSuchAdapter { .. }) => Err(Task::Study.refusal(&error)),
+        Err(error) => without(&Task::Study.words(&error)),
     }
 }

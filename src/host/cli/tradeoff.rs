@@ -7,13 +7,14 @@ use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::scene::suggestion;
+use crate::study::StudyError;
 use crate::study::tradeoff::choose::Goal;
-use crate::study::tradeoff::{TradeoffOptions, axes, files, tradeoff};
+use crate::study::tradeoff::{Tradeoff, TradeoffOptions, Watcher, axes, files, tradeoff};
 
 /// Measure what accuracy costs in time: each approximation swept, error beside cost
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("DIR gets report.html (open it in a browser), results.csv, results.json, a plot of each axis and, with --within or --budget, scene.toml with the settings that meet it.\n\nAxes:\n  format      f64, f32, f16, and the 12-bit fixed point of the paper's hardware, as its listing declares it\n  silhouette  per vertex, per fragment, bumped; against how fine the mesh is\n  irradiance, specular, hilite  texels a face of the cubes\n  filter      of the cubes: exact, the hardware's, nearest\n  lobes       specular cubes an octave of the exponent\n  rays        a vertex, for ambient occlusion\n  samples     along a pixel's side\n  pixels      used in a fit\n  solver      of a fit\n\nErrors are root mean square differences of linear radiance, relative to the reference's own.\n\nExamples:\n  skinfit tradeoff -o runs/cost                                the built-in scene, every axis\n  skinfit tradeoff scene.toml -o runs/cost --axis rays --axis samples\n  skinfit tradeoff scene.toml -o runs/cost --within 0.5%       the cheapest settings with that error\n  skinfit tradeoff scene.toml -o runs/cost --budget 200ms      the most accurate settings in that time", "no settings meet --within or --budget, or the command was interrupted")
+    after_help = super::with_failure("DIR gets report.html (open it in a browser), results.csv, results.json, a plot of each axis and, with --within or --budget, scene.toml with the settings that meet it; what is measured stands there axis by axis, so that Ctrl-C leaves the axes that are done. How long it will take is said before.\n\nAxes:\n  format      f64, f32, f16, and the 12-bit fixed point of the paper's hardware, as its listing declares it\n  silhouette  per vertex, per fragment, bumped; against how fine the mesh is\n  irradiance, specular, hilite  texels a face of the cubes\n  filter      of the cubes: exact, the hardware's, nearest\n  lobes       specular cubes an octave of the exponent\n  rays        a vertex, for ambient occlusion\n  samples     along a pixel's side\n  pixels      used in a fit\n  solver      of a fit\n\nErrors are root mean square differences of linear radiance, relative to the reference's own. A setting is marked\n`pareto` where no other is both as cheap and as accurate, `reference` where errors are measured against it, and\n`the scene's` where the scene has it.\n\nExamples:\n  skinfit tradeoff -o runs/cost                                the built-in scene, every axis\n  skinfit tradeoff scene.toml -o runs/cost --axis rays --axis samples\n  skinfit tradeoff scene.toml -o runs/cost --within 0.5%       the cheapest settings with that error\n  skinfit tradeoff scene.toml -o runs/cost --budget 200ms      the most accurate settings in that time", "no settings meet --within or --budget, or the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -48,10 +49,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         cache: Some(arguments.scene.cache().unwrap_or_else(|| scratch.path().to_owned())),
         goal: arguments.within.map(Goal::Within).or(arguments.budget.map(Goal::Seconds)),
     };
-    let found = tradeoff(&path, &options)?;
+    let name = arguments.scene.name(&path);
+    let mut leaving = Leaving { folder: &mut folder, scene: &name };
+    let found = tradeoff(&path, &options, Some(&mut leaving))?;
     tell_warnings(&found.warnings);
     folder.keep_results();
-    let mut written = files::write(folder.path(), &arguments.scene.name(&path), &found)?.len();
+    let mut written = files::write(folder.path(), &name, &found)?.len();
     if let Some(choice) = found.choice() {
         folder.write_scene(&path, Changes { settings: &choice.keys, ..Changes::default() })?;
         written += 1;
@@ -64,6 +67,47 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         return Ok(Exit::Failed);
     }
     Ok(Exit::Done)
+}
+
+/// Says how long it will take, and leaves the results of each axis as they come.
+struct Leaving<'a> {
+    folder: &'a mut RunFolder,
+    scene: &'a str,
+}
+
+impl Watcher for Leaving<'_> {
+    fn estimated(&mut self, seconds: &[(&'static str, f64)]) {
+        let whole: f64 = seconds.iter().map(|(_, seconds)| seconds).sum();
+        let of_axes = seconds.iter().map(|(axis, seconds)| format!("{axis} {}", about(*seconds)));
+        let of_axes: Vec<String> = of_axes.collect();
+        tell(&format!("this will take about {} ({}).", about(whole), of_axes.join(", ")));
+    }
+
+    fn measured(&mut self, so_far: &Tradeoff) -> Result<(), StudyError> {
+        self.folder.keep_results();
+        files::write(self.folder.path(), self.scene, so_far)?;
+        let place = self.folder.path().display();
+        let there: Vec<&str> = so_far.sweeps.iter().map(|sweep| sweep.axis).collect();
+        let missing = match so_far.pending.as_slice() {
+            [] => "no settings were chosen".to_owned(),
+            pending => format!("not those of {}", pending.join(", ")),
+        };
+        unfinished::written(format!(
+            "{place}: interrupted: the results of {} are there, {missing}.",
+            there.join(", ")
+        ));
+        Ok(())
+    }
+}
+
+/// Seconds to one digit, as an estimate deserves.
+fn about(seconds: f64) -> String {
+    match seconds {
+        s if s >= 90.0 => format!("{:.0} min", s / 60.0),
+        s if s >= 9.5 => format!("{:.0} s", 5.0 * (s / 5.0).round()),
+        s if s >= 0.95 => format!("{s:.0} s"),
+        s => format!("{:.1} s", s.max(0.1)),
+    }
 }
 
 fn parse_axis(name: &str) -> Result<String, String> {

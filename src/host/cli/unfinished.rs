@@ -171,6 +171,18 @@ pub(super) fn writing(folder: &Path) {
     });
 }
 
+/// Results are written for now, and the command goes on: from here, `words` are said when it is interrupted. If that
+/// was asked for meanwhile, it ends here.
+pub(super) fn written(words: String) {
+    change(|unfinished| {
+        unfinished.words = words.into();
+        unfinished.writing = None;
+        if std::mem::take(&mut unfinished.asked) {
+            interrupted(unfinished);
+        }
+    });
+}
+
 /// A folder for what is needed only as long as the command runs; it goes when the command ends or is interrupted.
 pub(super) fn scratch() -> Result<TempDir, Refusal> {
     // Made and noted at once: an interruption comes before both, or after.

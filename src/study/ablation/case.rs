@@ -32,7 +32,7 @@ impl Part {
 
     /// The name in tables and files.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Effect(effect) => effect.name(),
             Self::Base => "base_weight",

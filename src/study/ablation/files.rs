@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use super::units::{self, signed};
 use super::{Ablation, Row, ViewRow, page};
 use crate::StudyError;
 use crate::leftovers::Leftovers;
@@ -188,12 +189,12 @@ impl Change {
     }
 }
 
-/// The table on standard output.
+/// The table on standard output, in the units of the page.
 #[must_use]
 pub fn table(ablation: &Ablation) -> String {
     let width = ablation.rows.iter().map(|row| row.left_out.name().len()).max().unwrap_or(0).max(8);
     let mut text = format!(
-        "{:width$}  {:>10} {:>10} {:>7} {:>7} {:>7} {:>7} {:>6} {:>6} {:>5} {:>8}  {}\n",
+        "{:width$}  {:>10} {:>10} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}  {}\n",
         "left out",
         "loss",
         "change",
@@ -201,35 +202,40 @@ pub fn table(ablation: &Ablation) -> String {
         "PSNR",
         "SSIM",
         "FLIP",
-        "CPU",
-        "GPU",
-        "ops",
-        "B/sample",
+        "CPU, %",
+        "GPU, %",
+        "ops, %",
+        "bytes, %",
         "bakes saved"
     );
-    let full = ablation.rows.first();
+    let Some(full) = ablation.rows.first() else { return text };
     for row in &ablation.rows {
         let mean = row.mean();
         let score =
             |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
-        let ratio =
-            |x: Option<Timed>| x.map_or_else(|| "-".to_owned(), |x| format!("x{:.2}", x.ratio.median));
-        let saved = full.map(|full| full.counts.bakes_saved(&row.counts)).unwrap_or_default();
+        let time =
+            |x: Option<Timed>| x.map_or_else(|| "-".to_owned(), |x| signed(units::time_saved(x)[0], 1));
+        let (own, whole) = (&row.counts, &full.counts);
+        let bytes = units::saved(own.bytes_a_sample as f64, whole.bytes_a_sample as f64);
         let _ = writeln!(
             text,
-            "{:width$}  {:>10.3e} {:>10} {:>7} {:>7} {:>7} {:>7} {:>6} {:>6} {:>5.0} {:>8}  {}",
+            "{:width$}  {:>10.3e} {:>10} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}  {}",
             row.left_out.name(),
             row.loss,
-            if row.change.loss == 0.0 { "0".to_owned() } else { format!("{:+.2e}", row.change.loss) },
+            match units::loss_percent(row.change.loss, full) {
+                _ if row.change.loss == 0.0 => "0".to_owned(),
+                Some(percent) => format!("{}%", signed(percent, 2)),
+                None => format!("{:+.2e}", row.change.loss),
+            },
             row.change.t_in_words(),
             psnr_in_words(mean.psnr),
             score(mean.ssim, 4),
             score(mean.flip, 4),
-            ratio(row.cpu),
-            ratio(row.gpu),
-            row.counts.operations,
-            row.counts.bytes_a_sample,
-            saved.join(" "),
+            time(row.cpu),
+            time(row.gpu),
+            signed(units::saved(own.operations, whole.operations), 1),
+            signed(bytes, 1),
+            whole.bakes_saved(own).join(" "),
         );
     }
     text

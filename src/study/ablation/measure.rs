@@ -49,7 +49,6 @@ impl<'a> Clocks<'a> {
     }
 }
 
-#[cfg(feature = "gpu")]
 mod gpu {
     use crate::StudyError;
     use crate::engine::Point;
@@ -94,7 +93,7 @@ mod gpu {
                 let warning = format!("GPU time is not measured: {} has no timestamps.", gpu.name());
                 return Ok((Self(None), Some(warning)));
             }
-            Ok((Self(Some(Open { gpu, whole, params: point.params })), None))
+            Ok((Self(Some(Open { gpu, whole, params: point.params.clone() })), None))
         }
 
         pub(super) fn adapter(&self) -> Option<String> {
@@ -134,38 +133,5 @@ mod gpu {
         let antialias = Antialias::Grid(prepared.scene.quality.samples_per_axis);
         let options = RenderOptions { antialias, budget: Budget::Exact, timed: true, animated: false };
         Ok(Renderer::new(gpu, content, options)?)
-    }
-}
-
-#[cfg(not(feature = "gpu"))]
-mod gpu {
-    use std::marker::PhantomData;
-
-    use crate::StudyError;
-    use crate::engine::Point;
-    use crate::subject::Subject;
-    use crate::timing::Timed;
-
-    /// There is none.
-    pub(super) struct Clock<'a>(PhantomData<&'a ()>);
-
-    impl<'a> Clock<'a> {
-        pub(super) fn none() -> Self {
-            Self(PhantomData)
-        }
-        pub(super) fn open(
-            _: &'a Subject,
-            _: &Point,
-            wished: bool,
-        ) -> Result<(Self, Option<String>), StudyError> {
-            let why = "GPU time is not measured: this skinfit was built without its GPU renderer.";
-            Ok((Self::none(), wished.then(|| why.to_owned())))
-        }
-        pub(super) fn adapter(&self) -> Option<String> {
-            None
-        }
-        pub(super) fn time(&self, _: &Subject, _: &Point) -> Result<Option<Timed>, StudyError> {
-            Ok(None)
-        }
     }
 }

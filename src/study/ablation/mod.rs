@@ -12,6 +12,7 @@ pub mod files;
 pub mod measure;
 pub mod page;
 pub mod pairs;
+mod units;
 
 use std::path::{Path, PathBuf};
 
@@ -252,14 +253,15 @@ impl Study<'_> {
         let subject = Subject::new(self.scene, &prepare, self.made.as_deref(), &|prepared| {
             let scene = &mut prepared.scene;
             // What is fitted starts where the whole model ended.
-            scene.params = self.point.params;
+            scene.params = self.point.params.clone();
             case.apply(effects, &mut scene.params, &mut scene.fit.free);
             let compared = scene.views.iter().map(|view| self.made.is_some() || view.target.is_some());
             let gains = prepared.gains.iter_mut().zip(compared).filter(|(_, compared)| *compared);
             gains.zip(&self.point.gains).for_each(|((own, _), gain)| *own = *gain);
         })?;
         let outcome = if self.options.refit { Some(subject.fit(&FitOptions::default())?) } else { None };
-        let start = || Point { params: subject.prepared.scene.params, gains: self.point.gains.clone() };
+        let start =
+            || Point { params: subject.prepared.scene.params.clone(), gains: self.point.gains.clone() };
         let point = outcome.as_ref().map_or_else(start, |outcome| outcome.end.clone());
         let images = subject.images(&point);
         let errors = self.errors(&images, subject.prepared.scene.fit.loss);

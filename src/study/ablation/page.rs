@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use rayon::prelude::*;
 
+use super::units::{self, signed};
 use super::{Ablation, Row};
 use crate::model::effects::Effect;
 use crate::reference::{Source, psnr_in_words};
@@ -145,31 +146,25 @@ fn summary(ablation: &Ablation, full: &Row) -> String {
 
 fn cells(row: &Row, full: &Row) -> Vec<Cell> {
     let mean = row.mean();
+    let minus = |text: String| text.replace('-', "−");
     let saved = |own: f64, whole: f64| {
-        let percent = if whole > 0.0 { 100.0 * (1.0 - own / whole) } else { 0.0 };
-        Cell::value(signed(percent, 1), percent)
+        let percent = units::saved(own, whole);
+        Cell::value(minus(signed(percent, 1)), percent)
     };
     let time = |time: Option<Timed>| {
         time.map_or_else(Cell::none, |time| {
-            let percent = 100.0 * (1.0 - time.ratio.median);
-            let half = 50.0 * (time.ratio.upper - time.ratio.lower);
-            Cell::value(
-                format!("{} <span class=\"pm inline\">± {half:.1}</span>", signed(percent, 1)),
-                percent,
-            )
+            let [percent, half] = units::time_saved(time);
+            let html = format!("{} <span class=\"pm inline\">± {half:.1}</span>", minus(signed(percent, 1)));
+            Cell::value(html, percent)
         })
     };
-    let relative = |x: f64| if full.loss > 0.0 { 100.0 * x / full.loss } else { f64::NAN };
-    let percent = relative(row.change.loss);
-    let change = match row.change.loss {
-        0.0 => Cell::value("0", 0.0),
-        // Of next to nothing, percentages say nothing.
-        change if percent.is_nan() || percent.abs() >= 1e4 => {
-            Cell::value(format!("+{}", number(change, 3)), change)
-        }
-        change => {
-            let error = number(relative(row.change.std_error), 2);
-            Cell::value(format!("{}% <span class=\"pm inline\">± {error}</span>", signed(percent, 2)), change)
+    let change = match (row.change.loss, units::loss_percent(row.change.loss, full)) {
+        (0.0, _) => Cell::value("0", 0.0),
+        (change, None) => Cell::value(format!("+{}", number(change, 3)), change),
+        (change, Some(percent)) => {
+            let error = number(100.0 * row.change.std_error / full.loss, 2);
+            let html = format!("{}% <span class=\"pm inline\">± {error}</span>", minus(signed(percent, 2)));
+            Cell::value(html, change)
         }
     };
     let t = match row.change.t {
@@ -193,16 +188,6 @@ fn cells(row: &Row, full: &Row) -> Vec<Cell> {
         saved(row.counts.bytes_a_sample as f64, full.counts.bytes_a_sample as f64),
         Cell::text(&full.counts.bakes_saved(&row.counts).join(", ")),
     ]
-}
-
-/// A number with its sign.
-fn signed(x: f64, digits: usize) -> String {
-    let text = format!("{x:+.digits$}");
-    // What rounds to nothing has no sign.
-    match text.chars().any(|c| ('1'..='9').contains(&c)) {
-        true => text.replace('-', "−"),
-        false => text[1..].to_owned(),
-    }
 }
 
 fn tradeoff(ablation: &Ablation, full: &Row, cases: &[Row]) -> String {

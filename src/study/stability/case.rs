@@ -136,7 +136,7 @@ impl VertexInputs {
 }
 
 /// What the fragments of a batch share.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Setting {
     /// The switches of the model.
     pub setup: Setup,

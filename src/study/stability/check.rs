@@ -113,12 +113,12 @@ fn compare(answer: &Answer, reference: &Reference, slack: f64, holds: &[Holds]) 
     }
     if let Some(slopes) = &answer.slopes {
         for (at, (slope, wanted)) in slopes.iter().zip(&reference.fragments).enumerate() {
-            for param in Param::all() {
-                let (got, want) = (slope[param as usize], wanted.slopes[param as usize]);
-                let sizes = wanted.slope_size[param as usize];
+            for param in Param::built_in() {
+                let (got, want) = (slope[param.index()], wanted.slopes[param.index()]);
+                let sizes = wanted.slope_size[param.index()];
                 for c in 0..4 {
                     let size = sizes[c];
-                    let allowed = slack * wanted.slope_tolerance[param as usize][c];
+                    let allowed = slack * wanted.slope_tolerance[param.index()][c];
                     let number = Number { got: got[c], want: want[c], allowed, size };
                     verdict.note(number, Some(at), || format!("d {} / d {}", CHANNELS[c], param.name()));
                 }
@@ -146,15 +146,20 @@ fn compare_sums(sums: &Sums, wanted: &SumReference, slack: f64, verdict: &mut Ve
     let k = Param::COUNT;
     let diagonal = |a: usize| wanted.jtj[pair(a, a)].0.abs().sqrt();
     let root = wanted.residual.0.abs().sqrt();
-    for (a, param) in Param::all().enumerate() {
+    for (a, param) in Param::built_in().enumerate() {
         let size = diagonal(a) * root;
         note(format!("J^T r of {}", param.name()), equations.jtr[a], wanted.jtr[a], size);
         let gradient = sums.gradient[a] * weight / 2.0;
         note(format!("gradient by {}", param.name()), gradient, wanted.jtr[a], size);
-        for (b, other) in Param::all().enumerate().skip(a) {
+        for (b, other) in Param::built_in().enumerate().skip(a) {
             let size = diagonal(a) * diagonal(b);
             let what = format!("J^T J of {} and {}", param.name(), other.name());
-            note(what, equations.jtj[a * k + b], wanted.jtj[pair(a, b)], size);
+            let (upper, lower) = (equations.jtj[a * k + b], equations.jtj[b * k + a]);
+            note(what, upper, wanted.jtj[pair(a, b)], size);
+            if upper.to_bits() != lower.to_bits() {
+                let what = format!("J^T J of {} and {}", other.name(), param.name());
+                note(what, lower, wanted.jtj[pair(a, b)], size);
+            }
         }
     }
 }
@@ -179,7 +184,7 @@ fn held(hold: Holds, answer: &Answer, reference: &Reference, slack: f64) -> Verd
         Holds::Flat(param) => {
             for (at, slopes) in answer.slopes.iter().flatten().enumerate() {
                 let what = format!("the derivative by {}", param.name());
-                slopes[param as usize].iter().for_each(|&x| exact(at, x, 0.0, &what));
+                slopes[param.index()].iter().for_each(|&x| exact(at, x, 0.0, &what));
             }
         }
         Holds::Value(wanted) => {

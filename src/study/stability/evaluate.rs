@@ -177,7 +177,7 @@ pub fn shade_with_slopes<R: Scalar>(
     let weights = Weights::new(params, setup.effects, R::ZERO);
     let composition = Composition::new(terms(lights, f, s, Wanted::ALL), f.occlusion, weights);
     let mut slopes = [[0.0; 4]; Param::COUNT];
-    for param in Param::all().filter(|param| param.asked_for(setup.effects)) {
+    for param in Param::built_in().filter(|param| param.asked_for(setup.effects)) {
         let by = match LookupParam::from_param(param) {
             Some(lookup) => {
                 let slope = terms_tangent(lights, f, s, lookup);
@@ -190,7 +190,7 @@ pub fn shade_with_slopes<R: Scalar>(
                 [by(0), by(1), by(2), alpha]
             }
         };
-        slopes[param as usize] = by.map(R::wide);
+        slopes[param.index()] = by.map(R::wide);
     }
     (composition, slopes)
 }

@@ -43,7 +43,7 @@ struct OutFile {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CaseTable<S> {
-    name: String,
+    name: S,
     /// Which evaluator failed it, and how: for the reader.
     #[serde(default)]
     found_by: String,
@@ -122,7 +122,7 @@ fn parse(source: &Source) -> Result<Vec<KeptCase>, SceneError> {
 }
 
 fn case(source: &Source, table: CaseTable<Spanned<String>>) -> Result<KeptCase, SceneError> {
-    let all = Effect::ALL.map(|effect| (effect.name(), effect));
+    let all = Effect::BUILT_IN.map(|effect| (effect.name(), effect));
     let effects: Effects =
         table.effects.iter().map(|name| source.choose("effect", name, &all)).collect::<Result<_, _>>()?;
     let form = source.choose("form", &table.form, &Form::ALL.map(|form| (form.name(), form)))?;
@@ -130,20 +130,54 @@ fn case(source: &Source, table: CaseTable<Spanned<String>>) -> Result<KeptCase, 
     let silhouette = source.choose("silhouette", &table.silhouette, &silhouettes)?;
     let lights = source.choose("light", &table.lights, &LightKind::ALL.map(|l| (l.name(), l)))?;
     let loss = source.choose("loss", &table.loss, &Loss::ALL.map(|loss| (loss.name(), loss)))?;
+    let name = table.name.get_ref();
+    let refuse = |what: String, remedy: String| {
+        Err(source.error(&table.name, format!("case {name:?}: {what}"), remedy))
+    };
     let mut params = Params::defaults(form);
-    for (name, value) in &table.params {
-        let Some(param) = Param::from_name(name) else {
-            let words = format!("case \"{}\": unknown parameter `{name}`", table.name);
-            let known: Vec<&str> = Param::all().map(Param::name).collect();
-            return Err(SceneError::new(&source.path, words, crate::scene::suggestion(name, &known)));
+    for (key, value) in &table.params {
+        let Some(param) = Param::from_name(key) else {
+            let known: Vec<&str> = Param::built_in().map(Param::name).collect();
+            return refuse(format!("unknown parameter {key:?}"), crate::scene::suggestion(key, &known));
         };
+        let info = param.info();
+        let (low, high) = info.range();
+        if !value.iter().all(|&x| x.is_finite() && info.admits(x)) {
+            return refuse(format!("{key} = {value:?}"), format!("Give finite numbers from {low} to {high}"));
+        }
+        if !info.rgb && *value != [value[0]; 3] {
+            return refuse(
+                format!("{key} = {value:?}"),
+                "It is one number for all channels: give it three times".into(),
+            );
+        }
         params.set_rgb(param, *value);
+    }
+    if table.fragment.is_empty() {
+        return refuse("has no fragment".into(), "Give it a [[case.fragment]] at least".into());
+    }
+    let mut fragments: Vec<FragmentInputs> = table.fragment.into_iter().map(Into::into).collect();
+    for (number, fragment) in fragments.iter_mut().enumerate() {
+        for (place, x) in fragment.numbers_mut().into_iter().enumerate() {
+            // Every evaluator starts from the same, whatever it computes in. Of texels alone a file may hold anything.
+            let single = *x as f32;
+            if place >= TEXEL && !single.is_finite() {
+                let what = format!("fragment {number} holds {x:e}");
+                return refuse(
+                    what,
+                    "Give numbers that an f32 holds; only texels may be infinite or NaN".into(),
+                );
+            }
+            *x = f64::from(single);
+        }
     }
     let setup = Setup { form, silhouette, effects };
     let setting = Setting { setup, params, lights, loss };
-    let fragments = table.fragment.into_iter().map(Into::into).collect();
-    Ok(KeptCase { name: table.name, batch: Batch { setting, fragments } })
+    Ok(KeptCase { name: name.clone(), batch: Batch { setting, fragments } })
 }
+
+/// So many numbers of a fragment come first and are of its texel.
+const TEXEL: usize = 3;
 
 /// What was found, as the text of a file that [`read`] takes.
 ///
@@ -151,9 +185,9 @@ fn case(source: &Source, table: CaseTable<Spanned<String>>) -> Result<KeptCase, 
 /// Never: the tables are plain.
 pub fn to_toml(found: &[Found]) -> Result<String, toml::ser::Error> {
     let table = |(number, found): (usize, &Found)| {
-        let Setting { setup, params, lights, loss } = found.batch.setting;
+        let Setting { setup, params, lights, loss } = found.batch.setting.clone();
         let default = Params::defaults(setup.form);
-        let changed = Param::all().filter(|&param| params.rgb(param) != default.rgb(param));
+        let changed = Param::built_in().filter(|&param| params.rgb(param) != default.rgb(param));
         CaseTable {
             name: format!("found {}", number + 1),
             found_by: found.evaluator.clone(),
@@ -199,5 +233,38 @@ mod tests {
             to_toml(&[Found { evaluator: String::new(), failure: String::new(), batch: batch(1, 1, 1) }]);
         let text = text.unwrap().replace("lights = \"", "lights = \"x");
         assert!(refused(&text).contains("unknown light `x"), "{}", refused(&text));
+    }
+
+    #[test]
+    fn numbers_that_no_evaluator_can_start_from_are_refused_with_their_case() {
+        let found = Found { evaluator: String::new(), failure: String::new(), batch: batch(1, 1, 2) };
+        let text = to_toml(&[found]).unwrap();
+        let with = |change: &dyn Fn(&mut toml::Table)| {
+            let mut file: toml::Table = text.parse().unwrap();
+            change(file["case"][0].as_table_mut().unwrap());
+            let text = toml::to_string(&file).unwrap();
+            parse(&Source::of(Path::new("a.toml"), text)).map(drop).map_err(|error| error.to_string())
+        };
+        assert_eq!(with(&|_| ()), Ok(()));
+        let numbers = |x: f64| toml::Value::from(vec![x; 3]);
+        let param = |name: &'static str, x: f64| {
+            with(&|case| _ = case["params"].as_table_mut().unwrap().insert(name.into(), numbers(x)))
+                .unwrap_err()
+        };
+        for (words, wanted) in [
+            (param("specular_lobe", -5.0), "specular_lobe = [-5.0, -5.0, -5.0]"),
+            (param("base_weight", f64::INFINITY), "base_weight = [inf, inf, inf]"),
+            (param("hilit", 1.0), "unknown parameter \"hilit\""),
+            (
+                with(&|case| case["fragment"][1]["occlusion"] = 1e39.into()).unwrap_err(),
+                "fragment 1 holds 1e39",
+            ),
+            (with(&|case| case["fragment"] = toml::Value::Array(Vec::new())).unwrap_err(), "has no fragment"),
+        ] {
+            assert!(words.contains(wanted) && words.starts_with("a.toml: line "), "{words}");
+            assert!(words.contains("case \"found 1\""), "{words}");
+        }
+        let anything = |x: f64| with(&|case| case["fragment"][0]["texel"] = numbers(x));
+        assert!(anything(f64::NAN).is_ok() && anything(1e300).is_ok());
     }
 }

@@ -24,7 +24,6 @@ pub mod reference;
 pub mod report;
 pub mod scene;
 pub mod search;
-#[cfg(feature = "gpu")]
 pub mod shader;
 
 use case::Batch;

@@ -7,9 +7,7 @@ use crate::bake::Illumination;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Unknown};
-#[cfg(feature = "gpu")]
 use crate::gpu::Gpu;
-#[cfg(feature = "gpu")]
 use crate::gpu::engine::{GpuEngine, Memory, Task};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
@@ -88,10 +86,8 @@ impl EngineFactory for Cpu {
 }
 
 /// The GPU engine on an adapter.
-#[cfg(feature = "gpu")]
 pub struct OnAdapter(pub std::rc::Rc<super::shader::Adapter>);
 
-#[cfg(feature = "gpu")]
 impl OnAdapter {
     fn engine<'a>(gpu: &'a Gpu, inputs: &'a EngineInputs, point: &Point) -> Result<GpuEngine<'a>, String> {
         let EngineInputs { setup, illumination, views, loss, unknowns } = inputs;
@@ -106,7 +102,6 @@ impl OnAdapter {
     }
 }
 
-#[cfg(feature = "gpu")]
 impl EngineFactory for OnAdapter {
     fn name(&self) -> String {
         "GPU engine".to_owned()
@@ -138,7 +133,7 @@ impl EngineFactory for OnAdapter {
 /// Every parameter, tied.
 #[must_use]
 pub fn unknowns() -> Vec<Unknown> {
-    Param::all().map(|param| Unknown::Param(Column::tied(param))).collect()
+    Param::built_in().map(|param| Unknown::Param(Column::tied(param))).collect()
 }
 
 /// An engine as an evaluator.
@@ -150,7 +145,7 @@ impl<F: EngineFactory> Evaluator for EngineEvaluator<F> {
     }
 
     fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
-        let Setting { setup, params, lights: light, loss } = batch.setting;
+        let Setting { setup, params, lights: light, loss } = batch.setting.clone();
         let inputs = EngineInputs {
             setup,
             illumination: lights.of(light).clone(),

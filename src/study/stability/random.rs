@@ -46,7 +46,7 @@ fn setting(rng: &mut StdRng) -> Setting {
         }
     };
     let mut params = Params::defaults(form);
-    for param in Param::all() {
+    for param in Param::built_in() {
         let mut draw = || parameter(param, form, rng);
         let rgb = if param.info().rgb { [draw(), draw(), draw()] } else { [draw(); 3] };
         params.set_rgb(param, rgb);
@@ -191,7 +191,7 @@ mod tests {
     fn everything_but_texels_is_finite_within_bounds_and_held_by_an_f32() {
         for index in 0..20 {
             let Batch { setting, fragments } = batch(1, index, 64);
-            for param in Param::all() {
+            for param in Param::built_in() {
                 let info = param.info();
                 let inside = |x: f64| (info.lower..=info.upper).contains(&x) && x.is_finite();
                 assert!(setting.params.rgb(param).into_iter().all(inside), "{}", info.name);

@@ -213,7 +213,7 @@ fn one(
     let mut slope_tolerance: Slopes = std::array::from_fn(|p| {
         std::array::from_fn(|c| {
             let color = setting.params.rgb(Param::KeyColor)[c % 3].abs();
-            let parts = match Param::all().nth(p) {
+            let parts = match Param::built_in().nth(p) {
                 Some(Param::KeyColor) => key(c),
                 Some(Param::KeyAzimuth | Param::KeyElevation) => key(c) * color,
                 _ => 0.0,
@@ -313,8 +313,8 @@ fn moved(inputs: &FragmentInputs, moves: &mut Moves<'_>) -> FragmentInputs {
 
 /// The parameters that evaluators round to f32; angles they turn into sines and cosines in f64.
 fn moved_params(params: &Params, moves: &mut Moves<'_>) -> Params {
-    let mut moved = *params;
-    for param in Param::all() {
+    let mut moved = params.clone();
+    for param in Param::built_in() {
         let fixed = [Param::SpecularLobe, Param::EnvironmentRotation, Param::KeyAzimuth, Param::KeyElevation];
         if !fixed.contains(&param) {
             let factor = 1.0 + RADIUS * moves.step();

@@ -22,16 +22,16 @@ pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
         prepared.samples.iter().flat_map(|view| fragments(view, prepared.scene.form)).collect();
     let setup = Setup { effects, ..prepared.setup() };
     let loss = prepared.scene.fit.loss;
-    let own = Setting { setup, params: prepared.scene.params, lights: LightKind::Scene, loss };
-    let mut settings = vec![own];
+    let own = Setting { setup, params: prepared.scene.params.clone(), lights: LightKind::Scene, loss };
+    let mut settings = vec![own.clone()];
     for end in [0, 1] {
         // One parameter at its bound, and then all of them.
-        let mut all = own;
-        for param in Param::all().filter(|&param| param != Param::SpecularLobe) {
+        let mut all = own.clone();
+        for param in Param::built_in().filter(|&param| param != Param::SpecularLobe) {
             let info = param.info();
             let bound = [info.lower.max(-FAR), info.upper.min(FAR)][end];
             all.params.set(param, bound);
-            let mut one = own;
+            let mut one = own.clone();
             one.params.set(param, bound);
             settings.push(one);
         }
@@ -42,7 +42,7 @@ pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
             // What shows nothing alone (the rim, occlusion) is refused where shaders are planned.
             let shows = !TermName::of(effects).is_empty() || effects.needs(setup.silhouette).haze;
             if shows {
-                settings.push(Setting { setup: Setup { effects, ..setup }, ..own });
+                settings.push(Setting { setup: Setup { effects, ..setup }, ..own.clone() });
             }
         }
     }
@@ -83,7 +83,8 @@ fn fragment(f: &Fragment<f32>, form: Form) -> FragmentInputs {
 #[must_use]
 pub fn sweepable(own: Effects, environment: bool) -> Effects {
     let shading =
-        Effect::ALL.into_iter().filter(|e| !matches!(e, Effect::Bloom | Effect::Morph | Effect::Skin));
+        Effect::BUILT_IN.into_iter().filter(|e| !matches!(*e, Effect::Bloom | Effect::Morph | Effect::Skin));
     let deforming = [Effect::Morph, Effect::Skin].into_iter().filter(|&effect| own.has(effect));
-    if environment { shading.chain(deforming).collect() } else { own }
+    let built_in = own.iter().filter(|effect| effect.is_built_in());
+    if environment { shading.chain(deforming).collect() } else { built_in.collect() }
 }

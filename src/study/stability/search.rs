@@ -123,7 +123,8 @@ impl<'a> Hunt<'a> {
         verdict: &Verdict,
     ) -> usize {
         let lights = self.lights;
-        let alone = |fragment: &FragmentInputs| Batch { setting: batch.setting, fragments: vec![*fragment] };
+        let alone =
+            |fragment: &FragmentInputs| Batch { setting: batch.setting.clone(), fragments: vec![*fragment] };
         let name = evaluator.name();
         let room = KEPT.saturating_sub(self.found.iter().filter(|found| found.evaluator == name).count());
         if room == 0 && self.tallies[index].failed > 0 {
@@ -180,7 +181,7 @@ fn simplify(evaluator: &dyn Evaluator, lights: &LightBox, failing: Batch) -> Bat
     for effect in best.setting.setup.effects.iter() {
         attempt(&mut best, &|s, _| s.setup.effects = s.setup.effects.without(effect));
     }
-    for param in Param::all() {
+    for param in Param::built_in() {
         attempt(&mut best, &|s, _| s.params.set(param, param.default(Form::Corrected)));
     }
     type Part = fn(&mut FragmentInputs) -> &mut [f64];

@@ -13,7 +13,7 @@ use crate::gpu::{Choice, Gpu, GpuError};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::scene::{FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
+use crate::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;
 use crate::shader::probe::Probe;
@@ -197,5 +197,6 @@ fn scene() -> Scene {
             maps: MapSettings::default(),
         },
         quality: Quality::default(),
+        bloom: Bloom::default(),
     }
 }

@@ -2,10 +2,12 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::case::{FragmentInputs, VertexInputs};
-use super::evaluate::{Answer, Frame};
+use super::case::{FragmentInputs, Setting, VertexInputs};
+use super::check::check;
+use super::evaluate::{Answer, Frame, Sums};
 use super::hard::cases;
 use super::*;
+use crate::model::params::Param;
 
 fn study(seed: u64, cases: usize) -> Study {
     Study { lights: LightBox::new(None), kept: Vec::new(), swept: Vec::new(), seed, cases, pixels: 10_000 }
@@ -32,8 +34,8 @@ impl Evaluator for Broken {
 }
 
 /// An evaluator alone.
-fn only(broken: Broken) -> Evaluators {
-    Evaluators { shared: vec![Box::new(broken)], own: Vec::new() }
+fn only(evaluator: impl Evaluator + Sync + 'static) -> Evaluators {
+    Evaluators { shared: vec![Box::new(evaluator)], own: Vec::new() }
 }
 
 #[test]
@@ -44,6 +46,141 @@ fn sound_evaluators_pass_every_case() {
     assert!(report.random.iter().all(|tally| tally.tried == 600));
     // f32 is not f64: a deviation of exactly 0 would mean that nothing was compared.
     assert!(report.random[1].worst.deviation > 0.0 && report.random[2].worst.deviation > 0.0);
+}
+
+/// What of an answer is tampered with.
+#[derive(Clone, Copy, Debug)]
+enum Part {
+    Value,
+    Slope(Param),
+    Loss,
+    LossAlone,
+    Residual,
+    Jtr(Param),
+    Jtj(Param, Param),
+    Gradient(Param),
+}
+
+/// And how.
+#[derive(Clone, Copy, Debug)]
+enum Fault {
+    /// A hundredth more: a factor that is not quite right.
+    Share,
+    Sign,
+    Nan,
+}
+
+const FAULTS: [Fault; 3] = [Fault::Share, Fault::Sign, Fault::Nan];
+
+impl Fault {
+    fn apply(self, x: &mut f64) {
+        *x = match self {
+            Self::Share => *x * 1.01,
+            Self::Sign => -*x,
+            Self::Nan => f64::NAN,
+        };
+    }
+}
+
+/// An evaluator whose answers have a fault wherever the batch has many fragments or one, as every batch does.
+struct Faulty<E>(E, Part, Fault);
+
+impl<E: Evaluator> Evaluator for Faulty<E> {
+    fn name(&self) -> String {
+        "faulty".to_owned()
+    }
+    fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
+        let mut answer = self.0.fragments(lights, batch)?;
+        let Answer { values, slopes, sums } = &mut answer;
+        let fault = |x: &mut f64| self.2.apply(x);
+        let sum = |get: &dyn Fn(&mut Sums) -> &mut f64, sums: &mut Option<Sums>| {
+            fault(get(sums.as_mut().expect("an engine sums")));
+        };
+        match self.1 {
+            Part::Value => values.iter_mut().flatten().for_each(|value| fault(&mut value[1])),
+            Part::Slope(param) => {
+                slopes.iter_mut().flatten().for_each(|slopes| fault(&mut slopes[param.index()][1]));
+            }
+            Part::Loss => sum(&|sums| &mut sums.equations.loss, sums),
+            Part::LossAlone => sum(&|sums| &mut sums.loss, sums),
+            Part::Residual => sum(&|sums| &mut sums.equations.residual, sums),
+            Part::Jtr(param) => sum(&|sums| &mut sums.equations.jtr[param.index()], sums),
+            Part::Jtj(a, b) => {
+                sum(&|sums| &mut sums.equations.jtj[a.index() * Param::COUNT + b.index()], sums);
+            }
+            Part::Gradient(param) => sum(&|sums| &mut sums.gradient[param.index()], sums),
+        }
+        Ok(answer)
+    }
+}
+
+/// What the study says of a batch that every term shows in.
+fn said_of(evaluator: &dyn Evaluator) -> Option<String> {
+    let views = [[0.375, -0.5, -0.75], [0.25, 0.125, -1.0], [-0.75, 0.5, -0.5], [0.625, 0.75, -0.25]];
+    let fragment = |view| FragmentInputs { view, ..FragmentInputs::ORDINARY };
+    let batch = Batch { setting: Setting::ordinary(), fragments: views.map(fragment).to_vec() };
+    check(evaluator, &LightBox::new(None), &batch, &[]).failure
+}
+
+#[test]
+fn a_value_a_slope_and_a_sum_that_are_wrong_are_each_found_and_named() {
+    assert_eq!(said_of(&Plain::<f32>::new()), None);
+    assert_eq!(said_of(&EngineEvaluator(Cpu)), None);
+    let found = |evaluator: &dyn Evaluator, (part, fault): (Part, Fault), name: &str| {
+        let words = said_of(evaluator).unwrap_or_else(|| panic!("{part:?}, {fault:?}: nothing is found"));
+        assert!(words.starts_with(name), "{part:?}, {fault:?}: {words}");
+        let nan = matches!(fault, Fault::Nan);
+        assert_eq!(words.contains("NaN"), nan, "{part:?}, {fault:?}: {words}");
+    };
+    for fault in FAULTS {
+        let model = |part, name: &str| found(&Faulty(Plain::<f32>::new(), part, fault), (part, fault), name);
+        let engine =
+            |part, name: &str| found(&Faulty(EngineEvaluator(Cpu), part, fault), (part, fault), name);
+        model(Part::Value, "green is ");
+        engine(Part::Value, "green is ");
+        // The batch shows every parameter, so that each one's slope and sums can be wrong. Haze is in alpha alone.
+        for param in Param::all().filter(|&param| param != Param::HazeWeight) {
+            model(Part::Slope(param), &format!("d green / d {} is ", param.name()));
+        }
+        for param in Param::all() {
+            engine(Part::Jtr(param), &format!("J^T r of {} is ", param.name()));
+            engine(Part::Gradient(param), &format!("gradient by {} is ", param.name()));
+            engine(Part::Jtj(param, param), &format!("J^T J of {0} and {0} is ", param.name()));
+        }
+        let (base, open) = (Param::BaseWeight, Param::Occlusion);
+        engine(Part::Jtj(base, open), "J^T J of base_weight and occlusion is ");
+        engine(Part::Jtj(open, base), "J^T J of occlusion and base_weight is ");
+        engine(Part::Residual, "residual is ");
+        engine(Part::Loss, "loss is ");
+        engine(Part::LossAlone, "loss alone is ");
+    }
+}
+
+#[test]
+fn a_wrong_slope_and_a_wrong_sum_turn_the_whole_study_red() {
+    let exponent = Param::RimExponent;
+    let wrong: [(Evaluators, &str); 4] = [
+        (
+            only(Faulty(Plain::<f32>::new(), Part::Slope(exponent), Fault::Sign)),
+            "d green / d rim_exponent is ",
+        ),
+        (
+            only(Faulty(Plain::<f32>::new(), Part::Slope(exponent), Fault::Share)),
+            "d green / d rim_exponent is ",
+        ),
+        (only(Faulty(EngineEvaluator(Cpu), Part::Jtr(exponent), Fault::Sign)), "J^T r of rim_exponent is "),
+        (only(Faulty(EngineEvaluator(Cpu), Part::Loss, Fault::Share)), "loss is "),
+    ];
+    for (evaluators, words) in wrong {
+        let report = study(2, 256).run(&evaluators, &|_| {});
+        let failures = report.failures().join("\n");
+        // Of one evaluator so many failures are told and no more, which the hard cases use up before the random search.
+        for place in ["nearly facing", "parameter at a bound"] {
+            let told = |line: &str| line.starts_with(place) && line.contains(words);
+            assert!(failures.lines().any(told), "{place}: {words} is not told:\n{failures}");
+        }
+        assert!(report.text().contains("FAILED"));
+    }
 }
 
 #[test]
@@ -62,7 +199,7 @@ fn every_guard_that_is_taken_out_turns_the_study_red() {
         (
             Broken(|f, _, slopes| {
                 if f.silhouette == 0.0 {
-                    slopes[crate::model::params::Param::RimExponent as usize] = [f64::NAN; 4];
+                    slopes[Param::RimExponent.index()] = [f64::NAN; 4];
                 }
             }),
             &["facing", "random search"],
@@ -78,7 +215,7 @@ fn every_guard_that_is_taken_out_turns_the_study_red() {
         (
             Broken(|f, _, slopes| {
                 if f.normal.iter().all(|x| x.abs() < 1e-19) {
-                    slopes[crate::model::params::Param::NormalStrength as usize][2] = f64::INFINITY;
+                    slopes[Param::NormalStrength.index()][2] = f64::INFINITY;
                 }
             }),
             &["nearly no tangent frame", "random search"],

@@ -12,7 +12,7 @@ use crate::scene::error::SceneError;
 use crate::scene::{Source, check_text, check_values};
 
 /// Most jobs of a plan.
-const MOST: usize = 1_000_000;
+pub(super) const MOST: usize = 1_000_000;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::job::Job;
+use super::plan::MOST;
 use crate::output::{self, OutputError};
 
 /// Numbers and words, by name.
@@ -76,7 +77,9 @@ impl JobResult {
     /// Read a result file; `None` when there is none, or it is damaged.
     #[must_use]
     pub fn read(path: &Path) -> Option<Self> {
-        serde_json::from_slice(&std::fs::read(path).ok()?).ok()
+        let result: Self = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
+        // No plan has a job of a higher number; the gaps below one would be listed.
+        (result.job < MOST).then_some(result)
     }
 
     /// Write it, whole or not at all.

@@ -60,7 +60,7 @@ pub(super) fn tradeoffs(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobEr
         cache: cache(&inputs),
         goal: None,
     };
-    let found = tradeoff(inputs.scene, &options)?;
+    let found = tradeoff(inputs.scene, &options, None)?;
     let rows = found.sweeps.iter().flat_map(|sweep| sweep.settings.iter().map(|s| setting(sweep, s)));
     Ok(Findings { figures: Figures::new(), rows: rows.collect() })
 }
@@ -73,7 +73,7 @@ fn setting(sweep: &Sweep, setting: &Setting) -> Figures {
         ("setting", setting.name.as_str().into()),
         ("reference", setting.reference.into()),
     ]));
-    // A cost in seconds is a time; so is what is on its front.
+    // A cost in seconds is a time; so is whether it is Pareto-optimal.
     if setting.time.is_none() {
         figures.extend(named([("cost", number(setting.cost)), ("cost_unit", sweep.cost.into())]));
     }

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::bench::Bench;
+pub use super::bench::Rates;
 use crate::StudyError;
 use crate::model::effects::Silhouette;
 use crate::reference::Difference;
@@ -22,6 +23,11 @@ pub trait Axis: Sync {
     fn settable(&self) -> bool {
         false
     }
+    /// About how many seconds [`sweep`](Self::sweep) will take, from `rates` and cheap settings tried.
+    ///
+    /// # Errors
+    /// When a stage fails.
+    fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError>;
     /// Measure each setting.
     ///
     /// # Errors
@@ -64,8 +70,19 @@ pub struct Setting {
     pub counts: Vec<(&'static str, f64)>,
     /// Whether the others are measured against it.
     pub reference: bool,
+    /// Whether it is what the scene has at present.
+    pub present: bool,
     /// Whether no other setting is both as cheap and as accurate.
-    pub front: bool,
+    pub pareto: bool,
+}
+
+impl Setting {
+    /// What is to be noted of it: whether the others are measured against it, and whether the scene has it.
+    #[must_use]
+    pub fn notes(&self) -> Vec<&'static str> {
+        let notes = [(self.reference, "reference"), (self.present, "the scene's")];
+        notes.into_iter().filter_map(|(holds, note)| holds.then_some(note)).collect()
+    }
 }
 
 /// A curve.
@@ -126,7 +143,7 @@ impl Knob {
 }
 
 /// Mark the settings that no other one beats in both cost and error.
-pub fn mark_front(settings: &mut [Setting]) {
+pub fn mark_pareto(settings: &mut [Setting]) {
     let of: Vec<(f64, f64)> = settings.iter().map(|s| (s.cost, s.error.relative)).collect();
     for (i, setting) in settings.iter_mut().enumerate() {
         let (cost, error) = of[i];
@@ -134,7 +151,7 @@ pub fn mark_front(settings: &mut [Setting]) {
             let as_good = c <= cost && e <= error;
             as_good && (c < cost || e < error || j < i)
         };
-        setting.front = !of.iter().enumerate().any(|other| beats(&other));
+        setting.pareto = !of.iter().enumerate().any(|other| beats(&other));
     }
 }
 
@@ -151,19 +168,20 @@ mod tests {
             time: None,
             counts: Vec::new(),
             reference: false,
-            front: false,
+            present: false,
+            pareto: false,
         }
     }
 
     #[test]
-    fn the_front_holds_what_nothing_beats() {
+    fn settings_that_nothing_beats_are_pareto_optimal() {
         let mut settings: Vec<Setting> =
             [(1.0, 0.5), (2.0, 0.6), (2.0, 0.1), (3.0, 0.1), (9.0, 0.0), (9.0, 0.0)]
                 .map(|(c, e)| setting(c, e))
                 .into();
-        mark_front(&mut settings);
-        let front: Vec<bool> = settings.iter().map(|s| s.front).collect();
+        mark_pareto(&mut settings);
+        let optimal: Vec<bool> = settings.iter().map(|s| s.pareto).collect();
         // Of two that are equal, the first.
-        assert_eq!(front, [true, false, true, false, true, false]);
+        assert_eq!(optimal, [true, false, true, false, true, false]);
     }
 }

@@ -1,22 +1,30 @@
-//! A scene at other settings: baked, sampled and shaded, all else being equal.
+//! A scene at other settings: baked, sampled and shaded, all else being equal. Its surface is traced once for all
+//! settings that do not touch it.
 
+use std::cell::RefCell;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::Instant;
 
 use crate::StudyError;
-use crate::bake::{self, Illumination};
-use crate::engine::Point;
+use crate::bake::rays::RayMesh;
+use crate::bake::{self, Illumination, VertexOcclusion};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
+use crate::engine::{Objective, Point};
 use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
-use crate::model::params::Param;
+use crate::model::params::{Param, Params};
 use crate::prepare::{PrepareError, PrepareOptions, Prepared};
+use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
 use crate::samples::rows::Rows;
-use crate::samples::{self, ViewSamples};
+use crate::samples::{self, Hit, ViewSamples, sample_hits};
+use crate::scene::view::View;
 use crate::scene::{Loss, Quality, Scene};
 use crate::subject::shaded;
+use crate::timing::seconds_of;
 
 /// The settings that a scene file can have.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,15 +35,50 @@ pub struct Settings {
     pub quality: Quality,
 }
 
+/// What of the settings the samples depend on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Traced {
+    silhouette: Silhouette,
+    samples_per_axis: u32,
+    occlusion_rays: u32,
+}
+
+impl From<Settings> for Traced {
+    fn from(Settings { silhouette, quality }: Settings) -> Self {
+        let Quality { samples_per_axis, occlusion_rays, .. } = quality;
+        Self { silhouette, samples_per_axis, occlusion_rays }
+    }
+}
+
+/// The visible surface, a view each.
+type Surfaces = Arc<Vec<ViewSamples>>;
+
 /// A scene, to be evaluated at any settings.
 pub struct Bench<'a> {
     /// Its file.
     pub path: &'a Path,
-    /// As it stands, loaded and baked, with its own samples.
+    /// As it stands, loaded and baked; its samples are `surfaces`.
     pub prepared: Prepared,
     /// The parameter file, if any.
     pub params: Option<&'a Path>,
+    /// Its samples as it stands.
+    surfaces: Surfaces,
+    /// Those of the other settings that were evaluated last: one set of them is a good part of the memory.
+    last: RefCell<Option<(Traced, Surfaces)>>,
+    /// The points that its samples show, once some were made again with another occlusion.
+    hits: RefCell<Option<Arc<Vec<Vec<Hit>>>>>,
     cache: Option<PathBuf>,
+}
+
+/// Seconds of what sweeps are made of, measured on the scene as it stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Rates {
+    /// Tracing the surface of all views.
+    pub trace: f64,
+    /// Their images from samples that are there, compared with others.
+    pub images: f64,
+    /// A pass of the engine with every lookup live.
+    pub pass: f64,
 }
 
 /// A scene at some settings.
@@ -45,7 +88,7 @@ pub struct Evaluated {
     /// Its cubes.
     pub illumination: Illumination,
     /// Its visible surface, a view each.
-    pub samples: Vec<ViewSamples>,
+    pub samples: Surfaces,
 }
 
 impl<'a> Bench<'a> {
@@ -60,8 +103,34 @@ impl<'a> Bench<'a> {
             cache: cache.map(Path::to_owned),
             ..PrepareOptions::default()
         };
-        let prepared = Prepared::new(path, &options)?;
-        Ok(Self { path, prepared, params, cache: options.cache })
+        let mut prepared = Prepared::new(path, &options)?;
+        let surfaces = Arc::new(std::mem::take(&mut prepared.samples));
+        let (last, hits) = (RefCell::default(), RefCell::default());
+        Ok(Self { path, prepared, params, surfaces, last, hits, cache: options.cache })
+    }
+
+    /// The same scene at other constants, which move neither its mesh nor its samples.
+    #[must_use]
+    pub fn at(&self, params: Params) -> Self {
+        let mut prepared = self.prepared.clone();
+        prepared.scene.params = params;
+        let (surfaces, last, hits) = (Arc::clone(&self.surfaces), RefCell::default(), RefCell::default());
+        Self { prepared, surfaces, last, hits, cache: self.cache.clone(), ..*self }
+    }
+
+    /// What its sweeps are made of, measured.
+    ///
+    /// # Errors
+    /// When a stage fails.
+    pub fn rates(&self) -> Result<Rates, StudyError> {
+        let since = Instant::now();
+        let evaluated = self.evaluate(self.settings())?;
+        let images = evaluated.images(&self.point());
+        std::hint::black_box(Difference::of_all(&images, &images));
+        let images = since.elapsed().as_secs_f64();
+        let engine = evaluated.live_engine();
+        let pass = seconds_of(|| engine.loss(&self.point()));
+        Ok(Rates { trace: self.prepared.seconds.samples, images, pass })
     }
 
     /// Where bakes are kept.
@@ -82,11 +151,21 @@ impl<'a> Bench<'a> {
         self.prepared.start()
     }
 
-    /// How a fit's engine is asked for, of the scene as it stands and from its own start values: constants of an
-    /// earlier fit would be the answer already.
-    #[must_use]
-    pub fn fit_options(&self) -> PrepareOptions {
-        PrepareOptions { fit: true, cache: self.cache.clone(), ..PrepareOptions::default() }
+    /// The scene as it stands at its own start values, to be fitted: constants of an earlier fit would be the answer
+    /// already.
+    ///
+    /// # Errors
+    /// When a stage refuses its input.
+    pub fn to_fit(&self) -> Result<Prepared, StudyError> {
+        let prepared = match self.params {
+            None => self.prepared.clone(),
+            Some(_) => {
+                let options =
+                    PrepareOptions { fit: true, cache: self.cache.clone(), ..PrepareOptions::default() };
+                Prepared::baked(self.path, &options)?
+            }
+        };
+        Ok(Prepared { samples: self.surfaces.to_vec(), ..prepared })
     }
 
     /// The scene with these settings.
@@ -97,18 +176,91 @@ impl<'a> Bench<'a> {
         scene
     }
 
-    /// Bake and sample the scene at these settings. Bakes come from the cache where they are there.
+    /// Bake and sample the scene at these settings. Bakes come from the cache where they are there, and samples from
+    /// those that are there already.
     ///
     /// # Errors
     /// When a stage refuses its input.
     pub fn evaluate(&self, settings: Settings) -> Result<Evaluated, StudyError> {
         let scene = self.scene(settings);
         let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
-        let posed = scene.mesh.pose();
-        let samples =
-            samples::sample_views(&scene, &posed, bake.occlusion.as_ref()).map_err(PrepareError::from)?;
+        let samples = self.surfaces(&scene, settings.into(), bake.occlusion.as_ref())?;
         Ok(Evaluated { scene, illumination: bake.illumination, samples })
     }
+
+    /// As [`Self::evaluate`], with the surface traced anew.
+    ///
+    /// # Errors
+    /// When a stage refuses its input.
+    pub fn evaluate_anew(&self, settings: Settings) -> Result<Evaluated, StudyError> {
+        let scene = self.scene(settings);
+        let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
+        let samples = Arc::new(traced(&scene, bake.occlusion.as_ref())?);
+        Ok(Evaluated { scene, illumination: bake.illumination, samples })
+    }
+
+    /// The samples of `scene`, which is this one at other settings.
+    fn surfaces(
+        &self,
+        scene: &Scene,
+        settings: Traced,
+        occlusion: Option<&VertexOcclusion>,
+    ) -> Result<Surfaces, StudyError> {
+        let own = Traced::from(self.settings());
+        if settings == own {
+            return Ok(Arc::clone(&self.surfaces));
+        }
+        if let Some((_, surfaces)) = self.last.borrow().as_ref().filter(|(last, _)| *last == settings) {
+            return Ok(Arc::clone(surfaces));
+        }
+        // These go first: there is no need of both.
+        self.last.replace(None);
+        let occluded = Traced { occlusion_rays: own.occlusion_rays, ..settings } == own;
+        let made = if occluded { self.occluded(scene, occlusion)? } else { traced(scene, occlusion)? };
+        let surfaces = Arc::new(made);
+        self.last.replace(Some((settings, Arc::clone(&surfaces))));
+        Ok(surfaces)
+    }
+
+    /// The scene's own samples with another occlusion: what they show stays.
+    fn occluded(
+        &self,
+        scene: &Scene,
+        occlusion: Option<&VertexOcclusion>,
+    ) -> Result<Vec<ViewSamples>, StudyError> {
+        let mesh = &scene.mesh;
+        let open = samples::posed_occlusion(scene, &mesh.morphs, mesh.positions.len(), occlusion);
+        let mut surfaces = self.surfaces.to_vec();
+        let Some(open) = open.map_err(PrepareError::from)? else { return Ok(surfaces) };
+        let hits = self.hits(scene);
+        for (samples, hits) in surfaces.iter_mut().zip(hits.iter()) {
+            let Some(place) = samples.surface.places().occlusion else { continue };
+            let corners = |hit: &Hit| mesh.triangles[hit.triangle as usize].map(|i| open[i as usize]);
+            // As `samples` interpolates a number of the vertices.
+            let at = |hit: &Hit| -> f32 {
+                let (weights, corners) = (hit.weights(), corners(hit));
+                (0..3).map(|i| weights[i] * corners[i]).sum()
+            };
+            samples.surface.rows_mut().plane_mut(place).zip(hits).for_each(|(open, hit)| *open = at(hit));
+        }
+        Ok(surfaces)
+    }
+
+    /// The point of the mesh that each of the scene's own samples shows.
+    fn hits(&self, scene: &Scene) -> Arc<Vec<Vec<Hit>>> {
+        let traced = || {
+            let posed = scene.mesh.pose();
+            let rays = RayMesh::new(&posed.positions, &posed.triangles);
+            let of = |view: &View| sample_hits(scene, &posed, &rays, &view.camera);
+            Arc::new(scene.views.iter().map(of).collect())
+        };
+        Arc::clone(self.hits.borrow_mut().get_or_insert_with(traced))
+    }
+}
+
+/// The visible surface of each view of a scene, by rays.
+fn traced(scene: &Scene, occlusion: Option<&VertexOcclusion>) -> Result<Vec<ViewSamples>, StudyError> {
+    Ok(samples::sample_views(scene, &scene.mesh.pose(), occlusion).map_err(PrepareError::from)?)
 }
 
 /// Bake what the effects of `scene` ask for at the constants of `at`.

@@ -2,7 +2,7 @@
 //!
 //! Along each axis of the scene file one setting is taken. Errors of different approximations are independent
 //! enough that their squares add; seconds add. Whether they do is then measured: the scene with all settings
-//! together is compared with the scene at every axis' reference. If it is off by more than was asked for, less
+//! together is compared with the scene at every axis' reference. If it is off by more than the goal allows, less
 //! is asked of the sum, and other settings are taken.
 
 use serde::Serialize;
@@ -25,7 +25,7 @@ pub enum Goal {
 /// Settings that meet the goal.
 #[derive(Clone, Debug, Serialize)]
 pub struct Choice {
-    /// What was asked for, in words.
+    /// The goal, in words.
     pub goal: String,
     /// The setting along each axis.
     pub settings: Vec<(&'static str, String)>,
@@ -45,7 +45,7 @@ pub struct Choice {
 /// A goal that no settings meet.
 #[derive(Clone, Debug, Serialize)]
 pub struct Missed {
-    /// What was asked for, in words.
+    /// The goal, in words.
     pub goal: String,
     /// The least that was reached, in words.
     pub least: String,
@@ -127,10 +127,10 @@ fn words(goal: Goal) -> String {
     }
 }
 
-/// The settings of an axis that a scene file can have; only those on the front are worth choosing, and the
-/// reference is always there.
+/// The settings of an axis that a scene file can have; only those that are Pareto-optimal are worth choosing,
+/// and the reference is always there.
 fn candidates(sweep: &Sweep) -> Vec<&Setting> {
-    sweep.settings.iter().filter(|s| s.choose.is_some() && (s.front || s.reference)).collect()
+    sweep.settings.iter().filter(|s| s.choose.is_some() && (s.pareto || s.reference)).collect()
 }
 
 fn reference(sweep: &Sweep) -> Option<&Setting> {

@@ -45,17 +45,17 @@ pub fn write(folder: &Path, scene: &str, tradeoff: &Tradeoff) -> Result<Vec<Path
 
 fn csv(sweeps: &[Sweep]) -> String {
     let mut text = String::from(
-        "axis,setting,relative_rms,linear_rms,psnr_db,flip,cost,unit,seconds,seconds_lower,seconds_upper,rounds,reference,front,counts\n",
+        "axis,setting,relative_rms,linear_rms,psnr_db,flip,cost,unit,seconds,seconds_lower,seconds_upper,rounds,reference,present,pareto,counts\n",
     );
     for sweep in sweeps {
-        for Setting { name, error, cost, time, counts, reference, front, .. } in &sweep.settings {
+        for Setting { name, error, cost, time, counts, reference, present, pareto, .. } in &sweep.settings {
             let score = |x: Option<f64>| x.map_or_else(String::new, |x| format!("{x:.5}"));
             let time = time.map_or_else(|| ",,,".to_owned(), columns);
             let counts: Vec<String> =
                 counts.iter().map(|(name, n)| format!("{} {n}", name.replace(',', ""))).collect();
             let _ = writeln!(
                 text,
-                "{},{},{:e},{:e},{},{},{cost},{},{time},{reference},{front},{}",
+                "{},{},{:e},{:e},{},{},{cost},{},{time},{reference},{present},{pareto},{}",
                 sweep.axis,
                 name.replace(',', ";"),
                 error.relative,
@@ -83,12 +83,15 @@ fn json(scene: &str, tradeoff: &Tradeoff, files: &[String]) -> Result<String, se
         axes: &'a [Sweep],
         choice: Option<&'a Choice>,
         missed: Option<&'a Missed>,
+        /// Axes that were to be measured and are not: the study was stopped, or goes on.
+        pending: &'a [&'static str],
         warnings: &'a [String],
         files: &'a [String],
     }
-    let Tradeoff { sweeps, warnings, .. } = tradeoff;
+    let Tradeoff { sweeps, warnings, pending, .. } = tradeoff;
     let (choice, missed) = (tradeoff.choice(), tradeoff.missed());
-    Ok(serde_json::to_string_pretty(&File { scene, axes: sweeps, choice, missed, warnings, files })? + "\n")
+    Ok(serde_json::to_string_pretty(&File { scene, axes: sweeps, choice, missed, pending, warnings, files })?
+        + "\n")
 }
 
 /// The tables on standard output.
@@ -106,11 +109,9 @@ pub fn table(tradeoff: &Tradeoff) -> String {
         for setting in &sweep.settings {
             let score =
                 |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$}"));
-            let mark = match (setting.reference, setting.front) {
-                (true, _) => "  reference",
-                (_, true) => "  front",
-                _ => "",
-            };
+            let notes: Vec<&str> =
+                setting.pareto.then_some("pareto").into_iter().chain(setting.notes()).collect();
+            let mark = if notes.is_empty() { String::new() } else { format!("  {}", notes.join(", ")) };
             let _ = writeln!(
                 text,
                 "  {:width$}  {:>10.4} {:>8} {:>8} {:>12}{mark}",

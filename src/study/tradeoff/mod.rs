@@ -1,6 +1,6 @@
 //! Tradeoffs: error against time for every approximation that the tool has.
 //!
-//! - [`axis`]: what an approximation's sweep is; [`axes`]: each of them, a file each
+//! - [`axis`]: what an approximation's sweep is, and how long it will take; [`axes`]: each of them, a file each
 //! - [`mod@bench`]: a scene at other settings: baked, sampled, shaded
 //! - [`mod@choose`]: the cheapest settings within an error, or the best within a time
 //! - [`files`]: the table, `results.csv`, `results.json`, plots; [`page`]: `report.html`
@@ -15,6 +15,7 @@ pub mod page;
 use std::path::{Path, PathBuf};
 
 use super::StudyError;
+use crate::fit::params_file::Foreign;
 use crate::progress;
 use axis::{Axis, Sweep};
 use bench::Bench;
@@ -40,8 +41,21 @@ pub struct Tradeoff {
     pub sweeps: Vec<Sweep>,
     /// The settings that meet the goal, where there is one, or that none do.
     pub answer: Option<Answer>,
+    /// Axes that are still to be measured.
+    pub pending: Vec<&'static str>,
     /// What the user should know.
     pub warnings: Vec<String>,
+}
+
+/// Who is told how a study goes on.
+pub trait Watcher {
+    /// About how many seconds each axis will take, before the first of them is swept.
+    fn estimated(&mut self, seconds: &[(&'static str, f64)]);
+    /// One more axis is measured; the others are still `pending`.
+    ///
+    /// # Errors
+    /// When what there is cannot be kept.
+    fn measured(&mut self, so_far: &Tradeoff) -> Result<(), StudyError>;
 }
 
 impl Tradeoff {
@@ -58,19 +72,65 @@ impl Tradeoff {
     }
 }
 
-/// Sweep a scene's axes.
+/// Sweep a scene's axes. A `watcher` is told how long it will take, and of each axis once it is measured.
 ///
 /// # Errors
 /// When a stage refuses its input, or there is a goal and nothing to choose.
-pub fn tradeoff(scene: &Path, options: &TradeoffOptions) -> Result<Tradeoff, StudyError> {
+pub fn tradeoff(
+    scene: &Path,
+    options: &TradeoffOptions,
+    mut watcher: Option<&mut dyn Watcher>,
+) -> Result<Tradeoff, StudyError> {
     let bench = Bench::new(scene, options.params.as_deref(), options.cache.as_deref())?;
+    let mut warnings = bench.prepared.warnings.clone();
+    warnings.extend(foreign(&bench));
+    let axes = applying(&bench, options, &mut warnings)?;
+    check_goal(options.goal, &axes)?;
+    if let Some(watcher) = &mut watcher {
+        watcher.estimated(&estimated(&bench, &axes)?);
+    }
+    let pending = axes.iter().map(|axis| axis.name()).collect();
+    let mut found = Tradeoff { sweeps: Vec::new(), answer: None, pending, warnings };
+    let bar = progress::bar("axes", axes.len() as u64);
+    for axis in axes {
+        bar.set_message(axis.name());
+        found.sweeps.push(axis.sweep(&bench)?);
+        found.pending.remove(0);
+        if let Some(watcher) = &mut watcher {
+            watcher.measured(&found)?;
+        }
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    found.answer = options.goal.map(|goal| choose(&bench, &found.sweeps, goal)).transpose()?;
+    Ok(found)
+}
+
+/// What is to be said of constants that were fitted with other effects than are measured.
+fn foreign(bench: &Bench<'_>) -> Option<String> {
+    let scene = &bench.prepared.scene;
+    let foreign = Foreign {
+        file: bench.params?,
+        fitted: bench.prepared.fitted,
+        scene: &scene.path,
+        effects: scene.effects,
+        params: &scene.params,
+        chosen: &[],
+    };
+    foreign.words("measured", "If that is not meant, name the scene that was fitted.", true)
+}
+
+/// The axes that are wanted and that the scene asks for; what is left out is a warning, unless it was named.
+fn applying(
+    bench: &Bench<'_>,
+    options: &TradeoffOptions,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<&'static dyn Axis>, StudyError> {
     let wanted =
         |axis: &&dyn Axis| options.axes.is_empty() || options.axes.iter().any(|name| name == axis.name());
-    let all = axes::all();
-    let mut warnings = bench.prepared.warnings.clone();
-    let (mut axes, mut idle): (Vec<&dyn Axis>, Vec<String>) = (Vec::new(), Vec::new());
-    for axis in all.iter().copied().filter(wanted) {
-        match axis.applies(&bench) {
+    let (mut axes, mut idle): (Vec<&'static dyn Axis>, Vec<String>) = (Vec::new(), Vec::new());
+    for axis in axes::all().into_iter().filter(wanted) {
+        match axis.applies(bench) {
             Ok(()) => axes.push(axis),
             Err(why) if options.axes.is_empty() => idle.push(format!("{}: {why}", axis.name())),
             Err(why) => return Err(StudyError::Idle { axis: axis.name(), why }),
@@ -79,17 +139,21 @@ pub fn tradeoff(scene: &Path, options: &TradeoffOptions) -> Result<Tradeoff, Stu
     if !idle.is_empty() {
         warnings.push(format!("Left out, as the scene does not ask for it: {}.", idle.join("; ")));
     }
-    check_goal(options.goal, &axes)?;
-    let bar = progress::bar("axes", axes.len() as u64);
-    let mut sweeps = Vec::new();
-    for axis in axes {
-        bar.set_message(axis.name());
-        sweeps.push(axis.sweep(&bench)?);
+    Ok(axes)
+}
+
+/// About how many seconds each axis will take.
+fn estimated(bench: &Bench<'_>, axes: &[&'static dyn Axis]) -> Result<Vec<(&'static str, f64)>, StudyError> {
+    let bar = progress::bar("estimate", axes.len() as u64);
+    let rates = bench.rates()?;
+    let estimate = |axis: &&'static dyn Axis| {
+        let seconds = axis.seconds(bench, rates);
         bar.inc(1);
-    }
+        Ok((axis.name(), seconds?))
+    };
+    let seconds = axes.iter().map(estimate).collect();
     bar.finish_and_clear();
-    let answer = options.goal.map(|goal| choose(&bench, &sweeps, goal)).transpose()?;
-    Ok(Tradeoff { sweeps, answer, warnings })
+    seconds
 }
 
 /// Refuse a goal that no sweep of these axes could meet, before anything is measured.

@@ -21,6 +21,13 @@ pub fn page(scene: &str, tradeoff: &Tradeoff) -> String {
     for warning in &tradeoff.warnings {
         let _ = write!(main, "<p class=\"quiet\">{}</p>", escape(warning));
     }
+    if !tradeoff.pending.is_empty() {
+        let words = format!(
+            "Not measured: {}. The study was interrupted, or is not done yet.",
+            tradeoff.pending.join(", ")
+        );
+        let _ = write!(main, "<p id=\"pending\">{words}</p>");
+    }
     if let Some(missed) = tradeoff.missed() {
         let words = format!("<p>No settings are {}: {}.</p>", escape(&missed.goal), escape(&missed.least));
         main += &section("choice", &format!("No settings {}", missed.goal), &words);
@@ -41,12 +48,12 @@ pub fn page(scene: &str, tradeoff: &Tradeoff) -> String {
 
 fn tiles(tradeoff: &Tradeoff) -> String {
     let settings: usize = tradeoff.sweeps.iter().map(|sweep| sweep.settings.len()).sum();
-    let front: usize =
-        tradeoff.sweeps.iter().flat_map(|sweep| &sweep.settings).filter(|setting| setting.front).count();
+    let pareto: usize =
+        tradeoff.sweeps.iter().flat_map(|sweep| &sweep.settings).filter(|setting| setting.pareto).count();
     let tiles = [
         ("axes", tradeoff.sweeps.len().to_string()),
         ("settings", settings.to_string()),
-        ("on a front", front.to_string()),
+        ("Pareto-optimal", pareto.to_string()),
     ];
     let mut html: String = tiles.iter().map(|(name, value)| tile(name, value, "")).collect();
     if let Some(choice) = tradeoff.choice() {
@@ -137,7 +144,10 @@ fn axis(sweep: &Sweep) -> String {
         columns.push(("time", "of a pass, where it was measured"));
     }
     columns.extend(counts.iter().map(|name| (*name, "a count: the same on every machine")));
-    columns.push(("front.", "whether nothing is both as cheap and as accurate"));
+    columns.extend([
+        ("pareto.", "whether nothing is both as cheap and as accurate"),
+        ("note.", "what the others are measured against, and what the scene has at present"),
+    ]);
     let mut table = Table::new(&columns);
     for setting in &sweep.settings {
         let time = setting.time.map_or_else(Cell::none, |time| {
@@ -160,12 +170,8 @@ fn axis(sweep: &Sweep) -> String {
             cells.push(time);
         }
         cells.extend(setting.counts.iter().map(|&(_, n)| Cell::value(amount(n), n)));
-        let mark = match (setting.reference, setting.front) {
-            (true, _) => "reference",
-            (_, true) => "front",
-            _ => "",
-        };
-        cells.push(Cell::text(mark));
+        cells.push(Cell::text(if setting.pareto { "pareto" } else { "" }));
+        cells.push(Cell::text(&setting.notes().join(", ")));
         table.row(if setting.reference { "reference" } else { "" }, &cells);
     }
     let plot = plot(sweep);
@@ -188,21 +194,26 @@ fn spread(time: Timed) -> String {
     }
 }
 
+/// A setting's name in a plot, which tells the scene's own from the others.
+fn named(setting: &Setting) -> String {
+    if setting.present { format!("{} (the scene's)", setting.name) } else { setting.name.clone() }
+}
+
 /// Error against cost.
 #[must_use]
 pub fn plot(sweep: &Sweep) -> Plot<'_> {
     let dot = |setting: &Setting| Dot {
         x: setting.cost,
         y: 100.0 * setting.error.relative,
-        label: setting.name.clone(),
+        label: named(setting),
         title: format!(
             "{}: {}% off, {}",
-            setting.name,
+            named(setting),
             number(100.0 * setting.error.relative, 3),
             cost(sweep, setting)
         ),
         series: 0,
-        front: setting.front,
+        front: setting.pareto,
     };
     Plot {
         x: sweep.cost,
@@ -263,7 +274,7 @@ fn method(scene: &str) -> String {
     format!(
         "<p>Times are of rounds in which all settings of an axis take turns, after one that warms up: of bakes, traces and passes the \
          least, of fits the median, with the rounds' quartiles beside them; what takes more than 3 s is run once. Counts \
-         stand beside them, as they are the same on every machine. Filled dots are on the front: nothing is both as cheap and as \
+         stand beside them, as they are the same on every machine. Filled dots are Pareto-optimal: nothing is both as cheap and as \
          accurate; the dashed line joins them. Dots on the line marked 0 have no error at all.</p>{}",
         facts(&rows)
     )

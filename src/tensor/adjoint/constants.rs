@@ -21,10 +21,10 @@ impl Adjoint {
             @compute @workgroup_size(1)\nfn cs_main() {\n    const DEGREE = 0.017453292;\n",
         );
         for param in Param::all() {
-            let _ = writeln!(wgsl, "    var {} = values[{}];", param.name(), param as usize);
+            let _ = writeln!(wgsl, "    var {} = values[{}];", param.identifier(), param.index());
         }
         for (k, column) in self.columns.iter().enumerate() {
-            let name = column.param.name();
+            let name = column.param.identifier();
             let _ = match column.channels {
                 Channels::Tied => writeln!(wgsl, "    {name} = vec4f(vec3f(columns[{k}]), 0.0);"),
                 Channels::One(c) => writeln!(wgsl, "    {name}[{c}] = columns[{k}];"),
@@ -35,7 +35,7 @@ impl Adjoint {
         );
         for (i, constant) in self.plan.constants.iter().enumerate() {
             let value = match constant {
-                Constant::Param(param) => param.name(),
+                Constant::Param(param) => param.identifier(),
                 Constant::Turn => "vec4f(cos(turn), sin(turn), 0.0, 0.0)",
                 Constant::KeyDirection => {
                     "vec4f(cos(elevation) * sin(azimuth), sin(elevation), cos(elevation) * cos(azimuth), 0.0)"

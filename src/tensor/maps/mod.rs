@@ -2,7 +2,7 @@
 //!
 //! The image is linear in each map while the others are held, so that a map is the answer of a large, sparse,
 //! bounded least-squares problem: conjugate gradients solve it, whose products are forward and backward passes of
-//! the shading operation ([`crate::tensor`]). The maps are taken one after the other, and the constants are solved
+//! the shading operation ([`Shade`](crate::Shade)). The maps are taken one after the other, and the constants are solved
 //! again after each round. burn's Adam stands beside it, for comparison.
 //!
 //! - [`layer`]: a map as an unknown: texels, how samples see them, priors
@@ -38,7 +38,7 @@ pub enum MapError {
     Tensor(TensorError),
     /// A map, or what is looked up for it, is beyond what one buffer of the device holds.
     #[error(
-        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there. Scale the maps down, lower samples_per_axis in [quality], or choose an adapter with larger buffers (--adapter)."
+        "adapter {adapter}: the buffer of the {what} takes {bytes} bytes, but one may have {limit} at most there. Scale the maps down, lower samples_per_axis in [quality], or choose an adapter with larger buffers."
     )]
     TooLarge {
         /// The adapter.
@@ -52,7 +52,7 @@ pub enum MapError {
     },
     /// The device has no room for all samples and maps.
     #[error(
-        "adapter {adapter}: out of memory. A fit of maps keeps all samples on the adapter: lower samples_per_axis in [quality], give fewer or smaller views and maps, or choose another adapter (--adapter)."
+        "adapter {adapter}: out of memory. A fit of maps keeps all samples on the adapter: lower samples_per_axis in [quality], give fewer or smaller views and maps, or choose another adapter."
     )]
     OutOfMemory {
         /// The adapter.
@@ -62,9 +62,7 @@ pub enum MapError {
     #[error(transparent)]
     Constants(#[from] FitError),
     /// A map that no enabled effect reads.
-    #[error(
-        "no enabled effect reads {map}: it cannot be fitted. Leave it out of --maps, or enable {effects}."
-    )]
+    #[error("no enabled effect reads {map}: it cannot be fitted. Leave it out, or enable {effects}.")]
     Unread {
         /// The map's name.
         map: &'static str,
@@ -73,7 +71,7 @@ pub enum MapError {
     },
     /// A texture of a mesh on which no texel has a place.
     #[error(
-        "the mesh has no texture coordinates (or only one), so no texel of {map} has a place on it. Unwrap the mesh, or leave {map} out of --maps."
+        "the mesh has no texture coordinates (or only one), so no texel of {map} has a place on it. Unwrap the mesh, or leave {map} out."
     )]
     NotUnwrapped {
         /// The map's name.

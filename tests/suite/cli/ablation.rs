@@ -77,6 +77,48 @@ fn what_contributes_nothing_is_missed_by_nothing_at_all() {
     assert!(page.contains(">exact</td>") && !page.contains("200.00"));
 }
 
+/// The text of each cell of the page's table of cases, by its row's heading.
+fn page_cells(page: &str) -> BTreeMap<String, Vec<String>> {
+    let table = page.split("id=\"cases\"").nth(1).unwrap().split("</table>").next().unwrap();
+    let body = table.split("<tbody>").nth(1).unwrap();
+    let text = |cell: &str| -> String {
+        let plain: String = cell.split('<').map(|part| part.split('>').nth(1).unwrap_or_default()).collect();
+        plain.replace('−', "-")
+    };
+    let rows = body.split("<tr").skip(1).map(|row| row.split("<t").skip(1).map(text).collect::<Vec<_>>());
+    rows.map(|cells| (cells[0].clone(), cells)).collect()
+}
+
+#[test]
+fn page_and_terminal_tell_the_same_in_the_same_units() {
+    let sandbox = Sandbox::new();
+    // Held at a wrong value: there is a misfit that a change is a share of.
+    sandbox.edit("\"rim_exponent\", ", "");
+    let ran = sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]).done();
+    let page = page_cells(&sandbox.text("parts/report.html"));
+    let lines: Vec<Vec<&str>> = ran.out.lines().map(|line| line.split_whitespace().collect()).collect();
+    // Whole words of a heading; its last of two stand apart.
+    assert!(lines[0].join(" ").contains("change t PSNR SSIM FLIP CPU, % GPU, % ops, % bytes, %"), "{ran:?}");
+    let mut compared = 0;
+    for (name, cells) in &page {
+        let line = lines.iter().find(|line| line.first().is_some_and(|word| word == name));
+        let Some(line) = line else { continue };
+        // Name, loss, change, t, PSNR, SSIM, FLIP, CPU, GPU, operations, bytes.
+        let first = |cell: &str| cell.split(" ±").next().unwrap().trim().to_owned();
+        // The page has linear RMS, too, and without an adapter no column of GPU times.
+        for (column, on_page) in [(2, 2), (7, 8), (9, 9), (10, 10)] {
+            let (told, shown) = (line[column], first(&cells[on_page]));
+            // A change that is no share of anything is a number, which a table writes with an exponent.
+            let number = |text: &str| text.parse::<f64>().ok();
+            let same = told == shown || number(told).is_some_and(|x| number(&shown) == Some(x));
+            assert!(same, "{name}: {line:?} {cells:?}");
+            compared += 1;
+        }
+    }
+    assert!(compared >= 4 * 8, "{page:?} {ran:?}");
+    assert!(ran.out.contains('%') && page["rim"][2].contains('%'), "{ran:?}");
+}
+
 /// The scene with two effects and no targets: an ablation of a second or two.
 fn small() -> Sandbox {
     let sandbox = Sandbox::new();

@@ -8,12 +8,12 @@ use std::process::Command;
 use serde_json::Value;
 
 use super::sandbox::Sandbox;
-use super::tradeoffs::AXES;
+use super::tradeoffs::{AXES, done};
 
 /// The browser; none, said loudly, where it is left out on purpose.
 fn browser() -> Option<&'static str> {
     if std::env::var_os("SKINFIT_NO_BROWSER_TESTS").is_some() {
-        eprintln!("NOT CHECKED: SKINFIT_NO_BROWSER_TESTS is set, so no page was opened in a browser");
+        crate::common::not_checked("SKINFIT_NO_BROWSER_TESTS is set, so no page was opened in a browser");
         return None;
     }
     let names = ["chromium", "chromium-browser", "google-chrome"];
@@ -187,7 +187,7 @@ fn pages_work_in_a_browser() {
     sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never", "--refit"]);
     sandbox.fit("run", &["--engine", "cpu"]).done();
     let goal = ["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml", "--within", "1%"];
-    sandbox.run(&goal).done();
+    done(sandbox.run(&goal));
     let cost = sandbox.path("cost/report.html");
     let tables: Vec<String> = AXES.iter().map(|axis| format!("axis-{axis}")).collect();
     let tables: Vec<&str> = std::iter::once("cheapest").chain(tables.iter().map(String::as_str)).collect();

@@ -45,6 +45,66 @@ fn a_fits_constants_are_exported_with_their_provenance() {
 }
 
 #[test]
+fn constants_alone_need_no_scene() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    let there = sandbox.run(&["export", "run/params.toml", "--to", "c"]).done();
+    // Away from its scene, and whatever has become of that.
+    sandbox.write("away/params.toml", &sandbox.read("run/params.toml"));
+    sandbox.remove("mesh.glb");
+    for target in Target::ALL {
+        let name = target.name();
+        let ran = sandbox.run(&["export", "away/params.toml", "--to", name, "--constants"]).done();
+        assert!(ran.out.to_lowercase().contains("rim_weight") && ran.err.is_empty(), "{ran:?}");
+    }
+    let away = sandbox.run(&["export", "away/params.toml", "--to", "c"]).done();
+    let code = |text: &str| {
+        text.lines().filter(|line| !line.starts_with("//")).map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert_eq!(code(&away.out), code(&there.out));
+    assert!(!away.out.contains("Scene:"), "{}", away.out);
+    // The shader does, and says what for.
+    sandbox.run(&["export", "away/params.toml", "--to", "glsl"]).refused(&[
+        "away/params.toml: no scene.toml lies beside it",
+        "maps, silhouette",
+        "--constants",
+    ]);
+}
+
+#[test]
+fn what_is_exported_as_toml_draws_the_same_picture() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    sandbox.run(&["export", "run/params.toml", "--to", "toml", "-o", "skin.toml"]).done();
+    let draw = |params: &str, to: &str| {
+        sandbox.run(&["render", "scene.toml", "--engine", "cpu", "--params", params, "-o", to]).done();
+        crate::fixtures::read_exr(&sandbox.path(to)).rgb(["R", "G", "B"])
+    };
+    assert!(draw("run/params.toml", "a.exr") == draw("skin.toml", "b.exr"), "the pictures differ");
+}
+
+#[test]
+fn values_on_the_command_line_are_exported_and_told() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    let export = |more: &[&str]| sandbox.run(&[&["export", "run/params.toml", "--to"], more].concat());
+    let header = export(&["c", "--set", "hilite=0.7,0.6,0.5", "--set", "occlusion=0.25"]).done().out;
+    assert!(header.contains("// Set for this export: hilite=0.7,0.6,0.5, occlusion=0.25\n"), "{header}");
+    assert!(header.contains("skinfit_hilite[3] = {0.7f, 0.6f, 0.5f};"), "{header}");
+    assert!(header.contains("skinfit_occlusion = 0.25f;"), "{header}");
+    let shader = export(&["glsl", "--set", "hilite=0"]).done().out;
+    assert!(shader.contains("// Left out, as their weight is 0: hilite."), "{shader}");
+    let ran = export(&["c", "--set", "key_azimuth=3"]);
+    assert!(
+        ran.code == Some(0) && ran.err.contains("--set key_azimuth=3: no enabled effect asks for it"),
+        "{ran:?}"
+    );
+    let ran = export(&["c", "--set", "hilite=-1"]);
+    assert!(ran.code == Some(2) && ran.err.contains("hilite = -1 is out of bounds"), "{ran:?}");
+    export(&["c", "--set", "hilite=1", "--set", "hilite=2"]).refused(&["--set gives hilite twice"]);
+}
+
+#[test]
 fn constants_for_another_scenes_effects_are_exported_with_a_word_of_it() {
     let sandbox = Sandbox::new();
     sandbox.fit("run", &[]).done();
@@ -56,7 +116,12 @@ fn constants_for_another_scenes_effects_are_exported_with_a_word_of_it() {
     assert_eq!(export("scene.toml").done().err, "");
     let ran = export("other.toml");
     assert_eq!(ran.code, Some(0), "{ran:?}");
-    for words in ["run/params.toml: was fitted with the effects", "but other.toml has", "--scene"] {
+    for words in [
+        "run/params.toml: was fitted with the effects",
+        "but other.toml has",
+        "What is exported is the latter's",
+        "--scene",
+    ] {
         assert!(ran.err.contains(words), "{ran:?}");
     }
 }

@@ -1,19 +1,20 @@
 //! Rendering on a graphics adapter, and without one.
 
 use serde_json::Value;
+use skinfit::scene::Loss;
 
 use super::sandbox::{Ran, Sandbox};
 use crate::fixtures::read_exr;
 
 /// Whether there is an adapter; where there is none, `SKINFIT_NO_GPU_TESTS` must say that it is no mistake.
-fn adapter(sandbox: &Sandbox) -> bool {
+pub(super) fn adapter(sandbox: &Sandbox) -> bool {
     let info: Value = serde_json::from_str(&sandbox.run(&["info", "--json"]).done().out).unwrap();
     if info["engine"] == "gpu" {
         return true;
     }
     let excused = std::env::var_os("SKINFIT_NO_GPU_TESTS").is_some();
     assert!(excused, "{}\nThese tests need an adapter: tests/run installs a software one.", info["why"]);
-    eprintln!("NOT CHECKED, as SKINFIT_NO_GPU_TESTS is set: {}", info["why"]);
+    crate::common::not_checked(&format!("SKINFIT_NO_GPU_TESTS is set: {}", info["why"]));
     false
 }
 
@@ -33,24 +34,149 @@ fn an_image_is_the_same_from_both_engines_and_says_where_it_was_drawn() {
         return;
     }
     let render = |engine: &str, output: &str| {
-        let more = ["--engine", engine, "--params", "truth.toml", "--layers", "--size", "40x24"];
+        let more = [
+            "--engine",
+            engine,
+            "--params",
+            "truth.toml",
+            "--layers",
+            "--size",
+            "40x24",
+            "--antialias",
+            "2x2",
+        ];
         sandbox.run(&[&["render", "scene.toml", "-o", output], &more[..]].concat()).done().out
     };
     assert_eq!(render("cpu", "cpu.exr"), "wrote cpu.exr (view front; cpu)\n");
-    assert!(render("gpu", "gpu.exr").starts_with("wrote gpu.exr (view front; gpu: "));
+    let said = render("gpu", "gpu.exr");
+    assert!(said.starts_with("wrote gpu.exr (view front; gpu: "));
+    let software = said.contains("(software)");
     assert!(render("auto", "auto.exr").starts_with("wrote auto.exr (view front; gpu: "));
     let [cpu, gpu, auto] = ["cpu.exr", "gpu.exr", "auto.exr"].map(|name| read_exr(&sandbox.path(name)));
     assert!(gpu.planes == auto.planes);
     assert_eq!((gpu.width, gpu.height), (40, 24));
     assert_eq!(cpu.planes.keys().collect::<Vec<_>>(), gpu.planes.keys().collect::<Vec<_>>());
+    // Pixels that both cover wholly, and those that both cover in part: the background says nothing.
+    let (of_cpu, of_gpu) = (&cpu.planes["A"], &gpu.planes["A"]);
+    let pixels = |wanted: &dyn Fn(f32) -> bool| -> Vec<usize> {
+        (0..of_cpu.len()).filter(|&i| wanted(of_cpu[i]) && wanted(of_gpu[i])).collect()
+    };
+    let inside = pixels(&|alpha| alpha == 1.0);
+    let outline = pixels(&|alpha| alpha > 0.0 && alpha < 1.0);
+    assert!(inside.len() > 150 && outline.len() > 10, "{} and {}", inside.len(), outline.len());
+    // A rasteriser that snaps corners to 1/256 of a sample covers one pixel of a hundred otherwise.
+    let covered = inside.len() + outline.len();
+    let other = (0..of_cpu.len()).filter(|&i| of_cpu[i] != of_gpu[i]).count();
+    assert!(100 * other <= covered, "{other} of {covered} pixels are covered otherwise");
+    // On software f32 against f64, some dozens of roundings of 6e-8: 4e-6 was found, of the layer that holds a sun's edge.
+    // Hardware reads the surface up to 1/256 of a sample beside where the ray hits: 2e-3 of what changes from pixel to
+    // pixel, which on these maps of 16 texels is all there is, and several times that at a slant.
+    let most = if software { 1e-5 } else { 2e-2 };
     for (name, plane) in &cpu.planes {
-        let mut errors: Vec<f32> = plane.iter().zip(&gpu.planes[name]).map(|(a, b)| (a - b).abs()).collect();
-        errors.sort_by(f32::total_cmp);
-        // f32 against f64; the sun's edge in a cube of 8 texels is steep. Pixels at the outline may differ by a
-        // sample.
-        let nine_tenths = errors[errors.len() * 9 / 10];
-        assert!(nine_tenths < 1e-3, "{name}: {nine_tenths}");
+        let brightest = plane.iter().fold(0.0_f32, |most, x| most.max(x.abs())).max(1e-6);
+        let same = inside.iter().chain(outline.iter().filter(|&&i| of_cpu[i] == of_gpu[i]));
+        let worst = same.map(|&i| (plane[i] - gpu.planes[name][i]).abs() / brightest).fold(0.0, f32::max);
+        println!("{name}: off by at most {worst:.1e} of {brightest}");
+        assert!(worst <= most, "{name}: {worst}");
     }
+}
+
+#[test]
+fn haze_is_rendered_as_a_layer_of_its_own_and_its_weight_fitted_to_it() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"haze\"]");
+    let truth = sandbox.text("truth.toml") + "haze_weight = 0.37\n";
+    sandbox.write("truth.toml", truth.as_bytes());
+    let render = |view: &str, more: &[&str]| {
+        let path = format!("hazy/{view}.exr");
+        let render = [
+            "render",
+            "scene.toml",
+            "--engine",
+            "cpu",
+            "--params",
+            "truth.toml",
+            "--view",
+            view,
+            "-o",
+            &path,
+        ];
+        sandbox.run(&[&render[..], more].concat()).done();
+        read_exr(&sandbox.path(&path))
+    };
+    // The effect is asked for by name: it shows with and without other layers, and alpha stays coverage.
+    let plain = render("front", &[]);
+    assert!(plain.planes["haze.Y"].iter().any(|&haze| haze > 0.01));
+    assert!(
+        plain.planes["A"].iter().all(|alpha| [0.0, 1.0].contains(alpha))
+            && !plain.planes.contains_key("diffuse.R")
+    );
+    let layers = render("front", &["--layers"]);
+    assert!(layers.planes["haze.Y"] == plain.planes["haze.Y"] && layers.planes.contains_key("diffuse.R"));
+    render("side", &[]);
+    for view in ["front", "side"] {
+        let file = format!("hazy/{view}.exr");
+        sandbox.edit(&format!("\"targets/{view}.exr\""), &format!("\"{file}\"\nhaze = \"{file}\""));
+    }
+    sandbox.edit("free = [", "free = [\"haze_weight\", ");
+    let mut engines = vec!["cpu"];
+    if adapter(&sandbox) {
+        engines.push("gpu");
+    }
+    for engine in engines {
+        sandbox.fit(engine, &["--engine", engine]).done();
+        let report = sandbox.json(&format!("{engine}/report.json"));
+        let haze = &report["params"]["haze_weight"];
+        assert_eq!(
+            (haze["start"].as_f64(), haze["identifiable"].as_bool()),
+            (Some(1.0), Some(true)),
+            "{engine}"
+        );
+        let value = haze["value"].as_f64().unwrap();
+        // As the other constants: targets are f32, and the GPU's sums too.
+        assert!((value - 0.37).abs() < 1e-4 * 0.37, "{engine}: {value}");
+        let terms = read_exr(&sandbox.path(&format!("{engine}/front_terms.exr")));
+        let apart = terms.planes["haze.Y"].iter().zip(&plain.planes["haze.Y"]).map(|(a, b)| (a - b).abs());
+        assert!(apart.fold(0.0, f32::max) < 1e-3, "{engine}");
+    }
+}
+
+#[test]
+fn a_background_stands_behind_the_mesh_and_is_a_layer_of_its_own() {
+    let sandbox = Sandbox::new();
+    let render = |engine: &str, what: &str| {
+        let more = ["--engine", engine, "--background", what, "--layers", "--size", "40x24", "-o", "a.exr"];
+        sandbox.run(&[&["render", "scene.toml"], &more[..]].concat()).done();
+        read_exr(&sandbox.path("a.exr"))
+    };
+    for engine in ["cpu", "gpu"] {
+        if engine == "gpu" && !adapter(&sandbox) {
+            continue;
+        }
+        for what in ["environment", "0.5,0.25,0"] {
+            let seen = render(engine, what);
+            assert!(seen.planes["A"].iter().all(|&alpha| alpha == 1.0), "{engine} {what}");
+            for channel in ["R", "G", "B"] {
+                let layers: Vec<&Vec<f32>> = (seen.planes.iter())
+                    .filter(|(name, _)| name.ends_with(&format!(".{channel}")))
+                    .map(|(_, plane)| plane)
+                    .collect();
+                assert_eq!(layers.len(), 6, "{:?}", seen.planes.keys());
+                for (i, whole) in seen.planes[channel].iter().enumerate() {
+                    let sum: f32 = layers.iter().map(|plane| plane[i]).sum();
+                    assert!((sum - whole).abs() < 1e-5 * (1.0 + whole), "{engine} {what}: {sum} {whole}");
+                }
+            }
+        }
+        // The corner is the colour itself.
+        assert_eq!(render(engine, "0.5,0.25,0").planes["G"][0], 0.25);
+        assert!(render(engine, "none").planes["A"][0] == 0.0);
+    }
+    let refused = |what: &str| {
+        let ran = sandbox.run(&["render", "scene.toml", "-o", "b.exr", "--background", what]);
+        assert!(ran.code == Some(2) && ran.err.contains("none, environment, or three"), "{ran:?}");
+    };
+    ["sky", "1,2", "1,2,3,4", "1,-2,3", "nan,0,0", "1,2,x"].into_iter().for_each(refused);
 }
 
 #[test]
@@ -132,6 +258,7 @@ fn what_the_engines_cannot_do_is_refused_before_a_file_is_written() {
         (&["--accuracy", "good"], &["`exact`, `paper`"]),
         (&["--frames", "0"], &["0 is not in 1..=100000"]),
         (&["--animate"], &["--frames"]),
+        (&["--frames", "2", "--occlusion", "frames"], &["--animate"]),
     ] {
         let ran = sandbox.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat());
         assert_eq!(ran.code, Some(2), "{ran:?}");
@@ -253,18 +380,24 @@ fn a_fit_with_maps_is_not_gone_on_from_without_them() {
     let ran = sandbox.fit("run", &["--maps", "specular,color", "--max-iterations", "1"]);
     assert!(ran.code.is_some_and(|code| code < 2), "{ran:?}");
     // Its constants belong to maps that no state holds.
-    sandbox.fit("run", &["--resume"]).refused(&["run/state.json", "without --resume"]);
+    sandbox.fit("run", &["--resume"]).refused(&["run/state.json", "afresh"]);
 }
 
 #[test]
 fn every_loss_is_verified_on_both_engines() {
     let sandbox = Sandbox::new();
     let gpu = adapter(&sandbox);
+    // The scene's own loss, the default's, which no option names, and each that there is.
+    sandbox.edit("loss = \"relative_l2\"\n", "");
     for engine in if gpu { &["cpu", "gpu"][..] } else { &["cpu"] } {
-        for loss in ["l2", "huber", "smape"] {
-            let ran = sandbox
-                .fit("run", &["--engine", engine, "--verify", "--loss", loss, "--max-iterations", "1"]);
-            assert!(ran.err.contains("verified against the model in f64"), "{engine} {loss}: {ran:?}");
+        for loss in [None].into_iter().chain(Loss::ALL.map(|loss| Some(loss.name()))) {
+            let named: Vec<&str> = loss.map_or_else(Vec::new, |loss| vec!["--loss", loss]);
+            let more = [&["--engine", engine, "--verify", "--max-iterations", "1"], &named[..]].concat();
+            let ran = sandbox.fit("run", &more);
+            assert!(ran.err.contains("verified against the model in f64"), "{engine} {loss:?}: {ran:?}");
+            let report = sandbox.json("run/report.json");
+            assert_eq!(report["loss_name"], loss.unwrap_or("relative_l2"), "{engine}");
+            assert_eq!(report["engine"], *engine);
         }
     }
 }

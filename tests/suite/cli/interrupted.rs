@@ -174,6 +174,36 @@ fn an_interrupted_study_says_so_and_leaves_nothing() {
 
 #[cfg(unix)]
 #[test]
+fn an_interrupted_tradeoff_leaves_the_axes_that_are_done() {
+    let sandbox = Sandbox::new();
+    // What an earlier run left is replaced as soon as there is something in its place.
+    let study = |axes: &[&'static str]| {
+        let axes = axes.iter().flat_map(|axis| ["--axis", axis]);
+        ["tradeoff", "scene.toml", "-o", "cost", "--no-cache"].into_iter().chain(axes).collect::<Vec<_>>()
+    };
+    assert_eq!(sandbox.run(&study(&["silhouette"])).code, Some(0));
+    // The densest stack of specular cubes lasts for seconds.
+    sandbox.edit("lobe_size = 8", "lobe_size = 64");
+    let done = || sandbox.path("cost/format.svg").exists() && !sandbox.path("cost/silhouette.svg").exists();
+    let child = started(&sandbox, &study(&["lobes", "format"]), done);
+    let ran = interrupt(child);
+    assert_eq!((ran.code, ran.out.as_str()), (Some(1), ""), "{ran:?}");
+    let words = "skinfit: cost: interrupted: the results of format are there, not those of lobes.";
+    assert_eq!(ran.err.lines().last(), Some(words), "{ran:?}");
+    let results = sandbox.json("cost/results.json");
+    assert_eq!(results["pending"], serde_json::json!(["lobes"]));
+    assert_eq!(results["axes"].as_array().unwrap().len(), 1);
+    assert!(sandbox.text("cost/report.html").contains("Not measured: lobes."));
+    assert!(sandbox.text("cost/results.csv").lines().all(|line| !line.starts_with("lobes")));
+    assert_eq!(scratch(&sandbox), 0, "scratch is left");
+    // The same command again does it all.
+    let ran = sandbox.run(&study(&["filter", "format"]));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert_eq!(sandbox.json("cost/results.json")["pending"], serde_json::json!([]));
+}
+
+#[cfg(unix)]
+#[test]
 fn an_interrupted_sweep_keeps_the_results_of_its_jobs_and_leaves_no_scratch() {
     let sandbox = slow_bakes();
     let ablation = "command = \"ablate\"\nscene = \"scene.toml\"\nresults = \"out\"\n";
@@ -242,7 +272,7 @@ fn two_bakes_into_one_folder_are_one_too_many() {
 fn states_that_cannot_be_gone_on_from() {
     let sandbox = Sandbox::new();
     let resume = |words: &[&str]| sandbox.fit("run", &["--resume"]).refused(words);
-    resume(&["run/state.json: the state of the interrupted fit cannot be read", "without --resume"]);
+    resume(&["run/state.json: the state of the interrupted fit cannot be read", "afresh"]);
     assert!(!sandbox.path("run").exists(), "a refused run left its folder");
 
     sandbox.fit("run", &["--max-iterations", "1"]);
@@ -253,7 +283,7 @@ fn states_that_cannot_be_gone_on_from() {
     {
         eprintln!("{what}");
         sandbox.write("run/state.json", bytes);
-        resume(&["run/state.json: this is not a state that a fit has left", "without --resume"]);
+        resume(&["run/state.json: this is not a state that a fit has left", "afresh"]);
         assert_eq!(sandbox.read("run/state.json"), bytes, "{what}");
     }
     sandbox.write("run/state.json", &state);

@@ -5,9 +5,10 @@ use serde_json::Value;
 use super::sandbox::{Sandbox, TRUTH};
 use crate::fixtures::read_exr;
 
-/// The fitted values are the truth within this share of it: targets are f32, and varpro stops when
-/// a step would gain less than 1e-12 of the loss.
-const SHARE: f64 = 1e-4;
+/// The fitted values are the truth within this share of it: half of the widest standard error that the roundings of f32
+/// targets leave these small images, 2e-5 of the occlusion (5e-7 was found). Solvers for comparison stop where the loss
+/// falls by less than 1e-12 of the first one: a millionth of what was off at first.
+const SHARE: f64 = 1e-5;
 
 #[test]
 fn a_fit_finds_the_truth_and_leaves_every_file_of_a_run() {
@@ -151,17 +152,40 @@ fn parameters_with_three_values_are_fitted_in_each_channel() {
 }
 
 #[test]
-fn every_solver_fits_and_gains_are_found() {
+fn every_solver_finds_the_truth_and_a_gain_that_is_not_one() {
+    /// By what the side view is brighter than the front one.
+    const GAIN: f64 = 1.3;
     let sandbox = Sandbox::new();
     sandbox.edit("[fit]", "[fit]\ngains = true");
-    for solver in ["varpro", "lm", "lbfgs"] {
-        let ran = sandbox.fit(solver, &["--solver", solver]);
-        assert_ne!(ran.code, Some(2), "{ran:?}");
+    // Held at its true value: two weights and two powers are enough for solvers without derivatives.
+    let text = sandbox.text("scene.toml");
+    let free = text.lines().find(|line| line.starts_with("free = ")).unwrap();
+    sandbox.edit(free, "free = [\"base_weight\", \"rim_weight\", \"rim_exponent\"]");
+    sandbox.write("truth_bright.toml", format!("{TRUTH}[gains]\nside = {GAIN}\n").as_bytes());
+    let render =
+        ["render", "scene.toml", "--engine", "cpu", "--params", "truth_bright.toml", "--view", "side"];
+    sandbox.run(&[&render[..], &["-o", "targets/side.exr"]].concat()).done();
+    sandbox.write(
+        "start.toml",
+        TRUTH.replace("0.8", "1.0").replace("0.9", "0.5").replace("3.0", "2.0").as_bytes(),
+    );
+    let truth: toml::Table = TRUTH.parse().unwrap();
+    for solver in ["varpro", "lm", "lbfgs", "nelder-mead", "adam"] {
+        let ran = sandbox.fit(solver, &["--solver", solver, "--params", "start.toml"]);
+        // Converged, and not stopped by the number of iterations.
+        assert_eq!(ran.code, Some(0), "{solver}: {ran:?}");
         let report = sandbox.json(&format!("{solver}/report.json"));
         assert_eq!(report["solver"], solver);
         let fitted: toml::Table = sandbox.text(&format!("{solver}/params.toml")).parse().unwrap();
-        let gain = fitted["gains"]["side"].as_float().unwrap();
-        assert!((gain - 1.0).abs() < 1e-2, "{solver}: {gain}");
+        let wanted =
+            ["base_weight", "rim_weight", "rim_exponent"].map(|name| (name, &fitted["params"][name]));
+        let wanted = wanted.map(|(name, found)| (name, found, truth["params"][name].as_float().unwrap()));
+        for (name, found, want) in wanted.into_iter().chain([("gain", &fitted["gains"]["side"], GAIN)]) {
+            let found = found.as_float().unwrap();
+            let off = (found / want - 1.0).abs();
+            println!("{solver}: {name} off by {off:.1e}");
+            assert!(off <= SHARE, "{solver}: {name} = {found}, not {want}");
+        }
     }
 }
 
@@ -267,7 +291,11 @@ fn recovers(effects: &str, truth: &str) {
         for c in 0..3 {
             let channel = |value: &Value| value.get(c).unwrap_or(value).as_f64().unwrap();
             let truth = truth.get(c).unwrap_or(truth).as_float().unwrap();
-            assert!((channel(found) - truth).abs() <= SHARE * truth.abs(), "{name}: {found} is not {truth}");
+            // What two constants explain nearly alike takes up more of the roundings (2e-5 was found of the occlusion).
+            assert!(
+                (channel(found) - truth).abs() <= 5.0 * SHARE * truth.abs(),
+                "{name}: {found} is not {truth}"
+            );
         }
     }
 }

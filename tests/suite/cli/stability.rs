@@ -1,5 +1,11 @@
 //! Studies of stability.
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use super::damaged::sandbox_case;
 use super::sandbox::{Ran, Sandbox};
 
 /// Enough to try everything, and no more.
@@ -33,7 +39,41 @@ fn a_scene_is_studied_on_every_evaluator_and_the_same_seed_gives_the_same_on_any
 }
 
 #[test]
-fn cases_of_a_file_are_tried_again_and_other_files_are_refused() {
+fn a_failure_that_is_put_there_is_found_again_and_a_case_that_is_sound_passes() {
+    let sandbox = Sandbox::new();
+    let replay = |cases: &str| {
+        sandbox.write("cases.toml", cases.as_bytes());
+        sandbox.run(&[&["stability", "scene.toml", "--replay", "cases.toml"], &SHORT[..]].concat())
+    };
+    let rows = |report: &Value| -> Vec<Value> {
+        let engines = report["engines"].as_array().unwrap();
+        let case = |engine: &Value| {
+            let cases = engine["cases"].as_array().unwrap();
+            cases.iter().find(|case| case["name"] == "kept: put there").unwrap()["failure"].clone()
+        };
+        engines.iter().map(case).collect()
+    };
+    // The product of albedo and weight is beyond what an f32 holds: every number is sound, and no f32 is its colour.
+    let ran = replay(&sandbox_case([2e38; 3], 1000.0));
+    assert_eq!(ran.code, Some(1), "{ran:?}");
+    for evaluator in ["model f32", "CPU engine"] {
+        let told = format!("kept: put there: {evaluator}: red is inf; in f64 ");
+        assert!(ran.err.contains(&told), "{told}: {ran:?}");
+    }
+    assert!(ran.out.contains("FAILED"), "{ran:?}");
+    let report = sandbox.json("stable/stability.json");
+    let failures = rows(&report);
+    assert!(failures[0].is_null() && failures[1..].iter().all(Value::is_string), "{failures:?}");
+    assert_eq!(report["failed"], 2);
+    // The same case with numbers that an f32 can multiply.
+    let ran = replay(&sandbox_case([0.5; 3], 1000.0));
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = sandbox.json("stable/stability.json");
+    assert!(rows(&report).iter().all(Value::is_null) && report["failed"] == 0, "{report}");
+}
+
+#[test]
+fn files_that_hold_no_cases_are_refused() {
     let sandbox = Sandbox::new();
     sandbox.write("other.toml", b"[[case]]\nnames = \"x\"\n");
     sandbox
@@ -51,4 +91,82 @@ fn a_folder_that_cannot_be_had_is_refused_before_anything_is_studied() {
     let study = ["stability", "scene.toml", "--no-gpu", "--cases", "1000000", "-o", "file"];
     sandbox.run(&study).refused(&["file: cannot be written", "Choose a folder"]);
     assert_eq!(sandbox.read("file"), b"in the way");
+}
+
+/// A row a raw file, and a row a hard case, as the study's page has them.
+fn tables(results: &BTreeMap<String, Value>) -> [String; 2] {
+    let number = |verdict: &Value, key: &str| verdict[key].as_f64().unwrap();
+    let deviation = |x: f64| if x == 0.0 { "0".to_owned() } else { format!("{x:.1e}") };
+    let engine = |file: &Value, name: &str| -> Option<Value> {
+        file["engines"].as_array().unwrap().iter().find(|engine| engine["name"] == name).cloned()
+    };
+    let shown = ["model f32", "CPU engine", "shader rules", "GPU engine"];
+    let mut searches = format!("| raw file | random cases | {} | failed |\n", shown.join(" | "));
+    searches += &format!("|{}\n", " --- |".repeat(shown.len() + 3));
+    for (name, file) in results {
+        let random = |name| engine(file, name).map(|engine| engine["random"].clone());
+        let cell = |random: Option<Value>| match random {
+            None => "-".to_owned(),
+            Some(random) => {
+                let worst = &random["worst"];
+                format!("{:.2} ({:.2})", number(worst, "deviation"), number(worst, "share_of_tolerance"))
+            }
+        };
+        let cells: Vec<String> = shown.iter().map(|name| cell(random(name))).collect();
+        let tried = random("model f32").unwrap()["tried"].clone();
+        let failed = &file["failed"];
+        searches += &format!("| [{name}](results/{name}) | {tried} | {} | {failed} |\n", cells.join(" | "));
+    }
+    // The same cases on every machine: the worst of its kind for each column.
+    let columns: [(&str, &str, &str); 6] = [
+        ("model f32", "model f32", ""),
+        ("CPU engine", "CPU engine", ""),
+        ("shader rules, llvmpipe", "shader rules", "llvmpipe"),
+        ("shader rules, H200", "shader rules", "h200"),
+        ("GPU engine, llvmpipe", "GPU engine", "llvmpipe"),
+        ("GPU engine, H200", "GPU engine", "h200"),
+    ];
+    let titles: Vec<&str> = columns.iter().map(|column| column.0).collect();
+    let mut cases = format!("| case | {} |\n|{}\n", titles.join(" | "), " --- |".repeat(columns.len() + 1));
+    let first = results.values().next().unwrap();
+    for case in first["engines"][0]["cases"].as_array().unwrap() {
+        let worst = |(_, evaluator, file): (&str, &str, &str)| {
+            let files = results.iter().filter(|(name, _)| name.starts_with(file));
+            let engines = files.filter_map(|(_, results)| engine(results, evaluator));
+            let found = engines.filter_map(|engine| {
+                let cases = engine["cases"].as_array().unwrap();
+                cases.iter().find(|other| other["name"] == case["name"]).map(|case| number(case, "deviation"))
+            });
+            found.reduce(f64::max).map_or_else(|| "-".to_owned(), deviation)
+        };
+        let cells = columns.map(worst).join(" | ");
+        cases += &format!("| {} | {cells} |\n", case["name"].as_str().unwrap());
+    }
+    [searches, cases]
+}
+
+#[test]
+fn the_page_of_the_study_tells_all_that_its_raw_files_hold() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("experiments/stability");
+    let files = std::fs::read_dir(folder.join("results")).unwrap().map(|entry| entry.unwrap().path());
+    let json = files.filter(|path| path.extension().is_some_and(|ending| ending == "json"));
+    let read = |path: PathBuf| {
+        let name = path.file_name().unwrap().to_string_lossy().into_owned();
+        (name, serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap())
+    };
+    let results: BTreeMap<String, Value> = json.map(read).collect();
+    let page = std::fs::read_to_string(folder.join("README.md")).unwrap();
+    for table in tables(&results) {
+        // To mend it: put this in the place of the page's table.
+        assert!(page.contains(&table), "experiments/stability/README.md does not hold\n\n{table}");
+    }
+    // Each seed that the page names has its file, and each file its line about what made it.
+    let log = std::fs::read_to_string(folder.join("results/runs.csv")).unwrap();
+    for name in results.keys() {
+        assert!(log.lines().any(|line| line.starts_with(&format!("{name},"))), "runs.csv: {name}");
+        assert_eq!(results[name]["seed"].to_string(), name.split(['-', '.']).nth(2).unwrap(), "{name}");
+    }
+    for seed in 0..4 {
+        assert!(results.contains_key(&format!("cpu-1000000-{seed}.json")), "seed {seed}");
+    }
 }

@@ -1,6 +1,7 @@
 //! Plans, their jobs, and what is collected of them.
 
 use super::sandbox::{Ran, Sandbox};
+use super::tradeoffs::done;
 
 const PLAN: &str = "command = \"fit\"\nscene = \"scene.toml\"\nresults = \"out\"\n[[axis]]\nkey = \"fit.loss\"\n\
     values = [\"l2\", \"huber\"]\n[[axis]]\nkey = \"model.effects\"\nvalues = [[\"diffuse\", \"rim\"], [\"diffuse\"]]\n";
@@ -128,7 +129,7 @@ fn studies_are_jobs_too_and_their_table_has_a_row_a_case_of_the_command_s_own_fi
     assert!(got == wanted && got.len() > 5, "{got:?} {wanted:?}");
     assert_eq!((&rows(0)[0]["left_out"], &rows(0)[1]["left_out"]), (&"nothing".into(), &"diffuse".into()));
     let options = ["--params", "truth.toml", "--axis", "filter", "--axis", "irradiance"];
-    sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()).done();
+    done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()));
     let cost = sandbox.json("cost/results.json");
     let wanted: Vec<f64> = cost["axes"]
         .as_array()

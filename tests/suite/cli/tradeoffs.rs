@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-use super::sandbox::Sandbox;
+use super::sandbox::{Ran, Sandbox};
 
 /// Every axis, in the order of documentation.
 pub(super) const AXES: [&str; 11] = [
@@ -35,10 +35,105 @@ fn named<'a>(settings: &'a [Value], name: &str) -> &'a Value {
     settings.iter().find(|s| s["name"].as_str().unwrap().starts_with(name)).unwrap()
 }
 
+/// A tradeoff that was done, and said nothing but how long it would take.
+pub(super) fn done(ran: Ran) -> Ran {
+    assert_eq!((ran.code, ran.err.lines().count()), (Some(0), 1), "{ran:?}");
+    assert!(ran.err.starts_with("skinfit: this will take about "), "{ran:?}");
+    ran
+}
+
 #[test]
-fn every_axis_has_a_reference_without_error_and_a_front() {
+fn what_the_scene_has_is_among_the_settings_and_marked() {
     let sandbox = Sandbox::new();
-    sandbox.run(&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"]).done();
+    // Between the swept ones; the greatest of all; and one of them.
+    sandbox.edit("occlusion_rays = 32", "occlusion_rays = 48");
+    sandbox.edit("irradiance_size = 8", "irradiance_size = 144");
+    let axes = ["irradiance", "specular", "rays", "silhouette", "filter"];
+    let options = axes.iter().flat_map(|axis| ["--axis", axis]).collect::<Vec<_>>();
+    let ran = done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()));
+    let page = sandbox.text("cost/report.html");
+    for (axis, name) in [("irradiance", "144"), ("specular", "8"), ("rays", "48"), ("silhouette", "fragment")]
+    {
+        let settings = settings(&sandbox, "cost", axis);
+        let present: Vec<&Value> = settings.iter().filter(|s| s["present"] == true).collect();
+        assert_eq!((present.len(), present[0]["name"].as_str()), (1, Some(name)), "{axis}");
+        // The greatest is the reference, whoever named it.
+        assert_eq!(present[0]["reference"] == true, axis == "irradiance" || axis == "silhouette");
+        let marked = format!("{name} (the scene&#39;s)");
+        assert!(sandbox.text(&format!("cost/{axis}.svg")).contains(&marked), "{axis}");
+        assert!(page.contains(&marked), "{axis}");
+    }
+    let names: Vec<Value> = settings(&sandbox, "cost", "rays").iter().map(|s| s["name"].clone()).collect();
+    assert_eq!(names, ["4", "8", "16", "32", "48", "64", "128", "256", "1024"]);
+    assert_eq!(ran.out.matches("the scene's\n").count(), 4, "{ran:?}");
+    let line = ran.out.lines().find(|line| line.trim_start().starts_with("144 ")).unwrap();
+    assert!(line.ends_with("  pareto, reference, the scene's"), "{line}");
+    assert!(page.contains("<td>reference, the scene&#39;s</td>"));
+    // No word of a view's stands for a setting that nothing beats.
+    let csv = sandbox.text("cost/results.csv");
+    let columns: Vec<&str> = csv.lines().next().unwrap().split(',').collect();
+    assert!(columns.contains(&"pareto") && columns.contains(&"present") && !columns.contains(&"front"));
+    assert!(!ran.out.contains("front") && page.contains(">pareto</th>"), "{ran:?}");
+    assert!(settings(&sandbox, "cost", "filter").iter().all(|s| s["present"] == false));
+}
+
+#[test]
+fn samples_that_are_used_again_give_what_those_traced_anew_do() {
+    use skinfit::study::tradeoff::bench::Bench;
+    let sandbox = Sandbox::new();
+    let path = sandbox.path("scene.toml");
+    let bench = Bench::new(&path, None, Some(sandbox.cache())).unwrap();
+    let own = bench.settings();
+    let mut other = [own; 4];
+    other[0].quality.occlusion_rays = 16;
+    other[1].quality.samples_per_axis = 2;
+    other[2].quality.lobe_size = 16;
+    other[3].silhouette = skinfit::model::effects::Silhouette::Vertex;
+    for settings in [own].into_iter().chain(other) {
+        let (kept, anew) = (bench.evaluate(settings).unwrap(), bench.evaluate_anew(settings).unwrap());
+        let (kept, anew) = (kept.images(&bench.point()), anew.images(&bench.point()));
+        for (kept, anew) in kept.iter().zip(&anew) {
+            assert!(kept.rgb == anew.rgb && kept.alpha == anew.alpha, "{settings:?}");
+        }
+    }
+    // What a setting does not touch is not made twice.
+    let samples = |settings| bench.evaluate(settings).unwrap().samples;
+    assert!(std::sync::Arc::ptr_eq(&samples(own), &samples(other[2])));
+    assert!(std::sync::Arc::ptr_eq(&samples(other[1]), &samples(other[1])));
+}
+
+#[test]
+fn how_long_it_will_take_is_said_before_and_about_right() {
+    let sandbox = Sandbox::new();
+    // So many pixels that they take a good part of the time, without targets of that size.
+    for (view, size) in [("front", "width = 32\nheight = 32"), ("side", "width = 32\nheight = 24")] {
+        sandbox.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
+        sandbox.edit(size, "width = 192\nheight = 192");
+    }
+    let axes = ["irradiance", "rays", "samples"];
+    let options = axes.iter().flat_map(|axis| ["--axis", axis]).collect::<Vec<_>>();
+    let clock = std::time::Instant::now();
+    let ran = done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()));
+    let clock = clock.elapsed().as_secs_f64();
+    // `this will take about 10 s (irradiance 4 s, rays 5 s, samples 2 s).`
+    let seconds = |words: &str| -> f64 {
+        let mut words = words.split([' ', ',', ')']).filter(|word| !word.is_empty());
+        let number: f64 = words.next().unwrap().parse().unwrap();
+        number * if words.next() == Some("min") { 60.0 } else { 1.0 }
+    };
+    let told = seconds(ran.err.split("about ").nth(1).unwrap());
+    let of_axes: f64 =
+        axes.map(|axis| seconds(ran.err.split(&format!("{axis} ")).nth(1).unwrap())).iter().sum();
+    // Each is rounded by itself.
+    assert!((of_axes - told).abs() <= 0.25 * told + 1.0, "{ran:?}");
+    // An estimate: what else the machine does, and what it knew from one small try of each axis, is in it.
+    assert!(told > clock / 4.0 && told < 4.0 * clock, "{clock} s: {ran:?}");
+}
+
+#[test]
+fn every_axis_has_a_reference_without_error_and_settings_that_nothing_beats() {
+    let sandbox = Sandbox::new();
+    done(sandbox.run(&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"]));
     for axis in AXES {
         let settings = settings(&sandbox, "cost", axis);
         let references: Vec<&Value> = settings.iter().filter(|s| s["reference"] == true).collect();
@@ -47,9 +142,9 @@ fn every_axis_has_a_reference_without_error_and_a_front() {
         let others = settings.iter().filter(|s| s["reference"] == false);
         // A solver or a fit to fewer pixels may find the same answer to the bit.
         assert!(others.clone().any(|s| error(s) > 0.0) || axis == "pixels", "{axis}: {settings:?}");
-        assert!(settings.iter().any(|s| s["front"] == true), "{axis}");
-        // Nothing on the front is beaten.
-        for s in settings.iter().filter(|s| s["front"] == true) {
+        assert!(settings.iter().any(|s| s["pareto"] == true), "{axis}");
+        // What is Pareto-optimal is not beaten.
+        for s in settings.iter().filter(|s| s["pareto"] == true) {
             let cost = |s: &Value| s["cost"].as_f64().unwrap();
             assert!(!settings.iter().any(|o| cost(o) < cost(s) && error(o) < error(s)), "{axis}: {s}");
         }
@@ -64,9 +159,10 @@ fn every_axis_has_a_reference_without_error_and_a_front() {
 fn errors_fall_as_they_must() {
     let sandbox = Sandbox::new();
     let axes = ["--axis", "format", "--axis", "silhouette", "--axis", "filter", "--axis", "rays"];
-    sandbox
-        .run(&[&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"][..], &axes].concat())
-        .done();
+    done(
+        sandbox
+            .run(&[&["tradeoff", "scene.toml", "-o", "cost", "--params", "truth.toml"][..], &axes].concat()),
+    );
     // Each format has more bits than the one before; binary32 rounds to 6e-8 and is off by some ten roundings.
     let formats = settings(&sandbox, "cost", "format");
     let errors: Vec<f64> =
@@ -98,7 +194,7 @@ fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
         sandbox
             .run(&[&["tradeoff", "scene.toml", "--params", "truth.toml", "-o", to][..], &axes, goal].concat())
     };
-    let ran = run("near", &["--within", "1%"]).done();
+    let ran = done(run("near", &["--within", "1%"]));
     assert!(ran.out.contains("within 1.0000%: irradiance"), "{ran:?}");
     let choice = sandbox.json("near/results.json")["choice"].clone();
     assert!(choice["error"]["relative"].as_f64().unwrap() <= 0.01, "{choice}");
@@ -137,10 +233,10 @@ fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
     // One view of two: its share of the error may be the greater one.
     assert!(relative <= 0.015, "{relative}");
     // More is allowed for less; and where nothing is near enough, the sweeps are there all the same.
-    run("far", &["--within", "20%"]).done();
+    done(run("far", &["--within", "20%"]));
     let seconds = |to: &str| sandbox.json(&format!("{to}/results.json"))["choice"]["settings"].to_string();
     assert_ne!(seconds("far"), seconds("near"));
-    run("soon", &["--budget", "60s"]).done();
+    done(run("soon", &["--budget", "60s"]));
     assert_eq!(sandbox.json("soon/results.json")["choice"]["error"]["relative"].as_f64(), Some(0.0));
     let ran = run("soon", &["--budget", "0.000001ms"]);
     assert_eq!(ran.code, Some(1), "{ran:?}");

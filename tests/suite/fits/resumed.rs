@@ -137,7 +137,7 @@ fn the_state_of_another_fit_is_refused() {
     for (image, start, options, what) in cases {
         let error = resumed(image, &start, &options).unwrap_err().to_string();
         assert!(error.contains(what) && error.contains("state.json"), "{error}");
-        assert!(error.contains("without --resume"), "it says what to do: {error}");
+        assert!(error.contains("start afresh"), "it says what to do: {error}");
     }
 }
 

@@ -24,8 +24,9 @@ fn the_papers_budget_stays_near_the_cpu_engine() {
     // Filtering hardware has 8 bits of fraction and maps have 8 bits: 2e-3 of neighbouring texels' difference.
     // Silhouettes interpolated over the triangles of this mesh, and 16-bit targets, add as much again.
     let why = || keep("paper", &reference, &test);
+    // (2.7e-3 and 9.7e-3 were found on software; hardware's sampling adds a thousandth or two to the latter.)
     assert!(median < 4e-3, "{median}: {}", why());
-    assert!(most < 4e-2, "{most}: {}", why());
+    assert!(most < 1.5e-2, "{most}: {}", why());
     // It would be no measurement if nothing had changed.
     assert!(median > 1e-5, "{median}");
 }
@@ -44,15 +45,23 @@ fn a_budget_in_numbers_is_kept() {
         last_cost = cost;
         let test = renderer.render(&prepared.scene.views[0].camera, 1.0).unwrap().image;
         let Difference { interior, .. } = Difference::new(&reference, &test, 4);
-        // The budget is relative to white, the difference to the image's mean, which is darker than that; half
-        // of the pixels are well within it. f32 and what is drawn into add their own.
-        let median = quantile(&interior, 0.5);
-        assert!(
-            f64::from(median) < budget + 2e-3,
-            "{budget}: {median}; {}",
-            keep("budget", &reference, &test)
-        );
+        // The budget is relative to white, the differences to the image's mean. All but the pixels at creases, of which a
+        // sample may fall on another triangle, keep it: f32 and what is drawn into add their own (`parity`'s bounds).
+        let off = |share| f64::from(quantile(&interior, share) * mean(&reference));
+        println!("budget {budget}: planned {error}, median {}, 99.7 % {}", off(0.5), off(0.997));
+        let sampling = if gpu.is_software() { 1e-4 } else { 5e-3 };
+        let why = || keep("budget", &reference, &test);
+        assert!(off(0.997) <= budget + sampling, "{budget}: {}; {}", off(0.997), why());
+        // Half of the pixels are well within it: rules state their error at its worst.
+        assert!(off(0.5) <= 0.5 * budget + sampling, "{budget}: {}; {}", off(0.5), why());
     }
+}
+
+/// The mean of what the image shows where it is covered.
+fn mean(image: &Image) -> f32 {
+    let covered: Vec<_> = image.rgb.iter().zip(&image.alpha).filter(|(_, alpha)| **alpha > 0.0).collect();
+    let sum: f32 = covered.iter().map(|(rgb, _)| rgb.iter().map(|x| x.abs()).sum::<f32>() / 3.0).sum();
+    sum / covered.len() as f32
 }
 
 #[test]
@@ -70,9 +79,17 @@ fn multisampling_smooths_the_outline_and_leaves_the_inside_as_it_is() {
     // Four independent samples would have a quarter of the squared error; near a straight edge the hardware's
     // four are worth about three.
     assert!(coverage(&multi) < 0.4 * coverage(&single), "{}", keep("msaa", &many, &multi));
-    let inside = |image: &Image| quantile(&Difference::new(&many, image, 4).interior, 0.5);
-    // Shaded once a pixel and triangle, insides are as grainy as with one sample.
-    assert!(inside(&multi) < 1.2 * inside(&single), "{}", keep("msaa", &many, &multi));
+    for share in [0.5, 0.9, 0.99] {
+        let inside = |image: &Image| quantile(&Difference::new(&many, image, 4).interior, share);
+        // Shaded once a pixel and triangle, insides are as grainy as with one sample, in the tail as in the middle.
+        let (multi_off, single_off) = (inside(&multi), inside(&single));
+        println!("inside, {share}: {multi_off} with msaa, {single_off} with one sample");
+        assert!(
+            multi_off < 1.2 * single_off,
+            "{share}: {multi_off} {single_off}: {}",
+            keep("msaa", &many, &multi)
+        );
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ use skinfit::gpu::{Choice, Gpu, RenderOptions, Renderer};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::prepare::{PrepareOptions, Prepared, Views};
 use skinfit::render::antialias::Antialias;
+use skinfit::render::backdrop::Backdrop;
 use skinfit::render::bloom::add_bloom;
 use skinfit::render::files::{ImageOptions, write_exr};
 use skinfit::render::image::Image;
@@ -16,51 +17,54 @@ use skinfit::render::shade::Shader;
 use skinfit::samples::sample_views;
 use skinfit::shader::Budget;
 
-/// The adapter's device that most tests share; `None`, said loudly, where `SKINFIT_NO_GPU_TESTS` allows it.
-pub(super) fn gpu() -> Option<&'static Gpu> {
-    static GPU: OnceLock<Option<Gpu>> = OnceLock::new();
-    GPU.get_or_init(|| open(&Choice::default())).as_ref()
+use crate::common::not_checked;
+
+/// The adapter's device that most tests share; `None`, and each test says so, where `SKINFIT_NO_GPU_TESTS` allows it.
+pub(crate) fn gpu() -> Option<&'static Gpu> {
+    static GPU: OnceLock<Result<Gpu, String>> = OnceLock::new();
+    let opened = GPU.get_or_init(|| Gpu::open(&Choice::default()).map_err(|error| error.to_string()));
+    opened.as_ref().map_err(|error| excused(error)).ok()
 }
 
 /// A device of its own.
 pub(super) fn open(choice: &Choice) -> Option<Gpu> {
-    match Gpu::open(choice) {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var_os("SKINFIT_NO_GPU_TESTS").is_some() => {
-            eprintln!("NOT CHECKED, as SKINFIT_NO_GPU_TESTS is set: {error}");
-            None
-        }
-        Err(error) => panic!(
-            "{error}\nThe renderer's tests need an adapter: tests/run installs a software one where it can. \
-             SKINFIT_NO_GPU_TESTS=1 leaves them out."
-        ),
-    }
+    Gpu::open(choice).map_err(|error| excused(&error.to_string())).ok()
+}
+
+/// Without a device a test fails, unless the variable says to leave it out.
+fn excused(error: &str) {
+    assert!(
+        std::env::var_os("SKINFIT_NO_GPU_TESTS").is_some(),
+        "{error}\nThe renderer's tests need an adapter: tests/run installs a software one where it can. \
+         SKINFIT_NO_GPU_TESTS=1 leaves them out."
+    );
+    not_checked(&format!("SKINFIT_NO_GPU_TESTS is set: {error}"));
 }
 
 /// What both engines draw with, unless a test says otherwise.
-pub(super) const EXACT: RenderOptions =
+pub(crate) const EXACT: RenderOptions =
     RenderOptions { antialias: Antialias::Grid(2), budget: Budget::Exact, timed: false, animated: false };
 
 /// The paper's fragment program.
-pub(super) const SURFACE: Effects = Effects::SURFACE;
+pub(crate) const SURFACE: Effects = Effects::SURFACE;
 
 /// Every effect.
-pub(super) fn everything() -> Effects {
-    Effect::ALL.into_iter().collect()
+pub(crate) fn everything() -> Effects {
+    Effect::BUILT_IN.into_iter().collect()
 }
 
-pub(super) fn cache() -> PathBuf {
+pub(crate) fn cache() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics")
 }
 
 /// The built-in scene's file, made once.
-pub(super) fn built_in() -> PathBuf {
+pub(crate) fn built_in() -> PathBuf {
     static SCENE: OnceLock<PathBuf> = OnceLock::new();
     SCENE.get_or_init(|| demo::kept_scene(&cache(), Some(&cache())).unwrap()).clone()
 }
 
 /// The first view of a scene at `size` x `size` pixels.
-pub(super) fn prepared(scene: &Path, effects: Effects, size: u32) -> Prepared {
+pub(crate) fn prepared(scene: &Path, effects: Effects, size: u32) -> Prepared {
     let options = PrepareOptions {
         effects: Some(effects),
         views: Views::First,
@@ -74,13 +78,13 @@ pub(super) fn prepared(scene: &Path, effects: Effects, size: u32) -> Prepared {
 }
 
 /// The scene read another way.
-pub(super) fn read_as(mut prepared: Prepared, form: Form, silhouette: Silhouette) -> Prepared {
+pub(crate) fn read_as(mut prepared: Prepared, form: Form, silhouette: Silhouette) -> Prepared {
     (prepared.scene.form, prepared.scene.silhouette) = (form, silhouette);
     prepared
 }
 
 /// What a renderer needs of a scene.
-pub(super) fn content(prepared: &Prepared) -> Content<'_> {
+pub(crate) fn content(prepared: &Prepared) -> Content<'_> {
     Content {
         scene: &prepared.scene,
         illumination: &prepared.illumination,
@@ -90,40 +94,45 @@ pub(super) fn content(prepared: &Prepared) -> Content<'_> {
 }
 
 /// The CPU engine's image, with `n` x `n` samples a pixel.
-pub(super) fn on_cpu(prepared: &mut Prepared, n: u32) -> Image {
+pub(crate) fn on_cpu(prepared: &mut Prepared, n: u32) -> Image {
     prepared.scene.quality.samples_per_axis = n;
     let posed = prepared.scene.mesh.pose();
     let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
     let mut shaded = shader.shade(&samples[0], &prepared.scene.views[0].camera, prepared.gains[0]);
+    let (scene, view) = (&prepared.scene, &prepared.scene.views[0]);
+    if let Some(backdrop) = Backdrop::new(scene, &scene.params, view.background, &view.camera, n) {
+        backdrop.put_behind(&mut shaded.image, &mut shaded.glow, prepared.gains[0]);
+    }
     if prepared.scene.effects.has(Effect::Bloom) {
-        add_bloom(&mut shaded.image, &shaded.haze);
+        add_bloom(&mut shaded.image, &shaded.glow, prepared.scene.bloom.sigma);
     }
     shaded.image
 }
 
 /// The adapter's image.
-pub(super) fn on_gpu(gpu: &Gpu, prepared: &Prepared, options: RenderOptions) -> Image {
+pub(crate) fn on_gpu(gpu: &Gpu, prepared: &Prepared, options: RenderOptions) -> Image {
     let mut renderer = Renderer::new(gpu, content(prepared), options).unwrap();
+    renderer.set_background(prepared.scene.views[0].background);
     renderer.render(&prepared.scene.views[0].camera, prepared.gains[0]).unwrap().image
 }
 
 /// How two images differ, by pixel: interior ones, which both cover wholly, and edge ones, which only part
 /// of the samples cover. Errors are the greatest of the channels, relative to the image's mean radiance.
-pub(super) struct Difference {
+pub(crate) struct Difference {
     /// Sorted.
-    pub(super) interior: Vec<f32>,
+    pub(crate) interior: Vec<f32>,
     /// Sorted: of edge pixels that both cover equally.
-    pub(super) edge: Vec<f32>,
+    pub(crate) edge: Vec<f32>,
     /// Pixels whose coverage differs.
-    pub(super) uncovered: usize,
+    pub(crate) uncovered: usize,
     /// The greatest error of pixels whose coverage differs, beyond what one sample is worth.
-    pub(super) beyond_a_sample: f32,
+    pub(crate) beyond_a_sample: f32,
 }
 
 impl Difference {
     /// Of `test` from `reference`, with `samples` samples a pixel.
-    pub(super) fn new(reference: &Image, test: &Image, samples: u32) -> Self {
+    pub(crate) fn new(reference: &Image, test: &Image, samples: u32) -> Self {
         let covered: Vec<usize> = (0..reference.rgb.len()).filter(|&i| reference.alpha[i] > 0.0).collect();
         let sum: f32 =
             covered.iter().map(|&i| reference.rgb[i].iter().map(|x| x.abs()).sum::<f32>() / 3.0).sum();
@@ -152,13 +161,13 @@ impl Difference {
 }
 
 /// The error that a share of the pixels stays below.
-pub(super) fn quantile(sorted: &[f32], share: f64) -> f32 {
+pub(crate) fn quantile(sorted: &[f32], share: f64) -> f32 {
     let at = ((sorted.len() as f64 * share) as usize).min(sorted.len().saturating_sub(1));
     sorted.get(at).copied().unwrap_or(0.0)
 }
 
 /// Leave both images and a FLIP map of a failed comparison under `target/parity`; returns where.
-pub(super) fn keep(name: &str, reference: &Image, test: &Image) -> String {
+pub(crate) fn keep(name: &str, reference: &Image, test: &Image) -> String {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("../parity");
     let seen = |image: &Image| -> Vec<[f64; 3]> {
         image

@@ -17,17 +17,19 @@ fn shader(plan: &Plan, params: &Params) -> String {
     let mut text =
         String::from("#version 450\nlayout(set = 0, binding = 0) uniform Frame { vec4 eye; } frame;\n");
     for (i, resource) in plan.resources.iter().enumerate() {
-        let (name, binding) = (resource.name(), i + 1);
+        let (name, binding) = (format!("skinfit_{}", resource.name()), i + 1);
         let declared =
             |kind: &str, name: &str| format!("layout(set = 0, binding = {binding}) uniform {kind} {name};\n");
         text += &match resource.kind() {
             Kind::Cube => {
                 declared("textureCube", &format!("image_of_{name}"))
-                    + &format!("#define {name} samplerCube(image_of_{name}, filter_of_cube_sampler)\n")
+                    + &format!(
+                        "#define {name} samplerCube(image_of_{name}, filter_of_skinfit_cube_sampler)\n"
+                    )
             }
             Kind::Map => {
                 declared("texture2D", &format!("image_of_{name}"))
-                    + &format!("#define {name} sampler2D(image_of_{name}, filter_of_map_sampler)\n")
+                    + &format!("#define {name} sampler2D(image_of_{name}, filter_of_skinfit_map_sampler)\n")
             }
             Kind::Sampler => declared("sampler", &format!("filter_of_{name}")),
             // The vertex stage's.
@@ -51,7 +53,7 @@ fn shader(plan: &Plan, params: &Params) -> String {
         set += "    at.eye = frame.eye.xyz;\n";
     }
     text + &format!(
-        "layout(location = 0) out vec4 color;\nvoid main() {{\n    Surface at;\n{set}    color = skinfit_shade(at);\n}}\n"
+        "layout(location = 0) out vec4 color;\nvoid main() {{\n    SkinfitSurface at;\n{set}    color = skinfit_shade(at);\n}}\n"
     )
 }
 
@@ -77,7 +79,7 @@ fn as_wgsl(glsl: &str) -> String {
 fn exported_glsl_draws_the_pixels_of_the_renderers_own_shader() {
     let Some(gpu) = gpu() else { return };
     let prepared = prepared(&built_in(), SURFACE, 128);
-    let params = prepared.scene.params;
+    let params = prepared.scene.params.clone();
     let camera = prepared.scene.views[0].camera;
     let options = RenderOptions { antialias: Antialias::Grid(1), budget: Budget::Paper, ..EXACT };
     let draw = |change: &dyn Fn(&Plan) -> Plan| {

@@ -1,6 +1,7 @@
 //! Tiles, sequences of frames, layers.
 
-use skinfit::gpu::{Choice, RenderOptions, Renderer};
+use skinfit::bake::bake_pose;
+use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use skinfit::model::compose::TermName;
 use skinfit::model::effects::Effect;
 use skinfit::render::antialias::Antialias;
@@ -55,6 +56,13 @@ fn each_term_agrees_with_the_cpu_engines_and_they_add_up_to_the_whole() {
 #[test]
 fn a_renderer_goes_through_an_animation_as_the_cpu_engine_does() {
     let Some(gpu) = gpu() else { return };
+    // The same with and without an occlusion of each frame's own.
+    for of_its_own in [false, true] {
+        goes_through_an_animation(gpu, of_its_own);
+    }
+}
+
+fn goes_through_an_animation(gpu: &Gpu, of_its_own: bool) {
     let mut prepared = prepared(&built_in(), everything(), 96);
     let animation = Animation::open(&prepared.scene).unwrap().unwrap();
     let camera = prepared.scene.views[0].camera;
@@ -64,19 +72,44 @@ fn a_renderer_goes_through_an_animation_as_the_cpu_engine_does() {
     let still = prepared.scene.clone();
     let at_rest = skinfit::gpu::upload::Content { scene: &still, ..content(&prepared) };
     let mut renderer = Renderer::new(gpu, at_rest, RenderOptions { animated: true, ..EXACT }).unwrap();
-    let mut frames = Vec::new();
+    let (mut frames, mut occlusions) = (Vec::new(), Vec::new());
     for mesh in &meshes {
-        renderer.set_mesh(mesh);
+        let occlusion = of_its_own.then(|| bake_pose(&prepared.scene, &mesh.pose(), Some(&cache())).0);
+        renderer.set_mesh(mesh, occlusion.as_ref());
+        occlusions.push(occlusion);
         frames.push(renderer.render(&camera, 1.0).unwrap().image);
     }
     assert!(frames[0].rgb != frames[1].rgb, "nothing moves");
     drop(renderer);
-    for (i, (mesh, frame)) in meshes.into_iter().zip(frames).enumerate() {
+    for (i, ((mesh, occlusion), frame)) in meshes.into_iter().zip(occlusions).zip(frames).enumerate() {
         prepared.scene.mesh = mesh;
+        if of_its_own {
+            prepared.occlusion = occlusion;
+        }
         let reference = on_cpu(&mut prepared, 2);
         let Difference { interior, .. } = Difference::new(&reference, &frame, 4);
         // As in `parity`.
         let (found, most) = (quantile(&interior, 0.99), if gpu.is_software() { 1e-4 } else { 5e-3 });
         assert!(found < most, "frame {i}: {found}; {}", keep(&format!("animation_{i}"), &reference, &frame));
     }
+}
+
+#[test]
+fn an_image_that_is_not_waited_for_is_the_same_and_so_is_that_of_an_adopted_device() {
+    let Some(gpu) = gpu() else { return };
+    let prepared = prepared(&built_in(), everything(), 64);
+    let camera = prepared.scene.views[0].camera;
+    let mut renderer = Renderer::new(gpu, content(&prepared), EXACT).unwrap();
+    let waited = renderer.render(&camera, 0.7).unwrap().image;
+    assert!(waited.rgb.iter().flatten().any(|x| *x > 0.0));
+    let arrived = pollster::block_on(renderer.render_async(&camera, 0.7)).unwrap().image;
+    assert!(waited == arrived);
+    // As an application does that has opened a device for its window.
+    let own = pollster::block_on(Gpu::request(&Choice::default())).unwrap();
+    let adopted = Gpu::adopt(own.adapter.clone(), own.device.clone(), own.queue.clone());
+    let mut renderer = Renderer::new(&adopted, content(&prepared), EXACT).unwrap();
+    assert!(renderer.render(&camera, 0.7).unwrap().image == waited);
+    adopted.close();
+    let lost = pollster::block_on(renderer.render_async(&camera, 0.7)).map(|_| ());
+    assert!(matches!(lost, Err(GpuError::Lost { .. })), "{lost:?}");
 }

@@ -4,6 +4,7 @@
 //! - `parity`: both engines show the same
 //! - `accuracy`: what a looser budget and multisampling may change
 //! - `frames`: tiles, sequences, layers
+//! - `pictures`: backdrops, bloom, haze
 //! - `faults`: what is refused, and lost devices
 //! - `vectors`: the conformance vectors through the shader rules
 //! - `fused`: the fit engine on the adapter against the plain f64 model
@@ -11,12 +12,13 @@
 //! - `exported`: exported GLSL in place of the renderer's own
 
 mod accuracy;
-mod bench;
+pub(crate) mod bench;
 mod exported;
 mod faults;
 mod frames;
 mod fused;
 mod parity;
+mod pictures;
 mod samples;
 mod stability;
 mod vectors;

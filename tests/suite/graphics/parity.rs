@@ -62,6 +62,9 @@ fn compare(name: &str, gpu: &Gpu, mut prepared: Prepared) {
         ("beyond a sample", *beyond_a_sample, tolerance.nearly_all),
     ];
     println!("{name}: {figures:?}, greatest {:?}", interior.last());
+    crate::figures::measured(&format!("parity {name} median"), quantile(interior, 0.5));
+    crate::figures::measured(&format!("parity {name} most"), quantile(interior, 0.99));
+    crate::figures::measured(&format!("parity {name} greatest"), interior.last().copied().unwrap_or(0.0));
     for (what, found, most) in figures {
         assert!(found <= most, "{name}: {what}: {found} > {most}; {}", keep(name, &reference, &test));
     }

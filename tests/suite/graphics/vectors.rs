@@ -1,7 +1,6 @@
 //! The conformance vectors through the shader rules' WGSL, on a graphics adapter.
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
-use serde_json::Value;
 use skinfit::bake::Illumination;
 use skinfit::bake::{LobeStack, VertexOcclusion};
 use skinfit::gpu::Gpu;
@@ -19,7 +18,8 @@ use skinfit::shader::{Constant, Facts};
 use super::bench;
 use crate::common;
 use crate::fixtures::bare_scene;
-use crate::vectors::{Vectors, column_params, number, numbers, params, three};
+use crate::vectors::reader::{Node, Vectors};
+use crate::vectors::{column_params, cube, params};
 
 const EFFECTS: Effects = Effects::SURFACE.with(Effect::Haze);
 
@@ -46,22 +46,15 @@ fn block(probe: &Probe, params: &Params, eye: [f32; 3], morph_weights: &[f32]) -
     block
 }
 
-/// As the vectors' rule says, with `slack` times their tolerance for f32: WGSL asks of exp2, log2, division
+/// As the vectors' rule says, with four times their tolerance for f32: WGSL asks of exp2, log2, division
 /// and square roots only a few units in the last place, where the CPU rounds correctly.
-fn check(file: &Value, what: &str, got: &[f32], want: &Value) {
-    let want = numbers(want);
-    let slack = 4.0;
-    let tolerance = |name: &str| slack * file["tolerance"][name].as_f64().unwrap();
-    let largest = want.iter().fold(1.0_f64, |m, x| m.max(x.abs()));
-    assert_eq!(got.len(), want.len(), "{} {what}", file["name"]);
-    for (i, (&g, w)) in got.iter().zip(&want).enumerate() {
-        let bound = tolerance("f32_abs") * largest + tolerance("f32_rel") * w.abs();
-        assert!((f64::from(g) - w).abs() <= bound, "{} {what}[{i}]: {g} is not {w}", file["name"]);
-    }
+fn check(what: &str, got: &[f32], want: &Node<'_>) {
+    let got: Vec<f64> = got.iter().map(|&x| x.into()).collect();
+    want.vector.tolerances().single.times(4.0).check(what, &got, want);
 }
 
-fn illumination(vectors: &Vectors, file: &Value) -> Illumination {
-    let cube = |which: &str| vectors.cube::<f32>(file, which);
+fn illumination(vectors: &Vectors, file: &Node<'_>) -> Illumination {
+    let cube = |which: &str| cube::<f32>(vectors, file, which);
     Illumination {
         irradiance: Some(cube("diffuse")),
         lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![cube("spec")] }),
@@ -88,25 +81,16 @@ const PARTS: [(&str, &str); 8] = [
 ];
 
 /// One fragment file in one form.
-fn fragment(gpu: &Gpu, vectors: &Vectors, file: &Value, form: Form) {
+fn fragment(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>, form: Form) {
     let (name, silhouette) = match form {
         Form::Corrected => ("corrected", Silhouette::Bumped),
         Form::Listing => ("literal", Silhouette::Vertex),
     };
-    let want = &file["expected"][name];
+    let want = file.at("expected").at(name);
     if want.is_null() {
         return;
     }
-    let params = match form {
-        Form::Corrected => params(&file["constants"]["corrected"]),
-        Form::Listing => {
-            let mut params = Params::defaults(Form::Listing);
-            for (name, param) in [("hilite", Param::Hilite), ("reflection", Param::Reflection)] {
-                params.set(param, number(&file["constants"]["literal"][name]).unwrap());
-            }
-            params
-        }
-    };
+    let params = params(form, &file.at("constants").at(name));
     let given = [
         ("normal_texel", "vec3f"),
         ("vertex_tangent", "vec3f"),
@@ -122,58 +106,58 @@ fn fragment(gpu: &Gpu, vectors: &Vectors, file: &Value, form: Form) {
         ("attenuator", "f32"),
     ];
     let probe = Probe::new(&facts(form, silhouette), Stage::Fragment, &given, &PARTS).unwrap();
-    let inputs = &file["inputs"];
-    let rows = ["X", "Y", "Z"].map(|row| three(&inputs[format!("WorldTanMatrix{row}")]));
+    let inputs = file.at("inputs");
+    let rows = ["X", "Y", "Z"].map(|row| inputs.at(&format!("WorldTanMatrix{row}")).three());
     let column = |i: usize| [rows[0][i], rows[1][i], rows[2][i]];
-    let texel = numbers(&inputs["normSideSpec"]);
-    let s = numbers(&inputs["SkinSilhouetteVec"]);
+    let texel = inputs.at("normSideSpec").numbers();
+    let s = inputs.at("SkinSilhouetteVec").numbers();
     // The eye is at the origin, so that the position is the view vector.
-    let view = three(&inputs["WorldEyeDir"]);
+    let view = inputs.at("WorldEyeDir").three();
     let mut item = texel[..3].to_vec();
     for vector in [column(0), column(1), column(2), view, view] {
         item.extend(vector);
     }
     item.extend([s[0], s[2], if form == Form::Corrected { s[3].max(0.0) } else { s[3] }]);
-    item.extend(three(&inputs["skinColor"]));
-    item.extend([texel[3], number(&inputs["hiLightAttenuator"]).unwrap()]);
+    item.extend(inputs.at("skinColor").three());
+    item.extend([texel[3], inputs.at("hiLightAttenuator").number()]);
     let got = run(gpu, &probe, &illumination(vectors, file), &params, &item);
-    check(file, &format!("{name} n"), &got[..3], &want["n"]);
-    check(file, &format!("{name} reflection"), &got[3..6], &want["reflVect"]);
+    check("n", &got[..3], &want.at("n"));
+    check("reflection", &got[3..6], &want.at("reflVect"));
     if form == Form::Corrected {
-        check(file, "corrected rim", &got[6..7], &want["rim"]);
+        check("rim", &got[6..7], &want.at("rim"));
     }
     let channel = |c: usize| got[7 + c] + got[10 + c] + got[13 + c] + got[16 + c];
-    check(file, &format!("{name} rgba"), &[channel(0), channel(1), channel(2), got[19]], &want["rgba"]);
+    check("rgba", &[channel(0), channel(1), channel(2), got[19]], &want.at("rgba"));
 }
 
-fn rim(gpu: &Gpu, file: &Value) {
+fn rim(gpu: &Gpu, file: &Node<'_>) {
     let given = [("silhouette", "f32")];
     let wanted = [("rim", "f32")];
     let facts = facts(Form::Corrected, Silhouette::Fragment);
     let probe = Probe::new(&facts, Stage::Fragment, &given, &wanted).unwrap();
-    let z = numbers(&file["inputs"]["f"]);
+    let z = file.at("inputs").at("f").numbers();
     let mut got = vec![Vec::new(); z.len()];
-    for exponent in numbers(&file["inputs"]["exponent"]) {
+    for exponent in file.at("inputs").at("exponent").numbers() {
         let mut params = Params::defaults(Form::Corrected);
         params.set(Param::RimExponent, exponent);
         let column = run(gpu, &probe, &Illumination::default(), &params, &z);
         got.iter_mut().zip(column).for_each(|(row, x)| row.push(x));
     }
-    check(file, "rim", &got.concat(), &file["expected"]["rim"]);
+    check("rim", &got.concat(), &file.at("expected").at("rim"));
 }
 
-fn cube_sample(gpu: &Gpu, vectors: &Vectors, file: &Value) {
+fn cube_sample(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>) {
     let given = [("reflected", "vec3f")];
     let wanted = [("mirror_light", "vec4f")];
     let facts = facts(Form::Corrected, Silhouette::Fragment);
     let probe = Probe::new(&facts, Stage::Fragment, &given, &wanted).unwrap();
-    let directions = numbers(&file["inputs"]["directions"]);
+    let directions = file.at("inputs").at("directions").numbers();
     let got = run(gpu, &probe, &illumination(vectors, file), &Params::defaults(Form::Corrected), &directions);
-    check(file, "seamless lookups", &got, &file["expected"]["seamless"]);
+    check("seamless lookups", &got, &file.at("expected").at("seamless"));
 }
 
 /// The race's sixteen pixels: stored samples through the fragment rules.
-fn bench(gpu: &Gpu, vectors: &Vectors, file: &Value) {
+fn bench(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>) {
     let given = [
         ("base", "vec3f"),
         ("bump", "vec3f"),
@@ -187,16 +171,17 @@ fn bench(gpu: &Gpu, vectors: &Vectors, file: &Value) {
     ];
     let probe =
         Probe::new(&facts(Form::Corrected, Silhouette::Bumped), Stage::Fragment, &given, &PARTS).unwrap();
-    let params = column_params(&file["inputs"]["params"]);
-    let g = &file["inputs"]["gbuffer"];
+    let params = column_params(&file.at("inputs").at("params"));
+    let g = file.at("inputs").at("gbuffer");
     let mut items = Vec::new();
     for i in 0..16 {
         for name in ["A", "B", "A", "E"] {
-            items.extend(three(&g[name][i]));
+            items.extend(g.at(name).item(i).three());
         }
-        items.extend([number(&g["o"][i]).unwrap(), 1.0]);
-        items.extend(three(&g["c"][i]));
-        items.extend([number(&g["p"][i]).unwrap(), number(&g["a"][i]).unwrap()]);
+        let one = |name: &str| g.at(name).item(i).number();
+        items.extend([one("o"), 1.0]);
+        items.extend(g.at("c").item(i).three());
+        items.extend([one("p"), one("a")]);
     }
     let got = run(gpu, &probe, &illumination(vectors, file), &params, &items);
     let rgba =
@@ -204,13 +189,13 @@ fn bench(gpu: &Gpu, vectors: &Vectors, file: &Value) {
             let channel = |c: usize| p[7 + c] + p[10 + c] + p[13 + c] + p[16 + c];
             [channel(0), channel(1), channel(2), p[19]]
         });
-    check(file, "forward", &rgba.collect::<Vec<_>>(), &file["expected"]["forward"]);
+    check("forward", &rgba.collect::<Vec<_>>(), &file.at("expected").at("forward"));
 }
 
 /// The vertex stage: five morph targets and four bones of eight.
-fn vertex(gpu: &Gpu, file: &Value) {
-    let inputs = &file["inputs"];
-    let list = |name: &str| -> Vec<f32> { numbers(&inputs[name]).iter().map(|&x| x as f32).collect() };
+fn vertex(gpu: &Gpu, file: &Node<'_>) {
+    let inputs = file.at("inputs");
+    let list = |name: &str| -> Vec<f32> { inputs.at(name).numbers().iter().map(|&x| x as f32).collect() };
     let (coord, normal, tangent) = (list("coord"), list("normal"), list("tangent"));
     let (dx, dn, weights) = (list("coordMorph"), list("normalMorph"), list("morph_w"));
     let bones = list("bones");
@@ -228,6 +213,7 @@ fn vertex(gpu: &Gpu, file: &Value) {
                 weight,
                 positions: vec![Vec3::from_slice(&dx[3 * i..])],
                 normals: vec![Vec3::from_slice(&dn[4 * i..])],
+                ..Morph::default()
             })
             .collect(),
         joints: vec![[0, 1, 2, 3].map(|i: usize| joints[i] as u16)],
@@ -270,33 +256,24 @@ fn vertex(gpu: &Gpu, file: &Value) {
     }
     let eye: [f32; 3] = list("cam_pos")[..3].try_into().unwrap();
     let got = evaluate(gpu, &probe, content, &block(&probe, &params, eye, &active), &given).unwrap();
-    let expected = &file["expected"];
-    let three_of = |name: &str| Value::from(three(&expected[name]).to_vec());
-    check(file, "position", &got[..3], &three_of("worldCoord"));
+    let expected = file.at("expected");
+    (0..3).for_each(|i| check("position", &got[i..=i], &expected.at("worldCoord").item(i)));
     for (i, row) in ["WorldTanMatrixX", "WorldTanMatrixY", "WorldTanMatrixZ"].into_iter().enumerate() {
-        check(file, row, &[got[6 + i], got[9 + i], got[3 + i]], &expected[row]);
+        check(row, &[got[6 + i], got[9 + i], got[3 + i]], &expected.at(row));
     }
-    check(file, "view", &got[12..15], &expected["WorldEyeDir"]);
-    check(file, "occlusion", &got[15..16], &Value::from(vec![numbers(&expected["SkinSilhouetteVec"])[0]]));
+    check("view", &got[12..15], &expected.at("WorldEyeDir"));
+    check("occlusion", &got[15..16], &expected.at("SkinSilhouetteVec").item(0));
 }
 
 #[test]
 fn vectors_hold_in_the_shaders() {
-    let Some(folder) = common::shared("vectors", "SKINFIT_VECTORS") else { return };
-    let vectors = Vectors::read(&folder);
     let Some(gpu) = bench::gpu() else { return };
-    let mut checked = 0;
-    for file in vectors.files.values() {
-        checked += 1;
-        match file["kind"].as_str().unwrap() {
-            "fragment" => Form::ALL.into_iter().for_each(|form| fragment(gpu, &vectors, file, form)),
-            "rim" => rim(gpu, file),
-            "cube_sample" => cube_sample(gpu, &vectors, file),
-            "bench" => bench(gpu, &vectors, file),
-            "vertex" => vertex(gpu, file),
-            // Baking is no shader's; the rest is held against the CPU (`vectors`), where an unknown kind fails.
-            _ => checked -= 1,
-        }
+    let vectors = Vectors::read(&common::vectors());
+    for file in vectors.of_kind("fragment") {
+        Form::ALL.into_iter().for_each(|form| fragment(gpu, &vectors, &file, form));
     }
-    assert!(checked > 0, "{} holds nothing that shaders evaluate", folder.display());
+    rim(gpu, &vectors.one("rim"));
+    cube_sample(gpu, &vectors, &vectors.one("cube_sample"));
+    bench(gpu, &vectors, &vectors.one("bench"));
+    vectors.of_kind("vertex").iter().for_each(|file| vertex(gpu, file));
 }

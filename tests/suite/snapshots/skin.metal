@@ -3,6 +3,8 @@
 // Loss: relative_l2, 1.230000e-2 at the end of the fit
 // Standard error of rim_exponent: 4.00e-3
 //
+// Comments cite the listings of GPU Gems, chapter 3, and sections of docs/model.md, a page of skinfit.
+//
 // Call skinfit_shade with what the vertex stage hands over, in world space:
 // - vertex_uv: texture coordinates, origin at the image's top left
 // - vertex_occlusion: open share of the hemisphere, 1 = unoccluded
@@ -13,206 +15,206 @@
 // - eye: position of the eye
 //
 // It reads what `skinfit bake --params` writes of the scene, seamless and without mip levels:
-// - irradiance_cube: irradiance / pi of the environment (irradiance.exr)
-// - specular_cube: Phong lobe of exponent 32.0, luminance in alpha (specular.exr, or lobe_<exponent>.exr)
-// - hilite_cube: the environment (hilite.exr)
-// - color_map: the scene's colour map, decoded from sRGB
-// - normal_map: the scene's normal map as stored, +Y up
-// - specular_map: the scene's specular map, linear
-// - attenuator_map: the scene's attenuator map, linear
+// - skinfit_irradiance_cube: irradiance / pi of the environment (irradiance.exr)
+// - skinfit_specular_cube: Phong lobe of exponent 32.0, luminance in alpha (specular.exr, or lobe_<exponent>.exr)
+// - skinfit_hilite_cube: the environment (hilite.exr)
+// - skinfit_color_map: the scene's colour map, decoded from sRGB
+// - skinfit_normal_map: the scene's normal map as stored, +Y up
+// - skinfit_specular_map: the scene's specular map, linear
+// - skinfit_attenuator_map: the scene's attenuator map, linear
 
 #include <metal_stdlib>
 using namespace metal;
-constant float3 BASE_WEIGHT = float3(1.0, 1.0, 1.0);
-constant float3 RIM_WEIGHT = float3(0.5, 0.5, 0.5);
-constant float RIM_EXPONENT = 2.0;
-constant float3 HILITE = float3(0.7, 0.7, 0.7);
-constant float3 REFLECTION = float3(0.02, 0.02, 0.02);
-constant float3 SIDE_SPECULAR = float3(1.0, 1.0, 1.0);
-constant float OCCLUSION = 1.0;
-constant float NORMAL_STRENGTH = 1.0;
+constant float3 SKINFIT_BASE_WEIGHT = float3(1.0, 1.0, 1.0);
+constant float3 SKINFIT_RIM_WEIGHT = float3(0.5, 0.5, 0.5);
+constant float SKINFIT_RIM_EXPONENT = 2.0;
+constant float3 SKINFIT_HILITE = float3(0.7, 0.7, 0.7);
+constant float3 SKINFIT_REFLECTION = float3(0.02, 0.02, 0.02);
+constant float3 SKINFIT_SIDE_SPECULAR = float3(1.0, 1.0, 1.0);
+constant float SKINFIT_OCCLUSION = 1.0;
+constant float SKINFIT_NORMAL_STRENGTH = 1.0;
 
 // Textures and samplers, and the functions that read them.
 struct Skinfit {
-    texturecube<float> irradiance_cube;
-    texturecube<float> specular_cube;
-    texturecube<float> hilite_cube;
-    texture2d<float> color_map;
-    texture2d<float> normal_map;
-    texture2d<float> specular_map;
-    texture2d<float> attenuator_map;
-    sampler map_sampler;
-    sampler cube_sampler;
+    texturecube<float> skinfit_irradiance_cube;
+    texturecube<float> skinfit_specular_cube;
+    texturecube<float> skinfit_hilite_cube;
+    texture2d<float> skinfit_color_map;
+    texture2d<float> skinfit_normal_map;
+    texture2d<float> skinfit_specular_map;
+    texture2d<float> skinfit_attenuator_map;
+    sampler skinfit_map_sampler;
+    sampler skinfit_cube_sampler;
 
     // Whether no component is NaN or infinite, asked in a way that compilers do not assume away.
-    bool is_finite(float3 v) {
+    bool skinfit_is_finite(float3 v) {
         uint3 bits = as_type<uint3>(v) & uint3(0x7f800000u);
         return bits.x != 0x7f800000u && bits.y != 0x7f800000u && bits.z != 0x7f800000u;
     }
 
     // Whether every component is 0.
-    bool is_zero(float3 v) {
+    bool skinfit_is_zero(float3 v) {
         return v.x == 0.0 && v.y == 0.0 && v.z == 0.0;
     }
 
-    // v / |v| without under- or overflow; the fallback where v is zero or not finite (MODEL 7).
-    float3 normalize_or(float3 v, float3 fallback) {
+    // v / |v| without under- or overflow; the fallback where v is zero or not finite (docs/model.md section 7).
+    float3 skinfit_normalize_or(float3 v, float3 fallback) {
         float largest = max(max(abs(v.x), abs(v.y)), abs(v.z));
         // Below 1e-37 the reciprocal would overflow; such a vector is noise.
-        bool ok = largest >= 1e-37 && is_finite(v);
+        bool ok = largest >= 1e-37 && skinfit_is_finite(v);
         float3 u = (ok ? v / (ok ? largest : 1.0) : float3(1.0, 0.0, 0.0));
         return (ok ? u / sqrt(dot(u, u)) : fallback);
     }
 
     // Albedo, linear Rec.709, filtered by the hardware; stored in 8 bits.
-    float3 albedo_from_map(float2 vertex_uv) {
-        return color_map.sample(map_sampler, vertex_uv, level(0.0)).rgb;
+    float3 skinfit_albedo_from_map(float2 vertex_uv) {
+        return skinfit_color_map.sample(skinfit_map_sampler, vertex_uv, level(0.0)).rgb;
     }
 
     // The hilite attenuator a, filtered by the hardware; stored in 8 bits.
-    float attenuator_from_map(float2 vertex_uv) {
-        return attenuator_map.sample(map_sampler, vertex_uv, level(0.0)).r;
+    float skinfit_attenuator_from_map(float2 vertex_uv) {
+        return skinfit_attenuator_map.sample(skinfit_map_sampler, vertex_uv, level(0.0)).r;
     }
 
     // The normal map's texel, in [0, 1], filtered by the hardware; stored in 8 bits.
-    float3 normal_texel_from_map(float2 vertex_uv) {
-        return normal_map.sample(map_sampler, vertex_uv, level(0.0)).xyz;
+    float3 skinfit_normal_texel_from_map(float2 vertex_uv) {
+        return skinfit_normal_map.sample(skinfit_map_sampler, vertex_uv, level(0.0)).xyz;
     }
 
     // The side-specular intensity s, filtered by the hardware; stored in 8 bits.
-    float specular_from_map(float2 vertex_uv) {
-        return specular_map.sample(map_sampler, vertex_uv, level(0.0)).r;
+    float skinfit_specular_from_map(float2 vertex_uv) {
+        return skinfit_specular_map.sample(skinfit_map_sampler, vertex_uv, level(0.0)).r;
     }
 
-    // S.w: light that falls through leaves from +Z, clamped at 0 (MODEL 3, corrected form).
-    float clamped_dapple(float3 vertex_normal) {
+    // S.w: light that falls through leaves from +Z, clamped at 0 (docs/model.md section 3, corrected form).
+    float skinfit_clamped_dapple(float3 vertex_normal) {
         return max(vertex_normal.z, 0.0);
     }
 
-    // 2 rgb - 1 (MODEL 3, corrected form). A texel that is not finite or decodes to nothing is the smooth normal
-    // (MODEL 7); a positive z never vanishes, so that the normal does not either.
-    float3 decode_texel(float3 normal_texel) {
+    // 2 rgb - 1 (docs/model.md section 3, corrected form). A texel that is not finite or decodes to nothing is the smooth normal
+    // (docs/model.md section 7); a positive z never vanishes, so that the normal does not either.
+    float3 skinfit_decode_texel(float3 normal_texel) {
         float3 d = 2.0 * normal_texel - 1.0;
-        if (is_zero(d) || !is_finite(d)) {
+        if (skinfit_is_zero(d) || !skinfit_is_finite(d)) {
             return float3(0.0, 0.0, 1.0);
         }
         return float3(d.xy, (d.z >= 0.0 && d.z < 1e-6 ? 1e-6 : d.z));
     }
 
-    // occ = 1 - occlusion (1 - S.x) (MODEL 3).
-    float occluded_share(float open, float occlusion) {
+    // occ = 1 - occlusion (1 - S.x) (docs/model.md section 3).
+    float skinfit_occluded_share(float open, float occlusion) {
         return 1.0 - occlusion * (1.0 - open);
     }
 
-    // V, from the eye to the surface, re-normalised (MODEL 3, corrected form).
-    float3 view_exact(float3 vertex_position, float3 eye) {
-        return normalize_or(vertex_position - eye, float3(0.0, 0.0, -1.0));
+    // V, from the eye to the surface, re-normalised (docs/model.md section 3, corrected form).
+    float3 skinfit_view_exact(float3 vertex_position, float3 eye) {
+        return skinfit_normalize_or(vertex_position - eye, float3(0.0, 0.0, -1.0));
     }
 
     // The part of the shading normal that the normal map's strength leaves alone.
-    float3 base_of_texel(float3 decoded, float3 vertex_normal, float3 view) {
+    float3 skinfit_base_of_texel(float3 decoded, float3 vertex_normal, float3 view) {
         float3 base = decoded.z * vertex_normal;
-        return (abs(base.x) + abs(base.y) + abs(base.z) < 1e-37 || !is_finite(base) ? -view : base);
+        return (abs(base.x) + abs(base.y) + abs(base.z) < 1e-37 || !skinfit_is_finite(base) ? -view : base);
     }
 
     // The smooth normal N of unit length; +Z where it vanishes, whatever the eye sees. That needs no V, and
     // nearly no mesh has such a fragment.
-    float3 smooth_normal_unguarded(float3 vertex_normal) {
-        return normalize_or(vertex_normal, float3(0.0, 0.0, 1.0));
+    float3 skinfit_smooth_normal_unguarded(float3 vertex_normal) {
+        return skinfit_normalize_or(vertex_normal, float3(0.0, 0.0, 1.0));
     }
 
-    // S.z = 1 - |N.V| from the smooth normal at the fragment (MODEL 2).
-    float silhouette_smooth(float3 normal, float3 view) {
+    // S.z = 1 - |N.V| from the smooth normal at the fragment (docs/model.md section 2).
+    float skinfit_silhouette_smooth(float3 normal, float3 view) {
         return 1.0 - min(abs(dot(normal, view)), 1.0);
     }
 
     // The part of the shading normal that the normal map's strength scales.
-    float3 bump_of_texel(float3 decoded, float3 vertex_tangent, float3 vertex_bitangent) {
+    float3 skinfit_bump_of_texel(float3 decoded, float3 vertex_tangent, float3 vertex_bitangent) {
         float3 bump = decoded.x * vertex_tangent + decoded.y * vertex_bitangent;
-        return (is_finite(bump) ? bump : float3(0.0));
+        return (skinfit_is_finite(bump) ? bump : float3(0.0));
     }
 
     // E_h(V), the light behind the rim; filtered by the hardware.
-    float3 hilite_light_from_cube(float3 view_in_environment) {
-        return hilite_cube.sample(cube_sampler, view_in_environment, level(0.0)).rgb;
+    float3 skinfit_hilite_light_from_cube(float3 view_in_environment) {
+        return skinfit_hilite_cube.sample(skinfit_cube_sampler, view_in_environment, level(0.0)).rgb;
     }
 
-    // rim = S.z ^ rim_exponent, with 0^p = 0 and 0^0 = 1 (MODEL 3 and 7).
-    float rim_power(float silhouette, float rim_exponent) {
+    // rim = S.z ^ rim_exponent, with 0^p = 0 and 0^0 = 1 (docs/model.md sections 3 and 7).
+    float skinfit_rim_power(float silhouette, float rim_exponent) {
         // The smallest positive normal f32; below it the power is 0 for any exponent of the table's bounds.
         bool positive = silhouette >= 1.2e-38;
         float power = exp2(rim_exponent * log2((positive ? silhouette : 1.0)));
         return (positive ? power : (rim_exponent > 0.0 ? 0.0 : 1.0));
     }
 
-    // hilite: a E_h(V) (MODEL 3).
-    float3 attenuated_hilite(float attenuator, float3 hilite_light) {
+    // hilite: a E_h(V) (docs/model.md section 3).
+    float3 skinfit_attenuated_hilite(float attenuator, float3 hilite_light) {
         return attenuator * hilite_light;
     }
 
-    // n = normalize(TBN decode(t, normal_strength)) (MODEL 3); without a direction the smooth normal, and
-    // without that -V (MODEL 7).
-    float3 bumped_normal(float3 base, float3 bump, float3 normal, float3 view, float normal_strength) {
-        return normalize_or(base + normal_strength * bump, normalize_or(normal, -view));
+    // n = normalize(TBN decode(t, normal_strength)) (docs/model.md section 3); without a direction the smooth normal, and
+    // without that -V (docs/model.md section 7).
+    float3 skinfit_bumped_normal(float3 base, float3 bump, float3 normal, float3 view, float normal_strength) {
+        return skinfit_normalize_or(base + normal_strength * bump, skinfit_normalize_or(normal, -view));
     }
 
-    // hilite occ rim a E_h(V): back light that shines past the rim (MODEL 3).
-    float3 back_light(float3 hilite_term, float occ, float rim, float3 hilite) {
+    // hilite occ rim a E_h(V): back light that shines past the rim (docs/model.md section 3).
+    float3 skinfit_back_light(float3 hilite_term, float occ, float rim, float3 hilite) {
         return hilite * (occ * rim) * hilite_term;
     }
 
-    // R = V - 2 n (n.V) (MODEL 3, corrected form).
-    float3 mirror_direction(float3 n, float3 view) {
+    // R = V - 2 n (n.V) (docs/model.md section 3, corrected form).
+    float3 skinfit_mirror_direction(float3 n, float3 view) {
         return view - 2.0 * dot(n, view) * n;
     }
 
     // E_d(n), the irradiance; filtered by the hardware.
-    float3 irradiance_from_cube(float3 n_in_environment) {
-        return irradiance_cube.sample(cube_sampler, n_in_environment, level(0.0)).rgb;
+    float3 skinfit_irradiance_from_cube(float3 n_in_environment) {
+        return skinfit_irradiance_cube.sample(skinfit_cube_sampler, n_in_environment, level(0.0)).rgb;
     }
 
     // E_s(n), what shines from the side; filtered by the hardware.
-    float3 side_light_from_cube(float3 n_in_environment) {
-        return specular_cube.sample(cube_sampler, n_in_environment, level(0.0)).rgb;
+    float3 skinfit_side_light_from_cube(float3 n_in_environment) {
+        return skinfit_specular_cube.sample(skinfit_cube_sampler, n_in_environment, level(0.0)).rgb;
     }
 
-    // diffuse: albedo E_d(n), before occlusion and weights (MODEL 3).
-    float3 albedo_times_irradiance(float3 albedo, float3 irradiance) {
+    // diffuse: albedo E_d(n), before occlusion and weights (docs/model.md section 3).
+    float3 skinfit_albedo_times_irradiance(float3 albedo, float3 irradiance) {
         return albedo * irradiance;
     }
 
     // E_s(R), the mirrored environment; filtered by the hardware.
-    float4 mirror_light_from_cube(float3 reflected_in_environment) {
-        return specular_cube.sample(cube_sampler, reflected_in_environment, level(0.0)).rgba;
+    float4 skinfit_mirror_light_from_cube(float3 reflected_in_environment) {
+        return skinfit_specular_cube.sample(skinfit_cube_sampler, reflected_in_environment, level(0.0)).rgba;
     }
 
-    // side: s E_s(n) (MODEL 3).
-    float3 side_specular_term(float specular, float3 side_light) {
+    // side: s E_s(n) (docs/model.md section 3).
+    float3 skinfit_side_specular_term(float specular, float3 side_light) {
         return specular * side_light;
     }
 
-    // diffuse (base_weight + rim_weight rim) (MODEL 3).
-    float3 diffuse_light(float3 diffuse_term, float occ, float rim, float3 base_weight, float3 rim_weight) {
+    // diffuse (base_weight + rim_weight rim) (docs/model.md section 3).
+    float3 skinfit_diffuse_light(float3 diffuse_term, float occ, float rim, float3 base_weight, float3 rim_weight) {
         return diffuse_term * (occ * (base_weight + rim * rim_weight));
     }
 
-    // reflection: dapple E_s(R).rgb (MODEL 3).
-    float3 dappled_mirror(float dapple, float4 mirror_light) {
+    // reflection: dapple E_s(R).rgb (docs/model.md section 3).
+    float3 skinfit_dappled_mirror(float dapple, float4 mirror_light) {
         return dapple * mirror_light.rgb;
     }
 
-    // side_specular side (MODEL 3).
-    float3 side_specular_light(float3 side_term, float3 side_specular) {
+    // side_specular side (docs/model.md section 3).
+    float3 skinfit_side_specular_light(float3 side_term, float3 side_specular) {
         return side_specular * side_term;
     }
 
-    // reflection dapple E_s(R).rgb (MODEL 3).
-    float3 mirrored_light(float3 mirror_term, float3 reflection) {
+    // reflection dapple E_s(R).rgb (docs/model.md section 3).
+    float3 skinfit_mirrored_light(float3 mirror_term, float3 reflection) {
         return reflection * mirror_term;
     }
 
     // What the vertex stage hands over: world space, interpolated.
-    struct Surface {
+    struct SkinfitSurface {
         float2 vertex_uv;
         float vertex_occlusion;
         float3 vertex_normal;
@@ -223,38 +225,38 @@ struct Skinfit {
     };
 
     // Linear Rec.709 radiance, and 1 in alpha.
-    float4 skinfit_shade(Surface at) {
-        float3 albedo = albedo_from_map(at.vertex_uv);
-        float attenuator = attenuator_from_map(at.vertex_uv);
-        float3 normal_texel = normal_texel_from_map(at.vertex_uv);
+    float4 skinfit_shade(SkinfitSurface at) {
+        float3 albedo = skinfit_albedo_from_map(at.vertex_uv);
+        float attenuator = skinfit_attenuator_from_map(at.vertex_uv);
+        float3 normal_texel = skinfit_normal_texel_from_map(at.vertex_uv);
         float open = at.vertex_occlusion;
-        float specular = specular_from_map(at.vertex_uv);
-        float dapple = clamped_dapple(at.vertex_normal);
-        float3 decoded = decode_texel(normal_texel);
-        float occ = occluded_share(open, OCCLUSION);
-        float3 view = view_exact(at.vertex_position, at.eye);
-        float3 base = base_of_texel(decoded, at.vertex_normal, view);
-        float3 normal = smooth_normal_unguarded(at.vertex_normal);
+        float specular = skinfit_specular_from_map(at.vertex_uv);
+        float dapple = skinfit_clamped_dapple(at.vertex_normal);
+        float3 decoded = skinfit_decode_texel(normal_texel);
+        float occ = skinfit_occluded_share(open, SKINFIT_OCCLUSION);
+        float3 view = skinfit_view_exact(at.vertex_position, at.eye);
+        float3 base = skinfit_base_of_texel(decoded, at.vertex_normal, view);
+        float3 normal = skinfit_smooth_normal_unguarded(at.vertex_normal);
         float3 view_in_environment = view;
-        float silhouette = silhouette_smooth(normal, view);
-        float3 bump = bump_of_texel(decoded, at.vertex_tangent, at.vertex_bitangent);
-        float3 hilite_light = hilite_light_from_cube(view_in_environment);
-        float rim = rim_power(silhouette, RIM_EXPONENT);
-        float3 hilite_term = attenuated_hilite(attenuator, hilite_light);
-        float3 n = bumped_normal(base, bump, normal, view, NORMAL_STRENGTH);
-        float3 hilite_part = back_light(hilite_term, occ, rim, HILITE);
+        float silhouette = skinfit_silhouette_smooth(normal, view);
+        float3 bump = skinfit_bump_of_texel(decoded, at.vertex_tangent, at.vertex_bitangent);
+        float3 hilite_light = skinfit_hilite_light_from_cube(view_in_environment);
+        float rim = skinfit_rim_power(silhouette, SKINFIT_RIM_EXPONENT);
+        float3 hilite_term = skinfit_attenuated_hilite(attenuator, hilite_light);
+        float3 n = skinfit_bumped_normal(base, bump, normal, view, SKINFIT_NORMAL_STRENGTH);
+        float3 hilite_part = skinfit_back_light(hilite_term, occ, rim, SKINFIT_HILITE);
         float3 n_in_environment = n;
-        float3 reflected = mirror_direction(n, view);
+        float3 reflected = skinfit_mirror_direction(n, view);
         float3 reflected_in_environment = reflected;
-        float3 irradiance = irradiance_from_cube(n_in_environment);
-        float3 side_light = side_light_from_cube(n_in_environment);
-        float3 diffuse_term = albedo_times_irradiance(albedo, irradiance);
-        float4 mirror_light = mirror_light_from_cube(reflected_in_environment);
-        float3 side_term = side_specular_term(specular, side_light);
-        float3 diffuse_part = diffuse_light(diffuse_term, occ, rim, BASE_WEIGHT, RIM_WEIGHT);
-        float3 mirror_term = dappled_mirror(dapple, mirror_light);
-        float3 side_part = side_specular_light(side_term, SIDE_SPECULAR);
-        float3 mirror_part = mirrored_light(mirror_term, REFLECTION);
+        float3 irradiance = skinfit_irradiance_from_cube(n_in_environment);
+        float3 side_light = skinfit_side_light_from_cube(n_in_environment);
+        float3 diffuse_term = skinfit_albedo_times_irradiance(albedo, irradiance);
+        float4 mirror_light = skinfit_mirror_light_from_cube(reflected_in_environment);
+        float3 side_term = skinfit_side_specular_term(specular, side_light);
+        float3 diffuse_part = skinfit_diffuse_light(diffuse_term, occ, rim, SKINFIT_BASE_WEIGHT, SKINFIT_RIM_WEIGHT);
+        float3 mirror_term = skinfit_dappled_mirror(dapple, mirror_light);
+        float3 side_part = skinfit_side_specular_light(side_term, SKINFIT_SIDE_SPECULAR);
+        float3 mirror_part = skinfit_mirrored_light(mirror_term, SKINFIT_REFLECTION);
         return float4(diffuse_part + side_part + hilite_part + mirror_part, 1.0);
     }
 };

@@ -6,21 +6,19 @@ use burn::tensor::{Tensor, TensorData};
 use skinfit::gpu::Choice;
 use skinfit::tensor::SharedDevice;
 
-/// The device that all tests share; `None`, said loudly, where `SKINFIT_NO_GPU_TESTS` allows it.
-pub(super) fn shared() -> Option<&'static SharedDevice> {
-    static SHARED: OnceLock<Option<SharedDevice>> = OnceLock::new();
-    SHARED
-        .get_or_init(|| match SharedDevice::open(&Choice::default()) {
-            Ok(shared) => Some(shared),
-            Err(error) if std::env::var_os("SKINFIT_NO_GPU_TESTS").is_some() => {
-                eprintln!("NOT CHECKED, as SKINFIT_NO_GPU_TESTS is set: {error}");
-                None
-            }
-            Err(error) => {
-                panic!("{error}\nSKINFIT_NO_GPU_TESTS=1 leaves the tests out that need an adapter.")
-            }
-        })
-        .as_ref()
+/// The device that all tests share; `None`, and each test says so, where `SKINFIT_NO_GPU_TESTS` allows it.
+pub(crate) fn shared() -> Option<&'static SharedDevice> {
+    static SHARED: OnceLock<Result<SharedDevice, String>> = OnceLock::new();
+    let opened =
+        SHARED.get_or_init(|| SharedDevice::open(&Choice::default()).map_err(|error| error.to_string()));
+    let excused = |error: &String| {
+        assert!(
+            std::env::var_os("SKINFIT_NO_GPU_TESTS").is_some(),
+            "{error}\nSKINFIT_NO_GPU_TESTS=1 leaves the tests out that need an adapter."
+        );
+        crate::common::not_checked(&format!("SKINFIT_NO_GPU_TESTS is set: {error}"));
+    };
+    opened.as_ref().map_err(excused).ok()
 }
 
 /// Numbers in [0, 1) that look random and are the same every time (xorshift).

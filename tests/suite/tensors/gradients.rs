@@ -82,7 +82,7 @@ impl Case {
 
     /// The image in f64.
     fn image(&self, numbers: &Numbers) -> Vec<f64> {
-        let mut params = self.params;
+        let mut params = self.params.clone();
         for (column, &value) in self.columns.iter().zip(&numbers[0]) {
             column.set(&mut params, value);
         }
@@ -233,7 +233,7 @@ fn cases() -> Vec<(&'static str, Case)> {
     ]
     .into_iter()
     .collect();
-    let free: Vec<Column> = Param::all()
+    let free: Vec<Column> = Param::built_in()
         .filter(|param| *param != Param::SpecularLobe)
         .flat_map(|param| match param {
             Param::RimWeight | Param::Hilite => Column::per_channel(param).to_vec(),

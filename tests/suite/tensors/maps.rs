@@ -82,7 +82,8 @@ fn targets(truth: &Prepared) -> Vec<(View, Target)> {
     (truth.scene.views.iter().zip(&samples))
         .map(|(view, samples)| {
             let image = shader.shade(samples, &view.camera, 1.0).image;
-            let target = Target { rgb: image.rgb, alpha: Some(image.alpha), mask: None, clipped_at: None };
+            let alpha = Some(image.alpha);
+            let target = Target { rgb: image.rgb, alpha, haze: None, mask: None, clipped_at: None };
             (view.clone(), target)
         })
         .collect()
@@ -93,7 +94,7 @@ fn observed(changed: &Prepared, targets: &[(View, Target)]) -> Vec<ObservedView>
         .map(|(samples, (view, target))| {
             let view = View { target: Some(target.clone()), ..view.clone() };
             let rows = TargetRows::new(&view, &samples).unwrap().unwrap();
-            ObservedView { samples, target: rows.rgb, weight: rows.weight, clip: rows.clip }
+            ObservedView { samples, target: rows.channels, weight: rows.weight, clip: rows.clip }
         })
         .collect()
 }

@@ -6,7 +6,7 @@
 //! - `maps`: fits of whole maps
 //! - `gradients`: the shading operation and its adjoint
 
-mod bench;
+pub(crate) mod bench;
 mod device;
 mod drawn;
 mod gradients;

@@ -22,6 +22,9 @@ impl CpuEngine {
 
     /// As [`Self::image`], into the planes of an earlier image: memory that is new costs more than the pass.
     pub fn image_into(&self, index: usize, point: &Point, planes: &mut Vec<Vec<f32>>) {
+        if let Some(Ok(planned)) = &self.planned {
+            return planned.image_into(index, point, planes);
+        }
         let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
         let kept = self.kept(&point.params, lobe.as_deref());
         let view = &self.views[index];
@@ -55,7 +58,7 @@ impl CpuEngine {
 const GROUPS: usize = BLOCK * CHUNK;
 
 /// Of each chunk the parts of all planes.
-fn by_chunk(planes: &mut [Vec<f32>]) -> Vec<Vec<&mut [f32]>> {
+pub(in crate::engine) fn by_chunk(planes: &mut [Vec<f32>]) -> Vec<Vec<&mut [f32]>> {
     let mut chunks: Vec<Vec<&mut [f32]>> = Vec::new();
     for plane in planes {
         let parts = plane.chunks_mut(GROUPS * LANES);

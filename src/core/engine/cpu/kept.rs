@@ -5,19 +5,12 @@ use std::sync::{Arc, PoisonError};
 
 use rayon::prelude::*;
 
+use super::lobe::Lobe;
 use super::{BLOCK, CHUNK, CpuEngine};
 use crate::engine::Unknown;
-use crate::model::cube::Cube;
 use crate::model::params::{Param, Params};
 use crate::samples::rows::Row;
 use crate::with_simd;
-
-#[derive(Debug)]
-pub(super) struct Lobe {
-    exponent: f64,
-    pub(super) cube: Cube<f32>,
-    pub(super) slope: Cube<f32>,
-}
 
 #[derive(Debug)]
 pub(super) struct Kept {
@@ -28,15 +21,8 @@ pub(super) struct Kept {
 
 impl CpuEngine {
     pub(super) fn lobe(&self, exponent: f64) -> Option<Arc<Lobe>> {
-        let stack = self.illumination.lobes.as_ref()?;
         let mut slot = self.lobe.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(lobe) = slot.as_ref().filter(|lobe| lobe.exponent == exponent) {
-            return Some(Arc::clone(lobe));
-        }
-        let (cube, slope) = stack.at(exponent);
-        let lobe = Arc::new(Lobe { exponent, cube, slope });
-        *slot = Some(Arc::clone(&lobe));
-        Some(lobe)
+        Lobe::at(self.illumination.lobes.as_ref()?, exponent, &mut slot)
     }
 
     /// Terms that no free parameter changes, made on the first pass (and again should one of the

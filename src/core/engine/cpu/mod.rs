@@ -9,26 +9,30 @@
 //! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
 //! - `image`: the forward pass
 
-mod image;
+pub(super) mod image;
 mod kept;
-mod sums;
+pub(super) mod lobe;
+pub(super) mod sums;
 
 use std::sync::{Arc, Mutex};
 
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use self::kept::{Kept, Lobe};
+use self::kept::Kept;
+use self::lobe::Lobe;
 use self::sums::{BLOCK, Blocks, CHUNK, Scratch, Sums, Wish, pairwise};
 use super::gram::pair;
 use super::kernel::Kernel;
 use super::lanes::Lanes;
 use super::plan::Plan;
+use super::planned::PlannedEngine;
 use super::records::Records;
 use super::view::ObservedView;
 use super::{NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
-use crate::model::compose::Weights;
+use crate::model::compose::{TermName, Weights};
+use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
@@ -56,6 +60,9 @@ pub struct CpuEngine {
     lobe: Mutex<Option<Arc<Lobe>>>,
     /// Kept terms, and the parameters that they were made with.
     kept: Mutex<Option<Arc<Kept>>>,
+    /// What runs in the place of the kernel where effects were added, of which the kernel does not know; or why the
+    /// processor cannot compute them.
+    planned: Option<Result<PlannedEngine, String>>,
 }
 
 impl CpuEngine {
@@ -76,13 +83,20 @@ impl CpuEngine {
     pub fn with_kept_terms(
         setup: Setup,
         illumination: Illumination,
-        views: Vec<ObservedView>,
+        mut views: Vec<ObservedView>,
         loss: Loss,
         unknowns: Vec<Unknown>,
         keep: bool,
     ) -> Self {
         let compare_alpha = views.iter().any(ObservedView::compares_alpha);
         let plan = Plan::new(setup, &unknowns, compare_alpha, keep);
+        let planned = setup.built_in().is_err().then(|| {
+            let views = std::mem::take(&mut views);
+            let engine = PlannedEngine::new(setup, illumination.clone(), views, loss, unknowns.clone());
+            let mut engine = engine.map_err(|error| error.to_string())?;
+            engine.set_keep(keep);
+            Ok(engine)
+        });
         let mut engine = Self {
             setup,
             illumination,
@@ -95,6 +109,7 @@ impl CpuEngine {
             weight: (0.0, 0),
             lobe: Mutex::new(None),
             kept: Mutex::new(None),
+            planned,
         };
         engine.set_stride(1);
         engine
@@ -103,6 +118,9 @@ impl CpuEngine {
     /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
     pub fn set_stride(&mut self, stride: usize) {
         self.stride = stride.max(1);
+        if let Some(Ok(planned)) = &mut self.planned {
+            planned.set_stride(stride);
+        }
         self.weight = (0.0, 0);
         for view in &self.views {
             let groups = view.samples.groups();
@@ -113,6 +131,17 @@ impl CpuEngine {
         }
     }
 
+    /// Run with the instructions of `level` and not with the best that the processor has: so that one machine can show
+    /// what others will compute.
+    pub fn set_level(&mut self, level: Level) {
+        self.level = level;
+        if let Some(Ok(planned)) = &mut self.planned {
+            planned.set_level(level);
+        }
+        // What was kept was made with other instructions.
+        (self.lobe, self.kept) = (Mutex::new(None), Mutex::new(None));
+    }
+
     /// The blocks that a pass reads.
     fn read_blocks(&self, view: &ObservedView) -> impl Iterator<Item = usize> + use<> {
         (0..view.samples.groups().div_ceil(BLOCK)).step_by(self.stride)
@@ -121,19 +150,35 @@ impl CpuEngine {
     /// The views.
     #[must_use]
     pub fn views(&self) -> &[ObservedView] {
-        &self.views
+        match &self.planned {
+            Some(Ok(planned)) => planned.views(),
+            _ => &self.views,
+        }
+    }
+
+    /// One term of the image alone, in a plane a colour, where effects were added; `None` elsewhere, as
+    /// [`Shader`](crate::render::shade::Shader) shows the terms of the built-in ones.
+    #[must_use]
+    pub fn term_image(&self, index: usize, point: &Point, term: TermName) -> Option<Vec<Vec<f32>>> {
+        self.planned.as_ref()?.as_ref().ok()?.term_image(index, point, term)
+    }
+
+    /// What is switched on.
+    #[must_use]
+    pub const fn effects(&self) -> Effects {
+        self.setup.effects
     }
 
     /// Surface samples of positive weight, over all views.
     #[must_use]
     pub fn samples(&self) -> u64 {
-        self.views.iter().map(|view| view.samples.count() as u64).sum()
+        self.views().iter().map(|view| view.samples.count() as u64).sum()
     }
 
     /// How many blocks of pixels there are in all views.
     #[must_use]
     pub fn blocks(&self) -> usize {
-        self.views.iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
+        self.views().iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
     }
 
     #[inline(always)]
@@ -169,6 +214,15 @@ impl CpuEngine {
 
     /// One pass: sums over every chunk of every view.
     fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+        match &self.planned {
+            None => self.sum(point, wish),
+            Some(Ok(planned)) => planned.pass(point, wish),
+            // Told by `fault`; nothing takes the number for the loss.
+            Some(Err(_)) => NormalEquations { loss: f64::NAN, ..self.sum(point, wish) },
+        }
+    }
+
+    fn sum(&self, point: &Point, wish: Wish) -> NormalEquations {
         let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
         let kept = self.kept(&point.params, lobe.as_deref());
         let k = self.unknowns.len();
@@ -252,11 +306,16 @@ impl Objective for CpuEngine {
     }
 
     fn is_quadratic(&self) -> bool {
-        matches!(self.loss, Loss::L2 | Loss::RelativeL2) && self.views.iter().all(|view| view.clip.is_none())
+        matches!(self.loss, Loss::L2 | Loss::RelativeL2)
+            && self.views().iter().all(|view| view.clip.is_none())
     }
 
     fn rounding(&self) -> f64 {
-        super::rounding(&self.views, self.loss, self.stride)
+        super::rounding(self.views(), self.loss, self.stride)
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.planned.as_ref().and_then(|planned| planned.as_ref().err()).cloned()
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

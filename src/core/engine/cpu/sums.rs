@@ -12,11 +12,11 @@ use crate::samples::rows::Row;
 use crate::simd::Simd;
 
 /// Blocks in a chunk: one unit of work, and 64 terms a lane.
-pub(super) const CHUNK: usize = 4;
+pub(in crate::engine) const CHUNK: usize = 4;
 
 /// What a pass yields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Wish {
+pub(in crate::engine) enum Wish {
     Loss,
     Gradient,
     Normal,
@@ -30,10 +30,10 @@ pub(super) struct Blocks<'a> {
 }
 
 /// Packed sums of a chunk: each channel's triangle (or its last column), then the loss.
-pub(super) struct Sums(pub(super) Vec<f64>);
+pub(in crate::engine) struct Sums(pub(in crate::engine) Vec<f64>);
 
 /// Sum in a fixed binary tree: as accurate as it is deterministic.
-pub(super) fn pairwise(mut sums: Vec<Sums>) -> Sums {
+pub(in crate::engine) fn pairwise(mut sums: Vec<Sums>) -> Sums {
     let mut width = sums.len();
     while width > 1 {
         let half = width.div_ceil(2);
@@ -115,7 +115,7 @@ pub(super) fn chunk<S: Simd>(
 
 /// The sum of the lanes, as a tree: its halves are added side by side, and their order never changes.
 #[inline(always)]
-fn fold(lanes: &[f32; LANES]) -> f64 {
+pub(in crate::engine) fn fold(lanes: &[f32; LANES]) -> f64 {
     let mut sums = lanes.map(f64::from);
     let mut width = LANES;
     while width > 1 {

@@ -138,7 +138,7 @@ impl<S: Simd> Kernel<'_, S> {
             // By name, so that the match in `derivative` is resolved while compiling.
             macro_rules! put {
                 ($($param:ident)*) => {$(
-                    if self.plan.free[Param::$param as usize] {
+                    if self.plan.free[Param::$param.index()] {
                         for c in 0..3 {
                             let column = composition.derivative(Param::$param, c);
                             sink.put(window::column(c, Param::$param), column);

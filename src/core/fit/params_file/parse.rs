@@ -21,16 +21,25 @@ fn problem<T>(place: Range<usize>, problem: String) -> Result<T, Problem> {
     Err(Problem { place: Some(place), problem })
 }
 
-/// What `text` holds, for a scene of `form`, over the values of `base`.
-pub(super) fn parse(text: &str, form: Form, base: &Params) -> Result<ParamsFile, Problem> {
+/// What `text` holds: for a scene of that form, over its values, or for itself.
+pub(super) fn parse(text: &str, scene: Option<(Form, &Params)>) -> Result<ParamsFile, Problem> {
     let table = DeTable::parse(text).map_err(|e| Problem {
         place: e.span(),
         problem: format!("not TOML: {}. Correct the line or fit anew.", e.message().trim_end_matches('.')),
     })?;
-    let mut file = ParamsFile { form, effects: None, loss: None, params: *base, gains: Vec::new() };
+    let named = match table.get_ref().get("form").map(|value| (value.get_ref(), value.span())) {
+        Some((DeValue::String(name), place)) => Some((read_form(name, place.clone())?, place)),
+        _ => None,
+    };
+    if let (Some((named, place)), Some((form, _))) = (&named, scene) {
+        check_form(*named, form, place.clone())?;
+    }
+    let form = scene.map(|(form, _)| form).or(named.map(|(form, _)| form)).unwrap_or_default();
+    let params = scene.map_or_else(|| Params::defaults(form), |(_, base)| base.clone());
+    let mut file = ParamsFile { form, effects: None, loss: None, params, gains: Vec::new() };
     for (key, value) in table.get_ref() {
         match (key.get_ref().as_ref(), value.get_ref()) {
-            ("form", DeValue::String(name)) => check_form(name, form, value.span())?,
+            ("form", DeValue::String(_)) => {}
             ("effects", DeValue::Array(names)) => file.effects = Some(read_effects(names)?),
             ("loss", DeValue::String(name)) => file.loss = Some(read_loss(name, value.span())?),
             ("params", DeValue::Table(params)) => read_params(params, &mut file.params)?,
@@ -48,25 +57,30 @@ pub(super) fn parse(text: &str, form: Form, base: &Params) -> Result<ParamsFile,
     Ok(file)
 }
 
-fn check_form(name: &str, form: Form, place: Range<usize>) -> Result<(), Problem> {
-    match Form::ALL.into_iter().find(|f| f.name() == name) {
-        Some(found) if found == form => Ok(()),
-        Some(found) => problem(
-            place,
-            format!(
-                "these parameters are of the form `{}`, but the scene's form is `{}`. Use them with a scene of \
-                 their form, or fit this one anew.",
-                found.name(),
-                form.name()
-            ),
-        ),
+fn read_form(name: &str, place: Range<usize>) -> Result<Form, Problem> {
+    match Form::ALL.into_iter().find(|form| form.name() == name) {
+        Some(form) => Ok(form),
         None => problem(place, format!("unknown form `{name}`. It is `listing` or `corrected`.")),
     }
 }
 
+fn check_form(found: Form, form: Form, place: Range<usize>) -> Result<(), Problem> {
+    if found == form {
+        return Ok(());
+    }
+    let (found, form) = (found.name(), form.name());
+    problem(
+        place,
+        format!(
+            "these parameters are of the form `{found}`, but the scene's form is `{form}`. Use them with a scene of \
+             their form, or fit this one anew."
+        ),
+    )
+}
+
 fn read_effects(names: &DeArray<'_>) -> Result<Effects, Problem> {
     let effect = |name: &Spanned<DeValue<'_>>| {
-        let known = || Effect::ALL.map(Effect::name).join(", ");
+        let known = || Effect::all().map(Effect::name).collect::<Vec<_>>().join(", ");
         match name.get_ref() {
             DeValue::String(text) => Effect::from_name(text).ok_or_else(|| Problem {
                 place: Some(name.span()),

@@ -59,6 +59,31 @@ impl Document {
         Ok(())
     }
 
+    /// Which of a node's morph targets animation 0 gives another weight than 0 at any time: a key's value, or a
+    /// tangent of its spline, is not 0. Shorter than the targets where those at the end stay.
+    pub(super) fn moved_targets(&self, node: usize) -> Result<Vec<bool>, SceneError> {
+        let mut moved = Vec::new();
+        let Some(animation) = self.root.animations.first() else { return Ok(moved) };
+        for (i, channel) in animation.channels.iter().enumerate() {
+            let weights = Checked::Valid(Property::MorphTargetWeights);
+            if channel.target.path != weights || channel.target.node.value() != node {
+                continue;
+            }
+            let sampler = self.get(&animation.samplers, channel.sampler, "animation sampler")?;
+            let keys = self.scalars(sampler.input)?.len();
+            let values = self.scalars(sampler.output)?;
+            let stride =
+                if sampler.interpolation == Checked::Valid(Interpolation::CubicSpline) { 3 } else { 1 };
+            let targets = values.len() / (keys * stride).max(1);
+            if targets == 0 {
+                return Err(self.channel_error(i, "has fewer values than keys"));
+            }
+            moved.resize(targets.max(moved.len()), false);
+            values.iter().enumerate().for_each(|(at, &value)| moved[at % targets] |= value != 0.0);
+        }
+        Ok(moved)
+    }
+
     /// The first and the last key's time of animation 0; `None` without one, or without keys.
     pub(in crate::scene) fn animation_seconds(&self) -> Result<Option<(f64, f64)>, SceneError> {
         let Some(animation) = self.root.animations.first() else { return Ok(None) };

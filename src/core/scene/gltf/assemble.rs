@@ -90,7 +90,7 @@ impl Builder<'_> {
             Some(skin) => Some(self.skin(skin)?),
             None => None,
         };
-        let slots = if self.ask.morphs { self.slots(node, mesh, warnings) } else { Vec::new() };
+        let slots = if self.ask.morphs { self.slots(node, mesh, warnings)? } else { Vec::new() };
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("{name}, primitive {i}");
             let bones = skin.map(|(_, bones)| bones);
@@ -128,7 +128,12 @@ impl Builder<'_> {
 
     /// The morph slots of a node's targets. Targets of one name share a slot (a face, its lashes and
     /// its teeth smile together); the first one's weight counts.
-    fn slots(&mut self, node: usize, mesh: &json::Mesh, warnings: &mut Warnings) -> Vec<usize> {
+    fn slots(
+        &mut self,
+        node: usize,
+        mesh: &json::Mesh,
+        warnings: &mut Warnings,
+    ) -> Result<Vec<usize>, SceneError> {
         #[derive(serde::Deserialize)]
         struct Extras {
             #[serde(rename = "targetNames", default)]
@@ -140,16 +145,22 @@ impl Builder<'_> {
             mesh.primitives.iter().filter_map(|p| p.targets.as_ref()).map(Vec::len).max().unwrap_or(0);
         let animated = self.nodes.weights[node].as_ref();
         let weights = animated.or(self.document.root.nodes[node].weights.as_ref()).or(mesh.weights.as_ref());
+        // Weights that the scene gives hold through the whole animation.
+        let clip = match self.ask.clip && self.ask.morph_weights.is_none() {
+            true => self.document.moved_targets(node)?,
+            false => Vec::new(),
+        };
         let mut slots = Vec::new();
         for target in 0..count {
             let weight = weights.and_then(|weights| weights.get(target)).copied().unwrap_or(0.0);
             let name = names.get(target).filter(|name| !name.is_empty());
             let shared = name.and_then(|name| self.mesh.morphs.iter().position(|morph| morph.name == *name));
+            let animated = clip.get(target).copied().unwrap_or(false);
             slots.push(shared.unwrap_or(self.mesh.morphs.len()));
             match shared {
                 None => {
                     let name = name.cloned().unwrap_or_else(|| self.mesh.morphs.len().to_string());
-                    self.mesh.morphs.push(Morph { name, weight, ..Morph::default() });
+                    self.mesh.morphs.push(Morph { name, weight, animated, ..Morph::default() });
                 }
                 Some(slot) if self.mesh.morphs[slot].weight != weight && self.ask.morph_weights.is_none() => {
                     let Morph { name, weight: first, .. } = &self.mesh.morphs[slot];
@@ -161,7 +172,7 @@ impl Builder<'_> {
                 Some(_) => {}
             }
         }
-        slots
+        Ok(slots)
     }
 
     /// Add a primitive; `first` is where its skin's bones begin, if it has one.

@@ -35,6 +35,8 @@ pub(super) struct Ask {
     pub bones: bool,
     /// Seconds into animation 0; without: the nodes as they stand.
     pub time: Option<f64>,
+    /// Whether morph targets are to be marked that animation 0 moves.
+    pub clip: bool,
 }
 
 /// How much texture coordinates matter.

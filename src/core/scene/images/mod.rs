@@ -12,7 +12,7 @@ mod target;
 
 use std::path::Path;
 
-pub(super) use target::target;
+pub(super) use target::{haze, target};
 
 use super::error::{SceneError, Warnings, guarded, read_bytes, warn};
 use super::maps::Map;
@@ -87,9 +87,7 @@ impl Opened<'_> {
 
 /// Decode any image; of size `size` when that is given. No pixel is NaN or infinite.
 fn read(path: &Path, size: Option<(u32, u32)>) -> Result<Image, SceneError> {
-    let bytes = read_bytes(path, MOST_BYTES)?;
-    let opened = Opened { path, bytes: &bytes, size };
-    let image = guarded(path, || match bytes.as_slice() {
+    read_with(path, size, |opened| match opened.bytes {
         [0x76, 0x2f, 0x31, 0x01, ..] => open_exr::decode(opened),
         [b'#', b'?', ..] => raster::decode_hdr(opened),
         [0x89, b'P', b'N', b'G', ..] => raster::decode(opened, image::ImageFormat::Png),
@@ -105,7 +103,17 @@ fn read(path: &Path, size: Option<(u32, u32)>) -> Result<Image, SceneError> {
             };
             Err(opened.error(what, "Use OpenEXR, Radiance HDR, PNG or JPEG"))
         }
-    })?;
+    })
+}
+
+/// Decode an image by `decode`; no pixel is NaN or infinite.
+fn read_with(
+    path: &Path,
+    size: Option<(u32, u32)>,
+    decode: impl Fn(Opened<'_>) -> Result<Image, SceneError>,
+) -> Result<Image, SceneError> {
+    let bytes = read_bytes(path, MOST_BYTES)?;
+    let image = guarded(path, || decode(Opened { path, bytes: &bytes, size }))?;
     image.check_finite(path)?;
     Ok(image)
 }
@@ -158,13 +166,20 @@ pub(super) fn color_map(path: &Path) -> Result<Map<3>, SceneError> {
     Ok(image.into_map())
 }
 
-/// A tangent-space normal map as stored, turned to +Y up when `flip` says that it is +Y down.
-pub(super) fn normal_map(path: &Path, flip: bool) -> Result<Map<3>, SceneError> {
-    let mut map = read(path, None)?.into_map();
+/// A tangent-space normal map as stored, turned to +Y up when `flip` says that it is +Y down; and its alpha, where it
+/// has one.
+pub(super) fn normal_map(path: &Path, flip: bool) -> Result<(Map<3>, Option<Map<1>>), SceneError> {
+    let mut image = read(path, None)?;
+    let alpha = image.alpha.take().map(|alpha| Map {
+        width: image.width,
+        height: image.height,
+        texels: alpha.into_iter().map(|a| [a]).collect(),
+    });
+    let mut map = image.into_map();
     if flip {
         map.texels.iter_mut().for_each(|t| t[1] = 1.0 - t[1]);
     }
-    Ok(map)
+    Ok((map, alpha))
 }
 
 /// The first channel of a data map.

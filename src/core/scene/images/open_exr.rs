@@ -17,6 +17,26 @@ const KIND: &str = "an EXR file";
 
 /// Decode an EXR file of any compression; tiled files at their full resolution.
 pub(super) fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
+    let remedy = "Save colours under these names, in any layer";
+    decode_by(opened, colours, "has no channels R, G and B, nor Y", remedy)
+}
+
+/// The haze in an EXR file, as a grey image.
+pub(super) fn decode_haze(opened: Opened<'_>) -> Result<Image, SceneError> {
+    let remedy = "Save the haze under the name haze.Y, as `skinfit render --layers` does";
+    decode_by(opened, haze, "has no channel haze.Y, and is not an image of Y alone", remedy)
+}
+
+/// The indices of a layer's R, G, B and perhaps A.
+type Found = ([usize; 3], Option<usize>);
+
+/// Decode the first layer in which `find` finds something.
+fn decode_by(
+    opened: Opened<'_>,
+    find: fn(&Layer<AnyChannels<FlatSamples>>) -> Option<Found>,
+    missing: &str,
+    remedy: &str,
+) -> Result<Image, SceneError> {
     let damaged = |e: exr::error::Error| opened.damaged(KIND, e);
     let meta = MetaData::read_from_buffered(Cursor::new(opened.bytes), false).map_err(damaged)?;
     let window = meta.headers.first().map(|header| header.shared_attributes.display_window);
@@ -37,16 +57,12 @@ pub(super) fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
         .map_err(damaged)?;
     let mut found = Vec::new();
     for layer in &image.layer_data {
-        if let Some(channels) = colours(layer) {
+        if let Some(channels) = find(layer) {
             return place(opened, layer, &channels, window.position, window.size);
         }
         found.extend(layer.channel_data.list.iter().map(|channel| channel.name.to_string()));
     }
-    let found = found.join(", ");
-    Err(opened.error(
-        format!("has no channels R, G and B, nor Y (it has {found})"),
-        "Save colours under these names, in any layer",
-    ))
+    Err(opened.error(format!("{missing} (it has {})", found.join(", ")), remedy))
 }
 
 /// Refuse what cannot be read, before its pixels are allocated.
@@ -152,11 +168,24 @@ fn expansion(compression: Compression) -> u64 {
     }
 }
 
+/// The names of a layer's channels in lower case.
+fn names(layer: &Layer<AnyChannels<FlatSamples>>) -> Vec<String> {
+    layer.channel_data.list.iter().map(|channel| channel.name.to_string().to_lowercase()).collect()
+}
+
+/// The haze of a layer: the channel `haze.Y`, or the Y of an image that has no colours beside it.
+fn haze(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<Found> {
+    let names = names(layer);
+    let find = |name: &str| names.iter().position(|n| n == name);
+    let grey = || find("y").filter(|_| ["r", "g", "b", "ry", "by"].iter().all(|other| find(other).is_none()));
+    let at = find("haze.y").or_else(grey)?;
+    Some(([at; 3], None))
+}
+
 /// The indices of R, G, B and perhaps A in a layer: of the unnamed channel group if it has them, else
 /// of the first that has (`beauty.R`, ...). A grey image's Y stands for all three.
-fn colours(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<([usize; 3], Option<usize>)> {
-    let names: Vec<String> =
-        layer.channel_data.list.iter().map(|channel| channel.name.to_string().to_lowercase()).collect();
+fn colours(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<Found> {
+    let names = names(layer);
     let mut groups: Vec<&str> =
         names.iter().map(|n| n.rsplit_once('.').map_or("", |(group, _)| group)).collect();
     groups.sort_by_key(|group| !group.is_empty());
@@ -181,7 +210,7 @@ fn colours(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<([usize; 3], Optio
 fn place(
     opened: Opened<'_>,
     layer: &Layer<AnyChannels<FlatSamples>>,
-    (rgb, alpha): &([usize; 3], Option<usize>),
+    (rgb, alpha): &Found,
     origin: Vec2<i32>,
     size: Vec2<usize>,
 ) -> Result<Image, SceneError> {

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Image, read, srgb_decode};
+use super::{Image, open_exr, read, read_with, srgb_decode};
 use crate::model::params::LARGEST;
 use crate::scene::error::{SceneError, Warnings, warn};
 use crate::scene::view::{Clip, Target};
@@ -45,7 +45,39 @@ pub(in crate::scene) fn target(
         }
     }
     let mask = mask.map(|mask| read_mask(mask, size, warnings)).transpose()?;
-    Ok(Target { rgb: image.rgb, alpha, mask, clipped_at })
+    Ok(Target { rgb: image.rgb, alpha, haze: None, mask, clipped_at })
+}
+
+/// The haze of a target of `size`: an EXR's channel `haze.Y`, or the Y of an image that has no colours; linear,
+/// premultiplied by the target's coverage.
+pub(in crate::scene) fn haze(path: &Path, target: &Target, size: (u32, u32)) -> Result<Vec<f32>, SceneError> {
+    if target.clipped_at.is_some() {
+        return Err(SceneError::new(
+            path,
+            "is the haze of a target of 8 or 16 bits, which is compared one-sided where it is clipped",
+            "Give the target as EXR or HDR too, or leave the haze out",
+        ));
+    }
+    let image = read_with(path, Some(size), |opened| match opened.bytes {
+        [0x76, 0x2f, 0x31, 0x01, ..] => open_exr::decode_haze(opened),
+        _ => Err(opened.error(
+            "is no EXR file, and the haze is a number without bounds",
+            "Save it as an EXR with the channel haze.Y, as `skinfit render --layers` does",
+        )),
+    })?;
+    let haze: Vec<f32> = image.rgb.iter().map(|rgb| rgb[0]).collect();
+    if let Some(i) = haze.iter().position(|x| x.abs() > BRIGHTEST) {
+        let (x, y) = (i % size.0 as usize, i / size.0 as usize);
+        return Err(SceneError::new(
+            path,
+            format!(
+                "has {:?} at pixel ({x}, {y}): errors beyond {BRIGHTEST:e} have no square in 32 bits",
+                haze[i]
+            ),
+            "Scale the haze, and the environment's intensity with it",
+        ));
+    }
+    Ok(haze)
 }
 
 /// The first channel of a mask: what each pixel counts. A mask that counts nothing is refused.

@@ -184,8 +184,8 @@ impl Seed {
             }
             Param::KeyAzimuth => named(Constant::KeyDirection.name(), "constants.key_by_azimuth.xyz"),
             Param::KeyElevation => named(Constant::KeyDirection.name(), "constants.key_by_elevation.xyz"),
-            colour if colour.info().rgb => named(colour.name(), "vec3f(1.0)"),
-            scalar => named(scalar.name(), "1.0"),
+            colour if colour.info().rgb => named(colour.identifier(), "vec3f(1.0)"),
+            scalar => named(scalar.identifier(), "1.0"),
         }
     }
 }

@@ -21,8 +21,9 @@ mod text;
 
 pub use self::layout::Layout;
 pub use self::reduce::gather_module;
-pub use self::terms::terms_module;
+pub use self::terms::{held_parameters, terms_module};
 
+use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param};
 use crate::samples::LANES;
@@ -58,6 +59,8 @@ pub enum Wish {
 pub struct Fitted {
     /// The switches of the model.
     pub setup: Setup,
+    /// One term alone, instead of the whole.
+    pub output: Option<TermName>,
     /// The unknowns.
     pub unknowns: Vec<Unknown>,
     /// What is minimised.
@@ -223,6 +226,7 @@ const fn compared(fitted: &Fitted) -> Moved {
 fn facts(fitted: &Fitted) -> Facts {
     Facts {
         setup: fitted.setup,
+        output: fitted.output,
         source: fitted.layout.source,
         maps: MapFacts::default(),
         faces: fitted.faces,

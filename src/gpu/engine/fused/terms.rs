@@ -4,13 +4,24 @@ use std::fmt::Write as _;
 
 use super::layout::{Layout, fields_read};
 use super::{Fitted, WORKGROUP, facts};
+use crate::model::params::Param;
 use crate::records::StoredRecords;
 use crate::samples::LANES;
-use crate::shader::emit::{Plan, plan_terms, sample_fields};
+use crate::shader::emit::{Plan, sample_fields};
 use crate::shader::facts::{Facts, Source};
+use crate::shader::kept::{held, plan_terms};
 use crate::shader::module::{sample_struct, uniform};
 use crate::shader::rule::Stage;
 use crate::shader::search::components;
+
+/// The parameters that terms are made with.
+///
+/// # Errors
+/// When no rules yield the terms; in words.
+pub fn held_parameters(fitted: &Fitted) -> Result<Vec<Param>, String> {
+    // Turned or not, as another point may be.
+    held(&Facts { turned: true, ..facts(fitted) }).map_err(|error| error.to_string())
+}
 
 /// The shader that makes records of terms from records of samples, one sample a thread; and its plan, whose
 /// constants and resources are group 0. Bindings of group 1: the count of samples, samples, terms. Terms that are

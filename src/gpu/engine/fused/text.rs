@@ -4,11 +4,10 @@ use std::fmt::Write as _;
 
 use super::reduce::{functions, reduction};
 use super::{ColumnOf, Fused, Moved, Sum, WORKGROUP};
-use crate::scene::Loss;
 use crate::shader::emit::{hazy, parts};
 use crate::shader::module::{sample_struct, uniform};
 use crate::shader::rule::Stage;
-use skinfit_core::engine::residual::{HUBER_THRESHOLD, RELATIVE_FLOOR, SMAPE_CORNER, SMAPE_FLOOR};
+use skinfit_core::engine::residual::loss_text;
 
 impl Fused {
     /// The shader of the forward pass: the image, plane by plane, in the place of the sums.
@@ -70,11 +69,9 @@ impl Fused {
              @group(1) @binding(4) var<storage, read_write> partial_sums: array<f32>;\n\
              // The same buffers, four numbers at a time.\n\
              @group(1) @binding(5) var<storage, read> samples_quads: array<vec4f>;\n\
-             @group(1) @binding(6) var<storage, read> targets_quads: array<vec4f>;\n\n\
-             const RELATIVE_FLOOR = {RELATIVE_FLOOR:?}f;\nconst HUBER_THRESHOLD = {HUBER_THRESHOLD:?}f;\n\
-             const SMAPE_FLOOR = {SMAPE_FLOOR:?}f;\nconst SMAPE_CORNER = {SMAPE_CORNER:?}f;\n\n"
+             @group(1) @binding(6) var<storage, read> targets_quads: array<vec4f>;\n\n"
         );
-        wgsl.push_str(loss_function(self.fitted.loss));
+        wgsl.push_str(&loss_text(self.fitted.loss));
         wgsl.push('\n');
         wgsl.push_str(&functions());
         wgsl
@@ -176,14 +173,5 @@ impl Fused {
         };
         let (a, b) = (side(i, both.only()), side(j, both.only()));
         if both.only().is_some() { format!("{a} * {b}") } else { format!("dot({a}, {b})") }
-    }
-}
-
-const fn loss_function(loss: Loss) -> &'static str {
-    match loss {
-        Loss::L2 => include_str!("loss/l2.wgsl"),
-        Loss::RelativeL2 => include_str!("loss/relative_l2.wgsl"),
-        Loss::Huber => include_str!("loss/huber.wgsl"),
-        Loss::Smape => include_str!("loss/smape.wgsl"),
     }
 }

@@ -6,23 +6,24 @@ use std::time::Instant;
 use super::Arguments;
 use super::evidence::evidence;
 use super::solve::Solving;
-use super::words::{advice, advice_on_maps, tell_run};
-use crate::cli::fit_engine::{Chosen, FitEngine};
+use super::words::{Times, advice, advice_on_maps, tell_run};
+use crate::cli::fit_engine::{FitEngine, SelectedEngine};
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::maps::MapsLeft;
 use crate::cli::run_folder::RunFolder;
 use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
 use crate::fit::outcome::{Ending, Outcome};
-use crate::fit::params_file::ParamsFile;
+use crate::fit::params_file::{Origin, ParamsFile};
 use crate::prepare::Prepared;
 use crate::report::{self, RunInfo, ViewEvidence};
 use crate::scene::Scene;
 
-/// The scene file that was fitted, and what was left of its maps.
+/// The scene file that was fitted, what was left of its maps, and when the command began.
 #[derive(Clone, Copy)]
 pub(super) struct Fitted<'a> {
     pub(super) path: &'a Path,
     pub(super) maps: Option<&'a MapsLeft>,
+    pub(super) begun: Instant,
 }
 
 /// Leave the run folder's files, and tell how it ended.
@@ -30,9 +31,9 @@ pub(super) fn conclude(
     arguments: &Arguments,
     solving: Solving,
     folder: &RunFolder,
-    Fitted { path, maps }: Fitted<'_>,
+    Fitted { path, maps, begun }: Fitted<'_>,
     prepared: &Prepared,
-    chosen: &Chosen<'_>,
+    chosen: &SelectedEngine<'_>,
     outcome: &Outcome,
 ) -> Result<Exit, Refusal> {
     let engine = &chosen.engine;
@@ -45,7 +46,8 @@ pub(super) fn conclude(
     seconds.render = clock.elapsed().as_secs_f64();
     let maps_named = maps.map_or(&[][..], |left| &left.named);
     let named = folder.write_scene(path, Changes { maps: maps_named, ..changes(arguments, prepared) })?;
-    params_file(prepared, outcome).write(&folder.path().join("params.toml"), path, Some(outcome))?;
+    let origin = Origin { scene: path, outcome: Some(outcome), set: arguments.set.checked() };
+    params_file(prepared, outcome).write(&folder.path().join("params.toml"), origin)?;
     let mut run = RunInfo { seconds, named, ..run_info(arguments, solving, path, prepared, engine, views) };
     if let Some(left) = maps {
         tell_warnings(&left.warnings);
@@ -61,7 +63,9 @@ pub(super) fn conclude(
     if arguments.json {
         say(report.json.trim_end())?;
     } else {
-        tell_run(folder.path(), &prepared.scene.views, chosen, outcome, seconds.samples)?;
+        // All that there was to do is done: reading, bakes, samples, the fit, its pictures and the report.
+        let times = Times { whole: begun.elapsed().as_secs_f64(), samples: seconds.samples };
+        tell_run(folder.path(), &prepared.scene.views, chosen, outcome, times)?;
     }
     let advice = match maps {
         Some(left) => advice_on_maps(arguments, folder.path(), left, outcome),
@@ -81,7 +85,8 @@ fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> 
     Changes {
         loss: arguments.loss.as_deref(),
         // Where maps are fitted, the constants start from what their last round found.
-        start: (arguments.params.is_some() || arguments.maps.any()).then_some(start),
+        start: (arguments.params.is_some() || !arguments.set.checked().is_empty() || arguments.maps.any())
+            .then_some(start),
         ..Changes::default()
     }
 }
@@ -93,7 +98,7 @@ fn params_file(prepared: &Prepared, outcome: &Outcome) -> ParamsFile {
         form: prepared.scene.form,
         effects: Some(prepared.scene.effects),
         loss: Some(prepared.scene.fit.loss),
-        params: outcome.end.params,
+        params: outcome.end.params.clone(),
         gains: names.zip(outcome.end.gains.iter().copied()).collect(),
     }
 }
@@ -110,6 +115,7 @@ fn run_info(
         Some(_) => path.display().to_string(),
         None => "the built-in scene".to_owned(),
     };
+    let set = arguments.set.words();
     let effects: Vec<&str> = prepared.scene.effects.iter().map(crate::model::effects::Effect::name).collect();
     RunInfo {
         scene,
@@ -126,6 +132,7 @@ fn run_info(
             ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
         ]
         .into_iter()
+        .chain((!set.is_empty()).then(|| ("set".to_owned(), set.join(", "))))
         .chain(engine.provenance())
         .collect(),
         maps: None,

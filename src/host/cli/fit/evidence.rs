@@ -18,15 +18,21 @@ pub(super) fn evidence(
     outcome: &Outcome,
 ) -> Result<Vec<ViewEvidence>, Refusal> {
     let observed = engine.surfaced_views()?;
+    // What the model in f64 does not know, the engine shows itself.
+    let known = prepared.setup().built_in().is_ok();
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
     let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
     let views = prepared.scene.views.iter().zip(observed.iter()).enumerate();
     let evidence = views
         .map(|(index, (view, observed))| {
-            let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
+            let shaded = if known {
+                shader.shade(&observed.samples, &view.camera, outcome.end.gains[index])
+            } else {
+                engine.shaded(index, &view.camera, &outcome.end)?
+            };
             let (target, coverage) = compared(view, observed, &shaded.image);
             bar.inc(1);
-            ViewEvidence {
+            Ok(ViewEvidence {
                 name: view.name.clone(),
                 target,
                 fit: shaded.image,
@@ -36,11 +42,12 @@ pub(super) fn evidence(
                     .into_iter()
                     .map(|(name, image)| (name.name().to_owned(), image))
                     .collect(),
-            }
+                haze: shaded.haze,
+            })
         })
         .collect();
     bar.finish_and_clear();
-    Ok(evidence)
+    evidence
 }
 
 /// The target as an image, and how much of each pixel is compared.

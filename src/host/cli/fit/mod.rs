@@ -2,7 +2,7 @@
 //!
 //! - `solve`: the search, and what it goes on from
 //! - `evidence`: each view's target, fit and terms
-//! - `conclude`: what is left in the run folder; `words`: the outcome, told
+//! - `conclude`: what is left in the run folder; `words`: the outcome in words
 
 mod conclude;
 mod evidence;
@@ -10,12 +10,14 @@ mod solve;
 mod words;
 
 use std::path::PathBuf;
+use std::time::Instant;
 
 use super::fit_engine::FitEngineArguments;
 use super::interrupt::Interrupt;
 use super::maps::{MapArguments, MapRun};
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
+use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, tell_warnings, unfinished};
 use crate::prepare::{PrepareOptions, Prepared};
 use crate::scene::Loss;
@@ -27,17 +29,20 @@ use solve::{Solving, solve};
 /// Fit a scene's free parameters to its target images
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs; with --maps, maps.json and the fitted maps in maps/ instead of the latter.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs; with --maps, maps.json and the fitted maps in maps/ instead of the latter.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --set hilite=0.7,0.6,0.5    start there\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
-    /// The run folder [default: runs/<the scene's folder>].
+    /// The run folder [default: runs/<the scene's folder>, or of a NAME.toml that is not scene.toml
+    /// runs/<the scene's folder>.NAME].
     #[arg(short, long, value_name = "RUN")]
     output: Option<PathBuf>,
     /// Start from these parameters, instead of the scene's start values.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArguments,
     /// Which solver: varpro and lm take few passes; lbfgs, nelder-mead and adam are there to
     /// compare
     /// [default: varpro].
@@ -69,6 +74,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    let begun = Instant::now();
     arguments.maps.check()?;
     arguments.engine.check(arguments.maps.any())?;
     if arguments.engine.may_be_gpu() {
@@ -82,6 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let options = PrepareOptions {
         fit: true,
         params: arguments.params.clone(),
+        set: arguments.set.values()?.to_vec(),
         cache: arguments.scene.cache(),
         ..PrepareOptions::default()
     };
@@ -93,6 +100,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let solving = Solving::of(arguments, folder.path())?;
     let observed = if own { prepared.keep_targets().map(|()| None) } else { prepared.observed().map(Some) }?;
     tell_warnings(&prepared.warnings);
+    arguments.set.tell_idle(prepared.scene.effects);
     let interrupt = Interrupt::default();
     let (observed, maps) = match observed {
         Some(observed) if arguments.maps.any() => {
@@ -107,7 +115,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine, &interrupt)?;
         folder.keep();
         let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
-        let fitted = Fitted { path: &path, maps: maps.as_ref() };
+        let fitted = Fitted { path: &path, maps: maps.as_ref(), begun };
         conclude(arguments, solving, &folder, fitted, &prepared, chosen, &outcome)
     })
 }

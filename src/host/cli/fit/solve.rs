@@ -11,6 +11,7 @@ use crate::cli::interrupt::Interrupt;
 use crate::cli::run_folder::RunFolder;
 use crate::fit::outcome::Outcome;
 use crate::fit::state::Saved;
+use crate::fit::state::StateError;
 use crate::fit::{self, FitError, FitOptions, SolverKind};
 use crate::output::OutputError;
 use crate::prepare::Prepared;
@@ -81,10 +82,20 @@ pub(super) fn solve(
     bar.finish_and_clear();
     outcome.map_err(|error| match error {
         // It names its file itself.
-        FitError::State(error) => Refusal::from(error),
-        FitError::Engine(fault) => {
-            Refusal::failure(format!("{}: {}", prepared.scene.path.display(), FitError::Engine(fault)))
+        FitError::State(StateError::Unwritable(error)) => Refusal::from(error),
+        FitError::State(error) => with_option(&error, "without --resume"),
+        FitError::Engine(fault) => Refusal::failure(format!(
+            "{}: {fault} What was found up to then is kept: go on with --resume.",
+            prepared.scene.path.display()
+        )),
+        FitError::Solver { .. } => {
+            with_option(&format!("{}: {error}", prepared.scene.path.display()), "(--solver varpro)")
         }
         error => Refusal::new(format!("{}: {error}", prepared.scene.path.display())),
     })
+}
+
+/// The library's advice, which ends its words, with the option that follows it.
+fn with_option(words: &impl ToString, option: &str) -> Refusal {
+    Refusal::new(format!("{} {option}.", words.to_string().trim_end_matches('.')))
 }

@@ -3,35 +3,44 @@
 use std::path::Path;
 
 use super::Arguments;
-use crate::cli::fit_engine::Chosen;
+use crate::cli::fit_engine::SelectedEngine;
 use crate::cli::maps::MapsLeft;
 use crate::cli::{Refusal, say};
 use crate::engine::Unknown;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::scene::view::View;
 
-/// How the run went: the fitted values, what made the passes and the samples (in so many seconds), and where it is.
+/// Seconds of a run.
+#[derive(Clone, Copy)]
+pub(super) struct Times {
+    /// From the command's beginning to its last file.
+    pub(super) whole: f64,
+    /// Of making the samples.
+    pub(super) samples: f64,
+}
+
+/// How the run went: the fitted values, what made the passes and the samples, and where it is.
 pub(super) fn tell_run(
     folder: &Path,
     views: &[View],
-    chosen: &Chosen<'_>,
+    chosen: &SelectedEngine<'_>,
     outcome: &Outcome,
-    sample_seconds: f64,
+    times: Times,
 ) -> Result<(), Refusal> {
-    let engine = &chosen.engine;
-    tell_outcome(outcome, views)?;
+    let (engine, sample_seconds) = (&chosen.engine, times.samples);
+    tell_outcome(outcome, views, times.whole)?;
     if engine.name() == "gpu" {
         let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
         say(&format!("{} samples made by the {by} in {sample_seconds:.3} s", engine.samples()))?;
     }
-    if let Some(why) = &chosen.reasons.why {
+    if let Some(why) = &chosen.selection.why {
         say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
     }
     say(&format!("{}: final loss {:.6e}", folder.display(), outcome.loss_end))
 }
 
-/// The fitted values as a small table.
-fn tell_outcome(outcome: &Outcome, views: &[View]) -> Result<(), Refusal> {
+/// The fitted values as a small table, and how the fit ended after so many seconds of the command.
+fn tell_outcome(outcome: &Outcome, views: &[View], whole: f64) -> Result<(), Refusal> {
     for unknown in &outcome.unknowns {
         let (name, unit) = match unknown.unknown {
             Unknown::Gain(view) => (format!("gain.{}", views[view].name), ""),
@@ -46,12 +55,16 @@ fn tell_outcome(outcome: &Outcome, views: &[View]) -> Result<(), Refusal> {
         say(format!("{name:>22} {:>12.6}  {error:<11}  {unit}", unknown.value).trim_end())?;
     }
     let ending = outcome.ending.words();
+    let fitting = match outcome.seconds {
+        // A fit that goes on took time before.
+        fit if fit > whole => format!("and {fit:.2} s of fitting with what was done before"),
+        fit => format!("{fit:.2} s of them the fit's"),
+    };
     let count = |n: u64, one: &str, more: &str| format!("{n} {}", if n == 1 { one } else { more });
     say(&format!(
-        "{ending} after {} and {} over the samples, {:.2} s; loss {:.6e} -> {:.6e}",
+        "{ending} after {} and {} over the samples; loss {:.6e} -> {:.6e}; {whole:.2} s, {fitting}",
         count(outcome.iterations, "iteration", "iterations"),
         count(outcome.evaluations, "pass", "passes"),
-        outcome.seconds,
         outcome.loss_start,
         outcome.loss_end
     ))

@@ -3,7 +3,9 @@
 use std::time::Instant;
 
 use super::super::graphics::Task as Doing;
-use super::{Chosen, FitEngine, FitEngineArguments, ObservedView, Prepared, Reasons, Refusal, tell};
+use super::{
+    FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, SelectedEngine, Selection, tell,
+};
 use crate::gpu::engine::{DeviceSampleError, DeviceSamples, GpuEngine, Memory, Task};
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError};
@@ -37,20 +39,20 @@ impl FitEngineArguments {
         &self,
         prepared: &Prepared,
         observed: Vec<ObservedView>,
-        reasons: Reasons,
-        then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
+        selection: Selection,
+        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
-        let must = reasons.why.is_none();
+        let must = selection.why.is_none();
         let mut gpu = match self.open() {
             Ok(gpu) if must || !gpu.is_software() => gpu,
             Ok(gpu) => {
-                let reasons = reasons.but(&format!("{} is a program on the CPU", gpu.name()));
-                return self.on_cpu(prepared, observed, reasons, then);
+                let selection = selection.but(&format!("{} is a program on the CPU", gpu.name()));
+                return self.on_cpu(prepared, observed, selection, then);
             }
             Err(error) if must => return Err(refused(&error)),
             Err(error) => {
                 tell(&format!("{error} The CPU engine makes the passes."));
-                return self.on_cpu(prepared, observed, reasons.but("none could be opened"), then);
+                return self.on_cpu(prepared, observed, selection.but("none could be opened"), then);
             }
         };
         let mut resident = self.resident();
@@ -59,7 +61,7 @@ impl FitEngineArguments {
                 Ok(engine) => {
                     let engine = FitEngine::Gpu(engine);
                     self.verify(prepared, &engine)?;
-                    return then(&Chosen { engine, reasons });
+                    return then(&SelectedEngine { engine, selection });
                 }
                 // A device that ran out of memory is not to be trusted any more; half as much may fit.
                 Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
@@ -83,7 +85,7 @@ impl FitEngineArguments {
     pub(super) fn with_own_samples<T>(
         &self,
         prepared: &Prepared,
-        then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
+        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
         let gpu = self.open().map_err(|error| refused(&error))?;
         let content = Content {
@@ -101,7 +103,7 @@ impl FitEngineArguments {
                     Ok(engine) => {
                         let engine = FitEngine::Gpu(engine);
                         self.verify(prepared, &engine)?;
-                        return then(&Chosen { engine, reasons: Reasons::default() });
+                        return then(&SelectedEngine { engine, selection: Selection::default() });
                     }
                     Err(error) => error,
                 }
@@ -116,9 +118,10 @@ impl FitEngineArguments {
         tell(&format!("{error} The CPU makes the samples."));
         let start = Instant::now();
         let samples = prepared.traced()?;
-        let reasons = Reasons { traced_seconds: Some(start.elapsed().as_secs_f64()), ..Reasons::default() };
+        let selection =
+            Selection { traced_seconds: Some(start.elapsed().as_secs_f64()), ..Selection::default() };
         let observed = prepared.observed_with(samples)?;
-        self.with_gpu(prepared, observed, reasons, then)
+        self.with_gpu(prepared, observed, selection, then)
     }
 
     /// Most bytes that stay on the adapter, where that is limited.

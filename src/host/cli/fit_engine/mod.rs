@@ -1,19 +1,20 @@
-//! What evaluates the passes of a fit, and how it is chosen; `gpu` and `absent`: with the GPU engine, and without.
+//! What evaluates the passes of a fit, and how it is chosen; `gpu`: on a graphics adapter.
 
-#[cfg(not(feature = "gpu"))]
-mod absent;
-#[cfg(feature = "gpu")]
 mod gpu;
 
 use std::borrow::Cow;
 
 use super::{Refusal, tell};
-use crate::engine::Objective;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::reference::{Reference, deviation};
 use crate::engine::view::ObservedView;
+use crate::engine::{Objective, Point};
+use crate::model::compose::TermName;
 use crate::prepare::Prepared;
 use crate::progress;
+use crate::render::shade::Shaded;
+use crate::render::shade::image_of_planes;
+use crate::scene::view::Camera;
 
 /// How far an engine's sums may be from those in f64, relative to the geometric mean of the diagonal entries that
 /// share row and column: a few hundred roundings of f32, of either sign. A robust loss' weights move with the
@@ -47,31 +48,30 @@ pub(super) struct FitEngineArguments {
 }
 
 /// An engine, and how it came to be taken.
-pub(super) struct Chosen<'g> {
+pub(super) struct SelectedEngine<'g> {
     pub(super) engine: FitEngine<'g>,
-    pub(super) reasons: Reasons,
+    pub(super) selection: Selection,
 }
 
 /// How an engine came to be taken.
 #[derive(Default)]
-pub(super) struct Reasons {
+pub(super) struct Selection {
     /// Why `auto` took it.
     pub(super) why: Option<String>,
     /// What it took to trace its samples, where the adapter had no room for its own.
     traced_seconds: Option<f64>,
 }
 
-impl Reasons {
-    #[cfg(feature = "gpu")]
+impl Selection {
     fn but(self, words: &str) -> Self {
         Self { why: self.why.map(|why| format!("{why}, but {words}")), ..self }
     }
 }
 
-impl Chosen<'_> {
+impl SelectedEngine<'_> {
     /// The seconds that making the samples took, where it was done for the engine.
     pub(super) fn sample_seconds(&self) -> Option<f64> {
-        self.engine.own_sample_seconds().or(self.reasons.traced_seconds)
+        self.engine.own_sample_seconds().or(self.selection.traced_seconds)
     }
 }
 
@@ -81,12 +81,7 @@ pub(super) enum FitEngine<'g> {
     /// On the CPU.
     Cpu(CpuEngine),
     /// On a graphics adapter.
-    #[cfg(feature = "gpu")]
     Gpu(crate::gpu::engine::GpuEngine<'g>),
-    /// There is none without the feature.
-    #[cfg(not(feature = "gpu"))]
-    #[allow(dead_code, reason = "nothing can make it")]
-    Gpu(std::convert::Infallible, std::marker::PhantomData<&'g ()>),
 }
 
 impl FitEngine<'_> {
@@ -94,10 +89,7 @@ impl FitEngine<'_> {
     pub(super) fn objective(&self) -> &dyn Objective {
         match self {
             Self::Cpu(engine) => engine,
-            #[cfg(feature = "gpu")]
             Self::Gpu(engine) => engine,
-            #[cfg(not(feature = "gpu"))]
-            Self::Gpu(never, _) => match *never {},
         }
     }
 
@@ -105,16 +97,12 @@ impl FitEngine<'_> {
     pub(super) fn views(&self) -> &[ObservedView] {
         match self {
             Self::Cpu(engine) => engine.views(),
-            #[cfg(feature = "gpu")]
             Self::Gpu(engine) => engine.views(),
-            #[cfg(not(feature = "gpu"))]
-            Self::Gpu(never, _) => match *never {},
         }
     }
 
     /// The views with what their samples show, wherever those were made.
     pub(super) fn surfaced_views(&self) -> Result<Cow<'_, [ObservedView]>, Refusal> {
-        #[cfg(feature = "gpu")]
         if let Self::Gpu(engine) = self
             && let Some((made, _)) = engine.device_samples()
         {
@@ -128,9 +116,38 @@ impl FitEngine<'_> {
         Ok(Cow::Borrowed(self.views()))
     }
 
+    /// A view as the engine itself shades it, with an image for each term.
+    pub(super) fn shaded(&self, index: usize, camera: &Camera, point: &Point) -> Result<Shaded, Refusal> {
+        match self {
+            Self::Cpu(engine) => {
+                let samples = &engine.views()[index].samples;
+                let image = |planes: &[Vec<f32>]| image_of_planes(samples, planes, camera);
+                let whole = image(&engine.image(index, point));
+                let mut terms = Vec::new();
+                for term in TermName::of(engine.effects()) {
+                    let planes = engine.term_image(index, point, term);
+                    let planes =
+                        planes.ok_or_else(|| Refusal::failure("the CPU engine shows no single terms"))?;
+                    terms.push((term, image(&planes)));
+                }
+                Ok(Shaded { image: whole, terms, haze: Vec::new(), glow: Vec::new() })
+            }
+            Self::Gpu(engine) => {
+                let refused = |error| super::graphics::Task::Fit.refusal(&error);
+                let samples = &engine.views()[index].samples;
+                let image = |planes: &[Vec<f32>]| image_of_planes(samples, planes, camera);
+                let whole = image(&engine.image(index, point).map_err(refused)?);
+                let mut terms = Vec::new();
+                for term in TermName::of(engine.effects()) {
+                    terms.push((term, image(&engine.term_image(index, point, term).map_err(refused)?)));
+                }
+                Ok(Shaded { image: whole, terms, haze: Vec::new(), glow: Vec::new() })
+            }
+        }
+    }
+
     /// How many samples there are.
     pub(super) fn samples(&self) -> usize {
-        #[cfg(feature = "gpu")]
         if let Self::Gpu(engine) = self
             && let Some((made, _)) = engine.device_samples()
         {
@@ -143,10 +160,7 @@ impl FitEngine<'_> {
     pub(super) fn own_sample_seconds(&self) -> Option<f64> {
         match self {
             Self::Cpu(_) => None,
-            #[cfg(feature = "gpu")]
             Self::Gpu(engine) => engine.device_samples().map(|(_, seconds)| seconds),
-            #[cfg(not(feature = "gpu"))]
-            Self::Gpu(never, _) => match *never {},
         }
     }
 
@@ -165,7 +179,6 @@ impl FitEngine<'_> {
                 ("threads".to_owned(), rayon::current_num_threads().to_string()),
                 ("instructions".to_owned(), crate::simd::instructions()),
             ],
-            #[cfg(feature = "gpu")]
             Self::Gpu(engine) => {
                 let (resident, streamed) = engine.bytes();
                 let own = engine.device_samples().is_some();
@@ -177,8 +190,6 @@ impl FitEngine<'_> {
                     ("bytes uploaded a pass".to_owned(), streamed.to_string()),
                 ]
             }
-            #[cfg(not(feature = "gpu"))]
-            Self::Gpu(never, _) => match *never {},
         }
     }
 }
@@ -227,40 +238,41 @@ impl FitEngineArguments {
         self.adapter.as_deref()
     }
 
-    /// Call `then` with the engine that was asked for, over the scene's views; without any, over samples that the
+    /// Call `then` with the requested engine, over the scene's views; without any, over samples that the
     /// adapter makes.
     pub(super) fn with_engine<T>(
         &self,
         prepared: &Prepared,
         observed: Option<Vec<ObservedView>>,
-        then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
+        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
         let Some(observed) = observed else { return self.with_own_samples(prepared, then) };
         let (gpu, why) = self.wants_gpu(&observed);
-        let reasons = Reasons { why, ..Reasons::default() };
+        let selection = Selection { why, ..Selection::default() };
         if gpu {
-            return self.with_gpu(prepared, observed, reasons, then);
+            return self.with_gpu(prepared, observed, selection, then);
         }
-        self.on_cpu(prepared, observed, reasons, then)
+        self.on_cpu(prepared, observed, selection, then)
     }
 
     fn on_cpu<T>(
         &self,
         prepared: &Prepared,
         observed: Vec<ObservedView>,
-        reasons: Reasons,
-        then: impl FnOnce(&Chosen<'_>) -> Result<T, Refusal>,
+        selection: Selection,
+        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
         let engine = FitEngine::Cpu(prepared.engine_over(observed));
         self.verify(prepared, &engine)?;
-        then(&Chosen { engine, reasons })
+        then(&SelectedEngine { engine, selection })
     }
 
-    /// Hold an engine against the model in f64, where that is asked for.
+    /// Hold an engine against the model in f64, where that is requested.
     fn verify(&self, prepared: &Prepared, engine: &FitEngine<'_>) -> Result<(), Refusal> {
         if !self.verify {
             return Ok(());
         }
+        prepared.setup().built_in().map_err(|error| Refusal::new(format!("--verify: {error}.")))?;
         let (objective, point) = (engine.objective(), prepared.start());
         let bar = progress::spinner("verify");
         let views = engine.surfaced_views()?;

@@ -25,7 +25,7 @@ use crate::scene::view::View;
 use crate::tensor::SharedDevice;
 
 impl MapArguments {
-    /// Fit the maps that are asked for: samples, cubes, constants and free columns are then those of the fitted maps,
+    /// Fit the requested maps: samples, cubes, constants and free columns are then those of the fitted maps,
     /// and a view that was held out is gone.
     pub(in crate::cli) fn fit(
         &self,
@@ -36,6 +36,7 @@ impl MapArguments {
         if self.maps.is_empty() {
             return Ok((observed, None));
         }
+        prepared.setup().built_in().map_err(|error| Refusal::new(format!("--maps: {error}.")))?;
         let clock = Instant::now();
         let named = |kind: &MapKind| self.maps.iter().any(|name| name == kind.name());
         let kinds: Vec<MapKind> = MapKind::ALL.into_iter().filter(named).collect();
@@ -107,7 +108,14 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         MapError::Tensor(error) => tensor_words(error),
         error => error.to_string(),
     };
-    let words = format!("{}: {what}", scene.display());
+    // The library's advice ends its words; the option that follows it comes after.
+    let option = match error {
+        MapError::TooLarge { .. } | MapError::OutOfMemory { .. } => Some("--adapter"),
+        MapError::Unread { .. } | MapError::NotUnwrapped { .. } => Some("--maps"),
+        MapError::Tensor(_) | MapError::NotFinite { .. } | MapError::Constants(_) => None,
+    };
+    let option = option.map(|option| format!(" ({option})")).unwrap_or_default();
+    let words = format!("{}: {}{option}.", scene.display(), what.trim_end_matches('.'));
     match error {
         MapError::Tensor(_) | MapError::OutOfMemory { .. } | MapError::NotFinite { .. } => {
             Refusal::failure(words)

@@ -33,8 +33,7 @@ fn parse_antialias(name: &str) -> Result<Antialias, String> {
 
 /// What an engine is to do with a scene; the CPU's does not ask.
 #[derive(Clone, Copy)]
-#[cfg_attr(not(feature = "gpu"), allow(dead_code, reason = "the GPU's alone prepares for it"))]
-pub(super) struct Task {
+pub(super) struct Painting {
     /// Whether the mesh will move.
     pub(super) animated: bool,
     /// Whether GPU time is measured.
@@ -47,18 +46,18 @@ impl EngineArguments {
         self.engine != "cpu"
     }
 
-    /// Call `draw` with the engine that was asked for, the scene in it.
+    /// Call `draw` with the requested engine, the scene in it.
     pub(super) fn with_painter(
         &self,
         prepared: &mut Prepared,
-        task: Task,
+        painting: Painting,
         draw: impl FnOnce(&Prepared, &mut dyn Painter) -> Result<(), Refusal>,
     ) -> Result<(), Refusal> {
         let antialias = self.antialias.unwrap_or(Antialias::Grid(prepared.scene.quality.samples_per_axis));
         if self.may_be_gpu()
             && let Some(gpu) = self.open()?
         {
-            let mut painter = self.painter(&gpu, prepared, antialias, task)?;
+            let mut painter = self.painter(&gpu, prepared, antialias, painting)?;
             return draw(prepared, &mut painter);
         }
         let Antialias::Grid(n) = antialias else {
@@ -73,11 +72,10 @@ impl EngineArguments {
     }
 }
 
-#[cfg(feature = "gpu")]
 mod gpu {
     use super::super::painter::GpuPainter;
-    use super::{Antialias, EngineArguments, Prepared, Refusal, Task};
-    use crate::cli::graphics::Task as Doing;
+    use super::{Antialias, EngineArguments, Painting, Prepared, Refusal};
+    use crate::cli::graphics::Task;
     use crate::cli::tell;
     use crate::gpu::error::SOFTWARE_DRIVER;
     use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
@@ -89,7 +87,7 @@ mod gpu {
             match Gpu::open(&choice) {
                 Ok(gpu) => Ok(Some(gpu)),
                 Err(error) if self.engine == "gpu" || self.adapter.is_some() => {
-                    Err(Doing::Render.refusal(&error))
+                    Err(Task::Render.refusal(&error))
                 }
                 Err(GpuError::NoAdapter) => {
                     tell(&format!(
@@ -109,41 +107,11 @@ mod gpu {
             gpu: &'a Gpu,
             prepared: &'a Prepared,
             antialias: Antialias,
-            task: Task,
+            painting: Painting,
         ) -> Result<GpuPainter<'a>, Refusal> {
-            let Task { animated, timed } = task;
+            let Painting { animated, timed } = painting;
             let options = RenderOptions { antialias, budget: self.accuracy, timed, animated };
-            GpuPainter::new(gpu, prepared, options).map_err(|error| Doing::Render.refusal(&error))
-        }
-    }
-}
-
-#[cfg(not(feature = "gpu"))]
-mod gpu {
-    use super::{Antialias, CpuPainter, EngineArguments, Prepared, Refusal, Task};
-
-    /// There is none.
-    pub(super) enum Gpu {}
-
-    impl EngineArguments {
-        pub(super) fn open(&self) -> Result<Option<Gpu>, Refusal> {
-            if self.engine == "gpu" || self.adapter.is_some() {
-                return Err(Refusal::new(
-                    "this skinfit was built without its GPU renderer. Build it with the feature `gpu` (a \
-                     default one), or render with --engine cpu.",
-                ));
-            }
-            Ok(None)
-        }
-
-        pub(super) fn painter<'a>(
-            &self,
-            gpu: &'a Gpu,
-            _prepared: &'a Prepared,
-            _antialias: Antialias,
-            _task: Task,
-        ) -> Result<CpuPainter<'a>, Refusal> {
-            match *gpu {}
+            GpuPainter::new(gpu, prepared, options).map_err(|error| Task::Render.refusal(&error))
         }
     }
 }

@@ -11,18 +11,23 @@ mod painter;
 use std::path::{Path, PathBuf};
 
 use super::scene::{SceneArguments, parse_effects};
+use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell_warnings};
-use crate::model::effects::Effects;
-use crate::model::params::{Param, Params};
-use crate::prepare::{PrepareOptions, Prepared, Views};
+use crate::bake::{self, VertexOcclusion};
+use crate::fit::params_file::Foreign;
+use crate::model::effects::{Effect, Effects};
+use crate::model::params::{LARGEST, Param, Params};
+use crate::prepare::{ClipOcclusion, PrepareOptions, Prepared, Views};
 use crate::progress;
 use crate::render::files::{ImageOptions, write_exr_layers, write_image};
 use crate::render::image::{MAX_PIXELS, MAX_SIDE};
 use crate::render::tonemap::{Operator, ToneMap};
 use crate::samples;
 use crate::scene::animation::Animation;
+use crate::scene::mesh::Mesh;
+use crate::scene::view::Background;
 use frames::Frame;
-use painter::Painter;
+use painter::{Beside, Painter};
 
 /// Render a view of a scene with the model
 #[derive(clap::Args)]
@@ -32,9 +37,12 @@ use painter::Painter;
 pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
-    /// Parameters of an earlier fit, instead of the scene's start values.
+    /// Parameters of an earlier fit, instead of the scene's start values. Drawn are the scene's effects, or
+    /// those of --effects: where the fit had others, a warning names the values that were not fitted.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
+    #[command(flatten)]
+    set: SetArguments,
     /// Which view [default: the scene's first].
     #[arg(long, value_name = "NAME")]
     view: Option<String>,
@@ -48,9 +56,13 @@ pub(super) struct Arguments {
     /// Pixels across and down, instead of the view's; its vertical field of view stays.
     #[arg(long, value_name = "WxH", value_parser = parse_size)]
     size: Option<(u32, u32)>,
-    /// Write a layer for each term into the EXR; they add up to the whole.
+    /// Write a layer for each term into the EXR, and one for the background; they add up to the whole without its
+    /// bloom. The haze, where an effect makes one, stands beside them.
     #[arg(long)]
     layers: bool,
+    /// What stands behind the mesh, instead of the view's own: none, environment, or R,G,B (linear radiance).
+    #[arg(long, value_name = "WHAT", value_parser = parse_background)]
+    background: Option<Background>,
     /// How radiance becomes a PNG's colours.
     #[arg(long, default_value = "clip", value_parser = ["clip", "reinhard", "aces"])]
     tone: String,
@@ -62,10 +74,13 @@ pub(super) struct Arguments {
     /// Render so many frames: a whole turn of the camera about the mesh's vertical axis.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Sequences")]
     frames: Option<u32>,
-    /// Let the frames go through the mesh file's animation 0 instead, the camera standing still. Ambient
-    /// occlusion stays that of its beginning.
+    /// Let the frames go through the mesh file's animation 0 instead, the camera standing still.
     #[arg(long, requires = "frames", help_heading = "Sequences")]
     animate: bool,
+    /// How ambient occlusion follows the animation: `targets`, by what is baked once for each morph target that it
+    /// moves, or `frames`, by a bake of each frame.
+    #[arg(long, value_name = "HOW", default_value = "targets", value_parser = ["targets", "frames"], requires = "animate", help_heading = "Sequences")]
+    occlusion: String,
     /// Print what a frame took: GPU time by pass, uploaded bytes, bindings.
     #[arg(long)]
     stats: bool,
@@ -82,8 +97,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         fit: false,
         views: arguments.view.clone().map_or(Views::First, Views::Named),
         params: arguments.params.clone(),
+        set: arguments.set.values()?.to_vec(),
         cache: arguments.scene.cache(),
         time: arguments.animate.then_some(0.0),
+        clip: arguments.animate.then_some(arguments.follows()),
+        background: arguments.background,
     };
     let mut prepared = Prepared::baked(&path, &options)?;
     samples::check_uvs(&prepared.scene, &prepared.scene.mesh.uvs)?;
@@ -93,17 +111,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     }
     let animation = if arguments.animate { Some(animation(&prepared)?) } else { None };
     tell_warnings(&prepared.warnings);
+    tell_warnings(&foreign(arguments, &path, &prepared).into_iter().collect::<Vec<_>>());
+    arguments.set.tell_idle(prepared.scene.effects);
     let frames = frames(arguments, &prepared, animation.as_ref());
     let sequence = arguments.frames.is_some();
-    let task = engine::Task { animated: animation.is_some(), timed: arguments.stats };
-    arguments.engine.with_painter(&mut prepared, task, |prepared, painter| {
+    // The effect `haze` is asked for by name, and has no other place to go.
+    let layers = is_exr && arguments.layers;
+    let beside = Beside { layers, haze: layers || is_exr && prepared.scene.effects.has(Effect::Haze) };
+    let painting = engine::Painting { animated: animation.is_some(), timed: arguments.stats };
+    arguments.engine.with_painter(&mut prepared, painting, |prepared, painter| {
         let bar = progress::bar("frames", frames.len() as u64);
         for frame in &frames {
             if let (Some(animation), Some(time)) = (&animation, frame.time) {
-                painter.set_mesh(&animation.mesh(time)?)?;
+                let mesh = animation.mesh(time)?;
+                let occlusion = frame_occlusion(arguments, prepared, &mesh);
+                painter.set_mesh(&mesh, occlusion.as_ref())?;
             }
-            let layers = is_exr && arguments.layers;
-            let picture = painter.paint(&frame.camera, prepared.gains[0], layers)?;
+            let picture = painter.paint(&frame.camera, prepared.gains[0], beside)?;
             if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
                 return Err(samples::nothing_visible(&prepared.scene, &prepared.scene.views[0]).into());
             }
@@ -117,7 +141,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     Ok(Exit::Done)
 }
 
-/// The frames that were asked for.
+/// What is drawn with constants that were fitted with other effects, in words.
+fn foreign(arguments: &Arguments, path: &Path, prepared: &Prepared) -> Option<String> {
+    let foreign = Foreign {
+        file: arguments.params.as_deref()?,
+        fitted: prepared.fitted,
+        scene: if arguments.effects.is_some() { Path::new("--effects") } else { path },
+        effects: prepared.scene.effects,
+        params: &prepared.scene.params,
+        chosen: &arguments.set.params(),
+    };
+    let names = prepared.fitted?.iter().map(Effect::name).collect::<Vec<_>>().join(",");
+    let remedy = format!("To draw what was fitted, name the scene that was fitted, or --effects {names}.");
+    // Whoever names effects has left out what is left out.
+    foreign.words("drawn", &remedy, arguments.effects.is_none())
+}
+
+/// The requested frames.
 fn frames(arguments: &Arguments, prepared: &Prepared, animation: Option<&Animation>) -> Vec<Frame> {
     let (camera, output) = (&prepared.scene.views[0].camera, &arguments.output);
     match (arguments.frames, animation) {
@@ -155,14 +195,32 @@ fn write(
         ],
         ..ImageOptions::default()
     };
-    if picture.layers.is_empty() {
+    let haze = ("haze".to_owned(), picture.haze.as_slice());
+    let planes = if picture.haze.is_empty() { &[][..] } else { std::slice::from_ref(&haze) };
+    if picture.layers.is_empty() && planes.is_empty() {
         write_image(&frame.path, &picture.image, &options)?;
     } else {
-        let layers: Vec<_> =
-            picture.layers.iter().map(|(name, image)| (name.name().to_owned(), image.clone())).collect();
-        write_exr_layers(&frame.path, &picture.image, &layers, &options)?;
+        write_exr_layers(&frame.path, &picture.image, &picture.layers, planes, &options)?;
     }
     Ok(())
+}
+
+impl Arguments {
+    /// How occlusion follows an animation.
+    fn follows(&self) -> ClipOcclusion {
+        if self.occlusion == "frames" { ClipOcclusion::Frames } else { ClipOcclusion::Targets }
+    }
+}
+
+/// The occlusion of a frame's pose alone, where each frame is to be baked and an effect asks for it.
+fn frame_occlusion(arguments: &Arguments, prepared: &Prepared, mesh: &Mesh) -> Option<VertexOcclusion> {
+    let scene = &prepared.scene;
+    let wanted =
+        arguments.follows() == ClipOcclusion::Frames && scene.effects.needs(scene.silhouette).occlusion;
+    let cache = arguments.scene.cache();
+    let (occlusion, stats) = wanted.then(|| bake::bake_pose(scene, &mesh.pose(), cache.as_deref()))?;
+    tell_warnings(&stats.warnings);
+    Some(occlusion)
 }
 
 fn tell_done(
@@ -188,6 +246,24 @@ fn parse_stops(text: &str) -> Result<f32, String> {
     let stops = text.parse().map_err(|_| "give a number of stops, such as -1.5")?;
     // Beyond that, every image is black or white.
     if (-64.0..=64.0).contains(&stops) { Ok(stops) } else { Err("give stops in [-64, 64]".to_owned()) }
+}
+
+/// `none`, `environment` or `0.1,0.2,0.3`
+fn parse_background(text: &str) -> Result<Background, String> {
+    match text {
+        "none" => return Ok(Background::None),
+        "environment" => return Ok(Background::Environment),
+        _ => {}
+    }
+    let rgb: Vec<f64> = text.split(',').map_while(|c| c.trim().parse().ok()).collect();
+    match <[f64; 3]>::try_from(rgb) {
+        Ok(rgb) if text.matches(',').count() == 2 && rgb.iter().all(|c| (0.0..=LARGEST).contains(c)) => {
+            Ok(Background::Color(rgb))
+        }
+        _ => Err(format!(
+            "give none, environment, or three linear radiances from 0 to {LARGEST:e}, such as 0.1,0.2,0.3"
+        )),
+    }
 }
 
 /// `1920x1080`

@@ -1,10 +1,11 @@
 //! What draws frames: the CPU engine, or the GPU's renderer.
 
 use super::Refusal;
+use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
-use crate::model::compose::TermName;
 use crate::model::effects::Effect;
 use crate::prepare::Prepared;
+use crate::render::backdrop::Backdrop;
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
@@ -15,23 +16,37 @@ use crate::scene::view::Camera;
 /// What a frame shows.
 pub(super) struct Picture {
     pub(super) image: Image,
-    /// An image for each term, where layers are asked for.
-    pub(super) layers: Vec<(TermName, Image)>,
+    /// An image for each term and what stands behind the mesh, where layers are asked for.
+    pub(super) layers: Vec<(String, Image)>,
+    /// The haze of each pixel, where it is asked for and an effect makes one.
+    pub(super) haze: Vec<f32>,
     /// What the user should know.
     pub(super) warnings: Vec<String>,
+}
+
+/// What a picture is to hold beside the image.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Beside {
+    /// An image for each term and what stands behind the mesh.
+    pub(super) layers: bool,
+    /// The haze.
+    pub(super) haze: bool,
 }
 
 /// An engine with a scene in it.
 pub(super) trait Painter {
     /// The engine, in words.
     fn name(&self) -> String;
-    /// Move the mesh to another pose.
-    fn set_mesh(&mut self, mesh: &Mesh) -> Result<(), Refusal>;
+    /// Move the mesh to another pose, with the occlusion of that pose where it has one of its own.
+    fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal>;
     /// The image that `camera` sees, times `gain`.
-    fn paint(&mut self, camera: &Camera, gain: f64, layers: bool) -> Result<Picture, Refusal>;
+    fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal>;
     /// What the last frame took, a line each.
     fn stats(&self) -> Vec<String>;
 }
+
+/// The layer of what stands behind the mesh.
+const BACKGROUND: &str = "background";
 
 /// The CPU engine: rays through the samples' positions, the model in f64.
 pub(super) struct CpuPainter<'a> {
@@ -47,22 +62,22 @@ pub(super) struct CpuPainter<'a> {
 impl<'a> CpuPainter<'a> {
     /// Of a scene at its own pose.
     pub(super) fn new(prepared: &'a Prepared) -> Result<Self, Refusal> {
+        prepared.setup().built_in().map_err(|error| Refusal::new(format!("{error}.")))?;
         let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
-        let (posed, rays, open) = pose(prepared, &prepared.scene.mesh)?;
+        let (posed, rays, open) = pose(prepared, &prepared.scene.mesh, prepared.occlusion.as_ref())?;
         Ok(Self { prepared, shader, posed, rays, open, seconds: 0.0 })
     }
 }
 
 /// The mesh in the world, as rays see it, and its occlusion.
-fn pose(prepared: &Prepared, mesh: &Mesh) -> Result<(PosedMesh, RayMesh, Option<Vec<f32>>), Refusal> {
+fn pose(
+    prepared: &Prepared,
+    mesh: &Mesh,
+    occlusion: Option<&VertexOcclusion>,
+) -> Result<(PosedMesh, RayMesh, Option<Vec<f32>>), Refusal> {
     let posed = mesh.pose();
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
-    let open = samples::posed_occlusion(
-        &prepared.scene,
-        &mesh.morphs,
-        mesh.positions.len(),
-        prepared.occlusion.as_ref(),
-    )?;
+    let open = samples::posed_occlusion(&prepared.scene, &mesh.morphs, mesh.positions.len(), occlusion)?;
     Ok((posed, rays, open))
 }
 
@@ -71,22 +86,32 @@ impl Painter for CpuPainter<'_> {
         "cpu".to_owned()
     }
 
-    fn set_mesh(&mut self, mesh: &Mesh) -> Result<(), Refusal> {
-        (self.posed, self.rays, self.open) = pose(self.prepared, mesh)?;
+    fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal> {
+        let occlusion = occlusion.or(self.prepared.occlusion.as_ref());
+        (self.posed, self.rays, self.open) = pose(self.prepared, mesh, occlusion)?;
         Ok(())
     }
 
-    fn paint(&mut self, camera: &Camera, gain: f64, layers: bool) -> Result<Picture, Refusal> {
+    fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal> {
         let start = std::time::Instant::now();
         let scene = &self.prepared.scene;
         let samples = sample_view(scene, &self.posed, &self.rays, self.open.as_deref(), camera);
         let mut shaded = self.shader.shade(&samples, camera, gain);
+        let mut layers: Vec<(String, Image)> =
+            shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image)).collect();
+        let background = scene.views[0].background;
+        let n = scene.quality.samples_per_axis;
+        if let Some(backdrop) = Backdrop::new(scene, &scene.params, background, camera, n) {
+            layers.push((BACKGROUND.to_owned(), backdrop.layer(&shaded.image, gain)));
+            backdrop.put_behind(&mut shaded.image, &mut shaded.glow, gain);
+        }
         if scene.effects.has(Effect::Bloom) {
-            add_bloom(&mut shaded.image, &shaded.haze);
+            add_bloom(&mut shaded.image, &shaded.glow, scene.bloom.sigma);
         }
         self.seconds = start.elapsed().as_secs_f64();
-        let layers = if layers { shaded.terms } else { Vec::new() };
-        Ok(Picture { image: shaded.image, layers, warnings: Vec::new() })
+        let layers = if beside.layers { layers } else { Vec::new() };
+        let haze = if beside.haze { shaded.haze } else { Vec::new() };
+        Ok(Picture { image: shaded.image, layers, haze, warnings: Vec::new() })
     }
 
     fn stats(&self) -> Vec<String> {
@@ -94,23 +119,28 @@ impl Painter for CpuPainter<'_> {
     }
 }
 
-#[cfg(feature = "gpu")]
 pub(super) use gpu::GpuPainter;
 
-#[cfg(feature = "gpu")]
 mod gpu {
-    use super::{Camera, Mesh, Painter, Picture, Prepared, Refusal, TermName};
+    use super::{
+        BACKGROUND, Backdrop, Beside, Camera, Image, Mesh, Painter, Picture, Prepared, Refusal,
+        VertexOcclusion,
+    };
     use crate::cli::graphics::Task;
     use crate::gpu::timing::PassTime;
     use crate::gpu::upload::Content;
     use crate::gpu::{Gpu, GpuError, RenderOptions, Renderer};
+    use crate::model::compose::TermName;
 
     /// The production renderer.
     pub(in crate::cli::render) struct GpuPainter<'a> {
         gpu: &'a Gpu,
         renderer: Renderer<'a>,
+        prepared: &'a Prepared,
         terms: Vec<TermName>,
         times: Vec<PassTime>,
+        /// Whether what the user should know of the uploads was told.
+        told: bool,
     }
 
     impl<'a> GpuPainter<'a> {
@@ -126,9 +156,50 @@ mod gpu {
                 occlusion: prepared.occlusion.as_ref(),
                 params: &prepared.scene.params,
             };
-            let renderer = Renderer::new(gpu, content, options)?;
+            let mut renderer = Renderer::new(gpu, content, options)?;
+            renderer.set_background(prepared.scene.views[0].background);
             let terms = TermName::of(prepared.scene.effects);
-            Ok(Self { gpu, renderer, terms, times: Vec::new() })
+            Ok(Self { gpu, renderer, prepared, terms, times: Vec::new(), told: false })
+        }
+    }
+
+    impl GpuPainter<'_> {
+        /// The layers of a frame: terms, and what stands behind the mesh.
+        fn layers(&mut self, camera: &Camera, gain: f64) -> Result<Vec<(String, Image)>, GpuError> {
+            let mut layers = Vec::new();
+            let mut last = None;
+            for &name in &self.terms {
+                let image = self.renderer.render_term(name, camera, gain)?;
+                last = Some(Image { rgb: Vec::new(), ..image.clone() });
+                layers.push((name.name().to_owned(), image));
+            }
+            let (scene, n) = (&self.prepared.scene, self.renderer.backdrop_samples());
+            let background = scene.views[0].background;
+            if let Some(coverage) = last
+                && let Some(backdrop) = Backdrop::new(scene, &scene.params, background, camera, n)
+            {
+                layers.push((BACKGROUND.to_owned(), backdrop.layer(&coverage, gain)));
+            }
+            Ok(layers)
+        }
+
+        /// What the user should know of a frame.
+        fn warnings(&mut self, clipped: usize) -> Vec<String> {
+            let mut warnings = Vec::new();
+            let texels = self.renderer.clipped_texels();
+            if texels > 0 && !std::mem::replace(&mut self.told, true) {
+                warnings.push(format!(
+                    "{texels} texels of the environment's cubes are brighter than 65504, the end of 16-bit textures' \
+                     range, and are cut there. Use --accuracy exact to have them whole."
+                ));
+            }
+            if clipped > 0 {
+                warnings.push(format!(
+                    "{clipped} pixels are brighter than 65504, the end of the 16-bit targets' range, and were cut \
+                     there. Use --accuracy exact and no msaa4 to have them whole."
+                ));
+            }
+            warnings
         }
     }
 
@@ -138,25 +209,21 @@ mod gpu {
             format!("gpu: {}{kind}", self.gpu.name())
         }
 
-        fn set_mesh(&mut self, mesh: &Mesh) -> Result<(), Refusal> {
-            self.renderer.set_mesh(mesh);
+        fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal> {
+            self.renderer.set_mesh(mesh, occlusion);
             Ok(())
         }
 
-        fn paint(&mut self, camera: &Camera, gain: f64, layers: bool) -> Result<Picture, Refusal> {
+        fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal> {
             let refused = |error: GpuError| Task::Render.refusal(&error);
             let frame = self.renderer.render(camera, gain).map_err(refused)?;
             self.times = frame.times;
-            let wanted = if layers { self.terms.as_slice() } else { &[] };
-            let term = |&name| Ok((name, self.renderer.render_term(name, camera, gain)?));
-            let layers = wanted.iter().map(term).collect::<Result<_, GpuError>>().map_err(refused)?;
-            let warning = format!(
-                "{} pixels are brighter than 65504, the end of the 16-bit targets' range, and were cut there. \
-                 Use --accuracy exact and no msaa4 to have them whole.",
-                frame.clipped
-            );
-            let warnings = if frame.clipped > 0 { vec![warning] } else { Vec::new() };
-            Ok(Picture { image: frame.image, layers, warnings })
+            let layers = if beside.layers { self.layers(camera, gain).map_err(refused)? } else { Vec::new() };
+            let haze = match beside.haze {
+                true => self.renderer.render_haze(camera, gain).map_err(refused)?,
+                false => Vec::new(),
+            };
+            Ok(Picture { image: frame.image, layers, haze, warnings: self.warnings(frame.clipped) })
         }
 
         fn stats(&self) -> Vec<String> {
@@ -168,6 +235,7 @@ mod gpu {
             }
             let mebibytes = self.renderer.uploaded_bytes() as f64 / f64::from(1 << 20);
             lines.push(format!("{:>16}  {mebibytes:9.3} MiB", "uploaded"));
+            lines.push(format!("{:>16}  {:9} of 16-bit cubes", "texels cut", self.renderer.clipped_texels()));
             let names = plan.resources.iter().map(|r| r.name()).collect::<Vec<_>>().join(", ");
             lines.push(format!("{:>16}  {:9} ({names})", "bindings", plan.resources.len()));
             let names = plan.attributes.iter().map(|a| a.name()).collect::<Vec<_>>().join(", ");

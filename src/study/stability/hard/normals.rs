@@ -89,6 +89,13 @@ pub(super) fn normals() -> Vec<HardCase> {
         ],
         &[Holds::Alike(3)],
     ));
+    all.push(case(
+        "texel of the listing that is no direction",
+        "black or not finite: the smooth normal, which (0, 0, 1) is as printed, and nothing of the map",
+        with(|s| s.setup.form = Form::Listing),
+        vec![texel([0.0, 0.0, 1.0]), texel([0.0; 3]), texel([nan, 0.5, 1.0]), texel([0.5, 0.5, inf])],
+        &[Holds::Alike(4), Holds::Flat(Param::NormalStrength)],
+    ));
     for silhouette in Silhouette::ALL {
         all.push(case(
             "the listing as printed",

@@ -3,8 +3,8 @@
 use super::quality::{Swept, bake_seconds};
 use crate::StudyError;
 use crate::model::effects::{Effect, Effects, Needs};
-use crate::tradeoff::axis::{Axis, Knob, Sweep};
-use crate::tradeoff::bench::Bench;
+use crate::tradeoff::axis::{Axis, Knob, Rates, Sweep};
+use crate::tradeoff::bench::{Bench, Settings};
 
 /// The size of one kind of cube.
 pub(super) struct CubeSize {
@@ -64,8 +64,18 @@ impl Axis for CubeSize {
         true
     }
 
+    fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+        self.swept().seconds(bench, rates, &|_| 0.0, &|settings| self.bake(bench, settings))
+    }
+
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
-        let swept = Swept {
+        self.swept().sweep(bench, &bench.point(), &|settings| self.bake(bench, settings))
+    }
+}
+
+impl CubeSize {
+    fn swept(&self) -> Swept<'_> {
+        Swept {
             axis: self.name,
             title: self.title,
             method: "Images with the cube at each size, all else as the scene has it. Seconds are those of baking it, nothing cached."
@@ -73,11 +83,14 @@ impl Axis for CubeSize {
             knob: self.knob,
             values: self.values,
             count: ("KiB", &|size| 6.0 * f64::from((size + 2).pow(2)) * 16.0 / 1024.0),
-        };
-        swept.sweep(bench, &bench.point(), &|settings| {
-            let mut scene = bench.scene(settings);
-            scene.effects = Effects::of(&[self.effect]);
-            bake_seconds(bench, &scene, self.bake)
-        })
+            // Not one of so few texels that they are no measure of others.
+            probe: 16,
+        }
+    }
+
+    fn bake(&self, bench: &Bench<'_>, settings: Settings) -> Result<f64, StudyError> {
+        let mut scene = bench.scene(settings);
+        scene.effects = Effects::of(&[self.effect]);
+        bake_seconds(bench, &scene, self.bake)
     }
 }

@@ -4,7 +4,7 @@ use super::format::images_in;
 use crate::StudyError;
 use crate::model::formats::{Emulated, Format, HardwareFilter, NearestTexel};
 use crate::reference::Difference;
-use crate::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
+use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::Bench;
 
 /// Filters of cube lookups.
@@ -19,6 +19,11 @@ impl Axis for Filters {
         let scene = &bench.prepared.scene;
         let asked = scene.effects.needs(scene.silhouette).environment();
         asked.then_some(()).ok_or("no effect looks a cube up")
+    }
+
+    fn seconds(&self, _: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+        // Once as it stands, and with each filter.
+        Ok(4.0 * rates.images)
     }
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
@@ -39,14 +44,15 @@ impl Axis for Filters {
             time: None,
             counts: Vec::new(),
             reference: fetches == 4.0,
-            front: false,
+            present: false,
+            pareto: false,
         };
         let mut settings = vec![
             setting(NearestTexel::NAME, 1.0, &nearest),
             setting(HardwareFilter::NAME, 1.0, &hardware),
             setting("exact", 4.0, &exact),
         ];
-        mark_front(&mut settings);
+        mark_pareto(&mut settings);
         Ok(Sweep {
             axis: self.name(),
             title: "Filter of the cubes",

@@ -6,7 +6,7 @@ use crate::model::formats::{Declared, Emulated, Fixed, Format, Half, Single};
 use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::timing::{Rounds, interleaved, seconds_of};
-use crate::tradeoff::axis::{Axis, Setting, Sweep, mark_front};
+use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, Evaluated};
 
 /// Number formats.
@@ -19,6 +19,12 @@ impl Axis for Formats {
 
     fn applies(&self, _: &Bench<'_>) -> Result<(), &'static str> {
         Ok(())
+    }
+
+    fn seconds(&self, _: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+        // Five formats, four of them emulated by some three operations each; then f64 and f32 in turns.
+        let timed = Rounds::default().expected(&[rates.images, rates.pass]);
+        Ok((2.0 + 4.0 * 3.0) * rates.images + timed)
     }
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
@@ -52,7 +58,8 @@ impl Axis for Formats {
             time: None,
             counts: Vec::new(),
             reference: false,
-            front: false,
+            present: false,
+            pareto: false,
         };
         let mut settings = vec![
             setting(Fixed::NAME, 12.0, &in_format(Fixed::NAME)),
@@ -62,7 +69,7 @@ impl Axis for Formats {
             Setting { time: Some(timed[1]), ..setting(Single::NAME, 32.0, &in_format(Single::NAME)) },
             Setting { time: Some(timed[0]), reference: true, ..setting("f64", 64.0, &exact) },
         ];
-        mark_front(&mut settings);
+        mark_pareto(&mut settings);
         Ok(Sweep {
             axis: self.name(),
             title: "Number format",

@@ -1,9 +1,9 @@
 //! How many pixels a fit needs.
 
-use super::solver::Fits;
+use super::solver::{Fits, expected_passes};
 use crate::StudyError;
 use crate::fit::SolverKind;
-use crate::tradeoff::axis::{Axis, Sweep};
+use crate::tradeoff::axis::{Axis, Rates, Sweep};
 use crate::tradeoff::bench::Bench;
 
 /// Pixels used in a fit: every n-th block of them, or a coarse fit first and finer ones from there.
@@ -20,6 +20,12 @@ impl Axis for Pixels {
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
         let targets = bench.prepared.scene.views.iter().any(|view| view.target.is_some());
         targets.then_some(()).ok_or("no view names a target to fit to")
+    }
+
+    fn seconds(&self, _: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+        let share = |strides: &[usize]| strides.iter().map(|&stride| 1.0 / stride as f64).sum::<f64>();
+        let passes = STRIDES.map(|strides| share(strides) * rates.pass);
+        Ok(Fits::seconds(&passes.map(|pass| pass * expected_passes(SolverKind::Varpro)), rates))
     }
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {

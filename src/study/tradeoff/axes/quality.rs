@@ -4,8 +4,8 @@ use crate::StudyError;
 use crate::engine::Point;
 use crate::reference::Difference;
 use crate::scene::Scene;
-use crate::timing::{Job, Rounds, interleaved};
-use crate::tradeoff::axis::{Choose, Knob, Setting, Sweep, mark_front};
+use crate::timing::{Job, Rounds, interleaved, seconds_of};
+use crate::tradeoff::axis::{Choose, Knob, Rates, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, Settings, baked};
 
 /// How bakes, traces and fits are timed. What takes longer than a few seconds is run once: what disturbs it for a
@@ -18,11 +18,16 @@ pub(super) struct Swept<'a> {
     pub(super) title: &'static str,
     pub(super) method: String,
     pub(super) knob: Knob,
-    /// Ascending; the last is the reference.
+    /// Ascending; the scene's own comes among them, and the last is the reference.
     pub(super) values: &'a [u32],
-    /// What is counted of a value.
+    /// What is counted of a value, and what its seconds grow with.
     pub(super) count: (&'static str, &'a dyn Fn(u32) -> f64),
+    /// The value whose seconds are measured to foretell those of the others.
+    pub(super) probe: u32,
 }
+
+/// The work whose seconds are the cost of a setting.
+pub(super) type Work<'a> = &'a dyn Fn(Settings) -> Result<f64, StudyError>;
 
 impl Swept<'_> {
     fn settings(&self, bench: &Bench<'_>, value: u32) -> Settings {
@@ -31,19 +36,56 @@ impl Swept<'_> {
         settings
     }
 
+    /// What the scene has.
+    fn present(&self, bench: &Bench<'_>) -> u32 {
+        *self.knob.of(&mut bench.settings().quality)
+    }
+
+    /// The values, the scene's own among them.
+    fn values(&self, bench: &Bench<'_>) -> Vec<u32> {
+        let mut values = self.values.to_vec();
+        values.push(self.present(bench));
+        values.sort_unstable();
+        values.dedup();
+        values
+    }
+
+    /// About how many seconds [`Self::sweep`] takes, where the samples of a value take `trace` of them.
+    pub(super) fn seconds(
+        &self,
+        bench: &Bench<'_>,
+        rates: Rates,
+        trace: &dyn Fn(u32) -> f64,
+        work: Work<'_>,
+    ) -> Result<f64, StudyError> {
+        let mut counted = Ok(0.0);
+        let whole = seconds_of(|| counted = work(self.settings(bench, self.probe)));
+        let counted = counted?;
+        let values = self.values(bench);
+        let of = |value: u32| {
+            let share = (self.count.1)(value) / (self.count.1)(self.probe);
+            (whole - counted).max(0.0) + counted * share
+        };
+        let jobs: Vec<f64> = values.iter().map(|&value| of(value)).collect();
+        // What is not in the cache yet is baked once more.
+        let evaluated: f64 = values.iter().map(|&value| rates.images + trace(value) + of(value)).sum();
+        Ok(evaluated + ROUNDS.expected(&jobs))
+    }
+
     /// The images at each value against the last one's, and the seconds of `work` there.
     pub(super) fn sweep(
         &self,
         bench: &Bench<'_>,
         point: &Point,
-        work: &dyn Fn(Settings) -> Result<f64, StudyError>,
+        work: Work<'_>,
     ) -> Result<Sweep, StudyError> {
+        let (values, present) = (self.values(bench), self.present(bench));
         let mut images = Vec::new();
-        for &value in self.values {
+        for &value in &values {
             images.push(bench.evaluate(self.settings(bench, value))?.images(point));
         }
         let mut works: Vec<Box<dyn FnMut() -> Result<f64, StudyError> + '_>> = Vec::new();
-        for &value in self.values {
+        for &value in &values {
             let settings = self.settings(bench, value);
             works.push(Box::new(move || work(settings)));
         }
@@ -61,10 +103,11 @@ impl Swept<'_> {
             time: Some(timed[i]),
             counts: vec![(self.count.0, (self.count.1)(value))],
             reference: i == reference,
-            front: false,
+            present: value == present,
+            pareto: false,
         };
-        let mut settings: Vec<Setting> = self.values.iter().enumerate().map(setting).collect();
-        mark_front(&mut settings);
+        let mut settings: Vec<Setting> = values.iter().enumerate().map(setting).collect();
+        mark_pareto(&mut settings);
         let Self { axis, title, method, .. } = self;
         Ok(Sweep { axis, title, method: method.clone(), cost: "seconds", settings, traces: Vec::new() })
     }

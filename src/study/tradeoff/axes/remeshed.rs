@@ -1,6 +1,7 @@
 //! One surface as finer and coarser meshes, for what depends on how long a mesh's edges are.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::sync::Arc;
 
 use glam::Vec3;
 
@@ -82,7 +83,7 @@ impl Remeshed {
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
         let samples =
             samples::sample_views(&scene, &self.mesh, occlusion.as_ref()).map_err(PrepareError::from)?;
-        Ok(Evaluated { scene, illumination: bench.prepared.illumination.clone(), samples })
+        Ok(Evaluated { scene, illumination: bench.prepared.illumination.clone(), samples: Arc::new(samples) })
     }
 
     /// The median length of an edge.

@@ -5,8 +5,9 @@ use crate::StudyError;
 use crate::model::effects::Silhouette;
 use crate::reference::Difference;
 use crate::render::image::Image;
-use crate::shader::{Budget, Facts, facts::tessellation_error, plan};
-use crate::tradeoff::axis::{Axis, Choose, Setting, Sweep, mark_front};
+use crate::scene::facts::tessellation_error;
+use crate::shader::{Budget, Facts, plan};
+use crate::tradeoff::axis::{Axis, Choose, Rates, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, Settings};
 
 /// Where the silhouette is evaluated, against how fine the mesh is.
@@ -32,6 +33,12 @@ impl Axis for Silhouettes {
         true
     }
 
+    fn seconds(&self, _: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+        // On its own mesh three silhouettes beside the exact one, on each other mesh one.
+        let images = 4 + 2 * (COARSER + FINER);
+        Ok(images as f64 * (rates.trace + rates.images))
+    }
+
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let own = Remeshed::of(bench)?;
         let coarser = std::iter::successors(own.coarser(), Remeshed::coarser).take(COARSER);
@@ -44,7 +51,7 @@ impl Axis for Silhouettes {
         for mesh in std::iter::successors(Some(own.finer()), |mesh| Some(mesh.finer())).take(FINER) {
             settings.extend(measure(bench, &mesh, &[Silhouette::Vertex], false)?);
         }
-        mark_front(&mut settings);
+        mark_pareto(&mut settings);
         Ok(Sweep {
             axis: self.name(),
             title: "Silhouettes, and how fine the mesh is",
@@ -101,6 +108,7 @@ fn setting(
             ("sag", tessellation_error(scene)),
         ],
         reference: silhouette == Silhouette::Fragment,
-        front: false,
+        present: own && silhouette == bench.prepared.scene.silhouette,
+        pareto: false,
     })
 }

@@ -11,7 +11,7 @@ use crate::fit::{self, FitOptions, SolverKind};
 use crate::reference::Difference;
 use crate::subject::Subject;
 use crate::timing::{Job, interleaved};
-use crate::tradeoff::axis::{Axis, Setting, Sweep, Trace, mark_front};
+use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, Trace, mark_pareto};
 use crate::tradeoff::bench::Bench;
 
 /// The solvers.
@@ -27,6 +27,10 @@ impl Axis for Solvers {
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
         super::pixels::Pixels.applies(bench)
+    }
+
+    fn seconds(&self, _: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+        Ok(Fits::seconds(&SolverKind::ALL.map(|kind| expected_passes(kind) * rates.pass), rates))
     }
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
@@ -53,6 +57,17 @@ impl Axis for Solvers {
     }
 }
 
+/// About how many passes over the samples a solver takes; those that converge late are stopped.
+pub(super) fn expected_passes(solver: SolverKind) -> f64 {
+    match solver {
+        SolverKind::Varpro | SolverKind::Lm => 12.0,
+        // One an iteration, and now and then one more.
+        SolverKind::Lbfgs | SolverKind::Adam => 1.1 * MOST_ITERATIONS as f64,
+        // The simplex tries two places in most of its iterations.
+        SolverKind::NelderMead => 1.7 * MOST_ITERATIONS as f64,
+    }
+}
+
 /// Fits of a scene's constants, from the same start in different ways.
 pub(super) struct Fits {
     subject: Subject,
@@ -63,7 +78,12 @@ type Run = (String, Vec<usize>, SolverKind);
 
 impl Fits {
     pub(super) fn new(bench: &Bench<'_>) -> Result<Self, StudyError> {
-        Ok(Self { subject: Subject::new(bench.path, &bench.fit_options(), None, &|_| {})? })
+        Ok(Self { subject: Subject::of(bench.to_fit()?, None)? })
+    }
+
+    /// The seconds that [`Self::measure`] takes for runs of these seconds.
+    pub(super) fn seconds(runs: &[f64], rates: Rates) -> f64 {
+        ROUNDS.expected(runs) + (1 + runs.len()) as f64 * rates.images
     }
 
     pub(super) fn blocks(&self) -> usize {
@@ -102,10 +122,11 @@ impl Fits {
             time: Some(timed[i]),
             counts: vec![("passes", *passes as f64), ("loss", outcome.loss_end)],
             reference: i == reference,
-            front: false,
+            present: false,
+            pareto: false,
         };
         let mut settings: Vec<Setting> = outcomes.iter().enumerate().map(setting).collect();
-        mark_front(&mut settings);
+        mark_pareto(&mut settings);
         Ok((settings, outcomes.into_iter().map(|(outcome, _)| outcome).collect()))
     }
 

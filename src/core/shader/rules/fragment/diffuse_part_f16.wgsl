@@ -1,6 +1,7 @@
 // diffuse (base_weight + rim_weight rim), in 16 bits; radiance beyond their range is cut at 65504.
 //
 // gives: diffuse_part
+// adds: diffuse, rim
 // when: rim, f16
 // cost: 6
 // error: 0.002

@@ -2,6 +2,7 @@
 // without that -V (MODEL 7).
 //
 // gives: n
+// fallback: normal
 // when: bumped, corrected
 // cost: 22
 // uses: vector

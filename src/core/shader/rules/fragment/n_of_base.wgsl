@@ -1,6 +1,7 @@
 // Without a normal map n is a stored sample's base.
 //
 // gives: n
+// fallback: normal
 // when: !bumped, corrected, !raster
 // cost: 22
 // uses: vector

@@ -1,0 +1,133 @@
+//! Figures that stand in a page without a raw file: numbers with a unit of measure, powers of ten, and decimals in
+//! cells of tables.
+
+use std::path::Path;
+
+use super::pages::without_figures;
+
+/// Numbers with one of these behind them were measured somewhere, or are defined in [`DEFINITIONS`].
+const UNITS: [&str; 28] = [
+    "%", "°", "times", "dB", "million", "ns", "µs", "ms", "s", "second", "seconds", "minute", "minutes",
+    "hour", "hours", "mm", "fps", "kB", "KB", "MB", "GB", "TB", "KiB", "MiB", "GiB", "MB/s", "GB/s", "TB/s",
+];
+
+/// Pages that are looked at otherwise, or whose numbers are ranges, defaults and limits of their own.
+const REFERENCE: [(&str, &str); 5] = [
+    ("CHANGELOG.md", "what was true of each version when it was made"),
+    ("experiments/stability/README.md", "a test of its own compares its tables with its raw files"),
+    ("docs/scene-files.md", "keys with their defaults and ranges"),
+    ("docs/parameters.md", "the program's own table, which a test compares"),
+    ("docs/model.md", "formulas, limits of hard cases"),
+];
+
+/// The figures of `page` (its path in the project) that no raw file gives: each with the words around it.
+///
+/// # Errors
+/// When a comment is not closed, or words that are called a definition are no longer there.
+pub(crate) fn strays(page: &Path, text: &str) -> Result<Vec<String>, String> {
+    let name = page.to_string_lossy();
+    if REFERENCE.iter().any(|(reference, _)| name == *reference) {
+        return Ok(Vec::new());
+    }
+    let own = without_code(&without_figures(text)?);
+    let mut found = in_cells(&own);
+    // A unit in the next cell of a table is another column's; a definition may go over two lines.
+    let mut own = own.replace('|', " | ").split_whitespace().collect::<Vec<_>>().join(" ");
+    for (_, words, _) in DEFINITIONS.iter().filter(|(page, ..)| name == *page) {
+        if !own.contains(words) {
+            return Err(format!("`{words}` is called a definition, and is not there"));
+        }
+        own = own.replace(words, "");
+    }
+    let words: Vec<&str> = own.split(|c: char| c.is_whitespace() || "()[]/".contains(c)).collect();
+    let words: Vec<&str> = words.into_iter().filter(|word| !word.is_empty()).collect();
+    for (i, word) in words.iter().enumerate() {
+        let next = words.get(i + 1).copied().unwrap_or_default();
+        if measured(word, next) {
+            let around = &words[i.saturating_sub(4)..(i + 4).min(words.len())];
+            found.push(around.join(" "));
+        }
+    }
+    Ok(found)
+}
+
+/// Whether a word is a number with a unit, its own or the next word; or a number times a power of ten.
+fn measured(word: &str, next: &str) -> bool {
+    let word = word.trim_start_matches(['-', '+', '±', '~', '<', '>', '*', '"']);
+    let number = word.trim_end_matches(|c: char| !c.is_ascii_digit());
+    if !word.starts_with(|c: char| c.is_ascii_digit()) {
+        return false;
+    }
+    if word.contains("·10") {
+        return true;
+    }
+    let is_number = number.chars().all(|c| c.is_ascii_digit() || ".,e-".contains(c));
+    let unit = |word: &str| UNITS.contains(&word.trim_end_matches(['.', ',', ';', ':', '*', '"']));
+    let behind = &word[number.len()..];
+    is_number && (unit(behind) || (behind.is_empty() && unit(next)))
+}
+
+/// Cells of tables that are a number with decimals and nothing else.
+fn in_cells(text: &str) -> Vec<String> {
+    let rows = text.lines().filter(|line| line.starts_with('|'));
+    rows.filter(|row| {
+        row.split('|').any(|cell| cell.contains('.') && cell.trim().trim_matches('*').parse::<f64>().is_ok())
+    })
+    .map(str::to_owned)
+    .collect()
+}
+
+/// Without code in fences, in backquotes and indented, and without comments.
+fn without_code(text: &str) -> String {
+    let text: String = text.split("```").step_by(2).collect();
+    let lines: Vec<&str> = text.lines().filter(|line| !line.starts_with("    ")).collect();
+    let text: String = lines.join("\n").split('`').step_by(2).collect();
+    let mut parts = text.split("<!--");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |own, part| own + part.split_once("-->").map_or("", |(_, after)| after))
+}
+
+/// Numbers with a unit that are no measurement: the page, its words, and why.
+pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
+    ("README.md", "with 1% noise", "what was added"),
+    ("docs/gpu-engine.md", "beyond 8 million", "a limit of the program"),
+    ("docs/gpu-engine.md", "from 2 million samples a thread", "a threshold of the program"),
+    ("docs/maps.md", "allows 128 MiB", "WebGPU's limit"),
+    ("docs/rendering.md", "more than 16 million samples", "a limit of the program"),
+    ("experiments/race/README.md", "with 2% noise", "what was added"),
+    ("docs/studies.md", "more than 3 s is run once", "a rule of the program"),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_figure_without_a_raw_file_is_found() {
+        let found = |text: &str| strays(Path::new("docs/page.md"), text).unwrap().len();
+        for text in [
+            "It takes 12 ms.",
+            "It takes (1.5\ns).",
+            "off by 0.3%",
+            "5.2 times as fast",
+            "at most 3.0·10⁻⁴ of it",
+            "28.7 to 30.1 dB",
+            "| a | 0.899 |",
+            "**1,024 MB**",
+        ] {
+            assert_eq!(found(text), 1, "{text}");
+        }
+        for text in [
+            "2 x 2 samples, a 16-bit target, 13 unknowns",
+            "`12 ms` and\n\n    takes 12 ms\n",
+            "```\n12 ms\n```",
+            "[12](page.json#a) ms, [1.2·10⁻⁴](page.json#b), at 3840 x 2160 [1.2](page.json#c) times",
+            "| 8 | seconds of baking |",
+            "<!-- figures: page.json#a | {x} | -->\n| a |\n| --- |\n| 0.5 |\n<!-- end -->",
+            "| 3 | of 4 passes |",
+        ] {
+            assert_eq!(found(text), 0, "{text}");
+        }
+        assert_eq!(strays(Path::new("docs/model.md"), "2%").unwrap().len(), 0);
+    }
+}

@@ -1,0 +1,74 @@
+//! Gradients of an image on burn's tensors: `cargo run --release --features burn --example library_gradients`.
+//!
+//! The loss is the mean square of the built-in scene's images. Its slope by the constants and by the albedo of every
+//! sample comes from one backward pass; the constants' slopes are checked against differences of the loss.
+
+use std::error::Error;
+
+use burn::tensor::{Tensor, TensorData};
+use skinfit::gpu::Choice;
+use skinfit::model::params::Column;
+use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
+use skinfit::{Param, PrepareOptions, Prepared, built_in_scene};
+
+/// The free constants, and how far apart the loss is taken for a difference: the loss is a sum of f32, good to some
+/// 1e-6 of itself, and the differences of what is linear or square in a constant have no other error.
+const FREE: [Param; 3] = [Param::BaseWeight, Param::SideSpecular, Param::Hilite];
+const STEP: f32 = 0.05;
+/// Of the largest slope: roundings of the loss over twice the step.
+const TOLERANCE: f32 = 1e-3;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let cache = std::env::temp_dir().join("skinfit-library");
+    let scene = built_in_scene(&cache)?;
+    let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
+    let prepared = Prepared::new(&scene, &options)?;
+
+    let shared = SharedDevice::open(&Choice::default())?;
+    let columns = FREE.map(Column::tied);
+    let shaded = Shaded {
+        setup: prepared.setup(),
+        params: &prepared.scene.params,
+        columns: &columns,
+        illumination: &prepared.illumination,
+    };
+    let views: Vec<_> = prepared.samples.iter().collect();
+    let (shade, inputs) = Shade::new(&shared, &shaded, &views, Scatter::Exact)?;
+
+    // One backward pass: the slopes by three constants and by each sample's albedo.
+    let constants = inputs.columns.clone().autodiff().require_grad();
+    let albedo = inputs.albedo.clone().autodiff().require_grad();
+    let tracked = Inputs { columns: constants.clone(), albedo: albedo.clone(), ..inputs.clone() };
+    let gradients = shade.image(tracked)?.square().mean().backward();
+    let slopes = numbers(constants.grad(&gradients).ok_or("the loss does not depend on the constants")?)?;
+    let of_albedo = albedo.grad(&gradients).ok_or("the loss does not depend on the albedo")?;
+    println!(
+        "{}: {} samples, gradient by their albedo {:?}",
+        shared.gpu().name(),
+        shade.samples(),
+        of_albedo.dims()
+    );
+
+    let start = numbers(inputs.columns.clone())?;
+    let loss = |at: Vec<f32>| -> Result<f32, Box<dyn Error>> {
+        let columns = Tensor::<1>::from_data(TensorData::new(at, [FREE.len()]), shared.device());
+        let image = shade.image(Inputs { columns, ..inputs.clone() })?;
+        Ok(image.square().mean().try_into_scalar::<f32>().map_err(|error| error.to_string())?)
+    };
+    let largest = slopes.iter().fold(0.0_f32, |most, slope| most.max(slope.abs()));
+    for (i, param) in FREE.iter().enumerate() {
+        let moved =
+            |by: f32| start.iter().enumerate().map(|(j, x)| if i == j { x + by } else { *x }).collect();
+        let difference = (loss(moved(STEP))? - loss(moved(-STEP))?) / (2.0 * STEP);
+        println!("{:<14} slope {:.6}, by differences {difference:.6}", param.name(), slopes[i]);
+        if (slopes[i] - difference).abs() > TOLERANCE * largest {
+            return Err(format!("{}: the slope is wrong", param.name()).into());
+        }
+    }
+    Ok(())
+}
+
+/// A tensor's numbers on the host.
+fn numbers(tensor: Tensor<1>) -> Result<Vec<f32>, Box<dyn Error>> {
+    Ok(tensor.into_data().try_to_vec::<f32>().map_err(|error| format!("{error:?}"))?)
+}

@@ -1,0 +1,570 @@
+//! The engine that the rules make: loss, gradient and normal equations on the processor, of any plan.
+//!
+//! The planner's rules for stored samples, their tangents and the loss become tapes ([`crate::program`]): one that
+//! makes what is kept, and one for each kind of pass. Sums are added as in [`super::cpu`]: lanes of at most 64 terms in
+//! f32, then f64 in a fixed tree, so that results do not depend on the number of threads.
+//!
+//! - `pass`: what a pass computes, as tapes
+//! - `machine`: tapes over blocks of records, on SIMD
+
+mod machine;
+mod pass;
+
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use fearless_simd::Level;
+use rayon::prelude::*;
+
+use self::machine::{At, Bound, File, FileColumns, Stream, WIDTH};
+use self::pass::{CLIP_HIGH, CLIP_LOW, Fitted, GAIN, Pass, Reading, Stages, Written};
+use super::cpu::image::by_chunk;
+use super::cpu::lobe::Lobe;
+use super::cpu::sums::{CHUNK, Sums, Wish, fold, pairwise};
+use super::gram::{add_gram, add_last, pair};
+use super::lanes::Lanes;
+use super::view::ObservedView;
+use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
+use crate::bake::Illumination;
+use crate::model::compose::TermName;
+use crate::model::cube::Cube;
+use crate::model::evaluate::Setup;
+use crate::model::params::Param;
+use crate::program::graph::Input;
+use crate::program::shading::{ShadingError, constant};
+use crate::samples::LANES;
+use crate::samples::rows::Row;
+use crate::scene::Loss;
+use crate::simd::Simd;
+use crate::with_simd;
+
+/// Loss, gradient and normal equations on the CPU, of whatever rules the planner chose.
+#[derive(Debug)]
+pub struct PlannedEngine {
+    illumination: Illumination,
+    views: Vec<ObservedView>,
+    fitted: Fitted,
+    level: Level,
+    stride: usize,
+    weight: (f64, u64),
+    passes: Mutex<BTreeMap<Written, Arc<Pass>>>,
+    lobe: Mutex<Option<Arc<Lobe>>>,
+    kept: Mutex<Option<Arc<Kept>>>,
+}
+
+/// Kept numbers, and what they were made with.
+#[derive(Debug)]
+struct Kept {
+    written: Written,
+    /// The numbers that all samples shared, and the specular cube's exponent.
+    made_with: (Vec<f64>, f64),
+    /// For each view, rows of each record.
+    views: Vec<Vec<Row>>,
+}
+
+/// What the blocks of a view read in one pass.
+struct ViewPass<'a> {
+    view: &'a ObservedView,
+    streams: [Stream<'a>; 5],
+    sample: Option<Bound<'a>>,
+    pixel: Bound<'a>,
+    /// Sums a pixel.
+    sums: usize,
+}
+
+/// What a thread computes in.
+#[derive(Default)]
+struct Scratch {
+    sample: File,
+    pixel: File,
+    /// Sums over a pixel's samples, of [`WIDTH`] groups.
+    pixels: Vec<Row>,
+    sums: Vec<Row>,
+}
+
+impl PlannedEngine {
+    /// An engine over `views` for the `unknowns`.
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
+    pub fn new(
+        setup: Setup,
+        illumination: Illumination,
+        views: Vec<ObservedView>,
+        loss: Loss,
+        unknowns: Vec<Unknown>,
+    ) -> Result<Self, ShadingError> {
+        let mut fitted = Fitted::new(setup, unknowns, loss, &views);
+        fitted.faces = super::face_sizes(&illumination);
+        let mut engine = Self {
+            illumination,
+            views,
+            fitted,
+            level: Level::new(),
+            stride: 1,
+            weight: (0.0, 0),
+            passes: Mutex::default(),
+            lobe: Mutex::default(),
+            kept: Mutex::default(),
+        };
+        engine.set_stride(1);
+        // What cannot be computed shows here, and not in the midst of a fit.
+        engine.pass_for(Written { turned: false, gained: false })?;
+        engine.pass_for(Written { turned: true, gained: true })?;
+        Ok(engine)
+    }
+
+    /// Let each pass read only every `stride`-th block of pixels.
+    pub fn set_stride(&mut self, stride: usize) {
+        self.stride = stride.max(1);
+        self.weight = (0.0, 0);
+        for view in &self.views {
+            let groups = view.samples.groups();
+            let read = self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK));
+            let (weight, count) = view.weight_and_count(read);
+            self.weight.0 += weight;
+            self.weight.1 += count;
+        }
+    }
+
+    /// Run with the instructions of `level` and not with the best that the processor has.
+    pub fn set_level(&mut self, level: Level) {
+        self.level = level;
+        // What was kept was made with other instructions.
+        (self.lobe, self.kept) = (Mutex::default(), Mutex::default());
+    }
+
+    /// With `keep` false every number is computed anew in each pass.
+    pub fn set_keep(&mut self, keep: bool) {
+        self.fitted.keep = keep;
+        self.passes.get_mut().unwrap_or_else(PoisonError::into_inner).clear();
+        *self.kept.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
+    }
+
+    /// The views.
+    #[must_use]
+    pub fn views(&self) -> &[ObservedView] {
+        &self.views
+    }
+
+    fn read_blocks(&self, view: &ObservedView) -> impl Iterator<Item = usize> + use<> {
+        (0..view.samples.groups().div_ceil(BLOCK)).step_by(self.stride)
+    }
+
+    fn written(&self, point: &Point) -> Written {
+        let turns = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
+        let gains = |u: &Unknown| matches!(u, Unknown::Gain(_));
+        let unknowns = &self.fitted.unknowns;
+        Written {
+            turned: point.params.scalar(Param::EnvironmentRotation) != 0.0 || unknowns.iter().any(turns),
+            gained: point.gains.iter().any(|gain| *gain != 1.0) || unknowns.iter().any(gains),
+        }
+    }
+
+    fn pass_for(&self, written: Written) -> Result<Arc<Pass>, ShadingError> {
+        let mut passes = self.passes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pass) = passes.get(&written) {
+            return Ok(Arc::clone(pass));
+        }
+        let pass = Arc::new(Pass::new(&self.fitted, written)?);
+        passes.insert(written, Arc::clone(&pass));
+        Ok(pass)
+    }
+
+    fn lobe(&self, exponent: f64) -> Option<Arc<Lobe>> {
+        let mut slot = self.lobe.lock().unwrap_or_else(PoisonError::into_inner);
+        Lobe::at(self.illumination.lobes.as_ref()?, exponent, &mut slot)
+    }
+
+    /// A tape with what is the same for all records of a view in a pass.
+    fn bound<'a>(
+        &'a self,
+        reading: &'a Reading,
+        point: &Point,
+        view: usize,
+        lobe: Option<&'a Lobe>,
+    ) -> Bound<'a> {
+        let clip = self.views.get(view).and_then(|view| view.clip);
+        let value = |input: &Input| match input.name.as_str() {
+            GAIN => point.gains.get(view).copied().unwrap_or(1.0),
+            CLIP_LOW => clip.map_or(f64::NEG_INFINITY, |clip| clip.low.into()),
+            CLIP_HIGH => clip.map_or(f64::INFINITY, |clip| clip.high.into()),
+            _ => constant(input, &point.params).unwrap_or(0.0),
+        };
+        let uniforms = reading.tape.uniform_values(value).into_iter().map(|x| x as f32).collect();
+        let cubes = reading.tape.resources.iter().filter_map(|name| self.cube(name, lobe)).collect();
+        Bound { tape: &reading.tape, loads: &reading.loads, cubes, uniforms }
+    }
+
+    fn cube<'a>(&'a self, name: &str, lobe: Option<&'a Lobe>) -> Option<&'a Cube<f32>> {
+        match name {
+            "irradiance_faces" => self.illumination.irradiance.as_ref(),
+            "hilite_faces" => self.illumination.hilite.as_ref(),
+            "specular_faces" => lobe.map(|lobe| &lobe.cube),
+            "specular_slope_faces" => lobe.map(|lobe| &lobe.slope),
+            _ => None,
+        }
+    }
+
+    /// What no free parameter changes, made on the first pass, and again should a held parameter differ.
+    fn kept(&self, pass: &Pass, written: Written, point: &Point, lobe: Option<&Lobe>) -> Arc<Kept> {
+        let shared = |input: &Input| constant(input, &point.params).unwrap_or(0.0);
+        let exponent = pass.keep.tape.resources.iter().any(|name| name.starts_with("specular"));
+        let exponent = if exponent { point.params.scalar(Param::SpecularLobe) } else { 0.0 };
+        let made_with = (pass.keep.tape.uniform_values(shared), exponent);
+        let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) =
+            slot.as_ref().filter(|kept| kept.written == written && kept.made_with == made_with)
+        {
+            return Arc::clone(kept);
+        }
+        let views = (0..self.views.len()).map(|view| self.make_kept(pass, point, view, lobe)).collect();
+        let kept = Arc::new(Kept { written, made_with, views });
+        *slot = Some(Arc::clone(&kept));
+        kept
+    }
+
+    fn make_kept(&self, pass: &Pass, point: &Point, view: usize, lobe: Option<&Lobe>) -> Vec<Row> {
+        let (stride, observed) = (pass.kept, &self.views[view]);
+        let records = observed.samples.records();
+        let mut kept = vec![Row::ZERO; records * stride];
+        if stride == 0 {
+            return kept;
+        }
+        let bound = self.bound(&pass.keep, point, view, lobe);
+        let streams = streams(observed, &[], 0, &[], 0);
+        let size = BLOCK * CHUNK;
+        kept.par_chunks_mut(stride * size).enumerate().for_each_init(File::default, |file, (chunk, rows)| {
+            file.prepare(&bound);
+            with_simd!(self.level, simd => {
+                for (k, rows) in rows.chunks_mut(stride * WIDTH).enumerate() {
+                    let count = rows.len() / stride;
+                    machine::run(simd, &bound, file, &streams, chunk * size + k * WIDTH, count);
+                    for (output, &slot) in bound.tape.outputs.iter().enumerate() {
+                        let at = At::of(slot, bound.tape);
+                        for i in 0..count {
+                            rows[i * stride + output] = file.row(at, i);
+                        }
+                    }
+                }
+            });
+        });
+        kept
+    }
+
+    fn view_pass<'a>(
+        &'a self,
+        stages: &'a Stages,
+        kept: &'a [Row],
+        stride: usize,
+        point: &Point,
+        view: usize,
+        lobe: Option<&'a Lobe>,
+    ) -> ViewPass<'a> {
+        let sample = stages.sample.as_ref().map(|reading| self.bound(reading, point, view, lobe));
+        ViewPass {
+            view: &self.views[view],
+            streams: streams(&self.views[view], kept, stride, &[], 0),
+            sums: sample.as_ref().map_or(0, |bound| bound.tape.outputs.len()),
+            sample,
+            pixel: self.bound(&stages.pixel, point, view, lobe),
+        }
+    }
+
+    /// The image of view `index` at `point`: for each pixel slot the mean over its visible samples, colour and (where
+    /// the haze is compared) alpha, times the view's gain. A plane a channel.
+    #[must_use]
+    pub fn image(&self, index: usize, point: &Point) -> Vec<Vec<f32>> {
+        let mut planes = Vec::new();
+        self.image_into(index, point, &mut planes);
+        planes
+    }
+
+    /// As [`Self::image`], into the planes of an earlier image: memory that is new costs more than the pass.
+    pub fn image_into(&self, index: usize, point: &Point, planes: &mut Vec<Vec<f32>>) {
+        let written = self.written(point);
+        let Ok(pass) = self.pass_for(written) else { return };
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let kept = self.kept(&pass, written, point, lobe.as_deref());
+        let kept = &kept.views[index];
+        let of_view = self.view_pass(&pass.image, kept, pass.kept, point, index, lobe.as_deref());
+        self.shade(&of_view, planes);
+    }
+
+    /// One term of the image alone, a plane a colour; `None` where no rules yield it.
+    #[must_use]
+    pub fn term_image(&self, index: usize, point: &Point, term: TermName) -> Option<Vec<Vec<f32>>> {
+        let alone = Fitted {
+            output: Some(term),
+            unknowns: Vec::new(),
+            channels: 3,
+            keep: false,
+            ..self.fitted.clone()
+        };
+        let pass = Pass::new(&alone, self.written(point)).ok()?;
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let of_view = self.view_pass(&pass.image, &[], 0, point, index, lobe.as_deref());
+        let mut planes = Vec::new();
+        self.shade(&of_view, &mut planes);
+        Some(planes)
+    }
+
+    /// The outputs of every pixel, a plane each.
+    fn shade(&self, of_view: &ViewPass<'_>, planes: &mut Vec<Vec<f32>>) {
+        let groups = of_view.view.samples.groups();
+        let outputs = &of_view.pixel.tape.outputs;
+        planes.resize_with(outputs.len(), Vec::new);
+        planes.iter_mut().for_each(|plane| plane.resize(groups * LANES, 0.0));
+        by_chunk(planes).par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (chunk, parts)| {
+            scratch.prepare(of_view);
+            let first = chunk * BLOCK * CHUNK;
+            let end = groups.min(first + BLOCK * CHUNK);
+            with_simd!(self.level, simd => {
+                for start in (first..end).step_by(WIDTH) {
+                    let count = WIDTH.min(end - start);
+                    of_view.block(simd, scratch, start, count);
+                    for (part, &slot) in parts.iter_mut().zip(outputs) {
+                        let at = At::of(slot, of_view.pixel.tape);
+                        for i in 0..count {
+                            part[(start - first + i) * LANES..][..LANES].copy_from_slice(&*scratch.pixel.row(at, i));
+                        }
+                    }
+                }
+            });
+        });
+    }
+
+    pub(super) fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+        let channels = self.fitted.channels;
+        let k = self.fitted.unknowns.len();
+        let mut total = NormalEquations {
+            loss: 0.0,
+            residual: 0.0,
+            weight: self.weight.0 * channels as f64,
+            count: self.weight.1 * channels as u64,
+            jtr: vec![0.0; k],
+            jtj: vec![0.0; k * k],
+        };
+        let written = self.written(point);
+        let Ok(pass) = self.pass_for(written) else {
+            total.loss = f64::NAN;
+            return total;
+        };
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let kept = self.kept(&pass, written, point, lobe.as_deref());
+        let stages = if wish == Wish::Loss { &pass.loss } else { &pass.normal };
+        for view in 0..self.views.len() {
+            let of_view = self.view_pass(stages, &kept.views[view], pass.kept, point, view, lobe.as_deref());
+            let blocks: Vec<usize> = self.read_blocks(&self.views[view]).collect();
+            let sums: Vec<Sums> = blocks
+                .par_chunks(CHUNK)
+                .map_init(Scratch::default, |scratch, blocks| {
+                    scratch.prepare(&of_view);
+                    with_simd!(self.level, simd => of_view.chunk(simd, &pass, blocks, wish, scratch))
+                })
+                .collect();
+            self.add(view, &pass, &pairwise(sums), wish, &mut total);
+        }
+        if total.weight > 0.0 {
+            total.loss /= total.weight;
+        }
+        total
+    }
+
+    /// One view's packed sums into the full matrices.
+    fn add(&self, view: usize, pass: &Pass, sums: &Sums, wish: Wish, total: &mut NormalEquations) {
+        let Some(loss) = sums.0.last() else { return };
+        total.loss += loss;
+        let k = self.fitted.unknowns.len();
+        let gain = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(view));
+        let mut base = 0;
+        for channel in pass.channels.iter().filter(|_| wish != Wish::Loss) {
+            let (columns, count) = (channel.unknowns.len(), channel.outputs.len());
+            let unknown: Vec<Option<usize>> = channel.unknowns.iter().map(|u| u.or(gain)).collect();
+            // Of a gradient there is the last column alone.
+            let entry = |i: usize, j: usize| if wish == Wish::Gradient { i } else { pair(i, j, count) };
+            for i in 0..columns {
+                let Some(a) = unknown[i] else { continue };
+                total.jtr[a] += sums.0[base + entry(i, columns)];
+                for j in (i..columns).filter(|_| wish == Wish::Normal) {
+                    let Some(b) = unknown[j] else { continue };
+                    let value = sums.0[base + entry(i, j)];
+                    total.jtj[a * k + b] += value;
+                    if a != b {
+                        total.jtj[b * k + a] += value;
+                    }
+                }
+            }
+            total.residual += sums.0[base + entry(columns, columns)];
+            base += if wish == Wish::Gradient { count } else { count * (count + 1) / 2 };
+        }
+    }
+}
+
+/// The streams of a view, in the order of `pass::StreamOf`.
+fn streams<'a>(
+    view: &'a ObservedView,
+    kept: &'a [Row],
+    kept_stride: usize,
+    pixels: &'a [Row],
+    sums: usize,
+) -> [Stream<'a>; 5] {
+    let samples = view.samples.surface.rows();
+    [
+        Stream { rows: samples.all(), stride: samples.stride() },
+        Stream { rows: kept, stride: kept_stride },
+        Stream { rows: pixels, stride: sums },
+        Stream { rows: view.target.all(), stride: view.target.stride() },
+        Stream { rows: &view.weight, stride: 1 },
+    ]
+}
+
+impl Scratch {
+    fn prepare(&mut self, pass: &ViewPass<'_>) {
+        if let Some(bound) = &pass.sample {
+            self.sample.prepare(bound);
+        }
+        self.pixel.prepare(&pass.pixel);
+        self.pixels.resize(pass.sums * WIDTH, Row::ZERO);
+    }
+}
+
+impl ViewPass<'_> {
+    /// The outputs of `count` groups from `first` on, in the pixels' file.
+    #[inline(always)]
+    fn block<S: Simd>(&self, simd: S, scratch: &mut Scratch, first: usize, count: usize) {
+        let Some(sample) = &self.sample else {
+            machine::run(simd, &self.pixel, &scratch.pixel, &self.streams, first, count);
+            return;
+        };
+        self.add_samples(simd, sample, scratch, first, count);
+        let mut streams = self.streams;
+        streams[pass::StreamOf::Pixels as usize] = Stream { rows: &scratch.pixels, stride: self.sums };
+        // The sums stand from the first group on, the view's streams from their start.
+        for at in [pass::StreamOf::Targets as usize, pass::StreamOf::Weights as usize] {
+            let Stream { rows, stride } = streams[at];
+            streams[at].rows = rows.get(first * stride..).unwrap_or(&[]);
+        }
+        machine::run(simd, &self.pixel, &scratch.pixel, &streams, 0, count);
+    }
+
+    /// Add up the samples of each pixel, by their shares.
+    #[inline(always)]
+    fn add_samples<S: Simd>(
+        &self,
+        simd: S,
+        sample: &Bound<'_>,
+        scratch: &mut Scratch,
+        first: usize,
+        count: usize,
+    ) {
+        let surface = &self.view.samples.surface;
+        let starts = &self.view.samples.group_start;
+        scratch.pixels.fill(Row::ZERO);
+        let (mut record, end) = (starts[first] as usize, starts[first + count] as usize);
+        let mut group = first;
+        while record < end {
+            let block = WIDTH.min(end - record);
+            machine::run(simd, sample, &scratch.sample, &self.streams, record, block);
+            for i in 0..block {
+                while starts[group + 1] as usize <= record + i {
+                    group += 1;
+                }
+                let share = match surface.places().weight {
+                    Some(at) => Lanes::of_row(simd, &surface.rows().record(record + i)[at]),
+                    None => Lanes::splat(simd, 1.0),
+                };
+                let sums = &mut scratch.pixels[(group - first) * self.sums..][..self.sums];
+                for (sum, &slot) in sums.iter_mut().zip(&sample.tape.outputs) {
+                    use crate::model::real::Real;
+                    let value = Lanes::of_row(simd, &scratch.sample.row(At::of(slot, sample.tape), i));
+                    share.mul_add(value, Lanes::of_row(simd, sum)).store(sum);
+                }
+            }
+            record += block;
+        }
+    }
+
+    /// The sums over a few blocks.
+    #[inline(always)]
+    fn chunk<S: Simd>(
+        &self,
+        simd: S,
+        pass: &Pass,
+        blocks: &[usize],
+        wish: Wish,
+        scratch: &mut Scratch,
+    ) -> Sums {
+        let groups = self.view.samples.groups();
+        let size = |channel: &pass::ChannelColumns| match wish {
+            Wish::Loss => 0,
+            Wish::Gradient => channel.outputs.len(),
+            Wish::Normal => channel.outputs.len() * (channel.outputs.len() + 1) / 2,
+        };
+        let used: usize = pass.channels.iter().map(size).sum();
+        let at = |output: &usize| At::of(self.pixel.tape.outputs[*output], self.pixel.tape);
+        let columns: Vec<Vec<At>> = if wish == Wish::Loss {
+            Vec::new()
+        } else {
+            pass.channels.iter().map(|c| c.outputs.iter().map(at).collect()).collect()
+        };
+        let loss_at = at(&0);
+        let mut sums = std::mem::take(&mut scratch.sums);
+        sums.clear();
+        sums.resize(used, Row::ZERO);
+        let mut loss = Lanes::splat(simd, 0.0);
+        for &block in blocks {
+            let end = groups.min((block + 1) * BLOCK);
+            let mut first = block * BLOCK;
+            while first < end {
+                let count = WIDTH.min(end - first);
+                self.block(simd, scratch, first, count);
+                for i in 0..count {
+                    loss = loss + Lanes::of_row(simd, &scratch.pixel.row(loss_at, i));
+                }
+                let mut base = 0;
+                for channel in &columns {
+                    let source = FileColumns { file: &scratch.pixel, columns: channel, groups: count };
+                    if wish == Wish::Gradient {
+                        add_last(simd, source, &mut sums[base..]);
+                        base += channel.len();
+                    } else {
+                        add_gram(simd, source, &mut sums[base..]);
+                        base += channel.len() * (channel.len() + 1) / 2;
+                    }
+                }
+                first += count;
+            }
+        }
+        let mut folded: Vec<f64> = sums.iter().map(|row| fold(row)).collect();
+        folded.push(fold(&loss.to_array()));
+        scratch.sums = sums;
+        Sums(folded)
+    }
+}
+
+impl Objective for PlannedEngine {
+    fn unknowns(&self) -> &[Unknown] {
+        &self.fitted.unknowns
+    }
+
+    fn is_quadratic(&self) -> bool {
+        matches!(self.fitted.loss, Loss::L2 | Loss::RelativeL2) && !self.fitted.clipped
+    }
+
+    fn rounding(&self) -> f64 {
+        super::rounding(&self.views, self.fitted.loss, self.stride)
+    }
+
+    fn normal_equations(&self, point: &Point) -> NormalEquations {
+        self.pass(point, Wish::Normal)
+    }
+
+    fn loss(&self, point: &Point) -> f64 {
+        self.pass(point, Wish::Loss).loss
+    }
+
+    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
+        self.pass(point, Wish::Gradient).loss_and_gradient()
+    }
+}

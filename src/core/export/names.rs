@@ -1,0 +1,106 @@
+//! Names and citations of the shader rules, as another engine's source can take them in: nothing of an export may be
+//! called as something that is there already, and a comment cites what its reader can find.
+
+use std::collections::BTreeMap;
+
+use super::dialect::PREFIX;
+
+/// `wgsl` with the prefix before the name of every function and struct that it defines, and before the `constants` and
+/// `resources` that it reads. `fields` of structs keep their names.
+pub(super) fn prefixed(wgsl: &str, constants: &[String], resources: &[&str], fields: &[&str]) -> String {
+    let mut names: BTreeMap<&str, String> = BTreeMap::new();
+    for line in wgsl.lines() {
+        if let Some(name) = line.strip_prefix("fn ").and_then(|rest| rest.split('(').next()) {
+            names.insert(name, function(name));
+        } else if let Some(name) = line.strip_prefix("struct ").and_then(|rest| rest.split(' ').next()) {
+            names.insert(name, structure(name));
+        }
+    }
+    names.extend(constants.iter().map(|name| (name.as_str(), constant(name))));
+    names.extend(resources.iter().map(|name| (*name, function(name))));
+    names.retain(|name, _| !fields.contains(name));
+    let mut text = String::with_capacity(wgsl.len() + wgsl.len() / 8);
+    for line in wgsl.split_inclusive('\n') {
+        let (code, comment) = line.split_at(line.find("//").unwrap_or(line.len()));
+        rename(&mut text, code, &names);
+        text.push_str(comment);
+    }
+    text
+}
+
+/// The words of `code`, those in `names` by their new ones; what follows a full stop is a component.
+fn rename(text: &mut String, code: &str, names: &BTreeMap<&str, String>) {
+    let is_word = |c: char| c.is_ascii_alphanumeric() || c == '_';
+    let mut rest = code;
+    while let Some(first) = rest.chars().next() {
+        let end = if is_word(first) { rest.find(|c| !is_word(c)) } else { rest.find(is_word) };
+        let (part, after) = rest.split_at(end.unwrap_or(rest.len()));
+        let component = text.ends_with('.');
+        text.push_str(names.get(part).filter(|_| !component).map_or(part, String::as_str));
+        rest = after;
+    }
+}
+
+/// A function's or a resource's name in an export.
+pub(super) fn function(name: &str) -> String {
+    if name.starts_with(PREFIX) { name.to_owned() } else { format!("{PREFIX}{name}") }
+}
+
+/// A struct's.
+fn structure(name: &str) -> String {
+    format!("Skinfit{name}")
+}
+
+/// A constant's.
+pub(super) fn constant(name: &str) -> String {
+    format!("{PREFIX}{name}").to_uppercase()
+}
+
+/// What rules cite as `MODEL 3` is a section of the page that describes the model.
+const CITED: &str = "MODEL ";
+
+/// `text` with its citations as somebody reads them who has nothing but the export.
+pub(super) fn cited(text: &str) -> String {
+    let mut parts = text.split(CITED);
+    let mut cited = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let number = |text: &str| text.len() - text.trim_start_matches(|c: char| c.is_ascii_digit()).len();
+        let first = number(part);
+        let second = part[first..].strip_prefix(" and ").map_or(0, number);
+        cited += match (first, second) {
+            (0, _) => CITED,
+            (_, 0) => "docs/model.md section ",
+            _ => "docs/model.md sections ",
+        };
+        cited += part;
+    }
+    cited
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_name_of_its_own_has_the_prefix_and_no_other() {
+        let rule = "// What open is.\nfn open(occ: f32, OCCLUSION_X: f32) -> f32 {\n    return OCCLUSION * occ.open + open(occ); // open\n}\n\
+                    struct Surface {\n    eye: vec3f,\n}\nfn skinfit_shade(at: Surface) -> vec4f {\n    return textureSampleLevel(color_map, at.eye);\n}\n";
+        let constants = ["OCCLUSION".to_owned()];
+        assert_eq!(
+            prefixed(rule, &constants, &["color_map", "eye"], &["eye"]),
+            "// What open is.\nfn skinfit_open(occ: f32, OCCLUSION_X: f32) -> f32 {\n    return SKINFIT_OCCLUSION * occ.open + \
+             skinfit_open(occ); // open\n}\nstruct SkinfitSurface {\n    eye: vec3f,\n}\nfn skinfit_shade(at: SkinfitSurface) -> vec4f {\n    \
+             return textureSampleLevel(skinfit_color_map, at.eye);\n}\n"
+        );
+    }
+
+    #[test]
+    fn sections_are_cited_by_the_page_that_has_them() {
+        assert_eq!(cited("a (MODEL 3, corrected form)"), "a (docs/model.md section 3, corrected form)");
+        assert_eq!(
+            cited("MODEL 3 and 7; MODEL 12."),
+            "docs/model.md sections 3 and 7; docs/model.md section 12."
+        );
+        assert_eq!(cited("a MODEL of x"), "a MODEL of x");
+    }
+}

@@ -1,0 +1,650 @@
+//! The rules' WGSL as a graph: functions are called in place, branches become choices.
+//!
+//! - lookups in faces are one node (`sample_faces` of `rules/lib/cube.wgsl`, and its tangent), as their texels are
+//!   addressed by whole numbers, which graphs have not; `is_finite` likewise
+//! - both sides of an `if` are computed, and a value chosen where they meet: the rules' branches are short
+
+use naga::proc::TypeResolution;
+use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
+use naga::{
+    BinaryOperator as B, Block, Expression as E, Function, Handle, Literal, MathFunction as M, Module,
+    ScalarKind, Statement, TypeInner, UnaryOperator as U,
+};
+
+use super::graph::{Binary, Graph, Id, Unary};
+
+/// A text that cannot be lowered.
+#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
+pub enum LowerError {
+    /// It is no valid WGSL.
+    #[error("the rules cannot be read: {0}")]
+    Unreadable(String),
+    /// No such function.
+    #[error("there is no shader function {0}")]
+    Missing(String),
+    /// Something that graphs of numbers do not have.
+    #[error(
+        "shader function {function}: {what} cannot be computed on the processor; write it by arithmetic, comparisons and `if`"
+    )]
+    Unsupported {
+        /// The function.
+        function: String,
+        /// The expression or statement.
+        what: String,
+    },
+}
+
+/// A value while functions are lowered.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A number, a vector's components, or a structure's numbers member after member.
+    Numbers(Vec<Id>),
+    /// A texture, by its name.
+    Texture(String),
+}
+
+impl Value {
+    fn numbers(self) -> Option<Vec<Id>> {
+        match self {
+            Self::Numbers(ids) => Some(ids),
+            Self::Texture(_) => None,
+        }
+    }
+}
+
+/// A WGSL text whose functions can be called on graphs.
+#[derive(Debug)]
+pub struct Source {
+    module: Module,
+    info: ModuleInfo,
+}
+
+impl Source {
+    /// Read a whole module.
+    ///
+    /// # Errors
+    /// When it is not valid.
+    pub fn new(wgsl: &str) -> Result<Self, LowerError> {
+        let module = naga::front::wgsl::parse_str(wgsl)
+            .map_err(|error| LowerError::Unreadable(error.emit_to_string(wgsl)))?;
+        let info = Validator::new(ValidationFlags::all(), Capabilities::all())
+            .validate(&module)
+            .map_err(|error| LowerError::Unreadable(error.emit_to_string(wgsl)))?;
+        Ok(Self { module, info })
+    }
+
+    /// The value of a function, in `graph`.
+    ///
+    /// # Errors
+    /// When there is no such function, or it does what graphs of numbers do not have.
+    pub fn call(
+        &self,
+        graph: &mut Graph,
+        function: &str,
+        arguments: Vec<Value>,
+    ) -> Result<Vec<Id>, LowerError> {
+        let found = self.module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(function));
+        let (handle, _) = found.ok_or_else(|| LowerError::Missing(function.to_owned()))?;
+        self.invoke(graph, handle, arguments)
+    }
+
+    fn invoke(
+        &self,
+        graph: &mut Graph,
+        handle: Handle<Function>,
+        arguments: Vec<Value>,
+    ) -> Result<Vec<Id>, LowerError> {
+        let function = &self.module.functions[handle];
+        let mut frame = Frame {
+            source: self,
+            graph,
+            handle,
+            function,
+            arguments,
+            values: vec![None; function.expressions.len()],
+            locals: Vec::new(),
+            done: None,
+            returned: Vec::new(),
+            finished: false,
+        };
+        frame.locals()?;
+        frame.block(&function.body, None)?;
+        let mut returned = std::mem::take(&mut frame.returned);
+        let (_, mut result) = returned.pop().ok_or_else(|| frame.unsupported("no value"))?;
+        for (condition, value) in returned.into_iter().rev() {
+            let Some(condition) = condition else { continue };
+            result = result.iter().zip(value).map(|(&no, yes)| graph.select(condition, yes, no)).collect();
+        }
+        Ok(result)
+    }
+
+    /// How many numbers a type holds.
+    fn width(&self, inner: &TypeInner) -> Option<usize> {
+        Some(match inner {
+            TypeInner::Scalar(_) => 1,
+            TypeInner::Vector { size, .. } => *size as usize,
+            TypeInner::Struct { members, .. } => {
+                members.iter().map(|m| self.width(&self.module.types[m.ty].inner)).sum::<Option<usize>>()?
+            }
+            _ => return None,
+        })
+    }
+}
+
+/// One call.
+struct Frame<'a> {
+    source: &'a Source,
+    graph: &'a mut Graph,
+    handle: Handle<Function>,
+    function: &'a Function,
+    arguments: Vec<Value>,
+    /// Expressions that were reached.
+    values: Vec<Option<Value>>,
+    /// The local variables' numbers.
+    locals: Vec<Vec<Id>>,
+    /// Where the function has returned already.
+    done: Option<Id>,
+    /// What it returned, and where.
+    returned: Vec<(Option<Id>, Vec<Id>)>,
+    finished: bool,
+}
+
+/// Where a pointer leads.
+enum Place {
+    /// Numbers of a local variable: its index, the first, and how many.
+    Local(usize, usize, usize),
+    /// Numbers of a member of the uniform block: its name, the first, and how many.
+    Uniform(String, usize, usize),
+}
+
+impl Frame<'_> {
+    fn unsupported(&self, what: impl Into<String>) -> LowerError {
+        let function = self.function.name.clone().unwrap_or_default();
+        LowerError::Unsupported { function, what: what.into() }
+    }
+
+    fn inner(&self, handle: Handle<E>) -> &TypeInner {
+        match &self.source.info[self.handle][handle].ty {
+            TypeResolution::Handle(ty) => &self.source.module.types[*ty].inner,
+            TypeResolution::Value(inner) => inner,
+        }
+    }
+
+    fn locals(&mut self) -> Result<(), LowerError> {
+        for (_, variable) in self.function.local_variables.iter() {
+            let inner = &self.source.module.types[variable.ty].inner;
+            let width = self.source.width(inner).ok_or_else(|| self.unsupported("an array"))?;
+            let start = match variable.init {
+                Some(value) => self.numbers(value)?,
+                None => vec![self.graph.constant(0.0); width],
+            };
+            self.locals.push(start);
+        }
+        Ok(())
+    }
+
+    /// Where a statement under `condition` takes effect; `None` everywhere.
+    fn effective(&mut self, condition: Option<Id>) -> Option<Id> {
+        match (condition, self.done) {
+            (condition, None) => condition,
+            (None, Some(done)) => Some(self.graph.not(done)),
+            (Some(condition), Some(done)) => {
+                let going = self.graph.not(done);
+                Some(self.graph.and(condition, going))
+            }
+        }
+    }
+
+    fn block(&mut self, block: &Block, condition: Option<Id>) -> Result<(), LowerError> {
+        for statement in block {
+            if self.finished {
+                return Ok(());
+            }
+            match statement {
+                Statement::Emit(range) => {
+                    for expression in range.clone() {
+                        if !matches!(
+                            self.inner(expression),
+                            TypeInner::Pointer { .. } | TypeInner::ValuePointer { .. }
+                        ) {
+                            let value = self.expression(expression)?;
+                            self.values[expression.index()] = Some(value);
+                        }
+                    }
+                }
+                Statement::Block(inner) => self.block(inner, condition)?,
+                Statement::If { condition: test, accept, reject } => {
+                    let test = self.number(*test)?;
+                    let opposite = self.graph.not(test);
+                    for (test, block) in [(test, accept), (opposite, reject)] {
+                        match self.graph.value(test) {
+                            Some(0.0) => {}
+                            Some(_) => self.block(block, condition)?,
+                            None => {
+                                let both = condition.map_or(test, |outer| self.graph.and(outer, test));
+                                self.block(block, Some(both))?;
+                            }
+                        }
+                    }
+                }
+                Statement::Return { value: Some(value) } => {
+                    let value = self.numbers(*value)?;
+                    let effective = self.effective(condition);
+                    self.returned.push((effective, value));
+                    match condition {
+                        None => self.finished = true,
+                        Some(here) => {
+                            self.done = Some(self.done.map_or(here, |done| self.graph.or(done, here)));
+                        }
+                    }
+                }
+                Statement::Store { pointer, value } => {
+                    let Place::Local(variable, first, width) = self.place(*pointer)? else {
+                        return Err(self.unsupported("a store outside local variables"));
+                    };
+                    let value = self.numbers(*value)?;
+                    let effective = self.effective(condition);
+                    for (k, new) in value.into_iter().enumerate().take(width) {
+                        let old = self.locals[variable][first + k];
+                        let chosen = effective.map_or(new, |here| self.graph.select(here, new, old));
+                        self.locals[variable][first + k] = chosen;
+                    }
+                }
+                Statement::Call { function, arguments, result: Some(result) } => {
+                    let arguments =
+                        arguments.iter().map(|&a| self.value(a)).collect::<Result<Vec<_>, _>>()?;
+                    let value = self.called(*function, arguments)?;
+                    self.values[result.index()] = Some(Value::Numbers(value));
+                }
+                other => {
+                    let words = format!("{other:?}");
+                    let what = words.split([' ', '(', '{']).next().unwrap_or_default().to_owned();
+                    return Err(self.unsupported(format!("statement {what}")));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn called(&mut self, callee: Handle<Function>, arguments: Vec<Value>) -> Result<Vec<Id>, LowerError> {
+        match self.source.module.functions[callee].name.as_deref() {
+            Some("sample_faces") => self.sample_faces(&arguments, None),
+            // The tangent along the place alone; see `tangent::name`.
+            Some("sample_faces_ccd") => {
+                let along = arguments.get(3).cloned();
+                self.sample_faces(&arguments, along)
+            }
+            Some("is_finite") => {
+                let numbers = arguments.into_iter().next().and_then(Value::numbers).unwrap_or_default();
+                let mut all = self.graph.constant(1.0);
+                for number in numbers {
+                    let finite = self.graph.unary(Unary::IsFinite, number);
+                    all = self.graph.and(all, finite);
+                }
+                Ok(vec![all])
+            }
+            _ => self.source.invoke(self.graph, callee, arguments),
+        }
+    }
+
+    /// `sample_faces(faces, size, place)`, or how it moves as the place does.
+    fn sample_faces(&mut self, arguments: &[Value], along: Option<Value>) -> Result<Vec<Id>, LowerError> {
+        let [Value::Texture(name), Value::Numbers(size), Value::Numbers(place), ..] = arguments else {
+            return Err(self.unsupported("a lookup in what are no faces"));
+        };
+        let (&[size], &[face, s, t]) = (&size[..], &place[..]) else {
+            return Err(self.unsupported("a lookup at what is no place"));
+        };
+        let parts = self.graph.lookup(name, face, s, t);
+        let Some(along) = along.and_then(Value::numbers) else { return Ok(parts[..4].to_vec()) };
+        let graph = &mut *self.graph;
+        let ds = graph.binary(Binary::Multiply, size, along[1]);
+        let dt = graph.binary(Binary::Multiply, size, along[2]);
+        let channel = |c: usize| {
+            let across = graph.binary(Binary::Multiply, parts[4 + c], ds);
+            let down = graph.binary(Binary::Multiply, parts[8 + c], dt);
+            graph.binary(Binary::Add, across, down)
+        };
+        Ok((0..4).map(channel).collect())
+    }
+
+    fn place(&mut self, pointer: Handle<E>) -> Result<Place, LowerError> {
+        match &self.function.expressions[pointer] {
+            E::LocalVariable(variable) => {
+                let index = variable.index();
+                Ok(Place::Local(index, 0, self.locals[index].len()))
+            }
+            E::AccessIndex { base, index } => {
+                if let E::GlobalVariable(global) = self.function.expressions[*base] {
+                    return self.member(global, *index as usize);
+                }
+                let (inner, index) = (self.pointee(*base), *index as usize);
+                let (first, width) =
+                    self.within(&inner, index).ok_or_else(|| self.unsupported("an array's element"))?;
+                Ok(match self.place(*base)? {
+                    Place::Local(variable, at, _) => Place::Local(variable, at + first, width),
+                    Place::Uniform(name, at, _) => Place::Uniform(name, at + first, width),
+                })
+            }
+            _ => Err(self.unsupported("memory that is neither a variable nor a constant")),
+        }
+    }
+
+    /// A member of the uniform block.
+    fn member(&self, global: Handle<naga::GlobalVariable>, index: usize) -> Result<Place, LowerError> {
+        let module = &self.source.module;
+        let inner = &module.types[module.global_variables[global].ty].inner;
+        let TypeInner::Struct { members, .. } = inner else {
+            return Err(self.unsupported("memory that is no block of constants"));
+        };
+        let member = &members[index];
+        let width = self.source.width(&module.types[member.ty].inner);
+        let width = width.ok_or_else(|| self.unsupported("a constant that is no vector"))?;
+        Ok(Place::Uniform(member.name.clone().unwrap_or_default(), 0, width))
+    }
+
+    /// The type that a pointer leads to.
+    fn pointee(&self, pointer: Handle<E>) -> TypeInner {
+        match *self.inner(pointer) {
+            TypeInner::Pointer { base, .. } => self.source.module.types[base].inner.clone(),
+            TypeInner::ValuePointer { size: Some(size), scalar, .. } => TypeInner::Vector { size, scalar },
+            TypeInner::ValuePointer { size: None, scalar, .. } => TypeInner::Scalar(scalar),
+            ref other => other.clone(),
+        }
+    }
+
+    /// Where a component or member stands, and how many numbers it is.
+    fn within(&self, inner: &TypeInner, index: usize) -> Option<(usize, usize)> {
+        match inner {
+            TypeInner::Vector { .. } => Some((index, 1)),
+            TypeInner::Struct { members, .. } => {
+                let width = |m: &naga::StructMember| self.source.width(&self.source.module.types[m.ty].inner);
+                let before = members[..index].iter().map(width).sum::<Option<usize>>()?;
+                Some((before, width(&members[index])?))
+            }
+            _ => None,
+        }
+    }
+
+    fn value(&mut self, handle: Handle<E>) -> Result<Value, LowerError> {
+        match &self.values[handle.index()] {
+            Some(value) => Ok(value.clone()),
+            None => self.expression(handle),
+        }
+    }
+
+    fn numbers(&mut self, handle: Handle<E>) -> Result<Vec<Id>, LowerError> {
+        self.value(handle)?.numbers().ok_or_else(|| self.unsupported("a texture in the place of a number"))
+    }
+
+    fn number(&mut self, handle: Handle<E>) -> Result<Id, LowerError> {
+        let numbers = self.numbers(handle)?;
+        numbers.first().copied().ok_or_else(|| self.unsupported("nothing in the place of a number"))
+    }
+
+    fn expression(&mut self, handle: Handle<E>) -> Result<Value, LowerError> {
+        let numbers = match &self.function.expressions[handle] {
+            E::Literal(literal) => vec![self.literal(*literal)?],
+            E::Constant(constant) => {
+                let init = self.source.module.constants[*constant].init;
+                self.global(init)?
+            }
+            E::ZeroValue(ty) => {
+                let width = self.source.width(&self.source.module.types[*ty].inner);
+                let width = width.ok_or_else(|| self.unsupported("an array"))?;
+                vec![self.graph.constant(0.0); width]
+            }
+            E::FunctionArgument(i) => {
+                let argument = self.arguments.get(*i as usize).cloned();
+                return argument.ok_or_else(|| self.unsupported("an argument that was not given"));
+            }
+            E::GlobalVariable(global) => {
+                let name = self.source.module.global_variables[*global].name.clone();
+                return Ok(Value::Texture(name.unwrap_or_default()));
+            }
+            E::Compose { components, .. } => {
+                let mut all = Vec::new();
+                for &component in components {
+                    all.extend(self.numbers(component)?);
+                }
+                all
+            }
+            E::Splat { size, value } => vec![self.number(*value)?; *size as usize],
+            E::AccessIndex { base, index } => {
+                let inner = self.inner(*base).clone();
+                let (first, width) = self
+                    .within(&inner, *index as usize)
+                    .ok_or_else(|| self.unsupported("an array's element"))?;
+                self.numbers(*base)?[first..first + width].to_vec()
+            }
+            E::Access { base, index } => {
+                let (base, index) = (self.numbers(*base)?, self.number(*index)?);
+                let at = self.graph.value(index).ok_or_else(|| self.unsupported("a computed index"))?;
+                let found = base.get(at as usize).copied();
+                vec![found.ok_or_else(|| self.unsupported("an index that is too large"))?]
+            }
+            E::Swizzle { size, vector, pattern } => {
+                let vector = self.numbers(*vector)?;
+                pattern[..*size as usize].iter().map(|&c| vector[c as usize]).collect()
+            }
+            E::Load { pointer } => match self.place(*pointer)? {
+                Place::Local(variable, first, width) => self.locals[variable][first..first + width].to_vec(),
+                Place::Uniform(name, first, width) => {
+                    (first..first + width).map(|component| self.graph.uniform(&name, component)).collect()
+                }
+            },
+            E::Unary { op, expr } => {
+                let numbers = self.numbers(*expr)?;
+                let op = *op;
+                match op {
+                    U::Negate => numbers.into_iter().map(|x| self.graph.unary(Unary::Negate, x)).collect(),
+                    U::LogicalNot => numbers.into_iter().map(|x| self.graph.not(x)).collect(),
+                    U::BitwiseNot => return Err(self.unsupported("operator ~")),
+                }
+            }
+            E::Binary { op, left, right } => {
+                let (op, left, right) = (*op, self.numbers(*left)?, self.numbers(*right)?);
+                self.by_components(&[left, right], |frame, x| frame.binary(op, x[0], x[1]))?
+            }
+            E::Select { condition, accept, reject } => {
+                let (condition, yes, no) =
+                    (self.numbers(*condition)?, self.numbers(*accept)?, self.numbers(*reject)?);
+                self.by_components(&[condition, yes, no], |frame, x| {
+                    Ok(frame.graph.select(x[0], x[1], x[2]))
+                })?
+            }
+            // A number is a number here.
+            E::As { expr, kind: ScalarKind::Float, convert: Some(_) } => self.numbers(*expr)?,
+            E::Relational { fun, argument } => {
+                let all = self.numbers(*argument)?;
+                let both = match fun {
+                    naga::RelationalFunction::All => Graph::and,
+                    naga::RelationalFunction::Any => Graph::or,
+                    _ => return Err(self.unsupported("isnan or isinf (write is_finite)")),
+                };
+                all.into_iter().reduce(|a, b| both(self.graph, a, b)).into_iter().collect()
+            }
+            E::Math { fun, arg, arg1, arg2, .. } => {
+                let arguments: Vec<Vec<Id>> = [Some(*arg), *arg1, *arg2]
+                    .into_iter()
+                    .flatten()
+                    .map(|a| self.numbers(a))
+                    .collect::<Result<_, _>>()?;
+                self.math(*fun, &arguments)?
+            }
+            other => {
+                let words = format!("{other:?}");
+                let what = words.split([' ', '(', '{']).next().unwrap_or_default().to_owned();
+                return Err(self.unsupported(format!("expression {what}")));
+            }
+        };
+        Ok(Value::Numbers(numbers))
+    }
+
+    fn literal(&mut self, literal: Literal) -> Result<Id, LowerError> {
+        let value = match literal {
+            // The shortest decimal of an f32 is what was written: 0.1 is meant, not the f32 next to it.
+            Literal::F32(x) => format!("{x:e}").parse().unwrap_or_else(|_| f64::from(x)),
+            Literal::AbstractFloat(x) | Literal::F64(x) => x,
+            Literal::I32(x) => x.into(),
+            Literal::U32(x) => x.into(),
+            Literal::Bool(x) => f64::from(u8::from(x)),
+            other => return Err(self.unsupported(format!("{other:?}"))),
+        };
+        Ok(self.graph.constant(value))
+    }
+
+    /// A module's constant.
+    fn global(&mut self, handle: Handle<E>) -> Result<Vec<Id>, LowerError> {
+        match &self.source.module.global_expressions[handle] {
+            E::Literal(literal) => Ok(vec![self.literal(*literal)?]),
+            E::Constant(constant) => self.global(self.source.module.constants[*constant].init),
+            E::Compose { components, .. } => {
+                let parts = components.iter().map(|&c| self.global(c)).collect::<Result<Vec<_>, _>>()?;
+                Ok(parts.concat())
+            }
+            E::Splat { size, value } => Ok(vec![self.global(*value)?[0]; *size as usize]),
+            _ => Err(self.unsupported("a computed constant")),
+        }
+    }
+
+    /// Component by component; a single number stands for as many as the others have.
+    fn by_components(
+        &mut self,
+        arguments: &[Vec<Id>],
+        mut of: impl FnMut(&mut Self, &[Id]) -> Result<Id, LowerError>,
+    ) -> Result<Vec<Id>, LowerError> {
+        let width = arguments.iter().map(Vec::len).max().unwrap_or(0);
+        (0..width)
+            .map(|k| {
+                let at: Vec<Id> = arguments.iter().map(|a| a[k % a.len()]).collect();
+                of(self, &at)
+            })
+            .collect()
+    }
+
+    fn binary(&mut self, op: B, a: Id, b: Id) -> Result<Id, LowerError> {
+        let graph = &mut *self.graph;
+        Ok(match op {
+            B::Add => graph.binary(Binary::Add, a, b),
+            B::Subtract => graph.binary(Binary::Subtract, a, b),
+            B::Multiply => graph.binary(Binary::Multiply, a, b),
+            B::Divide => graph.binary(Binary::Divide, a, b),
+            B::Less => graph.binary(Binary::Less, a, b),
+            B::Greater => graph.binary(Binary::Less, b, a),
+            B::GreaterEqual => graph.binary(Binary::GreaterEqual, a, b),
+            B::LessEqual => graph.binary(Binary::GreaterEqual, b, a),
+            B::Equal => {
+                let (above, below) =
+                    (graph.binary(Binary::GreaterEqual, a, b), graph.binary(Binary::GreaterEqual, b, a));
+                graph.and(above, below)
+            }
+            B::NotEqual => {
+                let equal = self.binary(B::Equal, a, b)?;
+                self.graph.not(equal)
+            }
+            B::And | B::LogicalAnd => graph.and(a, b),
+            B::InclusiveOr | B::LogicalOr => graph.or(a, b),
+            other => return Err(self.unsupported(format!("operator {other:?}"))),
+        })
+    }
+
+    fn dot(&mut self, a: &[Id], b: &[Id]) -> Id {
+        let mut sum = self.graph.constant(0.0);
+        for (&x, &y) in a.iter().zip(b) {
+            let product = self.graph.binary(Binary::Multiply, x, y);
+            sum = self.graph.binary(Binary::Add, sum, product);
+        }
+        sum
+    }
+
+    fn math(&mut self, fun: M, arguments: &[Vec<Id>]) -> Result<Vec<Id>, LowerError> {
+        match fun {
+            M::Dot => return Ok(vec![self.dot(&arguments[0], &arguments[1])]),
+            M::Length => {
+                let square = self.dot(&arguments[0], &arguments[0]);
+                return Ok(vec![self.graph.unary(Unary::Sqrt, square)]);
+            }
+            M::Cross => {
+                let (a, b) = (&arguments[0], &arguments[1]);
+                let graph = &mut *self.graph;
+                let minor = |i: usize, j: usize| {
+                    let (p, q) = (
+                        graph.binary(Binary::Multiply, a[i], b[j]),
+                        graph.binary(Binary::Multiply, a[j], b[i]),
+                    );
+                    graph.binary(Binary::Subtract, p, q)
+                };
+                return Ok([(1, 2), (2, 0), (0, 1)]
+                    .map({
+                        let mut minor = minor;
+                        move |(i, j)| minor(i, j)
+                    })
+                    .to_vec());
+            }
+            _ => {}
+        }
+        self.by_components(arguments, |frame, x| frame.math_of_numbers(fun, x))
+    }
+
+    fn math_of_numbers(&mut self, fun: M, x: &[Id]) -> Result<Id, LowerError> {
+        let graph = &mut *self.graph;
+        Ok(match fun {
+            M::Abs => graph.unary(Unary::Abs, x[0]),
+            M::Floor => graph.unary(Unary::Floor, x[0]),
+            M::Sqrt => graph.unary(Unary::Sqrt, x[0]),
+            M::Exp2 => graph.unary(Unary::Exp2, x[0]),
+            M::Log2 => graph.unary(Unary::Log2, x[0]),
+            M::InverseSqrt => {
+                let root = graph.unary(Unary::Sqrt, x[0]);
+                graph.unary(Unary::Reciprocal, root)
+            }
+            M::Exp => {
+                let factor = graph.constant(std::f64::consts::LOG2_E);
+                let scaled = graph.binary(Binary::Multiply, factor, x[0]);
+                graph.unary(Unary::Exp2, scaled)
+            }
+            M::Log => {
+                let (factor, log) = (graph.constant(std::f64::consts::LN_2), graph.unary(Unary::Log2, x[0]));
+                graph.binary(Binary::Multiply, factor, log)
+            }
+            M::Pow => {
+                let log = graph.unary(Unary::Log2, x[0]);
+                let scaled = graph.binary(Binary::Multiply, x[1], log);
+                graph.unary(Unary::Exp2, scaled)
+            }
+            M::Fract => {
+                let whole = graph.unary(Unary::Floor, x[0]);
+                graph.binary(Binary::Subtract, x[0], whole)
+            }
+            M::Min => graph.binary(Binary::Min, x[0], x[1]),
+            M::Max => graph.binary(Binary::Max, x[0], x[1]),
+            M::Clamp => {
+                let raised = graph.binary(Binary::Max, x[0], x[1]);
+                graph.binary(Binary::Min, raised, x[2])
+            }
+            M::Saturate => {
+                let (zero, one) = (graph.constant(0.0), graph.constant(1.0));
+                let raised = graph.binary(Binary::Max, x[0], zero);
+                graph.binary(Binary::Min, raised, one)
+            }
+            M::Fma => {
+                let product = graph.binary(Binary::Multiply, x[0], x[1]);
+                graph.binary(Binary::Add, product, x[2])
+            }
+            M::Mix => {
+                let step = graph.binary(Binary::Subtract, x[1], x[0]);
+                let part = graph.binary(Binary::Multiply, step, x[2]);
+                graph.binary(Binary::Add, x[0], part)
+            }
+            M::Step => graph.binary(Binary::GreaterEqual, x[1], x[0]),
+            M::Sign => {
+                let zero = graph.constant(0.0);
+                let (positive, negative) =
+                    (graph.binary(Binary::Less, zero, x[0]), graph.binary(Binary::Less, x[0], zero));
+                graph.binary(Binary::Subtract, positive, negative)
+            }
+            other => return Err(self.unsupported(format!("{other:?}"))),
+        })
+    }
+}

@@ -1,0 +1,21 @@
+//! Planned rules as arithmetic on numbers, for the processor.
+//!
+//! The planner chooses rules, and their tangents are made from their text, as for a graphics adapter
+//! ([`crate::shader`]). Here that same text becomes a [`graph`] of numbers, in which every number stands once; what
+//! no free parameter moves can be cut off and kept ([`cut`]); the rest becomes a [`tape`] of instructions, which
+//! runs for one sample in any kind of number ([`evaluate`]) or for many at once in the engine. So no formula is
+//! written for the processor alone.
+//!
+//! - [`graph`]: numbers and what they are made of; equal ones are one
+//! - [`lower`]: WGSL functions called on graphs
+//! - [`shading`]: the value of a plan and how it moves, as a graph
+//! - [`cut`]: what stays from pass to pass
+//! - [`tape`]: instructions over registers
+//! - [`evaluate`]: a tape run for one sample
+
+pub mod cut;
+pub mod evaluate;
+pub mod graph;
+pub mod lower;
+pub mod shading;
+pub mod tape;

@@ -1,0 +1,185 @@
+//! What is kept of stored samples where no free parameter moves it: then it is all that a pass reads of them.
+//!
+//! Of the built-in effects that is the light of each term before its weights. Of an added one it is the frontier in the
+//! graph of quantities: what the rules that its own parameters move need, and those parameters do not move.
+
+use std::collections::BTreeSet;
+
+use super::emit::{Fields, Plan, hazy, parts, sample_fields};
+use super::facts::{Facts, Source};
+use super::quantity::{Constant, Resource};
+use super::rule::{Rule, Stage};
+use super::search::PlanError;
+use crate::model::params::Param;
+
+/// What is kept of the built-in effects, with WGSL types.
+const TERMS: [(&str, &str); 8] = [
+    ("diffuse_term", "vec3f"),
+    ("side_term", "vec3f"),
+    ("hilite_term", "vec3f"),
+    ("mirror_term", "vec3f"),
+    ("haze_term", "f32"),
+    ("key_term", "vec3f"),
+    ("silhouette", "f32"),
+    ("open", "f32"),
+];
+
+/// The fields that are kept of a stored sample. Where its rules cannot be planned, those of the built-in effects:
+/// that they cannot is told when they are.
+pub(super) fn kept_fields(facts: &Facts) -> Fields {
+    // What is kept does not depend on what is made of it.
+    let facts = &Facts { output: None, ..*facts };
+    let mut fields = of_built_in(facts);
+    if facts.setup.effects.added().next().is_some() {
+        let frontier = frontier(facts, &fields).unwrap_or_default();
+        fields.extend(frontier);
+    }
+    fields
+}
+
+fn of_built_in(facts: &Facts) -> Fields {
+    let needs = facts.needs();
+    let parts = parts(facts);
+    let part = |name: &str| parts.contains(&name);
+    let wanted = |name: &str| match name {
+        "diffuse_term" => part("diffuse_part"),
+        "side_term" => part("side_part"),
+        "hilite_term" => part("hilite_part"),
+        "mirror_term" => part("mirror_part"),
+        "key_term" => part("key_part"),
+        "haze_term" => hazy(facts),
+        "silhouette" => needs.rim,
+        _ => needs.occlusion,
+    };
+    TERMS.iter().copied().filter(|(name, _)| wanted(name)).collect()
+}
+
+/// The rules that yield what is kept of a stored sample: a plan whose goals are the fields of [`Source::Terms`].
+///
+/// # Errors
+/// When no rules yield them.
+pub fn plan_terms(facts: &Facts) -> Result<(Plan, Fields), PlanError> {
+    let kept = sample_fields(&Facts { source: Source::Terms, ..*facts });
+    Ok((plan_of(facts, &kept)?, kept))
+}
+
+/// The parameters that what is kept depends on. A fit that frees one of them keeps nothing.
+///
+/// # Errors
+/// When no rules yield what is kept.
+pub fn held(facts: &Facts) -> Result<Vec<Param>, PlanError> {
+    let (plan, _) = plan_terms(facts)?;
+    Ok(Param::all().filter(|&param| reads(&plan, param)).collect())
+}
+
+fn plan_of(facts: &Facts, kept: &Fields) -> Result<Plan, PlanError> {
+    let facts = Facts { source: Source::Samples, ..*facts };
+    let given = names(&sample_fields(&facts));
+    let goals: Vec<&'static str> = names(kept).into_iter().filter(|name| !given.contains(name)).collect();
+    Plan::search(&facts, &[], &goals, &given)
+}
+
+fn names(fields: &Fields) -> Vec<&'static str> {
+    fields.iter().map(|(name, _)| *name).collect()
+}
+
+/// Whether a plan reads a parameter, or what is made of it.
+fn reads(plan: &Plan, param: Param) -> bool {
+    let made = match param {
+        Param::EnvironmentRotation => Some(Constant::Turn),
+        Param::KeyAzimuth | Param::KeyElevation => Some(Constant::KeyDirection),
+        _ => None,
+    };
+    let lobe = param == Param::SpecularLobe && plan.resources.contains(&Resource::SpecularFaces);
+    lobe || plan.constants.contains(&Constant::Param(param))
+        || made.is_some_and(|made| plan.constants.contains(&made))
+}
+
+/// What must be kept beside `kept` so that the sum can be made of what is kept alone: quantities that move with no
+/// parameter but those that `kept` depends on, and are needed by rules that move with another.
+fn frontier(facts: &Facts, kept: &Fields) -> Result<Fields, PlanError> {
+    let samples = Facts { source: Source::Samples, ..*facts };
+    let mut goals = parts(&samples);
+    if hazy(&samples) {
+        goals.push("haze");
+    }
+    let whole = Plan::search(&samples, &[], &goals, &names(&sample_fields(&samples)))?;
+    let still = plan_of(facts, kept)?;
+    let is_held = |constant: Constant| match constant {
+        Constant::Param(param) => reads(&still, param),
+        _ => true,
+    };
+    let kept = names(kept);
+    let mut moving: BTreeSet<&'static str> = BTreeSet::new();
+    for rule in whole.rules(Stage::Fragment) {
+        let moves =
+            |name: &str| moving.contains(name) || Constant::from_name(name).is_some_and(|c| !is_held(c));
+        if rule.needs.iter().any(|(name, _)| moves(name)) {
+            moving.extend(rule.gives.iter().map(|(name, _)| *name));
+        }
+    }
+    // What needs nothing is there anyway.
+    let free = |name: &str| {
+        let mut given =
+            whole.rules(Stage::Fragment).filter(|rule| rule.gives.iter().any(|(given, _)| *given == name));
+        given.any(|rule| rule.needs.is_empty() && rule.reads.is_empty())
+    };
+    let moved = |rule: &&Rule| rule.gives.iter().any(|(name, _)| moving.contains(name));
+    // A part that nothing moves is kept as it is.
+    let parts = goals.iter().filter(|goal| !moving.contains(*goal)).map(|goal| (*goal, "vec3f"));
+    let needed = whole.rules(Stage::Fragment).filter(moved).flat_map(|rule| rule.needs.iter().copied());
+    let mut frontier = Fields::new();
+    for (name, kind) in needed.chain(parts) {
+        let constant = Constant::from_name(name).is_some();
+        let there = kept.contains(&name) || frontier.iter().any(|(known, _)| *known == name);
+        if !constant && !there && !moving.contains(name) && !free(name) {
+            frontier.push((name, kind));
+        }
+    }
+    Ok(frontier)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::effects::{Effect, Effects, Form, Silhouette};
+    use crate::model::evaluate::Setup;
+
+    #[test]
+    fn terms_are_all_that_the_built_in_rules_need_kept() {
+        // 37 divides no power of two: every effect is met with every other, on and off.
+        for bits in (0..1_u32 << Effect::BUILT_IN.len()).step_by(37) {
+            let on = |(i, _): &(usize, Effect)| bits & (1 << i) != 0;
+            let effects: Effects =
+                Effect::BUILT_IN.into_iter().enumerate().filter(on).map(|(_, e)| e).collect();
+            for silhouette in Silhouette::ALL {
+                let facts = Facts {
+                    setup: Setup { form: Form::Corrected, silhouette, effects },
+                    source: Source::Terms,
+                    ..Facts::default()
+                };
+                assert_eq!(frontier(&facts, &of_built_in(&facts)).unwrap(), [], "{effects:?} {silhouette:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_moves_lookups_is_held() {
+        let facts = |effects| Facts {
+            setup: Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects },
+            turned: true,
+            ..Facts::default()
+        };
+        let all = Effects::SURFACE.with(Effect::KeyLight);
+        let lookups = [
+            Param::NormalStrength,
+            Param::SpecularLobe,
+            Param::EnvironmentRotation,
+            Param::KeyAzimuth,
+            Param::KeyElevation,
+        ];
+        assert_eq!(held(&facts(all)).unwrap(), lookups);
+        let diffuse = Effects::of(&[Effect::Diffuse]);
+        assert_eq!(held(&facts(diffuse)).unwrap(), [Param::EnvironmentRotation]);
+    }
+}

@@ -1,0 +1,316 @@
+//! Whether the names, types and needs of a declared term fit the built-in rules.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::declaration::Declaration;
+use super::error::{Problem, TermError};
+use super::terms;
+use crate::model::compose::TermName;
+use crate::model::effects::Effect;
+use crate::model::params::Param;
+use crate::shader::emit::SAMPLE;
+use crate::shader::facts::Facts;
+use crate::shader::quantity::{Attribute, Constant, Resource};
+use crate::shader::rule::{LIBRARY, RULES, Rule, Stage};
+
+/// Words that the modules which rules are built into give a meaning of their own.
+const TAKEN: [&str; 34] = [
+    "at",
+    "part",
+    "samples",
+    "constants",
+    "group",
+    "lane",
+    "slot",
+    "share",
+    "shown",
+    "now",
+    "next",
+    "weight",
+    "observed",
+    "step",
+    "thread",
+    "workgroup",
+    "workgroups",
+    "targets",
+    "loss",
+    "scale",
+    "residual",
+    "value",
+    "wanted",
+    "beyond",
+    "weighed",
+    "record",
+    "count",
+    "terms",
+    "vertex",
+    "given",
+    "image",
+    "read",
+    "slots",
+    "i",
+];
+
+/// The declaration, where it fits.
+pub(super) fn checked(declaration: Declaration) -> Result<Declaration, TermError> {
+    names(&declaration)?;
+    adds(&declaration.rules)?;
+    for rule in &declaration.rules {
+        references(rule, &declaration)?;
+    }
+    types(&declaration)?;
+    circles(&declaration.rules)?;
+    there(&declaration)?;
+    Ok(declaration)
+}
+
+/// The name of something in shaders: lower-case words with single `_` between them.
+fn is_word(name: &str) -> bool {
+    let word =
+        |word: &str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit());
+    name.starts_with(|c: char| c.is_ascii_lowercase()) && name.split('_').all(word)
+}
+
+/// Whether a name counts up, as the modules' own do: `sum3`, `c0`, `d12_n`.
+fn counts_up(name: &str) -> bool {
+    ["sum", "c", "d"].iter().any(|head| {
+        name.strip_prefix(head).is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
+    })
+}
+
+fn quantity_name(name: &str, line: usize) -> Result<(), TermError> {
+    if !is_word(name) || counts_up(name) || TAKEN.contains(&name) || name.ends_with("_and_more") {
+        return Err(Problem::Name(name.to_owned()).at(line));
+    }
+    Ok(())
+}
+
+fn names(declaration: &Declaration) -> Result<(), TermError> {
+    let taken = |kind, name: &str, line| Err(Problem::Taken { kind, name: name.to_owned() }.at(line));
+    let Some((line, effect)) = declaration.effect else { return Err(Problem::NoEffect.at(1)) };
+    if !is_word(effect.name) || effect.meaning.is_empty() {
+        return Err(Problem::Value {
+            key: "effect",
+            given: effect.name.to_owned(),
+            wanted: "NAME, what it shows: the name in lower-case letters, digits and single `_`",
+        }
+        .at(line));
+    }
+    if Facts::default().holds(effect.name).is_some() {
+        return taken("effect or condition", effect.name, line);
+    }
+    let known: BTreeSet<&str> = RULES
+        .iter()
+        .chain(terms().into_iter().flat_map(|term| &term.rules))
+        .flat_map(|rule| rule.gives.iter().map(|(quantity, _)| *quantity))
+        .chain(SAMPLE.iter().map(|(name, _)| *name))
+        .chain(Attribute::ALL.iter().map(|attribute| attribute.name()))
+        .chain(Resource::ALL.iter().map(|resource| resource.name()))
+        .chain(Constant::OWN.iter().map(|constant| constant.name()))
+        .chain(["vertex_index"])
+        .collect();
+    let mut own = BTreeSet::new();
+    for &(line, parameter) in &declaration.parameters {
+        quantity_name(parameter.name, line)?;
+        let there = known.contains(parameter.name) || Param::from_identifier(parameter.name).is_some();
+        if there || !own.insert(parameter.name) {
+            return taken("parameter or quantity", parameter.name, line);
+        }
+    }
+    let params = own.clone();
+    for rule in &declaration.rules {
+        for (quantity, _) in &rule.gives {
+            quantity_name(quantity, rule.line)?;
+            let there = known.contains(quantity) || Param::from_identifier(quantity).is_some();
+            if there || params.contains(quantity) {
+                return taken("quantity", quantity, rule.line);
+            }
+        }
+        let functions = RULES.iter().chain(terms().into_iter().flat_map(|term| &term.rules));
+        let mut functions = functions.map(|rule| rule.function);
+        let library = LIBRARY.iter().any(|(_, text)| text.contains(&format!("fn {}(", rule.function)));
+        let twice = declaration.rules.iter().filter(|other| other.function == rule.function).count() > 1;
+        if library || twice || functions.any(|function| function == rule.function) {
+            return taken("function", rule.function, rule.line);
+        }
+    }
+    Ok(())
+}
+
+/// Parts of the radiance: new names, one vec3f each.
+fn adds(rules: &[Rule]) -> Result<(), TermError> {
+    for rule in rules {
+        for name in rule.adds.iter().chain(&rule.shows) {
+            if TermName::from_name(name).is_some() {
+                return Err(Problem::Taken { kind: "term", name: (*name).to_owned() }.at(rule.line));
+            }
+            quantity_name(name, rule.line)?;
+            let [(quantity, components)] = rule.gives.as_slice() else {
+                let given = "one of several".to_owned();
+                return Err(Problem::NoRadiance { quantity: rule.gives[0].0.to_owned(), given }.at(rule.line));
+            };
+            let given = rule.given_type(components);
+            if given != "vec3f" {
+                let (quantity, given) = ((*quantity).to_owned(), given.to_owned());
+                return Err(Problem::NoRadiance { quantity, given }.at(rule.line));
+            }
+        }
+    }
+    if rules.iter().all(|rule| rule.adds.is_empty()) {
+        return Err(Problem::NothingAdded.at(rules.first().map_or(1, |rule| rule.line)));
+    }
+    Ok(())
+}
+
+/// The conditions, library files and resources that a rule names.
+fn references(rule: &Rule, declaration: &Declaration) -> Result<(), TermError> {
+    let missing = |key, name: &str, known: Vec<String>| {
+        Err(Problem::NotThere { key, name: name.to_owned(), known }.at(rule.line))
+    };
+    let own = declaration.effect.map(|(_, effect)| effect.name);
+    for condition in &rule.when {
+        if Some(*condition) != own && Facts::default().holds(condition).is_none() {
+            let known = Effect::all().map(|effect| effect.name().to_owned());
+            return missing("when", condition, known.chain(Facts::CONDITIONS.map(str::to_owned)).collect());
+        }
+    }
+    for name in &rule.uses {
+        if !LIBRARY.iter().any(|(known, _)| known == name) {
+            return missing("uses", name, LIBRARY.map(|(known, _)| known.to_owned()).to_vec());
+        }
+    }
+    for name in &rule.reads {
+        if !Resource::ALL.iter().any(|resource| resource.name() == *name) {
+            return missing("reads", name, Resource::ALL.map(|resource| resource.name().to_owned()).to_vec());
+        }
+    }
+    Ok(())
+}
+
+/// The WGSL types of all quantities that built-in rules know.
+fn known_types() -> BTreeMap<&'static str, &'static str> {
+    let given = RULES.iter().flat_map(|rule| {
+        rule.gives.iter().map(move |(quantity, components)| (*quantity, rule.given_type(components)))
+    });
+    let needed = RULES.iter().flat_map(|rule| rule.needs.iter().copied());
+    SAMPLE.iter().copied().chain(given).chain(needed).collect()
+}
+
+fn types(declaration: &Declaration) -> Result<(), TermError> {
+    let mut types = known_types();
+    types.extend(Param::all().map(|param| (param.identifier(), param_type(param.info().rgb))));
+    types.extend(declaration.parameters.iter().map(|(_, p)| (p.name, param_type(p.rgb))));
+    for rule in &declaration.rules {
+        let given = rule.gives.iter().map(|(quantity, components)| (*quantity, rule.given_type(components)));
+        for (quantity, kind) in given.chain(rule.needs.iter().copied()) {
+            let wanted = *types.entry(quantity).or_insert(kind);
+            if wanted != kind {
+                let (quantity, given, wanted) = (quantity.to_owned(), kind.to_owned(), wanted.to_owned());
+                return Err(Problem::Type { quantity, given, wanted }.at(rule.line));
+            }
+        }
+    }
+    Ok(())
+}
+
+const fn param_type(rgb: bool) -> &'static str {
+    if rgb { "vec3f" } else { "f32" }
+}
+
+/// Rules of the file that need what they give.
+fn circles(rules: &[Rule]) -> Result<(), TermError> {
+    for start in rules {
+        let mut path = vec![start];
+        if let Some(circle) = circle(rules, &mut path, 0) {
+            return Err(Problem::Circle(circle).at(start.line));
+        }
+    }
+    Ok(())
+}
+
+/// The quantities of a circle that leads from the last rule of a path back to its first. (Built-in rules need nothing
+/// that a file gives.)
+fn circle<'a>(rules: &'a [Rule], path: &mut Vec<&'a Rule>, depth: usize) -> Option<String> {
+    let (first, last) = (*path.first()?, *path.last()?);
+    for (need, _) in &last.needs {
+        if first.gives.iter().any(|(quantity, _)| quantity == need) {
+            return Some(path.iter().map(|rule| rule.gives[0].0).collect::<Vec<_>>().join(", "));
+        }
+        // A path that is longer has been somewhere twice.
+        let next = rules.iter().filter(|rule| rule.gives.iter().any(|(quantity, _)| quantity == need));
+        for rule in next.filter(|_| depth < rules.len()) {
+            path.push(rule);
+            if let Some(found) = circle(rules, path, depth + 1) {
+                return Some(found);
+            }
+            path.pop();
+        }
+    }
+    None
+}
+
+/// The fields of stored samples, and all that rules give of them.
+fn of_samples<'a>(rules: &(impl Iterator<Item = &'a Rule> + Clone)) -> BTreeSet<&'static str> {
+    let mut there: BTreeSet<&'static str> = SAMPLE.iter().map(|(name, _)| *name).collect();
+    loop {
+        let before = there.len();
+        for rule in
+            rules.clone().filter(|rule| rule.stage == Stage::Fragment && !rule.when.contains(&"raster"))
+        {
+            let met = |name: &str| {
+                there.contains(name) || Param::from_identifier(name).is_some() || is_constant(name)
+            };
+            if rule.needs.iter().all(|(name, _)| met(name)) {
+                there.extend(rule.gives.iter().map(|(quantity, _)| *quantity));
+            }
+        }
+        if there.len() == before {
+            return there;
+        }
+    }
+}
+
+/// Whether a constant that is no parameter is there for stored samples.
+fn is_constant(name: &str) -> bool {
+    [Constant::Turn, Constant::KeyDirection].iter().any(|constant| constant.name() == name)
+}
+
+/// Everything that the rules need is there, for fragments and for samples; every parameter is needed.
+fn there(declaration: &Declaration) -> Result<(), TermError> {
+    let own: BTreeSet<&str> = declaration.parameters.iter().map(|(_, parameter)| parameter.name).collect();
+    let given: BTreeSet<&str> =
+        declaration.rules.iter().flat_map(|r| r.gives.iter().map(|(q, _)| *q)).collect();
+    let samples = of_samples(&RULES.iter());
+    for rule in &declaration.rules {
+        for &(need, _) in &rule.needs {
+            let constant = Param::from_identifier(need).is_some_and(Param::is_built_in) || is_constant(need);
+            if own.contains(need) || given.contains(need) || samples.contains(need) || constant {
+                continue;
+            }
+            let somewhere = RULES.iter().any(|rule| rule.gives.iter().any(|(quantity, _)| *quantity == need))
+                || Constant::from_name(need).is_some()
+                || Attribute::ALL.iter().any(|attribute| attribute.name() == need);
+            let quantity = need.to_owned();
+            if somewhere {
+                return Err(Problem::RasterOnly { quantity }.at(rule.line));
+            }
+            let all = own.iter().chain(&given).copied().chain(samples.iter().copied());
+            let near = nearest(need, all.chain(Param::built_in().map(Param::name)));
+            return Err(Problem::Unknown { quantity, near }.at(rule.line));
+        }
+    }
+    let idle = declaration.parameters.iter().find(|(_, parameter)| {
+        !declaration.rules.iter().any(|rule| rule.needs.iter().any(|(need, _)| *need == parameter.name))
+    });
+    idle.map_or(Ok(()), |&(line, parameter)| Err(Problem::Idle(parameter.name.to_owned()).at(line)))
+}
+
+/// The nearest of the known names, where any is near.
+fn nearest<'a>(given: &str, known: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let distance = |name: &str| strsim::damerau_levenshtein(given, name);
+    let near = known.map(|name| (distance(name), name)).min();
+    near.filter(|(distance, name)| *distance <= 1 + name.len() / 3)
+        .map(|(_, name)| name.to_owned())
+        .into_iter()
+        .collect()
+}

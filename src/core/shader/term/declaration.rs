@@ -1,0 +1,294 @@
+//! A file of rules: what its comments declare, and its functions.
+
+use super::error::{Problem, TermError};
+use crate::model::params::{LARGEST, Scale};
+use crate::shader::rule::{Error, Rule, Stage};
+
+/// What a file of rules holds.
+#[derive(Clone, Debug)]
+pub(crate) struct Declaration {
+    /// The effect, and its line.
+    pub(super) effect: Option<(usize, DeclaredEffect)>,
+    /// Its parameters, and their lines.
+    pub(super) parameters: Vec<(usize, DeclaredParameter)>,
+    /// Its rules, in their order.
+    pub(crate) rules: Vec<Rule>,
+}
+
+/// `effect: NAME, what it shows`
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct DeclaredEffect {
+    pub(super) name: &'static str,
+    pub(super) meaning: &'static str,
+}
+
+/// `parameter: NAME = 0.5 in [0, inf), rgb, linear; what it does; where it comes from`
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct DeclaredParameter {
+    pub(super) name: &'static str,
+    pub(super) default: f64,
+    pub(super) lower: f64,
+    pub(super) upper: f64,
+    pub(super) unit: &'static str,
+    pub(super) rgb: bool,
+    pub(super) linear: bool,
+    pub(super) scale: Scale,
+    pub(super) meaning: &'static str,
+    pub(super) source: &'static str,
+}
+
+/// The keys that a header may have.
+const KEYS: [&str; 12] = [
+    "effect",
+    "parameter",
+    "gives",
+    "adds",
+    "shows",
+    "when",
+    "cost",
+    "error",
+    "paper",
+    "uses",
+    "reads",
+    "fallback",
+];
+
+/// Read a file of rules of one stage, which is called `name`.
+///
+/// # Errors
+/// When it is not as [`super`] says.
+pub(crate) fn parse(stage: Stage, name: &'static str, text: &'static str) -> Result<Declaration, TermError> {
+    let mut declaration = Declaration { effect: None, parameters: Vec::new(), rules: Vec::new() };
+    let mut header: Vec<(usize, &'static str)> = Vec::new();
+    let mut lines = text.lines().enumerate();
+    while let Some((at, line)) = lines.next() {
+        if let Some(comment) = line.strip_prefix("//") {
+            header.push((at + 1, comment.trim_start_matches('/').trim()));
+        } else if line.starts_with("fn ") {
+            let last = lines.by_ref().find(|(_, line)| line.trim_end() == "}").map(|(_, line)| line);
+            let last = last.ok_or(Problem::Endless.at(at + 1))?;
+            let body = between(text, line, last);
+            let rule = declaration.rule(stage, at + 1, &header, body)?;
+            declaration.rules.push(rule);
+            header.clear();
+        } else if !line.trim().is_empty() {
+            return Err(Problem::Stray(line.trim().to_owned()).at(at + 1));
+        }
+    }
+    let alone = declaration.rules.len() == 1;
+    for rule in &mut declaration.rules {
+        rule.name = if alone { name } else { rule.function };
+    }
+    Ok(declaration)
+}
+
+/// The text from the start of a line to the end of another, its line break with it.
+fn between(text: &'static str, first: &str, last: &str) -> &'static str {
+    let offset = |line: &str| line.as_ptr() as usize - text.as_ptr() as usize;
+    let end = offset(last) + last.len();
+    let end = text[end..].find('\n').map_or(text.len(), |at| end + at + 1);
+    &text[offset(first)..end]
+}
+
+impl Declaration {
+    /// The rule of a function under its header; declarations of the file stand in the first rule's.
+    fn rule(
+        &mut self,
+        stage: Stage,
+        line: usize,
+        header: &[(usize, &'static str)],
+        body: &'static str,
+    ) -> Result<Rule, TermError> {
+        let mut rule = Rule::bare(stage, line, body).ok_or(Problem::Head.at(line))?;
+        for &(at, words) in header {
+            let (key, value) = words.split_once(": ").map_or(("", words), |(key, value)| (key, value.trim()));
+            match KEYS.iter().find(|known| **known == key) {
+                Some(&"effect" | &"parameter") => {
+                    self.declare(at, key, value)?;
+                    // What stood before belongs to the file.
+                    rule.about.clear();
+                }
+                Some(&key) => rule_line(&mut rule, key, value).map_err(|problem| problem.at(at))?,
+                None => {
+                    if let Some(&nearest) = KEYS.iter().find(|known| misspelt(key, known)) {
+                        return Err(Problem::Key { given: key.to_owned(), nearest }.at(at));
+                    }
+                    if !words.is_empty() {
+                        rule.about.push_str(if rule.about.is_empty() { "" } else { " " });
+                        rule.about.push_str(words);
+                    }
+                }
+            }
+        }
+        let lacks = |key| Problem::Lacks { function: rule.function.to_owned(), key }.at(line);
+        if rule.gives.is_empty() {
+            return Err(lacks("gives"));
+        }
+        if !rule.has_cost() {
+            return Err(lacks("cost"));
+        }
+        Ok(rule)
+    }
+
+    fn declare(&mut self, line: usize, key: &str, value: &'static str) -> Result<(), TermError> {
+        if key == "effect" {
+            if self.effect.is_some() || !self.rules.is_empty() {
+                return Err(Problem::Misplaced { key: "effect" }.at(line));
+            }
+            let (name, meaning) = value.split_once(',').unwrap_or((value, ""));
+            self.effect = Some((line, DeclaredEffect { name: name.trim(), meaning: meaning.trim() }));
+            return Ok(());
+        }
+        if !self.rules.is_empty() {
+            return Err(Problem::Misplaced { key: "parameter" }.at(line));
+        }
+        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log` or `, unit UNIT` where they \
+                      hold, then `; what it does; where it comes from`. The default lies within the bounds";
+        let parameter = parameter(value)
+            .ok_or_else(|| Problem::Value { key: "parameter", given: value.to_owned(), wanted }.at(line))?;
+        self.parameters.push((line, parameter));
+        Ok(())
+    }
+}
+
+/// Whether a word is nearly a key.
+fn misspelt(word: &str, key: &str) -> bool {
+    let lower = word.len() > 2 && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_');
+    lower && strsim::damerau_levenshtein(word, key) == 1
+}
+
+fn list(value: &'static str) -> impl Iterator<Item = &'static str> {
+    value.split(',').map(str::trim).filter(|word| !word.is_empty())
+}
+
+fn number(text: &str) -> Option<f64> {
+    text.trim().parse::<f64>().ok().filter(|number| number.is_finite())
+}
+
+/// A line of a rule's header into the rule.
+fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<(), Problem> {
+    let unread = |wanted| Problem::Value { key, given: value.to_owned(), wanted };
+    let amount = |text: &str| number(text).filter(|number| *number >= 0.0);
+    match key {
+        "gives" => rule.gives = list(value).map(|q| q.split_once('.').unwrap_or((q, ""))).collect(),
+        "adds" => rule.adds = list(value).collect(),
+        "shows" => rule.shows = Some(value),
+        "when" => rule.when = list(value).collect(),
+        "uses" => rule.uses = list(value).collect(),
+        "reads" => rule.reads = list(value).collect(),
+        "fallback" => rule.fallback = list(value).collect(),
+        "paper" => rule.paper = value == "yes",
+        "error" if value == "tessellation" => rule.error = Error::Tessellation,
+        "error" => {
+            rule.error = Error::Fixed(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
+        }
+        _ => {
+            let (fixed, each) = match value.strip_suffix(" a morph") {
+                Some(costs) => costs.split_once(" and ").unwrap_or(("0", costs)),
+                None => (value, "0"),
+            };
+            let costs = amount(fixed).zip(amount(each));
+            rule.set_cost(costs.ok_or_else(|| unread("how many operations it takes, about"))?);
+        }
+    }
+    Ok(())
+}
+
+fn parameter(value: &'static str) -> Option<DeclaredParameter> {
+    let mut parts = value.splitn(3, ';').map(str::trim);
+    let (numbers, meaning) = (parts.next()?, parts.next()?);
+    let (name, rest) = numbers.split_once('=')?;
+    let (default, rest) = rest.split_once(" in ")?;
+    let rest = rest.trim();
+    let end = rest.find([']', ')'])?;
+    let (lower, upper) = rest[..end].strip_prefix(['[', '('])?.split_once(',')?;
+    let bound = |text: &str| match text.trim() {
+        "inf" => Some(f64::INFINITY),
+        "-inf" => Some(f64::NEG_INFINITY),
+        other => number(other),
+    };
+    let mut parameter = DeclaredParameter {
+        name: name.trim(),
+        default: number(default)?,
+        lower: bound(lower)?,
+        upper: bound(upper)?,
+        unit: "",
+        rgb: false,
+        linear: false,
+        scale: Scale::Linear,
+        meaning,
+        source: parts.next().unwrap_or_default(),
+    };
+    for flag in list(&rest[end + 1..]) {
+        match flag {
+            "rgb" => parameter.rgb = true,
+            "linear" => parameter.linear = true,
+            "log" => parameter.scale = Scale::Log,
+            other => parameter.unit = other.strip_prefix("unit ")?.trim(),
+        }
+    }
+    let DeclaredParameter { default, lower, upper, linear, scale, .. } = parameter;
+    let within = (lower.max(-LARGEST)..=upper.min(LARGEST)).contains(&default);
+    // Logarithms are of positive numbers, and a linear parameter is solved for by its value.
+    let steps = scale == Scale::Linear || (lower > 0.0 && !linear);
+    (within && lower < upper && steps && !meaning.is_empty()).then_some(parameter)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TEXT: &str = "// Of the file.\n//\n// effect: sheen, light of fine hair\n\
+        // parameter: sheen_weight = 0.5 in [0, inf), rgb, linear; how much; a paper\n\
+        // parameter: sheen_width = 20 in [1, 90], log, unit degrees; how wide\n//\n// Of the rule.\n//\n\
+        // gives: sheen_part\n// adds: sheen\n// cost: 12\n\
+        fn sheen(n: vec3f, sheen_weight: vec3f) -> vec3f {\n    return sheen_weight * n;\n}\n\n\
+        // gives: sheen_a.x, sheen_b.y\n// cost: 3\nfn both() -> vec2f {\n    return vec2f(1.0);\n}\n";
+
+    fn read(text: &str) -> Result<Declaration, TermError> {
+        parse(Stage::Fragment, "file", crate::model::registry::leaked(text))
+    }
+
+    #[test]
+    fn effects_parameters_and_several_rules_are_read() {
+        let read = read(TEXT).unwrap();
+        assert_eq!(read.effect, Some((3, DeclaredEffect { name: "sheen", meaning: "light of fine hair" })));
+        let [(4, weight), (5, width)] = read.parameters.as_slice() else { panic!("{:?}", read.parameters) };
+        assert!(weight.rgb && weight.linear && weight.upper == f64::INFINITY && weight.source == "a paper");
+        assert!(width.scale == Scale::Log && width.unit == "degrees" && width.default == 20.0);
+        let [sheen, both] = read.rules.as_slice() else { panic!("{:?}", read.rules) };
+        assert_eq!((sheen.name, sheen.line, sheen.about.as_str()), ("sheen", 12, "Of the rule."));
+        assert_eq!((sheen.adds.as_slice(), sheen.needs.len()), (&["sheen"][..], 2));
+        assert_eq!(both.gives, [("sheen_a", "x"), ("sheen_b", "y")]);
+        assert!(both.body.starts_with("fn both") && both.body.ends_with("}\n"));
+    }
+
+    #[test]
+    fn what_cannot_be_read_is_told_with_its_line() {
+        let swap = |old: &str, new: &str| {
+            assert!(TEXT.contains(old), "{old}");
+            read(&TEXT.replacen(old, new, 1)).unwrap_err()
+        };
+        assert_eq!(swap("cost: 12", "cost: much").line, 11);
+        assert!(matches!(swap("adds: sheen", "add: sheen").problem, Problem::Key { nearest: "adds", .. }));
+        assert!(matches!(swap("// gives: sheen_part\n", "").problem, Problem::Lacks { key: "gives", .. }));
+        assert!(matches!(swap("// cost: 3\n", "").problem, Problem::Lacks { key: "cost", .. }));
+        assert_eq!(swap("-> vec2f {", "{").problem, Problem::Head);
+        assert_eq!(
+            swap("fn both()", "const A = 1.0;\nfn both()").problem,
+            Problem::Stray("const A = 1.0;".to_owned())
+        );
+        assert_eq!(swap("1.0);\n}\n", "1.0);\n").problem, Problem::Endless);
+        for (old, new) in [
+            ("= 0.5 in", "= -0.5 in"),
+            ("[0, inf), rgb", "[0, inf, rgb"),
+            ("rgb, linear", "rgb, linaer"),
+            ("[1, 90]", "[0, 90]"),
+            ("; how wide", ""),
+            ("[1, 90]", "[90, 1]"),
+        ] {
+            assert!(matches!(swap(old, new).problem, Problem::Value { key: "parameter", .. }), "{new}");
+        }
+        assert_eq!(swap("// gives: sheen_a", "// effect: b, c\n// gives: sheen_a").line, 16);
+    }
+}

@@ -1,0 +1,137 @@
+//! Terms: effects with parameters and rules of their own, each declared in one file.
+//!
+//! ```wgsl
+//! // Schlick's Fresnel factor on the mirrored environment (Schlick 1994).
+//! //
+//! // effect: fresnel_reflection, the mirrored environment grows towards grazing angles
+//! // parameter: fresnel_weight = 0.5 in [0, inf), rgb, linear; weight of the reflected environment; Schlick 1994
+//! // parameter: fresnel_f0 = 0.028 in [0, 0.2]; reflectance when facing; Schlick 1994
+//! //
+//! // gives: fresnel_part
+//! // adds: fresnel_reflection
+//! // cost: 14
+//! fn fresnel_light(n: vec3f, view: vec3f, mirror_light: vec4f, fresnel_weight: vec3f, fresnel_f0: f32) -> vec3f {
+//!     let grazing: f32 = 1.0 - min(abs(dot(n, view)), 1.0);
+//!     let square: f32 = grazing * grazing;
+//!     let fresnel: f32 = fresnel_f0 + (1.0 - fresnel_f0) * (square * square * grazing);
+//!     return fresnel_weight * (fresnel * mirror_light.rgb);
+//! }
+//! ```
+//!
+//! Each rule of the file holds only where its effect is enabled. What `adds` is a part of the radiance, and an image
+//! layer of that name. What the effect asks of the stages before (maps, cubes, fields of samples) follows from what
+//! its rules need.
+//!
+//! - `declaration`: the file's text; [`error`]: what is wrong with it
+//! - `check`: whether its names, types and needs fit the built-in rules; `wgsl`: whether its functions are valid and
+//!   have derivatives
+//! - `needs`: what its effect asks for
+
+mod check;
+pub(crate) mod declaration;
+pub mod error;
+mod needs;
+mod wgsl;
+
+use std::sync::{Mutex, PoisonError};
+
+use self::declaration::Declaration;
+pub use self::error::{Problem, TermError};
+use super::rule::{Rule, Stage};
+use crate::model::compose::{TermInfo, TermName};
+use crate::model::effects::{Effect, EffectInfo};
+use crate::model::params::{Param, ParamInfo};
+use crate::model::registry::{Added, RegistryError, leaked};
+
+/// A term that was registered.
+#[derive(Debug)]
+pub struct Term {
+    /// Its effect.
+    pub effect: Effect,
+    /// Its parameters.
+    pub params: Vec<Param>,
+    /// Its image layers.
+    pub layers: Vec<TermName>,
+    /// Its rules.
+    pub rules: Vec<Rule>,
+    /// The text that declares it.
+    pub text: &'static str,
+}
+
+static TERMS: Added<Term> = Added::new();
+
+/// Every term that was registered.
+pub fn terms() -> Vec<&'static Term> {
+    TERMS.rows()
+}
+
+/// Make a term known to this process for as long as it runs, from the text of the file that declares it; `name` is
+/// what the file is called. A text that was registered before is not registered again.
+///
+/// # Errors
+/// When the text is not as the module's documentation says, or does not fit the other rules.
+pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
+    // One at a time, so that nothing is taken between the check and the entry.
+    static ONE: Mutex<()> = Mutex::new(());
+    let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = terms().into_iter().find(|term| term.text == text) {
+        return Ok(known);
+    }
+    let text = leaked(text);
+    let declaration = declaration::parse(Stage::Fragment, leaked(name), text)?;
+    let declaration = check::checked(declaration)?;
+    wgsl::check(&declaration.rules)?;
+    enter(declaration, text)
+}
+
+/// Enter a checked declaration into the tables.
+fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, TermError> {
+    let Declaration { effect, parameters, mut rules } = declaration;
+    let (line, declared) = effect.ok_or(Problem::NoEffect.at(1))?;
+    let row = EffectInfo { name: declared.name, meaning: declared.meaning, needs: Some(needs::of_effect) };
+    let effect = Effect::register(row).map_err(|error| problem(error).at(line))?;
+    let effects: &'static [Effect] = Box::leak(Box::new([effect]));
+    let mut params = Vec::new();
+    for (line, declared) in parameters {
+        let row = ParamInfo {
+            param: Param::BaseWeight,
+            name: declared.name,
+            identifier: declared.name,
+            listing: declared.default,
+            corrected: declared.default,
+            lower: declared.lower,
+            upper: declared.upper,
+            unit: declared.unit,
+            rgb: declared.rgb,
+            linear: declared.linear,
+            scale: declared.scale,
+            effects,
+            source: declared.source,
+            meaning: declared.meaning,
+        };
+        params.push(Param::register(row).map_err(|error| problem(error).at(line))?);
+    }
+    let mut layers = Vec::new();
+    for rule in &mut rules {
+        for &name in rule.adds.iter().chain(&rule.shows) {
+            let layer = TermName::register(TermInfo { name, effects })
+                .map_err(|error| problem(error).at(rule.line))?;
+            if !layers.contains(&layer) {
+                layers.push(layer);
+            }
+        }
+        if !rule.when.contains(&declared.name) {
+            rule.when.push(declared.name);
+        }
+    }
+    let term = Term { effect, params, layers, rules, text };
+    let never = || Problem::Full { kind: "term", most: 0 }.at(line);
+    TERMS.add(|_| false, |_| false, |_| Ok(term), never)
+}
+
+fn problem(error: RegistryError) -> Problem {
+    match error {
+        RegistryError::Taken { kind, name } => Problem::Taken { kind, name },
+        RegistryError::Full { kind, most } => Problem::Full { kind, most },
+    }
+}

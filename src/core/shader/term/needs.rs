@@ -1,0 +1,93 @@
+//! What an added effect asks of the stages before the model: what the rules that show it read.
+
+use std::collections::HashMap;
+use std::sync::{LazyLock, Mutex, PoisonError};
+
+use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
+use crate::model::evaluate::Setup;
+use crate::shader::emit::SAMPLE;
+use crate::shader::facts::{Facts, Source};
+use crate::shader::quantity::Resource;
+use crate::shader::rule::rules;
+use crate::shader::search::search;
+
+/// What `effect` asks for beside the other `effects`.
+pub(super) fn of_effect(effect: Effect, effects: Effects, silhouette: Silhouette) -> Needs {
+    type Known = HashMap<(Effect, Effects, Silhouette), Needs>;
+    static KNOWN: LazyLock<Mutex<Known>> = LazyLock::new(Mutex::default);
+    let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    let key = (effect, effects, silhouette);
+    if let Some(needs) = known().get(&key) {
+        return *needs;
+    }
+    let own = rules(Effects::of(&[effect])).filter(|rule| rule.when.contains(&effect.name()));
+    let mut goals: Vec<&'static str> =
+        own.filter(|rule| !rule.adds.is_empty()).map(|rule| rule.gives[0].0).collect();
+    goals.dedup();
+    let needs = of_goals(&goals, effects, silhouette);
+    known().insert(key, needs);
+    needs
+}
+
+/// What the rules that yield quantities of stored samples ask for, in the corrected form: the listing's ask for no
+/// more.
+pub(super) fn of_goals(goals: &[&'static str], effects: Effects, silhouette: Silhouette) -> Needs {
+    let setup = Setup { form: Form::Corrected, silhouette, effects };
+    let facts = Facts { setup, source: Source::Samples, ..Facts::default() };
+    // What a sample can hold. The smooth normal is left to the rule that puts the base in its place, so that it is
+    // wanted by those alone that cannot do with that.
+    let stand_in = !effects.has(Effect::KeyLight);
+    let bumped = silhouette == Silhouette::Bumped;
+    let held = |name: &str| !(name == "normal" && stand_in || name == "silhouette" && bumped);
+    let given: Vec<&'static str> = SAMPLE.iter().map(|(name, _)| *name).filter(|name| held(name)).collect();
+    // What cannot be planned is told when it is.
+    let chosen = search(&facts, &[], goals, &given).unwrap_or_default();
+    let needed = |name: &str| {
+        let mut rules = chosen.iter().filter(|rule| !rule.fallback.contains(&name));
+        rules.any(|rule| rule.needs.iter().any(|(need, _)| *need == name))
+    };
+    let read = |resource: Resource| chosen.iter().any(|rule| rule.reads.contains(&resource.name()));
+    Needs {
+        color_map: needed("albedo"),
+        normal_map: needed("bump"),
+        specular_map: needed("specular"),
+        attenuator_map: needed("attenuator"),
+        tangents: needed("bump"),
+        irradiance: read(Resource::IrradianceFaces),
+        lobes: read(Resource::SpecularFaces),
+        hilite: read(Resource::HiliteFaces),
+        occlusion: needed("open"),
+        rim: needed("silhouette"),
+        dapple: needed("dapple"),
+        haze: false,
+        smooth_normal: needed("normal"),
+        key_light: false,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shader::emit::{hazy, parts};
+
+    #[test]
+    fn what_the_built_in_rules_read_is_what_the_built_in_effects_ask_for() {
+        // 37 divides no power of two: every effect is met with every other, on and off.
+        for bits in (0..1_u32 << Effect::BUILT_IN.len()).step_by(37) {
+            let on = |(i, _): &(usize, Effect)| bits & (1 << i) != 0;
+            let effects: Effects =
+                Effect::BUILT_IN.into_iter().enumerate().filter(on).map(|(_, e)| e).collect();
+            for silhouette in Silhouette::ALL {
+                let setup = Setup { form: Form::Corrected, silhouette, effects };
+                let facts = Facts { setup, source: Source::Samples, ..Facts::default() };
+                let mut goals = parts(&facts);
+                if hazy(&facts) {
+                    goals.push("haze");
+                }
+                let (read, asked) = (of_goals(&goals, effects, silhouette), effects.needs(silhouette));
+                let asked = Needs { haze: false, key_light: false, ..asked };
+                assert_eq!(read, asked, "{effects:?} {silhouette:?}");
+            }
+        }
+    }
+}

@@ -1,0 +1,91 @@
+//! The borders of the workspace's members: who may depend on what, and who knows of the command line.
+
+use std::path::{Path, PathBuf};
+
+fn member(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("src").join(name)
+}
+
+/// The dependencies that a member's manifest names, those of targets and of tests among them.
+fn dependencies(name: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(member(name).join("Cargo.toml")).unwrap();
+    let manifest: toml::Table = text.parse().unwrap();
+    let mut found = Vec::new();
+    let mut add = |table: &toml::Table| {
+        for kind in ["dependencies", "dev-dependencies", "build-dependencies"] {
+            let named = table.get(kind).and_then(toml::Value::as_table);
+            found.extend(named.into_iter().flat_map(toml::Table::keys).cloned());
+        }
+    };
+    add(&manifest);
+    let targets = manifest.get("target").and_then(toml::Value::as_table);
+    targets.into_iter().flat_map(toml::Table::values).filter_map(toml::Value::as_table).for_each(add);
+    assert!(found.len() > 3, "{name}: {found:?}");
+    found
+}
+
+#[test]
+fn members_depend_on_those_before_them_alone() {
+    // As the data flows: each may use those that stand before it.
+    let order = ["core", "gpu", "tensor", "report", "study", "host"];
+    for (place, name) in order.iter().enumerate() {
+        let found = dependencies(name);
+        for after in &order[place..] {
+            assert!(!found.contains(&format!("skinfit-{after}")), "{name} depends on {after}");
+        }
+    }
+    // The tensors are an addition that nothing else needs.
+    for name in ["report", "study"] {
+        assert!(!dependencies(name).contains(&"skinfit-tensor".to_owned()), "{name} depends on tensor");
+    }
+}
+
+#[test]
+fn the_library_has_no_command_line_signals_or_progress_bars() {
+    for name in ["core", "gpu", "tensor", "report"] {
+        for host in ["clap", "ctrlc", "indicatif", "nix"] {
+            assert!(!dependencies(name).contains(&host.to_owned()), "{name} depends on {host}");
+        }
+    }
+    for name in ["wgpu", "pollster"] {
+        assert!(!dependencies("core").contains(&name.to_owned()), "core depends on {name}");
+    }
+    for name in ["core", "gpu", "report", "study", "host"] {
+        let found = dependencies(name);
+        assert!(!found.iter().any(|found| found.starts_with("burn")), "{name} depends on burn");
+    }
+}
+
+/// Every Rust file below a folder.
+fn sources(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            sources(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+/// Whether a line of code holds the name of an option, as `--resume`.
+fn names_an_option(line: &str) -> bool {
+    let code = line.trim_start();
+    // Comments are for those who read the code; exports quote whole commands for people.
+    !code.starts_with("//")
+        && !code.contains("`skinfit ")
+        && code.split("--").skip(1).any(|after| after.starts_with(|first: char| first.is_ascii_lowercase()))
+}
+
+#[test]
+fn the_library_does_not_speak_of_options() {
+    let mut files = Vec::new();
+    ["core", "gpu", "tensor"].iter().for_each(|name| sources(&member(name), &mut files));
+    assert!(files.len() > 150, "{} files", files.len());
+    for path in files {
+        let text = std::fs::read_to_string(&path).unwrap();
+        let found = text.lines().enumerate().find(|(_, line)| names_an_option(line));
+        assert!(found.is_none(), "{}: {found:?}", path.display());
+    }
+    assert!(names_an_option("    #[error(\"go on with --resume.\")]"));
+}

@@ -1,0 +1,174 @@
+//! A scene that brings a term of its own: every command that a user would meet it in.
+
+use super::refusals::{Case, FIT, check};
+use super::sandbox::{Ran, Sandbox};
+use crate::added_term::FRESNEL;
+use crate::fixtures::read_exr;
+
+const EFFECTS: &str = "\"hilite\", \"reflection\"]";
+
+/// A scene with the term; its targets show it.
+fn scene() -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.write("terms/fresnel.wgsl", FRESNEL.as_bytes());
+    let with = "\"hilite\", \"reflection\", \"fresnel_reflection\"]\nterms = [\"terms/fresnel.wgsl\"]";
+    sandbox.edit(EFFECTS, with);
+    sandbox.edit("hilite = 0.7", "hilite = 0.7\nfresnel_weight = 0.3");
+    sandbox.edit(
+        "\"specular_lobe\"]",
+        "\"fresnel_weight\", \"fresnel_f0\"]\nper_channel = [\"fresnel_weight\"]",
+    );
+    sandbox
+}
+
+#[test]
+fn its_parameters_are_listed_and_its_rules_are_in_the_shader_of_its_scene() {
+    let sandbox = scene();
+    let listed = sandbox.run(&["params", "scene.toml"]).done().out;
+    assert!(
+        listed.contains("fresnel_f0") && listed.contains("[0, 0.2]") && listed.contains("Schlick 1994"),
+        "{listed}"
+    );
+    assert!(!sandbox.run(&["params"]).done().out.contains("fresnel"));
+    let shader = sandbox.run(&["shader", "scene.toml"]).done().out;
+    assert!(shader.contains("fresnel_part") && shader.contains("fn schlick("), "{shader}");
+    // An option may name its effect, and leave it out.
+    let only = sandbox.run(&["shader", "scene.toml", "--effects", "diffuse,fresnel_reflection"]).done().out;
+    assert!(only.contains("fn schlick(") && !only.contains("hilite_faces"));
+    let without = sandbox.run(&["shader", "scene.toml", "--effects", "diffuse"]).done().out;
+    assert!(!without.contains("fn schlick("));
+}
+
+#[test]
+fn without_a_list_of_effects_a_named_term_is_on() {
+    let sandbox = scene();
+    let text = sandbox.text("scene.toml");
+    let list = text.lines().find(|line| line.starts_with("effects = ")).unwrap();
+    sandbox.edit(list, "");
+    assert!(sandbox.run(&["shader", "scene.toml"]).done().out.contains("fn schlick("));
+}
+
+#[test]
+fn it_is_fitted_reported_drawn_and_exported() {
+    let sandbox = scene();
+    if !super::graphics::adapter(&sandbox) {
+        return;
+    }
+    let truth =
+        "form = \"corrected\"\n[params]\nfresnel_weight = [0.9, 0.7, 0.5]\nfresnel_f0 = 0.1\nhilite = 0.6\n";
+    sandbox.write("more.toml", truth.as_bytes());
+    for view in ["front", "side"] {
+        let target = format!("targets/{view}.exr");
+        let render = [
+            "render",
+            "scene.toml",
+            "--params",
+            "more.toml",
+            "--engine",
+            "gpu",
+            "--view",
+            view,
+            "-o",
+            &target,
+        ];
+        sandbox.run(&render).done();
+    }
+    for (engine, run) in [("cpu", "run_cpu"), ("gpu", "run")] {
+        let fitted = sandbox.run(&["fit", "scene.toml", "-o", run, "--engine", engine]);
+        assert_eq!(fitted.code, Some(0), "{fitted:?}");
+        let report = sandbox.json(&format!("{run}/report.json"));
+        let value = &report["params"]["fresnel_weight"]["value"];
+        for (c, want) in [0.9, 0.7, 0.5].into_iter().enumerate() {
+            // The targets' samples are rasterised and the fit's are traced; at the outline they differ.
+            assert!((value[c].as_f64().unwrap() - want).abs() < 0.05, "{engine}: {value}");
+        }
+    }
+    let file = sandbox.text("run/params.toml");
+    assert!(file.contains("fresnel_weight = [") && file.contains("fresnel_f0 = "), "{file}");
+    // The run's scene finds the term from where it lies.
+    let terms = read_exr(&sandbox.path("run/front_terms.exr"));
+    assert!(
+        terms.planes.keys().any(|name| name.starts_with("fresnel_reflection")),
+        "{:?}",
+        terms.planes.keys()
+    );
+    let glsl = sandbox.run(&["export", "run/params.toml", "--to", "glsl"]).done().out;
+    assert!(glsl.contains("float skinfit_schlick(") && glsl.contains("FRESNEL_WEIGHT"), "{glsl}");
+    let c = sandbox.run(&["export", "run/params.toml", "--to", "c"]).done().out;
+    assert!(c.contains("skinfit_fresnel_weight[3]"), "{c}");
+    let layers = [
+        "render",
+        "run/scene.toml",
+        "--params",
+        "run/params.toml",
+        "--layers",
+        "--engine",
+        "gpu",
+        "-o",
+        "a.exr",
+    ];
+    sandbox.run(&layers).done();
+    let layers = read_exr(&sandbox.path("a.exr"));
+    assert!(
+        layers.planes.keys().any(|name| name.starts_with("fresnel_reflection")),
+        "{:?}",
+        layers.planes.keys()
+    );
+}
+
+#[test]
+fn what_does_not_know_it_refuses_it_by_name() {
+    let sandbox = scene();
+    let refused = |ran: Ran| ran.refused(&["the effect fresnel_reflection comes from a file of its own"]);
+    refused(sandbox.run(&["render", "scene.toml", "-o", "a.exr", "--engine", "cpu"]));
+    refused(sandbox.run(&["ablate", "scene.toml", "-o", "parts"]));
+}
+
+#[test]
+fn terms_that_cannot_be_used_are_refused_with_their_file_and_line() {
+    fn spoil(sandbox: &Sandbox, change: fn(&Sandbox)) {
+        sandbox.write("terms/fresnel.wgsl", FRESNEL.as_bytes());
+        sandbox.edit(EFFECTS, "\"reflection\", \"fresnel_reflection\"]\nterms = [\"terms/fresnel.wgsl\"]");
+        change(sandbox);
+    }
+    fn change(sandbox: &Sandbox, old: &str, new: &str) {
+        assert!(FRESNEL.contains(old), "{old}");
+        sandbox.write("terms/fresnel.wgsl", FRESNEL.replacen(old, new, 1).as_bytes());
+    }
+    check(&[
+        Case {
+            what: "no file",
+            arguments: FIT,
+            spoil: &|sandbox| spoil(sandbox, |sandbox| sandbox.remove("terms/fresnel.wgsl")),
+            words: &["terms/fresnel.wgsl: there is no such file", "relative to that file"],
+        },
+        Case {
+            what: "no WGSL",
+            arguments: FIT,
+            spoil: &|sandbox| spoil(sandbox, |sandbox| change(sandbox, "min(abs(", "mini(abs(")),
+            words: &["terms/fresnel.wgsl: line 12: it is no valid WGSL", "Correct the function"],
+        },
+        Case {
+            what: "a quantity that nothing gives",
+            arguments: FIT,
+            spoil: &|sandbox| {
+                spoil(sandbox, |sandbox| change(sandbox, "mirror_light: vec4f", "miror_light: vec4f"));
+            },
+            words: &["terms/fresnel.wgsl: line 22: nothing gives miror_light. Did you mean mirror_light"],
+        },
+        Case {
+            what: "a name that is taken",
+            arguments: FIT,
+            spoil: &|sandbox| {
+                spoil(sandbox, |sandbox| change(sandbox, "parameter: fresnel_f0", "parameter: hilite"));
+            },
+            words: &["terms/fresnel.wgsl: line 5: the parameter or quantity `hilite` is there already"],
+        },
+        Case {
+            what: "a parameter out of its bounds",
+            arguments: FIT,
+            spoil: &|sandbox| spoil(sandbox, |sandbox| sandbox.edit("hilite = 0.7", "fresnel_f0 = 0.7")),
+            words: &["scene.toml: line 17: fresnel_f0 = 0.7 is out of bounds", "[0, 0.2]"],
+        },
+    ]);
+}
