@@ -5,7 +5,7 @@
 //! built-in scene, reads a constant with its standard error, renders a view and exports the constants:
 //!
 //! ```
-//! use skinfit::{ExportTarget, FitOptions, PrepareOptions, Prepared, Shader};
+//! use skinfit::{Constants, ExportTarget, FitOptions, PrepareOptions, Prepared, Shader};
 //! use skinfit::{built_in_scene, export_constants, fit, write_exr};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -27,8 +27,9 @@
 //!     let image = shader.shade(&observed.samples, &view.camera, 1.0).image;
 //!     write_exr(&folder.join("front.exr"), &image, &Default::default())?;
 //!
-//!     let (effects, params) = (prepared.scene.effects, &outcome.end.params);
-//!     println!("{}", export_constants(ExportTarget::Glsl, effects, params, &Default::default()));
+//!     let scene = &prepared.scene;
+//!     let constants = Constants::new(scene.form, scene.effects, &outcome.end.params);
+//!     println!("{}", export_constants(ExportTarget::Glsl, constants, &Default::default()));
 //!     Ok(())
 //! }
 //! ```
@@ -39,7 +40,7 @@
 //! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`]: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] |
 //! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name |
 //! | render | [`Shader`] on the CPU, [`Renderer`] on a graphics adapter; [`write_exr`] |
-//! | take it to another engine | [`export_constants`], [`export_function`] |
+//! | take it to another engine | [`export_constants`] of [`Constants`], [`export_function`] |
 //! | differentiate it on burn's tensors | `skinfit_tensor::Shade` (feature `burn`) |
 //!
 //! `experiments/library` has runnable programs: a fit, a rendering, gradients on tensors.
@@ -58,7 +59,7 @@ pub use skinfit_core::demo::built_in_scene;
 pub use skinfit_core::engine::cpu::CpuEngine;
 pub use skinfit_core::engine::{Objective, Point, Unknown};
 pub use skinfit_core::export::{
-    Target as ExportTarget, constants as export_constants, function as export_function,
+    Constants, Target as ExportTarget, constants as export_constants, function as export_function,
 };
 pub use skinfit_core::fit::outcome::Outcome;
 pub use skinfit_core::fit::{FitOptions, fit};

@@ -59,6 +59,14 @@ pub struct Constants<'a> {
     pub gains: &'a [(String, f64)],
 }
 
+impl<'a> Constants<'a> {
+    /// Constants of a model, without word of a loss that they minimise or of gains.
+    #[must_use]
+    pub const fn new(form: Form, effects: Effects, params: &'a Params) -> Self {
+        Self { form, effects, params, loss: None, gains: &[] }
+    }
+}
+
 /// Constants as text. As TOML they are a parameter file, which reads back.
 #[must_use]
 pub fn constants(target: Target, constants: Constants<'_>, from: &Provenance) -> String {
