@@ -22,7 +22,7 @@
 //!     println!("base_weight = {:.4}, standard error {:?}", base.value, base.std_error);
 //!     assert!((base.value - 0.85).abs() < 1e-5); // the targets' own, but for roundings to 32 bits
 //!
-//!     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
+//!     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params)?;
 //!     let (view, observed) = (&prepared.scene.views[0], &engine.views()[0]);
 //!     let image = shader.shade(&observed.samples, &view.camera, 1.0).image;
 //!     write_exr(&folder.join("front.exr"), &image, &Default::default())?;

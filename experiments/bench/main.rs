@@ -11,10 +11,8 @@ use skinfit::bake::panorama::Radiance;
 use skinfit::bake::prefilter::Prefilter;
 use skinfit::bake::rays::RayMesh;
 use skinfit::engine::{Objective, Point};
-use skinfit::model::evaluate::{compose, shade};
-use skinfit::model::fragment::Fragment;
-use skinfit::model::lights::{Cubes, Lights};
 use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::render::shade::Shader;
 use skinfit::samples::sample_view;
 
 /// The built-in scene, written once below target/.
@@ -40,35 +38,13 @@ fn passes(c: &mut Criterion) {
 
 fn sample(c: &mut Criterion) {
     let prepared = prepared();
-    let like = 0.0_f32;
-    let lobes = prepared.illumination.lobes.as_ref().expect("the built-in scene reflects");
-    let (specular, slope) = lobes.at(32.0);
-    let cubes = Cubes {
-        irradiance: prepared.illumination.irradiance.as_ref(),
-        specular: Some(&specular),
-        lobe_slope: Some(&slope),
-        hilite: prepared.illumination.hilite.as_ref(),
-    };
-    let (setup, params) = (prepared.setup(), prepared.scene.params.clone());
-    let lights = Lights::new(setup, &params, cubes, false, like);
-    let fragment = Fragment {
-        base: [0.1, 0.2, 0.9],
-        bump: [0.1, -0.1, 0.0],
-        normal: [0.1, 0.2, 0.9],
-        view: [0.0, 0.0, -1.0],
-        occlusion: 0.8,
-        silhouette: 0.2,
-        dapple: 0.9,
-        albedo: [0.8, 0.6, 0.5],
-        specular: 0.3,
-        attenuator: 0.4,
-    };
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)
+        .expect("the built-in rules can be computed");
+    let (samples, camera) = (&prepared.samples[0], &prepared.scene.views[0].camera);
     let mut group = c.benchmark_group("sample");
-    group.bench_function("value, scalar f32", |b| {
-        b.iter(|| shade(setup, &lights, &black_box(fragment), &params));
-    });
-    group.bench_function("terms, scalar f32", |b| {
-        b.iter(|| compose(setup, &lights, &black_box(fragment), &params).each_term(0));
+    group.throughput(Throughput::Elements(samples.count() as u64));
+    group.bench_function("the rules in f64, with every term", |b| {
+        b.iter(|| black_box(shader.shade(samples, camera, 1.0)));
     });
     group.finish();
 }

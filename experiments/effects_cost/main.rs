@@ -141,7 +141,7 @@ fn measure(
     let (made, groups) = DeviceSamples::new(gpu, content)?;
     let views = groups.into_iter().map(|samples| {
         // With alpha where the image has the haze there.
-        let hazy = effects.needs(prepared.scene.silhouette).haze;
+        let hazy = prepared.scene.needs().haze;
         let target = Rows::new(if hazy { 4 } else { 3 }, samples.groups());
         ObservedView { samples, target, ..ObservedView::default() }
     });

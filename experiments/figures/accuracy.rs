@@ -54,8 +54,15 @@ pub(crate) fn tests(lab: &Lab) -> Result<Value> {
 /// How often noise is drawn.
 const DRAWS: u64 = 8;
 
-/// The noise's standard deviation at a pixel whose target is `x`, where the image's mean is `mean`.
-type Deviation = fn(x: f32, mean: f32) -> f32;
+/// A kind of noise.
+#[derive(Clone, Copy)]
+struct Noise {
+    name: &'static str,
+    /// The standard deviation at a pixel whose target is `x`, where the image's mean is `mean`.
+    deviation: fn(x: f32, mean: f32) -> f32,
+    /// The side of the squares of pixels that are off by as many deviations.
+    alike: usize,
+}
 
 /// docs/accuracy.md: how far fits of noisy images are from the fit of the same images without noise, in standard
 /// errors. (That fit is within some 10⁻⁷ of the truth, far less than a standard error with noise.)
@@ -64,17 +71,18 @@ pub(crate) fn noise(lab: &Lab) -> Result<Value> {
     lab.skinfit("the built-in scene", &["demo", &demo.display().to_string()], false)?;
     let scene = demo.join("scene.toml");
     let truth = lab.fit("without noise", Some(&scene), &[])?.0;
-    let everywhere: Deviation = |_, mean| 0.01 * mean;
-    let relative: Deviation = |x, _| 0.01 * (x * x + 0.01).sqrt();
+    let everywhere =
+        Noise { name: "0.01 x mean radiance, everywhere", deviation: |_, mean| 0.01 * mean, alike: 1 };
+    let relative = Noise { name: "0.01 x (target + 0.1)", deviation: |x, _| 0.01 * (x + 0.1), alike: 1 };
+    let squares = Noise { name: "0.01 x mean radiance, alike over 8 x 8 pixels", alike: 8, ..everywhere };
     let mut rows = Vec::new();
-    for (noise, deviation, loss) in [
-        ("0.01 x mean radiance, everywhere", everywhere, "l2"),
-        ("0.01 x √(target² + 0.01)", relative, "relative_l2"),
-        ("0.01 x mean radiance, everywhere", everywhere, "relative_l2"),
-    ] {
-        let (mut off, mut bias) = (Vec::new(), 0.0);
+    for (kind, loss) in
+        [(everywhere, "l2"), (relative, "relative_l2"), (everywhere, "relative_l2"), (squares, "l2")]
+    {
+        let noise = kind.name;
+        let (mut off, mut independent, mut bias) = (Vec::new(), Vec::new(), 0.0);
         for seed in 0..DRAWS {
-            let targets = targets(lab, &demo, deviation, seed)?;
+            let targets = targets(lab, &demo, kind, seed)?;
             let targets: Vec<(&str, &str)> =
                 targets.iter().map(|(key, file)| (*key, file.as_str())).collect();
             let noisy = lab.scene("noisy", &scene, &targets)?;
@@ -82,20 +90,22 @@ pub(crate) fn noise(lab: &Lab) -> Result<Value> {
                 lab.fit(&format!("{noise}, {loss}, draw {seed}"), Some(&noisy), &["--loss", loss])?.0;
             let unknowns = report["unknowns"].as_array().cloned().unwrap_or_default();
             for (found, true_one) in unknowns.iter().zip(truth["unknowns"].as_array().into_iter().flatten()) {
-                off.push(
-                    (number(&found["value"]) - number(&true_one["value"])) / number(&found["std_error"]),
-                );
+                let distance = number(&found["value"]) - number(&true_one["value"]);
+                off.push(distance / number(&found["std_error"]));
+                independent.push(distance / number(&found["noise_error"]));
             }
             let weight = number(&report["params"]["base_weight"]["value"]);
             bias += (weight / number(&truth["params"]["base_weight"]["value"]) - 1.0) / DRAWS as f64;
         }
         let beyond = |errors: f64| off.iter().filter(|z| z.abs() > errors).count();
+        let mean_square = |off: &[f64]| off.iter().map(|z| z * z).sum::<f64>() / off.len() as f64;
         rows.push(json!({
             "name": format!("{noise} {loss}"),
             "noise": noise,
             "loss": format!("`{loss}`"),
             "distances": off.len(),
-            "mean_square": off.iter().map(|z| z * z).sum::<f64>() / off.len() as f64,
+            "mean_square": mean_square(&off),
+            "mean_square_of_independent": mean_square(&independent),
             "beyond_1": beyond(1.0),
             "beyond_2": beyond(2.0),
             "beyond_3": beyond(3.0),
@@ -106,21 +116,21 @@ pub(crate) fn noise(lab: &Lab) -> Result<Value> {
 }
 
 /// Noisy copies of the demo's targets, as settings of its scene file.
-fn targets(lab: &Lab, demo: &Path, deviation: Deviation, seed: u64) -> Result<Vec<(&'static str, String)>> {
+fn targets(lab: &Lab, demo: &Path, noise: Noise, seed: u64) -> Result<Vec<(&'static str, String)>> {
     let mut random = StdRng::seed_from_u64(seed);
     let mut settings = Vec::new();
     for (key, view) in
         [("view.0.target", "front"), ("view.1.target", "three_quarter"), ("view.2.target", "profile")]
     {
         let to = lab.scratch.path().join(format!("{view}.exr"));
-        add_noise(&demo.join(format!("targets/{view}.exr")), &to, deviation, &mut random)?;
+        add_noise(&demo.join(format!("targets/{view}.exr")), &to, noise, &mut random)?;
         settings.push((key, format!("{:?}", to.display().to_string())));
     }
     Ok(settings)
 }
 
 /// `from` with normal noise, as `to`.
-fn add_noise(from: &Path, to: &Path, deviation: Deviation, random: &mut StdRng) -> Result<()> {
+fn add_noise(from: &Path, to: &Path, noise: Noise, random: &mut StdRng) -> Result<()> {
     let image = read_first_rgba_layer_from_file(
         from,
         |size, _| vec![vec![[0.0_f32; 4]; size.width()]; size.height()],
@@ -129,10 +139,17 @@ fn add_noise(from: &Path, to: &Path, deviation: Deviation, random: &mut StdRng) 
     let mut rows = image.layer_data.channel_data.pixels;
     let pixels = || rows.iter().flatten();
     let mean = pixels().flat_map(|p| &p[..3]).sum::<f32>() / (3.0 * pixels().map(|p| p[3]).sum::<f32>());
-    for pixel in rows.iter_mut().flatten() {
-        let [rgb @ .., alpha] = pixel;
-        for x in rgb {
-            *x += *alpha * deviation(*x, mean) * normal(random);
+    let across = image.layer_data.size.width() / noise.alike + 2;
+    let down = image.layer_data.size.height() / noise.alike + 2;
+    let draws: Vec<[f32; 3]> = (0..across * down).map(|_| [0; 3].map(|_| normal(random))).collect();
+    // Squares that no square of the estimate coincides with.
+    let square = |at: usize, shift: usize| (at + shift % noise.alike) / noise.alike;
+    for (y, row) in rows.iter_mut().enumerate() {
+        for (x, pixel) in row.iter_mut().enumerate() {
+            let [rgb @ .., alpha] = pixel;
+            for (value, draw) in rgb.iter_mut().zip(draws[square(y, 5) * across + square(x, 3)]) {
+                *value += *alpha * (noise.deviation)(*value, mean) * draw;
+            }
         }
     }
     let channels = SpecificChannels::rgba(|at: Vec2<usize>| {

@@ -161,15 +161,13 @@ impl Lab {
         }
         let run = Command::new("date").args(["-u", "+%Y-%m-%d"]).output()?;
         let info: Value = serde_json::from_str(&self.skinfit("the machine", &["info", "--json"], false)?)?;
-        let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
         let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
-        let processor = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
         let head = json!({
             "command": format!("cargo run --release --example figures -- {name}"),
             "commit": commit,
             "date": String::from_utf8(run.stdout)?.trim(),
             "machine": {
-                "processor": processor.map_or("unknown", |(_, name)| name),
+                "processor": info["cpu"]["processor"],
                 "cores": info["cpu"]["threads"],
                 "instructions": info["cpu"]["instructions"],
                 "adapter": info["adapters"][0]["name"],

@@ -89,7 +89,6 @@ fn without_code(text: &str) -> String {
 
 /// Numbers with a unit that are no measurement: the page, its words, and why.
 pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
-    ("README.md", "with 1% noise", "what was added"),
     ("docs/gpu-engine.md", "beyond 8 million", "a limit of the program"),
     ("docs/gpu-engine.md", "from 2 million samples a thread", "a threshold of the program"),
     ("docs/maps.md", "allows 128 MiB", "WebGPU's limit"),

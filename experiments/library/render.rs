@@ -20,7 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let prepared = Prepared::new(&scene, &options)?;
     let view = prepared.scene.views.first().ok_or("the scene has no view")?;
 
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
     let on_cpu = shader.shade(&prepared.samples[0], &view.camera, 1.0).image;
     write_exr(Path::new("library_cpu.exr"), &on_cpu, &Default::default())?;
 

@@ -102,8 +102,7 @@ impl Scene {
         let (samples, illumination) = (sphere(), light());
         let params = Params::defaults(Form::Corrected);
         let columns = TOLD.map(|(param, ..)| Column::tied(param));
-        let setup =
-            Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: Effects::SURFACE };
+        let setup = Setup::new(Form::Corrected, Silhouette::Fragment, Effects::SURFACE);
         let shaded = Shaded { setup, params: &params, columns: &columns, illumination: &illumination };
         let (shade, inputs) = Shade::new(shared, &shaded, &[&samples], Scatter::Exact)?;
         Ok(Self { shade, inputs, small: Sparse::new(shared, &shrinking(&samples))?, usual: None })

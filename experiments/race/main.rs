@@ -47,11 +47,7 @@ struct Arguments {
     passes_only: bool,
 }
 
-const SETUP: Setup = Setup {
-    form: Form::Corrected,
-    silhouette: Silhouette::Bumped,
-    effects: Effects::SURFACE.with(Effect::Haze),
-};
+const SETUP: Setup = Setup::new(Form::Corrected, Silhouette::Bumped, Effects::SURFACE.with(Effect::Haze));
 
 fn timed(reps: usize, mut run: impl FnMut()) -> Value {
     run();

@@ -7,6 +7,7 @@ use crate::builtin::{self, BuiltinError};
 use crate::model::params::Param;
 use crate::output::{self, OutputError};
 use crate::prepare::{PrepareError, PrepareOptions, Prepared};
+use crate::program::shading::ShadingError;
 use crate::progress;
 use crate::render::files::{ImageFileError, ImageOptions, write_exr};
 use crate::render::shade::Shader;
@@ -21,6 +22,8 @@ pub enum DemoError {
     Prepare(#[from] PrepareError),
     #[error(transparent)]
     Image(#[from] ImageFileError),
+    #[error(transparent)]
+    Shading(#[from] ShadingError),
     #[error(transparent)]
     Output(#[from] OutputError),
 }
@@ -103,7 +106,7 @@ pub fn write_scene(folder: &Path, cache: Option<&Path>) -> Result<PathBuf, DemoE
     prepared.scene.params = builtin::true_params();
     let lobe = prepared.scene.params.scalar(Param::SpecularLobe);
     prepared.bake(lobe..=lobe, cache)?;
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
     let bar = progress::bar("targets", prepared.scene.views.len() as u64);
     for (view, samples) in prepared.scene.views.iter().zip(&prepared.samples) {
         let image = shader.shade(samples, &view.camera, 1.0).image;

@@ -68,6 +68,8 @@ pub struct StageSeconds {
     pub fit: f64,
     /// Rendering what the report shows.
     pub render: f64,
+    /// Scores, pictures and files of the report, up to its page.
+    pub report: f64,
 }
 
 /// Which of a scene's views are wanted.
@@ -248,11 +250,16 @@ impl Prepared {
         Point { params: self.scene.params.clone(), gains: self.gains.clone() }
     }
 
+    /// Pixels in a row of each view's image.
+    #[must_use]
+    pub fn image_widths(&self) -> Vec<usize> {
+        self.scene.views.iter().map(|view| view.camera.width as usize).collect()
+    }
+
     /// The switches of the model.
     #[must_use]
     pub fn setup(&self) -> Setup {
-        let Scene { form, silhouette, effects, .. } = self.scene;
-        Setup { form, silhouette, effects }
+        self.scene.setup()
     }
 
     /// The unknowns of the scene's fit: free columns, then free gains.

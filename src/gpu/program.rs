@@ -141,7 +141,7 @@ fn bind(gpu: &Gpu, layout: &BindGroupLayout, constants: Option<&Buffer>, resourc
 
 const fn vertex_format(attribute: Attribute) -> VertexFormat {
     match attribute {
-        Attribute::Position | Attribute::Normal => VertexFormat::Float32x3,
+        Attribute::Position | Attribute::Normal | Attribute::Corner => VertexFormat::Float32x3,
         Attribute::Tangent | Attribute::Weights => VertexFormat::Float32x4,
         Attribute::Uv => VertexFormat::Float32x2,
         Attribute::Occlusion => VertexFormat::Float32,

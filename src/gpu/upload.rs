@@ -37,6 +37,8 @@ pub struct Content<'a> {
 /// The scene's part on the device.
 pub(super) struct Uploads<'a> {
     content: Content<'a>,
+    /// In the place of the scene's mesh and its occlusion: one whose triangles share no vertices.
+    split: Option<(Mesh, Option<VertexOcclusion>)>,
     /// The morph targets that are summed, by their index in the mesh.
     targets: Vec<usize>,
     specular: Option<Cube<f32>>,
@@ -70,13 +72,38 @@ impl Bound {
 impl<'a> Uploads<'a> {
     /// The scene's triangles; everything else follows as it is asked for. `targets` are summed.
     pub(super) fn new(gpu: &Gpu, content: Content<'a>, targets: Vec<usize>) -> Result<Self, GpuError> {
-        let triangles = bytemuck::cast_slice(&content.scene.mesh.triangles);
+        Self::of_mesh(gpu, content, targets, None)
+    }
+
+    /// As [`new`](Self::new), of a mesh whose triangles share no vertices: each knows which corner it is. Its pose is
+    /// the scene's for good.
+    pub(super) fn by_corner(gpu: &Gpu, content: Content<'a>, targets: Vec<usize>) -> Result<Self, GpuError> {
+        let split = vertices::by_corner(&content.scene.mesh, content.occlusion);
+        Self::of_mesh(gpu, content, targets, Some(split))
+    }
+
+    fn of_mesh(
+        gpu: &Gpu,
+        content: Content<'a>,
+        targets: Vec<usize>,
+        split: Option<(Mesh, Option<VertexOcclusion>)>,
+    ) -> Result<Self, GpuError> {
+        let mesh = split.as_ref().map_or(&content.scene.mesh, |(mesh, _)| mesh);
+        let triangles = bytemuck::cast_slice(&mesh.triangles);
         let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX)?;
         let lobe = content.params.scalar(Param::SpecularLobe);
         let specular = content.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
         let bytes = triangles.len() as u64;
         let (attributes, resources) = (HashMap::new(), HashMap::new());
-        Ok(Self { content, targets, specular, attributes, resources, indices, bytes, clipped: 0 })
+        Ok(Self { content, split, targets, specular, attributes, resources, indices, bytes, clipped: 0 })
+    }
+
+    /// What attributes are of.
+    fn mesh(&self) -> (&Mesh, Option<&VertexOcclusion>) {
+        match &self.split {
+            Some((mesh, occlusion)) => (mesh, occlusion.as_ref()),
+            None => (&self.content.scene.mesh, self.content.occlusion),
+        }
     }
 
     pub(super) const fn content(&self) -> &Content<'a> {
@@ -100,7 +127,8 @@ impl<'a> Uploads<'a> {
         if let Some(buffer) = self.attributes.get(&attribute) {
             return Ok(buffer.clone());
         }
-        let bytes = vertices::attribute(attribute, &self.content.scene.mesh, self.content.occlusion);
+        let (mesh, occlusion) = self.mesh();
+        let bytes = vertices::attribute(attribute, mesh, occlusion);
         let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
         self.bytes += bytes.len() as u64;
         self.attributes.insert(attribute, made.clone());
@@ -118,13 +146,14 @@ impl<'a> Uploads<'a> {
     }
 
     fn make(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
-        let Content { scene, illumination, occlusion, .. } = self.content;
+        let Content { scene, illumination, .. } = self.content;
         let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
         let texels = match resource {
             Resource::MapSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::Repeat))),
             Resource::CubeSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::ClampToEdge))),
             Resource::MorphDeltas => {
-                let deltas = vertices::morph_deltas(&scene.mesh, &self.targets, occlusion);
+                let (mesh, occlusion) = self.mesh();
+                let deltas = vertices::morph_deltas(mesh, &self.targets, occlusion);
                 return self.storage(gpu, "morph targets", &deltas);
             }
             Resource::Bones => return self.storage(gpu, "bones", &vertices::bones(&scene.mesh.bones)),

@@ -4,7 +4,7 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use crate::bake::VertexOcclusion;
 use crate::model::vertex::Bone;
-use crate::scene::mesh::Mesh;
+use crate::scene::mesh::{Mesh, Morph};
 use crate::shader::Attribute;
 
 /// One attribute of every vertex, as bytes; what the mesh lacks is zero, which the vertex stage takes for
@@ -23,9 +23,41 @@ pub(super) fn attribute(attribute: Attribute, mesh: &Mesh, occlusion: Option<&Ve
             bytemuck::cast_slice(&joints).to_vec()
         }
         Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
+        Attribute::Corner => floats((0..count).flat_map(|i| Vec3::AXES[i % 3].to_array()).collect()),
     };
     bytes.resize(count * attribute.bytes() as usize, 0);
     bytes
+}
+
+/// A mesh whose triangles share no vertices, with its occlusion: vertex i is corner i % 3 of triangle i / 3.
+pub(super) fn by_corner(mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> (Mesh, Option<VertexOcclusion>) {
+    fn each<T: Copy>(of: &[T], triangles: &[[u32; 3]]) -> Vec<T> {
+        // What a mesh lacks, its corners lack.
+        triangles.as_flattened().iter().filter_map(|&i| of.get(i as usize).copied()).collect()
+    }
+    let corners = |i: usize| [0, 1, 2].map(|corner| (3 * i + corner) as u32);
+    let triangles = &mesh.triangles;
+    let morph = |morph: &Morph| Morph {
+        positions: each(&morph.positions, triangles),
+        normals: each(&morph.normals, triangles),
+        ..morph.clone()
+    };
+    let split = Mesh {
+        positions: each(&mesh.positions, triangles),
+        normals: each(&mesh.normals, triangles),
+        tangents: each(&mesh.tangents, triangles),
+        uvs: each(&mesh.uvs, triangles),
+        triangles: (0..triangles.len()).map(corners).collect(),
+        morphs: mesh.morphs.iter().map(morph).collect(),
+        joints: each(&mesh.joints, triangles),
+        weights: each(&mesh.weights, triangles),
+        bones: mesh.bones.clone(),
+    };
+    let occlusion = occlusion.map(|occlusion| VertexOcclusion {
+        base: each(&occlusion.base, triangles),
+        morphs: occlusion.morphs.iter().map(|open| each(open, triangles)).collect(),
+    });
+    (split, occlusion)
 }
 
 /// The bones of a vertex and their weights. One that no bone moves is in the world already: it hangs on
@@ -69,4 +101,32 @@ pub(super) fn morph_deltas(
         }
     }
     deltas
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_have_what_their_vertices_have() {
+        let at = |x: f32| Vec3::new(x, 0.0, 0.0);
+        let mesh = Mesh {
+            positions: vec![at(0.0), at(1.0), at(2.0), at(3.0)],
+            triangles: vec![[0, 1, 2], [2, 1, 3]],
+            morphs: vec![Morph { weight: 0.5, positions: vec![at(9.0); 4], ..Morph::default() }],
+            ..Mesh::default()
+        };
+        let occlusion = VertexOcclusion { base: vec![0.1, 0.2, 0.3, 0.4], morphs: vec![Vec::new()] };
+        let (split, open) = by_corner(&mesh, Some(&occlusion));
+        assert_eq!(split.positions, [0.0, 1.0, 2.0, 2.0, 1.0, 3.0].map(at));
+        assert_eq!(split.triangles, [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!((split.morphs[0].positions.len(), split.morphs[0].weight), (6, 0.5));
+        assert!(split.normals.is_empty() && split.morphs[0].normals.is_empty());
+        let open = open.unwrap();
+        assert_eq!(open.base, [0.1, 0.2, 0.3, 0.3, 0.2, 0.4]);
+        assert_eq!(open.morphs, [[0.0_f32; 0]]);
+        let corners = attribute(Attribute::Corner, &split, None);
+        let corners: &[[f32; 3]] = bytemuck::cast_slice(&corners);
+        assert_eq!(corners[3..], [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    }
 }

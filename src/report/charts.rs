@@ -241,7 +241,7 @@ pub(super) fn heat_map(correlations: &Correlations) -> String {
                 "<g transform=\"translate({x:.1} {y:.1})\"><title>{} and {}: {}</title>{}</g>",
                 names[0],
                 names[1],
-                number(r, 3),
+                r.map_or_else(|| "no errors to correlate".to_owned(), |r| number(r, 3)),
                 heat_cell(r, i == j, cell - 2.0)
             );
         }
@@ -249,19 +249,20 @@ pub(super) fn heat_map(correlations: &Correlations) -> String {
     svg + "</svg>"
 }
 
-/// One cell; those of an unknown with itself say nothing, and stay pale.
-fn heat_cell(r: f64, with_itself: bool, side: f64) -> String {
-    let strength = if with_itself || !r.is_finite() { 0.0 } else { r.abs().min(1.0) };
-    let (hue, ink) = match (r < 0.0, strength > 0.7) {
+/// One cell; those of an unknown with itself say nothing, and stay pale. Beside an unknown without an error, a dash.
+fn heat_cell(r: Option<f64>, with_itself: bool, side: f64) -> String {
+    let strength = r.filter(|r| !with_itself && r.is_finite()).map_or(0.0, |r| r.abs().min(1.0));
+    let (hue, ink) = match (r.is_some_and(|r| r < 0.0), strength > 0.7) {
         _ if with_itself => ("plus", "self"),
         (negative, strong) => {
             (if negative { "minus" } else { "plus" }, if strong { "strong" } else { "weak" })
         }
     };
-    let text = match side >= 34.0 {
-        true if with_itself => "1".to_owned(),
-        true if r.is_finite() => format!("{r:.2}").replace('-', "−"),
-        _ => String::new(),
+    let text = match r.filter(|r| r.is_finite()) {
+        _ if side < 34.0 => String::new(),
+        None => "–".to_owned(),
+        Some(_) if with_itself => "1".to_owned(),
+        Some(r) => format!("{r:.2}").replace('-', "−"),
     };
     let square = format!("width=\"{side:.1}\" height=\"{side:.1}\" rx=\"3\"");
     let (x, y) = (0.5 * side, 0.5 * side + 4.0);

@@ -6,6 +6,7 @@ use super::ViewEvidence;
 use super::json::ViewSummary;
 use super::page::escape;
 use super::pictures::Picture;
+use super::signed;
 use crate::render::files::{Image, encode_png};
 
 /// The longest side of a picture in the page; larger ones are shrunk by a whole factor.
@@ -13,15 +14,28 @@ pub const LONGEST: usize = 1024;
 /// The same for the small pictures of single terms.
 const LONGEST_TERM: usize = 320;
 
-/// One view: its scores, target, fit and error, and the terms of the fit.
+const FLIP_LEGEND: &str = "FLIP error <span class=\"bar\"><i>0</i><b></b><i>1</i></span>";
+
+/// One view: its scores, target, fit and errors (signed ones up to `scale`), and the terms of the fit.
 ///
 /// # Errors
 /// When a picture cannot be encoded.
-pub(super) fn view(view: &ViewEvidence, scores: &ViewSummary, error: &Picture) -> Result<String, String> {
+pub(super) fn view(
+    view: &ViewEvidence,
+    scores: &ViewSummary,
+    error: &Picture,
+    scale: f64,
+) -> Result<String, String> {
     let name = escape(&view.name);
     let target = Picture::of_image(&view.target.shrunk(LONGEST));
     let fit = Picture::of_image(&view.fit.shrunk(LONGEST));
-    let triple = triple(&view.name, &target, &fit, error, ["target", "fit", "wipe in the target"])?;
+    let signed = signed::picture(view, scale);
+    let triple = side_by_side(
+        &format!("view {}", view.name),
+        [&target, &fit],
+        ["target", "fit", "wipe in the target"],
+        &[("FLIP error", FLIP_LEGEND, error), ("signed error", &signed::legend(scale), &signed)],
+    )?;
     let (scores, terms) = (score_list(scores), terms(view)?);
     Ok(format!("<article class=\"view\"><header><h3>{name}</h3>{scores}</header>{triple}{terms}</article>"))
 }
@@ -38,8 +52,8 @@ pub fn triple(
     error: &Picture,
     [first, second, wipe]: [&str; 3],
 ) -> Result<String, String> {
-    let legend = "FLIP error <span class=\"bar\"><i>0</i><b></b><i>1</i></span>";
-    triple_of(&format!("view {name}"), [before, after, error], [first, second, wipe], ["FLIP error", legend])
+    let third = ["FLIP error", FLIP_LEGEND];
+    triple_of(&format!("view {name}"), [before, after, error], [first, second, wipe], third)
 }
 
 /// Three pictures of `subject` side by side, of which the first can be wiped over the second; `third` says what the
@@ -47,8 +61,19 @@ pub fn triple(
 pub(super) fn triple_of(
     subject: &str,
     [before, after, third]: [&Picture; 3],
-    [first, second, wipe]: [&str; 3],
+    words: [&str; 3],
     [what, caption]: [&str; 2],
+) -> Result<String, String> {
+    side_by_side(subject, [before, after], words, &[(what, caption, third)])
+}
+
+/// Two pictures of `subject`, of which the first can be wiped over the second, and one or two of the error between
+/// them, with what each is and its caption in HTML.
+fn side_by_side(
+    subject: &str,
+    [before, after]: [&Picture; 2],
+    [first, second, wipe]: [&str; 3],
+    errors: &[(&str, &str, &Picture)],
 ) -> Result<String, String> {
     let subject = escape(subject);
     let hint = format!("{second}<span class=\"hint\" hidden> · drag across it to {wipe}</span>");
@@ -62,10 +87,11 @@ pub(super) fn triple_of(
              alt=\"{what} of {subject}\"></div><figcaption>{caption}</figcaption></figure>"
         ))
     };
-    let panels =
-        [(before, first, first.to_owned()), (after, second, hint), (third, what, caption.to_owned())];
-    let figures = panels.into_iter().map(figure).collect::<Result<Vec<_>, String>>()?;
-    Ok(format!("<div class=\"triple\">{}</div>", figures.concat()))
+    let pair = [(before, first, first.to_owned()), (after, second, hint)];
+    let errors = errors.iter().map(|&(what, caption, picture)| (picture, what, caption.to_owned()));
+    let figures = pair.into_iter().chain(errors).map(figure).collect::<Result<Vec<_>, String>>()?;
+    let class = if figures.len() > 3 { "triple four" } else { "triple" };
+    Ok(format!("<div class=\"{class}\">{}</div>", figures.concat()))
 }
 
 fn score_list(scores: &ViewSummary) -> String {

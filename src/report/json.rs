@@ -7,9 +7,12 @@ use serde::ser::{Serialize, Serializer};
 
 use super::maps::{MapEvidence, MapSummary};
 use super::metrics::Scores;
+use super::misfit::Misfit;
 use super::{RunInfo, StageSeconds};
 use crate::engine::{Point, Unknown};
 use crate::fit::outcome::{Ending, Iteration, Outcome, UnknownOutcome};
+use crate::fit::profile::Profile;
+use crate::fit::statistics::ErrorBasis;
 use crate::model::params::{Channels, Param};
 
 /// The whole of `report.json`.
@@ -41,12 +44,18 @@ pub struct Summary {
     pub loss_name: &'static str,
     /// Each unknown: a tied parameter, one channel of a parameter, or a view's gain.
     pub unknowns: Vec<UnknownSummary>,
+    /// What the standard errors rest on.
+    pub errors: Errors,
+    /// How far the loss lets the weakest unknown go, where there is a weak one.
+    pub profile: Option<Profile>,
     /// How the unknowns' errors hang together.
     pub correlations: Correlations,
     /// Combinations that the images do not determine, each a unit vector (unknown: component).
     pub undetermined: Vec<Ordered<f64>>,
     /// The loss after each iteration.
     pub history: Vec<Iteration>,
+    /// What the fit gets wrong as a whole, and where.
+    pub misfit: Misfit,
     /// The views' pictures and terms, and the files of fitted maps, beside this file.
     pub files: Vec<String>,
     /// What the user should know.
@@ -56,6 +65,16 @@ pub struct Summary {
     /// What whole maps gained, where they were fitted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub maps: Option<MapSummary>,
+}
+
+/// What standard errors rest on.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Errors {
+    /// Independent residuals, roundings, or squares of pixels, and how large these are.
+    #[serde(flatten)]
+    pub basis: ErrorBasis,
+    /// By how many times the most they exceed those of independent residuals.
+    pub most_over_noise: Option<f64>,
 }
 
 /// A number before and after the fit.
@@ -76,6 +95,8 @@ pub struct ParamSummary {
     pub value: Value<f64>,
     /// One standard error; `null` where there is none.
     pub std_error: Option<Value<Option<f64>>>,
+    /// What it were if residuals were independent.
+    pub noise_error: Option<Value<Option<f64>>>,
     /// Whether the images determine it (each of its channels).
     pub identifiable: bool,
     /// Whether it (or a channel of it) ended on a bound.
@@ -125,6 +146,8 @@ pub struct UnknownSummary {
     pub value: f64,
     /// One standard error.
     pub std_error: Option<f64>,
+    /// What it were if residuals were independent.
+    pub noise_error: Option<f64>,
     /// Whether the images determine it.
     pub identifiable: bool,
     /// Whether it ended on a bound.
@@ -140,8 +163,8 @@ pub struct UnknownSummary {
 pub struct Correlations {
     /// The unknowns, in the order of rows and columns.
     pub names: Vec<String>,
-    /// Rows.
-    pub matrix: Vec<Vec<f64>>,
+    /// Rows; `null` beside an unknown without a standard error.
+    pub matrix: Vec<Vec<Option<f64>>>,
 }
 
 /// A JSON object whose keys keep their order.
@@ -155,7 +178,7 @@ impl<T: Serialize> Serialize for Ordered<T> {
 }
 
 impl Summary {
-    /// The summary of a run whose views have the scores `views`, in their order.
+    /// The summary of a run whose views have the scores `views`, in their order, and of what it gets wrong.
     #[must_use]
     pub fn new(
         run: &RunInfo,
@@ -163,6 +186,7 @@ impl Summary {
         views: &[ViewSummary],
         files: Vec<String>,
         warnings: Vec<String>,
+        misfit: Misfit,
     ) -> Self {
         let names: Vec<String> = outcome.unknowns.iter().map(|u| label(&u.unknown.name(), run)).collect();
         let order = names.len().max(1);
@@ -179,13 +203,19 @@ impl Summary {
             ending: outcome.ending,
             loss_name: run.loss.name(),
             unknowns: outcome.unknowns.iter().zip(&names).map(|(u, name)| unknown(u, name)).collect(),
+            errors: Errors {
+                basis: outcome.errors,
+                most_over_noise: outcome.most_over_noise().filter(|x| x.is_finite()),
+            },
+            profile: outcome.profile.clone(),
             correlations: Correlations {
                 names,
                 matrix: outcome
                     .correlations
                     .chunks(order)
                     .take(outcome.unknowns.len())
-                    .map(<[f64]>::to_vec)
+                    .enumerate()
+                    .map(|(i, row)| row.iter().enumerate().map(|(j, &r)| known(outcome, i, j, r)).collect())
                     .collect(),
             },
             undetermined: outcome
@@ -194,9 +224,10 @@ impl Summary {
                 .map(|d| Ordered(d.components.iter().map(|(name, x)| (label(name, run), *x)).collect()))
                 .collect(),
             history: outcome.history.clone(),
+            misfit,
             files,
             warnings,
-            provenance: Ordered(run.provenance()),
+            provenance: Ordered(run.origin()),
             maps: run.maps.as_ref().map(MapEvidence::summary),
         }
     }
@@ -219,6 +250,12 @@ fn label(name: &str, run: &RunInfo) -> String {
     }
 }
 
+/// A correlation of unknowns that both have an error.
+fn known(outcome: &Outcome, i: usize, j: usize, r: f64) -> Option<f64> {
+    let has = |k: usize| outcome.unknowns.get(k).is_some_and(|u| u.std_error.is_some());
+    (has(i) && has(j) && r.is_finite()).then_some(r)
+}
+
 fn unknown(outcome: &UnknownOutcome, name: &str) -> UnknownSummary {
     let (lower, upper) = outcome.unknown.bounds();
     UnknownSummary {
@@ -226,6 +263,7 @@ fn unknown(outcome: &UnknownOutcome, name: &str) -> UnknownSummary {
         start: outcome.start,
         value: outcome.value,
         std_error: outcome.std_error,
+        noise_error: outcome.noise_error,
         identifiable: outcome.identifiable,
         at_bound: outcome.at_bound,
         bounds: [lower, upper],
@@ -247,7 +285,7 @@ fn params(outcome: &Outcome) -> Vec<(String, ParamSummary)> {
 }
 
 fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
-    let mut errors = [None; 3];
+    let (mut errors, mut noise) = ([None; 3], [None; 3]);
     let (mut tied, mut identifiable, mut at_bound) = (true, true, false);
     for known in &outcome.unknowns {
         let Unknown::Param(column) = known.unknown else { continue };
@@ -257,6 +295,7 @@ fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
             at_bound |= known.at_bound;
             for c in (0..3).filter(|&c| column.channels.includes(c)) {
                 errors[c] = known.std_error.filter(|e| e.is_finite());
+                noise[c] = known.noise_error.filter(|e| e.is_finite());
             }
         }
     }
@@ -264,14 +303,17 @@ fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
         true => Value::Tied(point.params.scalar(param)),
         false => Value::Rgb(point.params.rgb(param)),
     };
-    let std_error = errors.iter().any(Option::is_some).then_some(match tied {
-        true => Value::Tied(errors[0]),
-        false => Value::Rgb(errors),
-    });
+    let gathered = |errors: [Option<f64>; 3]| {
+        errors.iter().any(Option::is_some).then_some(match tied {
+            true => Value::Tied(errors[0]),
+            false => Value::Rgb(errors),
+        })
+    };
     ParamSummary {
         start: value(&outcome.start),
         value: value(&outcome.end),
-        std_error,
+        std_error: gathered(errors),
+        noise_error: gathered(noise),
         identifiable,
         at_bound,
     }

@@ -1,7 +1,8 @@
 //! Metrics, pictures and pages that show how good a fit is.
 //!
 //! - [`metrics`], [`flip`]: PSNR, SSIM and FLIP of a view
-//! - [`json`]: the file `report.json`
+//! - [`json`]: the file `report.json`; [`errors`]: what its standard errors rest on
+//! - [`misfit`]: what a fit gets wrong as a whole, and where; [`signed`]: its signed error as a picture
 //! - [`pictures`]: target | fit | error side by side
 //! - [`page`], [`plot`]: what all pages share: sortable tables, scatter plots, pictures that wipe
 //! - [`maps`]: what whole maps gained, where they were fitted
@@ -10,6 +11,7 @@
 //! [`write_run`] leaves all of it in a run's folder, with an EXR of the terms for each view.
 
 mod charts;
+pub mod errors;
 pub mod figures;
 mod filter;
 pub mod flip;
@@ -18,9 +20,11 @@ pub mod json;
 mod lettering;
 pub mod maps;
 pub mod metrics;
+pub mod misfit;
 pub mod page;
 pub mod pictures;
 pub mod plot;
+pub mod signed;
 mod tables;
 mod words;
 
@@ -31,15 +35,19 @@ use skinfit_core::{engine, fit, model, output, prepare, progress, render, scene}
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use crate::fit::outcome::Outcome;
 use crate::output::OutputError;
 pub use crate::prepare::StageSeconds;
 use crate::render::files::{self, Image, ImageFileError, ImageOptions};
+use crate::render::places::Places;
 use crate::scene::Loss;
+use crate::scene::view::Clip;
 use json::{Summary, ViewSummary};
 use maps::MapEvidence;
 use metrics::Comparison;
+use misfit::Misfit;
 use pictures::Picture;
 
 /// The folder of fitted maps in a run folder.
@@ -66,6 +74,9 @@ pub struct RunInfo {
     pub warnings: Vec<String>,
     /// Further (name, text) to tell where the numbers come from: effects, seed, threads.
     pub provenance: Vec<(String, String)>,
+    /// Who made it when, and on what, as further (name, text): told by the report alone, so that the images of equal
+    /// runs are equal.
+    pub made: Vec<(String, String)>,
     /// What whole maps gained, where they were fitted.
     pub maps: Option<MapEvidence>,
     /// Files that the run's scene names: where one is what an earlier run left, it stays.
@@ -88,6 +99,10 @@ pub struct ViewEvidence {
     pub terms: Vec<(String, Image)>,
     /// The haze of each pixel, premultiplied by coverage, the gain included; empty where no effect makes one.
     pub haze: Vec<f32>,
+    /// Where the surface behind each pixel lies; what is not known of it is left empty.
+    pub places: Places,
+    /// Where an 8-bit target is clipped.
+    pub clip: Option<Clip>,
 }
 
 /// What [`write_run`] wrote.
@@ -134,9 +149,11 @@ pub enum ReportError {
 /// # Errors
 /// When sizes differ or a file cannot be written; each file is whole or not there.
 pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Report, ReportError> {
+    let since = Instant::now();
     for view in &run.views {
         view.check()?;
     }
+    let misfit = Misfit::of(&run.views);
     let mut warnings = run.warnings.clone();
     let mut written = Vec::new();
     let (mut views, mut shown) = (Vec::new(), Vec::new());
@@ -165,12 +182,15 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
     left.extend(run.maps.iter().flat_map(|maps| maps.files.iter().cloned()));
     let kept = remove_stale(folder, &path, &left, &run.named)?;
     left.extend(kept);
-    let summary = Summary::new(run, outcome, &views, left, warnings);
+    let scale = signed::scale(&run.views, misfit.threshold);
+    let mut summary = Summary::new(run, outcome, &views, left, warnings, misfit);
+    summary.seconds.report = since.elapsed().as_secs_f64();
     let json = summary.to_json().map_err(|e| OutputError::new(&path, &e))?;
     output::write(&path, json.as_bytes())?;
     written.push(path);
     let path = folder.join("report.html");
-    let page = html::page(&title(folder), run, &summary, &shown).map_err(|e| OutputError::new(&path, &e))?;
+    let page =
+        html::page(&title(folder), run, &summary, &shown, scale).map_err(|e| OutputError::new(&path, &e))?;
     output::write(&path, page.as_bytes())?;
     written.push(path);
     Ok(Report { summary, json, files: written })
@@ -239,6 +259,13 @@ impl RunInfo {
     fn provenance(&self) -> Vec<(String, String)> {
         let own = [("software", software()), ("scene", self.scene.clone())];
         own.into_iter().map(|(name, text)| (name.to_owned(), text)).chain(self.provenance.clone()).collect()
+    }
+
+    /// The same, and who made it when.
+    fn origin(&self) -> Vec<(String, String)> {
+        let mut origin = self.provenance();
+        origin.splice(1..1, self.made.iter().cloned());
+        origin
     }
 
     /// The provenance that image files carry: as the report's, and the fitted parameters.
@@ -350,6 +377,8 @@ mod tests {
             coverage: Vec::new(),
             terms: Vec::new(),
             haze: Vec::new(),
+            places: Places::default(),
+            clip: None,
         };
         let views = ["front", "Front", "../up", "", "a/b", "a:b", "größe"].map(view);
         let stems = file_stems(&views);

@@ -48,7 +48,11 @@ fn row(
     let (value, error) = match unknown.std_error.filter(|e| e.is_finite()) {
         Some(e) => {
             let (value, error) = with_error(unknown.value, e);
-            (value, format!(" <span class=\"pm\">± {error}</span>"))
+            let noise =
+                unknown.noise_error.filter(|noise| e > 1.05 * noise).map_or_else(String::new, |noise| {
+                    format!(" <small>by independent residuals {}</small>", number(noise, 2))
+                });
+            (value, format!(" <span class=\"pm\">± {error}</span>{noise}"))
         }
         None => (number(unknown.value, 4), String::new()),
     };
@@ -108,6 +112,7 @@ pub(super) fn stages(summary: &Summary) -> String {
         ("maps", 5, s.maps),
         ("fit", 3, s.fit),
         ("render", 4, s.render),
+        ("report", 6, s.report),
     ];
     let stages = stages.map(|(name, i, t)| (name, i, if t.is_finite() { t.max(0.0) } else { 0.0 }));
     let total: f64 = stages.iter().map(|(_, _, t)| t).sum();

@@ -93,13 +93,25 @@ pub(super) fn list(names: &[String]) -> String {
 
 /// How the fit ended, with a capital.
 pub(super) fn ending(ending: Ending) -> String {
-    let (first, rest) = ending.words().split_at(1);
+    capital(ending.words())
+}
+
+/// `words`, which begin with a letter of ASCII, with a capital.
+pub(super) fn capital(words: &str) -> String {
+    let (first, rest) = words.split_at(1);
     first.to_uppercase() + rest
+}
+
+/// `words` with a capital and a full stop.
+fn sentence(words: &str) -> String {
+    capital(words) + "."
 }
 
 /// The verdict: how the fit ended, what it reached, and what to be wary of; a sentence an entry.
 pub(super) fn verdict(summary: &Summary) -> Vec<String> {
     let mut sentences = vec![how_it_ended(summary), what_it_reached(summary)];
+    let misfit = [summary.misfit.explained_in_words(), summary.misfit.largest_in_words()];
+    sentences.extend(misfit.into_iter().flatten().map(|words| sentence(&words)));
     let named = |wanted: &dyn Fn(&super::json::UnknownSummary) -> bool| -> Vec<String> {
         summary.unknowns.iter().filter(|u| wanted(u)).map(|u| u.name.clone()).collect()
     };
@@ -116,9 +128,15 @@ pub(super) fn verdict(summary: &Summary) -> Vec<String> {
         (_, true) => {
             sentences.push("Nothing was free: the images were compared with the start values.".to_owned());
         }
+        (true, _) if !at_bound.is_empty() => sentences.push(format!(
+            "The images determine every free parameter but {}, held by {}.",
+            list(&at_bound),
+            if at_bound.len() == 1 { "its bound" } else { "their bounds" },
+        )),
         (true, _) => sentences.push("The images determine every free parameter.".to_owned()),
         (false, _) => sentences.push(format!("The images do not determine {}.", list(&unknown))),
     }
+    sentences.extend(super::errors::sentences(summary));
     sentences.retain(|s| !s.is_empty());
     sentences
 }
@@ -193,9 +211,8 @@ pub(super) fn entangled(summary: &Summary) -> Vec<String> {
     let mut pairs = Vec::new();
     for (i, row) in summary.correlations.matrix.iter().enumerate() {
         for (j, r) in row.iter().enumerate().take(i) {
-            if r.abs() >= 0.95 {
-                pairs.push((r.abs(), format!("{} and {} ({})", names[j], names[i], number(*r, 3))));
-            }
+            let Some(r) = r.filter(|r| r.abs() >= 0.95) else { continue };
+            pairs.push((r.abs(), format!("{} and {} ({})", names[j], names[i], number(r, 3))));
         }
     }
     pairs.sort_by(|a, b| b.0.total_cmp(&a.0));

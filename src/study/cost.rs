@@ -37,7 +37,7 @@ impl Counts {
         let planned = plan(&Facts::of_scene(scene, params, Budget::Exact, false))?;
         let attributes =
             subject.engine.views().first().map_or(0, |view| view.samples.surface.rows().stride());
-        let needs = scene.effects.needs(scene.silhouette);
+        let needs = scene.needs();
         let lookups = [needs.irradiance, scene.effects.has(Effect::SideSpecular), needs.dapple, needs.hilite];
         let lookups = lookups.into_iter().filter(|&wanted| wanted).count();
         let (bakes, baked_bytes) = bakes(&subject.prepared);

@@ -2,9 +2,9 @@
 
 use crate::fit::FitError;
 use crate::gpu::GpuError;
-use crate::model::evaluate::AddedEffect;
 use crate::output::OutputError;
 use crate::prepare::PrepareError;
+use crate::program::shading::ShadingError;
 use crate::render::files::ImageFileError;
 use crate::shader::PlanError;
 
@@ -17,8 +17,8 @@ pub enum StudyError {
     /// A fit, and the scene that it was of.
     #[error("{scene}: {error}")]
     Fit { scene: String, error: FitError },
-    #[error("{0}.")]
-    Added(#[from] AddedEffect),
+    #[error(transparent)]
+    Shading(#[from] ShadingError),
     #[error(transparent)]
     Plan(#[from] PlanError),
     #[error("{0} Update its driver, or choose another adapter with WGPU_ADAPTER_NAME.")]

@@ -11,7 +11,7 @@
 
 // What other members of the workspace hold stands under the names that it has there.
 use skinfit_core::{
-    bake, engine, fit, model, output, prepare, progress, render, samples, scene, shader, simd,
+    bake, engine, fit, model, output, prepare, program, progress, render, samples, scene, shader, simd,
 };
 use skinfit_gpu as gpu;
 use skinfit_report as report;

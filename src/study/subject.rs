@@ -44,7 +44,6 @@ impl Subject {
         change: &dyn Fn(&mut Prepared),
     ) -> Result<Self, StudyError> {
         let mut prepared = Prepared::new(scene, options)?;
-        prepared.setup().built_in()?;
         change(&mut prepared);
         Self::of(prepared, references)
     }
@@ -58,7 +57,7 @@ impl Subject {
         let made = match references {
             Some(images) => Some(images),
             None if prepared.scene.views.iter().all(|view| view.target.is_none()) => {
-                own = images(&prepared, &prepared.samples.iter().collect::<Vec<_>>(), &prepared.start());
+                own = images(&prepared, &prepared.samples.iter().collect::<Vec<_>>(), &prepared.start())?;
                 Some(own.as_slice())
             }
             None => None,
@@ -73,8 +72,10 @@ impl Subject {
     }
 
     /// The image of each view at `point`, bloom and all: the model in f64.
-    #[must_use]
-    pub fn images(&self, point: &Point) -> Vec<Image> {
+    ///
+    /// # Errors
+    /// When a rule cannot be computed on the processor.
+    pub fn images(&self, point: &Point) -> Result<Vec<Image>, StudyError> {
         let samples: Vec<&ViewSamples> = self.engine.views().iter().map(|view| &view.samples).collect();
         images(&self.prepared, &samples, point)
     }
@@ -84,7 +85,15 @@ impl Subject {
     /// # Errors
     /// When the fit cannot be done; one that does not converge says so in its outcome.
     pub fn fit(&self, options: &FitOptions) -> Result<Outcome, StudyError> {
-        fit::fit(&self.engine, &self.prepared.start(), options, &mut |_| {})
+        self.fit_from(&self.prepared.start(), options)
+    }
+
+    /// Fit what is free, from `start`.
+    ///
+    /// # Errors
+    /// When the fit cannot be done; one that does not converge says so in its outcome.
+    pub fn fit_from(&self, start: &Point, options: &FitOptions) -> Result<Outcome, StudyError> {
+        fit::fit(&self.engine, start, options, &mut |_| {})
             .map_err(|error| StudyError::Fit { scene: self.prepared.scene.path.display().to_string(), error })
     }
 
@@ -98,9 +107,9 @@ impl Subject {
     }
 }
 
-fn images(prepared: &Prepared, samples: &[&ViewSamples], point: &Point) -> Vec<Image> {
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &point.params);
-    shaded(&prepared.scene, &shader, samples, &point.gains)
+fn images(prepared: &Prepared, samples: &[&ViewSamples], point: &Point) -> Result<Vec<Image>, StudyError> {
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &point.params)?;
+    Ok(shaded(&prepared.scene, &shader, samples, &point.gains))
 }
 
 /// The image of each view of `scene`, bloom and all, times its gain.

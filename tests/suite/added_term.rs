@@ -4,21 +4,26 @@
 use std::sync::OnceLock;
 
 use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::reference::Reference;
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{Objective, Point, Unknown};
 use skinfit::fit::{FitOptions, fit};
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effects, Form, Silhouette};
-use skinfit::model::evaluate::{Setup, shade};
+use skinfit::model::evaluate::Setup;
 use skinfit::model::fragment::Fragment;
 use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Column, Param};
+use skinfit::render::shade::Shader;
 use skinfit::samples::LANES;
 use skinfit::scene::Loss;
+use skinfit::scene::view::Camera;
 use skinfit::shader::term::{Problem, Term, register};
 use skinfit::shader::{Facts, Resource, Source, plan};
 
 use crate::engine::{EVERYTHING, illumination, params, single, view};
+use crate::evaluators::shade;
+use crate::fixtures::camera;
 
 /// Schlick's Fresnel factor on the mirrored environment.
 pub(crate) const FRESNEL: &str = "\
@@ -63,7 +68,7 @@ fn f0() -> Param {
 }
 
 fn setup(silhouette: Silhouette) -> Setup {
-    Setup { form: Form::Corrected, silhouette, effects: EVERYTHING.with(term().effect) }
+    Setup::new(Form::Corrected, silhouette, EVERYTHING.with(term().effect))
 }
 
 /// Where nothing is at its default, and gradients are not small.
@@ -251,6 +256,50 @@ fn the_cpu_engine_shades_and_fits_an_added_term_or_refuses_it() {
             assert_gradient(&engine, setup, &views[0], "cpu");
             assert_fit(&cpu(setup, &[with_target(setup, views[0].clone())], &unknowns(lookups)), "cpu");
         }
+    }
+}
+
+/// The view's samples as an image one pixel high, a pixel slot each.
+fn shown(mut view: ObservedView) -> (ObservedView, Camera) {
+    let slots = view.samples.groups() * LANES;
+    view.samples.pixel = (0..slots as u32).collect();
+    view.samples.coverage = vec![1.0; slots];
+    #[rustfmt::skip]
+    let anywhere = [1.0, 0.0, 0.0, 0.0,  0.0, 1.0, 0.0, 0.0,  0.0, 0.0, 1.0, 0.0,  0.0, 0.0, 0.0, 1.0];
+    let camera = Camera { width: slots as u32, height: 1, ..camera(anywhere, 40.0, 1) };
+    (view, camera)
+}
+
+#[test]
+fn the_reference_in_f64_and_the_renderer_on_the_processor_are_the_formula() {
+    for silhouette in [Silhouette::Fragment, Silhouette::Bumped] {
+        let (setup, light) = (setup(silhouette), illumination());
+        let (view, camera) = shown(view(5, 37));
+        let planes = formula(setup, &view, &point());
+        let views = [view];
+        let free = unknowns(true);
+        let plain = Reference::new(setup, &light, &views, Loss::L2, &free).unwrap();
+        let shader = Shader::new(setup, &light, &point().params).unwrap();
+        let shaded = shader.shade(&views[0].samples, &camera, 1.0);
+        assert_eq!(shaded.terms.len(), 7);
+        for slot in 0..planes[0].len() {
+            let pixel = plain.pixel(0, slot, &point().params);
+            for c in 0..4 {
+                // Both are in f64: a few hundred roundings.
+                assert!(
+                    (pixel[c].0 - planes[c][slot]).abs() < 1e-12,
+                    "{silhouette:?}: channel {c} of {slot}"
+                );
+            }
+            for c in 0..3 {
+                let (got, want) = (shaded.image.rgb[slot][c], planes[c][slot]);
+                let sum: f32 = shaded.terms.iter().map(|(_, image)| image.rgb[slot][c]).sum();
+                // Images hold f32: one rounding of the whole, seven of the terms.
+                assert!((f64::from(got) - want).abs() <= 1e-7 * want.abs(), "{slot}: {got} {want}");
+                assert!((sum - got).abs() <= 1e-6 * got.abs(), "{slot}: {sum} {got}");
+            }
+        }
+        assert_gradient(&plain, setup, &views[0], "f64");
     }
 }
 

@@ -18,22 +18,25 @@ use skinfit::engine::residual::weighted_residual;
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{self, Objective, Point};
 use skinfit::fit::{self, FitOptions, Tolerances};
+use skinfit::model::compose::{Composition, Weights};
 use skinfit::model::cube::{Channel, Cube};
+use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{self, Effect, Effects};
-use skinfit::model::evaluate::{self, Setup};
-use skinfit::model::fragment::{Fragment, guarded};
+use skinfit::model::evaluate::Setup;
+use skinfit::model::fragment::{Fragment, guarded, shading};
 use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Channels, Column, Param, Params};
 use skinfit::model::real::Real;
+use skinfit::model::terms::{LookupParam, Wanted, terms, terms_tangent};
 use skinfit::samples::rows::{Row, Rows};
-use skinfit::samples::surface_records::Asked;
+use skinfit::samples::surface_records::{Asked, Unmade};
 use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::scene;
 use skinfit::scene::view::Clip;
 use skinfit::simd::levels;
 
 use crate::witness::cube::Cube as WitnessCube;
-use crate::witness::fragment::{Constants, Form, Silhouette, Surface};
+use crate::witness::fragment::{Constants, Form, Silhouette, Surface, Variant};
 use crate::witness::losses::Loss;
 use crate::witness::scene::{At, Pixel, Scene, Unknown, View};
 
@@ -69,6 +72,11 @@ pub(crate) trait Evaluator {
     fn computes(&self) -> Width;
     /// In which numbers surfaces and cubes are stored.
     fn stores(&self) -> Width;
+    /// Whether it knows more than the paper's first version, of which alone the model is written by hand.
+    fn knows(&self, variant: Variant) -> bool {
+        let _ = variant;
+        true
+    }
     /// Each view's image, gains applied.
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>>;
     /// Loss, gradient and normal equations.
@@ -151,7 +159,13 @@ fn setup(scene: &Scene) -> Setup {
         Silhouette::Fragment => effects::Silhouette::Fragment,
         Silhouette::Bumped => effects::Silhouette::Bumped,
     };
-    Setup { form, silhouette, effects: EFFECTS }
+    let Variant { smooth_lookups, dapple_axis, interpolated_rim } = scene.variant;
+    Setup {
+        lookups: if smooth_lookups { effects::Lookups::Smooth } else { effects::Lookups::Bumped },
+        dapple: dapple_axis.map_or(Dapple::default(), |axis| Dapple::new(axis, 0.0, true)),
+        interpolated_rim,
+        ..Setup::new(form, silhouette, EFFECTS)
+    }
 }
 
 fn loss_of(loss: Loss) -> scene::Loss {
@@ -213,10 +227,10 @@ fn illumination(scene: &Scene) -> Illumination {
 }
 
 /// A surface as samples hold it.
-fn stored(f: &Surface) -> Fragment<f32> {
+fn stored(f: &Surface) -> (Fragment<f32>, Unmade) {
     let three = |v: [f64; 3]| v.map(|x| x as f32);
     let (base, bump) = guarded(three(f.base), three(f.bump), three(f.view));
-    Fragment {
+    let fragment = Fragment {
         base,
         bump,
         normal: three(f.normal),
@@ -227,7 +241,9 @@ fn stored(f: &Surface) -> Fragment<f32> {
         albedo: three(f.albedo),
         specular: f.specular as f32,
         attenuator: f.attenuator as f32,
-    }
+    };
+    let [corner_silhouettes, corner_shares] = f.corners.map(three);
+    (fragment, Unmade { dapple_normal: fragment.normal, corner_silhouettes, corner_shares })
 }
 
 /// A view as engines read it: groups of sixteen pixels, with as many records as one of them has samples. Pixels that
@@ -236,8 +252,9 @@ fn observed(view: &View) -> ObservedView {
     let groups: Vec<&[Pixel]> = view.pixels.chunks(LANES).collect();
     let records = |group: &[Pixel]| group.iter().map(|pixel| pixel.samples.len()).max().unwrap_or(1);
     let count = groups.iter().map(|group| records(group)).sum();
+    let asked = Asked { dapple_normal: true, corners: true, ..Asked::EVERYTHING };
     let mut samples = ViewSamples { group_start: vec![0], ..ViewSamples::default() };
-    samples.surface = SurfaceRecords::new(Asked::EVERYTHING, count);
+    samples.surface = SurfaceRecords::new(asked, count);
     samples.pixel = (0..(LANES * groups.len()) as u32).collect();
     samples.coverage = vec![1.0; LANES * groups.len()];
     let (mut target, mut weight) = (Rows::new(4, groups.len()), vec![Row::ZERO; groups.len()]);
@@ -250,7 +267,7 @@ fn observed(view: &View) -> ObservedView {
                 let there = lane < group.len() && record < pixel.samples.len();
                 let share = if there { sample.share as f32 } else { 0.0 };
                 let slot = (first as usize + record) * LANES + lane;
-                samples.surface.set(slot, &stored(&sample.surface), share);
+                samples.surface.set_all(slot, &stored(&sample.surface), share);
             }
             if lane < group.len() {
                 (0..4).for_each(|c| target.record_mut(g)[c][lane] = pixel.target[c] as f32);
@@ -299,9 +316,12 @@ impl Evaluator for Plain {
     fn stores(&self) -> Width {
         Width::Single
     }
+    fn knows(&self, variant: Variant) -> bool {
+        variant == Variant::default()
+    }
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
         let (light, views, point) = (illumination(scene), all_observed(scene), point(at));
-        let plain = Reference::new(setup(scene), &light, &views, scene::Loss::L2, &[]);
+        let plain = Reference::new(setup(scene), &light, &views, scene::Loss::L2, &[]).unwrap();
         let pixel = |view: usize, slot: usize| {
             plain.pixel(view, slot, &point.params).map(|(value, _)| point.gains[view] * value)
         };
@@ -310,7 +330,8 @@ impl Evaluator for Plain {
     }
     fn equations(&self, scene: &Scene, at: &At, unknowns: &[Unknown]) -> Found {
         let (light, views) = (illumination(scene), all_observed(scene));
-        let plain = Reference::new(setup(scene), &light, &views, loss_of(scene.loss), &unknowns_of(unknowns));
+        let plain = Reference::new(setup(scene), &light, &views, loss_of(scene.loss), &unknowns_of(unknowns))
+            .unwrap();
         of_objective(&plain, at)
     }
 }
@@ -435,7 +456,21 @@ pub(crate) fn shade<R: Real>(
     f: &Fragment<R>,
     params: &Params,
 ) -> [R; 4] {
-    evaluate::shade(setup, lights, f, params)
+    let composition = composed(setup, lights, f, params);
+    [composition.result(0), composition.result(1), composition.result(2), composition.alpha()]
+}
+
+/// A fragment's terms and their sum, from the pieces that the kernel is made of.
+pub(crate) fn composed<R: Real>(
+    setup: Setup,
+    lights: &Lights<'_, R>,
+    f: &Fragment<R>,
+    params: &Params,
+) -> Composition<R> {
+    let like = f.occlusion;
+    let s = shading(setup.form, setup.silhouette, f, like.lit(params.scalar(Param::NormalStrength)));
+    let terms = terms(lights, f, &s, Wanted::ALL);
+    Composition::new(terms, f.occlusion, Weights::new(params, setup.effects, like))
 }
 
 /// How they move with a parameter.
@@ -447,7 +482,16 @@ pub(crate) fn derivative<R: Real>(
     params: &Params,
     param: Param,
 ) -> [R; 4] {
-    evaluate::derivative(setup, lights, f, params, param)
+    let composition = composed(setup, lights, f, params);
+    if let Some(lookup) = LookupParam::from_param(param) {
+        let strength = f.occlusion.lit(params.scalar(Param::NormalStrength));
+        let slope = terms_tangent(lights, f, &shading(setup.form, setup.silhouette, f, strength), lookup);
+        let along = |c| composition.along(&slope, c);
+        return [along(0), along(1), along(2), composition.alpha_along(&slope)];
+    }
+    let by = |c| composition.derivative(param, c);
+    let alpha = if param == Param::HazeWeight { composition.terms.haze } else { f.occlusion.lit(0.0) };
+    [by(0), by(1), by(2), alpha]
 }
 
 /// Single fragments, in the numbers that one of them stands for.
@@ -607,6 +651,9 @@ impl<R: Number> Evaluator for Single<R> {
     fn stores(&self) -> Width {
         self.computes()
     }
+    fn knows(&self, variant: Variant) -> bool {
+        variant == Variant::default()
+    }
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
         image_in(self.0, scene, at)
     }
@@ -627,6 +674,9 @@ impl Evaluator for AtLevel {
     }
     fn stores(&self) -> Width {
         Width::Single
+    }
+    fn knows(&self, variant: Variant) -> bool {
+        variant == Variant::default()
     }
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
         skinfit_core::with_simd!(self.0, simd => image_in(Lanes::splat(simd, 0.0), scene, at))

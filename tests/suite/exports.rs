@@ -6,7 +6,8 @@ use std::process::Command;
 
 use skinfit::export::{self, Constants, Provenance, Target};
 use skinfit::fit::params_file::ParamsFile;
-use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::dapple::Dapple;
+use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
 use skinfit::shader::facts::MapFacts;
@@ -32,7 +33,7 @@ pub(crate) fn engine_facts() -> Facts {
 /// Scenes that differ in all that changes a fragment stage.
 fn scenes() -> Vec<(&'static str, Facts)> {
     let exact = engine_facts();
-    let setup = |form, silhouette, effects| Setup { form, silhouette, effects };
+    let setup = |form, silhouette, effects| Setup::new(form, silhouette, effects);
     let all = Effects::SURFACE.with(Effect::KeyLight).with(Effect::Haze);
     let corrected =
         |silhouette, effects| Facts { setup: setup(Form::Corrected, silhouette, effects), ..exact };
@@ -48,6 +49,26 @@ fn scenes() -> Vec<(&'static str, Facts)> {
             },
         ),
         ("listing", Facts { setup: setup(Form::Listing, Silhouette::Vertex, all), ..exact }),
+        (
+            "as_interpolated",
+            Facts {
+                setup: Setup { interpolated_rim: true, ..setup(Form::Listing, Silhouette::Vertex, all) },
+                square_rim: true,
+                ..exact
+            },
+        ),
+        (
+            "second_version",
+            Facts {
+                setup: Setup {
+                    lookups: Lookups::Smooth,
+                    dapple: Dapple::new([0.48, -0.36, 0.8], 30.0, false),
+                    ..setup(Form::Corrected, Silhouette::Fragment, all)
+                },
+                turned: true,
+                ..exact
+            },
+        ),
         ("bare", Facts { maps: MapFacts::default(), ..corrected(Silhouette::Fragment, all) }),
     ]
 }
@@ -433,6 +454,29 @@ fn terms_without_weight_are_left_out_and_said_to_be() {
     let planned = plan(&Facts { setup, ..facts }).unwrap();
     assert!(planned.cost < 0.9 * plan(&facts).unwrap().cost, "{}", planned.cost);
     assert!(less.lines().count() < whole.lines().count());
+}
+
+#[test]
+fn an_interpolated_rim_is_handed_to_the_function_with_its_exponent() {
+    let (_, facts) = scenes().into_iter().find(|(name, _)| *name == "as_interpolated").unwrap();
+    let text = exported(Target::Glsl, &facts);
+    assert!(text.contains("float vertex_rim;") && !text.contains("vertex_silhouette"), "{text}");
+    assert!(text.contains("- vertex_rim: (1 - |N.V|) ^ 2.0 of the vertex, as interpolated"), "{text}");
+}
+
+#[test]
+fn the_second_version_reads_two_normals_and_the_axis_of_its_dapple() {
+    let (_, facts) = scenes().into_iter().find(|(name, _)| *name == "second_version").unwrap();
+    let mut params = Params::defaults(Form::Corrected);
+    params.set(Param::KeyColor, 0.5);
+    let text = export::function(Target::Glsl, &facts, &params, &provenance()).unwrap();
+    let [x, y, z] = facts.setup.dapple.axis();
+    assert!(text.contains(&format!("return vec3({x:?}, {y:?}, {z:?});")), "{text}");
+    // Cubes along N, the key light along n.
+    assert!(
+        text.contains("skinfit_turned_n(lookup_normal") && text.contains("(albedo, n, normal,"),
+        "{text}"
+    );
 }
 
 #[test]

@@ -8,7 +8,8 @@ use std::path::Path;
 use bevy_mikktspace::{Geometry, TangentSpace, generate_tangents};
 use glam::{DMat4, Vec2, Vec3, Vec4};
 use serde_json::Value;
-use skinfit::model::effects::{Effects, Form, Silhouette};
+use skinfit::model::dapple::Dapple;
+use skinfit::model::effects::{Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::Params;
 use skinfit::scene::maps::{Environment, Map, Maps};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
@@ -160,6 +161,8 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         environment: None,
         form: Form::Corrected,
         silhouette: Silhouette::Fragment,
+        lookups: Lookups::default(),
+        dapple: Dapple::default(),
         effects,
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),

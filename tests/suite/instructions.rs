@@ -47,21 +47,21 @@ fn every_level_gives_the_plain_models_passes_and_images_and_the_others_but_for_r
     let light = illumination();
     let unknowns = all_unknowns(2);
     let single: Vec<Effects> = [Effect::Diffuse, Effect::Hilite, Effect::Reflection, Effect::KeyLight]
-        .map(|effect| Effects::of(&[effect]))
+        .map(|effect| Effects::of(&[effect, Effect::NormalMap]))
         .to_vec();
     let mut cases = Vec::new();
     for form in Form::ALL {
         for silhouette in Silhouette::ALL {
-            cases.push((Setup { form, silhouette, effects: EVERYTHING }, Loss::L2));
+            cases.push((Setup::new(form, silhouette, EVERYTHING), Loss::L2));
         }
     }
-    let setup = |effects| Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects };
+    let setup = |effects| Setup::new(Form::Corrected, Silhouette::Bumped, effects);
     cases.extend(Loss::ALL.map(|loss| (setup(EVERYTHING), loss)));
     cases.extend(single.into_iter().map(|effects| (setup(effects), Loss::L2)));
     let mut worst = 0.0_f64;
     for (setup, loss) in cases {
         let point = point();
-        let plain = Reference::new(setup, &light, &views, loss, &unknowns);
+        let plain = Reference::new(setup, &light, &views, loss, &unknowns).unwrap();
         let want = plain.normal_equations(&point);
         let mut best: Option<NormalEquations> = None;
         for level in levels() {
@@ -108,9 +108,9 @@ fn every_level_shows_the_plain_models_image() {
     let views = [view(70, 33)];
     let light = illumination();
     for form in Form::ALL {
-        let setup = Setup { form, silhouette: Silhouette::Bumped, effects: EVERYTHING };
+        let setup = Setup::new(form, Silhouette::Bumped, EVERYTHING);
         let point = Point { params: params(), gains: vec![1.5] };
-        let plain = Reference::new(setup, &light, &views, Loss::L2, &[]);
+        let plain = Reference::new(setup, &light, &views, Loss::L2, &[]).unwrap();
         for level in levels() {
             let mut engine = engine(setup, &views, Loss::L2, &[], true);
             engine.set_level(level);
@@ -132,7 +132,7 @@ fn every_level_shows_the_plain_models_image() {
 fn sums_are_the_same_to_the_bit_for_any_number_of_threads_at_every_level() {
     let views = [view(300, 34)];
     let unknowns = all_unknowns(1);
-    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Bumped, effects: EVERYTHING };
+    let setup = Setup::new(Form::Corrected, Silhouette::Bumped, EVERYTHING);
     for level in levels() {
         let mut engine = engine(setup, &views, Loss::Huber, &unknowns, true);
         engine.set_level(level);
@@ -147,7 +147,7 @@ fn sums_are_the_same_to_the_bit_for_any_number_of_threads_at_every_level() {
 #[test]
 fn fits_end_at_the_same_constants_whatever_instructions_ran() {
     let mut views = [view(120, 35)];
-    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: EVERYTHING };
+    let setup = Setup::new(Form::Corrected, Silhouette::Fragment, EVERYTHING);
     let unknowns = all_unknowns(1);
     let truth = Point { params: params(), gains: vec![1.0] };
     // Targets that the model does not meet, so that a loss is left.

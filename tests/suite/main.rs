@@ -22,6 +22,7 @@ mod graphics;
 mod instructions;
 mod meshes;
 mod occlusion;
+mod readings;
 mod refusals;
 mod reports;
 mod samples;

@@ -38,6 +38,32 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         (view, String::new(), &["no view"]),
         ("[model]", "[model]\nform = \"corected\"".into(), &["unknown form", "Did you mean `corrected`"]),
         ("[model]", "[model]\nsilhouette = \"pixel\"".into(), &["unknown silhouette `pixel`", "bumped"]),
+        (
+            "[model]",
+            "[model]\nlookups = \"smoth\"".into(),
+            &["unknown lookups `smoth`", "Did you mean `smooth`"],
+        ),
+        (
+            "\"env.exr\"",
+            "\"env.exr\"\ndapple = [1, 0, 0, 0, 1, 0, 0, 0]".into(),
+            &["line 11", "dapple has 8 numbers instead of 9 or 16", "Give a rotation"],
+        ),
+        (
+            "\"env.exr\"",
+            "\"env.exr\"\ndapple = [1, 0, 0, 0, 1, 0, 0, nan, 1]".into(),
+            &["dapple holds NaN at row 2, column 1"],
+        ),
+        (
+            "\"env.exr\"",
+            "\"env.exr\"\ndapple = [1,0,0, 0,1,0, 0,0,2]".into(),
+            &["dapple scales", "orthonormal"],
+        ),
+        ("\"env.exr\"", "\"env.exr\"\ndapple = [1,0,0, 0,1,0, 0,0,-1]".into(), &["dapple mirrors"]),
+        (
+            "\"env.exr\"",
+            "\"env.exr\"\ndapple = [1,0,0,0, 0,1,0,0, 0,0,1,3, 0,0,0,1]".into(),
+            &["dapple moves or projects", "last row and column"],
+        ),
         ("[model]", "[model]\neffects = [\"difuse\"]".into(), &["unknown effect `difuse`", "`diffuse`"]),
         ("[model]", "[model]\neffects = [\"rim\", \"rim\"]".into(), &["rim is listed twice", "Take one"]),
         ("[maps]", "[maps]\nnormal_y = \"left\"".into(), &["unknown direction", "up, down"]),

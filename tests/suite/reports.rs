@@ -6,9 +6,13 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use skinfit::engine::{Point, Unknown};
 use skinfit::fit::outcome::{Direction, Ending, Iteration, Outcome, UnknownOutcome};
+use skinfit::fit::profile::{Profile, ProfilePoint};
+use skinfit::fit::sandwich::Blocks;
+use skinfit::fit::statistics::ErrorBasis;
 use skinfit::model::effects::Form;
 use skinfit::model::params::{Column, Param, Params};
 use skinfit::render::files::Image;
+use skinfit::render::places::Places;
 use skinfit::report::{ReportError, RunInfo, StageSeconds, ViewEvidence, write_run};
 use skinfit::scene::Loss;
 
@@ -56,7 +60,13 @@ fn ball(name: &str, side: usize, light: [f32; 3]) -> ViewEvidence {
         (fit.alpha[i], target.alpha[i]) = (alpha, alpha);
     }
     let coverage = fit.alpha.clone();
-    ViewEvidence { name: name.to_owned(), target, fit, coverage, terms: terms.to_vec(), haze: Vec::new() }
+    let facing = (0..side * side).map(|i| {
+        let at = |k: usize| 2.2 * ((k as f32 + 0.5) / side as f32 - 0.5);
+        (1.0 - at(i % side).powi(2) - at(i / side).powi(2)).max(0.0).sqrt()
+    });
+    let places = Places { facing: facing.collect(), ..Places::default() };
+    let (name, terms) = (name.to_owned(), terms.to_vec());
+    ViewEvidence { name, target, fit, coverage, terms, haze: Vec::new(), places, clip: None }
 }
 
 fn run() -> RunInfo {
@@ -70,10 +80,23 @@ fn run_of(side: usize) -> RunInfo {
         loss: Loss::RelativeL2,
         engine: "cpu".to_owned(),
         samples: 1_234_567,
-        seconds: StageSeconds { load: 0.61, bake: 3.2, samples: 0.45, maps: 0.0, fit: 0.083, render: 0.2 },
+        seconds: StageSeconds {
+            load: 0.61,
+            bake: 3.2,
+            samples: 0.45,
+            maps: 0.0,
+            fit: 0.083,
+            render: 0.2,
+            report: 0.0,
+        },
         views: vec![ball("front", side, [0.5, 0.6, 0.62]), ball(ODD_NAME, side - 16, [-0.8, 0.3, -0.1])],
         warnings: vec!["head.glb: weights of 3 vertices did not sum to 1 & were <scaled>.".to_owned()],
         provenance: vec![("effects".to_owned(), "diffuse, rim, hilite".to_owned())],
+        made: vec![
+            ("command".to_owned(), "skinfit fit 'a <b>.toml' -o run".to_owned()),
+            ("date".to_owned(), "2026-11-23T01:02:03Z".to_owned()),
+            ("processor".to_owned(), "an AMD EPYC".to_owned()),
+        ],
         maps: None,
         named: Vec::new(),
     }
@@ -106,6 +129,8 @@ fn outcome() -> Outcome {
                 start: unknown.get(&start),
                 value,
                 std_error,
+                // Independent residuals would say half.
+                noise_error: std_error.map(|error| 0.5 * error),
                 identifiable: unknown != tied(Param::Reflection),
                 at_bound: unknown == tied(Param::Hilite),
                 sensitivity: 0.3 / (1.0 + value.abs()),
@@ -134,6 +159,8 @@ fn outcome() -> Outcome {
         loss_end: losses[6],
         unknowns,
         correlations,
+        errors: ErrorBasis::Blocks(Blocks { alike: 12, side: 40, count: 80, next: 0.9 }),
+        profile: Some(profile()),
         undetermined: vec![
             Direction { components: vec![("reflection".to_owned(), 1.0)] },
             Direction { components: vec![("gain.1".to_owned(), 0.81), ("base_weight.r".to_owned(), -0.58)] },
@@ -144,6 +171,23 @@ fn outcome() -> Outcome {
         seconds: 0.083,
         ending: Ending::Converged,
         starts: Vec::new(),
+    }
+}
+
+/// A valley towards sharper lobes.
+fn profile() -> Profile {
+    let point = |(value, loss)| ProfilePoint { value, loss };
+    Profile {
+        name: "specular_lobe".to_owned(),
+        value: 210.0,
+        std_error: 31.0,
+        rise: 1e-6,
+        interval: [180.2, 760.0],
+        closed: [true, false],
+        points: [(180.0, 0.004_7), (210.0, 0.004_697_9), (241.0, 0.004_697_8), (760.0, 0.004_698_2)]
+            .map(point)
+            .to_vec(),
+        passes: 7,
     }
 }
 
@@ -191,6 +235,7 @@ fn the_json_holds_what_the_format_promises() {
     );
     assert_eq!(json.pointer("/params/base_weight/start").unwrap(), &serde_json::json!([1.0, 1.0, 1.0]));
     assert_eq!(number("/params/base_weight/std_error/1"), 0.0019);
+    assert_eq!(number("/params/base_weight/noise_error/1"), 0.000_95);
     assert_eq!(number("/params/rim_weight/value"), -0.1234);
     assert_eq!(number("/params/rim_weight/std_error"), 0.0312);
     assert_eq!(json["params"]["hilite"]["std_error"], Value::Null);
@@ -214,9 +259,109 @@ fn the_json_holds_what_the_format_promises() {
     assert_eq!(json["unknowns"][9]["name"], format!("gain.{ODD_NAME}"));
     assert_eq!(json["unknowns"][0]["bounds"], serde_json::json!([0.0, null]));
     assert_eq!(number("/correlations/matrix/3/4"), -0.973);
+    // hilite is at its bound, reflection undetermined: neither has an error that could be correlated.
+    for other in [0, 4, 5, 6] {
+        assert!(
+            json["correlations"]["matrix"][5][other].is_null()
+                && json["correlations"]["matrix"][other][6].is_null()
+        );
+    }
+    assert_eq!((json["errors"]["basis"].as_str(), number("/errors/alike")), (Some("blocks"), 12.0));
+    assert_eq!((number("/errors/side"), number("/errors/count")), (40.0, 80.0));
+    assert_eq!(number("/errors/most_over_noise"), 2.0);
+    assert_eq!(number("/unknowns/3/noise_error"), 0.0156);
+    assert_eq!((number("/profile/interval/1"), json["profile"]["closed"][1].as_bool()), (760.0, Some(false)));
     assert_eq!(json["undetermined"][1]["base_weight.r"], -0.58);
     assert_eq!(json["history"].as_array().unwrap().len(), 7);
     assert_eq!(json["provenance"]["software"], concat!("skinfit ", env!("CARGO_PKG_VERSION")));
+    assert_eq!(json["provenance"]["command"], "skinfit fit 'a <b>.toml' -o run");
+    assert_eq!(json["provenance"]["date"], "2026-11-23T01:02:03Z");
+    assert_eq!(json["provenance"]["processor"], "an AMD EPYC");
+    assert!(number("/seconds/report") > 0.0);
+}
+
+/// The target's rim is half as strong again: of the light there, a known part is missing.
+#[test]
+fn what_is_wrong_is_told_with_its_place_in_words_and_numbers() {
+    let folder = folder("misfit");
+    let run = run();
+    write_run(&folder, &run, &outcome()).unwrap();
+    let json = read_json(&folder);
+    let misfit = &json["misfit"];
+    let first = &misfit["places"][0];
+    assert_eq!(
+        (first["place"].as_str(), first["told"].as_bool()),
+        (Some("at the rim"), Some(true)),
+        "{misfit:#}"
+    );
+    // By hand: over the covered pixels whose normal is more than 70 degrees from the eye.
+    let (mut residual, mut target, mut pixels) = (0.0, 0.0, 0.0);
+    for view in &run.views {
+        for i in
+            (0..view.coverage.len()).filter(|&i| view.coverage[i] >= 0.999 && view.places.facing[i] < 0.342)
+        {
+            let mean = |rgb: [f32; 3]| rgb.iter().map(|c| f64::from(*c)).sum::<f64>() / 3.0;
+            residual += mean(view.fit.rgb[i]) - mean(view.target.rgb[i]);
+            target += mean(view.target.rgb[i]);
+            pixels += 1.0;
+        }
+    }
+    let near = |key: &str, want: f64| (first[key].as_f64().unwrap() / want - 1.0).abs() < 1e-6;
+    assert!(
+        near("mean", residual / pixels) && near("relative", residual / target),
+        "{first:#} {residual} {pixels}"
+    );
+    assert!(
+        residual < 0.0 && first["std_error"].as_f64().unwrap() < 0.3 * (residual / pixels).abs(),
+        "{first:#}"
+    );
+    // What is known of creases and of the light is nothing.
+    let places: Vec<&str> =
+        misfit["places"].as_array().unwrap().iter().map(|place| place["place"].as_str().unwrap()).collect();
+    assert!(!places.iter().any(|place| place.contains("crease") || place.contains("side")), "{places:?}");
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    let sentence =
+        format!("<li>Too dark at the rim by {:.0}% (mean radiance off by ", -100.0 * residual / target);
+    assert!(page.contains(&sentence), "{sentence}");
+    // Beside the ending, and in the lead.
+    let matched = misfit["match"].as_str().unwrap();
+    assert!(["close", "rough", "poor"].contains(&matched), "{matched}");
+    assert!(page.contains(&format!(
+        ">Converged</span><span class=\"pill {}\">A {matched} match</span>",
+        match matched {
+            "close" => "good",
+            "rough" => "warn",
+            _ => "bad",
+        }
+    )));
+    assert!(page.contains("The model explains ") && page.contains("Largest misfit: too dark at the rim by "));
+}
+
+#[test]
+fn the_page_shows_the_signed_error_and_says_who_made_it_when() {
+    let folder = folder("signed");
+    write_run(&folder, &run(), &outcome()).unwrap();
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    for view in ["front", "profile &lt;b&gt;&quot;&amp;&#39; {{title}}/../x"] {
+        assert_eq!(page.matches(&format!("alt=\"signed error of view {view}\"")).count(), 1, "{view}");
+        assert_eq!(page.matches(&format!("alt=\"FLIP error of view {view}\"")).count(), 1, "{view}");
+    }
+    // Colours and both ends of the scale, which is the same for all views.
+    let legends: Vec<&str> = page.split("<span class=\"bar signed\"><i>−").skip(1).collect();
+    let ends: Vec<&str> = legends.iter().filter_map(|legend| legend.split('<').next()).collect();
+    assert!(ends.len() == 2 && ends[0] == ends[1], "{ends:?}");
+    assert!(legends[0].starts_with(&format!("{0}</i><b></b><i>+{0}</i>", ends[0])), "{}", &legends[0][..60]);
+    assert!(page.contains("blue where the fit is too dark, red where it is too bright"));
+    for (name, text) in [
+        ("command", "skinfit fit &#39;a &lt;b&gt;.toml&#39; -o run"),
+        ("date", "2026-11-23T01:02:03Z"),
+        ("processor", "an AMD EPYC"),
+    ] {
+        assert!(page.contains(&format!("<dt>{name}</dt><dd>{text}</dd>")), "{name}");
+    }
+    // Images of equal runs are equal, whenever they are made.
+    let terms = std::fs::read(folder.join("front_terms.exr")).unwrap();
+    assert!(!terms.windows(10).any(|bytes| bytes == b"2026-11-23"));
 }
 
 #[test]
@@ -273,6 +418,40 @@ fn a_fit_without_unknowns_views_or_history_still_reports() {
 }
 
 #[test]
+fn the_page_says_what_errors_rest_on_and_which_unknowns_their_bounds_hold() {
+    let folder = folder("errors");
+    let mut outcome = outcome();
+    let reflection = outcome.unknowns.iter().position(|u| !u.identifiable).unwrap();
+    outcome.unknowns[reflection].identifiable = true;
+    outcome.undetermined.clear();
+    write_run(&folder, &run(), &outcome).unwrap();
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    for words in [
+        "The images determine every free parameter but hilite, held by its bound.",
+        "Residuals are alike over about 12 pixels: errors are up to 2.0 times those of independent ones.",
+        "specular_lobe lies in a valley: from 180 to 760 or more the loss is as good as at 210.0.",
+        "Held by its bound, and so not determined from inside: hilite.",
+        "id=\"profile\"",
+        "hilite and occlusion: no errors to correlate",
+        "by independent residuals 0.016",
+    ] {
+        assert!(page.contains(words), "{words}");
+    }
+    assert!(!page.contains("determine every free parameter."));
+    assert_well_formed(&page);
+    // Without correlated residuals, a valley or bounds nothing of the kind is said.
+    let plain = Outcome { errors: ErrorBasis::Rounding, profile: None, ..outcome };
+    let mut plain = plain;
+    plain.unknowns.iter_mut().for_each(|u| (u.noise_error, u.at_bound) = (u.std_error, false));
+    write_run(&folder, &run(), &plain).unwrap();
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(page.contains("The images determine every free parameter."));
+    for words in ["Residuals are alike", "valley", "not determined from inside", "by independent residuals"] {
+        assert!(!page.contains(words), "{words}");
+    }
+}
+
+#[test]
 fn the_page_is_well_formed_and_asks_for_nothing_from_outside() {
     let folder = folder("page");
     write_run(&folder, &run(), &outcome()).unwrap();
@@ -288,8 +467,8 @@ fn the_page_is_well_formed_and_asks_for_nothing_from_outside() {
     for source in page.split("src=\"").skip(1).chain(page.split("href=\"").skip(1)) {
         assert!(source.starts_with("data:"), "{}", &source[..40]);
     }
-    // Two views of three pictures and five terms each.
-    assert_eq!(page.matches("<img src=\"data:image/png;base64,").count(), 2 * (3 + 5));
+    // Two views of four pictures and five terms each.
+    assert_eq!(page.matches("<img src=\"data:image/png;base64,").count(), 2 * (4 + 5));
     // Against passes and against seconds, from where the fit began.
     assert_eq!(page.matches("<title>start: loss ").count(), 2);
 }

@@ -160,7 +160,7 @@ fn coverage_is_that_of_the_independent_renderer_but_for_its_wider_filter() {
 }
 
 /// A wavy sheet that faces +Z, with a little of everything.
-fn sheet() -> PosedMesh {
+pub(crate) fn sheet() -> PosedMesh {
     let mut mesh = PosedMesh::default();
     for i in 0..21_u16 {
         for j in 0..21_u16 {
@@ -180,7 +180,7 @@ fn sheet() -> PosedMesh {
     mesh
 }
 
-fn sheet_scene(effects: Effects) -> Scene {
+pub(crate) fn sheet_scene(effects: Effects) -> Scene {
     let mut scene = bare_scene(effects);
     let rows = [1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.05, 0.0, 0.0, 1.0, -4.0, 0.0, 0.0, 0.0, 1.0];
     scene.views = vec![skinfit::scene::view::View {

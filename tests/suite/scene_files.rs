@@ -4,7 +4,8 @@ use std::path::Path;
 
 use image::{ImageFormat, Rgb, Rgba, RgbaImage};
 use serde_json::{Value, json};
-use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::dapple::Dapple;
+use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::{Column, Param};
 use skinfit::render::backdrop::Backdrop;
 use skinfit::scene::maps::{Environment, Map};
@@ -46,6 +47,8 @@ fn keys_of_a_scene_do_what_they_say() {
     let listing = edit("[model]", "[model]\nform = \"listing\"");
     assert_eq!((listing.form, listing.silhouette), (Form::Listing, Silhouette::Vertex));
     assert_eq!(listing.params.scalar(Param::BaseWeight), 0.0);
+    assert_eq!(listing.lookups, Lookups::Bumped);
+    assert_eq!(edit("[model]", "[model]\nlookups = \"smooth\"").lookups, Lookups::Smooth);
     let triple = edit("[model.params]", "[model.params]\nhilite = [0.1, 0.2, 0.3]\n");
     assert_eq!(triple.params.rgb(Param::Hilite), [0.1, 0.2, 0.3]);
     assert!(triple.fit.free.contains(&Column::per_channel(Param::Hilite)[2]));
@@ -57,6 +60,76 @@ fn keys_of_a_scene_do_what_they_say() {
     assert_eq!(edit("[quality]", "[quality]\nsamples_per_axis = 3").quality.samples_per_axis, 3);
     let masked = edit("[fit]", "mask = \"mask.png\"\n[fit]");
     assert_eq!(masked.views[0].target.as_ref().unwrap().mask.as_ref().unwrap()[0], 1.0);
+}
+
+#[test]
+fn the_dapple_is_the_third_row_of_its_matrix_and_turns_with_the_environment() {
+    let scene_folder = SceneFolder::new();
+    let dapple =
+        |keys: &str| scene_folder.edited("\"env.exr\"", &format!("\"env.exr\"\n{keys}")).unwrap().0.dapple;
+    assert_eq!(dapple(""), Dapple::default());
+    // Axes to axes: the third row is +Y, then +X, which a quarter turn takes to -Z.
+    let up = dapple("dapple = [1,0,0, 0,0,-1, 0,1,0]");
+    assert_eq!(up.axis(), [0.0, 1.0, 0.0]);
+    assert_eq!(dapple("dapple = [1,0,0,0, 0,0,-1,0, 0,1,0,0, 0,0,0,1]"), up);
+    assert_eq!(dapple("rotation_degrees = 90\ndapple = [1,0,0, 0,0,-1, 0,1,0]").axis(), up.axis());
+    let aside = "dapple = [0,0,-1, 0,1,0, 1,0,0]";
+    assert_eq!(dapple(aside).axis(), [1.0, 0.0, 0.0]);
+    for (keys, want) in [
+        (format!("rotation_degrees = 90\n{aside}"), [0.0, 0.0, -1.0]),
+        // One that is not given stands in the world; the identity that is given turns.
+        ("rotation_degrees = 90".to_owned(), [0.0, 0.0, 1.0]),
+        ("rotation_degrees = 180\ndapple = [1,0,0, 0,1,0, 0,0,1]".to_owned(), [0.0, 0.0, -1.0]),
+    ] {
+        let axis = dapple(&keys).axis();
+        // A rounding of pi in f64.
+        assert!(axis.iter().zip(want).all(|(a, b): (&f32, f32)| (a - b).abs() < 1e-15), "{keys}: {axis:?}");
+    }
+    // A file's few digits are made a unit vector.
+    let rounded = dapple("dapple = [1,0,0, 0,0.8,-0.6004, 0,0.6,0.8]").axis();
+    assert_eq!(rounded, [0.0, 0.6, 0.8]);
+    // Samples hold a normal where the turn is fitted, and S.w where it is not.
+    for (key, free, turns) in [
+        (format!("\n{aside}"), "environment_rotation", true),
+        (format!("\n{aside}"), "hilite", false),
+        (String::new(), "environment_rotation", false),
+    ] {
+        let text = SCENE.replacen("\"env.exr\"", &format!("\"env.exr\"{key}"), 1);
+        let text = text.replacen("[fit]", &format!("[fit]\nfree = [\"{free}\"]"), 1);
+        scene_folder.write("scene.toml", text.as_bytes());
+        let (scene, _) = scene_folder.load().unwrap();
+        assert_eq!(
+            (scene.setup().dapple.turns(), scene.setup().hand_written()),
+            (turns, !turns),
+            "{key} {free}"
+        );
+    }
+}
+
+#[test]
+fn a_normal_map_that_nothing_sees_is_not_read_and_a_warning_says_so() {
+    let scene_folder = SceneFolder::new();
+    let smooth = "[model]\nlookups = \"smooth\"";
+    let (scene, warnings) = scene_folder.edited("[model]", smooth).unwrap();
+    assert!(scene.maps.normal.is_none() && scene.mesh.tangents.is_empty());
+    assert!(scene.setup().hand_written(), "n is the smooth normal, and that is all");
+    let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+    assert!(said.len() == 1 && said[0].contains("`normal_map` does nothing without `key_light`"), "{said:?}");
+    for (keys, hand_written) in [
+        ("effects = [\"diffuse\", \"normal_map\", \"key_light\"]", false),
+        ("effects = [\"normal_map\", \"key_light\"]", true),
+        ("silhouette = \"bumped\"", false),
+    ] {
+        let (scene, warnings) = scene_folder.edited("[model]", &format!("{smooth}\n{keys}")).unwrap();
+        assert!(scene.maps.normal.is_some() && warnings.is_empty(), "{keys}: {warnings:?}");
+        assert_eq!(scene.setup().hand_written(), hand_written, "{keys}");
+    }
+    // No first version has two normals.
+    let (listing, _) = scene_folder.edited("[model]", "[model]\nform = \"listing\"").unwrap();
+    assert!(listing.setup().interpolated_rim && !listing.setup().hand_written());
+    let fragment = "[model]\nform = \"listing\"\nsilhouette = \"fragment\"";
+    let (listing, _) = scene_folder.edited("[model]", fragment).unwrap();
+    assert!(listing.setup().hand_written());
 }
 
 #[test]

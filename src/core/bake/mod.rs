@@ -179,7 +179,7 @@ pub fn bake(
 ) -> Result<(Bake, BakeStats), BakeError> {
     let (illumination, stats) = bake_light(scene, exponents, cache)?;
     let mut baker = Baker { cache, stats };
-    let needs = scene.effects.needs(scene.silhouette);
+    let needs = scene.needs();
     let occlusion = needs.occlusion.then(|| occlusion_of_used(scene, pose, &mut baker));
     Ok((Bake { illumination, occlusion }, baker.stats))
 }
@@ -193,7 +193,7 @@ pub fn bake_light(
     exponents: RangeInclusive<f64>,
     cache: Option<&Path>,
 ) -> Result<(Illumination, BakeStats), BakeError> {
-    let needs = scene.effects.needs(scene.silhouette);
+    let needs = scene.needs();
     let mut baker = Baker { cache, stats: BakeStats::default() };
     let mut light = Illumination::default();
     if needs.environment() {

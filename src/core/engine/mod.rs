@@ -3,7 +3,9 @@
 //! - [`Objective`]: all that the solvers see of an engine
 //! - [`cpu`]: the CPU engine; its parts are `plan` (what a pass computes), `kernel` (groups of pixels
 //!   to columns), `window` (where these stand), `gram` (columns to products) and [`residual`] (the losses)
+//! - [`pulls`]: where residuals stand in the images
 //! - [`lanes`]: sixteen f32 lanes as one number of the model; `corners`: their lookups in cubes
+//! - [`planned`]: the engine that the rules make; [`rules`]: rules over samples in any kind of number
 //! - [`mod@reference`]: the same in f64, plainly: what both are held against
 //! - [`view`]: samples beside what was observed; `records`: the same as the kernel reads them
 
@@ -14,9 +16,11 @@ mod kernel;
 pub mod lanes;
 mod plan;
 pub mod planned;
+pub mod pulls;
 mod records;
 pub mod reference;
 pub mod residual;
+pub mod rules;
 pub mod view;
 mod window;
 
@@ -58,8 +62,8 @@ impl NormalEquations {
 pub trait Objective: Sync {
     /// The unknowns, in the order of every vector below: parameters' columns, then gains.
     fn unknowns(&self) -> &[Unknown];
-    /// Whether the loss is exactly quadratic in the linear unknowns, as l2 and relative_l2 are when
-    /// no target pixel is clipped: a solver then knows the loss at other linear unknowns without a
+    /// Whether the loss is exactly quadratic in the linear unknowns, as l2 is when no target pixel is clipped: a
+    /// solver then knows the loss at other linear unknowns without a
     /// pass. `false` is always safe.
     fn is_quadratic(&self) -> bool {
         false
@@ -72,6 +76,12 @@ pub trait Objective: Sync {
     }
     /// Why passes cannot be made any more, as when a device is lost; what they yielded since is void.
     fn fault(&self) -> Option<String> {
+        None
+    }
+    /// Where the residuals at `point` stand in the images, whose rows have `widths` pixels (a number a view), and how
+    /// each tile of them pulls at the unknowns: a pass that takes some ten times as long as another. `None` where the
+    /// engine cannot tell.
+    fn pulls(&self, _point: &Point, _widths: &[usize]) -> Option<pulls::Pulls> {
         None
     }
     /// Loss and normal equations at `point` (parameters and gains), for all unknowns.

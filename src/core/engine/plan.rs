@@ -91,7 +91,7 @@ pub(super) struct Plan {
 
 impl Plan {
     pub(super) fn new(setup: Setup, unknowns: &[Unknown], compare_alpha: bool, keep: bool) -> Self {
-        let needs = setup.effects.needs(setup.silhouette);
+        let needs = setup.needs();
         let enabled = Wanted {
             diffuse: needs.irradiance,
             side: setup.effects.has(Effect::SideSpecular),

@@ -1,120 +1,122 @@
-//! Normal equations in f64, one sample after another and without a shortcut: what the engines are held
-//! against. Some hundred times slower than they are.
+//! Normal equations in f64, from the rules' own arithmetic: what the engines are held against. Some hundred times
+//! slower than they are.
 
 use rayon::prelude::*;
 
 use super::residual::weighted_residual;
+use super::rules::{CubesAt, Loads, Registers, SampleSteps, Setting, sample_facts};
 use super::view::ObservedView;
 use super::{HALF_UNIT, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
-use crate::model::cube::Cube;
-use crate::model::evaluate::{Setup, derivative, shade};
-use crate::model::fragment::Fragment;
-use crate::model::lights::{Cubes, Lights};
+use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::model::vector::V3;
+use crate::program::lower::Natives;
+use crate::program::shading::{Shading, ShadingError};
+use crate::program::steps::Rounding;
 use crate::samples::LANES;
 use crate::scene::Loss;
+use crate::shader::tangent::chain::Seed;
 
 /// Half units in the last place by which an engine's f32 value of a pixel may be off, of either sign: some ten
 /// operations' roundings, which are independent, lie within their root.
 const ROUNDINGS: f64 = 4.0;
 
-/// Pixels of a unit of work; a fixed number, so that sums do not depend on threads.
-const CHUNK: usize = 64 * LANES;
+/// Groups of pixels of a unit of work; a fixed number, so that sums do not depend on threads.
+const CHUNK: usize = 64;
 
 /// The plain f64 objective over views.
 #[derive(Debug)]
 pub struct Reference<'a> {
-    setup: Setup,
     illumination: &'a Illumination,
     views: &'a [ObservedView],
     loss: Loss,
     unknowns: Vec<Unknown>,
-}
-
-/// Cubes in f64, at one exponent.
-struct Wide {
-    irradiance: Option<Cube<f64>>,
-    specular: Option<Cube<f64>>,
-    lobe_slope: Option<Cube<f64>>,
-    hilite: Option<Cube<f64>>,
+    /// Yields the value, and how it moves with each of `free`.
+    steps: SampleSteps,
+    free: Vec<Param>,
 }
 
 /// Value and columns of one pixel's four channels, the gain not applied.
 pub type PixelColumns = [(f64, Vec<f64>); 4];
 
+/// A view at one point.
+struct ViewAt<'a> {
+    view: &'a ObservedView,
+    setting: &'a Setting<'a, f64>,
+    loads: Loads,
+}
+
 impl<'a> Reference<'a> {
     /// Of the views, for the unknowns.
-    #[must_use]
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
     pub fn new(
         setup: Setup,
         illumination: &'a Illumination,
         views: &'a [ObservedView],
         loss: Loss,
         unknowns: &[Unknown],
-    ) -> Self {
-        Self { setup, illumination, views, loss, unknowns: unknowns.to_vec() }
-    }
-
-    fn cubes(&self, exponent: f64) -> Wide {
-        let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(f64::from));
-        let lobe = self.illumination.lobes.as_ref().map(|stack| stack.at(exponent));
-        Wide {
-            irradiance: self.illumination.irradiance.as_ref().map(wide),
-            specular: lobe.as_ref().map(|(cube, _)| wide(cube)),
-            lobe_slope: lobe.as_ref().map(|(_, slope)| wide(slope)),
-            hilite: self.illumination.hilite.as_ref().map(wide),
+    ) -> Result<Self, ShadingError> {
+        let mut free = Vec::new();
+        for unknown in unknowns {
+            let Unknown::Param(column) = unknown else { continue };
+            if column.param.asked_for(setup.effects) && !free.contains(&column.param) {
+                free.push(column.param);
+            }
         }
+        let seeds: Vec<Seed> = free.iter().map(|&param| Seed::of_param(param)).collect();
+        let shading =
+            Shading::new(&sample_facts(setup, illumination, true), &seeds, |_| None, Natives::Written)?;
+        let outputs = [&[shading.value], &shading.tangents[..]].concat().concat();
+        let steps = SampleSteps::new(&shading.graph, &outputs, |_| Rounding::Plain);
+        Ok(Self { illumination, views, loss, unknowns: unknowns.to_vec(), steps, free })
     }
 
-    fn lights<'c>(&self, cubes: &'c Wide, params: &Params) -> Lights<'c, f64> {
-        let Wide { irradiance, specular, lobe_slope, hilite } = cubes;
-        let cubes = Cubes {
-            irradiance: irradiance.as_ref(),
-            specular: specular.as_ref(),
-            lobe_slope: lobe_slope.as_ref(),
-            hilite: hilite.as_ref(),
-        };
-        Lights::new(self.setup, params, cubes, true, 0.0)
+    fn cubes(&self, params: &Params) -> CubesAt<f64> {
+        CubesAt::new(self.illumination, params, f64::from)
+    }
+
+    fn at<'s>(&'s self, view: usize, setting: &'s Setting<'s, f64>) -> ViewAt<'s> {
+        let view = &self.views[view];
+        ViewAt { view, setting, loads: self.steps.loads(view.samples.surface.places()) }
     }
 
     /// Value and columns of one pixel slot of a view: the means over its samples.
     #[must_use]
     pub fn pixel(&self, view: usize, slot: usize, params: &Params) -> PixelColumns {
-        let cubes = self.cubes(params.scalar(Param::SpecularLobe));
-        self.pixel_in(&self.lights(&cubes, params), &self.views[view], slot, params)
+        let cubes = self.cubes(params);
+        let setting = self.steps.setting(params, &cubes, 0.0);
+        let group = self.group(&self.at(view, &setting), slot / LANES, &mut Registers::default());
+        group[slot % LANES].clone()
     }
 
-    fn pixel_in(
-        &self,
-        lights: &Lights<'_, f64>,
-        view: &ObservedView,
-        slot: usize,
-        params: &Params,
-    ) -> PixelColumns {
-        let mut out: PixelColumns = std::array::from_fn(|_| (0.0, vec![0.0; self.unknowns.len()]));
-        let starts = &view.samples.group_start;
-        for record in starts[slot / LANES]..starts[slot / LANES + 1] {
-            let at = record as usize * LANES + slot % LANES;
-            let f = fragment(view, at);
-            let share = f64::from(view.samples.surface.weight(at));
-            let value = shade(self.setup, lights, &f, params);
-            (0..4).for_each(|c| out[c].0 += share * value[c]);
-            for (k, unknown) in self.unknowns.iter().enumerate() {
-                let Unknown::Param(column) = unknown else { continue };
-                if !column.param.asked_for(self.setup.effects) {
-                    continue;
-                }
-                let slope = derivative(self.setup, lights, &f, params, column.param);
-                for c in 0..4 {
-                    if c == 3 || column.channels.includes(c) {
-                        out[c].1[k] += share * slope[c];
+    /// The pixels of a group.
+    fn group(&self, at: &ViewAt<'_>, group: usize, registers: &mut Registers<f64>) -> [PixelColumns; LANES] {
+        let nothing = || (0.0, vec![0.0; self.unknowns.len()]);
+        let mut pixels: [PixelColumns; LANES] = std::array::from_fn(|_| std::array::from_fn(|_| nothing()));
+        let samples = &at.view.samples;
+        for record in samples.group_start[group]..samples.group_start[group + 1] {
+            let record = record as usize;
+            let found = self.steps.record(at.setting, &at.loads, &samples.surface, record, registers);
+            let numbers: Vec<_> = found.collect();
+            let tangent = |param: Param| self.free.iter().position(|&free| free == param);
+            for (lane, pixel) in pixels.iter_mut().enumerate() {
+                let share = f64::from(samples.surface.weight(record * LANES + lane));
+                for (c, (value, columns)) in pixel.iter_mut().enumerate() {
+                    *value += share * numbers[c].0[lane];
+                    for (column, unknown) in columns.iter_mut().zip(&self.unknowns) {
+                        let Unknown::Param(free) = unknown else { continue };
+                        if let Some(k) = tangent(free.param)
+                            && (c == 3 || free.channels.includes(c))
+                        {
+                            *column += share * numbers[4 * (1 + k) + c].0[lane];
+                        }
                     }
                 }
             }
         }
-        out
+        pixels
     }
 
     /// The normal equations, and how far J^T J of an engine that computes in f32 may be from theirs because its
@@ -134,14 +136,15 @@ impl<'a> Reference<'a> {
     }
 
     fn all_sums(&self, point: &Point) -> (NormalEquations, Vec<f64>) {
-        let cubes = self.cubes(point.params.scalar(Param::SpecularLobe));
-        let lights = self.lights(&cubes, &point.params);
+        let cubes = self.cubes(&point.params);
+        let setting = self.steps.setting(&point.params, &cubes, 0.0);
         let mut total = (empty(self.unknowns.len()), vec![0.0; self.unknowns.len()]);
-        for (index, view) in self.views.iter().enumerate() {
-            let slots = view.samples.groups() * LANES;
-            let chunks: Vec<(NormalEquations, Vec<f64>)> = (0..slots.div_ceil(CHUNK))
+        for index in 0..self.views.len() {
+            let at = self.at(index, &setting);
+            let groups = at.view.samples.groups();
+            let chunks: Vec<(NormalEquations, Vec<f64>)> = (0..groups.div_ceil(CHUNK))
                 .into_par_iter()
-                .map(|chunk| self.sums(index, chunk * CHUNK..slots.min((chunk + 1) * CHUNK), &lights, point))
+                .map(|chunk| self.sums(index, &at, chunk * CHUNK..groups.min((chunk + 1) * CHUNK), point))
                 .collect();
             for (chunk, moved) in &chunks {
                 add(&mut total.0, chunk);
@@ -154,45 +157,59 @@ impl<'a> Reference<'a> {
         total
     }
 
-    /// The sums over some of a view's pixels, the loss not yet divided by the weight; and for each unknown by how much
+    /// The sums over some of a view's groups, the loss not yet divided by the weight; and for each unknown by how much
     /// its entry on the diagonal of J^T J may move with the residuals' roundings.
     fn sums(
         &self,
         view: usize,
-        slots: std::ops::Range<usize>,
-        lights: &Lights<'_, f64>,
+        at: &ViewAt<'_>,
+        groups: std::ops::Range<usize>,
         point: &Point,
     ) -> (NormalEquations, Vec<f64>) {
-        let (k, observed, gain) = (self.unknowns.len(), &self.views[view], point.gains[view]);
-        let (mut sums, mut moved) = (empty(k), vec![0.0; k]);
-        for slot in slots {
-            let pixel = self.pixel_in(lights, observed, slot, &point.params);
-            let weight = f64::from(observed.pixel_weight(slot));
-            for (c, (value, mut row)) in pixel.into_iter().enumerate().take(observed.target.stride()) {
-                let target = f64::from(observed.target.number(c, slot));
-                row.iter_mut().for_each(|x| *x *= gain);
-                if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(view)) {
-                    row[g] = value;
-                }
-                let at = |model: f64| weighted_residual(self.loss, observed.clip, model, target, weight);
-                let (model, r) = (gain * value, at(gain * value));
-                let off = ROUNDINGS * HALF_UNIT * model.abs();
-                let by = |model: f64| (at(model).scale.powi(2) - r.scale.powi(2)).abs();
-                let reweighted = by(model + off).max(by(model - off));
-                sums.loss += r.loss;
-                sums.residual += r.residual * r.residual;
-                sums.weight += weight;
-                sums.count += u64::from(weight > 0.0);
-                for a in 0..k {
-                    moved[a] += reweighted * row[a] * row[a];
-                    sums.jtr[a] += r.scale * row[a] * r.residual;
-                    for b in 0..k {
-                        sums.jtj[a * k + b] += r.scale * row[a] * r.scale * row[b];
-                    }
+        let k = self.unknowns.len();
+        let mut sums = (empty(k), vec![0.0; k]);
+        let mut registers = Registers::default();
+        for group in groups {
+            for (lane, pixel) in self.group(at, group, &mut registers).into_iter().enumerate() {
+                self.add_pixel((view, group * LANES + lane), pixel, point.gains[view], &mut sums);
+            }
+        }
+        sums
+    }
+
+    /// Add what the pixel at a view's slot counts.
+    fn add_pixel(
+        &self,
+        (view, slot): (usize, usize),
+        pixel: PixelColumns,
+        gain: f64,
+        (sums, moved): &mut (NormalEquations, Vec<f64>),
+    ) {
+        let (k, observed) = (self.unknowns.len(), &self.views[view]);
+        let weight = f64::from(observed.pixel_weight(slot));
+        for (c, (value, mut row)) in pixel.into_iter().enumerate().take(observed.target.stride()) {
+            let target = f64::from(observed.target.number(c, slot));
+            row.iter_mut().for_each(|x| *x *= gain);
+            if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(view)) {
+                row[g] = value;
+            }
+            let at = |model: f64| weighted_residual(self.loss, observed.clip, model, target, weight);
+            let (model, r) = (gain * value, at(gain * value));
+            let off = ROUNDINGS * HALF_UNIT * model.abs();
+            let by = |model: f64| (at(model).scale.powi(2) - r.scale.powi(2)).abs();
+            let reweighted = by(model + off).max(by(model - off));
+            sums.loss += r.loss;
+            sums.residual += r.residual * r.residual;
+            sums.weight += weight;
+            sums.count += u64::from(weight > 0.0);
+            for a in 0..k {
+                moved[a] += reweighted * row[a] * row[a];
+                sums.jtr[a] += r.scale * row[a] * r.residual;
+                for b in 0..k {
+                    sums.jtj[a * k + b] += r.scale * row[a] * r.scale * row[b];
                 }
             }
         }
-        (sums, moved)
     }
 }
 
@@ -276,22 +293,4 @@ pub fn deviation(got: &NormalEquations, want: &NormalEquations, unknowns: &[Unkn
         }
     }
     worst
-}
-
-/// A stored sample in f64.
-fn fragment(view: &ObservedView, at: usize) -> Fragment<f64> {
-    let f = view.samples.surface.fragment(at);
-    let wide = |v: V3<f32>| -> V3<f64> { v.map(f64::from) };
-    Fragment {
-        base: wide(f.base),
-        bump: wide(f.bump),
-        normal: wide(f.normal),
-        view: wide(f.view),
-        occlusion: f.occlusion.into(),
-        silhouette: f.silhouette.into(),
-        dapple: f.dapple.into(),
-        albedo: wide(f.albedo),
-        specular: f.specular.into(),
-        attenuator: f.attenuator.into(),
-    }
 }

@@ -71,7 +71,14 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
         String::new(),
         "Call skinfit_shade with what the vertex stage hands over, in world space:".to_owned(),
     ]);
-    lines.extend(plan.surface().iter().map(|(name, _)| format!("- {name}: {}", meaning(name))));
+    lines.extend(plan.surface().iter().map(|(name, _)| match *name {
+        // Of the vertex stage, and so no constant of the function.
+        "vertex_rim" => {
+            let exponent = params.scalar(Param::RimExponent);
+            format!("- {name}: (1 - |N.V|) ^ {exponent:?} of the vertex, as interpolated")
+        }
+        name => format!("- {name}: {}", meaning(name)),
+    }));
     let bound = |resource: &Resource| {
         Some(format!("- {}: {}", names::function(resource.name()), what_to_bind(*resource, params)?))
     };

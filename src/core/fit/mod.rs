@@ -9,9 +9,12 @@
 //! - `drive`: the executor, watched
 //! - [`state`]: interrupted fits, resumed; [`fingerprint`]: by fits of the same alone
 //! - [`starts`]: where the other starts of a multi-start fit begin
-//! - [`statistics`]: standard errors and correlations; `null_space`: what is undetermined
+//! - [`statistics`]: standard errors and correlations; [`sandwich`]: where neighbouring residuals are alike;
+//!   `null_space`: what is undetermined; [`profile`]: how far the loss lets an unknown go
 //! - [`outcome`]: what a fit yields
 //! - [`params_file`]: what was fitted, as `params.toml`
+
+use std::sync::atomic::Ordering;
 
 use web_time::Instant;
 
@@ -27,6 +30,8 @@ mod null_space;
 pub mod options;
 pub mod outcome;
 pub mod params_file;
+pub mod profile;
+pub mod sandwich;
 pub mod starts;
 pub mod state;
 pub mod statistics;
@@ -40,8 +45,9 @@ use coordinates::Coordinates;
 use drive::Log;
 use linearisation::{Linearisation, Passes};
 use outcome::{Ending, Iteration, Outcome, StartOutcome, UnknownOutcome};
+use profile::{Answer, Profile};
 use state::{Run, Saved};
-use statistics::Statistics;
+use statistics::{ErrorBasis, Statistics};
 
 use crate::engine::{Objective, Point};
 
@@ -88,7 +94,8 @@ pub fn fit(
         }
     }
     log.write()?;
-    Ok(conclude(&coordinates, start, options, &log.saved, objective.rounding()))
+    let saved = log.saved;
+    Ok(conclude(objective, &coordinates, start, options, &saved))
 }
 
 fn check_bounds(objective: &dyn Objective, start: &Point) -> Result<(), FitError> {
@@ -146,24 +153,34 @@ fn begin_run(passes: &Passes<'_>, origin: &Linearisation, seed: u64, index: u32)
 
 /// The best run, and what is known of it.
 fn conclude(
+    objective: &dyn Objective,
     coordinates: &Coordinates,
     start: &Point,
     options: &FitOptions,
     saved: &Saved,
-    rounding: f64,
 ) -> Outcome {
+    let clock = Instant::now();
     let best = saved.runs.iter().min_by(|a, b| a.loss.total_cmp(&b.loss));
     let untouched = Run::beginning(saved.origin.clone());
     let best = best.unwrap_or(&untouched);
     let model = best.model().unwrap_or(&saved.origin);
     let at_bound: Vec<bool> = (0..model.len()).map(|i| is_at_bound(coordinates, i, best.at[i])).collect();
-    let known = Statistics::new(coordinates, model, &at_bound, rounding);
     let end = coordinates.point(&best.at);
+    let stop = || options.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::SeqCst));
+    let wanted = !options.widths.is_empty() && !model.is_empty() && !stop();
+    let pulls = if wanted { objective.pulls(&coordinates.point(&model.at), &options.widths) } else { None };
+    let known = Statistics::new(coordinates, model, &at_bound, objective.rounding(), pulls.as_ref());
+    let profile = if options.profile && ending(saved, best) == Ending::Converged {
+        profile_of(objective, coordinates, model, &known, &stop)
+    } else {
+        None
+    };
     let unknowns = coordinates.unknowns().iter().enumerate().map(|(i, unknown)| UnknownOutcome {
         unknown: *unknown,
         start: unknown.get(start),
         value: unknown.get(&end),
         std_error: known.std_errors[i],
+        noise_error: known.noise_errors[i],
         identifiable: known.identifiable[i],
         at_bound: at_bound[i],
         sensitivity: sensitivity(coordinates, &saved.origin, i),
@@ -175,15 +192,35 @@ fn conclude(
         loss_end: best.loss,
         unknowns: unknowns.collect(),
         correlations: known.correlations,
+        errors: known.basis,
+        profile,
         undetermined: known.undetermined,
         history: best.history.clone(),
         iterations: best.iterations,
         evaluations: saved.evaluations,
-        seconds: saved.seconds,
+        seconds: saved.seconds + clock.elapsed().as_secs_f64(),
         starts: saved.runs.iter().map(start_outcome).collect(),
         ending: ending(saved, best),
         end,
     }
+}
+
+/// The profile of the weakest unknown, where residuals are more than roundings.
+fn profile_of(
+    objective: &dyn Objective,
+    coordinates: &Coordinates,
+    model: &Linearisation,
+    known: &Statistics,
+    stop: &dyn Fn() -> bool,
+) -> Option<Profile> {
+    if known.basis == ErrorBasis::Rounding || stop() {
+        return None;
+    }
+    let error = |i: usize| known.std_errors[i].map(|error| error / coordinates.slope(i, model.at[i]));
+    let errors: Vec<Option<f64>> = (0..model.len()).map(error).collect();
+    let answer = Answer { model, errors: &errors, unit: &known.unit };
+    let weakest = profile::weakest(coordinates, &answer)?;
+    profile::profile(&Passes::new(objective, coordinates, 0), &answer, weakest, stop)
 }
 
 fn is_at_bound(coordinates: &Coordinates, i: usize, at: f64) -> bool {

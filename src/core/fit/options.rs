@@ -115,6 +115,11 @@ pub struct FitOptions {
     pub resume: Option<PathBuf>,
     /// Set from outside (by Ctrl-C) to end the fit after the present iteration.
     pub interrupt: Option<Arc<AtomicBool>>,
+    /// Pixels in a row of each view's image: with them standard errors know which residuals are neighbours. Empty: they
+    /// assume independent residuals.
+    pub widths: Vec<usize>,
+    /// Whether the weakest unknown is held beside the answer, to see how far the loss lets it go.
+    pub profile: bool,
 }
 
 impl Default for FitOptions {
@@ -129,6 +134,8 @@ impl Default for FitOptions {
             state: None,
             resume: None,
             interrupt: None,
+            widths: Vec::new(),
+            profile: false,
         }
     }
 }

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::profile::Profile;
+use super::statistics::ErrorBasis;
 use crate::engine::{Point, Unknown};
 
 /// A finished (or interrupted) fit.
@@ -21,6 +23,10 @@ pub struct Outcome {
     pub unknowns: Vec<UnknownOutcome>,
     /// Correlation matrix of the unknowns, row-major, K x K; 0 beside unknowns without a variance.
     pub correlations: Vec<f64>,
+    /// What the standard errors rest on.
+    pub errors: ErrorBasis,
+    /// How far the loss lets the weakest unknown go, where there is a weak one and the profile was asked for.
+    pub profile: Option<Profile>,
     /// Directions in which the loss does not change: the images cannot determine these.
     pub undetermined: Vec<Direction>,
     /// The loss after each iteration.
@@ -43,6 +49,15 @@ impl Outcome {
     #[must_use]
     pub fn constant(&self, name: &str) -> Option<&UnknownOutcome> {
         self.unknowns.iter().find(|outcome| outcome.unknown.name() == name)
+    }
+}
+
+impl Outcome {
+    /// By how many times the most the standard errors exceed those of independent residuals; `None` without any.
+    #[must_use]
+    pub fn most_over_noise(&self) -> Option<f64> {
+        let ratio = |u: &UnknownOutcome| Some(u.std_error? / u.noise_error.filter(|e| *e > 0.0)?);
+        self.unknowns.iter().filter_map(ratio).reduce(f64::max)
     }
 }
 
@@ -93,8 +108,10 @@ pub struct UnknownOutcome {
     pub start: f64,
     /// Its value at the end.
     pub value: f64,
-    /// One standard error, from the normal equations; `None` at a bound or when unidentifiable.
+    /// One standard error; `None` at a bound or when unidentifiable.
     pub std_error: Option<f64>,
+    /// What it were if residuals were independent.
+    pub noise_error: Option<f64>,
     /// Whether the images determine it.
     pub identifiable: bool,
     /// Whether it ended on a bound.

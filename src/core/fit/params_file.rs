@@ -205,7 +205,10 @@ fn comment(known: &[UnknownOutcome], channel: impl Fn(&Unknown) -> Option<usize>
     let words = picked.iter().map(|(_, u)| match u.std_error {
         _ if u.at_bound => "at its bound".to_owned(),
         _ if !u.identifiable => "not determined by the images".to_owned(),
-        Some(error) => format!("+- {error:.2e}"),
+        Some(error) => match u.noise_error.filter(|noise| error > 1.05 * noise) {
+            Some(noise) => format!("+- {error:.2e} (noise_error {noise:.2e})"),
+            None => format!("+- {error:.2e}"),
+        },
         None => "of unknown error".to_owned(),
     });
     words.collect::<Vec<_>>().join(", ")

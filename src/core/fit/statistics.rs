@@ -16,10 +16,14 @@
 //!   at most `sqrt(E (J'WJ)^-1_ii)` (Cauchy and Schwarz). With a noise of a thousandth or more it
 //!   is far below `s^2`; of a fit to noise-free images it is what the error consists of.
 //!
-//! It holds for residuals that are independent, of variance in inverse proportion to w, and about
-//! linear in the unknowns over a standard error. Where a model misses what an image shows, neighbouring
-//! residuals are alike, and the true errors are greater. A robust loss enters by its reweighted
-//! quadratic.
+//! That is the *noise error*: it holds for residuals that are independent, of variance in inverse proportion to w. Where a
+//! model misses what an image shows, neighbouring residuals are alike, and the true errors are greater: then the
+//! [`sandwich`](super::sandwich) of squares of pixels has them. The *standard error* is the greater of the two: with few
+//! squares a sandwich is as often too small as too large, and of independent residuals both are the same but for that.
+//! Where roundings are all that is left there is none, as they are no draws.
+//!
+//! Both take the image as linear in the unknowns over a standard error; [`profile`](super::profile) does not. A robust
+//! loss enters by its reweighted quadratic. Correlations are those of independent residuals.
 
 use nalgebra::{DMatrix, SymmetricEigen};
 
@@ -28,6 +32,8 @@ use super::coordinates::Coordinates;
 use super::linearisation::Linearisation;
 use super::null_space::{NullSpace, unit_diagonal};
 use super::outcome::Direction;
+use super::sandwich::{Blocks, sandwich};
+use crate::engine::pulls::Pulls;
 
 /// What is known of an answer, in the order of the unknowns.
 #[derive(Clone, Debug)]
@@ -35,57 +41,100 @@ pub struct Statistics {
     /// One standard error, in the unknown's own unit; `None` when unidentifiable, at a bound, or
     /// without residuals to spare.
     pub std_errors: Vec<Option<f64>>,
+    /// The same if residuals were independent.
+    pub noise_errors: Vec<Option<f64>>,
+    /// What is known of neighbouring residuals.
+    pub basis: ErrorBasis,
     /// Whether the images determine the unknown.
     pub identifiable: Vec<bool>,
     /// K x K, row-major; 0 beside unknowns without a standard error.
     pub correlations: Vec<f64>,
     /// What they do not.
     pub undetermined: Vec<Direction>,
+    /// The diagonal of (J'WJ)^+ in coordinates: variances of unknowns where residuals have the variance 1.
+    pub(super) unit: Vec<f64>,
+}
+
+/// What standard errors rest on.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+#[serde(rename_all = "kebab-case", tag = "basis")]
+pub enum ErrorBasis {
+    /// Residuals are taken to be independent: nobody knows which of them are neighbours.
+    Independent,
+    /// Roundings are all that is left of the residuals.
+    Rounding,
+    /// Squares of pixels are.
+    Blocks(Blocks),
 }
 
 impl Statistics {
     /// What `model` says of an answer of which the unknowns of `at_bound` are held by their bounds;
-    /// `rounding` is what roundings may leave of its residual.
+    /// `rounding` is what roundings may leave of its residual, and `pulls` what is known of where residuals stand.
     #[must_use]
-    pub fn new(coordinates: &Coordinates, model: &Linearisation, at_bound: &[bool], rounding: f64) -> Self {
+    pub fn new(
+        coordinates: &Coordinates,
+        model: &Linearisation,
+        at_bound: &[bool],
+        rounding: f64,
+        pulls: Option<&Pulls>,
+    ) -> Self {
         let k = model.len();
         let null = NullSpace::of(coordinates, model);
         let identifiable = null.identifiable(k);
         let known: Vec<usize> = (0..k).filter(|&i| identifiable[i] && !at_bound[i]).collect();
-        let covariance = covariance(model, at_bound, rounding);
-        let deviation = |i: usize| covariance.as_ref().map(|c| c[(i, i)].max(0.0).sqrt());
-        let mut std_errors = vec![None; k];
+        let slope: Vec<f64> = (0..k).map(|i| coordinates.slope(i, model.at[i])).collect();
+        let Inverse { matrix, rank } = inverse(model, at_bound);
+        let left = model.count.checked_sub(rank as u64).filter(|&left| left > 0);
+        let variance = left.map(|left| (model.residual / left as f64).max(rounding));
+        let is_rounding = left.is_some_and(|left| model.residual / left as f64 <= rounding);
+        let clustered =
+            pulls.filter(|_| left.is_some() && !is_rounding).and_then(|p| sandwich(&matrix, p, &slope));
+        let (mut std_errors, mut noise_errors) = (vec![None; k], vec![None; k]);
         let mut correlations = vec![0.0; k * k];
+        let root = |x: f64| x.max(0.0).sqrt();
         for &i in &known {
-            std_errors[i] = deviation(i).map(|s| s * coordinates.slope(i, model.at[i]));
+            let Some(variance) = variance else { continue };
+            let noise = root(variance * matrix[(i, i)]) * slope[i];
+            let apart = clustered.as_ref().map_or(0.0, |(c, _)| root(c[(i, i)]) * slope[i]);
+            (noise_errors[i], std_errors[i]) = (Some(noise), Some(noise.max(apart)));
             for &j in &known {
-                if let (Some(c), Some(si), Some(sj)) = (&covariance, deviation(i), deviation(j)) {
-                    let rho = if si * sj > 0.0 { c[(i, j)] / (si * sj) } else { 0.0 };
-                    correlations[i * k + j] = if i == j { 1.0 } else { rho.clamp(-1.0, 1.0) };
-                }
+                let size = root(matrix[(i, i)]) * root(matrix[(j, j)]);
+                let rho = if size > 0.0 { matrix[(i, j)] / size } else { 0.0 };
+                correlations[i * k + j] = if i == j { 1.0 } else { rho.clamp(-1.0, 1.0) };
             }
         }
-        Self { std_errors, identifiable, correlations, undetermined: null.directions(coordinates, model) }
+        let basis = match clustered {
+            Some((_, blocks)) => ErrorBasis::Blocks(blocks),
+            None if is_rounding => ErrorBasis::Rounding,
+            None => ErrorBasis::Independent,
+        };
+        let undetermined = null.directions(coordinates, model);
+        let unit = (0..k).map(|i| matrix[(i, i)].max(0.0)).collect();
+        Self { std_errors, noise_errors, basis, identifiable, correlations, undetermined, unit }
     }
 }
 
-/// `s^2 (J'WJ)^+` over the unknowns that no bound holds, zero elsewhere; `None` when no residuals are
-/// left over.
-fn covariance(model: &Linearisation, at_bound: &[bool], rounding: f64) -> Option<DMatrix<f64>> {
+/// A pseudo-inverse, and the rank of what it is of.
+struct Inverse {
+    matrix: DMatrix<f64>,
+    rank: usize,
+}
+
+/// `(J'WJ)^+` over the unknowns that no bound holds, zero elsewhere.
+fn inverse(model: &Linearisation, at_bound: &[bool]) -> Inverse {
+    let k = model.len();
     if model.is_empty() {
-        return None;
+        return Inverse { matrix: DMatrix::zeros(k, k), rank: 0 };
     }
     let (scaled, inverse) = unit_diagonal(model, |i| !at_bound[i]);
     let eigen = SymmetricEigen::new(scaled);
     let threshold = NULL_EIGENVALUE * eigen.eigenvalues.max();
     let inverted = eigen.eigenvalues.map(|value| if value > threshold { 1.0 / value } else { 0.0 });
     let rank = inverted.iter().filter(|&&value| value > 0.0).count();
-    let left = model.count.checked_sub(rank as u64).filter(|&left| left > 0)?;
-    let variance = (model.residual / left as f64).max(rounding);
     let pseudo_inverse =
         &eigen.eigenvectors * DMatrix::from_diagonal(&inverted) * eigen.eigenvectors.transpose();
-    let k = model.len();
-    Some(DMatrix::from_fn(k, k, |i, j| variance * pseudo_inverse[(i, j)] * inverse[i] * inverse[j]))
+    let matrix = DMatrix::from_fn(k, k, |i, j| pseudo_inverse[(i, j)] * inverse[i] * inverse[j]);
+    Inverse { matrix, rank }
 }
 
 #[cfg(test)]
@@ -134,7 +183,7 @@ mod tests {
             gradient: vec![0.0; k],
             hessian,
         };
-        Statistics::new(&coordinates, &model, &vec![false; k], rounding)
+        Statistics::new(&coordinates, &model, &vec![false; k], rounding, None)
     }
 
     const THREE: [Param; 3] = [Param::BaseWeight, Param::Hilite, Param::Reflection];

@@ -119,46 +119,16 @@ impl<R: Real> Composition<R> {
     /// The result in channel `c`, 0 to 2.
     #[inline(always)]
     pub fn result(&self, c: usize) -> R {
-        if R::DECLARED {
-            return self.declared(c);
-        }
         let (t, w) = (&self.terms, &self.weights);
         let side = w.side_specular[c] * t.side[c];
         let rest = w.reflection[c].mul_add(t.mirror[c], side);
         self.occ.mul_add(self.occluded(c), w.key[c].mul_add(t.key[c], rest))
     }
 
-    /// The sum in the listing's order, each of its variables of the type that it declares. (The attenuator is
-    /// in the hilite's term already, which is thus rounded once where the listing rounds twice.)
-    #[inline(always)]
-    fn declared(&self, c: usize) -> R {
-        let (t, w) = (&self.terms, &self.weights);
-        let diffuse = (t.diffuse[c] * self.occ).fixed();
-        let lit = diffuse.mul_add(self.facing(c), w.side_specular[c] * t.side[c]).fixed();
-        let mirrored = (t.mirror[c] * w.reflection[c].fixed()).fixed();
-        let hilite = (w.hilite[c] * self.occ_rim * t.hilite[c]).fixed();
-        ((lit + mirrored).fixed() + hilite).fixed() + (w.key[c] * t.key[c]).fixed()
-    }
-
-    /// What each term adds to channel `c`.
-    #[inline(always)]
-    pub fn each_term(&self, c: usize) -> [(TermName, R); 6] {
-        let (t, w) = (&self.terms, &self.weights);
-        let light = t.diffuse[c] * self.occ;
-        [
-            (TermName::Diffuse, light * w.base[c]),
-            (TermName::Rim, w.rim[c] * t.diffuse[c] * self.occ_rim),
-            (TermName::SideSpecular, w.side_specular[c] * t.side[c]),
-            (TermName::Hilite, w.hilite[c] * t.hilite[c] * self.occ_rim),
-            (TermName::Reflection, w.reflection[c] * t.mirror[c]),
-            (TermName::KeyLight, w.key[c] * t.key[c]),
-        ]
-    }
-
     /// The haze written to alpha.
     #[inline(always)]
     pub fn alpha(&self) -> R {
-        (self.weights.haze * self.terms.haze).fixed()
+        self.weights.haze * self.terms.haze
     }
 
     /// d result / d param in channel `c`, for a parameter that needs no lookup.
@@ -294,33 +264,5 @@ impl TermName {
 impl fmt::Debug for TermName {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.name())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::model::effects::Form;
-
-    #[test]
-    fn the_terms_add_up_to_the_result() {
-        let terms = Terms {
-            diffuse: [0.31, 0.52, 0.73],
-            side: [0.11, 0.23, 0.37],
-            hilite: [1.9, 0.7, 0.4],
-            mirror: [2.3, 1.1, 0.6],
-            haze: 0.3,
-            key: [0.4, -0.2, 0.1],
-            silhouette: 0.6,
-        };
-        let effects = Effects::SURFACE.with(Effect::KeyLight);
-        let mut params = Params::defaults(Form::Corrected);
-        params.set(Param::Occlusion, 0.7);
-        let composition = Composition::new(terms, 0.4, Weights::new(&params, effects, 0.0));
-        for c in 0..3 {
-            let sum: f64 = composition.each_term(c).iter().map(|(_, value)| value).sum();
-            // A few roundings of f64.
-            assert!((sum - composition.result(c)).abs() < 1e-15, "{c}: {sum} {}", composition.result(c));
-        }
     }
 }

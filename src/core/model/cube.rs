@@ -78,6 +78,18 @@ impl<R: Real> CubePoint<R> {
         Self { inverse_major: R::select(ok, point.inverse_major, zero), ..point }
     }
 
+    /// Of a unit vector, or of the zero vector, which meets the middle of a face.
+    #[inline(always)]
+    pub fn of_unit(d: V3<R>) -> Self {
+        Self::of_finite(d)
+    }
+
+    /// The face, and the place on it in [0, 1]^2.
+    #[inline(always)]
+    pub fn place(&self) -> [R; 3] {
+        [self.face, self.s, self.t]
+    }
+
     /// Ties of the major axis go to x before y before z; seamlessness makes the choice immaterial.
     #[inline(always)]
     fn of_finite([x, y, z]: V3<R>) -> Self {
@@ -89,7 +101,8 @@ impl<R: Real> CubePoint<R> {
         let point = Self { face: zero, s: zero, t: zero, inverse_major: one, x_major, y_major, positive };
         let (s, t) = point.across(x, y, z);
         let face = Self::pick(x_major, y_major, zero, x.lit(2.0), x.lit(4.0));
-        let inverse_major = Self::pick(x_major, y_major, ax, ay, az).recip();
+        // A direction of 0 meets the middle.
+        let inverse_major = Self::pick(x_major, y_major, ax, ay, az).max(one.lit(1e-36)).recip();
         Self {
             face: face + R::select(positive, zero, one),
             s: (s * inverse_major).mul_add(half, half),

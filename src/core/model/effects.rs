@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use super::evaluate::Setup;
 use super::registry::{Added, RegistryError};
 
 /// Which of the two readings of the paper's listings is evaluated.
@@ -63,6 +64,30 @@ impl Silhouette {
     }
 }
 
+/// Along which normal the cubes are looked up, and what is mirrored.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Lookups {
+    /// The normal-mapped n (the paper's listings).
+    #[default]
+    Bumped,
+    /// The smooth N, of unit length: bumps show under the key light alone (the paper's second version).
+    Smooth,
+}
+
+impl Lookups {
+    /// Both choices, in the order of documentation.
+    pub const ALL: [Self; 2] = [Self::Bumped, Self::Smooth];
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Bumped => "bumped",
+            Self::Smooth => "smooth",
+        }
+    }
+}
+
 /// One switchable part of the model: the place of its row among the built-in ones, which stand first, and those that
 /// [`register`](Effect::register) has added.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -105,8 +130,8 @@ pub struct EffectInfo {
     /// What it shows, in one line.
     pub meaning: &'static str,
     /// What it asks of the stages before the model beside what the built-in effects do, when it is one of a set;
-    /// `None` of a built-in one, whose needs [`Effects::needs`] knows.
-    pub needs: Option<fn(Effect, Effects, Silhouette) -> Needs>,
+    /// `None` of a built-in one, whose needs [`Setup::needs`] knows.
+    pub needs: Option<fn(Effect, &Setup) -> Needs>,
 }
 
 const TABLE: [EffectInfo; Effect::BUILT_IN.len()] = [
@@ -305,36 +330,56 @@ impl Effects {
         self.iter().filter(|effect| !effect.is_built_in())
     }
 
-    /// What the enabled effects ask for, with the silhouette evaluated as `silhouette` says.
+    /// What the enabled effects ask for, with the silhouette evaluated as `silhouette` says, in the paper's first
+    /// version.
     #[must_use]
     pub fn needs(self, silhouette: Silhouette) -> Needs {
+        Setup::new(Form::Corrected, silhouette, self).needs()
+    }
+
+    /// Whether a cube is looked up along n, or what is mirrored at it.
+    #[must_use]
+    pub fn looks_up_n(self) -> bool {
+        self.has_any(&[Effect::Diffuse, Effect::SideSpecular]) || self.mirrors()
+    }
+
+    fn mirrors(self) -> bool {
+        self.has_any(&[Effect::Reflection, Effect::Haze, Effect::Bloom])
+    }
+}
+
+impl Setup {
+    /// What the enabled effects ask for.
+    #[must_use]
+    pub fn needs(&self) -> Needs {
         use Effect as E;
-        let reflection = self.has_any(&[E::Reflection, E::Haze, E::Bloom]);
+        let effects = self.effects;
+        let reflection = effects.mirrors();
         // The silhouette S.z is only asked for by what it multiplies.
-        let rim = self.has(E::Hilite) || (self.has(E::Diffuse) && self.has(E::Rim));
-        let shaded_by_n = self.has_any(&[E::Diffuse, E::SideSpecular, E::KeyLight])
-            || reflection
-            || (rim && silhouette == Silhouette::Bumped);
-        let normal_map = self.has(E::NormalMap) && shaded_by_n;
-        let albedo = self.has_any(&[E::Diffuse, E::KeyLight]);
-        let attenuator = self.has_any(&[E::Hilite, E::Haze, E::Bloom]);
+        let rim = effects.has(E::Hilite) || (effects.has(E::Diffuse) && effects.has(E::Rim));
+        let looked_up = effects.looks_up_n();
+        let shaded_by_n = effects.has(E::KeyLight)
+            || (looked_up && !self.smooth_lookups())
+            || (rim && self.silhouette == Silhouette::Bumped);
+        let normal_map = self.bumps() && shaded_by_n;
+        let attenuator = effects.has_any(&[E::Hilite, E::Haze, E::Bloom]);
         let built_in = Needs {
-            color_map: albedo,
+            color_map: effects.has_any(&[E::Diffuse, E::KeyLight]),
             normal_map,
-            specular_map: self.has(E::SideSpecular),
+            specular_map: effects.has(E::SideSpecular),
             attenuator_map: attenuator,
             tangents: normal_map,
-            irradiance: self.has(E::Diffuse),
-            lobes: self.has(E::SideSpecular) || reflection,
-            hilite: self.has(E::Hilite),
-            occlusion: self.has(E::Occlusion) && self.has_any(&[E::Diffuse, E::Hilite]),
+            irradiance: effects.has(E::Diffuse),
+            lobes: effects.has(E::SideSpecular) || reflection,
+            hilite: effects.has(E::Hilite),
+            occlusion: effects.has(E::Occlusion) && effects.has_any(&[E::Diffuse, E::Hilite]),
             rim,
             dapple: reflection,
-            haze: self.has_any(&[E::Haze, E::Bloom]),
-            smooth_normal: self.has(E::KeyLight),
-            key_light: self.has(E::KeyLight),
+            haze: effects.has_any(&[E::Haze, E::Bloom]),
+            smooth_normal: effects.has(E::KeyLight) || (looked_up && self.smooth_lookups()),
+            key_light: effects.has(E::KeyLight),
         };
-        let added = self.added().filter_map(|effect| Some(effect.info().needs?(effect, self, silhouette)));
+        let added = effects.added().filter_map(|effect| Some(effect.info().needs?(effect, self)));
         added.fold(built_in, Needs::or)
     }
 }

@@ -1,15 +1,9 @@
-//! The whole model for one fragment: value and derivatives. The engine streams through samples with
-//! the same pieces; this is the plain composition of them, for single fragments and for tests.
+//! What is evaluated.
 
-use super::compose::{Composition, Weights};
-use super::effects::{Effect, Effects, Form, Silhouette};
-use super::fragment::{Fragment, shading};
-use super::lights::Lights;
-use super::params::{Param, Params};
-use super::real::Real;
-use super::terms::{LookupParam, Wanted, terms, terms_tangent};
+use super::dapple::Dapple;
+use super::effects::{Effect, Effects, Form, Lookups, Silhouette};
 
-/// What is evaluated: the switches that are the same for every fragment of a scene.
+/// The switches that are the same for every fragment of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Setup {
     /// Which reading of the listings.
@@ -18,80 +12,61 @@ pub struct Setup {
     pub silhouette: Silhouette,
     /// What is switched on.
     pub effects: Effects,
+    /// Along which normal the cubes are looked up.
+    pub lookups: Lookups,
+    /// Where light falls through leaves from.
+    pub dapple: Dapple,
+    /// Whether it is the rim, S.y, that is interpolated from vertices (listing 3-3), and not S.z, whose power is then
+    /// taken where the fragment is. Of a lone fragment there is nothing to interpolate. Read where the silhouette is
+    /// [`Silhouette::Vertex`].
+    pub interpolated_rim: bool,
 }
-
-/// An effect that an evaluator does not know which was written for the built-in ones alone.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error(
-    "the effect {} comes from a file of its own, which the hand-written evaluator on the CPU does not know. Use the \
-     graphics adapter, or leave the effect out", .0.name()
-)]
-pub struct AddedEffect(pub Effect);
 
 impl Setup {
-    /// Refuse what evaluators that are written for the built-in effects alone do not know.
-    ///
-    /// # Errors
-    /// When an effect is enabled that was added.
-    pub fn built_in(&self) -> Result<(), AddedEffect> {
-        self.effects.added().next().map_or(Ok(()), |effect| Err(AddedEffect(effect)))
-    }
-}
-
-impl LookupParam {
-    /// The parameter of the table, if its derivative needs lookups.
+    /// The three switches that every scene has; the others are as the first version has them.
     #[must_use]
-    pub const fn from_param(param: Param) -> Option<Self> {
-        match param {
-            Param::NormalStrength => Some(Self::NormalStrength),
-            Param::SpecularLobe => Some(Self::SpecularLobe),
-            Param::EnvironmentRotation => Some(Self::EnvironmentRotation),
-            Param::KeyAzimuth => Some(Self::KeyAzimuth),
-            Param::KeyElevation => Some(Self::KeyElevation),
-            _ => None,
+    pub const fn new(form: Form, silhouette: Silhouette, effects: Effects) -> Self {
+        Self {
+            form,
+            silhouette,
+            effects,
+            lookups: Lookups::Bumped,
+            dapple: Dapple::LEAVES_AHEAD,
+            interpolated_rim: false,
         }
     }
-}
 
-/// The colour and alpha of a fragment.
-#[inline(always)]
-pub fn shade<R: Real>(setup: Setup, lights: &Lights<'_, R>, f: &Fragment<R>, params: &Params) -> [R; 4] {
-    let composition = compose(setup, lights, f, params);
-    [composition.result(0), composition.result(1), composition.result(2), composition.alpha()]
-}
-
-/// The composition behind [`shade`]: its terms and cheap derivatives.
-#[inline(always)]
-pub fn compose<R: Real>(
-    setup: Setup,
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    params: &Params,
-) -> Composition<R> {
-    let like = f.occlusion;
-    let s = shading(setup.form, setup.silhouette, f, like.lit(params.scalar(Param::NormalStrength)));
-    let terms = terms(lights, f, &s, Wanted::ALL);
-    Composition::new(terms, f.occlusion, Weights::new(params, setup.effects, like))
-}
-
-/// How colour and alpha move with `param` (all of its channels together).
-#[inline(always)]
-pub fn derivative<R: Real>(
-    setup: Setup,
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    params: &Params,
-    param: Param,
-) -> [R; 4] {
-    let composition = compose(setup, lights, f, params);
-    if let Some(lookup) = LookupParam::from_param(param) {
-        let strength = f.occlusion.lit(params.scalar(Param::NormalStrength));
-        let s = shading(setup.form, setup.silhouette, f, strength);
-        let slope = terms_tangent(lights, f, &s, lookup);
-        let along = |c| composition.along(&slope, c);
-        return [along(0), along(1), along(2), composition.alpha_along(&slope)];
+    /// Whether anything sees the bumped normal. With smooth lookups the key light and a bumped silhouette do, and rules
+    /// that were added may.
+    #[must_use]
+    pub fn bumps(&self) -> bool {
+        let seen = self.effects.has(Effect::KeyLight)
+            || self.silhouette == Silhouette::Bumped
+            || self.effects.added().next().is_some();
+        self.effects.has(Effect::NormalMap) && (self.lookups == Lookups::Bumped || seen)
     }
-    let by = |c| composition.derivative(param, c);
-    let alpha = if param == Param::HazeWeight { composition.terms.haze } else { f.occlusion.lit(0.0) };
-    [by(0), by(1), by(2), alpha]
+
+    /// Whether the cubes are looked up along another normal than n. Where nothing bends n it is the smooth normal, but
+    /// in the listing, whose n is as long as it was interpolated.
+    #[must_use]
+    pub fn smooth_lookups(&self) -> bool {
+        self.lookups == Lookups::Smooth && (self.bumps() || self.form == Form::Listing)
+    }
+
+    /// Whether the rim is made at a triangle's corners.
+    #[must_use]
+    pub fn rim_of_corners(&self) -> bool {
+        self.interpolated_rim && self.silhouette == Silhouette::Vertex
+    }
+
+    /// Whether the engine's kernel, which is written by hand, says what the rules say.
+    #[must_use]
+    pub fn hand_written(&self) -> bool {
+        let needs = self.needs();
+        let two_normals = self.smooth_lookups() && self.effects.looks_up_n();
+        let turning_dapple = self.dapple.turns() && needs.dapple;
+        let rim_of_corners = self.rim_of_corners() && needs.rim;
+        let added = self.effects.added().next().is_some();
+        !(added || two_normals || turning_dapple || rim_of_corners)
+    }
 }

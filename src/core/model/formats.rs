@@ -7,7 +7,7 @@
 //!   that is light, `float` (not rounded) between the assignments
 //! - [`HardwareFilter`], [`NearestTexel`]: exact numbers, but lookups filtered more coarsely
 //!
-//! Each is the one model with another scalar, [`Emulated`]. Textures are addressed in f64, as texture units
+//! Each is the rules' arithmetic with another scalar, [`Emulated`]. Textures are addressed in f64, as texture units
 //! have numbers of their own; what a lookup yields is rounded.
 
 use std::marker::PhantomData;
@@ -41,8 +41,6 @@ pub fn to_fixed(x: f64) -> f64 {
 pub trait Format: Copy {
     /// Its name in tables.
     const NAME: &'static str;
-    /// Whether the sum is taken in the listing's order, with its declared types.
-    const DECLARED: bool = false;
     /// The result of any operation.
     #[inline(always)]
     fn round(x: f64) -> f64 {
@@ -105,7 +103,6 @@ format!(
     /// The types that listing 3-4 declares.
     Declared {
         const NAME: &'static str = "as listed";
-        const DECLARED: bool = true;
         fn half(x: f64) -> f64 {
             to_half(x).clamp(-HALF_MAX, HALF_MAX)
         }
@@ -275,7 +272,6 @@ impl<F: Format> Real for Emulated<F> {
     type Mask = bool;
     type Texel = f64;
     type Wide = Addressed<F>;
-    const DECLARED: bool = F::DECLARED;
 
     #[inline(always)]
     fn widen(self) -> Addressed<F> {

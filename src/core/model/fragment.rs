@@ -102,25 +102,20 @@ pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R
     let v = f.view;
     let m = scale_add(strength, f.bump, f.base);
     let (n, n_tangent) = match form {
-        Form::Listing => (m.map(R::half), f.bump),
+        Form::Listing => (m, f.bump),
         Form::Corrected => {
             let (n, inverse_length) = unit_normal(m, f.normal, v);
             // d (m / |m|) = (dm - n (n . dm)) / |m|
             let turning = scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump));
             let (least, most) = (strength.lit(-STEEPEST), strength.lit(STEEPEST));
-            (n.map(R::half), turning.map(|x| x.max(least).min(most)))
+            (n, turning.map(|x| x.max(least).min(most)))
         }
     };
-    let (q, dq) = (dot(n, v).fixed(), dot(n_tangent, v));
+    let (q, dq) = (dot(n, v), dot(n_tangent, v));
     let (reflection, reflection_tangent) = match form {
         // Oddity 3: the two dot products look swapped.
-        Form::Listing => {
-            let twice = scale(two.fixed(), n).map(R::half);
-            (sub(scale(q, v), twice).map(R::fixed), sub(scale(dq, v), scale(two, n_tangent)))
-        }
-        Form::Corrected => {
-            (scale_add(-two * q, n, v).map(R::fixed), scale(-two, scale_add(dq, n, scale(q, n_tangent))))
-        }
+        Form::Listing => (sub(scale(q, v), scale(two, n)), sub(scale(dq, v), scale(two, n_tangent))),
+        Form::Corrected => (scale_add(-two * q, n, v), scale(-two, scale_add(dq, n, scale(q, n_tangent)))),
     };
     let (silhouette, silhouette_tangent) = match at {
         Silhouette::Bumped => (silhouette(q), silhouette_slope(q) * dq),
@@ -141,40 +136,4 @@ fn unit_normal<R: Real>(m: V3<R>, smooth: V3<R>, view: V3<R>) -> (V3<R>, R) {
     }
     let (normal, _) = normalize_or(smooth, [-view[0], -view[1], -view[2]]);
     normalize_or(m, normal)
-}
-
-impl Fragment<f64> {
-    /// The fragment in the number format that `like` is a number of.
-    #[must_use]
-    pub fn in_format<R: Real>(&self, like: R) -> Fragment<R> {
-        let lit = |v: V3<f64>| v.map(|x| like.lit(x));
-        let fragment = Fragment {
-            base: lit(self.base),
-            bump: lit(self.bump),
-            normal: lit(self.normal),
-            view: lit(self.view),
-            occlusion: like.lit(self.occlusion),
-            silhouette: like.lit(self.silhouette),
-            dapple: like.lit(self.dapple),
-            albedo: lit(self.albedo),
-            specular: like.lit(self.specular),
-            attenuator: like.lit(self.attenuator),
-        };
-        fragment.declared()
-    }
-}
-
-impl<R: Real> Fragment<R> {
-    /// The fragment with the types that the listing declares for what it reads: `half` textures, a `fixed`
-    /// attenuator.
-    #[must_use]
-    #[inline(always)]
-    pub fn declared(self) -> Self {
-        Self {
-            albedo: self.albedo.map(R::half),
-            specular: self.specular.half(),
-            attenuator: self.attenuator.fixed(),
-            ..self
-        }
-    }
 }

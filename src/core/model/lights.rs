@@ -73,7 +73,7 @@ impl<'a, R: Real> Lights<'a, R> {
     /// The environment is turned when its rotation is not 0, or `turning` is free.
     #[inline(always)]
     pub fn new(setup: Setup, params: &Params, cubes: Cubes<'a, R::Texel>, turning: bool, like: R) -> Self {
-        let needs = setup.effects.needs(setup.silhouette);
+        let needs = setup.needs();
         let degrees = params.scalar(Param::EnvironmentRotation);
         let (sin, cos) = degrees.to_radians().sin_cos();
         Lights {

@@ -16,8 +16,6 @@ pub trait Real:
     type Texel: Copy;
     /// What textures are addressed with: a reduced format has too few numbers for that.
     type Wide: Real<Texel = Self::Texel>;
-    /// Whether variables have the types that listing 3-4 declares; then the sum is taken in its order.
-    const DECLARED: bool = false;
 
     /// This number as an address.
     fn widen(self) -> Self::Wide;

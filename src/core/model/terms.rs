@@ -4,6 +4,7 @@
 use super::cube::{Cube, CubePoint, Footprint};
 use super::fragment::{Fragment, Shading};
 use super::lights::Lights;
+use super::params::Param;
 use super::real::Real;
 use super::vector::{V3, dot, mul, scale};
 
@@ -49,6 +50,21 @@ pub enum LookupParam {
     KeyAzimuth,
     /// `key_elevation`
     KeyElevation,
+}
+
+impl LookupParam {
+    /// The parameter of the table, if its derivative needs lookups.
+    #[must_use]
+    pub const fn from_param(param: Param) -> Option<Self> {
+        match param {
+            Param::NormalStrength => Some(Self::NormalStrength),
+            Param::SpecularLobe => Some(Self::SpecularLobe),
+            Param::EnvironmentRotation => Some(Self::EnvironmentRotation),
+            Param::KeyAzimuth => Some(Self::KeyAzimuth),
+            Param::KeyElevation => Some(Self::KeyElevation),
+            _ => None,
+        }
+    }
 }
 
 #[inline(always)]
@@ -115,15 +131,15 @@ pub fn terms<R: Real>(lights: &Lights<'_, R>, f: &Fragment<R>, s: &Shading<R>, w
     let mut terms = Terms::none(s.silhouette);
     let read = |cube: &Cube<R::Texel>, at: &Footprint<R::Wide>| cube.sample_at(at).map(R::narrow);
     if let (true, Some(cube)) = (wanted.diffuse, lights.irradiance) {
-        terms.diffuse = mul(f.albedo, rgb(read(cube, &diffuse))).map(R::fixed);
+        terms.diffuse = mul(f.albedo, rgb(read(cube, &diffuse)));
     }
     if let (true, Some(cube)) = (wanted.side, lights.side) {
-        terms.side = scale(f.specular, rgb(read(cube, &side))).map(R::fixed);
+        terms.side = scale(f.specular, rgb(read(cube, &side)));
     }
     if let (true, Some(cube)) = (wanted.mirror, lights.mirror) {
         let e = read(cube, &mirror);
-        terms.mirror = scale(f.dapple, rgb(e)).map(R::fixed);
-        terms.haze = ((f.dapple * e[3]).fixed() * f.attenuator).fixed();
+        terms.mirror = scale(f.dapple, rgb(e));
+        terms.haze = f.dapple * e[3] * f.attenuator;
     }
     if let (true, Some(cube)) = (wanted.hilite, lights.hilite) {
         terms.hilite = scale(f.attenuator, rgb(read(cube, &hilite)));

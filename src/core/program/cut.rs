@@ -25,26 +25,34 @@ pub struct Cut {
 /// Cut off what `outputs` need but does not differ between passes; `moves` says which inputs and lookups do.
 pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) -> Cut {
     let live = graph.made_of(&moves);
-    let varies = graph.made_of(|graph, id| matches!(graph.node(id), Node::Field(_) | Node::Lookup { .. }));
+    let varies =
+        graph.made_of(|graph, id| matches!(graph.node(id), Node::Field(_)) || graph.looked_up(id).is_some());
+    let looked_up = graph.made_of(|graph, id| graph.looked_up(id).is_some());
     let reached = graph.reached(outputs);
     let stays = |id: Id| varies[id.index()] && !live[id.index()];
-    let mut edge = vec![false; graph.len()];
+    let (mut edge, mut seldom) = (vec![false; graph.len()], vec![false; graph.len()]);
     for at in (0..graph.len()).map(|at| Id(at as u32)).filter(|id| reached[id.index()]) {
         if live[at.index()] {
-            graph.operands(at).into_iter().filter(|&id| stays(id)).for_each(|id| edge[id.index()] = true);
+            // A fallback is asked for so seldom that it is not worth keeping, unless it is a lookup.
+            let first = graph.call_of(at).map_or(usize::MAX, |call| call.native.hot());
+            let last = graph.call_of(at).map_or(0, |call| call.arguments.len());
+            for (k, id) in graph.operands(at).into_iter().enumerate().filter(|&(_, id)| stays(id)) {
+                let fallback = (first..last).contains(&k) && !looked_up[id.index()];
+                (if fallback { &mut seldom } else { &mut edge })[id.index()] = true;
+            }
         }
     }
     outputs.iter().filter(|&&id| stays(id)).for_each(|id| edge[id.index()] = true);
     // Without lookups of its own a pass need not read samples at all.
-    let looks_up = (0..graph.len())
-        .any(|at| reached[at] && live[at] && matches!(graph.node(Id(at as u32)), Node::Lookup { .. }));
+    let looks_up =
+        (0..graph.len()).any(|at| reached[at] && live[at] && graph.looked_up(Id(at as u32)).is_some());
     let mut kept = Vec::new();
     for at in 0..graph.len() {
         let id = Id(at as u32);
-        if !edge[at] {
+        if !edge[at] && !seldom[at] {
             continue;
         }
-        if is_cheap(graph, id) {
+        if !edge[at] || is_cheap(graph, id) {
             let leaves = leaves(graph, id);
             if !looks_up {
                 leaves
@@ -73,7 +81,7 @@ fn is_cheap(graph: &Graph, id: Id) -> bool {
         match node {
             Node::Field(_) => fields += 1,
             Node::Constant(_) | Node::Uniform(_) => {}
-            Node::Lookup { .. } | Node::Part(..) => return false,
+            Node::Call(_) | Node::Part(..) => return false,
             Node::Unary(..) | Node::Binary(..) | Node::Select { .. } => operations += 1,
         }
     }

@@ -1,7 +1,8 @@
 //! A tape run for one sample, in any kind of number: f64 is what engines are held against.
 
-use super::graph::{Binary, Input, LOOKUP_PARTS, Unary};
-use super::tape::{Instruction, Slot, Tape, Test};
+use super::graph::{Binary, Input, Native, Unary};
+use super::native;
+use super::tape::{CallOf, Instruction, Slot, Tape, Test};
 use crate::model::cube::Cube;
 use crate::model::real::Real;
 
@@ -23,14 +24,16 @@ impl Tape {
             Slot::Register(at) => registers[at],
             Slot::Uniform(at) => shared.uniforms[at],
         };
-        for instruction in &self.instructions {
-            let of = |slot| get(&registers, slot);
-            let (value, out) = match *instruction {
-                Instruction::Load(at, out) => (field(&self.fields[at]), out),
-                Instruction::Unary(op, a, out) => (unary(op, of(a)), out),
-                Instruction::Binary(op, a, b, out) => (binary(op, of(a), of(b)), out),
-                Instruction::MultiplyAdd([a, b, c], out) => (of(a).mul_add(of(b), of(c)), out),
-                Instruction::SubtractProduct([a, b, c], out) => ((-of(a)).mul_add(of(b), of(c)), out),
+        let mut at = 0;
+        while let Some(instruction) = self.instructions.get(at) {
+            at += 1;
+            let of = |slot: &Slot| get(&registers, *slot);
+            let (value, out) = match instruction {
+                Instruction::Load(at, out) => (field(&self.fields[*at]), *out),
+                Instruction::Unary(op, a, out) => (unary(*op, of(a)), *out),
+                Instruction::Binary(op, a, b, out) => (binary(*op, of(a), of(b)), *out),
+                Instruction::MultiplyAdd([a, b, c], out) => (of(a).mul_add(of(b), of(c)), *out),
+                Instruction::SubtractProduct([a, b, c], out) => ((-of(a)).mul_add(of(b), of(c)), *out),
                 Instruction::Select(test, yes, no, out) => {
                     let mask = match test {
                         Test::Less(a, b) => of(a).lt(of(b)),
@@ -38,13 +41,23 @@ impl Tape {
                         Test::IsFinite(a) => of(a).is_finite(),
                         Test::Holds(a) => of(a).ge(one.lit(0.5)),
                     };
-                    (R::select(mask, of(yes), of(no)), out)
+                    (R::select(mask, of(yes), of(no)), *out)
                 }
-                Instruction::Lookup(resource, [face, s, t], parts) => {
-                    let found = look_up(shared.cubes[resource], of(face), of(s), of(t));
-                    for (part, register) in parts.iter().enumerate() {
-                        if let Some(at) = register {
-                            registers[*at] = found[part];
+                Instruction::Call(call) => {
+                    self.called(call, shared, &mut registers);
+                    continue;
+                }
+                Instruction::Unit(call, flag, skip) => {
+                    if self.called(call, shared, &mut registers) {
+                        at += skip;
+                    }
+                    registers[*flag] = zero;
+                    continue;
+                }
+                Instruction::Mend(mend) => {
+                    for (part, fallback) in mend.parts.iter().zip(&mend.fallback) {
+                        if let Some(part) = *part {
+                            registers[part] = get(&registers, *fallback);
                         }
                     }
                     continue;
@@ -54,20 +67,28 @@ impl Tape {
         }
         self.outputs.iter().map(|&slot| get(&registers, slot)).collect()
     }
-}
 
-/// A bilinear lookup: four channels, how they move with s and how with t, a texel.
-#[inline(always)]
-pub fn look_up<R: Real>(cube: &Cube<R::Texel>, face: R, s: R, t: R) -> [R; LOOKUP_PARTS] {
-    let at = cube.footprint_at(face.widen(), s.widen(), t.widen());
-    let [value, across, down] = cube.sample_with_gradient(&at);
-    let mut parts = [face; LOOKUP_PARTS];
-    for c in 0..4 {
-        parts[c] = R::narrow(value[c]);
-        parts[4 + c] = R::narrow(across[c]);
-        parts[8 + c] = R::narrow(down[c]);
+    /// Run a call; whether it has a value of its own.
+    fn called<R: Real>(&self, call: &CallOf, shared: &Shared<'_, R>, registers: &mut [R]) -> bool {
+        let of = |slot: &Slot| match *slot {
+            Slot::Register(at) => registers[at],
+            Slot::Uniform(at) => shared.uniforms[at],
+        };
+        let cube = match call.native {
+            Native::Lookup(resource) => shared.cubes.get(resource as usize).copied(),
+            _ => None,
+        };
+        let arguments: Vec<R> = call.arguments.iter().map(of).collect();
+        let along: Vec<Vec<R>> = call.along.iter().map(|d| d.iter().map(of).collect()).collect();
+        let (value, slopes, found) = native::call(call.native, cube, &arguments, &along);
+        let parts = call.parts.iter().chain(call.slopes.iter().flatten());
+        for (register, number) in parts.zip(value.into_iter().chain(slopes.into_iter().flatten())) {
+            if let Some(at) = *register {
+                registers[at] = number;
+            }
+        }
+        found
     }
-    parts
 }
 
 /// An operation on one number.

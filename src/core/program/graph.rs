@@ -47,8 +47,58 @@ pub enum Binary {
     GreaterEqual,
 }
 
-/// What a lookup in faces yields: the four channels, then how each moves with s and with t, a texel.
-pub const LOOKUP_PARTS: usize = 12;
+/// A function of several numbers that runs as one instruction ([`super::native`]). It has parts, and for each vector
+/// that its arguments move along more of them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Native {
+    /// `normalize_or` of a vector; after it the fallback, which is seldom asked for.
+    Unit,
+    /// `cube_place_of_unit` of a direction: face, s, t.
+    Place,
+    /// A bilinear lookup in padded cube faces, at (face, s, t): the four channels. Which faces: the place among
+    /// [`Graph::resources`].
+    Lookup(u32),
+}
+
+impl Native {
+    /// How many numbers it takes, how many of them can move, and how many it yields: of the value, and along each
+    /// vector that the arguments move.
+    #[must_use]
+    pub const fn widths(self) -> Widths {
+        match self {
+            Self::Unit => Widths { arguments: 6, moving: 3, parts: 3, slopes: 3 },
+            Self::Place => Widths { arguments: 3, moving: 3, parts: 3, slopes: 2 },
+            Self::Lookup(_) => Widths { arguments: 3, moving: 2, parts: 4, slopes: 4 },
+        }
+    }
+
+    /// Which of its arguments are asked for only where the others leave nothing: those from here on.
+    #[must_use]
+    pub const fn hot(self) -> usize {
+        3
+    }
+}
+
+/// How many numbers a [`Native`] takes and yields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs, reason = "told by Native::widths")]
+pub struct Widths {
+    pub arguments: usize,
+    pub moving: usize,
+    pub parts: usize,
+    pub slopes: usize,
+}
+
+/// A call of a [`Native`].
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Call {
+    /// The function.
+    pub native: Native,
+    /// Its arguments.
+    pub arguments: Vec<Id>,
+    /// What its arguments move along, where the call is for how the value moves; else nothing.
+    pub along: Vec<Id>,
+}
 
 /// One number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -72,19 +122,9 @@ pub enum Node {
         /// Where it is 0.
         no: Id,
     },
-    /// A bilinear lookup in padded cube faces, at (s, t) in [0, 1]^2 of a face. Its value is read by
-    /// [`Node::Part`]s.
-    Lookup {
-        /// The place among [`Graph::resources`].
-        resource: u32,
-        /// 0 to 5: +X -X +Y -Y +Z -Z.
-        face: Id,
-        /// Along the face.
-        s: Id,
-        /// Down the face.
-        t: Id,
-    },
-    /// One of a lookup's [`LOOKUP_PARTS`] numbers.
+    /// A call, by its place among the graph's calls. Its numbers are read by [`Node::Part`]s.
+    Call(u32),
+    /// One of a call's numbers.
     Part(Id, u8),
 }
 
@@ -108,6 +148,8 @@ pub struct Graph {
     pub uniforms: Vec<Input>,
     /// Faces that are looked up, by their names in the rules.
     pub resources: Vec<String>,
+    calls: Vec<Call>,
+    known_calls: HashMap<Call, u32>,
 }
 
 /// The place of `item` in `list`, put there where it is new.
@@ -132,6 +174,11 @@ impl Graph {
         self.nodes.len()
     }
 
+    /// Every node, operands before what they are operands of.
+    pub fn ids(&self) -> impl Iterator<Item = Id> + use<> {
+        (0..self.nodes.len()).map(|at| Id(at as u32))
+    }
+
     /// Whether there are none.
     #[must_use]
     pub const fn is_empty(&self) -> bool {
@@ -146,6 +193,16 @@ impl Graph {
         self.nodes.push(node);
         self.known.insert(node, id);
         id
+    }
+
+    /// The node that is this one, where there is one.
+    pub(super) fn known(&self, node: Node) -> Option<Id> {
+        self.known.get(&node).copied()
+    }
+
+    /// The node of a call, where there is one.
+    pub(super) fn known_call(&self, call: &Call) -> Option<Id> {
+        self.known(Node::Call(*self.known_calls.get(call)?))
     }
 
     /// A constant.
@@ -175,11 +232,47 @@ impl Graph {
         self.add(Node::Uniform(at))
     }
 
-    /// A lookup's parts: value, then its slopes along s and t, a texel.
-    pub fn lookup(&mut self, resource: &str, face: Id, s: Id, t: Id) -> [Id; LOOKUP_PARTS] {
-        let resource = place(&mut self.resources, resource.to_owned());
-        let lookup = self.add(Node::Lookup { resource, face, s, t });
-        std::array::from_fn(|part| self.add(Node::Part(lookup, part as u8)))
+    /// The place of faces among those that are looked up.
+    pub fn resource(&mut self, name: &str) -> u32 {
+        place(&mut self.resources, name.to_owned())
+    }
+
+    /// A call that a node is.
+    #[must_use]
+    pub fn call_of(&self, id: Id) -> Option<&Call> {
+        match self.node(id) {
+            Node::Call(at) => self.calls.get(at as usize),
+            _ => None,
+        }
+    }
+
+    /// Whether a node is a lookup, and of which faces.
+    #[must_use]
+    pub fn looked_up(&self, id: Id) -> Option<&str> {
+        match self.call_of(id)?.native {
+            Native::Lookup(resource) => self.resources.get(resource as usize).map(String::as_str),
+            _ => None,
+        }
+    }
+
+    /// The numbers of a function's value, or (with `along`) of how it moves.
+    pub fn call(&mut self, native: Native, arguments: Vec<Id>, along: Vec<Id>) -> Vec<Id> {
+        let widths = native.widths();
+        if !along.is_empty() && along.iter().all(|&id| self.value(id) == Some(0.0)) {
+            return vec![self.constant(0.0); widths.slopes];
+        }
+        let count = if along.is_empty() { widths.parts } else { widths.slopes };
+        let node = self.add_call(Call { native, arguments, along });
+        (0..count).map(|part| self.add(Node::Part(node, part as u8))).collect()
+    }
+
+    fn add_call(&mut self, call: Call) -> Id {
+        let next = self.calls.len() as u32;
+        let at = *self.known_calls.entry(call.clone()).or_insert(next);
+        if at == next {
+            self.calls.push(call);
+        }
+        self.add(Node::Call(at))
     }
 
     /// An operation on one number.
@@ -288,7 +381,10 @@ impl Graph {
             Node::Unary(_, a) | Node::Part(a, _) => vec![a],
             Node::Binary(_, a, b) => vec![a, b],
             Node::Select { condition, yes, no } => vec![condition, yes, no],
-            Node::Lookup { face, s, t, .. } => vec![face, s, t],
+            Node::Call(at) => {
+                let Call { arguments, along, .. } = &self.calls[at as usize];
+                arguments.iter().chain(along).copied().collect()
+            }
         }
     }
 
@@ -363,10 +459,22 @@ impl Graph {
                     let (condition, yes, no) = (to(condition), to(yes), to(no));
                     graph.select(condition, yes, no)
                 }
-                Node::Lookup { resource, face, s, t } => {
-                    let (face, s, t) = (to(face), to(s), to(t));
-                    let resource = place(&mut graph.resources, self.resources[resource as usize].clone());
-                    graph.add(Node::Lookup { resource, face, s, t })
+                Node::Call(at) => {
+                    let Call { native, arguments, along } = &self.calls[at as usize];
+                    let (mut copied, mut moved_along) = (Vec::new(), Vec::new());
+                    for &id in arguments {
+                        copied.push(self.copy(id, graph, moved, instead));
+                    }
+                    for &id in along {
+                        moved_along.push(self.copy(id, graph, moved, instead));
+                    }
+                    let native = match *native {
+                        Native::Lookup(resource) => {
+                            Native::Lookup(graph.resource(&self.resources[resource as usize]))
+                        }
+                        other => other,
+                    };
+                    graph.add_call(Call { native, arguments: copied, along: moved_along })
                 }
                 Node::Part(lookup, part) => {
                     let lookup = to(lookup);

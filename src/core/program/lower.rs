@@ -1,17 +1,20 @@
 //! The rules' WGSL as a graph: functions are called in place, branches become choices.
 //!
-//! - lookups in faces are one node (`sample_faces` of `rules/lib/cube.wgsl`, and its tangent), as their texels are
+//! - lookups in faces are one call (`sample_faces` of `rules/lib/cube.wgsl`, and its tangent), as their texels are
 //!   addressed by whole numbers, which graphs have not; `is_finite` likewise
+//! - so are unit vectors and places on cubes ([`super::native`]), which every fragment needs again and again
 //! - both sides of an `if` are computed, and a value chosen where they meet: the rules' branches are short
+
+mod math;
 
 use naga::proc::TypeResolution;
 use naga::valid::{Capabilities, ModuleInfo, ValidationFlags, Validator};
 use naga::{
-    BinaryOperator as B, Block, Expression as E, Function, Handle, Literal, MathFunction as M, Module,
-    ScalarKind, Statement, TypeInner, UnaryOperator as U,
+    Block, Expression as E, Function, Handle, Literal, Module, ScalarKind, Statement, TypeInner,
+    UnaryOperator as U,
 };
 
-use super::graph::{Binary, Graph, Id, Unary};
+use super::graph::{Graph, Id, Native, Unary};
 
 /// A text that cannot be lowered.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
@@ -52,11 +55,21 @@ impl Value {
     }
 }
 
+/// What becomes of functions that can be one instruction ([`super::native`]); lookups always are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Natives {
+    /// They are one: the fastest.
+    Called,
+    /// They are operations, as the rules write them: so that each can be rounded.
+    Written,
+}
+
 /// A WGSL text whose functions can be called on graphs.
 #[derive(Debug)]
 pub struct Source {
     module: Module,
     info: ModuleInfo,
+    natives: Natives,
 }
 
 impl Source {
@@ -64,13 +77,13 @@ impl Source {
     ///
     /// # Errors
     /// When it is not valid.
-    pub fn new(wgsl: &str) -> Result<Self, LowerError> {
+    pub fn new(wgsl: &str, natives: Natives) -> Result<Self, LowerError> {
         let module = naga::front::wgsl::parse_str(wgsl)
             .map_err(|error| LowerError::Unreadable(error.emit_to_string(wgsl)))?;
         let info = Validator::new(ValidationFlags::all(), Capabilities::all())
             .validate(&module)
             .map_err(|error| LowerError::Unreadable(error.emit_to_string(wgsl)))?;
-        Ok(Self { module, info })
+        Ok(Self { module, info, natives })
     }
 
     /// The value of a function, in `graph`.
@@ -129,6 +142,14 @@ impl Source {
             _ => return None,
         })
     }
+}
+
+/// What a literal stands for: a constant of mathematics whose nearest f32 it is; else what was written, as the shortest
+/// decimal of an f32 is. 0.1 is meant, not the f32 next to it.
+fn meant(x: f32) -> f64 {
+    let known = [std::f64::consts::LN_2, std::f64::consts::PI / 180.0];
+    let exact = known.into_iter().find(|known| *known as f32 == x);
+    exact.unwrap_or_else(|| format!("{x:e}").parse().unwrap_or_else(|_| f64::from(x)))
 }
 
 /// One call.
@@ -267,14 +288,39 @@ impl Frame<'_> {
     }
 
     fn called(&mut self, callee: Handle<Function>, arguments: Vec<Value>) -> Result<Vec<Id>, LowerError> {
-        match self.source.module.functions[callee].name.as_deref() {
-            Some("sample_faces") => self.sample_faces(&arguments, None),
-            // The tangent along the place alone; see `tangent::name`.
-            Some("sample_faces_ccd") => {
-                let along = arguments.get(3).cloned();
-                self.sample_faces(&arguments, along)
+        let called = self.source.natives == Natives::Called;
+        match (self.source.module.functions[callee].name.as_deref(), &arguments[..]) {
+            (Some("sample_faces"), [Value::Texture(name), _, Value::Numbers(place)]) => {
+                let resource = self.graph.resource(name);
+                Ok(self.graph.call(Native::Lookup(resource), place.clone(), Vec::new()))
             }
-            Some("is_finite") => {
+            // The tangent along the place alone; see `tangent::name`.
+            (
+                Some("sample_faces_ccd"),
+                [Value::Texture(name), _, Value::Numbers(place), Value::Numbers(along)],
+            ) => {
+                let resource = self.graph.resource(name);
+                Ok(self.graph.call(Native::Lookup(resource), place.clone(), along[1..].to_vec()))
+            }
+            (Some("cube_place_of_unit"), [Value::Numbers(direction)]) if called => {
+                Ok(self.graph.call(Native::Place, direction.clone(), Vec::new()))
+            }
+            (Some("cube_place_of_unit_tangent"), [Value::Numbers(direction), Value::Numbers(along)])
+                if called =>
+            {
+                let moved = self.graph.call(Native::Place, direction.clone(), along.clone());
+                Ok([vec![self.graph.constant(0.0)], moved].concat())
+            }
+            (Some("normalize_or"), [Value::Numbers(v), Value::Numbers(fallback)]) if called => {
+                Ok(self.graph.call(Native::Unit, [&v[..], fallback].concat(), Vec::new()))
+            }
+            (
+                Some("normalize_or_tangent"),
+                [Value::Numbers(v), Value::Numbers(fallback), Value::Numbers(along), Value::Numbers(other)],
+            ) if called && other.iter().all(|&id| self.graph.value(id) == Some(0.0)) => {
+                Ok(self.graph.call(Native::Unit, [&v[..], fallback].concat(), along.clone()))
+            }
+            (Some("is_finite"), _) => {
                 let numbers = arguments.into_iter().next().and_then(Value::numbers).unwrap_or_default();
                 let mut all = self.graph.constant(1.0);
                 for number in numbers {
@@ -285,27 +331,6 @@ impl Frame<'_> {
             }
             _ => self.source.invoke(self.graph, callee, arguments),
         }
-    }
-
-    /// `sample_faces(faces, size, place)`, or how it moves as the place does.
-    fn sample_faces(&mut self, arguments: &[Value], along: Option<Value>) -> Result<Vec<Id>, LowerError> {
-        let [Value::Texture(name), Value::Numbers(size), Value::Numbers(place), ..] = arguments else {
-            return Err(self.unsupported("a lookup in what are no faces"));
-        };
-        let (&[size], &[face, s, t]) = (&size[..], &place[..]) else {
-            return Err(self.unsupported("a lookup at what is no place"));
-        };
-        let parts = self.graph.lookup(name, face, s, t);
-        let Some(along) = along.and_then(Value::numbers) else { return Ok(parts[..4].to_vec()) };
-        let graph = &mut *self.graph;
-        let ds = graph.binary(Binary::Multiply, size, along[1]);
-        let dt = graph.binary(Binary::Multiply, size, along[2]);
-        let channel = |c: usize| {
-            let across = graph.binary(Binary::Multiply, parts[4 + c], ds);
-            let down = graph.binary(Binary::Multiply, parts[8 + c], dt);
-            graph.binary(Binary::Add, across, down)
-        };
-        Ok((0..4).map(channel).collect())
     }
 
     fn place(&mut self, pointer: Handle<E>) -> Result<Place, LowerError> {
@@ -484,7 +509,7 @@ impl Frame<'_> {
     fn literal(&mut self, literal: Literal) -> Result<Id, LowerError> {
         let value = match literal {
             // The shortest decimal of an f32 is what was written: 0.1 is meant, not the f32 next to it.
-            Literal::F32(x) => format!("{x:e}").parse().unwrap_or_else(|_| f64::from(x)),
+            Literal::F32(x) => meant(x),
             Literal::AbstractFloat(x) | Literal::F64(x) => x,
             Literal::I32(x) => x.into(),
             Literal::U32(x) => x.into(),
@@ -521,130 +546,5 @@ impl Frame<'_> {
                 of(self, &at)
             })
             .collect()
-    }
-
-    fn binary(&mut self, op: B, a: Id, b: Id) -> Result<Id, LowerError> {
-        let graph = &mut *self.graph;
-        Ok(match op {
-            B::Add => graph.binary(Binary::Add, a, b),
-            B::Subtract => graph.binary(Binary::Subtract, a, b),
-            B::Multiply => graph.binary(Binary::Multiply, a, b),
-            B::Divide => graph.binary(Binary::Divide, a, b),
-            B::Less => graph.binary(Binary::Less, a, b),
-            B::Greater => graph.binary(Binary::Less, b, a),
-            B::GreaterEqual => graph.binary(Binary::GreaterEqual, a, b),
-            B::LessEqual => graph.binary(Binary::GreaterEqual, b, a),
-            B::Equal => {
-                let (above, below) =
-                    (graph.binary(Binary::GreaterEqual, a, b), graph.binary(Binary::GreaterEqual, b, a));
-                graph.and(above, below)
-            }
-            B::NotEqual => {
-                let equal = self.binary(B::Equal, a, b)?;
-                self.graph.not(equal)
-            }
-            B::And | B::LogicalAnd => graph.and(a, b),
-            B::InclusiveOr | B::LogicalOr => graph.or(a, b),
-            other => return Err(self.unsupported(format!("operator {other:?}"))),
-        })
-    }
-
-    fn dot(&mut self, a: &[Id], b: &[Id]) -> Id {
-        let mut sum = self.graph.constant(0.0);
-        for (&x, &y) in a.iter().zip(b) {
-            let product = self.graph.binary(Binary::Multiply, x, y);
-            sum = self.graph.binary(Binary::Add, sum, product);
-        }
-        sum
-    }
-
-    fn math(&mut self, fun: M, arguments: &[Vec<Id>]) -> Result<Vec<Id>, LowerError> {
-        match fun {
-            M::Dot => return Ok(vec![self.dot(&arguments[0], &arguments[1])]),
-            M::Length => {
-                let square = self.dot(&arguments[0], &arguments[0]);
-                return Ok(vec![self.graph.unary(Unary::Sqrt, square)]);
-            }
-            M::Cross => {
-                let (a, b) = (&arguments[0], &arguments[1]);
-                let graph = &mut *self.graph;
-                let minor = |i: usize, j: usize| {
-                    let (p, q) = (
-                        graph.binary(Binary::Multiply, a[i], b[j]),
-                        graph.binary(Binary::Multiply, a[j], b[i]),
-                    );
-                    graph.binary(Binary::Subtract, p, q)
-                };
-                return Ok([(1, 2), (2, 0), (0, 1)]
-                    .map({
-                        let mut minor = minor;
-                        move |(i, j)| minor(i, j)
-                    })
-                    .to_vec());
-            }
-            _ => {}
-        }
-        self.by_components(arguments, |frame, x| frame.math_of_numbers(fun, x))
-    }
-
-    fn math_of_numbers(&mut self, fun: M, x: &[Id]) -> Result<Id, LowerError> {
-        let graph = &mut *self.graph;
-        Ok(match fun {
-            M::Abs => graph.unary(Unary::Abs, x[0]),
-            M::Floor => graph.unary(Unary::Floor, x[0]),
-            M::Sqrt => graph.unary(Unary::Sqrt, x[0]),
-            M::Exp2 => graph.unary(Unary::Exp2, x[0]),
-            M::Log2 => graph.unary(Unary::Log2, x[0]),
-            M::InverseSqrt => {
-                let root = graph.unary(Unary::Sqrt, x[0]);
-                graph.unary(Unary::Reciprocal, root)
-            }
-            M::Exp => {
-                let factor = graph.constant(std::f64::consts::LOG2_E);
-                let scaled = graph.binary(Binary::Multiply, factor, x[0]);
-                graph.unary(Unary::Exp2, scaled)
-            }
-            M::Log => {
-                let (factor, log) = (graph.constant(std::f64::consts::LN_2), graph.unary(Unary::Log2, x[0]));
-                graph.binary(Binary::Multiply, factor, log)
-            }
-            M::Pow => {
-                let log = graph.unary(Unary::Log2, x[0]);
-                let scaled = graph.binary(Binary::Multiply, x[1], log);
-                graph.unary(Unary::Exp2, scaled)
-            }
-            M::Fract => {
-                let whole = graph.unary(Unary::Floor, x[0]);
-                graph.binary(Binary::Subtract, x[0], whole)
-            }
-            M::Min => graph.binary(Binary::Min, x[0], x[1]),
-            M::Max => graph.binary(Binary::Max, x[0], x[1]),
-            M::Clamp => {
-                let raised = graph.binary(Binary::Max, x[0], x[1]);
-                graph.binary(Binary::Min, raised, x[2])
-            }
-            M::Saturate => {
-                let (zero, one) = (graph.constant(0.0), graph.constant(1.0));
-                let raised = graph.binary(Binary::Max, x[0], zero);
-                graph.binary(Binary::Min, raised, one)
-            }
-            M::Fma => {
-                let product = graph.binary(Binary::Multiply, x[0], x[1]);
-                graph.binary(Binary::Add, product, x[2])
-            }
-            M::Mix => {
-                let step = graph.binary(Binary::Subtract, x[1], x[0]);
-                let part = graph.binary(Binary::Multiply, step, x[2]);
-                graph.binary(Binary::Add, x[0], part)
-            }
-            M::Step => graph.binary(Binary::GreaterEqual, x[1], x[0]),
-            M::Sign => {
-                let zero = graph.constant(0.0);
-                let (positive, negative) =
-                    (graph.binary(Binary::Less, zero, x[0]), graph.binary(Binary::Less, x[0], zero));
-                graph.binary(Binary::Subtract, positive, negative)
-            }
-            other => return Err(self.unsupported(format!("{other:?}"))),
-        })
     }
 }

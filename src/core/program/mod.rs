@@ -7,15 +7,20 @@
 //! written for the processor alone.
 //!
 //! - [`graph`]: numbers and what they are made of; equal ones are one
+//! - [`native`]: functions that are one instruction
 //! - [`lower`]: WGSL functions called on graphs
 //! - [`shading`]: the value of a plan and how it moves, as a graph
 //! - [`cut`]: what stays from pass to pass
-//! - [`tape`]: instructions over registers
+//! - [`steps`]: a graph evaluated node by node, in any kind of number
+//! - [`tape`]: instructions over registers, which `writer` finds
 //! - [`evaluate`]: a tape run for one sample
 
 pub mod cut;
 pub mod evaluate;
 pub mod graph;
 pub mod lower;
+pub mod native;
 pub mod shading;
+pub mod steps;
 pub mod tape;
+mod writer;

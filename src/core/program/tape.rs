@@ -4,9 +4,9 @@
 //! operation and comparisons part of the choice that they make; registers are used again as soon as their number is not
 //! needed any more.
 
-use std::collections::HashMap;
-
-use super::graph::{Binary, Graph, Id, Input, LOOKUP_PARTS, Node, Unary, apply_binary, apply_unary};
+use super::graph::{Binary, Graph, Id, Input, Native, Node, Unary, apply_binary, apply_unary};
+use super::native;
+use super::writer::Writer;
 
 /// Where an operand stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -30,6 +30,32 @@ pub enum Test {
     Holds(Slot),
 }
 
+/// A call of a [`Native`], of whose parts those are written that have a register.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CallOf {
+    /// The function.
+    pub native: Native,
+    /// What its value is of; a fallback is not among it.
+    pub arguments: Vec<Slot>,
+    /// The vectors that the arguments move along.
+    pub along: Vec<Vec<Slot>>,
+    /// The parts of the value.
+    pub parts: Vec<Option<usize>>,
+    /// The parts of how it moves, along each.
+    pub slopes: Vec<Vec<Option<usize>>>,
+}
+
+/// What stands in for unit vectors that there are not.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mend {
+    /// The register that tells where there is one.
+    pub flag: usize,
+    /// The registers of the unit vector.
+    pub parts: Vec<Option<usize>>,
+    /// What stands in.
+    pub fallback: Vec<Slot>,
+}
+
 /// One instruction; its last member is the register that it writes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Instruction {
@@ -45,8 +71,13 @@ pub enum Instruction {
     SubtractProduct([Slot; 3], usize),
     /// `yes` or `no`.
     Select(Test, Slot, Slot, usize),
-    /// A lookup at (face, s, t), of whose parts those are written that have a register.
-    Lookup(usize, [Slot; 3], [Option<usize>; LOOKUP_PARTS]),
+    /// A function.
+    Call(Box<CallOf>),
+    /// A unit vector: as [`Instruction::Call`]. Where every sample has one, so many instructions are left out: they
+    /// make what stands in, and a [`Mend`] is the last of them. Else the register tells which have.
+    Unit(Box<CallOf>, usize, usize),
+    /// Put what stands in where it is needed.
+    Mend(Box<Mend>),
 }
 
 /// A list of instructions.
@@ -62,17 +93,24 @@ pub struct Tape {
     pub resources: Vec<String>,
     /// Where each output stands at the end.
     pub outputs: Vec<Slot>,
-    graph: Graph,
-    uniforms: Vec<Operand>,
+    pub(super) graph: Graph,
+    pub(super) uniforms: Vec<Operand>,
+}
+
+/// An operand before it has a place: a node, or the reciprocal of one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub(super) enum Operand {
+    Of(Id),
+    ReciprocalOf(Id),
+    /// Where a unit vector has a direction, by the node of its call.
+    FlagOf(Id),
 }
 
 impl Tape {
     /// The instructions that compute `outputs`.
     #[must_use]
     pub fn new(graph: &Graph, outputs: &[Id]) -> Self {
-        let mut writer = Writer::new(graph, outputs);
-        outputs.iter().for_each(|&id| writer.want(id));
-        writer.finish(outputs)
+        Writer::new(graph, outputs).tape(outputs)
     }
 
     /// The numbers that are the same for all samples, in the order of their slots.
@@ -82,6 +120,7 @@ impl Tape {
         let mut of = |operand| match operand {
             Operand::Of(id) => self.uniform(id, &value, &mut known),
             Operand::ReciprocalOf(id) => 1.0 / self.uniform(id, &value, &mut known),
+            Operand::FlagOf(_) => unreachable!("a flag is a register"),
         };
         self.uniforms.iter().map(|&operand| of(operand)).collect()
     }
@@ -103,243 +142,23 @@ impl Tape {
                     of(yes)
                 }
             }
-            Node::Field(_) | Node::Lookup { .. } | Node::Part(..) => {
-                unreachable!("it differs between samples")
+            Node::Part(call, part) => {
+                let part = part as usize;
+                let Some(call) = self.graph.call_of(call) else { unreachable!("parts are of calls") };
+                let numbers: Vec<f64> = call.arguments.iter().map(|&id| of(id)).collect();
+                let along: Vec<f64> = call.along.iter().map(|&id| of(id)).collect();
+                let along: Vec<Vec<f64>> = (!along.is_empty()).then_some(along).into_iter().collect();
+                let (value, slopes, found) = native::call(call.native, None, &numbers, &along);
+                match (slopes.first(), found) {
+                    (Some(slope), _) => slope[part],
+                    (None, true) => value[part],
+                    (None, false) => numbers[call.native.hot() + part],
+                }
             }
+            Node::Field(_) | Node::Call(_) => unreachable!("it differs between samples"),
         };
         known[id.index()] = Some(x);
         x
-    }
-}
-
-/// Instructions over nodes, whose registers are not yet known.
-struct Writer<'a> {
-    graph: &'a Graph,
-    /// Whether a node differs between samples.
-    varies: Vec<bool>,
-    /// How often a node is an operand or an output.
-    uses: Vec<u32>,
-    /// Denominators of several quotients: one reciprocal serves them.
-    divides: Vec<u32>,
-    written: Vec<bool>,
-    instructions: Vec<Draft>,
-    uniforms: Vec<Operand>,
-}
-
-/// An operand: a node, or the reciprocal of one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum Operand {
-    Of(Id),
-    ReciprocalOf(Id),
-}
-
-/// An instruction with operands in the place of slots.
-struct Draft {
-    kind: Kind,
-    reads: Vec<Operand>,
-    writes: Vec<(Operand, usize)>,
-}
-
-#[derive(Clone, Copy)]
-enum Kind {
-    Load(usize),
-    Unary(Unary),
-    Binary(Binary),
-    MultiplyAdd,
-    SubtractProduct,
-    SelectLess,
-    SelectGreaterEqual,
-    SelectFinite,
-    SelectHolds,
-    Lookup(usize),
-}
-
-impl<'a> Writer<'a> {
-    fn new(graph: &'a Graph, outputs: &[Id]) -> Self {
-        let varies =
-            graph.made_of(|graph, id| matches!(graph.node(id), Node::Field(_) | Node::Lookup { .. }));
-        let reached = graph.reached(outputs);
-        let (mut uses, mut divides) = (vec![0; graph.len()], vec![0; graph.len()]);
-        outputs.iter().for_each(|id| uses[id.index()] += 1);
-        for at in (0..graph.len()).filter(|&at| reached[at]) {
-            let id = Id(at as u32);
-            graph.operands(id).iter().for_each(|operand| uses[operand.index()] += 1);
-            if let Node::Binary(Binary::Divide, _, b) = graph.node(id) {
-                divides[b.index()] += 1;
-            }
-        }
-        Self {
-            graph,
-            varies,
-            uses,
-            divides,
-            written: vec![false; graph.len()],
-            instructions: Vec::new(),
-            uniforms: Vec::new(),
-        }
-    }
-
-    /// A product that nothing else needs.
-    fn lone_product(&self, id: Id) -> Option<(Id, Id)> {
-        match self.graph.node(id) {
-            Node::Binary(Binary::Multiply, a, b) if self.uses[id.index()] == 1 && self.varies[id.index()] => {
-                Some((a, b))
-            }
-            _ => None,
-        }
-    }
-
-    /// Write what a node needs, then the node.
-    fn want(&mut self, id: Id) {
-        if self.written[id.index()] || !self.varies[id.index()] {
-            return;
-        }
-        self.written[id.index()] = true;
-        if let Node::Part(lookup, part) = self.graph.node(id) {
-            self.want(lookup);
-            self.part(lookup, part, id);
-            return;
-        }
-        let (kind, reads) = self.selected(id);
-        for operand in &reads {
-            match *operand {
-                Operand::Of(id) => self.want(id),
-                Operand::ReciprocalOf(id) => self.want_reciprocal(id),
-            }
-        }
-        // A lookup writes those of its parts that are wanted later.
-        let is_lookup = matches!(kind, Kind::Lookup(_));
-        let writes = if is_lookup { Vec::new() } else { vec![(Operand::Of(id), 0)] };
-        self.instructions.push(Draft { kind, reads, writes });
-    }
-
-    fn want_reciprocal(&mut self, id: Id) {
-        self.want(id);
-        let known =
-            self.instructions.iter().any(|d| d.writes.iter().any(|w| w.0 == Operand::ReciprocalOf(id)));
-        if self.varies[id.index()] && !known {
-            self.instructions.push(Draft {
-                kind: Kind::Unary(Unary::Reciprocal),
-                reads: vec![Operand::Of(id)],
-                writes: vec![(Operand::ReciprocalOf(id), 0)],
-            });
-        }
-    }
-
-    /// A part of a lookup that was written already.
-    fn part(&mut self, lookup: Id, part: u8, id: Id) {
-        let reads_lookup =
-            |draft: &&mut Draft| matches!(draft.kind, Kind::Lookup(at) if at == lookup.index());
-        if let Some(draft) = self.instructions.iter_mut().find(reads_lookup) {
-            draft.writes.push((Operand::Of(id), part as usize));
-        }
-    }
-
-    /// The instruction for a node.
-    fn selected(&self, id: Id) -> (Kind, Vec<Operand>) {
-        let of = |ids: &[Id]| ids.iter().map(|&id| Operand::Of(id)).collect::<Vec<_>>();
-        match self.graph.node(id) {
-            Node::Field(at) => (Kind::Load(at as usize), Vec::new()),
-            Node::Unary(op, a) => (Kind::Unary(op), of(&[a])),
-            Node::Binary(op, a, b) => match (op, self.lone_product(a), self.lone_product(b)) {
-                (Binary::Add, _, Some((x, y))) => (Kind::MultiplyAdd, of(&[x, y, a])),
-                (Binary::Add, Some((x, y)), None) => (Kind::MultiplyAdd, of(&[x, y, b])),
-                (Binary::Subtract, _, Some((x, y))) => (Kind::SubtractProduct, of(&[x, y, a])),
-                (Binary::Divide, ..) if self.divides[b.index()] > 1 || !self.varies[b.index()] => {
-                    (Kind::Binary(Binary::Multiply), vec![Operand::Of(a), Operand::ReciprocalOf(b)])
-                }
-                _ => (Kind::Binary(op), of(&[a, b])),
-            },
-            Node::Select { condition, yes, no } => match self.graph.node(condition) {
-                Node::Binary(Binary::Less, a, b) => (Kind::SelectLess, of(&[a, b, yes, no])),
-                Node::Binary(Binary::GreaterEqual, a, b) => (Kind::SelectGreaterEqual, of(&[a, b, yes, no])),
-                Node::Unary(Unary::IsFinite, a) => (Kind::SelectFinite, of(&[a, yes, no])),
-                _ => (Kind::SelectHolds, of(&[condition, yes, no])),
-            },
-            Node::Lookup { face, s, t, .. } => (Kind::Lookup(id.index()), of(&[face, s, t])),
-            Node::Part(..) => unreachable!("a lookup writes its parts"),
-            Node::Constant(_) | Node::Uniform(_) => unreachable!("it is the same for all samples"),
-        }
-    }
-
-    fn finish(mut self, outputs: &[Id]) -> Tape {
-        let mut last: HashMap<Operand, usize> = HashMap::new();
-        for (at, draft) in self.instructions.iter().enumerate() {
-            last.extend(draft.reads.iter().map(|&operand| (operand, at)));
-        }
-        // Outputs stay.
-        last.extend(outputs.iter().map(|&id| (Operand::Of(id), usize::MAX)));
-        let drafts = std::mem::take(&mut self.instructions);
-        let (mut places, mut free): (HashMap<Operand, usize>, Vec<usize>) = (HashMap::new(), Vec::new());
-        let mut registers = 0;
-        let mut instructions = Vec::new();
-        for (at, draft) in drafts.iter().enumerate() {
-            let reads: Vec<Slot> = draft.reads.iter().map(|&o| self.slot(o, &places)).collect();
-            let mut released: Vec<Operand> = draft.reads.clone();
-            released.retain(|operand| last.get(operand) == Some(&at));
-            for operand in released {
-                free.extend(places.remove(&operand));
-            }
-            let mut writes: Vec<(usize, usize)> = Vec::new();
-            for &(operand, part) in &draft.writes {
-                let register = free.pop().unwrap_or_else(|| {
-                    registers += 1;
-                    registers - 1
-                });
-                places.insert(operand, register);
-                writes.push((part, register));
-            }
-            instructions.push(self.instruction(draft.kind, &reads, &writes));
-        }
-        let outputs = outputs.iter().map(|&id| self.slot(Operand::Of(id), &places)).collect();
-        let Self { graph, uniforms, .. } = self;
-        Tape {
-            instructions,
-            registers,
-            fields: graph.fields.clone(),
-            resources: graph.resources.clone(),
-            outputs,
-            graph: graph.clone(),
-            uniforms,
-        }
-    }
-
-    fn instruction(&self, kind: Kind, reads: &[Slot], writes: &[(usize, usize)]) -> Instruction {
-        let out = writes.first().map_or(0, |(_, register)| *register);
-        match (kind, reads) {
-            (Kind::Load(field), _) => Instruction::Load(field, out),
-            (Kind::Unary(op), &[a]) => Instruction::Unary(op, a, out),
-            (Kind::Binary(op), &[a, b]) => Instruction::Binary(op, a, b, out),
-            (Kind::MultiplyAdd, &[a, b, c]) => Instruction::MultiplyAdd([a, b, c], out),
-            (Kind::SubtractProduct, &[a, b, c]) => Instruction::SubtractProduct([a, b, c], out),
-            (Kind::SelectLess, &[a, b, yes, no]) => Instruction::Select(Test::Less(a, b), yes, no, out),
-            (Kind::SelectGreaterEqual, &[a, b, yes, no]) => {
-                Instruction::Select(Test::GreaterEqual(a, b), yes, no, out)
-            }
-            (Kind::SelectFinite, &[a, yes, no]) => Instruction::Select(Test::IsFinite(a), yes, no, out),
-            (Kind::SelectHolds, &[a, yes, no]) => Instruction::Select(Test::Holds(a), yes, no, out),
-            (Kind::Lookup(node), &[face, s, t]) => {
-                let Node::Lookup { resource, .. } = self.graph.node(Id(node as u32)) else {
-                    unreachable!("a lookup is made of a lookup's node")
-                };
-                let mut parts = [None; LOOKUP_PARTS];
-                writes.iter().for_each(|&(part, register)| parts[part] = Some(register));
-                Instruction::Lookup(resource as usize, [face, s, t], parts)
-            }
-            _ => unreachable!("every kind reads as many operands as it is given"),
-        }
-    }
-
-    /// Where an operand stands.
-    fn slot(&mut self, operand: Operand, places: &HashMap<Operand, usize>) -> Slot {
-        if let Some(&register) = places.get(&operand) {
-            return Slot::Register(register);
-        }
-        let known = self.uniforms.iter().position(|&uniform| uniform == operand);
-        Slot::Uniform(known.unwrap_or_else(|| {
-            self.uniforms.push(operand);
-            self.uniforms.len() - 1
-        }))
     }
 }
 

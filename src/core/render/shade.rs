@@ -1,19 +1,20 @@
-//! Samples to images: the model in f64, with an image for each term.
+//! From samples to images: the rules in f64, with an image for each term.
 
+use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::image::Image;
 use crate::bake::Illumination;
+use crate::engine::rules::{CubesAt, Loads, Registers, SampleSteps, Setting, sample_facts};
 use crate::model::compose::TermName;
-use crate::model::cube::Cube;
-use crate::model::effects::Effect;
-use crate::model::evaluate::{Setup, compose, shade};
-use crate::model::fragment::Fragment;
-use crate::model::lights::{Cubes, Lights};
+use crate::model::effects::{Effect, Effects};
+use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::model::real::Real;
+use crate::program::shading::{ShadingError, TermShading};
+use crate::program::steps::Rounding;
 use crate::samples::{LANES, ViewSamples};
 use crate::scene::view::Camera;
+use crate::with_simd;
 
 /// A view's image and what it is made of.
 #[derive(Clone, Debug)]
@@ -30,113 +31,74 @@ pub struct Shaded {
     pub glow: Vec<[f32; 3]>,
 }
 
-/// The light of a scene in f64, at the lobe of one set of parameters.
+/// The rules of a scene's terms with its light in f64, at one set of parameters.
+#[derive(Debug)]
 pub struct Shader {
-    setup: Setup,
+    effects: Effects,
     params: Params,
-    irradiance: Option<Cube<f64>>,
-    specular: Option<Cube<f64>>,
-    hilite: Option<Cube<f64>>,
+    cubes: CubesAt<f64>,
+    names: Vec<TermName>,
+    /// Yields three numbers a term, then the haze.
+    steps: SampleSteps,
+    level: Level,
+}
+
+/// A pixel's sums.
+struct Pixel {
+    index: usize,
+    coverage: f32,
+    terms: Vec<[f64; 3]>,
+    haze: f64,
+    glow: [f64; 3],
 }
 
 impl Shader {
     /// Of a scene's cubes, at `params`.
-    #[must_use]
-    pub fn new(setup: Setup, illumination: &Illumination, params: &Params) -> Self {
-        let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(f64::from));
-        let lobe = |stack: &crate::bake::LobeStack| stack.at(params.scalar(Param::SpecularLobe)).0;
-        Self {
-            setup,
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
+    pub fn new(setup: Setup, illumination: &Illumination, params: &Params) -> Result<Self, ShadingError> {
+        let turned = params.scalar(Param::EnvironmentRotation) != 0.0;
+        let TermShading { graph, terms, haze } =
+            TermShading::new(&sample_facts(setup, illumination, turned))?;
+        let outputs: Vec<_> = terms.iter().flat_map(|(_, numbers)| *numbers).chain([haze]).collect();
+        Ok(Self {
+            effects: setup.effects,
             params: params.clone(),
-            irradiance: illumination.irradiance.as_ref().map(wide),
-            specular: illumination.lobes.as_ref().map(lobe).as_ref().map(wide),
-            hilite: illumination.hilite.as_ref().map(wide),
-        }
-    }
-
-    /// The image of a view in another number format: what `like` is a number of. No terms, no haze.
-    #[must_use]
-    pub fn shade_in<R>(&self, samples: &ViewSamples, camera: &Camera, gain: f64, like: R) -> Image
-    where
-        R: Real<Texel = f64> + Into<f64> + Sync,
-    {
-        let mut image = Image::new(camera.width as usize, camera.height as usize);
-        let groups: Vec<Vec<(usize, f32, [f64; 3])>> = (0..samples.groups())
-            .into_par_iter()
-            .map(|group| self.group_in(samples, group, gain, like))
-            .collect();
-        for (at, coverage, rgb) in groups.into_iter().flatten() {
-            image.rgb[at] = rgb.map(|x| x as f32);
-            image.alpha[at] = coverage;
-        }
-        image
-    }
-
-    /// The pixels of a group, each sample in another number format; their mean is exact.
-    fn group_in<R>(
-        &self,
-        samples: &ViewSamples,
-        group: usize,
-        gain: f64,
-        like: R,
-    ) -> Vec<(usize, f32, [f64; 3])>
-    where
-        R: Real<Texel = f64> + Into<f64>,
-    {
-        let lights = Lights::new(self.setup, &self.params, self.cubes(), false, like);
-        let records = samples.group_start[group] as usize..samples.group_start[group + 1] as usize;
-        let mut pixels = Vec::new();
-        for lane in 0..LANES {
-            let slot = group * LANES + lane;
-            if samples.pixel[slot] == u32::MAX {
-                continue;
-            }
-            let coverage = samples.coverage[slot];
-            let mut sum = [0.0; 3];
-            for at in records.clone().map(|record| record * LANES + lane) {
-                let share = f64::from(samples.surface.weight(at)) * f64::from(coverage) * gain;
-                if share != 0.0 {
-                    let fragment = wide(&samples.surface.fragment(at)).in_format(like);
-                    let rgba = shade(self.setup, &lights, &fragment, &self.params);
-                    (0..3).for_each(|c| sum[c] += share * rgba[c].into());
-                }
-            }
-            pixels.push((samples.pixel[slot] as usize, coverage, sum));
-        }
-        pixels
-    }
-
-    fn cubes(&self) -> Cubes<'_, f64> {
-        Cubes {
-            irradiance: self.irradiance.as_ref(),
-            specular: self.specular.as_ref(),
-            lobe_slope: None,
-            hilite: self.hilite.as_ref(),
-        }
+            cubes: CubesAt::new(illumination, params, f64::from),
+            names: terms.iter().map(|(name, _)| *name).collect(),
+            steps: SampleSteps::new(&graph, &outputs, |_| Rounding::Plain),
+            level: Level::new(),
+        })
     }
 
     /// The image of a view, times `gain`. All cores; the same for any number of threads.
     #[must_use]
     pub fn shade(&self, samples: &ViewSamples, camera: &Camera, gain: f64) -> Shaded {
-        let names = TermName::of(self.setup.effects);
         let (width, height) = (camera.width as usize, camera.height as usize);
+        let plane = |wanted: bool| if wanted { width * height } else { 0 };
         let mut shaded = Shaded {
             image: Image::new(width, height),
-            terms: names.iter().map(|&name| (name, Image::new(width, height))).collect(),
-            haze: vec![0.0; if self.hazy() { width * height } else { 0 }],
-            glow: vec![[0.0; 3]; if self.setup.effects.has(Effect::Bloom) { width * height } else { 0 }],
+            terms: self.names.iter().map(|&name| (name, Image::new(width, height))).collect(),
+            haze: vec![0.0; plane(self.effects.has_any(&[Effect::Haze, Effect::Bloom]))],
+            glow: vec![[0.0; 3]; plane(self.effects.has(Effect::Bloom))],
         };
-        let groups: Vec<Vec<Pixel>> =
-            (0..samples.groups()).into_par_iter().map(|group| self.group(samples, group, gain)).collect();
+        let setting = self.steps.setting(&self.params, &self.cubes, 0.0);
+        let loads = self.steps.loads(samples.surface.places());
+        let groups: Vec<Vec<Pixel>> = (0..samples.groups())
+            .into_par_iter()
+            .map_init(Registers::default, |registers, group| {
+                self.group(samples, group, gain, (&setting, &loads), registers)
+            })
+            .collect();
         for pixel in groups.into_iter().flatten() {
             let at = pixel.index;
-            for (name, (_, image)) in names.iter().zip(&mut shaded.terms) {
-                let term = pixel.terms[name.index()];
+            for (term, (_, image)) in pixel.terms.iter().zip(&mut shaded.terms) {
                 image.rgb[at] = term.map(|x| x as f32);
                 image.alpha[at] = pixel.coverage;
             }
             shaded.image.rgb[at] =
-                [0, 1, 2].map(|c| names.iter().map(|n| pixel.terms[n.index()][c]).sum::<f64>() as f32);
+                [0, 1, 2].map(|c| pixel.terms.iter().map(|term| term[c]).sum::<f64>() as f32);
             shaded.image.alpha[at] = pixel.coverage;
             if let Some(haze) = shaded.haze.get_mut(at) {
                 *haze = pixel.haze as f32;
@@ -148,83 +110,108 @@ impl Shader {
         shaded
     }
 
-    fn hazy(&self) -> bool {
-        self.setup.effects.has_any(&[Effect::Haze, Effect::Bloom])
-    }
-
     /// The pixels of a group: means over their samples, premultiplied by their coverage.
-    fn group(&self, samples: &ViewSamples, group: usize, gain: f64) -> Vec<Pixel> {
-        let lights = Lights::new(self.setup, &self.params, self.cubes(), false, 0.0_f64);
-        let records = samples.group_start[group] as usize..samples.group_start[group + 1] as usize;
-        let lane = |lane: usize| {
-            let slot = group * LANES + lane;
-            let index = samples.pixel[slot];
-            if index == u32::MAX {
-                return None;
-            }
-            let coverage = samples.coverage[slot];
-            let mut pixel = Pixel {
-                index: index as usize,
-                coverage,
-                terms: [[0.0; 3]; TermName::BUILT_IN.len()],
+    fn group(
+        &self,
+        samples: &ViewSamples,
+        group: usize,
+        gain: f64,
+        (setting, loads): (&Setting<'_, f64>, &Loads),
+        registers: &mut Registers<f64>,
+    ) -> Vec<Pixel> {
+        let count = self.names.len();
+        let mut pixels: Vec<Pixel> = (group * LANES..(group + 1) * LANES)
+            .map(|slot| Pixel {
+                index: samples.pixel[slot] as usize,
+                coverage: samples.coverage[slot],
+                terms: vec![[0.0; 3]; count],
                 haze: 0.0,
                 glow: [0.0; 3],
-            };
-            for record in records.clone() {
-                let at = record * LANES + lane;
-                let share = f64::from(samples.surface.weight(at)) * f64::from(coverage) * gain;
+            })
+            .collect();
+        let mut numbers = Vec::with_capacity(3 * count + 1);
+        for record in samples.group_start[group] as usize..samples.group_start[group + 1] as usize {
+            numbers.clear();
+            // The same numbers with any instructions: nothing is fused, and lanes do not meet.
+            with_simd!(self.level, simd => {
+                let _ = simd;
+                numbers.extend(self.steps.record(setting, loads, &samples.surface, record, registers));
+            });
+            for (lane, pixel) in pixels.iter_mut().enumerate() {
+                let weight = f64::from(samples.surface.weight(record * LANES + lane));
+                let share = weight * f64::from(pixel.coverage) * gain;
+                // Padding holds no numbers that could be relied on.
                 if share == 0.0 {
                     continue;
                 }
-                let composition =
-                    compose(self.setup, &lights, &wide(&samples.surface.fragment(at)), &self.params);
-                let haze = share * composition.alpha();
-                for c in 0..3 {
-                    for (name, value) in composition.each_term(c) {
-                        pixel.terms[name.index()][c] += share * value;
+                let haze = share * numbers[3 * count].0[lane];
+                for (term, value) in pixel.terms.iter_mut().zip(numbers.chunks(3)) {
+                    for c in 0..3 {
+                        let value = value[c].0[lane];
+                        term[c] += share * value;
                         pixel.glow[c] += haze * value;
                     }
                 }
                 pixel.haze += haze;
             }
-            Some(pixel)
+        }
+        pixels.retain(|pixel| pixel.index != u32::MAX as usize);
+        pixels
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DMat4;
+
+    use super::*;
+    use crate::model::effects::{Form, Silhouette};
+    use crate::samples::SurfaceRecords;
+    use crate::samples::surface_records::{Asked, NEUTRAL};
+
+    /// The first of sixteen pixels in a row, of one sample each, all alike.
+    fn first(effects: &[Effect], set: impl Fn(&mut Params)) -> Shaded {
+        let mut samples = ViewSamples {
+            group_start: vec![0, 1],
+            pixel: (0..LANES as u32).collect(),
+            coverage: vec![1.0; LANES],
+            surface: SurfaceRecords::new(Asked::EVERYTHING, 1),
         };
-        (0..LANES).filter_map(lane).collect()
+        let facing =
+            crate::model::fragment::Fragment { base: [0.0, 0.0, 1.0], view: [0.0, 0.0, -1.0], ..NEUTRAL };
+        (0..LANES).for_each(|slot| samples.surface.set(slot, &facing, 1.0));
+        let setup = Setup::new(Form::Corrected, Silhouette::Bumped, Effects::of(effects));
+        let camera = Camera { world_to_camera: DMat4::IDENTITY, fov_y: 1.0, width: LANES as u32, height: 1 };
+        let dark = Illumination { irradiance: None, lobes: None, hilite: None };
+        let mut params = Params::defaults(Form::Corrected);
+        set(&mut params);
+        Shader::new(setup, &dark, &params).unwrap().shade(&samples, &camera, 2.0)
     }
-}
 
-/// The planes of a view (for each pixel slot the mean over its samples, times the gain) as an image.
-#[must_use]
-pub fn image_of_planes(samples: &ViewSamples, planes: &[Vec<f32>], camera: &Camera) -> Image {
-    let mut image = Image::new(camera.width as usize, camera.height as usize);
-    for (slot, &pixel) in samples.pixel.iter().enumerate().filter(|(_, pixel)| **pixel != u32::MAX) {
-        let (at, coverage) = (pixel as usize, samples.coverage[slot]);
-        image.rgb[at] = [0, 1, 2].map(|c| coverage * planes[c][slot]);
-        image.alpha[at] = coverage;
+    #[test]
+    fn effects_that_show_nothing_alone_make_a_black_image() {
+        let shaded = first(&[Effect::NormalMap, Effect::Rim], |_| {});
+        assert!(shaded.terms.is_empty() && shaded.haze.is_empty());
+        assert_eq!((shaded.image.rgb[0], shaded.image.alpha[0]), ([0.0; 3], 1.0));
     }
-    image
-}
 
-struct Pixel {
-    index: usize,
-    coverage: f32,
-    terms: [[f64; 3]; TermName::BUILT_IN.len()],
-    haze: f64,
-    glow: [f64; 3],
-}
+    #[test]
+    fn cubes_that_are_not_there_give_no_light() {
+        let shaded = first(&[Effect::Diffuse, Effect::Reflection, Effect::Haze], |_| {});
+        assert_eq!((shaded.image.rgb[0], shaded.haze[0]), ([0.0; 3], 0.0));
+        assert_eq!(shaded.terms.len(), 2);
+    }
 
-fn wide(f: &Fragment<f32>) -> Fragment<f64> {
-    let v = |x: [f32; 3]| x.map(f64::from);
-    Fragment {
-        base: v(f.base),
-        bump: v(f.bump),
-        normal: v(f.normal),
-        view: v(f.view),
-        occlusion: f.occlusion.into(),
-        silhouette: f.silhouette.into(),
-        dapple: f.dapple.into(),
-        albedo: v(f.albedo),
-        specular: f.specular.into(),
-        attenuator: f.attenuator.into(),
+    #[test]
+    fn the_key_light_counts_by_the_bump_alone() {
+        // The normal that is stored is the zero vector, so that N.L is 0 and n.L is the sine of the elevation's
+        // complement: the light stands along n.
+        let shaded = first(&[Effect::KeyLight], |params| {
+            params.set(Param::KeyElevation, 0.0);
+            params.set(Param::KeyAzimuth, 0.0);
+            params.set(Param::KeyColor, 0.25);
+        });
+        assert_eq!(shaded.image.rgb[0], [0.5; 3]);
+        assert_eq!(shaded.terms[0].1.rgb[0], [0.5; 3]);
     }
 }

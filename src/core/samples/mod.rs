@@ -184,7 +184,7 @@ pub fn nothing_visible(scene: &Scene, view: &View) -> SampleError {
 /// # Errors
 /// [`SampleError::NoUvs`]
 pub fn check_uvs(scene: &Scene, uvs: &[Vec2]) -> Result<(), SampleError> {
-    if scene.effects.needs(scene.silhouette).maps() && uvs.is_empty() {
+    if scene.needs().maps() && uvs.is_empty() {
         return Err(SampleError::NoUvs { scene: scene.path.display().to_string() });
     }
     Ok(())

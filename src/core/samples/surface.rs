@@ -3,10 +3,12 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::surface_records::Asked;
+use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
-use crate::model::effects::{Form, Needs, Silhouette};
+use crate::model::effects::{Form, Silhouette};
+use crate::model::evaluate::Setup;
 use crate::model::fragment::{Fragment, guarded};
+use crate::model::params::Param;
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
 use crate::scene::maps::Maps;
@@ -18,24 +20,27 @@ const LEAST_Z: f32 = 1e-6;
 /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads its neutral
 /// value, which it does not decode.
 fn bumped(scene: &Scene) -> bool {
-    let normal_map = scene.effects.needs(scene.silhouette).normal_map;
+    let normal_map = scene.needs().normal_map;
     normal_map && (scene.maps.normal.is_some() || scene.form == Form::Listing)
 }
 
 /// What the effects of a scene read of each sample.
 pub(super) fn asked_of(scene: &Scene) -> Asked {
     let bumped = bumped(scene) && !scene.mesh.tangents.is_empty();
-    asked(&scene.effects.needs(scene.silhouette), scene.silhouette, bumped)
+    asked(&scene.setup(), bumped)
 }
 
-fn asked(needs: &Needs, silhouette: Silhouette, bumped: bool) -> Asked {
+fn asked(setup: &Setup, bumped: bool) -> Asked {
+    let needs = setup.needs();
     Asked {
         bump: bumped,
         normal: needs.smooth_normal,
         albedo: needs.color_map,
         occlusion: needs.occlusion,
-        silhouette: needs.rim && silhouette != Silhouette::Bumped,
-        dapple: needs.dapple,
+        silhouette: needs.rim && setup.silhouette != Silhouette::Bumped && !setup.rim_of_corners(),
+        corners: needs.rim && setup.rim_of_corners(),
+        dapple: needs.dapple && !setup.dapple.turns(),
+        dapple_normal: needs.dapple && setup.dapple.turns(),
         specular: needs.specular_map,
         attenuator: needs.attenuator_map,
         weight: true,
@@ -48,8 +53,9 @@ pub(super) struct Surface<'a> {
     maps: &'a Maps,
     occlusion: Option<&'a [f32]>,
     form: Form,
-    silhouette: Silhouette,
-    needs: Needs,
+    setup: Setup,
+    /// What S.w is the cosine with.
+    dapple: Vec3,
     eye: DVec3,
     /// w cross(N, T) of each vertex; empty without a normal map.
     bitangents: Vec<Vec3>,
@@ -64,7 +70,8 @@ impl<'a> Surface<'a> {
         occlusion: Option<&'a [f32]>,
         eye: DVec3,
     ) -> Self {
-        let needs = scene.effects.needs(scene.silhouette);
+        let setup = scene.setup();
+        let dapple = setup.dapple.turned(scene.params.scalar(Param::EnvironmentRotation)).into();
         let bumped = bumped(scene) && !mesh.tangents.is_empty();
         let bitangent = |(n, t): (&Vec3, &glam::Vec4)| t.w * n.cross(t.truncate()).normalize_or_zero();
         let bitangents = if bumped {
@@ -75,17 +82,17 @@ impl<'a> Surface<'a> {
         let per_vertex = scene.form == Form::Listing || scene.silhouette == Silhouette::Vertex;
         let view = |p: &Vec3| (p.as_dvec3() - eye).normalize_or_zero().as_vec3();
         let views = if per_vertex { mesh.positions.par_iter().map(view).collect() } else { Vec::new() };
-        let (form, silhouette, maps) = (scene.form, scene.silhouette, &scene.maps);
-        Self { mesh, maps, occlusion, form, silhouette, needs, eye, bitangents, views }
+        let (form, maps) = (scene.form, &scene.maps);
+        Self { mesh, maps, occlusion, form, setup, dapple, eye, bitangents, views }
     }
 
     /// What the effects read of each sample.
     pub(super) fn asked(&self) -> Asked {
-        asked(&self.needs, self.silhouette, !self.bitangents.is_empty())
+        asked(&self.setup, !self.bitangents.is_empty())
     }
 
     /// The surface at `hit`.
-    pub(super) fn at(&self, hit: Hit) -> Fragment<f32> {
+    pub(super) fn at(&self, hit: Hit) -> (Fragment<f32>, Unmade) {
         let corners = self.mesh.triangles[hit.triangle as usize].map(|i| i as usize);
         let weights = hit.weights();
         let vector = |of: &[Vec3]| -> Vec3 { (0..3).map(|i| weights[i] * of[corners[i]]).sum() };
@@ -106,15 +113,14 @@ impl<'a> Surface<'a> {
             let tangent = (0..3).map(|i| weights[i] * self.mesh.tangents[corners[i]].truncate()).sum();
             self.bumped(uv, interpolated, tangent, vector(&self.bitangents))
         };
-        let silhouette = match self.silhouette {
-            Silhouette::Vertex => {
-                let at = |i: usize| self.mesh.normals[corners[i]].dot(self.views[corners[i]]);
-                (0..3).map(|i| weights[i] * (1.0 - at(i).abs().min(1.0))).sum()
-            }
+        let corner_silhouettes = self.corner_silhouettes(corners);
+        let silhouette = match self.setup.silhouette {
+            Silhouette::Vertex => (0..3).map(|i| weights[i] * corner_silhouettes[i]).sum(),
             Silhouette::Fragment | Silhouette::Bumped => 1.0 - normal.dot(view).abs().min(1.0),
         };
         let (base, bump) = guarded(base.to_array(), bump.to_array(), exact_view.to_array());
-        Fragment {
+        let dapple = self.dapple.dot(interpolated);
+        let fragment = Fragment {
             base,
             bump,
             view: view.to_array(),
@@ -122,13 +128,22 @@ impl<'a> Surface<'a> {
             occlusion: self.occlusion.map_or(1.0, scalar),
             silhouette,
             dapple: match self.form {
-                Form::Corrected => interpolated.z.max(0.0),
-                Form::Listing => interpolated.z,
+                Form::Corrected => dapple.max(0.0),
+                Form::Listing => dapple,
             },
             albedo: self.maps.color.as_ref().map_or([1.0; 3], |map| map.sample(uv.x, uv.y)),
             specular: self.maps.specular.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]),
             attenuator: self.maps.attenuator.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]),
-        }
+        };
+        let dapple_normal = interpolated.to_array();
+        (fragment, Unmade { dapple_normal, corner_silhouettes, corner_shares: weights })
+    }
+
+    /// S.z at three vertices; 0 where no one asks.
+    fn corner_silhouettes(&self, corners: [usize; 3]) -> [f32; 3] {
+        let view = |i: usize| self.views.get(i).copied();
+        let silhouette = |view: Vec3, i: usize| 1.0 - self.mesh.normals[i].dot(view).abs().min(1.0);
+        corners.map(|i| view(i).map_or(0.0, |view| silhouette(view, i)))
     }
 
     /// The normal map's part along N, and its part along T and B.

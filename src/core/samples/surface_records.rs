@@ -36,6 +36,17 @@ pub fn neutral(field: &str) -> Option<f32> {
     })
 }
 
+/// What rules read of a sample beside its [`Fragment`], where a parameter moves what the fragment holds ready made.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Unmade {
+    /// N as interpolated, from which S.w is made.
+    pub dapple_normal: [f32; 3],
+    /// S.z at the corners of the triangle, from which the rim is made.
+    pub corner_silhouettes: [f32; 3],
+    /// What each corner counts: barycentric coordinates.
+    pub corner_shares: [f32; 3],
+}
+
 /// Which numbers are kept of each sample, beside its base and its view vector.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[allow(missing_docs, reason = "named as the fragment's fields")]
@@ -46,6 +57,10 @@ pub struct Asked {
     pub occlusion: bool,
     pub silhouette: bool,
     pub dapple: bool,
+    /// In the place of the dapple.
+    pub dapple_normal: bool,
+    /// In the place of the silhouette: what [`Unmade`] has of corners.
+    pub corners: bool,
     pub specular: bool,
     pub attenuator: bool,
     /// The sample's share of its pixel; without it, each counts 1.
@@ -53,7 +68,7 @@ pub struct Asked {
 }
 
 impl Asked {
-    /// Every number.
+    /// Every number of a fragment.
     pub const EVERYTHING: Self = Self {
         bump: true,
         normal: true,
@@ -61,6 +76,8 @@ impl Asked {
         occlusion: true,
         silhouette: true,
         dapple: true,
+        dapple_normal: false,
+        corners: false,
         specular: true,
         attenuator: true,
         weight: true,
@@ -80,6 +97,9 @@ pub struct Places {
     pub occlusion: Option<usize>,
     pub silhouette: Option<usize>,
     pub dapple: Option<usize>,
+    pub dapple_normal: Option<usize>,
+    pub corner_silhouettes: Option<usize>,
+    pub corner_shares: Option<usize>,
     pub specular: Option<usize>,
     pub attenuator: Option<usize>,
     /// The sample's share of its pixel.
@@ -105,6 +125,9 @@ impl Places {
             occlusion: place(asked.occlusion, 1),
             silhouette: place(asked.silhouette, 1),
             dapple: place(asked.dapple, 1),
+            dapple_normal: place(asked.dapple_normal, 3),
+            corner_silhouettes: place(asked.corners, 3),
+            corner_shares: place(asked.corners, 3),
             specular: place(asked.specular, 1),
             attenuator: place(asked.attenuator, 1),
             weight: place(asked.weight, 1),
@@ -122,6 +145,9 @@ impl Places {
             ("open", self.occlusion, 1),
             ("silhouette", self.silhouette, 1),
             ("dapple", self.dapple, 1),
+            ("dapple_normal", self.dapple_normal, 3),
+            ("corner_silhouettes", self.corner_silhouettes, 3),
+            ("corner_shares", self.corner_shares, 3),
             ("albedo", self.albedo, 3),
             ("specular", self.specular, 1),
             ("attenuator", self.attenuator, 1),
@@ -139,6 +165,14 @@ impl Places {
         ]
     }
 
+    fn unmade(&self, unmade: &Unmade) -> [(Option<usize>, [f32; 3]); 3] {
+        [
+            (self.dapple_normal, unmade.dapple_normal),
+            (self.corner_silhouettes, unmade.corner_silhouettes),
+            (self.corner_shares, unmade.corner_shares),
+        ]
+    }
+
     fn scalars(&self, f: &Fragment<f32>) -> [(Option<usize>, f32); 5] {
         [
             (self.occlusion, f.occlusion),
@@ -150,8 +184,14 @@ impl Places {
     }
 
     /// Write one lane of a record.
-    pub(super) fn put(&self, record: &mut [Row], lane: usize, fragment: &Fragment<f32>, weight: f32) {
-        for (place, value) in self.vectors(fragment) {
+    pub(super) fn put(
+        &self,
+        record: &mut [Row],
+        lane: usize,
+        (fragment, unmade): &(Fragment<f32>, Unmade),
+        weight: f32,
+    ) {
+        for (place, value) in self.vectors(fragment).into_iter().chain(self.unmade(unmade)) {
             let Some(at) = place else { continue };
             for c in 0..3 {
                 record[at + c][lane] = value[c];
@@ -229,12 +269,21 @@ impl SurfaceRecords {
             normal: vector(at.normal, base),
             view: vector(at.view, NEUTRAL.view),
             occlusion: scalar(at.occlusion, NEUTRAL.occlusion),
-            silhouette: scalar(at.silhouette, NEUTRAL.silhouette),
+            silhouette: scalar(at.silhouette, self.silhouette_of_corners(slot)),
             dapple: scalar(at.dapple, NEUTRAL.dapple),
             albedo: vector(at.albedo, NEUTRAL.albedo),
             specular: scalar(at.specular, NEUTRAL.specular),
             attenuator: scalar(at.attenuator, NEUTRAL.attenuator),
         }
+    }
+
+    /// S.z, interpolated from the corners where records hold them.
+    fn silhouette_of_corners(&self, slot: usize) -> f32 {
+        if self.places.corner_shares.is_none() {
+            return NEUTRAL.silhouette;
+        }
+        let Unmade { corner_silhouettes, corner_shares, .. } = self.unmade(slot);
+        corner_silhouettes.iter().zip(corner_shares).map(|(z, share)| z * share).sum()
     }
 
     /// The share that the sample at `slot` has of its pixel's covered area; padding has 0.
@@ -243,8 +292,26 @@ impl SurfaceRecords {
         self.places.weight.map_or(1.0, |at| self.rows.number(at, slot))
     }
 
-    /// Set the sample at `slot`.
+    /// Set the sample at `slot`; what is made of its fragment alone.
     pub fn set(&mut self, slot: usize, fragment: &Fragment<f32>, weight: f32) {
-        self.places.put(self.rows.record_mut(slot / LANES), slot % LANES, fragment, weight);
+        self.set_all(slot, &(*fragment, Unmade::default()), weight);
+    }
+
+    /// Set the sample at `slot`.
+    pub fn set_all(&mut self, slot: usize, sample: &(Fragment<f32>, Unmade), weight: f32) {
+        self.places.put(self.rows.record_mut(slot / LANES), slot % LANES, sample, weight);
+    }
+
+    /// What the sample at `slot` holds beside its fragment; 0 where its records lack it.
+    #[must_use]
+    pub fn unmade(&self, slot: usize) -> Unmade {
+        let vector = |place: Option<usize>| {
+            place.map_or([0.0; 3], |at| [0, 1, 2].map(|c| self.rows.number(at + c, slot)))
+        };
+        Unmade {
+            dapple_normal: vector(self.places.dapple_normal),
+            corner_silhouettes: vector(self.places.corner_silhouettes),
+            corner_shares: vector(self.places.corner_shares),
+        }
     }
 }

@@ -32,7 +32,7 @@ impl Animation {
         let pose = Pose::check(&source, &file)?;
         let folder = scene.path.parent().unwrap_or(Path::new(""));
         let document = Document::open(&folder.join(&file.mesh.file))?;
-        let needs = scene.effects.needs(scene.silhouette);
+        let needs = scene.needs();
         let ask = ask(&scene.maps, scene.form, scene.effects, needs, &pose);
         let seconds = document.animation_seconds()?;
         Ok(seconds.map(|seconds| Self { document, ask, seconds }))

@@ -155,22 +155,33 @@ fn rigid(source: &Source, value: &Spanned<Vec<f64>>) -> Result<DMat4, SceneError
     let Ok(rows) = <[f64; 16]>::try_from(numbers.as_slice()) else {
         return Err(refuse(format!("has {} numbers instead of 16", numbers.len())));
     };
-    if let Some(i) = rows.iter().position(|number| !number.is_finite()) {
-        return Err(refuse(format!("holds {} at row {}, column {}", rows[i], i / 4, i % 4)));
-    }
+    all_finite(&rows, 4).map_err(refuse)?;
     let matrix = DMat4::from_cols_array(&rows).transpose();
-    let rotation = DMat3::from_mat4(matrix);
-    // Files round to a few digits; beyond 1e-3 the image would be visibly sheared.
-    let close = |a: DVec3, b: DVec3| (a - b).abs().max_element() <= 1e-3;
-    let gram = rotation.transpose() * rotation;
-    if !(close(gram.x_axis, DVec3::X) && close(gram.y_axis, DVec3::Y) && close(gram.z_axis, DVec3::Z)) {
-        return Err(refuse("scales or shears: its rotation part is not orthonormal to 1e-3".into()));
-    }
-    if rotation.determinant() < 0.0 {
-        return Err(refuse("mirrors: its rotation part is left-handed".into()));
-    }
+    turns_alone(DMat3::from_mat4(matrix)).map_err(|what| refuse(what.into()))?;
     if (matrix.row(3) - glam::DVec4::W).abs().max_element() > 1e-9 {
         return Err(refuse("has a last row other than 0, 0, 0, 1 (is it stored by columns?)".into()));
     }
     Ok(matrix)
+}
+
+/// Say where a matrix of so many columns holds what is not finite.
+pub(super) fn all_finite(rows: &[f64], columns: usize) -> Result<(), String> {
+    match rows.iter().position(|number| !number.is_finite()) {
+        Some(i) => Err(format!("holds {} at row {}, column {}", rows[i], i / columns, i % columns)),
+        None => Ok(()),
+    }
+}
+
+/// Say how a matrix is no rotation.
+pub(super) fn turns_alone(rotation: DMat3) -> Result<(), &'static str> {
+    // Files round to a few digits; beyond 1e-3 the image would be visibly sheared.
+    let close = |a: DVec3, b: DVec3| (a - b).abs().max_element() <= 1e-3;
+    let gram = rotation.transpose() * rotation;
+    if !(close(gram.x_axis, DVec3::X) && close(gram.y_axis, DVec3::Y) && close(gram.z_axis, DVec3::Z)) {
+        return Err("scales or shears: its rotation part is not orthonormal to 1e-3");
+    }
+    if rotation.determinant() < 0.0 {
+        return Err("mirrors: its rotation part is left-handed");
+    }
+    Ok(())
 }

@@ -1,7 +1,6 @@
 //! What a scene calls for of the shader planner.
 
 use super::Scene;
-use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source};
 
@@ -9,14 +8,14 @@ impl Facts {
     /// Of a scene at `params`, within `budget`, on an adapter with or without 16-bit arithmetic.
     #[must_use]
     pub fn of_scene(scene: &Scene, params: &Params, budget: Budget, f16: bool) -> Self {
-        let Scene { form, silhouette, effects, maps, mesh, .. } = scene;
+        let Scene { maps, mesh, .. } = scene;
         let same = |a: Option<(usize, usize)>, b: Option<(usize, usize)>| a.is_some() && a == b;
         let color = maps.color.as_ref().map(|map| (map.width, map.height));
         let normal = maps.normal.as_ref().map(|map| (map.width, map.height));
         let specular = maps.specular.as_ref().map(|map| (map.width, map.height));
         let attenuator = maps.attenuator.as_ref().map(|map| (map.width, map.height));
         Self {
-            setup: Setup { form: *form, silhouette: *silhouette, effects: *effects },
+            setup: scene.setup(),
             source: Source::Raster,
             maps: MapFacts {
                 color: color.is_some(),

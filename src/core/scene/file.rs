@@ -58,6 +58,7 @@ pub(super) struct EnvironmentTable {
     pub file: PathBuf,
     pub rotation_degrees: Option<Spanned<f64>>,
     pub intensity: Option<Spanned<f64>>,
+    pub dapple: Option<Spanned<Vec<f64>>>,
 }
 
 /// `[model]`
@@ -66,6 +67,7 @@ pub(super) struct EnvironmentTable {
 pub(super) struct ModelTable {
     pub form: Option<Spanned<String>>,
     pub silhouette: Option<Spanned<String>>,
+    pub lookups: Option<Spanned<String>>,
     pub effects: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     pub terms: Vec<PathBuf>,

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::animation::{Pose, ask, idle_effects};
 use super::cameras::{self, ViewPlan};
+use super::dapple::dapple;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, SceneFile, Source};
 use super::gltf::{Ask, Document};
@@ -14,7 +15,9 @@ use super::settings::{self, interval, number};
 use super::terms::terms;
 use super::view::{Background, View};
 use super::{FitSettings, Scene, images};
-use crate::model::effects::{Effects, Needs};
+use crate::model::dapple::Dapple;
+use crate::model::effects::{Effect, Effects, Needs};
+use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::progress;
 
@@ -56,6 +59,8 @@ impl Scene {
         let folder = path.parent().unwrap_or(Path::new(""));
         let terms = terms(&file.model, folder)?;
         let (form, silhouette) = settings::form(&source, &file.model)?;
+        let lookups = settings::lookups(&source, &file.model)?;
+        let dapple = read_dapple(&source, &file)?;
         let params = settings::params(&source, &file.model.params, form)?;
         let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
@@ -75,13 +80,19 @@ impl Scene {
         if listed.is_none() {
             effects = terms.iter().fold(effects, |effects, term| effects.with(term.effect));
         }
-        let needs = effects.needs(silhouette);
+        let setup = Setup { lookups, dapple, ..Setup::new(form, silhouette, effects) };
+        let needs = setup.needs();
         let mut idle = Warnings::new();
         let fit = settings::fit(&source, &file.fit, &file.model.params, effects, &mut idle)?;
         if options.targets {
             // What is free concerns a fit alone.
             warnings.append(&mut idle);
             check_haze(&source, &mut plans, &fit, needs, &mut warnings);
+        }
+        if effects.has(Effect::NormalMap) && !setup.bumps() {
+            let message = "looks cubes up along the smooth normal, and nothing else sees a normal map: the effect \
+                           `normal_map` does nothing without `key_light`";
+            warn(&mut warnings, &source.path, message);
         }
         let maps = read_maps(&source, &file, folder, needs, &mut warnings)?;
         bar.inc(1);
@@ -109,6 +120,8 @@ impl Scene {
             environment,
             form,
             silhouette,
+            lookups,
+            dapple,
             effects,
             params,
             views,
@@ -242,6 +255,13 @@ fn light(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneE
     Ok((turn, intensity))
 }
 
+/// Where light falls through leaves from, in the environment as it is turned.
+fn read_dapple(source: &Source, file: &SceneFile) -> Result<Dapple, SceneError> {
+    let Some(table) = &file.environment else { return Ok(Dapple::default()) };
+    let (degrees, _) = light(source, table)?;
+    dapple(source, table.dapple.as_ref(), degrees)
+}
+
 /// Refuse the text of a scene file for whatever [`Scene::load`] would refuse before it reads another file than those of
 /// its terms.
 pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
@@ -249,6 +269,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let file: SceneFile = source.parse()?;
     let terms = terms(&file.model, path.parent().unwrap_or(Path::new("")))?;
     let (form, _) = settings::form(&source, &file.model)?;
+    settings::lookups(&source, &file.model)?;
     settings::params(&source, &file.model.params, form)?;
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
@@ -260,7 +281,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let effects = settings::effects(&source, &file.model)?.unwrap_or_else(every);
     settings::fit(&source, &file.fit, &file.model.params, effects, &mut Warnings::new())?;
     normal_flip(&source, &file)?;
-    file.environment.as_ref().map_or(Ok(()), |table| light(&source, table).map(drop))
+    read_dapple(&source, &file).map(drop)
 }
 
 fn metres(source: &Source, file: &SceneFile) -> Result<f64, SceneError> {

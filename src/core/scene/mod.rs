@@ -4,7 +4,7 @@
 //! - [`view`]: cameras and targets
 //! - [`maps`]: texture maps and the panorama
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
-//!   `settings` and `cameras`
+//!   `settings`, `cameras` and `dapple`
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
@@ -18,6 +18,7 @@
 pub mod animation;
 pub mod assignment;
 mod cameras;
+mod dapple;
 pub mod error;
 pub mod facts;
 mod file;
@@ -47,8 +48,10 @@ pub use terms::register_terms;
 
 use std::path::PathBuf;
 
-use crate::model::effects::{Effects, Form, Silhouette};
-use crate::model::params::{Column, Params};
+use crate::model::dapple::Dapple;
+use crate::model::effects::{Effects, Form, Lookups, Needs, Silhouette};
+use crate::model::evaluate::Setup;
+use crate::model::params::{Column, Param, Params};
 
 /// A scene that was read and checked.
 #[derive(Clone, Debug)]
@@ -67,6 +70,10 @@ pub struct Scene {
     pub form: Form,
     /// Where S.z is evaluated.
     pub silhouette: Silhouette,
+    /// Along which normal the cubes are looked up.
+    pub lookups: Lookups,
+    /// Where light falls through leaves from, before `environment_rotation`.
+    pub dapple: Dapple,
     /// What is switched on.
     pub effects: Effects,
     /// Start values.
@@ -79,6 +86,24 @@ pub struct Scene {
     pub quality: Quality,
     /// How far the bloom reaches.
     pub bloom: Bloom,
+}
+
+impl Scene {
+    /// The switches of the model.
+    #[must_use]
+    pub fn setup(&self) -> Setup {
+        let Self { form, silhouette, effects, lookups, dapple, .. } = *self;
+        let rotation = Param::EnvironmentRotation;
+        let turns = self.fit.free.iter().any(|column| column.param == rotation);
+        let interpolated_rim = form == Form::Listing;
+        Setup { form, silhouette, effects, lookups, dapple: dapple.turning(turns), interpolated_rim }
+    }
+
+    /// What its effects ask for.
+    #[must_use]
+    pub fn needs(&self) -> Needs {
+        self.setup().needs()
+    }
 }
 
 /// The scene's `[bloom]` table.
@@ -114,7 +139,7 @@ pub struct FitSettings {
 pub enum Loss {
     /// r^2
     L2,
-    /// r^2 / (target^2 + 0.01): errors count in proportion, down to a tenth of unit radiance.
+    /// About r^2 / (model + 0.1)^2, by reweighting: errors count in proportion, down to a tenth of unit radiance.
     #[default]
     RelativeL2,
     /// r^2 within 0.05, then linear (Huber): outliers count less.

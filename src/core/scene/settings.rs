@@ -5,7 +5,7 @@ use toml::Spanned;
 use super::error::{SceneError, Warnings, warn};
 use super::file::{BloomTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
 use super::{Bloom, FitSettings, Loss, Quality, map_fit};
-use crate::model::effects::{Effect, Effects, Form, Silhouette};
+use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
 
 /// The `[model]` table's form and silhouette.
@@ -19,6 +19,12 @@ pub(super) fn form(source: &Source, model: &ModelTable) -> Result<(Form, Silhoue
         None => form.default_silhouette(),
     };
     Ok((form, silhouette))
+}
+
+/// The `[model]` table's `lookups`.
+pub(super) fn lookups(source: &Source, model: &ModelTable) -> Result<Lookups, SceneError> {
+    let known = Lookups::ALL.map(|lookups| (lookups.name(), lookups));
+    model.lookups.as_ref().map_or(Ok(Lookups::default()), |name| source.choose("lookups", name, &known))
 }
 
 /// The `effects` key, where there is one.

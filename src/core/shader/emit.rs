@@ -58,6 +58,10 @@ pub const SAMPLE: [(&str, &str); 10] = [
     ("attenuator", "f32"),
 ];
 
+/// What a stored sample may hold beside, from which a rule makes what [`SAMPLE`] holds ready made.
+pub const UNMADE: [(&str, &str); 3] =
+    [("dapple_normal", "vec3f"), ("corner_silhouettes", "vec3f"), ("corner_shares", "vec3f")];
+
 /// The cheapest shader that yields what `facts` call for.
 ///
 /// # Errors
@@ -94,18 +98,21 @@ pub fn sample_fields(facts: &Facts) -> Fields {
     }
     let needs = facts.needs();
     let bumped_silhouette = facts.holds("bumped_silhouette") == Some(true);
+    let (turning, corners) = (facts.setup.dapple.turns(), facts.setup.rim_of_corners());
     let wanted = |name: &str| match name {
         "bump" => needs.normal_map,
         "normal" => needs.smooth_normal,
         "open" => needs.occlusion,
-        "silhouette" => needs.rim && !bumped_silhouette,
-        "dapple" => needs.dapple,
+        "silhouette" => needs.rim && !bumped_silhouette && !corners,
+        "corner_silhouettes" | "corner_shares" => needs.rim && corners,
+        "dapple" => needs.dapple && !turning,
+        "dapple_normal" => needs.dapple && turning,
         "albedo" => needs.color_map,
         "specular" => needs.specular_map,
         "attenuator" => needs.attenuator_map,
         _ => true,
     };
-    SAMPLE.iter().copied().filter(|(name, _)| wanted(name)).collect()
+    SAMPLE.into_iter().chain(UNMADE).filter(|(name, _)| wanted(name)).collect()
 }
 
 /// Whether the haze goes to alpha.
@@ -240,6 +247,7 @@ impl Plan {
         }
         if stages.contains(&Stage::Fragment) {
             wgsl.push_str(&self.face_sizes());
+            wgsl.push_str(&self.dapple_axis());
         }
         for step in steps().filter(|step| step.rule.plain_value().is_none()) {
             if !step.rule.about.is_empty() {
@@ -266,6 +274,18 @@ impl Plan {
             format!("\nfn {name}_size() -> f32 {{\n    return {size};\n}}\n")
         };
         faces.map(function).collect()
+    }
+
+    /// `axis_of_dapple()`, where a rule asks for it.
+    fn dapple_axis(&self) -> String {
+        if !self.steps.iter().any(|step| step.rule.body.contains("axis_of_dapple()")) {
+            return String::new();
+        }
+        let [x, y, z] = self.facts.setup.dapple.axis();
+        format!(
+            "\n// The third row of DappleXf in the world, before environment_rotation (MODEL 2).\n\
+             fn axis_of_dapple() -> vec3f {{\n    return vec3f({x:?}, {y:?}, {z:?});\n}}\n"
+        )
     }
 
     /// The rules of a stage, in the order of their evaluation.

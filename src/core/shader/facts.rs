@@ -1,6 +1,7 @@
 //! What a scene calls for: the input of the planner.
 
 use crate::model::compose::TermName;
+use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::shader::quantity::Resource;
@@ -114,11 +115,7 @@ impl Default for Facts {
             normal_attenuator: true,
         };
         Self {
-            setup: Setup {
-                form: Form::Corrected,
-                silhouette: Silhouette::Fragment,
-                effects: Effects::SURFACE,
-            },
+            setup: Setup::new(Form::Corrected, Silhouette::Fragment, Effects::SURFACE),
             source: Source::Raster,
             maps: one_size,
             faces: FaceSizes::default(),
@@ -138,17 +135,21 @@ impl Facts {
     /// What the enabled effects ask for.
     #[must_use]
     pub fn needs(&self) -> Needs {
-        self.setup.effects.needs(self.setup.silhouette)
+        self.setup.needs()
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 17] = [
+    pub const CONDITIONS: [&'static str; 21] = [
         "vertex_silhouette",
         "fragment_silhouette",
         "bumped_silhouette",
         "raster",
         "terms",
         "bumped",
+        "smooth_lookups",
+        "dapple_ahead",
+        "dapple_turned",
+        "interpolated_rim",
         "has_color_map",
         "has_normal_map",
         "has_specular_map",
@@ -183,6 +184,9 @@ impl Facts {
             "raster" => self.source == Source::Raster,
             "terms" => self.source == Source::Terms,
             "bumped" => self.bumped(),
+            "smooth_lookups" => self.setup.smooth_lookups(),
+            "interpolated_rim" => self.setup.rim_of_corners(),
+            "dapple_ahead" => self.setup.dapple.axis() == Dapple::LEAVES_AHEAD.axis(),
             "has_color_map" => self.maps.color,
             "has_normal_map" => self.maps.normal,
             "has_specular_map" => self.maps.specular,
@@ -191,6 +195,7 @@ impl Facts {
             "normal_attenuator_one_size" => self.maps.normal_attenuator,
             "morphs" => self.morphs > 0,
             "bones" => self.bones,
+            "dapple_turned" => self.turned && !self.setup.dapple.is_in_world(),
             "turned" => self.turned,
             "square_rim" => self.square_rim,
             "f16" => self.f16,
@@ -201,7 +206,7 @@ impl Facts {
     /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads
     /// its neutral value, which it does not decode.
     fn bumped(&self) -> bool {
-        let normal_map = self.setup.effects.has(Effect::NormalMap);
-        normal_map && (self.source != Source::Raster || self.maps.normal || self.setup.form == Form::Listing)
+        self.setup.bumps()
+            && (self.source != Source::Raster || self.maps.normal || self.setup.form == Form::Listing)
     }
 }

@@ -13,7 +13,7 @@ use super::search::PlanError;
 use crate::model::params::Param;
 
 /// What is kept of the built-in effects, with WGSL types.
-const TERMS: [(&str, &str); 8] = [
+const TERMS: [(&str, &str); 10] = [
     ("diffuse_term", "vec3f"),
     ("side_term", "vec3f"),
     ("hilite_term", "vec3f"),
@@ -21,6 +21,8 @@ const TERMS: [(&str, &str); 8] = [
     ("haze_term", "f32"),
     ("key_term", "vec3f"),
     ("silhouette", "f32"),
+    ("corner_silhouettes", "vec3f"),
+    ("corner_shares", "vec3f"),
     ("open", "f32"),
 ];
 
@@ -41,6 +43,7 @@ fn of_built_in(facts: &Facts) -> Fields {
     let needs = facts.needs();
     let parts = parts(facts);
     let part = |name: &str| parts.contains(&name);
+    let corners = facts.setup.rim_of_corners();
     let wanted = |name: &str| match name {
         "diffuse_term" => part("diffuse_part"),
         "side_term" => part("side_part"),
@@ -48,7 +51,8 @@ fn of_built_in(facts: &Facts) -> Fields {
         "mirror_term" => part("mirror_part"),
         "key_term" => part("key_part"),
         "haze_term" => hazy(facts),
-        "silhouette" => needs.rim,
+        "silhouette" => needs.rim && !corners,
+        "corner_silhouettes" | "corner_shares" => needs.rim && corners,
         _ => needs.occlusion,
     };
     TERMS.iter().copied().filter(|(name, _)| wanted(name)).collect()
@@ -154,7 +158,7 @@ mod tests {
                 Effect::BUILT_IN.into_iter().enumerate().filter(on).map(|(_, e)| e).collect();
             for silhouette in Silhouette::ALL {
                 let facts = Facts {
-                    setup: Setup { form: Form::Corrected, silhouette, effects },
+                    setup: Setup::new(Form::Corrected, silhouette, effects),
                     source: Source::Terms,
                     ..Facts::default()
                 };
@@ -166,7 +170,7 @@ mod tests {
     #[test]
     fn what_moves_lookups_is_held() {
         let facts = |effects| Facts {
-            setup: Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects },
+            setup: Setup::new(Form::Corrected, Silhouette::Fragment, effects),
             turned: true,
             ..Facts::default()
         };

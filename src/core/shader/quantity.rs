@@ -20,12 +20,23 @@ pub enum Attribute {
     Joints,
     /// Weights of four bones: `vec4f`.
     Weights,
+    /// Which corner of its triangle it is, a unit vector for each of the three: `vec3f`. A mesh has it where triangles
+    /// share no vertices.
+    Corner,
 }
 
 impl Attribute {
     /// Every attribute.
-    pub const ALL: [Self; 7] =
-        [Self::Position, Self::Normal, Self::Tangent, Self::Uv, Self::Occlusion, Self::Joints, Self::Weights];
+    pub const ALL: [Self; 8] = [
+        Self::Position,
+        Self::Normal,
+        Self::Tangent,
+        Self::Uv,
+        Self::Occlusion,
+        Self::Joints,
+        Self::Weights,
+        Self::Corner,
+    ];
 
     /// The quantity's name in rules.
     #[must_use]
@@ -38,6 +49,7 @@ impl Attribute {
             Self::Occlusion => "rest_occlusion",
             Self::Joints => "joints",
             Self::Weights => "joint_weights",
+            Self::Corner => "corner",
         }
     }
 
@@ -45,7 +57,7 @@ impl Attribute {
     #[must_use]
     pub const fn wgsl(self) -> &'static str {
         match self {
-            Self::Position | Self::Normal => "vec3f",
+            Self::Position | Self::Normal | Self::Corner => "vec3f",
             Self::Tangent | Self::Weights => "vec4f",
             Self::Uv => "vec2f",
             Self::Occlusion => "f32",
@@ -57,7 +69,7 @@ impl Attribute {
     #[must_use]
     pub const fn bytes(self) -> u64 {
         match self {
-            Self::Position | Self::Normal => 12,
+            Self::Position | Self::Normal | Self::Corner => 12,
             Self::Tangent | Self::Weights | Self::Joints => 16,
             Self::Uv => 8,
             Self::Occlusion => 4,

@@ -195,11 +195,12 @@ impl Rule {
 const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
-pub const LIBRARY: [(&str, &str); 4] = [
+pub const LIBRARY: [(&str, &str); 5] = [
     ("vector", include_str!("rules/lib/vector.wgsl")),
     ("frame", include_str!("rules/lib/frame.wgsl")),
     ("cube", include_str!("rules/lib/cube.wgsl")),
     ("texels", include_str!("rules/lib/texels.wgsl")),
+    ("rim", include_str!("rules/lib/rim.wgsl")),
 ];
 
 /// The built-in rules.

@@ -33,12 +33,13 @@ pub use self::samples::{DeviceSampleError, DeviceSamples};
 use self::terms::replace_samples;
 use crate::bake::Illumination;
 use crate::model::compose::TermName;
-use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::scene::Loss;
 use crate::shader::facts::FaceSizes;
 use crate::{Gpu, GpuError};
+use skinfit_core::engine::cpu::CpuEngine;
+use skinfit_core::engine::pulls::Pulls;
 use skinfit_core::engine::view::ObservedView;
 use skinfit_core::engine::{BLOCK, NormalEquations, Objective, Point, Unknown};
 
@@ -75,6 +76,8 @@ pub struct GpuEngine<'g> {
     made_seconds: f64,
     setup: Setup,
     views: &'g [ObservedView],
+    /// For the one pass that the CPU makes: see `pulls`.
+    illumination: Illumination,
     loss: Loss,
     unknowns: Vec<Unknown>,
     stride: usize,
@@ -144,7 +147,7 @@ impl<'g> GpuEngine<'g> {
     ) -> Result<Self, GpuError> {
         let Task { setup, illumination, views, loss, unknowns } = task;
         // Mesa's software driver loses its device over a pass that looks nothing up and weighs nothing.
-        if TermName::of(setup.effects).is_empty() && !setup.effects.needs(setup.silhouette).haze {
+        if TermName::of(setup.effects).is_empty() && !setup.needs().haze {
             return Err(GpuError::NothingShown);
         }
         let alpha = views.iter().any(ObservedView::compares_alpha);
@@ -154,6 +157,7 @@ impl<'g> GpuEngine<'g> {
             made,
             made_seconds: 0.0,
             setup,
+            illumination: illumination.clone(),
             loss,
             unknowns,
             stride: 1,
@@ -219,12 +223,6 @@ impl<'g> GpuEngine<'g> {
     #[must_use]
     pub fn device_samples(&self) -> Option<(&'g DeviceSamples<'g>, f64)> {
         Some((self.made?, self.made_seconds))
-    }
-
-    /// What is switched on.
-    #[must_use]
-    pub const fn effects(&self) -> Effects {
-        self.setup.effects
     }
 
     /// The adapter's name.
@@ -395,11 +393,32 @@ impl Objective for GpuEngine<'_> {
     }
 
     fn is_quadratic(&self) -> bool {
-        matches!(self.loss, Loss::L2 | Loss::RelativeL2) && !self.traits.clipped
+        self.loss == Loss::L2 && !self.traits.clipped
     }
 
     fn rounding(&self) -> f64 {
         skinfit_core::engine::rounding(self.views, self.loss, self.stride)
+    }
+
+    /// Made by the CPU engine, a view at a time, from the samples that it uploaded; of samples that the adapter made
+    /// there are none.
+    fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
+        if self.made.is_some() || widths.len() != self.views.len() {
+            return None;
+        }
+        let mut pulls = Pulls::default();
+        for index in 0..self.views.len() {
+            let mut alone = vec![ObservedView::default(); self.views.len()];
+            alone[index] = self.views[index].clone();
+            let (illumination, unknowns) = (self.illumination.clone(), self.unknowns.clone());
+            let mut engine =
+                CpuEngine::with_kept_terms(self.setup, illumination, alone, self.loss, unknowns, false);
+            engine.set_stride(self.stride);
+            let mut of_view = engine.pulls(point, widths)?;
+            pulls.residuals.push(of_view.residuals.swap_remove(index));
+            pulls.tiles.append(&mut of_view.tiles);
+        }
+        Some(pulls)
     }
 
     fn fault(&self) -> Option<String> {

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use crate::records::StoredRecords;
 use crate::samples::LANES;
 use crate::samples::surface_records::Places;
-use crate::shader::emit::SAMPLE;
+use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::module::uniform;
 use crate::shader::rule::Stage;
 use crate::shader::{Facts, Plan, PlanError, Source};
@@ -157,6 +157,6 @@ fn quantity(field: &'static str, facts: &Facts) -> &'static str {
 
 /// The numbers of a quantity, one by one.
 fn parts(field: &Field, goal: &str) -> Vec<String> {
-    let vector = SAMPLE.iter().any(|(name, kind)| *name == field.name && *kind == "vec3f");
+    let vector = SAMPLE.iter().chain(&UNMADE).any(|(name, kind)| *name == field.name && *kind == "vec3f");
     if vector { ["x", "y", "z"].map(|c| format!("{goal}.{c}")).to_vec() } else { vec![goal.to_owned()] }
 }

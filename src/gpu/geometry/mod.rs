@@ -68,7 +68,11 @@ impl<'a> Geometry<'a> {
         let targets: Vec<usize> = (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0).collect();
         let morph_weights = targets.iter().map(|&i| morphs[i].weight).collect();
         let facts = Facts::of_scene(content.scene, content.params, Budget::Exact, false);
-        let mut uploads = Uploads::new(gpu, content, targets)?;
+        let mut uploads = if places.corner_shares.is_some() {
+            Uploads::by_corner(gpu, content, targets)?
+        } else {
+            Uploads::new(gpu, content, targets)?
+        };
         let unplanned = |error: crate::shader::PlanError| GpuError::Plan(error.to_string());
         let alone = outline(&facts).map_err(unplanned)?;
         let alone = Program::new(gpu, alone, &mut uploads, &[], 1)?;

@@ -21,7 +21,7 @@ pub(super) struct Arguments {
     /// Leave two parts out at a time, too.
     #[arg(long)]
     pairs: bool,
-    /// Fit the constants that are left again in each case: what can the others make up for?
+    /// Fit the constants that are left again in each case, from four starts (the whole model from three of them): what can the others make up for?
     #[arg(long)]
     refit: bool,
     /// Constants of an earlier fit [default: the whole model is fitted to the targets first; without targets, the

@@ -17,6 +17,8 @@ pub(super) fn fingerprint(scene: &Scene) -> Fingerprint {
     let all = Fingerprint::default()
         .with("form", scene.form.name())
         .with("silhouette", scene.silhouette.name())
+        .with("lookups", scene.lookups.name())
+        .with("dapple", format!("{:?}", scene.dapple))
         .with("list of effects", effects.join(" "))
         .with("loss", scene.fit.loss.name())
         .with("color map", map(color.as_ref()))

@@ -1,5 +1,6 @@
 //! `skinfit info`: what there is to compute with, and what will be used.
 
+use super::machine::processor;
 use super::{Exit, Refusal, quieten_graphics, say};
 
 /// Print graphics adapters, their limits, what will be used and why
@@ -41,6 +42,7 @@ struct Report {
 
 #[derive(serde::Serialize)]
 struct Cpu {
+    processor: String,
     threads: usize,
     instructions: String,
 }
@@ -68,7 +70,11 @@ struct Feature {
 
 impl Report {
     fn new(wanted: Option<&str>) -> Self {
-        let cpu = Cpu { threads: rayon::current_num_threads(), instructions: crate::simd::instructions() };
+        let cpu = Cpu {
+            processor: processor(),
+            threads: rayon::current_num_threads(),
+            instructions: crate::simd::instructions(),
+        };
         let (adapters, choice) = graphics::adapters(wanted);
         let (adapter, why) = match choice {
             Ok((name, why)) => (Some(name), why),
@@ -81,7 +87,7 @@ impl Report {
     fn text(&self) -> String {
         let mut lines = vec![
             format!("skinfit {}", self.version),
-            format!("CPU: {} threads, {}", self.cpu.threads, self.cpu.instructions),
+            format!("CPU: {}, {} threads, {}", self.cpu.processor, self.cpu.threads, self.cpu.instructions),
         ];
         for adapter in &self.adapters {
             lines.push(format!("adapter: {} ({}, {})", adapter.name, adapter.kind, adapter.interface));

@@ -3,7 +3,7 @@
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `stability`,
 //!   `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit; `fingerprint`: what its state belongs to
-//! - `graphics`: what to do about an adapter that cannot
+//! - `graphics`: what to do about an adapter that cannot; `machine`: what a report says of its making
 //! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
@@ -20,6 +20,7 @@ mod fitted_scene;
 mod graphics;
 mod info;
 mod interrupt;
+mod machine;
 mod maps;
 mod params;
 mod render;

@@ -96,14 +96,14 @@ fn scores(view: &ViewRow) -> String {
 fn csv(ablation: &Ablation) -> String {
     let mut text = String::from(
         "left_out,view,loss,loss_change,std_error,t,linear_rms,relative_rms,psnr_db,ssim,flip,cpu_ms,cpu_ratio,\
-         gpu_ms,gpu_ratio,operations,bytes_a_sample,samples,baked_bytes,bakes\n",
+         gpu_ms,gpu_ratio,operations,bytes_a_sample,samples,baked_bytes,bakes,starts,best_start\n",
     );
     for row in &ablation.rows {
         let (name, mean) = (row.left_out.name(), row.mean());
-        let Row { loss, change, counts, .. } = row;
+        let Row { loss, change, counts, starts, .. } = row;
         let _ = writeln!(
             text,
-            "{name},all,{loss:e},{:e},{:e},{},{},{},{},{:.1},{},{},{},{}",
+            "{name},all,{loss:e},{:e},{:e},{},{},{},{},{:.1},{},{},{},{},{}",
             change.loss,
             change.std_error,
             change.t.map_or_else(String::new, |t| format!("{t:.2}")),
@@ -115,11 +115,12 @@ fn csv(ablation: &Ablation) -> String {
             counts.samples,
             counts.baked_bytes,
             counts.bakes.join(" "),
+            starts.as_ref().map_or_else(|| ",".to_owned(), |s| format!("{},{}", s.tried.len(), s.best)),
         );
         for view in &row.views {
             let name_of_view = view.view.replace([',', '"', '\n'], "_");
             let _ =
-                writeln!(text, "{name},{name_of_view},{:e},,,,{},,,,,,,,,", view.loss, view_columns(view));
+                writeln!(text, "{name},{name_of_view},{:e},,,,{},,,,,,,,,,,", view.loss, view_columns(view));
         }
     }
     text

@@ -1,6 +1,6 @@
 //! Ablation: each effect and each term left out in turn, what the images lose and what is saved.
 //!
-//! - [`case`]: what is left out
+//! - [`case`]: what is left out; [`mod@refit`]: what is left, fitted again
 //! - [`measure`]: the time of a case beside the whole model's
 //! - [`files`]: the table, `results.csv`, `results.json`, pictures; [`page`]: `report.html`, [`mod@pairs`]
 //!   in it
@@ -12,6 +12,7 @@ pub mod files;
 pub mod measure;
 pub mod page;
 pub mod pairs;
+pub mod refit;
 mod units;
 
 use std::path::{Path, PathBuf};
@@ -25,7 +26,6 @@ use super::significance::{Change, LossMap, change};
 use super::subject::Subject;
 use super::timing::Timed;
 use crate::engine::{Objective, Point, Unknown};
-use crate::fit::FitOptions;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
@@ -36,6 +36,7 @@ use crate::report::pictures::Picture;
 use crate::scene::Loss;
 use case::Case;
 use measure::Clocks;
+use refit::{Starts, errors_of, refit};
 
 /// What is to be ablated, and how.
 #[derive(Clone, Debug, Default)]
@@ -108,6 +109,8 @@ pub struct Row {
     pub constants: Vec<Constant>,
     /// How the fit ended, where there was one.
     pub ending: Option<Ending>,
+    /// Where the fits of what is left began, where it was fitted again.
+    pub starts: Option<Starts>,
 }
 
 /// One view of a case.
@@ -167,20 +170,26 @@ pub fn ablate(scene: &Path, options: &AblationOptions) -> Result<Ablation, Study
     let source = whole.source;
     // Beside itself, the whole model has nothing to be fitted to.
     let fit = source == Source::Targets && (options.refit || options.params.is_none());
-    let outcome = if fit { Some(whole.fit(&FitOptions::default())?) } else { None };
-    let point = outcome.as_ref().map_or_else(|| whole.prepared.start(), |outcome| outcome.end.clone());
-    let images = whole.images(&point);
+    let own = whole.prepared.start();
+    let (outcome, starts) = match (fit, options.refit) {
+        (false, _) => (None, None),
+        (true, false) => (Some(whole.fit(&errors_of(&whole))?), None),
+        // From the starts that its parts have, but the one that is its own end.
+        (true, true) => Some(refit(&whole, None, &own)?).unzip(),
+    };
+    let point = outcome.as_ref().map_or_else(|| own.clone(), |outcome| outcome.end.clone());
+    let images = whole.images(&point)?;
     // Without targets, the whole model at its constants is what the others should look like.
     let made = (source == Source::Model).then(|| images.clone());
     let references = references(&whole);
-    let study = Study { scene, prepare, options, references, made, point: &point };
+    let study = Study { scene, prepare, options, references, made, point: &point, own: &own };
     let clocks = Clocks::new(&whole, &point, options.gpu)?;
     let mut warnings = whole.prepared.warnings.clone();
     warnings.extend(clocks.warning.clone());
 
     let loss = whole.prepared.scene.fit.loss;
     let errors = study.errors(&images, loss);
-    let full = Evaluated { case: Case::default(), images, errors, point: point.clone(), outcome };
+    let full = Evaluated { case: Case::default(), images, errors, point: point.clone(), outcome, starts };
     let before: Vec<LossMap> = full.errors.iter().map(|errors| errors.map.clone()).collect();
     let cases = Case::all(whole.prepared.scene.effects, options.pairs);
     let mut held = Vec::new();
@@ -239,7 +248,10 @@ struct Study<'a> {
     references: Vec<ReferenceView>,
     /// The whole model's images, where they are the reference.
     made: Option<Vec<Image>>,
+    /// The whole model's constants.
     point: &'a Point,
+    /// Where a fit of the scene starts.
+    own: &'a Point,
 }
 
 impl Study<'_> {
@@ -259,13 +271,19 @@ impl Study<'_> {
             let gains = prepared.gains.iter_mut().zip(compared).filter(|(_, compared)| *compared);
             gains.zip(&self.point.gains).for_each(|((own, _), gain)| *own = *gain);
         })?;
-        let outcome = if self.options.refit { Some(subject.fit(&FitOptions::default())?) } else { None };
-        let start =
-            || Point { params: subject.prepared.scene.params.clone(), gains: self.point.gains.clone() };
-        let point = outcome.as_ref().map_or_else(start, |outcome| outcome.end.clone());
-        let images = subject.images(&point);
+        let from_whole =
+            Point { params: subject.prepared.scene.params.clone(), gains: self.point.gains.clone() };
+        let (outcome, starts) = if self.options.refit {
+            let mut own = self.own.clone();
+            case.apply(effects, &mut own.params, &mut Vec::new());
+            Some(refit(&subject, Some(&from_whole), &own)?).unzip()
+        } else {
+            (None, None)
+        };
+        let point = outcome.as_ref().map_or(from_whole, |outcome| outcome.end.clone());
+        let images = subject.images(&point)?;
         let errors = self.errors(&images, subject.prepared.scene.fit.loss);
-        Ok((subject, Evaluated { case, images, errors, point, outcome }))
+        Ok((subject, Evaluated { case, images, errors, point, outcome, starts }))
     }
 }
 
@@ -276,6 +294,7 @@ struct Evaluated {
     errors: Vec<ViewErrors>,
     point: Point,
     outcome: Option<Outcome>,
+    starts: Option<Starts>,
 }
 
 impl Evaluated {
@@ -303,6 +322,7 @@ impl Evaluated {
             gpu,
             constants: constants(subject, &self.point, self.outcome.as_ref()),
             ending: self.outcome.map(|outcome| outcome.ending),
+            starts: self.starts,
             left_out: self.case,
         })
     }

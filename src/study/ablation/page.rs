@@ -139,8 +139,8 @@ fn summary(ablation: &Ablation, full: &Row) -> String {
         }
         table.row(class, &cells);
     }
-    let note = "<p class=\"quiet\">Click a heading to sort. The first row is the whole model; its time is taken beside itself, \
-                so that what it seems to save is the noise of the clock.</p>";
+    let note = "<p class=\"quiet\">Click a heading to sort. The first row is the whole model, timed \
+                in turns with a second copy of itself: the time that it seems to save is the noise of the clock.</p>";
     format!("{note}{}", table.html("cases"))
 }
 
@@ -269,6 +269,7 @@ fn constants(ablation: &Ablation) -> String {
         .unwrap_or_default();
     let columns: Vec<(&str, &str)> = std::iter::once(("left out", "which effects or terms"))
         .chain(names.iter().map(|name| (*name, "its fitted value")))
+        .chain([("best start.", "which start's end was kept, and of how many")])
         .collect();
     let mut table = Table::new(&columns);
     for row in &ablation.rows {
@@ -282,8 +283,11 @@ fn constants(ablation: &Ablation) -> String {
                 Cell::value(html, constant.value)
             }
         };
-        let cells: Vec<Cell> =
-            std::iter::once(Cell::text(&row.left_out.name())).chain(names.iter().map(cell)).collect();
+        let best = row.starts.as_ref().map_or_else(Cell::none, |starts| Cell::text(&starts.words()));
+        let cells: Vec<Cell> = std::iter::once(Cell::text(&row.left_out.name()))
+            .chain(names.iter().map(cell))
+            .chain([best])
+            .collect();
         table.row(class, &cells);
     }
     table.html("by-constant")

@@ -163,7 +163,7 @@ impl Setting {
         params.set(Param::EnvironmentRotation, 20.0);
         params.set(Param::KeyAzimuth, 30.0);
         params.set_rgb(Param::KeyColor, [0.5, 0.375, 0.25]);
-        let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects: EVERYTHING };
+        let setup = Setup::new(Form::Corrected, Silhouette::Fragment, EVERYTHING);
         Self { setup, params, lights: LightKind::Wavy, loss: Loss::L2 }
     }
 }

@@ -6,6 +6,7 @@ use super::hard::Holds;
 use super::lights::LightBox;
 use super::reference::{FEW, MANY, Reference, SumReference, pair};
 use crate::model::params::Param;
+use crate::program::shading::ShadingError;
 
 /// How an evaluator did: the worst of what it was asked.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -85,8 +86,12 @@ pub fn check_against(
     lights: &LightBox,
     batch: &Batch,
     holds: &[Holds],
-    reference: &Reference,
+    reference: &Result<Reference, ShadingError>,
 ) -> Verdict {
+    let reference = match reference {
+        Ok(reference) => reference,
+        Err(error) => return Verdict::failed(error.to_string()),
+    };
     let answer = match evaluator.fragments(lights, batch) {
         Ok(answer) => answer,
         Err(words) => return Verdict::failed(words),
@@ -96,7 +101,10 @@ pub fn check_against(
     if verdict.failure.is_none() {
         return verdict;
     }
-    compare(&answer, &Reference::new(lights, batch, MANY), slack, holds)
+    match Reference::new(lights, batch, MANY) {
+        Ok(reference) => compare(&answer, &reference, slack, holds),
+        Err(error) => Verdict::failed(error.to_string()),
+    }
 }
 
 fn compare(answer: &Answer, reference: &Reference, slack: f64, holds: &[Holds]) -> Verdict {

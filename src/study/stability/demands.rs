@@ -109,7 +109,7 @@ fn clipped(engine: &dyn EngineFactory, given: &Circumstances<'_>, clip: Clip, ta
 /// A flat grey surface under an even light of 1: its value is `base_weight` times its albedo.
 fn grey(fragments: &[FragmentInputs], target: f32, free: &[Param]) -> (EngineInputs, Point) {
     let effects = Effects::of(&[Effect::Diffuse, Effect::Rim]);
-    let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Fragment, effects };
+    let setup = Setup::new(Form::Corrected, Silhouette::Fragment, effects);
     let even = Cube::from_fn(2, |_, _, _| [1.0_f32; 4]);
     let inputs = EngineInputs {
         setup,

@@ -5,16 +5,11 @@ use std::marker::PhantomData;
 use super::case::{Batch, FragmentInputs, VertexInputs};
 use super::lights::LightBox;
 use super::objectives::EngineFactory;
-use crate::bake::Illumination;
+use super::rules::Rules;
 use crate::engine::NormalEquations;
-use crate::model::compose::{Composition, Weights};
-use crate::model::cube::Cube;
-use crate::model::evaluate::Setup;
-use crate::model::fragment::{Fragment, Shading, shading};
-use crate::model::lights::{Cubes, Lights};
-use crate::model::params::{Param, Params};
+use crate::engine::rules::CubesAt;
+use crate::model::params::Param;
 use crate::model::real::Real;
-use crate::model::terms::{LookupParam, Wanted, terms, terms_tangent};
 use crate::model::vertex::deform;
 
 /// Red, green, blue, and the haze in alpha.
@@ -132,79 +127,6 @@ impl Scalar for f64 {
     }
 }
 
-/// The cubes at one lobe exponent, in a scalar's texels.
-pub struct WideCubes<R: Real>([Option<Cube<R::Texel>>; 4]);
-
-impl<R: Scalar> WideCubes<R> {
-    /// The cubes of `light` at `exponent`.
-    #[must_use]
-    pub fn new(light: &Illumination, exponent: f64) -> Self {
-        let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(R::texel));
-        let lobe = light.lobes.as_ref().map(|stack| stack.at(exponent));
-        Self([
-            light.irradiance.as_ref().map(wide),
-            lobe.as_ref().map(|(cube, _)| wide(cube)),
-            lobe.as_ref().map(|(_, slope)| wide(slope)),
-            light.hilite.as_ref().map(wide),
-        ])
-    }
-
-    /// The same cubes, each texel changed by `change`.
-    #[must_use]
-    pub fn changed(&self, mut change: impl FnMut(R::Texel) -> R::Texel) -> Self {
-        let change = std::cell::RefCell::new(&mut change);
-        let texel = |texel: [R::Texel; 4]| texel.map(|x| change.borrow_mut()(x));
-        Self(self.0.each_ref().map(|cube| cube.as_ref().map(|cube| cube.map(texel))))
-    }
-
-    /// The lights of `setup` at `params`; the environment's turn is always computed, as it may be free.
-    pub fn lights(&self, setup: Setup, params: &Params) -> Lights<'_, R> {
-        let [irradiance, specular, lobe_slope, hilite] = self.0.each_ref().map(Option::as_ref);
-        let cubes = Cubes { irradiance, specular, lobe_slope, hilite };
-        Lights::new(setup, params, cubes, true, R::ZERO)
-    }
-}
-
-/// A fragment with its terms, and its derivatives by every parameter that its effects read.
-#[inline(never)]
-pub fn shade_with_slopes<R: Scalar>(
-    setup: Setup,
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    s: &Shading<R>,
-    params: &Params,
-) -> (Composition<R>, Slopes) {
-    let weights = Weights::new(params, setup.effects, R::ZERO);
-    let composition = Composition::new(terms(lights, f, s, Wanted::ALL), f.occlusion, weights);
-    let mut slopes = [[0.0; 4]; Param::COUNT];
-    for param in Param::built_in().filter(|param| param.asked_for(setup.effects)) {
-        let by = match LookupParam::from_param(param) {
-            Some(lookup) => {
-                let slope = terms_tangent(lights, f, s, lookup);
-                let along = |c| composition.along(&slope, c);
-                [along(0), along(1), along(2), composition.alpha_along(&slope)]
-            }
-            None => {
-                let by = |c| composition.derivative(param, c);
-                let alpha = if param == Param::HazeWeight { composition.terms.haze } else { R::ZERO };
-                [by(0), by(1), by(2), alpha]
-            }
-        };
-        slopes[param.index()] = by.map(R::wide);
-    }
-    (composition, slopes)
-}
-
-/// The shading normal of a fragment at `params`.
-pub fn shading_at<R: Scalar>(setup: Setup, f: &Fragment<R>, params: &Params) -> Shading<R> {
-    shading(setup.form, setup.silhouette, f, R::ZERO.lit(params.scalar(Param::NormalStrength)))
-}
-
-/// The colour of a composition.
-pub fn rgba<R: Scalar>(composition: &Composition<R>) -> Rgba {
-    [composition.result(0), composition.result(1), composition.result(2), composition.alpha()].map(R::wide)
-}
-
 /// The model, one fragment after the other.
 #[derive(Debug, Default)]
 pub struct Plain<R>(PhantomData<R>);
@@ -227,14 +149,14 @@ where
 
     fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
         let setting = &batch.setting;
-        let cubes =
-            WideCubes::<R>::new(lights.of(setting.lights), setting.params.scalar(Param::SpecularLobe));
-        let lights = cubes.lights(setting.setup, &setting.params);
+        let light = lights.of(setting.lights);
+        let rules = Rules::of(setting.setup, light).map_err(|error| error.to_string())?;
+        let cubes = CubesAt::new(light, &setting.params, R::texel);
+        let at = rules.at(&setting.params, &cubes);
         let each = |inputs: &FragmentInputs| {
             let f = inputs.fragment(setting.setup, R::ZERO);
-            let s = shading_at(setting.setup, &f, &setting.params);
-            let (composition, slopes) = shade_with_slopes(setting.setup, &lights, &f, &s, &setting.params);
-            (rgba(&composition), slopes)
+            let shaded = rules.shaded(&at, &f, &rules.shading(&at, &f));
+            (shaded.rgba, shaded.slopes)
         };
         let (values, slopes) = batch.fragments.iter().map(each).unzip();
         Ok(Answer { values: Some(values), slopes: Some(slopes), sums: None })

@@ -171,7 +171,7 @@ fn case(source: &Source, table: CaseTable<Spanned<String>>) -> Result<KeptCase, 
             *x = f64::from(single);
         }
     }
-    let setup = Setup { form, silhouette, effects };
+    let setup = Setup::new(form, silhouette, effects);
     let setting = Setting { setup, params, lights, loss };
     Ok(KeptCase { name: name.clone(), batch: Batch { setting, fragments } })
 }

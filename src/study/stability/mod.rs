@@ -3,8 +3,8 @@
 //! - [`case`]: the numbers that evaluators are given; [`lights`]: what they look up
 //! - [`hard`]: the hard cases of MODEL 7, a declaration each; [`demands`]: those of engines and fits
 //! - [`random`]: random cases; [`scene`]: a scene's own samples; [`kept`]: cases kept in files
-//! - [`evaluate`]: what an evaluator is, and the model as one; [`objectives`]: engines; `shader`: the
-//!   renderer's rules
+//! - [`evaluate`]: what an evaluator is, and the model as one, by the [`rules`]; [`objectives`]: engines; `shader`:
+//!   the renderer's rules on an adapter
 //! - [`mod@reference`]: the model in f64, and how far rounding may move it
 //! - [`check`]: an answer held against the reference; [`search`]: the search, and failures made simple
 //! - [`report`]: what came of it
@@ -22,6 +22,7 @@ pub mod objectives;
 pub mod random;
 pub mod reference;
 pub mod report;
+pub mod rules;
 pub mod scene;
 pub mod search;
 pub mod shader;

@@ -52,7 +52,7 @@ fn setting(rng: &mut StdRng) -> Setting {
         params.set_rgb(param, rgb);
     }
     Setting {
-        setup: Setup { form, silhouette: one_of(rng, &Silhouette::ALL), effects },
+        setup: Setup::new(form, one_of(rng, &Silhouette::ALL), effects),
         params,
         lights: one_of(rng, &LightKind::OWN),
         loss: one_of(rng, &Loss::ALL),

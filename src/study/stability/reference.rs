@@ -12,13 +12,16 @@ use rand::{RngExt, SeedableRng};
 use rayon::prelude::*;
 
 use super::case::{Batch, FragmentInputs, Setting};
-use super::evaluate::{Rgba, Slopes, TARGET, WideCubes, rgba, shade_with_slopes, shading_at};
+use super::evaluate::{Rgba, Slopes, TARGET};
 use super::lights::LightBox;
+use super::rules::{Rules, Shading};
 use crate::engine::residual::{Weighted, weighted_residual};
+use crate::engine::rules::CubesAt;
 use crate::model::effects::Silhouette;
-use crate::model::fragment::{Fragment, Shading};
+use crate::model::fragment::Fragment;
 use crate::model::params::{Param, Params};
 use crate::model::vector::dot;
+use crate::program::shading::ShadingError;
 
 /// By how much each number is moved, as a share of itself (of the largest component of its vector): eight
 /// roundings of 2^-24 either way, as many as lie one behind the other between an input and what a lookup or
@@ -128,11 +131,14 @@ pub struct Reference {
 
 impl Reference {
     /// The batch in f64, each fragment moved `moves` times.
-    #[must_use]
-    pub fn new(lights: &LightBox, batch: &Batch, moves: usize) -> Self {
+    ///
+    /// # Errors
+    /// When the rules cannot be computed on the processor.
+    pub fn new(lights: &LightBox, batch: &Batch, moves: usize) -> Result<Self, ShadingError> {
         let setting = &batch.setting;
-        let exponent = setting.params.scalar(Param::SpecularLobe);
-        let cubes = WideCubes::<f64>::new(lights.of(setting.lights), exponent);
+        let light = lights.of(setting.lights);
+        let rules = Rules::of(setting.setup, light)?;
+        let cubes = CubesAt::new(light, &setting.params, f64::from);
         let mut rng = StdRng::seed_from_u64(0);
         let mut rounded = || {
             let mut texels = Moves::new(&mut rng, 0);
@@ -141,8 +147,9 @@ impl Reference {
         // With few of them the worst rounding of a difference of texels may not be among them.
         let others: Vec<_> = (0..(moves / 2).clamp(3, MOST_CUBES)).map(|_| rounded()).collect();
         // The same moves for each, so that a fragment fares alike alone and among others.
-        let each = |inputs| one(setting, (&cubes, &others), inputs, moves, &mut StdRng::seed_from_u64(1));
-        Self { fragments: batch.fragments.par_iter().map(each).collect() }
+        let each =
+            |inputs| one(setting, &rules, (&cubes, &others), inputs, moves, &mut StdRng::seed_from_u64(1));
+        Ok(Self { fragments: batch.fragments.par_iter().map(each).collect() })
     }
 
     /// The sums over all fragments.
@@ -183,25 +190,23 @@ pub const fn pair(a: usize, b: usize) -> usize {
 
 fn one(
     setting: &Setting,
-    (cubes, others): (&WideCubes<f64>, &[WideCubes<f64>]),
+    rules: &Rules,
+    (cubes, others): (&CubesAt<f64>, &[CubesAt<f64>]),
     inputs: &FragmentInputs,
     moves: usize,
     rng: &mut StdRng,
 ) -> FragmentReference {
     let setup = setting.setup;
     let evaluate =
-        |cubes: &WideCubes<f64>, inputs: &FragmentInputs, params: &Params, moves: Option<&mut Moves<'_>>| {
+        |cubes: &CubesAt<f64>, inputs: &FragmentInputs, params: &Params, moves: Option<&mut Moves<'_>>| {
             let f = inputs.fragment(setup, 0.0_f64);
-            let mut s = shading_at(setup, &f, params);
+            let at = rules.at(params, cubes);
+            let mut s = rules.shading(&at, &f);
             if let Some(moves) = moves {
                 round_shading(&mut s, &f, (setup.silhouette, params.scalar(Param::NormalStrength)), moves);
             }
-            let (composition, slopes) =
-                shade_with_slopes(setup, &cubes.lights(setup, params), &f, &s, params);
-            let summands: Rgba = std::array::from_fn(|c| {
-                if c == 3 { 0.0 } else { composition.each_term(c).iter().map(|(_, x)| x.abs()).sum() }
-            });
-            (rgba(&composition), slopes, summands)
+            let shaded = rules.shaded(&at, &f, &s);
+            (shaded.rgba, shaded.slopes, shaded.summands)
         };
     let (value, slopes, summands) = evaluate(cubes, inputs, &setting.params, None);
     // The key light's term is a difference of two Lambert terms, each as large as this.

@@ -20,7 +20,8 @@ const FAR: f64 = 1e3;
 pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
     let fragments: Vec<FragmentInputs> =
         prepared.samples.iter().flat_map(|view| fragments(view, prepared.scene.form)).collect();
-    let setup = Setup { effects, ..prepared.setup() };
+    // Of fragments alone: nothing is interpolated, and S.w is given.
+    let setup = Setup::new(prepared.scene.form, prepared.scene.silhouette, effects);
     let loss = prepared.scene.fit.loss;
     let own = Setting { setup, params: prepared.scene.params.clone(), lights: LightKind::Scene, loss };
     let mut settings = vec![own.clone()];
@@ -40,7 +41,7 @@ pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
     for effect in effects.iter() {
         for effects in [Effects::of(&[effect]), effects.without(effect)] {
             // What shows nothing alone (the rim, occlusion) is refused where shaders are planned.
-            let shows = !TermName::of(effects).is_empty() || effects.needs(setup.silhouette).haze;
+            let shows = !TermName::of(effects).is_empty() || Setup { effects, ..setup }.needs().haze;
             if shows {
                 settings.push(Setting { setup: Setup { effects, ..setup }, ..own.clone() });
             }

@@ -10,6 +10,7 @@ use super::random::{BATCH, batch};
 use super::reference::{FEW, Reference};
 use crate::model::effects::{Form, Silhouette};
 use crate::model::params::Param;
+use crate::program::shading::ShadingError;
 use crate::scene::Loss;
 
 /// A new hard case.
@@ -50,7 +51,7 @@ pub struct Hunt<'a> {
 /// A batch that the shared evaluators have answered.
 struct Tried {
     batch: Batch,
-    reference: Reference,
+    reference: Result<Reference, ShadingError>,
     verdicts: Vec<Verdict>,
 }
 

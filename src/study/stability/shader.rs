@@ -10,7 +10,8 @@ use crate::bake::Illumination;
 use crate::gpu::probe::{constants, evaluate};
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError};
-use crate::model::effects::{Effect, Effects, Form, Silhouette};
+use crate::model::dapple::Dapple;
+use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
@@ -114,7 +115,7 @@ impl Evaluator for Rules {
 
     fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
         let setting = &batch.setting;
-        let Setup { effects, silhouette, form } = setting.setup;
+        let Setup { effects, silhouette, form, .. } = setting.setup;
         let facts = Facts {
             setup: setting.setup,
             maps: MapFacts { normal: true, ..MapFacts::default() },
@@ -144,7 +145,7 @@ impl Evaluator for Rules {
     }
 
     fn frames(&self, vertices: &[VertexInputs]) -> Result<Option<Vec<Frame>>, String> {
-        let setup = Setup { form: Form::Corrected, silhouette: Silhouette::Vertex, effects: EVERYTHING };
+        let setup = Setup::new(Form::Corrected, Silhouette::Vertex, EVERYTHING);
         let facts =
             Facts { setup, maps: MapFacts { normal: true, ..MapFacts::default() }, ..Facts::default() };
         let wanted = [("vertex_normal", "vec3f"), ("vertex_tangent", "vec3f"), ("vertex_bitangent", "vec3f")];
@@ -187,6 +188,8 @@ fn scene() -> Scene {
         environment: None,
         form: Form::Corrected,
         silhouette: Silhouette::Fragment,
+        lookups: Lookups::default(),
+        dapple: Dapple::default(),
         effects: Effects::default(),
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),

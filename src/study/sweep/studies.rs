@@ -44,6 +44,12 @@ fn case(row: &ablation::Row) -> Figures {
         ("bytes_a_sample", row.counts.bytes_a_sample.into()),
         ("baked_bytes", row.counts.baked_bytes.into()),
     ]));
+    if let Some(starts) = &row.starts {
+        figures.extend(named([
+            ("starts", starts.tried.len().into()),
+            ("best_start", starts.best.as_str().into()),
+        ]));
+    }
     for constant in &row.constants {
         add_constant(&mut figures, &constant.name, constant.value, constant.std_error);
     }

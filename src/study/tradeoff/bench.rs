@@ -17,6 +17,7 @@ use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::prepare::{PrepareError, PrepareOptions, Prepared};
 use crate::reference::Difference;
+use crate::render::format::FormatShader;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
 use crate::samples::rows::Rows;
@@ -125,7 +126,7 @@ impl<'a> Bench<'a> {
     pub fn rates(&self) -> Result<Rates, StudyError> {
         let since = Instant::now();
         let evaluated = self.evaluate(self.settings())?;
-        let images = evaluated.images(&self.point());
+        let images = evaluated.images(&self.point())?;
         std::hint::black_box(Difference::of_all(&images, &images));
         let images = since.elapsed().as_secs_f64();
         let engine = evaluated.live_engine();
@@ -281,21 +282,25 @@ impl Evaluated {
     /// The switches of the model.
     #[must_use]
     pub fn setup(&self) -> Setup {
-        let Scene { form, silhouette, effects, .. } = self.scene;
-        Setup { form, silhouette, effects }
+        self.scene.setup()
     }
 
-    /// The f64 shader at these settings.
-    #[must_use]
-    pub fn shader(&self, point: &Point) -> Shader {
-        Shader::new(self.setup(), &self.illumination, &point.params)
+    /// The shader of number formats at these settings.
+    ///
+    /// # Errors
+    /// When a rule cannot be computed on the processor.
+    pub fn format_shader(&self, point: &Point) -> Result<FormatShader, StudyError> {
+        Ok(FormatShader::new(self.setup(), &self.illumination, &point.params)?)
     }
 
     /// The image of each view.
-    #[must_use]
-    pub fn images(&self, point: &Point) -> Vec<Image> {
+    ///
+    /// # Errors
+    /// When a rule cannot be computed on the processor.
+    pub fn images(&self, point: &Point) -> Result<Vec<Image>, StudyError> {
         let samples: Vec<&ViewSamples> = self.samples.iter().collect();
-        shaded(&self.scene, &self.shader(point), &samples, &point.gains)
+        let shader = Shader::new(self.setup(), &self.illumination, &point.params)?;
+        Ok(shaded(&self.scene, &shader, &samples, &point.gains))
     }
 
     /// An engine over the samples that does every lookup anew, as a renderer does; its targets are black.

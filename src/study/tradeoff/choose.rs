@@ -54,9 +54,9 @@ pub struct Missed {
 /// What the search for settings ends with.
 pub type Answer = Result<Choice, Missed>;
 
-/// How often less is asked of the sum of squares.
+/// How often the choice is made again, with a smaller bound on the sum of the errors' squares.
 const ATTEMPTS: usize = 24;
-/// By how much less each time.
+/// The factor on that bound, each time.
 const TIGHTER: f64 = 0.8;
 
 /// Choose a setting along each axis, and measure them together.
@@ -68,7 +68,7 @@ pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Answer,
     let names: Vec<&'static str> =
         sweeps.iter().filter(|sweep| !candidates(sweep).is_empty()).map(|sweep| sweep.axis).collect();
     let references: Vec<&Setting> = sweeps.iter().flat_map(reference).collect();
-    let exact = bench.evaluate(settings(bench, &references))?.images(&bench.point());
+    let exact = bench.evaluate(settings(bench, &references))?.images(&bench.point())?;
     let mut asked = match goal {
         Goal::Within(error) => error,
         Goal::Seconds(_) => f64::INFINITY,
@@ -83,7 +83,7 @@ pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Answer,
         };
         let Some(found) = found else { break };
         let error =
-            Difference::of_all(&exact, &bench.evaluate(settings(bench, &found))?.images(&bench.point()));
+            Difference::of_all(&exact, &bench.evaluate(settings(bench, &found))?.images(&bench.point())?);
         let (seconds, foretold) = sums(&found);
         if matches!(goal, Goal::Within(most) if error.relative > most) {
             least = least.min(error.relative);

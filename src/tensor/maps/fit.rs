@@ -137,10 +137,9 @@ struct Fixed<'a> {
 
 impl<'a> Fixed<'a> {
     fn of(task: &MapTask<'a>) -> Self {
-        let Scene { form, silhouette, effects, .. } = task.scene;
         Self {
             scene: task.scene,
-            setup: Setup { form: *form, silhouette: *silhouette, effects: *effects },
+            setup: task.scene.setup(),
             unknowns: task.unknowns.clone(),
             held_out: task.held_out,
             interrupt: task.interrupt.clone(),
@@ -202,15 +201,17 @@ impl Rounds<'_, '_> {
         let held_out = self.fixed.held_out;
         let of = |(i, view)| Observed { view, gain: self.constants.gains[i], counts: held_out != Some(i) };
         let seen: Vec<Observed<'_>> = self.observed.iter().enumerate().map(of).collect();
+        let before = self.problem.loss(&seen, settings.loss)? + self.problem.prior(index)?;
         self.problem.reweight(self.shared, &seen, settings.loss)?;
         let (steps, stopped) = (settings.maps.steps as usize, || self.fixed.stopped());
-        let losses = match settings.maps.solver {
+        match settings.maps.solver {
             MapSolver::ConjugateGradients => cg::solve(&mut self.problem, index, steps, &stopped)?,
             MapSolver::Adam => adam::solve(&mut self.problem, index, steps, settings.maps.rate, &stopped)?,
         };
-        self.shared.gpu().check().map_err(TensorError::from)?;
         let prior = self.problem.prior(index)?;
-        self.step(round, self.problem.layers[index].name, losses, prior);
+        let after = self.problem.loss(&seen, settings.loss)? + prior;
+        self.shared.gpu().check().map_err(TensorError::from)?;
+        self.step(round, self.problem.layers[index].name, (before, after), prior);
         Ok(())
     }
 

@@ -6,9 +6,9 @@ use std::ops::Range;
 use crate::SharedDevice;
 use crate::samples::{LANES, ViewSamples};
 
-/// Bytes that a sample takes in the largest buffer: base, view, normal, silhouette, dapple and share, twelve numbers
-/// of 32 bits.
-const SAMPLE_BYTES: u64 = 48;
+/// Bytes that a sample takes in the largest buffer: base, view, normal, three corners' silhouettes and shares, a normal
+/// for the dapple, and the sample's share, 19 numbers of 32 bits at most.
+const SAMPLE_BYTES: u64 = 76;
 
 /// Whole groups of one view or of several, one after the other.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

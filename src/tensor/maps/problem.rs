@@ -92,10 +92,7 @@ impl Problem {
         views: &[Observed<'_>],
         loss: Loss,
     ) -> Result<(), TensorError> {
-        let mut image = Vec::new();
-        for part in &self.parts {
-            image.extend(read(part.shade.image(part.inputs.clone())?)?);
-        }
+        let image = self.image()?;
         let (mut gains, mut targets, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let mut total = 0.0;
         for Observed { view, gain, counts } in views {
@@ -136,7 +133,41 @@ impl Problem {
         Ok(())
     }
 
-    /// The loss, and its slope by the texels of a layer, at `texels`.
+    /// The image at the layers' values, without gains: four numbers a pixel slot.
+    fn image(&self) -> Result<Vec<f32>, TensorError> {
+        let mut image = Vec::new();
+        for part in &self.parts {
+            image.extend(read(part.shade.image(part.inputs.clone())?)?);
+        }
+        Ok(image)
+    }
+
+    /// The images' loss at the layers' values, as the engine has it: what [`slope`](Self::slope) minimises are squares that
+    /// stand for it.
+    ///
+    /// # Errors
+    /// When the device does not give the image.
+    pub fn loss(&self, views: &[Observed<'_>], loss: Loss) -> Result<f64, TensorError> {
+        let image = self.image()?;
+        let (mut sum, mut total, mut first) = (0.0, 0.0, 0);
+        for Observed { view, gain, counts } in views {
+            let channels = view.target.stride();
+            let slots = view.samples.groups() * LANES;
+            for slot in (0..slots).filter(|&slot| *counts && view.pixel_weight(slot) > 0.0) {
+                let pixel = f64::from(view.pixel_weight(slot));
+                total += pixel * channels as f64;
+                for c in 0..channels {
+                    let shown = gain * f64::from(image[4 * (first + slot) + c]);
+                    let target = f64::from(view.target.number(c, slot));
+                    sum += weighted_residual(loss, view.clip, shown, target, pixel).loss;
+                }
+            }
+            first += slots;
+        }
+        Ok(sum / total.max(f64::MIN_POSITIVE))
+    }
+
+    /// The squares that stand for the loss, and their slope by the texels of a layer, at `texels`.
     ///
     /// # Errors
     /// When the device does not take it, or the loss is not finite.

@@ -8,10 +8,9 @@ use wgpu::{
 use crate::adjoint::Adjoint;
 use crate::buffer::TensorBuffer;
 use crate::gpu::{Gpu, GpuError};
-use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::pass;
-use crate::samples::ViewSamples;
+use crate::samples::{SurfaceRecords, ViewSamples};
 use crate::shade::Shaded;
 
 /// The block of constants, and the pass that fills it.
@@ -111,15 +110,18 @@ pub(super) fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32
     let slots = || views.iter().flat_map(|view| (0..view.surface.slots()).map(|slot| (&view.surface, slot)));
     let mut numbers = Vec::new();
     for (name, width) in adjoint.fixed() {
-        let number = |fragment: Fragment<f32>, c: usize| match name {
-            "base" => fragment.base[c],
-            "view" => fragment.view[c],
-            "normal" => fragment.normal[c],
-            "silhouette" => fragment.silhouette,
-            _ => fragment.dapple,
+        let number = |(surface, slot): (&SurfaceRecords, usize), c: usize| match name {
+            "base" => surface.fragment(slot).base[c],
+            "view" => surface.fragment(slot).view[c],
+            "normal" => surface.fragment(slot).normal[c],
+            "silhouette" => surface.fragment(slot).silhouette,
+            "dapple_normal" => surface.unmade(slot).dapple_normal[c],
+            "corner_silhouettes" => surface.unmade(slot).corner_silhouettes[c],
+            "corner_shares" => surface.unmade(slot).corner_shares[c],
+            _ => surface.fragment(slot).dapple,
         };
         for c in 0..width {
-            numbers.extend(slots().map(|(surface, slot)| number(surface.fragment(slot), c)));
+            numbers.extend(slots().map(|sample| number(sample, c)));
         }
     }
     numbers.extend(slots().map(|(surface, slot)| surface.weight(slot)));

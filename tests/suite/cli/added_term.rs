@@ -1,7 +1,7 @@
 //! A scene that brings a term of its own: every command that a user would meet it in.
 
 use super::refusals::{Case, FIT, check};
-use super::sandbox::{Ran, Sandbox};
+use super::sandbox::Sandbox;
 use crate::added_term::FRESNEL;
 use crate::fixtures::read_exr;
 
@@ -50,29 +50,10 @@ fn without_a_list_of_effects_a_named_term_is_on() {
 
 #[test]
 fn it_is_fitted_reported_drawn_and_exported() {
-    let sandbox = scene();
-    if !super::graphics::adapter(&sandbox) {
+    if !super::graphics::adapter(&scene()) {
         return;
     }
-    let truth =
-        "form = \"corrected\"\n[params]\nfresnel_weight = [0.9, 0.7, 0.5]\nfresnel_f0 = 0.1\nhilite = 0.6\n";
-    sandbox.write("more.toml", truth.as_bytes());
-    for view in ["front", "side"] {
-        let target = format!("targets/{view}.exr");
-        let render = [
-            "render",
-            "scene.toml",
-            "--params",
-            "more.toml",
-            "--engine",
-            "gpu",
-            "--view",
-            view,
-            "-o",
-            &target,
-        ];
-        sandbox.run(&render).done();
-    }
+    let sandbox = with_targets("gpu");
     for (engine, run) in [("cpu", "run_cpu"), ("gpu", "run")] {
         let fitted = sandbox.run(&["fit", "scene.toml", "-o", run, "--engine", engine]);
         assert_eq!(fitted.code, Some(0), "{fitted:?}");
@@ -116,12 +97,70 @@ fn it_is_fitted_reported_drawn_and_exported() {
     );
 }
 
-#[test]
-fn what_does_not_know_it_refuses_it_by_name() {
+/// The truth that targets are drawn with, and where they are drawn.
+fn with_targets(engine: &str) -> Sandbox {
     let sandbox = scene();
-    let refused = |ran: Ran| ran.refused(&["the effect fresnel_reflection comes from a file of its own"]);
-    refused(sandbox.run(&["render", "scene.toml", "-o", "a.exr", "--engine", "cpu"]));
-    refused(sandbox.run(&["ablate", "scene.toml", "-o", "parts"]));
+    let truth =
+        "form = \"corrected\"\n[params]\nfresnel_weight = [0.9, 0.7, 0.5]\nfresnel_f0 = 0.1\nhilite = 0.6\n";
+    sandbox.write("more.toml", truth.as_bytes());
+    for view in ["front", "side"] {
+        let target = format!("targets/{view}.exr");
+        let of = ["render", "scene.toml", "--params", "more.toml", "--view", view];
+        sandbox.run(&[&of[..], &["--engine", engine, "-o", &target]].concat()).done();
+    }
+    sandbox
+}
+
+#[test]
+fn the_processor_draws_it_with_its_layer_fits_it_and_verifies_the_fit() {
+    let sandbox = with_targets("cpu");
+    let fitted = sandbox.run(&["fit", "scene.toml", "-o", "run", "--engine", "cpu", "--verify"]);
+    assert_eq!(fitted.code, Some(0), "{fitted:?}");
+    assert!(fitted.err.contains("verified against the model in f64"), "{fitted:?}");
+    let report = sandbox.json("run/report.json");
+    let params = &report["params"];
+    for (c, want) in [0.9, 0.7, 0.5].into_iter().enumerate() {
+        let value = &params["fresnel_weight"]["value"];
+        // Targets and fit share their samples; 32-bit roundings of a target are what is left, and directions in which
+        // two parameters trade lend them a thousand times their weight.
+        assert!((value[c].as_f64().unwrap() - want).abs() < 1e-3, "{value}");
+    }
+    let of = ["render", "run/scene.toml", "--params", "run/params.toml", "--engine", "cpu"];
+    sandbox.run(&[&of[..], &["--layers", "-o", "a.exr"]].concat()).done();
+    for file in ["a.exr", "run/front_terms.exr"] {
+        let planes = read_exr(&sandbox.path(file)).planes;
+        assert!(
+            planes.keys().any(|name| name.starts_with("fresnel_reflection")),
+            "{file}: {:?}",
+            planes.keys()
+        );
+    }
+}
+
+#[test]
+fn an_ablation_tells_what_it_is_worth() {
+    let sandbox = with_targets("cpu");
+    sandbox.run(&["ablate", "scene.toml", "--params", "more.toml", "-o", "parts"]).done();
+    let listed = std::fs::read_dir(sandbox.path("parts")).unwrap().flatten();
+    let texts = listed.filter_map(|entry| std::fs::read_to_string(entry.path()).ok());
+    assert!(texts.filter(|text| text.contains("fresnel_reflection")).count() > 0);
+}
+
+#[cfg(feature = "burn")]
+#[test]
+fn a_map_is_fitted_beside_it() {
+    let sandbox = with_targets("cpu");
+    if !super::graphics::adapter(&sandbox) {
+        return;
+    }
+    sandbox.edit("color = \"color.png\"\n", "");
+    sandbox.edit("loss = ", "maps = { rounds = 1, steps = 4, color = { smoothness = 0.0 } }\nloss = ");
+    let fitted = sandbox.fit("run", &["--maps", "color"]);
+    assert_eq!(fitted.code, Some(0), "{fitted:?}");
+    let report = sandbox.json("run/maps.json");
+    let psnr = |when: &str| report["views"][0][when]["psnr"].as_f64().unwrap();
+    // The map is what the targets were drawn with and the scene lacks.
+    assert!(psnr("after") > psnr("before"), "{report}");
 }
 
 #[test]

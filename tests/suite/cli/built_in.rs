@@ -147,9 +147,10 @@ fn with_noise_the_truth_lies_within_three_standard_errors() {
         assert!((value - truth).abs() <= 3.0 * error, "{name}: {value} +- {error} is not {truth}");
         assert!(error > 0.0 && error < 0.01 * truth, "{name}: +- {error} says nothing");
     }
-    // A loss that divides by the noisy target prefers the pixels that came out dark: a bias of the
-    // order of the noise's square, which so many pixels resolve. It stays below the noise itself.
-    for (name, [value, _, truth]) in fit("relative_l2") {
-        assert!((value - truth).abs() <= 0.01 * truth, "{name}: {value} is not {truth}");
+    // This noise is not of the variance that the relative loss takes it to be of: its sandwich errors hold all the same.
+    // Of 13 constants the furthest is expected 1.7 errors away; one in 50 such fits has one beyond 3.
+    for (name, [value, error, truth]) in fit("relative_l2") {
+        assert!((value - truth).abs() <= 4.0 * error, "{name}: {value} +- {error} is not {truth}");
+        assert!(error > 0.0 && error < 0.02 * truth, "{name}: +- {error} says nothing");
     }
 }

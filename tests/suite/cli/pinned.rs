@@ -18,7 +18,7 @@ struct Pin {
     losses: [f64; 2],
     /// Surface samples.
     samples: u64,
-    /// Value and standard error of each constant that the images determine and no bound holds.
+    /// Value and noise error (the standard error if residuals were independent) of each constant that the images determine and no bound holds.
     constants: &'static [(&'static str, f64, f64)],
 }
 
@@ -81,7 +81,7 @@ const PINS: [Pin; 4] = [
 ];
 
 /// A scene's text with its paths made absolute, without lamps and materials, which are not of this model.
-fn scene_text(data: &Path, scene: &str) -> String {
+pub(super) fn scene_text(data: &Path, scene: &str) -> String {
     let file = data.join(scene).join("scene.toml");
     let text = std::fs::read_to_string(&file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     let mut table: toml::Table = text.parse().unwrap();
@@ -126,14 +126,14 @@ fn fits_of_the_real_scenes_end_where_they_did() {
         }
         let params = report["params"].as_object().unwrap();
         for (name, want, error) in pin.constants {
-            let (got, found) = (&params[*name]["value"], params[*name]["std_error"].as_f64());
+            let (got, found) = (&params[*name]["value"], params[*name]["noise_error"].as_f64());
             let got = got.as_f64().unwrap();
             println!("{}: {name} {got} +- {found:?}", pin.scene);
             // A fit ends where a step would gain less than it can measure: within a hundredth of a standard error.
             if (got - want).abs() > 0.01 * error {
                 moved.push(format!("{}: {name} {got} instead of {want} +- {error:e}", pin.scene));
             }
-            // Standard errors are written here to three digits.
+            // They are written here to three digits.
             if found.is_none_or(|found| (found / error - 1.0).abs() > 0.01) {
                 moved.push(format!("{}: {name} +- {found:?} instead of {error:e}", pin.scene));
             }

@@ -91,7 +91,7 @@ fn samples_that_are_used_again_give_what_those_traced_anew_do() {
     other[3].silhouette = skinfit::model::effects::Silhouette::Vertex;
     for settings in [own].into_iter().chain(other) {
         let (kept, anew) = (bench.evaluate(settings).unwrap(), bench.evaluate_anew(settings).unwrap());
-        let (kept, anew) = (kept.images(&bench.point()), anew.images(&bench.point()));
+        let (kept, anew) = (kept.images(&bench.point()).unwrap(), anew.images(&bench.point()).unwrap());
         for (kept, anew) in kept.iter().zip(&anew) {
             assert!(kept.rgb == anew.rgb && kept.alpha == anew.alpha, "{settings:?}");
         }

@@ -1,10 +1,12 @@
 //! A small image of the skin model's structure in f64, with its exact Jacobian: what the solvers are
 //! tested on.
 
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
+use skinfit::engine::pulls::{Pulls, ResidualImage, TILE, Tile};
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
 use skinfit::model::effects::Form;
 use skinfit::model::params::{Column, Param, Params};
@@ -40,6 +42,8 @@ pub(super) struct Image {
     pub(super) ripple: f64,
     /// Whether to pass sums on as if they came from 32-bit floats.
     pub(super) single_precision: bool,
+    /// Pixels in a row of each view, where they stand in one; pixels take turns between the two views.
+    width: Option<usize>,
     passes: std::sync::Arc<AtomicU64>,
 }
 
@@ -55,10 +59,39 @@ impl Image {
             loss: Loss::L2,
             ripple: 0.0,
             single_precision: false,
+            width: None,
             passes: Default::default(),
         };
         image.target = image.render(truth);
         image
+    }
+
+    /// Two square views of `width` pixels a side, of squares of `side` pixels that are all alike.
+    pub(super) fn patched(width: usize, side: usize, truth: &Point) -> Self {
+        let across = width / side;
+        let patches = Self::new(2 * across * across, truth);
+        let of = |i: usize| {
+            let (x, y) = (i / 2 % width, i / 2 / width);
+            2 * (y / side * across + x / side) + i % 2
+        };
+        let pixels = (0..2 * width * width).map(|i| patches.pixels[of(i)].clone()).collect();
+        let mut image = Self { pixels, width: Some(width), ..patches };
+        image.target = image.render(truth);
+        image
+    }
+
+    /// Independent Gaussian noise of one deviation for each square of `side` pixels, the same all over it.
+    pub(super) fn with_patches_of_noise(&self, side: usize, deviation: f64, seed: u64) -> Self {
+        let width = self.width.unwrap();
+        let noisy = self.with_noise(deviation, seed);
+        let first = |i: usize| {
+            let (x, y) = (i / 2 % width, i / 2 / width);
+            2 * (y / side * side * width + x / side * side) + i % 2
+        };
+        let moved =
+            |i: usize, c: usize| self.target[i][c] + noisy.target[first(i)][c] - self.target[first(i)][c];
+        let target = (0..self.target.len()).map(|i| [0, 1, 2].map(|c| moved(i, c))).collect();
+        Self { target, ..noisy }
     }
 
     pub(super) fn with(&self, unknowns: &[Unknown]) -> Self {
@@ -85,6 +118,16 @@ impl Image {
                 let normal = (-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos();
                 *value += deviation * normal / pixel.weight.sqrt();
             }
+        }
+        noisy
+    }
+
+    /// Independent Gaussian noise on the target, of deviation `share (value + 0.1) / sqrt(weight)`: as `relative_l2` takes
+    /// it to be.
+    pub(super) fn with_relative_noise(&self, share: f64, seed: u64) -> Self {
+        let mut noisy = self.with_noise(share, seed);
+        for (noisy, clean) in noisy.target.iter_mut().flatten().zip(self.target.iter().flatten()) {
+            *noisy = clean + (*noisy - clean) * (clean + 0.1);
         }
         noisy
     }
@@ -117,8 +160,13 @@ impl Image {
         match self.loss {
             Loss::L2 => (r * r, 1.0, r),
             Loss::RelativeL2 => {
-                let scaled = 1.0 / (target * target + 0.01);
-                (r * r * scaled, scaled, r)
+                // docs/scene-files.md, in the form that does not cancel at small residuals; the images are bright.
+                let (p, q) = (model.max(0.0) + 0.1, target.max(0.0) + 0.1);
+                let share = (p - q) / (p + q);
+                let bright = 2.0 * share * (p - q) / p + 4.0 * (share.atanh() - share);
+                let [m, t] = [model, target].map(|x| x.min(0.0));
+                let below = 100.0 * (m - t) * (m + t - 2.0 * target) - 2.0 * t * (p - q) / (p * q);
+                (bright + below, 1.0 / (p * p), r)
             }
             Loss::Huber => {
                 let (delta, size) = (0.05, r.abs());
@@ -178,13 +226,36 @@ impl Objective for Image {
         &self.unknowns
     }
     fn is_quadratic(&self) -> bool {
-        matches!(self.loss, Loss::L2 | Loss::RelativeL2)
+        self.loss == Loss::L2
     }
     fn normal_equations(&self, point: &Point) -> NormalEquations {
         self.sums(point, &self.unknowns)
     }
     fn loss(&self, point: &Point) -> f64 {
         self.sums(point, &[]).loss
+    }
+    fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
+        let width = self.width?;
+        assert_eq!(widths, [width; 2]);
+        let mut tiles: BTreeMap<(usize, u32, u32), Vec<f64>> = BTreeMap::new();
+        let mut residuals = vec![ResidualImage { width, pixels: vec![None; width * width] }; 2];
+        for (i, (pixel, target)) in self.pixels.iter().zip(&self.target).enumerate() {
+            let (x, y) = (i / 2 % width, i / 2 / width);
+            let place = (pixel.view, (y / TILE) as u32, (x / TILE) as u32);
+            let pull = tiles.entry(place).or_insert_with(|| vec![0.0; self.unknowns.len()]);
+            let mut shown = [0.0; 4];
+            for c in 0..3 {
+                let (_, reweighted, r) = self.residual(pixel.value(point, c, self.ripple), target[c]);
+                let weight = pixel.weight * reweighted;
+                shown[c] = (weight.sqrt() * r) as f32;
+                for (sum, unknown) in pull.iter_mut().zip(&self.unknowns) {
+                    *sum += weight * r * pixel.derivative(point, c, unknown, self.ripple);
+                }
+            }
+            residuals[pixel.view].pixels[i / 2] = Some(shown);
+        }
+        let tile = |((view, row, column), pull)| Tile { view, column, row, pull };
+        Some(Pulls { residuals, tiles: tiles.into_iter().map(tile).collect() })
     }
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
         let sums = self.sums(point, &self.unknowns);

@@ -98,7 +98,7 @@ pub(crate) fn on_cpu(prepared: &mut Prepared, n: u32) -> Image {
     prepared.scene.quality.samples_per_axis = n;
     let posed = prepared.scene.mesh.pose();
     let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
     let mut shaded = shader.shade(&samples[0], &prepared.scene.views[0].camera, prepared.gains[0]);
     let (scene, view) = (&prepared.scene, &prepared.scene.views[0]);
     if let Some(backdrop) = Backdrop::new(scene, &scene.params, view.background, &view.camera, n) {

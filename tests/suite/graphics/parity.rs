@@ -7,8 +7,11 @@ use std::path::Path;
 
 use glam::{DMat4, Vec3};
 use skinfit::gpu::Gpu;
-use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::dapple::Dapple;
+use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
+use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Prepared;
+use skinfit::scene::Scene;
 
 use super::bench::*;
 use crate::common;
@@ -121,6 +124,28 @@ fn all_effects_together_show_the_same_on_both_engines() {
 }
 
 #[test]
+fn the_papers_other_readings_show_the_same_on_both_engines() {
+    let Some(gpu) = gpu() else { return };
+    type Change = fn(&mut Scene);
+    let readings: [(&str, Change); 4] = [
+        ("smooth", |scene| scene.lookups = Lookups::Smooth),
+        ("dapple", |scene| scene.dapple = Dapple::new([0.6, 0.0, 0.8], 50.0, false)),
+        ("turning_dapple", |scene| {
+            scene.dapple = Dapple::new([0.48, -0.36, 0.8], 0.0, false);
+            scene.fit.free.push(Column::tied(Param::EnvironmentRotation));
+        }),
+        ("interpolated_rim", |scene| (scene.form, scene.silhouette) = (Form::Listing, Silhouette::Vertex)),
+    ];
+    for (name, read) in readings {
+        let mut prepared = prepared(&built_in(), everything(), SIZE);
+        pose(&mut prepared);
+        turn(&mut prepared);
+        read(&mut prepared.scene);
+        compare(name, gpu, prepared);
+    }
+}
+
+#[test]
 fn every_shared_scene_shows_the_same_on_both_engines() {
     let (Some(gpu), Some(folder)) = (gpu(), common::data()) else { return };
     for scene in ["lps_forest", "lps_sunrise"] {
@@ -182,7 +207,6 @@ pub(super) fn pose(prepared: &mut Prepared) {
 
 /// Parameters away from their defaults, channels apart.
 pub(super) fn turn(prepared: &mut Prepared) {
-    use skinfit::model::params::Param;
     let params = &mut prepared.scene.params;
     params.set_rgb(Param::BaseWeight, [0.9, 1.0, 1.1]);
     params.set_rgb(Param::RimWeight, [0.4, -0.1, 0.3]);

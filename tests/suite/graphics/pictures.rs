@@ -144,7 +144,7 @@ fn a_pixels_glow_is_the_mean_over_its_samples_of_radiance_times_haze() {
         prepared.scene.quality.samples_per_axis = n;
         let posed = prepared.scene.mesh.pose();
         let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
-        let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
+        let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
         shader.shade(&samples[0], &prepared.scene.views[0].camera, 1.0)
     };
     let (coarse, fine) = (of(32, 3), of(96, 1));
@@ -171,7 +171,7 @@ fn the_haze_is_the_same_from_both_engines() {
     prepared.scene.quality.samples_per_axis = 2;
     let posed = prepared.scene.mesh.pose();
     let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
     let camera = prepared.scene.views[0].camera;
     let want = shader.shade(&samples[0], &camera, 0.5).haze;
     let mut renderer = Renderer::new(gpu, content(&prepared), EXACT).unwrap();

@@ -24,7 +24,7 @@ use crate::vectors::{column_params, cube, params};
 const EFFECTS: Effects = Effects::SURFACE.with(Effect::Haze);
 
 fn facts(form: Form, silhouette: Silhouette) -> Facts {
-    let setup = Setup { form, silhouette, effects: EFFECTS };
+    let setup = Setup::new(form, silhouette, EFFECTS);
     Facts { setup, maps: MapFacts { normal: true, ..MapFacts::default() }, ..Facts::default() }
 }
 

@@ -66,6 +66,14 @@ struct Skinfit {
         return (ok ? u / sqrt(dot(u, u)) : fallback);
     }
 
+    // S.z to a power, with 0^p = 0 and 0^0 = 1 (docs/model.md sections 3 and 7).
+    float skinfit_rim_power(float silhouette, float rim_exponent) {
+        // The smallest positive normal f32; below it the power is 0 for any exponent of the table's bounds.
+        bool positive = silhouette >= 1.2e-38;
+        float power = exp2(rim_exponent * log2((positive ? silhouette : 1.0)));
+        return (positive ? power : (rim_exponent > 0.0 ? 0.0 : 1.0));
+    }
+
     // Albedo, linear Rec.709, filtered by the hardware; stored in 8 bits.
     float3 skinfit_albedo_from_map(float2 vertex_uv) {
         return skinfit_color_map.sample(skinfit_map_sampler, vertex_uv, level(0.0)).rgb;
@@ -84,11 +92,6 @@ struct Skinfit {
     // The side-specular intensity s, filtered by the hardware; stored in 8 bits.
     float skinfit_specular_from_map(float2 vertex_uv) {
         return skinfit_specular_map.sample(skinfit_map_sampler, vertex_uv, level(0.0)).r;
-    }
-
-    // S.w: light that falls through leaves from +Z, clamped at 0 (docs/model.md section 3, corrected form).
-    float skinfit_clamped_dapple(float3 vertex_normal) {
-        return max(vertex_normal.z, 0.0);
     }
 
     // 2 rgb - 1 (docs/model.md section 3, corrected form). A texel that is not finite or decodes to nothing is the smooth normal
@@ -117,10 +120,20 @@ struct Skinfit {
         return (abs(base.x) + abs(base.y) + abs(base.z) < 1e-37 || !skinfit_is_finite(base) ? -view : base);
     }
 
+    // S.w: light that falls through leaves from +Z (listing 3-3 with the identity as DappleXf).
+    float skinfit_dapple_from_ahead(float3 dapple_normal) {
+        return dapple_normal.z;
+    }
+
     // The smooth normal N of unit length; +Z where it vanishes, whatever the eye sees. That needs no V, and
     // nearly no mesh has such a fragment.
     float3 skinfit_smooth_normal_unguarded(float3 vertex_normal) {
         return skinfit_normalize_or(vertex_normal, float3(0.0, 0.0, 1.0));
+    }
+
+    // S.w clamped at 0 (docs/model.md section 3, corrected form).
+    float skinfit_clamped_dapple(float dapple_cosine) {
+        return max(dapple_cosine, 0.0);
     }
 
     // S.z = 1 - |N.V| from the smooth normal at the fragment (docs/model.md section 2).
@@ -139,12 +152,9 @@ struct Skinfit {
         return skinfit_hilite_cube.sample(skinfit_cube_sampler, view_in_environment, level(0.0)).rgb;
     }
 
-    // rim = S.z ^ rim_exponent, with 0^p = 0 and 0^0 = 1 (docs/model.md sections 3 and 7).
-    float skinfit_rim_power(float silhouette, float rim_exponent) {
-        // The smallest positive normal f32; below it the power is 0 for any exponent of the table's bounds.
-        bool positive = silhouette >= 1.2e-38;
-        float power = exp2(rim_exponent * log2((positive ? silhouette : 1.0)));
-        return (positive ? power : (rim_exponent > 0.0 ? 0.0 : 1.0));
+    // rim = S.z ^ rim_exponent (docs/model.md section 3).
+    float skinfit_rim_of_silhouette(float silhouette, float rim_exponent) {
+        return skinfit_rim_power(silhouette, rim_exponent);
     }
 
     // hilite: a E_h(V) (docs/model.md section 3).
@@ -164,8 +174,8 @@ struct Skinfit {
     }
 
     // R = V - 2 n (n.V) (docs/model.md section 3, corrected form).
-    float3 skinfit_mirror_direction(float3 n, float3 view) {
-        return view - 2.0 * dot(n, view) * n;
+    float3 skinfit_mirror_direction(float3 lookup_normal, float3 view) {
+        return view - 2.0 * dot(lookup_normal, view) * lookup_normal;
     }
 
     // E_d(n), the irradiance; filtered by the hardware.
@@ -231,22 +241,25 @@ struct Skinfit {
         float3 normal_texel = skinfit_normal_texel_from_map(at.vertex_uv);
         float open = at.vertex_occlusion;
         float specular = skinfit_specular_from_map(at.vertex_uv);
-        float dapple = skinfit_clamped_dapple(at.vertex_normal);
+        float3 dapple_normal = at.vertex_normal;
         float3 decoded = skinfit_decode_texel(normal_texel);
         float occ = skinfit_occluded_share(open, SKINFIT_OCCLUSION);
         float3 view = skinfit_view_exact(at.vertex_position, at.eye);
         float3 base = skinfit_base_of_texel(decoded, at.vertex_normal, view);
+        float dapple_cosine = skinfit_dapple_from_ahead(dapple_normal);
         float3 normal = skinfit_smooth_normal_unguarded(at.vertex_normal);
         float3 view_in_environment = view;
+        float dapple = skinfit_clamped_dapple(dapple_cosine);
         float silhouette = skinfit_silhouette_smooth(normal, view);
         float3 bump = skinfit_bump_of_texel(decoded, at.vertex_tangent, at.vertex_bitangent);
         float3 hilite_light = skinfit_hilite_light_from_cube(view_in_environment);
-        float rim = skinfit_rim_power(silhouette, SKINFIT_RIM_EXPONENT);
+        float rim = skinfit_rim_of_silhouette(silhouette, SKINFIT_RIM_EXPONENT);
         float3 hilite_term = skinfit_attenuated_hilite(attenuator, hilite_light);
         float3 n = skinfit_bumped_normal(base, bump, normal, view, SKINFIT_NORMAL_STRENGTH);
         float3 hilite_part = skinfit_back_light(hilite_term, occ, rim, SKINFIT_HILITE);
-        float3 n_in_environment = n;
-        float3 reflected = skinfit_mirror_direction(n, view);
+        float3 lookup_normal = n;
+        float3 n_in_environment = lookup_normal;
+        float3 reflected = skinfit_mirror_direction(lookup_normal, view);
         float3 reflected_in_environment = reflected;
         float3 irradiance = skinfit_irradiance_from_cube(n_in_environment);
         float3 side_light = skinfit_side_light_from_cube(n_in_environment);

@@ -4,7 +4,7 @@ use burn::tensor::{Tensor, TensorData};
 use skinfit::bake::{Illumination, LobeStack};
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
-use skinfit::model::evaluate::{Setup, shade};
+use skinfit::model::evaluate::Setup;
 use skinfit::model::fragment::Fragment;
 use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Column, Param, Params};
@@ -12,6 +12,8 @@ use skinfit::samples::surface_records::{Asked, NEUTRAL};
 use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::tensor::footprint::cube_border;
 use skinfit::tensor::{Input, Inputs, Scatter, Shade, Shaded, Sparse};
+
+use crate::evaluators::shade;
 
 use super::bench::{Random, assert_near, matrix, numbers, shared};
 
@@ -77,7 +79,7 @@ impl Case {
             lobe,
             hilite,
         ];
-        Self { setup: Setup { form, silhouette, effects }, params, columns, samples, numbers }
+        Self { setup: Setup::new(form, silhouette, effects), params, columns, samples, numbers }
     }
 
     /// The image in f64.

@@ -77,7 +77,7 @@ fn sampled(prepared: &Prepared) -> Vec<ViewSamples> {
 
 /// What the scene looks like as it is, to be met by the samples of another.
 fn targets(truth: &Prepared) -> Vec<(View, Target)> {
-    let shader = Shader::new(truth.setup(), &truth.illumination, &truth.scene.params);
+    let shader = Shader::new(truth.setup(), &truth.illumination, &truth.scene.params).unwrap();
     let samples = sampled(truth);
     (truth.scene.views.iter().zip(&samples))
         .map(|(view, samples)| {

@@ -26,6 +26,17 @@ impl Silhouette {
     pub(crate) const ALL: [Self; 3] = [Self::Vertex, Self::Fragment, Self::Bumped];
 }
 
+/// Where the model may be read in another way than its first version.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Variant {
+    /// The cubes are looked up along N, and bumps show under the key light alone.
+    pub(crate) smooth_lookups: bool,
+    /// The third row of DappleXf, in a world that the environment is turned in: S.w is made of N and not given.
+    pub(crate) dapple_axis: Option<V3>,
+    /// The rim is interpolated from a triangle's corners, and not a power of S.z.
+    pub(crate) interpolated_rim: bool,
+}
+
 /// The model's fourteen constants, a value a channel; those that have one value hold it three times.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Constants {
@@ -135,6 +146,8 @@ pub(crate) struct Surface {
     pub(crate) view: V3,
     pub(crate) open: f64,
     pub(crate) silhouette: f64,
+    /// S.z at the corners of its triangle, and their barycentric coordinates.
+    pub(crate) corners: [V3; 2],
     pub(crate) dapple: f64,
     pub(crate) albedo: V3,
     pub(crate) specular: f64,
@@ -161,6 +174,7 @@ impl Inputs {
             view,
             open: self.open,
             silhouette: self.silhouette,
+            corners: [[self.silhouette; 3], [1.0, 0.0, 0.0]],
             dapple,
             albedo: self.albedo,
             specular: self.specular,
@@ -233,7 +247,14 @@ pub(crate) fn power(z: f64, p: f64) -> f64 {
 }
 
 /// Listing 3-4 over one surface.
-pub(crate) fn shade(form: Form, at: Silhouette, f: &Surface, lights: &Lights, k: &Constants) -> Shaded {
+pub(crate) fn shade(
+    form: Form,
+    at: Silhouette,
+    variant: Variant,
+    f: &Surface,
+    lights: &Lights,
+    k: &Constants,
+) -> Shaded {
     let v = f.view;
     let m = sum(f.base, scaled(k.normal_strength[0], f.bump));
     let n = match form {
@@ -241,22 +262,35 @@ pub(crate) fn shade(form: Form, at: Silhouette, f: &Surface, lights: &Lights, k:
         Form::Corrected => unit(m).or_else(|| unit(f.normal)).unwrap_or(scaled(-1.0, v)),
     };
     let q = dot(n, v);
+    let along = if variant.smooth_lookups { f.normal } else { n };
+    let facing = dot(along, v);
     let reflection = match form {
         // Oddity 3: the listing scales V, not n.
-        Form::Listing => sum(scaled(q, v), scaled(-2.0, n)),
-        Form::Corrected => sum(v, scaled(-2.0 * q, n)),
+        Form::Listing => sum(scaled(facing, v), scaled(-2.0, along)),
+        Form::Corrected => sum(v, scaled(-2.0 * facing, along)),
     };
     let z = if at == Silhouette::Bumped { 1.0 - q.abs().min(1.0) } else { f.silhouette };
-    let rim = power(z, k.rim_exponent[0]);
+    let exponent = k.rim_exponent[0];
+    let [corners, shares] = f.corners;
+    let rim = if variant.interpolated_rim {
+        (0..3).map(|i| shares[i] * power(corners[i], exponent)).sum()
+    } else {
+        power(z, exponent)
+    };
     let occ = 1.0 - k.occlusion[0] * (1.0 - f.open);
 
     // World to environment: back by the turn about +Y.
     let (sin, cos) = k.environment_rotation[0].to_radians().sin_cos();
     let turned = |d: V3| [cos * d[0] - sin * d[2], d[1], sin * d[0] + cos * d[2]];
+    let dapple = match (variant.dapple_axis, form) {
+        (None, _) => f.dapple,
+        (Some(axis), Form::Listing) => dot(axis, turned(f.normal)),
+        (Some(axis), Form::Corrected) => dot(axis, turned(f.normal)).max(0.0),
+    };
     let exponent = k.specular_lobe[0];
     let lookups = [
-        lights.irradiance.along(turned(n)),
-        lights.lobe(exponent, turned(n)),
+        lights.irradiance.along(turned(along)),
+        lights.lobe(exponent, turned(along)),
         lights.lobe(exponent, turned(reflection)),
         lights.hilite.along(turned(v)),
     ];
@@ -270,9 +304,9 @@ pub(crate) fn shade(form: Form, at: Silhouette, f: &Surface, lights: &Lights, k:
         f.albedo[c] * e_d[c] * occ * (k.base_weight[c] + k.rim_weight[c] * rim)
             + k.side_specular[c] * f.specular * e_s[c]
             + k.hilite[c] * occ * rim * f.attenuator * e_h[c]
-            + k.reflection[c] * f.dapple * e_r[c]
+            + k.reflection[c] * dapple * e_r[c]
             + k.key_color[c] * f.albedo[c] * key
     };
-    let haze = k.haze_weight[0] * f.dapple * f.attenuator * e_r[3];
+    let haze = k.haze_weight[0] * dapple * f.attenuator * e_r[3];
     Shaded { rgba: [colour(0), colour(1), colour(2), haze], n, n_dot_v: q, rim, reflection, lookups }
 }

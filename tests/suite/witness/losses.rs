@@ -17,7 +17,7 @@ impl Loss {
         let r = (model - target).abs();
         match self {
             Self::L2 => r * r,
-            Self::RelativeL2 => r * r / (target * target + 0.01),
+            Self::RelativeL2 => relative(model, target),
             Self::Huber if r <= 0.05 => r * r,
             Self::Huber => 0.05 * (2.0 * r - 0.05),
             Self::Smape => {
@@ -34,7 +34,7 @@ impl Loss {
         let r = (model - target).abs();
         match self {
             Self::L2 => 1.0,
-            Self::RelativeL2 => 1.0 / (target * target + 0.01),
+            Self::RelativeL2 => (model.max(0.0) + 0.1).powi(-2),
             Self::Huber => 0.05 / r.max(0.05),
             Self::Smape => 0.5 / (r.max(1e-4) * (model.abs() + target.abs() + 0.01)),
         }
@@ -50,4 +50,13 @@ impl Loss {
         }
         (at(1.0) - at(-1.0)) / (2.0 * h)
     }
+}
+
+/// 2 int (x - target) / (max(x, 0) + 0.1)^2 dx from the target to the model: at 0 the integrand's two formulas meet.
+fn relative(model: f64, target: f64) -> f64 {
+    // An antiderivative of either side, both 0 at 0.
+    let bright = |x: f64| (1.0 + x / 0.1).ln() - (0.1 + target) * (1.0 / 0.1 - 1.0 / (x + 0.1));
+    let dark = |x: f64| x * (0.5 * x - target) / 0.01;
+    let whole = |x: f64| 2.0 * if x > 0.0 { bright(x) } else { dark(x) };
+    whole(model) - whole(target)
 }

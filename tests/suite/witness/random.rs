@@ -4,7 +4,7 @@ use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
 use super::cube::Cube;
-use super::fragment::{Constants, Form, Inputs, Lights, NAMES, Silhouette, Surface};
+use super::fragment::{Constants, Form, Inputs, Lights, NAMES, Silhouette, Surface, Variant};
 use super::losses::Loss;
 use super::scene::{At, Pixel, Sample, Scene, Unknown, View};
 use super::{V3, dot, scaled, sum, unit};
@@ -104,6 +104,11 @@ fn surface(rng: &mut StdRng, form: Form, silhouette: Silhouette) -> Surface {
         attenuator: special(rng, 0.0),
     };
     let f = inputs.surface(form);
+    // S.z where it is 0 and 1 as well, each at a corner of its own.
+    let corner_silhouettes = [z, special(rng, 0.0), special(rng, 1.0)];
+    let (u, v) = (rng.random_range(0.0..1.0_f64), rng.random_range(0.0..1.0_f64));
+    let (u, v) = if u + v > 1.0 { (1.0 - u, 1.0 - v) } else { (u, v) };
+    let shares = [1.0 - u - v, u, v];
     Surface {
         base: f.base.map(single),
         bump: f.bump.map(single),
@@ -111,6 +116,7 @@ fn surface(rng: &mut StdRng, form: Form, silhouette: Silhouette) -> Surface {
         view: f.view.map(single),
         open: single(f.open),
         silhouette: single(f.silhouette),
+        corners: [corner_silhouettes, shares].map(|numbers| numbers.map(single)),
         dapple: single(f.dapple),
         albedo: f.albedo.map(single),
         specular: single(f.specular),
@@ -118,10 +124,21 @@ fn surface(rng: &mut StdRng, form: Form, silhouette: Silhouette) -> Surface {
     }
 }
 
+/// [`scene_as`] of the first version.
+pub(super) fn scene(form: Form, silhouette: Silhouette, loss: Loss, most: usize, seed: u64) -> Scene {
+    scene_as(Variant::default(), (form, silhouette), loss, most, seed)
+}
+
 /// A scene of several views whose pixels have one to `most` samples. Targets are the image at [`point`], off by 0.02 to
 /// 0.1 either way: on both sides of Huber's threshold, and far from where SMAPE's weight turns an f32's rounding
 /// of the residual into a large share of itself.
-pub(super) fn scene(form: Form, silhouette: Silhouette, loss: Loss, most: usize, seed: u64) -> Scene {
+pub(super) fn scene_as(
+    variant: Variant,
+    (form, silhouette): (Form, Silhouette),
+    loss: Loss,
+    most: usize,
+    seed: u64,
+) -> Scene {
     let mut rng = StdRng::seed_from_u64(seed);
     let mut pixel = |i: usize| {
         let count = rng.random_range(1..=most);
@@ -135,7 +152,7 @@ pub(super) fn scene(form: Form, silhouette: Silhouette, loss: Loss, most: usize,
     };
     let views =
         [64, 32].map(|pixels| View { pixels: (0..pixels).map(&mut pixel).collect(), clip: None }).to_vec();
-    let mut scene = Scene { form, silhouette, loss, lights: lights(), views };
+    let mut scene = Scene { form, silhouette, variant, loss, lights: lights(), views };
     let image = scene.image(&point(2));
     for (view, image) in scene.views.iter_mut().zip(&image) {
         for (pixel, shown) in view.pixels.iter_mut().zip(image) {

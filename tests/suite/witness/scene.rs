@@ -1,6 +1,6 @@
 //! Pixels, views, and what a fit asks of them: loss, gradient and normal equations, all by central differences.
 
-use super::fragment::{Constants, Form, Lights, Silhouette, Surface, shade};
+use super::fragment::{Constants, Form, Lights, Silhouette, Surface, Variant, shade};
 use super::losses::Loss;
 
 /// A sample of a pixel.
@@ -33,6 +33,7 @@ pub(crate) struct View {
 pub(crate) struct Scene {
     pub(crate) form: Form,
     pub(crate) silhouette: Silhouette,
+    pub(crate) variant: Variant,
     pub(crate) loss: Loss,
     pub(crate) lights: Lights,
     pub(crate) views: Vec<View>,
@@ -135,7 +136,8 @@ impl Scene {
     pub(crate) fn unscaled(&self, constants: &Constants) -> Vec<Vec<[f64; 4]>> {
         let pixel = |pixel: &Pixel| {
             pixel.samples.iter().fold([0.0; 4], |mean, sample| {
-                let light = shade(self.form, self.silhouette, &sample.surface, &self.lights, constants).rgba;
+                let Self { form, silhouette, variant, lights, .. } = self;
+                let light = shade(*form, *silhouette, *variant, &sample.surface, lights, constants).rgba;
                 std::array::from_fn(|c| mean[c] + sample.share * light[c])
             })
         };

@@ -8,10 +8,12 @@
 //! - `kept`: what stays from pass to pass: the lobe's cube, and terms that no free parameter moves
 //! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
 //! - `image`: the forward pass
+//! - `pulls`: a pass that keeps the tiles of the images apart
 
 pub(super) mod image;
 mod kept;
 pub(super) mod lobe;
+mod pulls;
 pub(super) mod sums;
 
 use std::sync::{Arc, Mutex};
@@ -27,12 +29,12 @@ use super::kernel::Kernel;
 use super::lanes::Lanes;
 use super::plan::Plan;
 use super::planned::PlannedEngine;
+use super::pulls::Pulls;
 use super::records::Records;
 use super::view::ObservedView;
 use super::{NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
-use crate::model::compose::{TermName, Weights};
-use crate::model::effects::Effects;
+use crate::model::compose::Weights;
 use crate::model::evaluate::Setup;
 use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
@@ -60,8 +62,8 @@ pub struct CpuEngine {
     lobe: Mutex<Option<Arc<Lobe>>>,
     /// Kept terms, and the parameters that they were made with.
     kept: Mutex<Option<Arc<Kept>>>,
-    /// What runs in the place of the kernel where effects were added, of which the kernel does not know; or why the
-    /// processor cannot compute them.
+    /// What runs in the place of the kernel where the rules say what the kernel does not know; or why the processor
+    /// cannot compute them.
     planned: Option<Result<PlannedEngine, String>>,
 }
 
@@ -90,7 +92,7 @@ impl CpuEngine {
     ) -> Self {
         let compare_alpha = views.iter().any(ObservedView::compares_alpha);
         let plan = Plan::new(setup, &unknowns, compare_alpha, keep);
-        let planned = setup.built_in().is_err().then(|| {
+        let planned = (!setup.hand_written()).then(|| {
             let views = std::mem::take(&mut views);
             let engine = PlannedEngine::new(setup, illumination.clone(), views, loss, unknowns.clone());
             let mut engine = engine.map_err(|error| error.to_string())?;
@@ -154,19 +156,6 @@ impl CpuEngine {
             Some(Ok(planned)) => planned.views(),
             _ => &self.views,
         }
-    }
-
-    /// One term of the image alone, in a plane a colour, where effects were added; `None` elsewhere, as
-    /// [`Shader`](crate::render::shade::Shader) shows the terms of the built-in ones.
-    #[must_use]
-    pub fn term_image(&self, index: usize, point: &Point, term: TermName) -> Option<Vec<Vec<f32>>> {
-        self.planned.as_ref()?.as_ref().ok()?.term_image(index, point, term)
-    }
-
-    /// What is switched on.
-    #[must_use]
-    pub const fn effects(&self) -> Effects {
-        self.setup.effects
     }
 
     /// Surface samples of positive weight, over all views.
@@ -306,8 +295,7 @@ impl Objective for CpuEngine {
     }
 
     fn is_quadratic(&self) -> bool {
-        matches!(self.loss, Loss::L2 | Loss::RelativeL2)
-            && self.views().iter().all(|view| view.clip.is_none())
+        self.loss == Loss::L2 && self.views().iter().all(|view| view.clip.is_none())
     }
 
     fn rounding(&self) -> f64 {
@@ -316,6 +304,14 @@ impl Objective for CpuEngine {
 
     fn fault(&self) -> Option<String> {
         self.planned.as_ref().and_then(|planned| planned.as_ref().err()).cloned()
+    }
+
+    fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
+        match &self.planned {
+            _ if widths.len() != self.views().len() => None,
+            None => Some(self.kernel_pulls(point, widths)),
+            Some(planned) => planned.as_ref().ok()?.pulls(point, widths),
+        }
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

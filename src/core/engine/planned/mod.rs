@@ -5,8 +5,10 @@
 //! f32, then f64 in a fixed tree, so that results do not depend on the number of threads.
 //!
 //! - `pass`: what a pass computes, as tapes
-//! - `machine`: tapes over blocks of records, on SIMD
+//! - `code`: tapes as the code of a machine that has an accumulator
+//! - `machine`: that machine, over blocks of records, on SIMD
 
+mod code;
 mod machine;
 mod pass;
 
@@ -16,17 +18,17 @@ use std::sync::{Arc, Mutex, PoisonError};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use self::machine::{At, Bound, File, FileColumns, Stream, WIDTH};
+use self::machine::{BATCH, Bound, Column, File, FileColumns, Stream};
 use self::pass::{CLIP_HIGH, CLIP_LOW, Fitted, GAIN, Pass, Reading, Stages, Written};
 use super::cpu::image::by_chunk;
 use super::cpu::lobe::Lobe;
 use super::cpu::sums::{CHUNK, Sums, Wish, fold, pairwise};
 use super::gram::{add_gram, add_last, pair};
 use super::lanes::Lanes;
+use super::pulls::{Gathered, Pulls};
 use super::view::ObservedView;
 use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
-use crate::model::compose::TermName;
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
@@ -75,11 +77,17 @@ struct ViewPass<'a> {
 /// What a thread computes in.
 #[derive(Default)]
 struct Scratch {
-    sample: File,
     pixel: File,
-    /// Sums over a pixel's samples, of [`WIDTH`] groups.
-    pixels: Vec<Row>,
+    samples: SampleScratch,
     sums: Vec<Row>,
+}
+
+/// What a thread adds samples up in.
+#[derive(Default)]
+struct SampleScratch {
+    file: File,
+    /// Sums over a pixel's samples, of [`BATCH`] groups.
+    pixels: Vec<Row>,
 }
 
 impl PlannedEngine {
@@ -191,9 +199,9 @@ impl PlannedEngine {
             CLIP_HIGH => clip.map_or(f64::INFINITY, |clip| clip.high.into()),
             _ => constant(input, &point.params).unwrap_or(0.0),
         };
-        let uniforms = reading.tape.uniform_values(value).into_iter().map(|x| x as f32).collect();
-        let cubes = reading.tape.resources.iter().filter_map(|name| self.cube(name, lobe)).collect();
-        Bound { tape: &reading.tape, loads: &reading.loads, cubes, uniforms }
+        let uniforms = reading.program.tape.uniform_values(value).into_iter().map(|x| x as f32).collect();
+        let cubes = reading.program.tape.resources.iter().filter_map(|name| self.cube(name, lobe)).collect();
+        Bound { program: &reading.program, loads: &reading.loads, cubes, uniforms }
     }
 
     fn cube<'a>(&'a self, name: &str, lobe: Option<&'a Lobe>) -> Option<&'a Cube<f32>> {
@@ -209,9 +217,9 @@ impl PlannedEngine {
     /// What no free parameter changes, made on the first pass, and again should a held parameter differ.
     fn kept(&self, pass: &Pass, written: Written, point: &Point, lobe: Option<&Lobe>) -> Arc<Kept> {
         let shared = |input: &Input| constant(input, &point.params).unwrap_or(0.0);
-        let exponent = pass.keep.tape.resources.iter().any(|name| name.starts_with("specular"));
+        let exponent = pass.keep.program.tape.resources.iter().any(|name| name.starts_with("specular"));
         let exponent = if exponent { point.params.scalar(Param::SpecularLobe) } else { 0.0 };
-        let made_with = (pass.keep.tape.uniform_values(shared), exponent);
+        let made_with = (pass.keep.program.tape.uniform_values(shared), exponent);
         let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) =
             slot.as_ref().filter(|kept| kept.written == written && kept.made_with == made_with)
@@ -237,13 +245,13 @@ impl PlannedEngine {
         kept.par_chunks_mut(stride * size).enumerate().for_each_init(File::default, |file, (chunk, rows)| {
             file.prepare(&bound);
             with_simd!(self.level, simd => {
-                for (k, rows) in rows.chunks_mut(stride * WIDTH).enumerate() {
+                for (k, rows) in rows.chunks_mut(stride * BATCH).enumerate() {
                     let count = rows.len() / stride;
-                    machine::run(simd, &bound, file, &streams, chunk * size + k * WIDTH, count);
-                    for (output, &slot) in bound.tape.outputs.iter().enumerate() {
-                        let at = At::of(slot, bound.tape);
+                    machine::run(simd, &bound, file, &streams, chunk * size + k * BATCH, count);
+                    for output in 0..stride {
+                        let column = file.column(output);
                         for i in 0..count {
-                            rows[i * stride + output] = file.row(at, i);
+                            rows[i * stride + output] = column[i].get();
                         }
                     }
                 }
@@ -265,7 +273,7 @@ impl PlannedEngine {
         ViewPass {
             view: &self.views[view],
             streams: streams(&self.views[view], kept, stride, &[], 0),
-            sums: sample.as_ref().map_or(0, |bound| bound.tape.outputs.len()),
+            sums: sample.as_ref().map_or(0, |bound| bound.program.tape.outputs.len()),
             sample,
             pixel: self.bound(&stages.pixel, point, view, lobe),
         }
@@ -291,42 +299,23 @@ impl PlannedEngine {
         self.shade(&of_view, planes);
     }
 
-    /// One term of the image alone, a plane a colour; `None` where no rules yield it.
-    #[must_use]
-    pub fn term_image(&self, index: usize, point: &Point, term: TermName) -> Option<Vec<Vec<f32>>> {
-        let alone = Fitted {
-            output: Some(term),
-            unknowns: Vec::new(),
-            channels: 3,
-            keep: false,
-            ..self.fitted.clone()
-        };
-        let pass = Pass::new(&alone, self.written(point)).ok()?;
-        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
-        let of_view = self.view_pass(&pass.image, &[], 0, point, index, lobe.as_deref());
-        let mut planes = Vec::new();
-        self.shade(&of_view, &mut planes);
-        Some(planes)
-    }
-
     /// The outputs of every pixel, a plane each.
     fn shade(&self, of_view: &ViewPass<'_>, planes: &mut Vec<Vec<f32>>) {
         let groups = of_view.view.samples.groups();
-        let outputs = &of_view.pixel.tape.outputs;
-        planes.resize_with(outputs.len(), Vec::new);
+        planes.resize_with(of_view.pixel.program.tape.outputs.len(), Vec::new);
         planes.iter_mut().for_each(|plane| plane.resize(groups * LANES, 0.0));
         by_chunk(planes).par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (chunk, parts)| {
             scratch.prepare(of_view);
             let first = chunk * BLOCK * CHUNK;
             let end = groups.min(first + BLOCK * CHUNK);
             with_simd!(self.level, simd => {
-                for start in (first..end).step_by(WIDTH) {
-                    let count = WIDTH.min(end - start);
-                    of_view.block(simd, scratch, start, count);
-                    for (part, &slot) in parts.iter_mut().zip(outputs) {
-                        let at = At::of(slot, of_view.pixel.tape);
+                for start in (first..end).step_by(BATCH) {
+                    let count = BATCH.min(end - start);
+                    of_view.block(simd, &scratch.pixel, &mut scratch.samples, start, count);
+                    for (output, part) in parts.iter_mut().enumerate() {
+                        let column = scratch.pixel.column(output);
                         for i in 0..count {
-                            part[(start - first + i) * LANES..][..LANES].copy_from_slice(&*scratch.pixel.row(at, i));
+                            part[(start - first + i) * LANES..][..LANES].copy_from_slice(&*column[i].get());
                         }
                     }
                 }
@@ -369,6 +358,46 @@ impl PlannedEngine {
             total.loss /= total.weight;
         }
         total
+    }
+
+    /// A pass that keeps the tiles of the images apart.
+    fn tiled_pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
+        let written = self.written(point);
+        let pass = self.pass_for(written).ok()?;
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let kept = self.kept(&pass, written, point, lobe.as_deref());
+        let mut pulls = Pulls::default();
+        for (index, (view, &width)) in self.views.iter().zip(widths).enumerate() {
+            let of_view =
+                self.view_pass(&pass.normal, &kept.views[index], pass.kept, point, index, lobe.as_deref());
+            let own = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(index));
+            let columns: Vec<Vec<Option<usize>>> =
+                pass.channels.iter().map(|c| c.unknowns.iter().map(|u| u.or(own)).collect()).collect();
+            let groups = view.samples.groups();
+            let blocks: Vec<usize> = self.read_blocks(view).collect();
+            let parts = blocks.par_iter().map_init(Scratch::default, |scratch, &block| {
+                scratch.prepare(&of_view);
+                let mut gathered = Gathered::new(view, width, &columns, self.fitted.unknowns.len());
+                let end = groups.min((block + 1) * BLOCK);
+                let Scratch { pixel, samples, .. } = scratch;
+                let outputs: Vec<Vec<&Column>> = pass
+                    .channels
+                    .iter()
+                    .map(|c| c.outputs.iter().map(|&k| pixel.column(k)).collect())
+                    .collect();
+                for first in (block * BLOCK..end).step_by(BATCH) {
+                    let count = BATCH.min(end - first);
+                    with_simd!(self.level, simd => of_view.block(simd, pixel, samples, first, count));
+                    for i in 0..count {
+                        gathered.add(first + i, |channel, column| outputs[channel][column][i].get());
+                    }
+                }
+                gathered
+            });
+            let parts: Vec<Gathered<'_>> = parts.collect();
+            pulls.add_view(index, width, parts);
+        }
+        Some(pulls)
     }
 
     /// One view's packed sums into the full matrices.
@@ -422,30 +451,30 @@ fn streams<'a>(
 impl Scratch {
     fn prepare(&mut self, pass: &ViewPass<'_>) {
         if let Some(bound) = &pass.sample {
-            self.sample.prepare(bound);
+            self.samples.file.prepare(bound);
         }
         self.pixel.prepare(&pass.pixel);
-        self.pixels.resize(pass.sums * WIDTH, Row::ZERO);
+        self.samples.pixels.resize(pass.sums * BATCH, Row::ZERO);
     }
 }
 
 impl ViewPass<'_> {
     /// The outputs of `count` groups from `first` on, in the pixels' file.
     #[inline(always)]
-    fn block<S: Simd>(&self, simd: S, scratch: &mut Scratch, first: usize, count: usize) {
+    fn block<S: Simd>(&self, simd: S, file: &File, samples: &mut SampleScratch, first: usize, count: usize) {
         let Some(sample) = &self.sample else {
-            machine::run(simd, &self.pixel, &scratch.pixel, &self.streams, first, count);
+            machine::run(simd, &self.pixel, file, &self.streams, first, count);
             return;
         };
-        self.add_samples(simd, sample, scratch, first, count);
+        self.add_samples(simd, sample, samples, first, count);
         let mut streams = self.streams;
-        streams[pass::StreamOf::Pixels as usize] = Stream { rows: &scratch.pixels, stride: self.sums };
+        streams[pass::StreamOf::Pixels as usize] = Stream { rows: &samples.pixels, stride: self.sums };
         // The sums stand from the first group on, the view's streams from their start.
         for at in [pass::StreamOf::Targets as usize, pass::StreamOf::Weights as usize] {
             let Stream { rows, stride } = streams[at];
             streams[at].rows = rows.get(first * stride..).unwrap_or(&[]);
         }
-        machine::run(simd, &self.pixel, &scratch.pixel, &streams, 0, count);
+        machine::run(simd, &self.pixel, file, &streams, 0, count);
     }
 
     /// Add up the samples of each pixel, by their shares.
@@ -454,7 +483,7 @@ impl ViewPass<'_> {
         &self,
         simd: S,
         sample: &Bound<'_>,
-        scratch: &mut Scratch,
+        scratch: &mut SampleScratch,
         first: usize,
         count: usize,
     ) {
@@ -464,8 +493,8 @@ impl ViewPass<'_> {
         let (mut record, end) = (starts[first] as usize, starts[first + count] as usize);
         let mut group = first;
         while record < end {
-            let block = WIDTH.min(end - record);
-            machine::run(simd, sample, &scratch.sample, &self.streams, record, block);
+            let block = BATCH.min(end - record);
+            machine::run(simd, sample, &scratch.file, &self.streams, record, block);
             for i in 0..block {
                 while starts[group + 1] as usize <= record + i {
                     group += 1;
@@ -475,9 +504,9 @@ impl ViewPass<'_> {
                     None => Lanes::splat(simd, 1.0),
                 };
                 let sums = &mut scratch.pixels[(group - first) * self.sums..][..self.sums];
-                for (sum, &slot) in sums.iter_mut().zip(&sample.tape.outputs) {
+                for (output, sum) in sums.iter_mut().enumerate() {
                     use crate::model::real::Real;
-                    let value = Lanes::of_row(simd, &scratch.sample.row(At::of(slot, sample.tape), i));
+                    let value = Lanes::of_row(simd, &scratch.file.column(output)[i].get());
                     share.mul_add(value, Lanes::of_row(simd, sum)).store(sum);
                 }
             }
@@ -502,14 +531,15 @@ impl ViewPass<'_> {
             Wish::Normal => channel.outputs.len() * (channel.outputs.len() + 1) / 2,
         };
         let used: usize = pass.channels.iter().map(size).sum();
-        let at = |output: &usize| At::of(self.pixel.tape.outputs[*output], self.pixel.tape);
-        let columns: Vec<Vec<At>> = if wish == Wish::Loss {
+        let Scratch { pixel, samples, sums } = scratch;
+        let file = &*pixel;
+        let column = |output: usize| file.column(output);
+        let losses = column(0);
+        let columns: Vec<Vec<&Column>> = if wish == Wish::Loss {
             Vec::new()
         } else {
-            pass.channels.iter().map(|c| c.outputs.iter().map(at).collect()).collect()
+            pass.channels.iter().map(|c| c.outputs.iter().map(|&output| column(output)).collect()).collect()
         };
-        let loss_at = at(&0);
-        let mut sums = std::mem::take(&mut scratch.sums);
         sums.clear();
         sums.resize(used, Row::ZERO);
         let mut loss = Lanes::splat(simd, 0.0);
@@ -517,14 +547,14 @@ impl ViewPass<'_> {
             let end = groups.min((block + 1) * BLOCK);
             let mut first = block * BLOCK;
             while first < end {
-                let count = WIDTH.min(end - first);
-                self.block(simd, scratch, first, count);
-                for i in 0..count {
-                    loss = loss + Lanes::of_row(simd, &scratch.pixel.row(loss_at, i));
+                let count = BATCH.min(end - first);
+                self.block(simd, file, samples, first, count);
+                for row in &losses[..count] {
+                    loss = loss + Lanes::of_row(simd, &row.get());
                 }
                 let mut base = 0;
                 for channel in &columns {
-                    let source = FileColumns { file: &scratch.pixel, columns: channel, groups: count };
+                    let source = FileColumns { columns: channel, groups: count };
                     if wish == Wish::Gradient {
                         add_last(simd, source, &mut sums[base..]);
                         base += channel.len();
@@ -538,7 +568,6 @@ impl ViewPass<'_> {
         }
         let mut folded: Vec<f64> = sums.iter().map(|row| fold(row)).collect();
         folded.push(fold(&loss.to_array()));
-        scratch.sums = sums;
         Sums(folded)
     }
 }
@@ -549,11 +578,15 @@ impl Objective for PlannedEngine {
     }
 
     fn is_quadratic(&self) -> bool {
-        matches!(self.fitted.loss, Loss::L2 | Loss::RelativeL2) && !self.fitted.clipped
+        self.fitted.loss == Loss::L2 && !self.fitted.clipped
     }
 
     fn rounding(&self) -> f64 {
         super::rounding(&self.views, self.fitted.loss, self.stride)
+    }
+
+    fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
+        if widths.len() == self.views.len() { self.tiled_pulls(point, widths) } else { None }
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
+use super::machine::Program;
 use crate::engine::Unknown;
 use crate::engine::residual::loss_text;
 use crate::engine::view::ObservedView;
-use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param};
 use crate::program::cut::{KEPT, cut};
 use crate::program::graph::{Binary, Graph, Id, Node};
-use crate::program::lower::{LowerError, Source, Value};
+use crate::program::lower::{LowerError, Natives, Source, Value};
 use crate::program::shading::{Shading, ShadingError};
 use crate::program::tape::Tape;
 use crate::samples::surface_records::{Places, neutral};
@@ -46,8 +46,6 @@ pub(super) struct Fitted {
     pub(super) clipped: bool,
     /// Whether what no free parameter moves is kept.
     pub(super) keep: bool,
-    /// One term alone, instead of the whole.
-    pub(super) output: Option<TermName>,
 }
 
 /// What of a point is written into the tapes.
@@ -63,7 +61,12 @@ impl Fitted {
     /// Of views of one kind.
     pub(super) fn new(setup: Setup, unknowns: Vec<Unknown>, loss: Loss, views: &[ObservedView]) -> Self {
         let channels = if views.iter().any(ObservedView::compares_alpha) { 4 } else { 3 };
-        let places = views.first().map(|view| *view.samples.surface.places()).unwrap_or_default();
+        let places = views
+            .iter()
+            // One that holds nothing says nothing of where numbers stand.
+            .find(|view| view.samples.groups() > 0)
+            .map(|view| *view.samples.surface.places())
+            .unwrap_or_default();
         Self {
             setup,
             unknowns,
@@ -78,7 +81,6 @@ impl Fitted {
             clipped: views.iter().any(|view| view.clip.is_some()),
             places,
             keep: true,
-            output: None,
         }
     }
 
@@ -102,7 +104,7 @@ impl Fitted {
 /// A tape, and where it reads each of its fields.
 #[derive(Debug)]
 pub(super) struct Reading {
-    pub(super) tape: Tape,
+    pub(super) program: Program,
     /// For each field, its stream and its row there.
     pub(super) loads: Vec<(usize, usize)>,
 }
@@ -162,8 +164,8 @@ impl Pass {
         let facts = facts(fitted, written);
         let held = held_fields(&fitted.places);
         let stand_in = |field: &str| if held.contains_key(field) { None } else { neutral(field) };
-        let shading = Shading::new(&facts, &seeds, stand_in, "")?;
-        let losses = Source::new(&loss_text(fitted.loss))?;
+        let shading = Shading::new(&facts, &seeds, stand_in, Natives::Called)?;
+        let losses = Source::new(&loss_text(fitted.loss), Natives::Called)?;
         let channels = fitted.channels;
         let outputs: Vec<Id> = std::iter::once(&shading.value)
             .chain(&shading.tangents)
@@ -174,8 +176,7 @@ impl Pass {
             !fitted.keep
                 || match graph.node(id) {
                     Node::Uniform(at) => names.contains(&graph.uniforms[at as usize].name),
-                    Node::Lookup { resource, .. } => names.contains(&graph.resources[resource as usize]),
-                    _ => false,
+                    _ => graph.looked_up(id).is_some_and(|name| names.iter().any(|known| known == name)),
                 }
         };
         let cut = cut(&shading.graph, &outputs, moves);
@@ -222,7 +223,7 @@ impl Reading {
             field => (StreamOf::Samples as usize, held.get(field).map_or(0, |place| place + input.component)),
         };
         let loads = tape.fields.iter().map(load).collect();
-        Self { tape, loads }
+        Self { program: Program::new(tape), loads }
     }
 }
 
@@ -361,7 +362,6 @@ fn facts(fitted: &Fitted, written: Written) -> Facts {
         turned: written.turned,
         square_rim: false,
         budget: Budget::Exact,
-        output: fitted.output,
         ..Facts::default()
     }
 }

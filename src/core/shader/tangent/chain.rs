@@ -41,6 +41,8 @@ pub struct Chain {
     pub radiance: Vec<Option<String>>,
     /// For each seed, how the haze moves (an `f32`).
     pub haze: Vec<Option<String>>,
+    /// For each seed, the quantities that move with it, and how (WGSL of their types).
+    pub moved: Vec<BTreeMap<&'static str, String>>,
 }
 
 impl Chain {
@@ -60,6 +62,7 @@ impl Chain {
                 .collect();
             chain.radiance.push((!along.is_empty()).then(|| along.join(" + ")));
             chain.haze.push(if hazy(&plan.facts) { moved.get("haze").cloned() } else { None });
+            chain.moved.push(moved);
         }
         chain.functions.push_str(tangents.text());
         Ok(chain)

@@ -8,7 +8,7 @@ use super::terms;
 use crate::model::compose::TermName;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
-use crate::shader::emit::SAMPLE;
+use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::Facts;
 use crate::shader::quantity::{Attribute, Constant, Resource};
 use crate::shader::rule::{LIBRARY, RULES, Rule, Stage};
@@ -103,7 +103,7 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
         .iter()
         .chain(terms().into_iter().flat_map(|term| &term.rules))
         .flat_map(|rule| rule.gives.iter().map(|(quantity, _)| *quantity))
-        .chain(SAMPLE.iter().map(|(name, _)| *name))
+        .chain(SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name))
         .chain(Attribute::ALL.iter().map(|attribute| attribute.name()))
         .chain(Resource::ALL.iter().map(|resource| resource.name()))
         .chain(Constant::OWN.iter().map(|constant| constant.name()))

@@ -3,20 +3,20 @@
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
-use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
+use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
-use crate::shader::emit::SAMPLE;
+use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
 use crate::shader::rule::rules;
 use crate::shader::search::search;
 
-/// What `effect` asks for beside the other `effects`.
-pub(super) fn of_effect(effect: Effect, effects: Effects, silhouette: Silhouette) -> Needs {
-    type Known = HashMap<(Effect, Effects, Silhouette), Needs>;
+/// What `effect` asks for beside the others of `setup`.
+pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
+    type Known = HashMap<(Effect, Setup), Needs>;
     static KNOWN: LazyLock<Mutex<Known>> = LazyLock::new(Mutex::default);
     let known = || KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
-    let key = (effect, effects, silhouette);
+    let key = (effect, *setup);
     if let Some(needs) = known().get(&key) {
         return *needs;
     }
@@ -24,22 +24,22 @@ pub(super) fn of_effect(effect: Effect, effects: Effects, silhouette: Silhouette
     let mut goals: Vec<&'static str> =
         own.filter(|rule| !rule.adds.is_empty()).map(|rule| rule.gives[0].0).collect();
     goals.dedup();
-    let needs = of_goals(&goals, effects, silhouette);
+    let needs = of_goals(&goals, setup);
     known().insert(key, needs);
     needs
 }
 
-/// What the rules that yield quantities of stored samples ask for, in the corrected form: the listing's ask for no
-/// more.
-pub(super) fn of_goals(goals: &[&'static str], effects: Effects, silhouette: Silhouette) -> Needs {
-    let setup = Setup { form: Form::Corrected, silhouette, effects };
-    let facts = Facts { setup, source: Source::Samples, ..Facts::default() };
+/// What the rules that yield quantities of stored samples ask for.
+pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
+    let facts = Facts { setup: *setup, source: Source::Samples, ..Facts::default() };
     // What a sample can hold. The smooth normal is left to the rule that puts the base in its place, so that it is
     // wanted by those alone that cannot do with that.
-    let stand_in = !effects.has(Effect::KeyLight);
-    let bumped = silhouette == Silhouette::Bumped;
+    let stand_in = !setup.effects.has(Effect::KeyLight) && !setup.smooth_lookups();
+    let bumped = setup.silhouette == Silhouette::Bumped;
     let held = |name: &str| !(name == "normal" && stand_in || name == "silhouette" && bumped);
-    let given: Vec<&'static str> = SAMPLE.iter().map(|(name, _)| *name).filter(|name| held(name)).collect();
+    let held = |name: &str| held(name) && !(name == "silhouette" && setup.rim_of_corners());
+    let given: Vec<&'static str> =
+        SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name).filter(|name| held(name)).collect();
     // What cannot be planned is told when it is.
     let chosen = search(&facts, &[], goals, &given).unwrap_or_default();
     let needed = |name: &str| {
@@ -57,7 +57,7 @@ pub(super) fn of_goals(goals: &[&'static str], effects: Effects, silhouette: Sil
         lobes: read(Resource::SpecularFaces),
         hilite: read(Resource::HiliteFaces),
         occlusion: needed("open"),
-        rim: needed("silhouette"),
+        rim: needed("silhouette") || needed("corner_silhouettes"),
         dapple: needed("dapple"),
         haze: false,
         smooth_normal: needed("normal"),
@@ -68,6 +68,7 @@ pub(super) fn of_goals(goals: &[&'static str], effects: Effects, silhouette: Sil
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::effects::{Form, Lookups};
     use crate::shader::emit::{hazy, parts};
 
     #[test]
@@ -77,16 +78,19 @@ mod tests {
             let on = |(i, _): &(usize, Effect)| bits & (1 << i) != 0;
             let effects: Effects =
                 Effect::BUILT_IN.into_iter().enumerate().filter(on).map(|(_, e)| e).collect();
-            for silhouette in Silhouette::ALL {
-                let setup = Setup { form: Form::Corrected, silhouette, effects };
+            let lookups = Lookups::ALL.into_iter();
+            for (silhouette, lookups) in
+                lookups.flat_map(|lookups| Silhouette::ALL.map(|silhouette| (silhouette, lookups)))
+            {
+                let setup = Setup { lookups, ..Setup::new(Form::Corrected, silhouette, effects) };
                 let facts = Facts { setup, source: Source::Samples, ..Facts::default() };
                 let mut goals = parts(&facts);
                 if hazy(&facts) {
                     goals.push("haze");
                 }
-                let (read, asked) = (of_goals(&goals, effects, silhouette), effects.needs(silhouette));
+                let (read, asked) = (of_goals(&goals, &setup), setup.needs());
                 let asked = Needs { haze: false, key_light: false, ..asked };
-                assert_eq!(read, asked, "{effects:?} {silhouette:?}");
+                assert_eq!(read, asked, "{effects:?} {silhouette:?} {lookups:?}");
             }
         }
     }

@@ -190,7 +190,7 @@ impl Fused {
         sample_fields(&self.plan.facts)
     }
 
-    /// The sums of a wish that are not 0 by their nature.
+    /// The sums of a wish; products of two columns that share no colour channel are 0 and left out.
     fn sums(&self, wish: Wish) -> Vec<Sum> {
         let k = self.columns.len();
         let meet = |i: usize, j: usize| self.moved(i).and(self.moved(j)) != Moved::NONE;

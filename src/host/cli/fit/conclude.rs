@@ -9,6 +9,7 @@ use super::solve::Solving;
 use super::words::{Times, advice, advice_on_maps, tell_run};
 use crate::cli::fit_engine::{FitEngine, SelectedEngine};
 use crate::cli::fitted_scene::{Changes, Start};
+use crate::cli::machine::made;
 use crate::cli::maps::MapsLeft;
 use crate::cli::run_folder::RunFolder;
 use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
@@ -65,7 +66,7 @@ pub(super) fn conclude(
     } else {
         // All that there was to do is done: reading, bakes, samples, the fit, its pictures and the report.
         let times = Times { whole: begun.elapsed().as_secs_f64(), samples: seconds.samples };
-        tell_run(folder.path(), &prepared.scene.views, chosen, outcome, times)?;
+        tell_run(folder.path(), &prepared.scene.views, chosen, outcome, &report.summary.misfit, times)?;
     }
     let advice = match maps {
         Some(left) => advice_on_maps(arguments, folder.path(), left, outcome),
@@ -128,6 +129,7 @@ fn run_info(
         provenance: vec![
             ("form".to_owned(), prepared.scene.form.name().to_owned()),
             ("silhouette".to_owned(), prepared.scene.silhouette.name().to_owned()),
+            ("lookups".to_owned(), prepared.scene.lookups.name().to_owned()),
             ("effects".to_owned(), effects.join(", ")),
             ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
         ]
@@ -135,6 +137,7 @@ fn run_info(
         .chain((!set.is_empty()).then(|| ("set".to_owned(), set.join(", "))))
         .chain(engine.provenance())
         .collect(),
+        made: made(),
         maps: None,
         named: Vec::new(),
     }

@@ -7,6 +7,7 @@ use crate::fit::outcome::Outcome;
 use crate::prepare::Prepared;
 use crate::progress;
 use crate::render::image::Image;
+use crate::render::places::places;
 use crate::render::shade::Shader;
 use crate::report::ViewEvidence;
 use crate::scene::view::View;
@@ -18,18 +19,12 @@ pub(super) fn evidence(
     outcome: &Outcome,
 ) -> Result<Vec<ViewEvidence>, Refusal> {
     let observed = engine.surfaced_views()?;
-    // What the model in f64 does not know, the engine shows itself.
-    let known = prepared.setup().built_in().is_ok();
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params);
+    let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params)?;
     let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
     let views = prepared.scene.views.iter().zip(observed.iter()).enumerate();
     let evidence = views
         .map(|(index, (view, observed))| {
-            let shaded = if known {
-                shader.shade(&observed.samples, &view.camera, outcome.end.gains[index])
-            } else {
-                engine.shaded(index, &view.camera, &outcome.end)?
-            };
+            let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
             let (target, coverage) = compared(view, observed, &shaded.image);
             bar.inc(1);
             Ok(ViewEvidence {
@@ -43,6 +38,14 @@ pub(super) fn evidence(
                     .map(|(name, image)| (name.name().to_owned(), image))
                     .collect(),
                 haze: shaded.haze,
+                places: places(
+                    &observed.samples,
+                    prepared.setup(),
+                    &prepared.illumination,
+                    &outcome.end.params,
+                    [view.camera.width, view.camera.height].map(|side| side as usize),
+                ),
+                clip: observed.clip,
             })
         })
         .collect();

@@ -72,6 +72,8 @@ pub(super) fn solve(
         resume: arguments.resume.then(|| state.clone()),
         state: (!maps).then_some(state),
         interrupt: Some(interrupt.watch()),
+        widths: prepared.image_widths(),
+        profile: true,
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");

@@ -8,6 +8,8 @@ use crate::cli::maps::MapsLeft;
 use crate::cli::{Refusal, say};
 use crate::engine::Unknown;
 use crate::fit::outcome::{Ending, Outcome};
+use crate::report::errors::{basis_in_words, profile_in_words};
+use crate::report::misfit::Misfit;
 use crate::scene::view::View;
 
 /// Seconds of a run.
@@ -25,10 +27,12 @@ pub(super) fn tell_run(
     views: &[View],
     chosen: &SelectedEngine<'_>,
     outcome: &Outcome,
+    misfit: &Misfit,
     times: Times,
 ) -> Result<(), Refusal> {
     let (engine, sample_seconds) = (&chosen.engine, times.samples);
     tell_outcome(outcome, views, times.whole)?;
+    tell_misfit(misfit)?;
     if engine.name() == "gpu" {
         let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
         say(&format!("{} samples made by the {by} in {sample_seconds:.3} s", engine.samples()))?;
@@ -47,12 +51,19 @@ fn tell_outcome(outcome: &Outcome, views: &[View], whole: f64) -> Result<(), Ref
             Unknown::Param(column) => (column.name(), column.param.info().unit),
         };
         let error = match unknown.std_error {
-            Some(error) => format!("+- {error:.2e}"),
+            Some(error) => match unknown.noise_error.filter(|noise| error > 1.05 * noise) {
+                Some(noise) => format!("+- {error:.2e} (noise {noise:.1e})"),
+                None => format!("+- {error:.2e}"),
+            },
             None if !unknown.identifiable => "not determined by the images".to_owned(),
             None if unknown.at_bound => "at its bound".to_owned(),
             None => String::new(),
         };
         say(format!("{name:>22} {:>12.6}  {error:<11}  {unit}", unknown.value).trim_end())?;
+    }
+    let basis = basis_in_words(outcome.errors, outcome.most_over_noise());
+    for words in basis.into_iter().chain(outcome.profile.as_ref().and_then(profile_in_words)) {
+        say(&words)?;
     }
     let ending = outcome.ending.words();
     let fitting = match outcome.seconds {
@@ -68,6 +79,16 @@ fn tell_outcome(outcome: &Outcome, views: &[View], whole: f64) -> Result<(), Ref
         outcome.loss_start,
         outcome.loss_end
     ))
+}
+
+/// How good what it ended at is, in a line, and below it where it is wrong, the largest misfit first.
+fn tell_misfit(misfit: &Misfit) -> Result<(), Refusal> {
+    let line: Vec<String> =
+        misfit.explained_in_words().into_iter().chain(misfit.largest_in_words()).collect();
+    if !line.is_empty() {
+        say(&line.join("; "))?;
+    }
+    misfit.told().try_for_each(|place| say(&format!("  {}", place.sentence())))
 }
 
 /// What to do about a fit that did not converge.

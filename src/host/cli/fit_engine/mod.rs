@@ -5,16 +5,12 @@ mod gpu;
 use std::borrow::Cow;
 
 use super::{Refusal, tell};
+use crate::engine::Objective;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::reference::{Reference, deviation};
 use crate::engine::view::ObservedView;
-use crate::engine::{Objective, Point};
-use crate::model::compose::TermName;
 use crate::prepare::Prepared;
 use crate::progress;
-use crate::render::shade::Shaded;
-use crate::render::shade::image_of_planes;
-use crate::scene::view::Camera;
 
 /// How far an engine's sums may be from those in f64, relative to the geometric mean of the diagonal entries that
 /// share row and column: a few hundred roundings of f32, of either sign. A robust loss' weights move with the
@@ -114,36 +110,6 @@ impl FitEngine<'_> {
             return Ok(Cow::Owned(views));
         }
         Ok(Cow::Borrowed(self.views()))
-    }
-
-    /// A view as the engine itself shades it, with an image for each term.
-    pub(super) fn shaded(&self, index: usize, camera: &Camera, point: &Point) -> Result<Shaded, Refusal> {
-        match self {
-            Self::Cpu(engine) => {
-                let samples = &engine.views()[index].samples;
-                let image = |planes: &[Vec<f32>]| image_of_planes(samples, planes, camera);
-                let whole = image(&engine.image(index, point));
-                let mut terms = Vec::new();
-                for term in TermName::of(engine.effects()) {
-                    let planes = engine.term_image(index, point, term);
-                    let planes =
-                        planes.ok_or_else(|| Refusal::failure("the CPU engine shows no single terms"))?;
-                    terms.push((term, image(&planes)));
-                }
-                Ok(Shaded { image: whole, terms, haze: Vec::new(), glow: Vec::new() })
-            }
-            Self::Gpu(engine) => {
-                let refused = |error| super::graphics::Task::Fit.refusal(&error);
-                let samples = &engine.views()[index].samples;
-                let image = |planes: &[Vec<f32>]| image_of_planes(samples, planes, camera);
-                let whole = image(&engine.image(index, point).map_err(refused)?);
-                let mut terms = Vec::new();
-                for term in TermName::of(engine.effects()) {
-                    terms.push((term, image(&engine.term_image(index, point, term).map_err(refused)?)));
-                }
-                Ok(Shaded { image: whole, terms, haze: Vec::new(), glow: Vec::new() })
-            }
-        }
     }
 
     /// How many samples there are.
@@ -272,7 +238,6 @@ impl FitEngineArguments {
         if !self.verify {
             return Ok(());
         }
-        prepared.setup().built_in().map_err(|error| Refusal::new(format!("--verify: {error}.")))?;
         let (objective, point) = (engine.objective(), prepared.start());
         let bar = progress::spinner("verify");
         let views = engine.surfaced_views()?;
@@ -282,7 +247,8 @@ impl FitEngineArguments {
             &views,
             prepared.scene.fit.loss,
             objective.unknowns(),
-        );
+        )
+        .map_err(|error| Refusal::new(format!("--verify: {error}.")))?;
         let (want, moved) = reference.with_rounding(&point);
         let found = deviation(&objective.normal_equations(&point), &want, objective.unknowns());
         bar.finish_and_clear();

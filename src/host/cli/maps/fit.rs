@@ -23,6 +23,7 @@ use crate::report::metrics::Comparison;
 use crate::scene::MapKind;
 use crate::scene::view::View;
 use crate::tensor::SharedDevice;
+use skinfit_core::program::shading::ShadingError;
 
 impl MapArguments {
     /// Fit the requested maps: samples, cubes, constants and free columns are then those of the fitted maps,
@@ -36,7 +37,6 @@ impl MapArguments {
         if self.maps.is_empty() {
             return Ok((observed, None));
         }
-        prepared.setup().built_in().map_err(|error| Refusal::new(format!("--maps: {error}.")))?;
         let clock = Instant::now();
         let named = |kind: &MapKind| self.maps.iter().any(|name| name == kind.name());
         let kinds: Vec<MapKind> = MapKind::ALL.into_iter().filter(named).collect();
@@ -50,7 +50,7 @@ impl MapArguments {
         let task = MapTask { held_out, interrupt, ..task };
         let found = told(&shared, task, prepared.scene.fit.maps.rounds, run.quiet)
             .map_err(|error| refusal(&error, &prepared.scene.path))?;
-        let views = gained(prepared, &observed, &found, held_out);
+        let views = gained(prepared, &observed, &found, held_out)?;
         let maps = found.layers.iter().map(|layer| MapPictures::new(layer, &posed));
         let maps = maps.collect::<Result<Vec<_>, _>>()?;
         let FittedMaps { illumination, mut observed, constants, history, interrupted, .. } = found;
@@ -133,11 +133,11 @@ fn gained(
     before: &[ObservedView],
     found: &FittedMaps,
     held_out: Option<usize>,
-) -> Vec<MapView> {
-    let initial = Shader::new(prepared.setup(), &prepared.illumination, &found.initial.params);
-    let fitted = Shader::new(prepared.setup(), &found.illumination, &found.constants.params);
+) -> Result<Vec<MapView>, ShadingError> {
+    let initial = Shader::new(prepared.setup(), &prepared.illumination, &found.initial.params)?;
+    let fitted = Shader::new(prepared.setup(), &found.illumination, &found.constants.params)?;
     let views = prepared.scene.views.iter().enumerate();
-    views
+    let scored = views
         .map(|(i, view)| {
             let scores = |shader: &Shader, observed: &ObservedView, gain: f64| {
                 let image = shader.shade(&observed.samples, &view.camera, gain).image;
@@ -151,5 +151,6 @@ fn gained(
                 after: scores(&fitted, &found.observed[i], found.constants.gains[i]),
             }
         })
-        .collect()
+        .collect();
+    Ok(scored)
 }

@@ -215,8 +215,7 @@ impl Arguments {
 /// The occlusion of a frame's pose alone, where each frame is to be baked and an effect asks for it.
 fn frame_occlusion(arguments: &Arguments, prepared: &Prepared, mesh: &Mesh) -> Option<VertexOcclusion> {
     let scene = &prepared.scene;
-    let wanted =
-        arguments.follows() == ClipOcclusion::Frames && scene.effects.needs(scene.silhouette).occlusion;
+    let wanted = arguments.follows() == ClipOcclusion::Frames && scene.needs().occlusion;
     let cache = arguments.scene.cache();
     let (occlusion, stats) = wanted.then(|| bake::bake_pose(scene, &mesh.pose(), cache.as_deref()))?;
     tell_warnings(&stats.warnings);

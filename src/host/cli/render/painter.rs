@@ -62,8 +62,7 @@ pub(super) struct CpuPainter<'a> {
 impl<'a> CpuPainter<'a> {
     /// Of a scene at its own pose.
     pub(super) fn new(prepared: &'a Prepared) -> Result<Self, Refusal> {
-        prepared.setup().built_in().map_err(|error| Refusal::new(format!("{error}.")))?;
-        let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params);
+        let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
         let (posed, rays, open) = pose(prepared, &prepared.scene.mesh, prepared.occlusion.as_ref())?;
         Ok(Self { prepared, shader, posed, rays, open, seconds: 0.0 })
     }

@@ -17,7 +17,7 @@ impl Axis for Filters {
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
         let scene = &bench.prepared.scene;
-        let asked = scene.effects.needs(scene.silhouette).environment();
+        let asked = scene.needs().environment();
         asked.then_some(()).ok_or("no effect looks a cube up")
     }
 
@@ -28,14 +28,13 @@ impl Axis for Filters {
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let evaluated = bench.evaluate(bench.settings())?;
-        let shader = evaluated.shader(&bench.point());
-        let exact = images_in(&evaluated, bench, |s, c, g| shader.shade_in(s, c, g, 0.0_f64));
+        let shader = evaluated.format_shader(&bench.point())?;
+        let exact = images_in(&evaluated, bench, |s, c, g| shader.shade(s, c, g, 0.0_f64));
         let hardware = images_in(&evaluated, bench, |s, c, g| {
-            shader.shade_in(s, c, g, Emulated::<HardwareFilter>::new(0.0))
+            shader.shade(s, c, g, Emulated::<HardwareFilter>::new(0.0))
         });
-        let nearest = images_in(&evaluated, bench, |s, c, g| {
-            shader.shade_in(s, c, g, Emulated::<NearestTexel>::new(0.0))
-        });
+        let nearest =
+            images_in(&evaluated, bench, |s, c, g| shader.shade(s, c, g, Emulated::<NearestTexel>::new(0.0)));
         let setting = |name: &str, fetches: f64, images: &[crate::render::image::Image]| Setting {
             name: name.to_owned(),
             choose: None,

@@ -30,22 +30,22 @@ impl Axis for Formats {
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let evaluated = bench.evaluate(bench.settings())?;
         let point = bench.point();
-        let shader = evaluated.shader(&point);
+        let shader = evaluated.format_shader(&point)?;
         let exact = images_in(&evaluated, bench, |samples, camera, gain| {
-            shader.shade_in(samples, camera, gain, 0.0_f64)
+            shader.shade(samples, camera, gain, 0.0_f64)
         });
         let in_format = |format: &str| -> Vec<Image> {
             images_in(&evaluated, bench, |samples, camera, gain| match format {
-                Single::NAME => shader.shade_in(samples, camera, gain, Emulated::<Single>::new(0.0)),
-                Half::NAME => shader.shade_in(samples, camera, gain, Emulated::<Half>::new(0.0)),
-                Declared::NAME => shader.shade_in(samples, camera, gain, Emulated::<Declared>::new(0.0)),
-                _ => shader.shade_in(samples, camera, gain, Emulated::<Fixed>::new(0.0)),
+                Single::NAME => shader.shade(samples, camera, gain, Emulated::<Single>::new(0.0)),
+                Half::NAME => shader.shade(samples, camera, gain, Emulated::<Half>::new(0.0)),
+                Declared::NAME => shader.shade(samples, camera, gain, Emulated::<Declared>::new(0.0)),
+                _ => shader.shade(samples, camera, gain, Emulated::<Fixed>::new(0.0)),
             })
         };
         let engine = evaluated.live_engine();
         let mut wide = || {
             Ok::<f64, StudyError>(seconds_of(|| {
-                images_in(&evaluated, bench, |s, c, g| shader.shade_in(s, c, g, 0.0_f64))
+                images_in(&evaluated, bench, |s, c, g| shader.shade(s, c, g, 0.0_f64))
             }))
         };
         let mut single = || Ok(seconds_of(|| engine.loss(&point)));
@@ -75,7 +75,8 @@ impl Axis for Formats {
             title: "Number format",
             method: "Every operation rounded to the format; `as listed` rounds only what listing 3-4 declares half (textures, the normal) \
                      and fixed (light; 12 bits from -2 to 2), which is 14 bits on the whole. Formats below f32 are emulated, so they have \
-                     no time; that of f64 is of scalar code, that of f32 of the engine's SIMD lanes, a pass over all views."
+                     no time; that of f64 is of the rules step by step, sixteen samples at a time, that of f32 of the engine's SIMD lanes, \
+                     a pass over all views."
                 .to_owned(),
             cost: "bits",
             settings,

@@ -82,7 +82,7 @@ impl Swept<'_> {
         let (values, present) = (self.values(bench), self.present(bench));
         let mut images = Vec::new();
         for &value in &values {
-            images.push(bench.evaluate(self.settings(bench, value))?.images(point));
+            images.push(bench.evaluate(self.settings(bench, value))?.images(point)?);
         }
         let mut works: Vec<Box<dyn FnMut() -> Result<f64, StudyError> + '_>> = Vec::new();
         for &value in &values {

@@ -16,7 +16,7 @@ impl Axis for Rays {
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
         let scene = &bench.prepared.scene;
-        let asked = scene.effects.needs(scene.silhouette).occlusion;
+        let asked = scene.needs().occlusion;
         asked.then_some(()).ok_or("no effect asks for occlusion")
     }
 

@@ -77,7 +77,7 @@ fn measure(
     own: bool,
 ) -> Result<Vec<Setting>, StudyError> {
     let exact = Settings { silhouette: Silhouette::Fragment, ..bench.settings() };
-    let exact = mesh.evaluated(bench, exact)?.images(&bench.point());
+    let exact = mesh.evaluated(bench, exact)?.images(&bench.point())?;
     silhouettes.iter().map(|&silhouette| setting(bench, mesh, silhouette, &exact, own)).collect()
 }
 
@@ -99,7 +99,7 @@ fn setting(
     Ok(Setting {
         name,
         choose: own.then_some(Choose::Silhouette(silhouette)),
-        error: Difference::of_all(exact, &evaluated.images(&bench.point())),
+        error: Difference::of_all(exact, &evaluated.images(&bench.point())?),
         cost: plan(&facts)?.cost,
         time: None,
         counts: vec![

@@ -113,19 +113,22 @@ impl Fits {
         drop(works);
         let outcomes: Vec<(Outcome, u64)> = outcomes.into_iter().filter_map(RefCell::into_inner).collect();
         let images = |point: &Point| self.subject.images(point);
-        let best = images(&outcomes[reference].0.end);
-        let setting = |(i, (outcome, passes)): (usize, &(Outcome, u64))| Setting {
-            name: runs[i].0.clone(),
-            choose: None,
-            error: Difference::of_all(&best, &images(&outcome.end)),
-            cost: timed[i].seconds.median,
-            time: Some(timed[i]),
-            counts: vec![("passes", *passes as f64), ("loss", outcome.loss_end)],
-            reference: i == reference,
-            present: false,
-            pareto: false,
+        let best = images(&outcomes[reference].0.end)?;
+        let setting = |(i, (outcome, passes)): (usize, &(Outcome, u64))| -> Result<Setting, StudyError> {
+            Ok(Setting {
+                name: runs[i].0.clone(),
+                choose: None,
+                error: Difference::of_all(&best, &images(&outcome.end)?),
+                cost: timed[i].seconds.median,
+                time: Some(timed[i]),
+                counts: vec![("passes", *passes as f64), ("loss", outcome.loss_end)],
+                reference: i == reference,
+                present: false,
+                pareto: false,
+            })
         };
-        let mut settings: Vec<Setting> = outcomes.iter().enumerate().map(setting).collect();
+        let mut settings: Vec<Setting> =
+            outcomes.iter().enumerate().map(setting).collect::<Result<_, StudyError>>()?;
         mark_pareto(&mut settings);
         Ok((settings, outcomes.into_iter().map(|(outcome, _)| outcome).collect()))
     }

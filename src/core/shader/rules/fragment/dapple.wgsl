@@ -1,8 +1,8 @@
-// S.w: light that falls through leaves from +Z, clamped at 0 (MODEL 3, corrected form).
+// S.w clamped at 0 (MODEL 3, corrected form).
 //
 // gives: dapple
-// when: corrected, raster
+// when: corrected
 // cost: 1
-fn clamped_dapple(vertex_normal: vec3f) -> f32 {
-    return max(vertex_normal.z, 0.0);
+fn clamped_dapple(dapple_cosine: f32) -> f32 {
+    return max(dapple_cosine, 0.0);
 }

@@ -1,8 +1,8 @@
 // S.w, signed (listing 3-3).
 //
 // gives: dapple
-// when: listing, raster
+// when: listing
 // cost: 0
-fn signed_dapple(vertex_normal: vec3f) -> f32 {
-    return vertex_normal.z;
+fn signed_dapple(dapple_cosine: f32) -> f32 {
+    return dapple_cosine;
 }

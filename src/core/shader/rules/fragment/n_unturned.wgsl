@@ -1,8 +1,8 @@
-// The normal in the environment's frame, which is not turned.
+// The normal of lookups in the environment's frame, which is not turned.
 //
 // gives: n_in_environment
 // when: !turned
 // cost: 0
-fn unturned_n(n: vec3f) -> vec3f {
-    return n;
+fn unturned_n(lookup_normal: vec3f) -> vec3f {
+    return lookup_normal;
 }

@@ -3,6 +3,6 @@
 // gives: reflected
 // when: corrected
 // cost: 7
-fn mirror_direction(n: vec3f, view: vec3f) -> vec3f {
-    return view - 2.0 * dot(n, view) * n;
+fn mirror_direction(lookup_normal: vec3f, view: vec3f) -> vec3f {
+    return view - 2.0 * dot(lookup_normal, view) * lookup_normal;
 }

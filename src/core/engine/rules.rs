@@ -1,0 +1,176 @@
+//! The planned rules over stored samples in any kind of number: what engines and renderers are held against, and what
+//! shows how number formats round.
+
+use crate::bake::Illumination;
+use crate::model::batch::Batch;
+use crate::model::cube::Cube;
+use crate::model::evaluate::Setup;
+use crate::model::params::{Param, Params};
+use crate::model::real::Real;
+use crate::program::graph::{Graph, Id, Input};
+use crate::program::shading::constant;
+use crate::program::steps::{self, Rounding, Steps};
+use crate::samples::rows::Row;
+use crate::samples::surface_records::{Places, neutral};
+use crate::samples::{LANES, SurfaceRecords};
+use crate::shader::facts::{Facts, MapFacts, Source};
+
+/// A number of each of a record's samples.
+pub type Sixteen<R> = Batch<R, LANES>;
+
+/// What rules for stored samples are planned from; `turned`: whether the environment is, or will be. Cubes that are not
+/// there count as one dark texel a face.
+#[must_use]
+pub fn sample_facts(setup: Setup, illumination: &Illumination, turned: bool) -> Facts {
+    let mut faces = super::face_sizes(illumination);
+    for size in [&mut faces.irradiance, &mut faces.specular, &mut faces.hilite] {
+        size.get_or_insert(1);
+    }
+    Facts { setup, source: Source::Samples, maps: MapFacts::default(), faces, turned, ..Facts::default() }
+}
+
+/// The cubes of a scene at one `specular_lobe`, in texels of a kind.
+#[derive(Clone, Debug)]
+pub struct CubesAt<T> {
+    irradiance: Option<Cube<T>>,
+    specular: Option<Cube<T>>,
+    specular_slope: Option<Cube<T>>,
+    hilite: Option<Cube<T>>,
+    dark: Cube<T>,
+}
+
+impl<T: Copy> CubesAt<T> {
+    /// The cubes at `params`, each number converted.
+    #[must_use]
+    pub fn new(illumination: &Illumination, params: &Params, texel: impl Fn(f32) -> T) -> Self {
+        let converted = |cube: &Cube<f32>| cube.map(|numbers| numbers.map(&texel));
+        let stack = illumination.lobes.as_ref();
+        let lobe = stack.map(|stack| stack.at(params.scalar(Param::SpecularLobe)));
+        Self {
+            irradiance: illumination.irradiance.as_ref().map(converted),
+            specular: lobe.as_ref().map(|(cube, _)| converted(cube)),
+            specular_slope: lobe.as_ref().map(|(_, slope)| converted(slope)),
+            hilite: illumination.hilite.as_ref().map(converted),
+            dark: converted(&Cube::from_fn(1, |_, _, _| [0.0_f32; 4])),
+        }
+    }
+
+    /// The same cubes, each number changed.
+    #[must_use]
+    pub fn changed(&self, mut change: impl FnMut(T) -> T) -> Self {
+        let change = std::cell::RefCell::new(&mut change);
+        let changed = |cube: &Cube<T>| cube.map(|numbers| numbers.map(|x| change.borrow_mut()(x)));
+        let of = |cube: &Option<Cube<T>>| cube.as_ref().map(changed);
+        Self {
+            irradiance: of(&self.irradiance),
+            specular: of(&self.specular),
+            specular_slope: of(&self.specular_slope),
+            hilite: of(&self.hilite),
+            dark: self.dark.clone(),
+        }
+    }
+
+    /// The cube that rules read by that name; one that gives no light where there is none.
+    #[must_use]
+    pub fn named(&self, name: &str) -> &Cube<T> {
+        let cube = match name {
+            "irradiance_faces" => &self.irradiance,
+            "specular_faces" => &self.specular,
+            "specular_slope_faces" => &self.specular_slope,
+            "hilite_faces" => &self.hilite,
+            _ => &None,
+        };
+        cube.as_ref().unwrap_or(&self.dark)
+    }
+}
+
+/// Numbers that rules make of stored samples.
+#[derive(Clone, Debug)]
+pub struct SampleSteps {
+    steps: Steps,
+}
+
+/// Where a field stands in a record, or what stands in for it.
+#[derive(Clone, Copy, Debug)]
+enum Load {
+    Row(usize),
+    Neutral(f32),
+}
+
+/// Where a view's records hold what is read of them.
+#[derive(Clone, Debug)]
+pub struct Loads(Vec<Load>);
+
+/// What is the same for all samples of an evaluation.
+pub struct Setting<'a, R: Real> {
+    shared: steps::Setting<'a, Sixteen<R>>,
+    like: Sixteen<R>,
+}
+
+/// Memory to work in.
+#[derive(Debug)]
+pub struct Registers<R: Real>(Vec<Sixteen<R::Wide>>);
+
+impl<R: Real> Default for Registers<R> {
+    fn default() -> Self {
+        Self(Vec::new())
+    }
+}
+
+impl SampleSteps {
+    /// What computes `outputs` of a graph whose fields are those of samples.
+    #[must_use]
+    pub fn new(graph: &Graph, outputs: &[Id], rounding: impl Fn(Id) -> Rounding) -> Self {
+        Self { steps: Steps::new(graph, outputs, rounding) }
+    }
+
+    /// Where records hold the fields.
+    #[must_use]
+    pub fn loads(&self, places: &Places) -> Loads {
+        let held = |input: &Input| places.fields().find(|(name, ..)| *name == input.name);
+        let load = |input: &Input| match held(input) {
+            Some((_, place, _)) => Load::Row(place + input.component),
+            // Where no smooth normal is held, the base stands in.
+            None if input.name == "normal" => Load::Row(places.base.unwrap_or(0) + input.component),
+            None => Load::Neutral(neutral(&input.name).unwrap_or(0.0)),
+        };
+        Loads(self.steps.fields().iter().map(load).collect())
+    }
+
+    /// The setting of an evaluation at `params` in numbers of `like`'s kind.
+    #[must_use]
+    pub fn setting<'a, R: Real>(
+        &self,
+        params: &Params,
+        cubes: &'a CubesAt<R::Texel>,
+        like: R,
+    ) -> Setting<'a, R> {
+        let like = Batch([like; LANES]);
+        let value = |input: &Input| constant(input, params).unwrap_or(0.0);
+        Setting { shared: self.steps.setting(like, value, |name| cubes.named(name)), like }
+    }
+
+    /// The outputs for the samples of a record.
+    #[inline(always)]
+    pub fn record<'o, R: Real>(
+        &'o self,
+        setting: &'o Setting<'_, R>,
+        loads: &Loads,
+        surface: &SurfaceRecords,
+        record: usize,
+        registers: &'o mut Registers<R>,
+    ) -> impl Iterator<Item = Sixteen<R>> + 'o {
+        let rows = surface.rows().record(record);
+        let lit = |row: &Row| {
+            let mut all = setting.like;
+            all.0.iter_mut().zip(row.iter()).for_each(|(lane, &x)| *lane = lane.lit(x.into()));
+            all
+        };
+        let field = |at: usize| match loads.0[at] {
+            Load::Row(row) => lit(&rows[row]),
+            Load::Neutral(value) => setting.like.lit(value.into()),
+        };
+        self.steps.run(&setting.shared, setting.like, &mut registers.0, field);
+        self.steps.outputs(&setting.shared, &registers.0)
+    }
+}

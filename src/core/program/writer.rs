@@ -1,0 +1,416 @@
+//! Nodes of a graph in an order in which they can be computed, as instructions; then the registers.
+//!
+//! An operand that was not yet written is written right before the operation, so that most numbers are used by the
+//! instruction after theirs.
+
+use std::collections::HashMap;
+
+use super::graph::{Binary, Call, Graph, Id, Native, Node, Unary};
+use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
+
+/// Instructions over nodes, whose registers are not yet known.
+pub(super) struct Writer<'a> {
+    graph: &'a Graph,
+    /// Whether a node differs between samples.
+    varies: Vec<bool>,
+    /// Whether a node is needed for every sample, and not only where something stands in.
+    hot: Vec<bool>,
+    /// How often a node is an operand or an output.
+    uses: Vec<u32>,
+    /// Denominators of several quotients: one reciprocal serves them.
+    divides: Vec<u32>,
+    /// For each call, the calls for how its value moves.
+    slopes: HashMap<(Native, Vec<Id>), Vec<Id>>,
+    written: Vec<bool>,
+    reciprocals: Vec<bool>,
+    drafts: Vec<Draft>,
+    uniforms: Vec<Operand>,
+}
+
+/// An instruction with operands in the place of slots.
+struct Draft {
+    kind: Kind,
+    reads: Vec<Operand>,
+    writes: Vec<Operand>,
+}
+
+enum Kind {
+    Load(usize),
+    Unary(Unary),
+    Binary(Binary),
+    MultiplyAdd,
+    SubtractProduct,
+    SelectLess,
+    SelectGreaterEqual,
+    SelectFinite,
+    SelectHolds,
+    /// The parts of the value, then of the slopes, that are written.
+    Call {
+        native: Native,
+        along: usize,
+        parts: Vec<usize>,
+        skip: Option<usize>,
+    },
+    /// The parts that are mended.
+    Mend(Vec<usize>),
+}
+
+impl<'a> Writer<'a> {
+    pub(super) fn new(graph: &'a Graph, outputs: &[Id]) -> Self {
+        let varies = graph
+            .made_of(|graph, id| matches!(graph.node(id), Node::Field(_)) || graph.looked_up(id).is_some());
+        let reached = graph.reached(outputs);
+        let (mut uses, mut divides) = (vec![0; graph.len()], vec![0; graph.len()]);
+        outputs.iter().for_each(|id| uses[id.index()] += 1);
+        let mut slopes: HashMap<(Native, Vec<Id>), Vec<Id>> = HashMap::new();
+        for at in (0..graph.len()).filter(|&at| reached[at]) {
+            let id = Id(at as u32);
+            graph.operands(id).iter().for_each(|operand| uses[operand.index()] += 1);
+            if let Node::Binary(Binary::Divide, _, b) = graph.node(id) {
+                divides[b.index()] += 1;
+            }
+            if let Some(Call { native, arguments, along }) = graph.call_of(id)
+                && !along.is_empty()
+            {
+                slopes.entry((*native, arguments.clone())).or_default().push(id);
+            }
+        }
+        Self {
+            graph,
+            varies,
+            hot: hot(graph, outputs),
+            uses,
+            divides,
+            slopes,
+            written: vec![false; graph.len()],
+            reciprocals: vec![false; graph.len()],
+            drafts: Vec::new(),
+            uniforms: Vec::new(),
+        }
+    }
+
+    pub(super) fn tape(mut self, outputs: &[Id]) -> Tape {
+        outputs.iter().for_each(|&id| self.want(id));
+        self.finish(outputs)
+    }
+
+    /// A product that nothing else needs.
+    fn lone_product(&self, id: Id) -> Option<(Id, Id)> {
+        match self.graph.node(id) {
+            Node::Binary(Binary::Multiply, a, b) if self.uses[id.index()] == 1 && self.varies[id.index()] => {
+                Some((a, b))
+            }
+            _ => None,
+        }
+    }
+
+    /// Write what a node needs, then the node.
+    fn want(&mut self, id: Id) {
+        if self.written[id.index()] || !self.varies[id.index()] {
+            return;
+        }
+        match self.graph.node(id) {
+            Node::Part(call, _) => return self.want_call(call),
+            Node::Call(_) => return self.want_call(id),
+            _ => {}
+        }
+        self.written[id.index()] = true;
+        let (kind, reads) = self.selected(id);
+        for operand in &reads {
+            match *operand {
+                Operand::Of(id) | Operand::FlagOf(id) => self.want(id),
+                Operand::ReciprocalOf(id) => self.want_reciprocal(id),
+            }
+        }
+        self.drafts.push(Draft { kind, reads, writes: vec![Operand::Of(id)] });
+    }
+
+    fn want_reciprocal(&mut self, id: Id) {
+        self.want(id);
+        if self.varies[id.index()] && !self.reciprocals[id.index()] {
+            self.reciprocals[id.index()] = true;
+            self.drafts.push(Draft {
+                kind: Kind::Unary(Unary::Reciprocal),
+                reads: vec![Operand::Of(id)],
+                writes: vec![Operand::ReciprocalOf(id)],
+            });
+        }
+    }
+
+    /// A call's value and how it moves along all that is asked for, in one instruction.
+    fn want_call(&mut self, id: Id) {
+        let Some(Call { native, arguments, along }) = self.graph.call_of(id).cloned() else { return };
+        let hot = native.hot();
+        let group = self.slopes.get(&(native, arguments.clone())).cloned().unwrap_or_default();
+        let value = self.value_of(native, &arguments);
+        // A vector that is made of the value, or of how it moves, comes later, by an instruction of its own.
+        let free = |&slope: &Id| {
+            let along = self.graph.call_of(slope).map(|call| call.along.clone()).unwrap_or_default();
+            let reached = self.graph.reached(&along);
+            !value.iter().chain(&group).any(|member| reached[member.index()])
+        };
+        let together: Vec<Id> = group.iter().copied().filter(free).collect();
+        let (value, slopes) =
+            if along.is_empty() || together.contains(&id) { (value, together) } else { (None, vec![id]) };
+        arguments[..hot].iter().for_each(|&id| self.want(id));
+        let mut reads: Vec<Operand> = arguments[..hot].iter().map(|&id| Operand::Of(id)).collect();
+        for &slope in &slopes {
+            let along = self.graph.call_of(slope).map(|call| call.along.clone()).unwrap_or_default();
+            along.iter().for_each(|&id| self.want(id));
+            reads.extend(along.into_iter().map(Operand::Of));
+        }
+        let widths = native.widths();
+        let (mut parts, mut writes) = (Vec::new(), Vec::new());
+        let calls = value.into_iter().map(|id| (id, 0));
+        let moved = slopes.iter().enumerate().map(|(k, &id)| (id, widths.parts + k * widths.slopes));
+        for (call, first) in calls.chain(moved) {
+            self.written[call.index()] = true;
+            for part in 0..widths.parts.max(widths.slopes) {
+                if let Some(node) =
+                    self.graph.known(Node::Part(call, part as u8)).filter(|n| self.uses[n.index()] > 0)
+                {
+                    self.written[node.index()] = true;
+                    parts.push(first + part);
+                    writes.push(Operand::Of(node));
+                }
+            }
+        }
+        let shown: Vec<(usize, Operand)> = parts
+            .iter()
+            .copied()
+            .zip(writes.iter().copied())
+            .filter(|(part, _)| *part < widths.parts)
+            .collect();
+        let fallback = &arguments[hot..];
+        let mends = !fallback.is_empty() && !shown.is_empty();
+        if mends {
+            // What every sample needs is no part of what is left out.
+            for &id in fallback {
+                self.want_hot(id);
+            }
+            writes.push(Operand::FlagOf(id));
+        }
+        let at = self.drafts.len();
+        let skip = mends.then_some(0);
+        self.drafts.push(Draft {
+            kind: Kind::Call { native, along: slopes.len(), parts, skip },
+            reads,
+            writes,
+        });
+        if mends {
+            let before = self.written.clone();
+            let reciprocals = self.reciprocals.clone();
+            fallback.iter().for_each(|&id| self.want(id));
+            let mut reads = vec![Operand::FlagOf(id)];
+            reads.extend(shown.iter().map(|(_, operand)| *operand));
+            reads.extend(fallback.iter().map(|&id| Operand::Of(id)));
+            let parts = shown.iter().map(|(part, _)| *part).collect();
+            self.drafts.push(Draft { kind: Kind::Mend(parts), reads, writes: Vec::new() });
+            // What was written in between is there only where it was needed.
+            (self.written, self.reciprocals) = (before, reciprocals);
+            let after = self.drafts.len();
+            if let Kind::Call { skip, .. } = &mut self.drafts[at].kind {
+                *skip = Some(after - at - 1);
+            }
+        }
+    }
+
+    /// The call of a function's value, where it is asked for.
+    fn value_of(&self, native: Native, arguments: &[Id]) -> Option<Id> {
+        self.graph.known_call(&Call { native, arguments: arguments.to_vec(), along: Vec::new() })
+    }
+
+    /// Write what a node is made of that every sample needs.
+    fn want_hot(&mut self, id: Id) {
+        if self.hot[id.index()] {
+            self.want(id);
+            return;
+        }
+        if self.varies[id.index()] {
+            self.graph.operands(id).into_iter().for_each(|id| self.want_hot(id));
+        }
+    }
+
+    /// The instruction for a node.
+    fn selected(&self, id: Id) -> (Kind, Vec<Operand>) {
+        let of = |ids: &[Id]| ids.iter().map(|&id| Operand::Of(id)).collect::<Vec<_>>();
+        match self.graph.node(id) {
+            Node::Field(at) => (Kind::Load(at as usize), Vec::new()),
+            Node::Unary(op, a) => (Kind::Unary(op), of(&[a])),
+            Node::Binary(op, a, b) => match (op, self.lone_product(a), self.lone_product(b)) {
+                (Binary::Add, _, Some((x, y))) => (Kind::MultiplyAdd, of(&[x, y, a])),
+                (Binary::Add, Some((x, y)), None) => (Kind::MultiplyAdd, of(&[x, y, b])),
+                (Binary::Subtract, _, Some((x, y))) => (Kind::SubtractProduct, of(&[x, y, a])),
+                (Binary::Divide, ..) if self.divides[b.index()] > 1 || !self.varies[b.index()] => {
+                    (Kind::Binary(Binary::Multiply), vec![Operand::Of(a), Operand::ReciprocalOf(b)])
+                }
+                _ => (Kind::Binary(op), of(&[a, b])),
+            },
+            Node::Select { condition, yes, no } => match self.graph.node(condition) {
+                Node::Binary(Binary::Less, a, b) => (Kind::SelectLess, of(&[a, b, yes, no])),
+                Node::Binary(Binary::GreaterEqual, a, b) => (Kind::SelectGreaterEqual, of(&[a, b, yes, no])),
+                Node::Unary(Unary::IsFinite, a) => (Kind::SelectFinite, of(&[a, yes, no])),
+                _ => (Kind::SelectHolds, of(&[condition, yes, no])),
+            },
+            Node::Part(..) | Node::Call(_) => unreachable!("a call writes its parts"),
+            Node::Constant(_) | Node::Uniform(_) => unreachable!("it is the same for all samples"),
+        }
+    }
+
+    fn finish(mut self, outputs: &[Id]) -> Tape {
+        let mut last: HashMap<Operand, usize> = HashMap::new();
+        for (at, draft) in self.drafts.iter().enumerate() {
+            last.extend(draft.reads.iter().map(|&operand| (operand, at)));
+        }
+        // Outputs stay.
+        last.extend(outputs.iter().map(|&id| (Operand::Of(id), usize::MAX)));
+        let drafts = std::mem::take(&mut self.drafts);
+        let mut registers = Registers::default();
+        let mut instructions = Vec::new();
+        for (at, draft) in drafts.iter().enumerate() {
+            let reads: Vec<Slot> = draft.reads.iter().map(|&o| self.slot(o, &registers)).collect();
+            // A call reads its arguments again and again while it writes.
+            let calls = matches!(draft.kind, Kind::Call { .. });
+            if !calls {
+                registers.release(&draft.reads, at, &last);
+            }
+            let writes: Vec<usize> = draft.writes.iter().map(|&operand| registers.take(operand)).collect();
+            if calls {
+                registers.release(&draft.reads, at, &last);
+            }
+            instructions.push(instruction(&draft.kind, &reads, &writes));
+            // What nobody reads, a flag for instance, is free again.
+            registers.release(
+                &draft.writes,
+                at,
+                &draft.writes.iter().map(|&o| (o, *last.get(&o).unwrap_or(&at))).collect(),
+            );
+        }
+        let outputs = outputs.iter().map(|&id| self.slot(Operand::Of(id), &registers)).collect();
+        Tape {
+            instructions,
+            registers: registers.count,
+            fields: self.graph.fields.clone(),
+            resources: self.graph.resources.clone(),
+            outputs,
+            graph: self.graph.clone(),
+            uniforms: self.uniforms,
+        }
+    }
+
+    /// Where an operand stands.
+    fn slot(&mut self, operand: Operand, registers: &Registers) -> Slot {
+        if let Some(&register) = registers.places.get(&operand) {
+            return Slot::Register(register);
+        }
+        let known = self.uniforms.iter().position(|&uniform| uniform == operand);
+        Slot::Uniform(known.unwrap_or_else(|| {
+            self.uniforms.push(operand);
+            self.uniforms.len() - 1
+        }))
+    }
+}
+
+/// The nodes that every sample needs: fallbacks are not, nor what only they are made of.
+fn hot(graph: &Graph, outputs: &[Id]) -> Vec<bool> {
+    let mut hot = vec![false; graph.len()];
+    outputs.iter().for_each(|id| hot[id.index()] = true);
+    for at in (0..graph.len()).rev() {
+        if hot[at] {
+            let id = Id(at as u32);
+            for (k, operand) in graph.operands(id).into_iter().enumerate() {
+                let seldom = graph
+                    .call_of(id)
+                    .is_some_and(|call| (call.native.hot()..call.arguments.len()).contains(&k));
+                if !seldom {
+                    hot[operand.index()] = true;
+                }
+            }
+        }
+    }
+    hot
+}
+
+/// Which registers are in use.
+#[derive(Default)]
+struct Registers {
+    places: HashMap<Operand, usize>,
+    free: Vec<usize>,
+    count: usize,
+}
+
+impl Registers {
+    fn take(&mut self, operand: Operand) -> usize {
+        let register = self.free.pop().unwrap_or_else(|| {
+            self.count += 1;
+            self.count - 1
+        });
+        self.places.insert(operand, register);
+        register
+    }
+
+    /// Free what is read for the last time.
+    fn release(&mut self, operands: &[Operand], at: usize, last: &HashMap<Operand, usize>) {
+        for operand in operands {
+            if last.get(operand) == Some(&at) {
+                self.free.extend(self.places.remove(operand));
+            }
+        }
+    }
+}
+
+fn instruction(kind: &Kind, reads: &[Slot], writes: &[usize]) -> Instruction {
+    let out = writes.first().copied().unwrap_or(0);
+    match (kind, reads) {
+        (&Kind::Load(field), _) => Instruction::Load(field, out),
+        (&Kind::Unary(op), &[a]) => Instruction::Unary(op, a, out),
+        (&Kind::Binary(op), &[a, b]) => Instruction::Binary(op, a, b, out),
+        (Kind::MultiplyAdd, &[a, b, c]) => Instruction::MultiplyAdd([a, b, c], out),
+        (Kind::SubtractProduct, &[a, b, c]) => Instruction::SubtractProduct([a, b, c], out),
+        (Kind::SelectLess, &[a, b, yes, no]) => Instruction::Select(Test::Less(a, b), yes, no, out),
+        (Kind::SelectGreaterEqual, &[a, b, yes, no]) => {
+            Instruction::Select(Test::GreaterEqual(a, b), yes, no, out)
+        }
+        (Kind::SelectFinite, &[a, yes, no]) => Instruction::Select(Test::IsFinite(a), yes, no, out),
+        (Kind::SelectHolds, &[a, yes, no]) => Instruction::Select(Test::Holds(a), yes, no, out),
+        (Kind::Call { native, along, parts, skip }, _) => {
+            called(*native, *along, parts, *skip, reads, writes)
+        }
+        (Kind::Mend(parts), [Slot::Register(flag), rest @ ..]) => {
+            let mut registers = vec![None; 3];
+            for (part, slot) in parts.iter().zip(rest) {
+                if let Slot::Register(at) = slot {
+                    registers[*part] = Some(*at);
+                }
+            }
+            let fallback = rest[parts.len()..].to_vec();
+            Instruction::Mend(Box::new(Mend { flag: *flag, parts: registers, fallback }))
+        }
+        _ => unreachable!("every kind reads as many operands as it is given"),
+    }
+}
+
+fn called(
+    native: Native,
+    along: usize,
+    parts: &[usize],
+    skip: Option<usize>,
+    reads: &[Slot],
+    writes: &[usize],
+) -> Instruction {
+    let widths = native.widths();
+    let mut all = vec![None; widths.parts + along * widths.slopes];
+    parts.iter().zip(writes).for_each(|(&part, &register)| all[part] = Some(register));
+    let slopes = all.split_off(widths.parts);
+    let call = Box::new(CallOf {
+        native,
+        arguments: reads[..native.hot()].to_vec(),
+        along: reads[native.hot()..].chunks(widths.moving).map(<[Slot]>::to_vec).collect(),
+        parts: all,
+        slopes: slopes.chunks(widths.slopes).map(<[_]>::to_vec).collect(),
+    });
+    match (skip, writes.last()) {
+        (Some(skip), Some(&flag)) => Instruction::Unit(call, flag, skip),
+        _ => Instruction::Call(call),
+    }
+}
