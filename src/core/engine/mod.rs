@@ -79,8 +79,8 @@ pub trait Objective: Sync {
         None
     }
     /// Where the residuals at `point` stand in the images, whose rows have `widths` pixels (a number a view), and how
-    /// each tile of them pulls at the unknowns: a pass that takes some ten times as long as another. `None` where the
-    /// engine cannot tell.
+    /// each tile of them pulls at the unknowns: a pass slower than others, as each tile's sums are
+    /// kept apart. `None` where the engine cannot tell.
     fn pulls(&self, _point: &Point, _widths: &[usize]) -> Option<pulls::Pulls> {
         None
     }

@@ -1,6 +1,6 @@
 //! A tape as the code of a machine that has an accumulator.
 //!
-//! Most numbers are used once, by the instruction after theirs: they stay in the accumulator, which the processor
+//! Many numbers are used once, by the instruction after theirs: they stay in the accumulator, which the processor
 //! keeps in its registers, and are never written to memory. What is used later is stored.
 
 use crate::program::graph::{Binary, Native, Unary};
