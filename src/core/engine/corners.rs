@@ -26,14 +26,11 @@ impl<S: Simd> Corners<S> {
         let numbers = texels.as_flattened();
         let count = numbers.len() - 4 * row;
         let (upper, lower) = (&numbers[..count], &numbers[4 * row..][..count]);
-        let mut rows = [[f32x16::splat(simd, 0.0); 8]; 2];
-        for pair in 0..8 {
-            // By way of u32, so that the end of a range cannot overflow, which would be asked too.
-            let (i, j) = (first[2 * pair] as u32 as usize, first[2 * pair + 1] as u32 as usize);
-            rows[0][pair] = joined(simd, &upper[i..i + 8], &upper[j..j + 8]);
-            rows[1][pair] = joined(simd, &lower[i..i + 8], &lower[j..j + 8]);
-        }
-        Self([transposed(simd, rows[0]), transposed(simd, rows[1])])
+        // One row after the other, so that the eight registers of one are enough at a time.
+        Self([
+            transposed(simd, gathered(simd, upper, &first)),
+            transposed(simd, gathered(simd, lower, &first)),
+        ])
     }
 
     /// A channel's four corners.
@@ -49,6 +46,18 @@ impl<S: Simd> Corners<S> {
 /// that is put there for a while lies across two of them, and a forward pass takes a fifth longer.
 #[repr(align(64))]
 struct Line([i32; LANES]);
+
+/// Eight numbers from each of the places on, those of two places a register.
+#[inline(always)]
+fn gathered<S: Simd>(simd: S, numbers: &[f32], first: &[i32; LANES]) -> [f32x16<S>; 8] {
+    let mut pairs = [f32x16::splat(simd, 0.0); 8];
+    for pair in 0..8 {
+        // By way of u32, so that the end of a range cannot overflow, which would be asked too.
+        let (i, j) = (first[2 * pair] as u32 as usize, first[2 * pair + 1] as u32 as usize);
+        pairs[pair] = joined(simd, &numbers[i..i + 8], &numbers[j..j + 8]);
+    }
+    pairs
+}
 
 /// Two lanes' pairs of texels in one register.
 #[inline(always)]

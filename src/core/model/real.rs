@@ -92,6 +92,12 @@ pub trait Real:
     ) -> [[Self; 4]; 3];
 }
 
+/// `yes` where `mask` holds, else `no`: [`Real::select`] of numbers whose kind is plain.
+#[inline(always)]
+pub fn select<R: Real>(mask: R::Mask, yes: R, no: R) -> R {
+    R::select(mask, yes, no)
+}
+
 macro_rules! real_for_float {
     ($float:ident) => {
         impl Real for $float {

@@ -13,13 +13,14 @@
 //! - [`cut`]: what stays from pass to pass
 //! - [`steps`]: a graph evaluated node by node, in any kind of number
 //! - [`tape`]: instructions over registers, which `writer` finds
-//! - [`evaluate`]: a tape run for one sample
+//! - [`evaluate`]: a tape run for one sample; [`print`]: a tape as Rust
 
 pub mod cut;
 pub mod evaluate;
 pub mod graph;
 pub mod lower;
 pub mod native;
+pub mod print;
 pub mod shading;
 pub mod steps;
 pub mod tape;

@@ -22,6 +22,8 @@ pub struct Unit<R: Real> {
     pub all: bool,
     /// What the vector was divided by, so that its square is in range.
     size: R,
+    /// 1 / that.
+    reciprocal: R,
     /// 1 / the length of what was left.
     inverse: R,
 }
@@ -36,9 +38,8 @@ impl<R: Real> Unit<R> {
         // A NaN fails the comparisons.
         let plain = R::and(square.ge(low), high.ge(square));
         if R::all(plain) {
-            let inverse = one / square.sqrt();
-            let direction = scale(inverse, v);
-            return Self { direction, has_direction: plain, all: true, size: one, inverse };
+            let (direction, inverse) = Self::divided(v, square);
+            return Self { direction, has_direction: plain, all: true, size: one, reciprocal: one, inverse };
         }
         let largest = v[0].abs().max(v[1].abs()).max(v[2].abs());
         // `max` may have dropped a NaN, the sum has not.
@@ -46,9 +47,17 @@ impl<R: Real> Unit<R> {
         let ok = R::and(largest.ge(one.lit(1e-37)), R::and(largest.is_finite(), sum.is_finite()));
         let size = R::select(ok, largest, one);
         let zero = one.lit(0.0);
-        let u = select::<R>(ok, scale(one / size, v), [one, zero, zero]);
-        let inverse = one / dot(u, u).sqrt();
-        Self { direction: scale(inverse, u), has_direction: ok, all: R::all(ok), size, inverse }
+        let reciprocal = one / size;
+        let u = select::<R>(ok, scale(reciprocal, v), [one, zero, zero]);
+        let (direction, inverse) = Self::divided(u, dot(u, u));
+        Self { direction, has_direction: ok, all: R::all(ok), size, reciprocal, inverse }
+    }
+
+    /// A vector by its length, whose square is in range, and 1 / the length.
+    #[inline(always)]
+    fn divided(v: V3<R>, square: R) -> (V3<R>, R) {
+        let inverse = square.sqrt().recip();
+        (scale(inverse, v), inverse)
     }
 
     /// How it moves as the vector moves along `d`: at most 1e6 in each component, beyond which squares of derivatives
@@ -62,7 +71,7 @@ impl<R: Real> Unit<R> {
         let mut turning = across;
         for k in 0..3 {
             let moved = (-radial).mul_add(n[k], across[k]);
-            turning[k] = moved.max(-most).min(most) / self.size;
+            turning[k] = moved.max(-most).min(most) * self.reciprocal;
         }
         if self.all { turning } else { select::<R>(self.has_direction, turning, [most.lit(0.0); 3]) }
     }

@@ -90,6 +90,21 @@ impl<'a> Writer<'a> {
     }
 
     pub(super) fn tape(mut self, outputs: &[Id]) -> Tape {
+        // Where lookups fall comes first, and powers: what they wait for hides behind the texels.
+        let hot: Vec<Id> = (0..self.graph.len()).filter(|&at| self.hot[at]).map(|at| Id(at as u32)).collect();
+        for &id in &hot {
+            if let Some(call) = self.graph.call_of(id)
+                && matches!(call.native, Native::Lookup(_))
+            {
+                let reads: Vec<Id> = call.arguments.iter().chain(&call.along).copied().collect();
+                reads.into_iter().for_each(|id| self.want(id));
+            }
+        }
+        for &id in &hot {
+            if matches!(self.graph.node(id), Node::Unary(Unary::Exp2, _)) {
+                self.want(id);
+            }
+        }
         outputs.iter().for_each(|&id| self.want(id));
         self.finish(outputs)
     }

@@ -12,7 +12,7 @@ use super::LANES;
 
 /// One vector's worth of numbers, on a cache line of its own.
 #[repr(C, align(64))]
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Row([f32; LANES]);
 
 impl Row {

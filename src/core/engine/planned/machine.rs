@@ -9,7 +9,10 @@ use std::cell::Cell;
 use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
 
+use super::ahead;
+use super::block::Block;
 use super::code::{CallOf, Choice, Code, Heavy, Op, Register};
+use super::pass::StreamOf;
 use crate::engine::gram::Source as GramSource;
 use crate::engine::lanes::Lanes;
 use crate::model::cube::{Cube, CubePoint};
@@ -26,9 +29,9 @@ use prefetch_index::prefetch_index;
 /// Rows of a register: so many that dispatch costs little, so few that registers stay in the nearest cache.
 const WIDTH: usize = 4;
 /// Records whose outputs stand side by side: a Gram matrix adds up so many at once.
-pub(super) const BATCH: usize = 8;
+pub(super) const BATCH: usize = 16;
 /// Records ahead of which fields are asked for.
-const AHEAD: usize = 8;
+pub(super) const AHEAD: usize = 8;
 
 type Rows = [Cell<Row>; WIDTH];
 /// The rows of an output.
@@ -41,17 +44,33 @@ pub(super) struct Stream<'a> {
     pub(super) stride: usize,
 }
 
-/// A tape as the machine runs it.
+/// A tape, and what runs it.
 #[derive(Debug)]
 pub(super) struct Program {
     pub(super) tape: Tape,
-    code: Code,
+    runs: Runs,
+}
+
+#[derive(Debug)]
+enum Runs {
+    /// A function that was compiled ahead, by its place.
+    Compiled(usize),
+    /// This machine.
+    Code(Code),
 }
 
 impl Program {
-    pub(super) fn new(tape: Tape) -> Self {
-        let code = Code::new(&tape);
-        Self { tape, code }
+    /// `ahead`: the tape is of a plan that is compiled ahead.
+    pub(super) fn new(tape: Tape, ahead: bool) -> Self {
+        let compiled = if ahead { ahead::find(&tape) } else { None };
+        let runs = compiled.map_or_else(|| Runs::Code(Code::new(&tape)), Runs::Compiled);
+        Self { tape, runs }
+    }
+
+    /// Whether a function that was compiled ahead runs it.
+    #[cfg(test)]
+    pub(super) const fn is_compiled(&self) -> bool {
+        matches!(self.runs, Runs::Compiled(_))
     }
 }
 
@@ -60,7 +79,7 @@ impl Program {
 pub(super) struct Bound<'a> {
     pub(super) program: &'a Program,
     /// For each field, the stream that holds it and its row there.
-    pub(super) loads: &'a [(usize, usize)],
+    pub(super) loads: &'a [(StreamOf, usize)],
     pub(super) cubes: Vec<&'a Cube<f32>>,
     pub(super) uniforms: Vec<f32>,
 }
@@ -78,37 +97,38 @@ pub(super) struct File {
 impl File {
     /// Have room for a tape (and for what nobody reads), and its uniform numbers in place.
     pub(super) fn prepare(&mut self, bound: &Bound<'_>) {
-        let code = &bound.program.code;
-        self.uniforms.clear();
-        self.uniforms.extend(bound.uniforms.iter().map(|&value| Row::of([value; LANES])));
-        self.nobody = code.registers;
-        self.registers.resize_with(code.registers + 1, || std::array::from_fn(|_| Cell::new(Row::ZERO)));
-        for &(register, uniform) in &code.filled {
-            self.registers[register].iter().for_each(|cell| cell.set(self.uniforms[uniform]));
+        if let Runs::Code(code) = &bound.program.runs {
+            self.uniforms.clear();
+            self.uniforms.extend(bound.uniforms.iter().map(|&value| Row::of([value; LANES])));
+            self.nobody = code.registers;
+            self.registers.resize_with(code.registers + 1, || std::array::from_fn(|_| Cell::new(Row::ZERO)));
+            for &(register, uniform) in &code.filled {
+                self.registers[register].iter().for_each(|cell| cell.set(self.uniforms[uniform]));
+            }
         }
         let outputs = bound.program.tape.outputs.len();
         self.columns.resize_with(outputs, || std::array::from_fn(|_| Cell::new(Row::ZERO)));
     }
 
-    /// The rows of an output.
-    pub(super) fn column(&self, output: usize) -> &Column {
-        &self.columns[output]
+    /// The rows of each output.
+    pub(super) fn columns(&self) -> &[Column] {
+        &self.columns
     }
 }
 
 #[inline(always)]
-fn load<S: Simd>(simd: S, cell: &Cell<Row>) -> Lanes<S> {
+pub(super) fn load<S: Simd>(simd: S, cell: &Cell<Row>) -> Lanes<S> {
     Lanes::of_row(simd, &cell.get())
 }
 
 #[inline(always)]
-fn store<S: Simd>(cell: &Cell<Row>, value: Lanes<S>) {
+pub(super) fn store<S: Simd>(cell: &Cell<Row>, value: Lanes<S>) {
     let mut row = Row::ZERO;
     value.store(&mut row);
     cell.set(row);
 }
 
-/// Columns of a file as the Gram matrix reads them.
+/// Columns as the Gram matrix reads them.
 #[derive(Clone, Copy)]
 pub(super) struct FileColumns<'a> {
     pub(super) columns: &'a [&'a Column],
@@ -140,11 +160,19 @@ pub(super) fn run<S: Simd>(
     first: usize,
     count: usize,
 ) {
+    let code = match &bound.program.runs {
+        Runs::Compiled(tape) => {
+            let block = Block { bound, streams, first, count, cubes: &bound.cubes, columns: &file.columns };
+            return ahead::run(*tape, simd, block);
+        }
+        Runs::Code(code) => code,
+    };
     simd.vectorize(
         #[inline(always)]
         || {
             for start in (0..count).step_by(WIDTH) {
-                run_each(simd, bound, file, streams, first + start, WIDTH.min(count - start), start);
+                let count = WIDTH.min(count - start);
+                run_each(simd, code, bound, file, streams, first + start, count, start);
             }
         },
     );
@@ -153,6 +181,7 @@ pub(super) fn run<S: Simd>(
 #[inline(always)]
 fn run_each<S: Simd>(
     simd: S,
+    code: &Code,
     bound: &Bound<'_>,
     file: &File,
     streams: &[Stream<'_>],
@@ -202,14 +231,14 @@ fn run_each<S: Simd>(
             binary(Binary::$op, $a, $b)
         };
     }
-    let ops = &bound.program.code.ops[..];
+    let ops = &code.ops[..];
     let mut at = 0;
     while let Some(op) = ops.get(at) {
         at += 1;
         match op {
             Op::Load(field, out) => {
                 let (stream, place) = bound.loads[*field];
-                let Stream { rows, stride } = streams[stream];
+                let Stream { rows, stride } = streams[stream as usize];
                 let out = &file.registers[*out];
                 if count == WIDTH {
                     let start = first * stride + place;
@@ -505,6 +534,9 @@ mod tests {
             let (a, b, c) = (pick(), pick(), pick());
             let size = graph.unary(Unary::Abs, b);
             let above = graph.binary(Binary::Add, size, one);
+            // So that comparisons of what is equal but for roundings are none.
+            let apart = graph.constant(0.0123);
+            let beside = graph.binary(Binary::Add, b, apart);
             let made = match rng.random_range(0..14) {
                 0 => graph.binary(Binary::Add, a, b),
                 1 => graph.binary(Binary::Subtract, a, b),
@@ -512,10 +544,10 @@ mod tests {
                 3 => graph.binary(Binary::Divide, a, above),
                 4 => graph.binary(Binary::Min, a, b),
                 5 => graph.binary(Binary::Max, a, b),
-                6 => graph.binary(Binary::Less, a, b),
-                7 => graph.binary(Binary::GreaterEqual, a, b),
+                6 => graph.binary(Binary::Less, a, beside),
+                7 => graph.binary(Binary::GreaterEqual, a, beside),
                 8 => {
-                    let less = graph.binary(Binary::Less, a, c);
+                    let less = graph.binary(Binary::Less, c, beside);
                     graph.select(less, b, c)
                 }
                 9 => graph.unary(Unary::Sqrt, above),
@@ -564,8 +596,9 @@ mod tests {
             let uniform = |input: &Input| UNIFORMS[input.component];
             let uniforms: Vec<f64> = tape.uniform_values(uniform);
             let shared = Shared { uniforms: uniforms.clone(), cubes: Vec::new() };
-            let loads: Vec<(usize, usize)> = tape.fields.iter().map(|input| (0, input.component)).collect();
-            let program = Program::new(tape.clone());
+            let loads: Vec<(StreamOf, usize)> =
+                tape.fields.iter().map(|input| (StreamOf::Samples, input.component)).collect();
+            let program = Program::new(tape.clone(), false);
             let uniforms = uniforms.into_iter().map(|x| x as f32).collect();
             let bound = Bound { program: &program, loads: &loads, cubes: Vec::new(), uniforms };
             for level in levels() {
@@ -581,7 +614,7 @@ mod tests {
                                 |input: &Input| f64::from(rows[(first + i) * FIELDS + input.component][lane]);
                             let want = tape.run(&shared, 0.0_f64, at);
                             for (k, want) in want.into_iter().enumerate() {
-                                let got = f64::from(file.column(k)[i].get()[lane]);
+                                let got = f64::from(file.columns()[k][i].get()[lane]);
                                 // Roundings of f32 over some sixty operations of slopes up to 4.
                                 let close = (got - want).abs() <= 1e-3 * (1.0 + want.abs());
                                 assert!(close, "{} graph {draw}, output {k}: {got} {want}", name(level));

@@ -2,64 +2,50 @@
 
 use std::collections::BTreeMap;
 
+use super::ahead;
 use super::machine::Program;
 use crate::engine::Unknown;
-use crate::engine::residual::loss_text;
 use crate::engine::view::ObservedView;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param};
 use crate::program::cut::{KEPT, cut};
-use crate::program::graph::{Binary, Graph, Id, Node};
-use crate::program::lower::{LowerError, Natives, Source, Value};
+use crate::program::graph::{Graph, Id, Input, Node};
+use crate::program::lower::Natives;
 use crate::program::shading::{Shading, ShadingError};
 use crate::program::tape::Tape;
 use crate::samples::surface_records::{Places, neutral};
-use crate::scene::Loss;
 use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source as FactsSource};
 use crate::shader::tangent::chain::Seed;
 
-/// The streams that tapes read: samples, kept numbers, sums of a pixel's samples, targets, pixels' weights.
+/// The streams that tapes read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum StreamOf {
     Samples = 0,
     Kept,
-    Pixels,
-    Targets,
-    Weights,
+    /// What stands in for fields that samples lack: [`NEUTRALS`], each for as many rows as a block has.
+    Neutral,
 }
+
+/// The numbers that stand in for fields.
+pub(super) const NEUTRALS: [f32; 2] = [0.0, 1.0];
 
 /// What is the same for every view of a fit.
 #[derive(Clone, Debug)]
 pub(super) struct Fitted {
     pub(super) setup: Setup,
     pub(super) unknowns: Vec<Unknown>,
-    pub(super) loss: Loss,
     /// Colours, and the haze where it is compared.
     pub(super) channels: usize,
     pub(super) faces: FaceSizes,
     /// Where a sample's numbers stand.
     pub(super) places: Places,
-    /// Whether a pixel may have several samples.
-    pub(super) several: bool,
-    /// Whether pixels count differently.
-    pub(super) weighted: bool,
-    pub(super) clipped: bool,
     /// Whether what no free parameter moves is kept.
     pub(super) keep: bool,
 }
 
-/// What of a point is written into the tapes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct Written {
-    /// Whether the environment is turned, or will be.
-    pub(super) turned: bool,
-    /// Whether a view's gain is not 1, or will not be.
-    pub(super) gained: bool,
-}
-
 impl Fitted {
     /// Of views of one kind.
-    pub(super) fn new(setup: Setup, unknowns: Vec<Unknown>, loss: Loss, views: &[ObservedView]) -> Self {
+    pub(super) fn new(setup: Setup, unknowns: Vec<Unknown>, views: &[ObservedView]) -> Self {
         let channels = if views.iter().any(ObservedView::compares_alpha) { 4 } else { 3 };
         let places = views
             .iter()
@@ -67,21 +53,7 @@ impl Fitted {
             .find(|view| view.samples.groups() > 0)
             .map(|view| *view.samples.surface.places())
             .unwrap_or_default();
-        Self {
-            setup,
-            unknowns,
-            loss,
-            channels,
-            faces: FaceSizes::default(),
-            several: views.iter().any(|view| {
-                view.samples.records() != view.samples.groups()
-                    || view.samples.surface.places().weight.is_some()
-            }),
-            weighted: views.iter().any(|view| !view.weight.is_empty()),
-            clipped: views.iter().any(|view| view.clip.is_some()),
-            places,
-            keep: true,
-        }
+        Self { setup, unknowns, channels, faces: FaceSizes::default(), places, keep: true }
     }
 
     /// The parameters that are free and that an effect asks for, each once.
@@ -106,25 +78,16 @@ impl Fitted {
 pub(super) struct Reading {
     pub(super) program: Program,
     /// For each field, its stream and its row there.
-    pub(super) loads: Vec<(usize, usize)>,
+    pub(super) loads: Vec<(StreamOf, usize)>,
 }
 
-/// The columns of one channel: outputs of the last tape.
+/// The columns of one channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ChannelColumns {
     /// For each column its unknown; `None` for the view's gain.
     pub(super) unknowns: Vec<Option<usize>>,
-    /// The outputs of the columns, and after them the residual's.
-    pub(super) outputs: Vec<usize>,
-}
-
-/// What one kind of pass runs for a block.
-#[derive(Debug)]
-pub(super) struct Stages {
-    /// Over samples: what is added up to a pixel; `None` where a pixel is one sample.
-    pub(super) sample: Option<Reading>,
-    /// Over pixels.
-    pub(super) pixel: Reading,
+    /// For each column the output that it is a multiple of: how the channel's value moves, or (of the gain) the value.
+    pub(super) tangents: Vec<usize>,
 }
 
 /// All tapes of a fit.
@@ -134,204 +97,142 @@ pub(super) struct Pass {
     pub(super) keep: Reading,
     /// Kept numbers a sample.
     pub(super) kept: usize,
-    /// Yields the channels' values, the gain applied.
-    pub(super) image: Stages,
-    /// Yields the loss.
-    pub(super) loss: Stages,
-    /// Yields the loss, then what `channels` names.
-    pub(super) normal: Stages,
+    /// Yields the channels' values.
+    pub(super) value: Reading,
+    /// Yields the channels' values, then how they move.
+    pub(super) moved: Reading,
     pub(super) channels: Vec<ChannelColumns>,
+    /// The outputs of `moved` that are read.
+    pub(super) read: Vec<usize>,
 }
 
-/// A pixel's value and tangents, and the graph that holds them.
-struct Shown {
-    graph: Graph,
-    value: Vec<Id>,
-    tangents: Vec<Vec<Id>>,
+/// The tapes of a plan, before it is known who reads what of them.
+pub(super) struct Tapes {
+    pub(super) keep: Tape,
+    pub(super) value: Tape,
+    pub(super) moved: Tape,
+    /// For each seed and channel the output of `moved`; `None` where the channel never moves.
+    columns: Vec<Vec<Option<usize>>>,
 }
 
-/// The outputs of the columns of a pixel.
-struct Compared {
-    loss: Id,
-    numbers: Vec<Id>,
-    channels: Vec<ChannelColumns>,
-}
-
-impl Pass {
-    pub(super) fn new(fitted: &Fitted, written: Written) -> Result<Self, ShadingError> {
-        let free = fitted.free();
+impl Tapes {
+    /// Of the plan that `facts` call for, along `free`, for its first `channels` channels; `held` says which fields
+    /// samples hold.
+    pub(super) fn new(
+        facts: &Facts,
+        free: &[Param],
+        channels: usize,
+        held: impl Fn(&str) -> bool,
+        keep: bool,
+    ) -> Result<Self, ShadingError> {
         let seeds: Vec<Seed> = free.iter().map(|&param| Seed::of_param(param)).collect();
-        let facts = facts(fitted, written);
-        let held = held_fields(&fitted.places);
-        let stand_in = |field: &str| if held.contains_key(field) { None } else { neutral(field) };
-        let shading = Shading::new(&facts, &seeds, stand_in, Natives::Called)?;
-        let losses = Source::new(&loss_text(fitted.loss), Natives::Called)?;
-        let channels = fitted.channels;
+        let stand_in = |field: &str| if held(field) { None } else { neutral(field) };
+        let shading = Shading::new(facts, &seeds, stand_in, Natives::Called)?;
         let outputs: Vec<Id> = std::iter::once(&shading.value)
             .chain(&shading.tangents)
             .flat_map(|numbers| numbers[..channels].to_vec())
             .collect();
         let names = live_names(&seeds);
         let moves = |graph: &Graph, id: Id| {
-            !fitted.keep
+            !keep
                 || match graph.node(id) {
                     Node::Uniform(at) => names.contains(&graph.uniforms[at as usize].name),
                     _ => graph.looked_up(id).is_some_and(|name| names.iter().any(|known| known == name)),
                 }
         };
         let cut = cut(&shading.graph, &outputs, moves);
-        let keep = Reading::new(fitted, &shading.graph, &cut.kept);
-        let shown = Shown {
-            graph: cut.graph,
-            value: cut.outputs[..channels].to_vec(),
-            tangents: cut.outputs[channels..].chunks(channels).map(<[Id]>::to_vec).collect(),
-        };
-        let (sample, mut shown) = if fitted.several { shown.summed() } else { (None, shown) };
-        let compared = shown.compared(fitted, written, &free, &losses)?;
-        let image: Vec<Id> = (0..channels).map(|c| shown.gained(shown.value[c], written)).collect();
-        let all: Vec<Id> = std::iter::once(compared.loss).chain(compared.numbers).collect();
-        let stages = |outputs: &[Id], tangents: bool| Stages {
-            sample: sample.as_ref().map(|shown| {
-                let mut sums = shown.value.clone();
-                if tangents {
-                    sums.extend(shown.tangents.concat());
-                }
-                Reading::new(fitted, &shown.graph, &sums)
-            }),
-            pixel: Reading::new(fitted, &shown.graph, outputs),
-        };
+        let mut moved = cut.outputs[..channels].to_vec();
+        let mut columns = Vec::new();
+        for tangent in cut.outputs[channels..].chunks(channels) {
+            let mut column = |&id: &Id| {
+                let stays = cut.graph.value(id) == Some(0.0);
+                (!stays).then(|| {
+                    moved.push(id);
+                    moved.len() - 1
+                })
+            };
+            columns.push(tangent.iter().map(&mut column).collect());
+        }
         Ok(Self {
-            keep,
-            kept: cut.kept.len(),
-            image: stages(&image, false),
-            loss: stages(&all[..1], false),
-            normal: stages(&all, true),
-            channels: compared.channels,
+            keep: Tape::new(&shading.graph, &cut.kept),
+            value: Tape::new(&cut.graph, &moved[..channels]),
+            moved: Tape::new(&cut.graph, &moved),
+            columns,
         })
     }
 }
 
+impl Pass {
+    /// The tapes of a fit whose environment is `turned`, or will be: those of a plan that is compiled ahead where there
+    /// is one that yields all that is asked for.
+    pub(super) fn new(fitted: &Fitted, turned: bool) -> Result<Self, ShadingError> {
+        let free = fitted.free();
+        let held = |field: &str| fitted.places.fields().any(|(name, ..)| name == field);
+        let ahead = ahead::plan_for(fitted, &free, turned);
+        let tapes = match ahead {
+            // It reads every field; what samples lack stands in a stream of its own.
+            Some(plan) => Tapes::new(&plan.facts(), &plan.free(), plan.channels(), |_| true, plan.keeps())?,
+            None => Tapes::new(
+                &facts(fitted.setup, fitted.faces, turned),
+                &free,
+                fitted.channels,
+                held,
+                fitted.keep,
+            )?,
+        };
+        let seeds = ahead.map_or(free, ahead::Plan::free);
+        let channels: Vec<ChannelColumns> =
+            (0..fitted.channels).map(|c| ChannelColumns::new(fitted, &seeds, &tapes, c)).collect();
+        let mut read: Vec<usize> = (0..fitted.channels).collect();
+        read.extend(channels.iter().flat_map(|channel| &channel.tangents));
+        read.sort_unstable();
+        read.dedup();
+        let reading = |tape| Reading::new(&fitted.places, tape, ahead.is_some());
+        Ok(Self {
+            kept: tapes.keep.outputs.len(),
+            keep: reading(tapes.keep),
+            value: reading(tapes.value),
+            moved: reading(tapes.moved),
+            channels,
+            read,
+        })
+    }
+}
+
+impl ChannelColumns {
+    fn new(fitted: &Fitted, seeds: &[Param], tapes: &Tapes, c: usize) -> Self {
+        let mut channel = Self::default();
+        for (index, unknown) in fitted.unknowns.iter().enumerate() {
+            let Unknown::Param(column) = unknown else { continue };
+            let other = matches!(column.channels, Channels::One(own) if c < 3 && own != c);
+            let seed = seeds.iter().position(|&param| param == column.param).filter(|_| !other);
+            if let Some(tangent) = seed.and_then(|seed| tapes.columns[seed][c]) {
+                channel.unknowns.push(Some(index));
+                channel.tangents.push(tangent);
+            }
+        }
+        if fitted.gains() {
+            channel.unknowns.push(None);
+            channel.tangents.push(c);
+        }
+        channel
+    }
+}
+
 impl Reading {
-    fn new(fitted: &Fitted, graph: &Graph, outputs: &[Id]) -> Self {
-        let held = held_fields(&fitted.places);
-        let tape = Tape::new(graph, outputs);
-        let load = |input: &crate::program::graph::Input| match input.name.as_str() {
-            KEPT => (StreamOf::Kept as usize, input.component),
-            SHOWN => (StreamOf::Pixels as usize, input.component),
-            OBSERVED => (StreamOf::Targets as usize, input.component),
-            WEIGHT => (StreamOf::Weights as usize, 0),
-            field => (StreamOf::Samples as usize, held.get(field).map_or(0, |place| place + input.component)),
+    fn new(places: &Places, tape: Tape, ahead: bool) -> Self {
+        let held: BTreeMap<&str, usize> = places.fields().map(|(name, place, _)| (name, place)).collect();
+        let load = |input: &Input| match (input.name.as_str(), held.get(input.name.as_str())) {
+            (KEPT, _) => (StreamOf::Kept, input.component),
+            (_, Some(place)) => (StreamOf::Samples, place + input.component),
+            (field, None) => {
+                let value = neutral(field).unwrap_or(0.0);
+                (StreamOf::Neutral, NEUTRALS.iter().position(|&x| x == value).unwrap_or(0))
+            }
         };
         let loads = tape.fields.iter().map(load).collect();
-        Self { program: Program::new(tape), loads }
+        Self { program: Program::new(tape, ahead), loads }
     }
-}
-
-/// Names of what pixels hold beside samples.
-const SHOWN: &str = "shown";
-const OBSERVED: &str = "observed";
-const WEIGHT: &str = "weight";
-/// Names of what views hold.
-pub(super) const GAIN: &str = "gain";
-pub(super) const CLIP_LOW: &str = "clip_low";
-pub(super) const CLIP_HIGH: &str = "clip_high";
-
-impl Shown {
-    /// What is added up over samples, and pixels that read the sums.
-    fn summed(self) -> (Option<Self>, Self) {
-        let mut graph = Graph::default();
-        let mut next = 0..;
-        let mut read = |graph: &mut Graph| graph.field(SHOWN, next.next().unwrap_or(0));
-        let value = self.value.iter().map(|_| read(&mut graph)).collect();
-        let mut tangents = Vec::new();
-        for tangent in &self.tangents {
-            let read = |&id: &Id| {
-                let sum = read(&mut graph);
-                // What never moves needs no column.
-                self.graph.value(id).filter(|&x| x == 0.0).map_or(sum, |zero| graph.constant(zero))
-            };
-            tangents.push(tangent.iter().map(read).collect());
-        }
-        (Some(self), Self { graph, value, tangents })
-    }
-
-    fn gained(&mut self, id: Id, written: Written) -> Id {
-        if !written.gained {
-            return id;
-        }
-        let gain = self.graph.uniform(GAIN, 0);
-        self.graph.binary(Binary::Multiply, gain, id)
-    }
-
-    /// What a pixel counts in a channel: a clipped target only says "at least" or "at most" (docs/model.md).
-    fn counted(&mut self, fitted: &Fitted, value: Id, wanted: Id) -> Id {
-        let graph = &mut self.graph;
-        let weight = if fitted.weighted { graph.field(WEIGHT, 0) } else { graph.constant(1.0) };
-        if !fitted.clipped {
-            return weight;
-        }
-        let (low, high) = (self.graph.uniform(CLIP_LOW, 0), self.graph.uniform(CLIP_HIGH, 0));
-        let graph = &mut self.graph;
-        let at_least = |graph: &mut Graph, a, b| graph.binary(Binary::GreaterEqual, a, b);
-        let (is_low, below) = (at_least(graph, low, wanted), at_least(graph, wanted, value));
-        let (is_high, above) = (at_least(graph, wanted, high), at_least(graph, value, wanted));
-        let (below, above) = (graph.and(is_low, below), graph.and(is_high, above));
-        let (beyond, nothing) = (graph.or(below, above), graph.constant(0.0));
-        graph.select(beyond, nothing, weight)
-    }
-
-    /// Loss, residuals and columns.
-    fn compared(
-        &mut self,
-        fitted: &Fitted,
-        written: Written,
-        free: &[Param],
-        losses: &Source,
-    ) -> Result<Compared, LowerError> {
-        let mut compared =
-            Compared { loss: self.graph.constant(0.0), numbers: Vec::new(), channels: Vec::new() };
-        for c in 0..fitted.channels {
-            let (value, wanted) = (self.gained(self.value[c], written), self.graph.field(OBSERVED, c));
-            let counted = self.counted(fitted, value, wanted);
-            let arguments = [value, wanted, counted].map(|id| Value::Numbers(vec![id])).to_vec();
-            let weighed = losses.call(&mut self.graph, "weighted_residual", arguments)?;
-            compared.loss = self.graph.binary(Binary::Add, compared.loss, weighed[0]);
-            let mut channel = ChannelColumns::default();
-            let mut put = |channel: &mut ChannelColumns, id: Id| {
-                compared.numbers.push(id);
-                // The loss is the first output.
-                channel.outputs.push(compared.numbers.len());
-            };
-            for (index, unknown) in fitted.unknowns.iter().enumerate() {
-                let Unknown::Param(column) = unknown else { continue };
-                let seed = free.iter().position(|&param| param == column.param);
-                let other = matches!(column.channels, Channels::One(own) if c < 3 && own != c);
-                let Some(tangent) = seed.filter(|_| !other).map(|seed| self.tangents[seed][c]) else {
-                    continue;
-                };
-                if self.graph.value(tangent) == Some(0.0) {
-                    continue;
-                }
-                let moved = self.gained(tangent, written);
-                let column = self.graph.binary(Binary::Multiply, weighed[1], moved);
-                channel.unknowns.push(Some(index));
-                put(&mut channel, column);
-            }
-            if fitted.gains() {
-                let column = self.graph.binary(Binary::Multiply, weighed[1], self.value[c]);
-                channel.unknowns.push(None);
-                put(&mut channel, column);
-            }
-            put(&mut channel, weighed[2]);
-            compared.channels.push(channel);
-        }
-        Ok(compared)
-    }
-}
-
-/// The first row of each field that samples hold.
-fn held_fields(places: &Places) -> BTreeMap<&'static str, usize> {
-    places.fields().map(|(name, place, _)| (name, place)).collect()
 }
 
 /// Constants and resources that free parameters move.
@@ -353,13 +254,14 @@ fn live_names(seeds: &[Seed]) -> Vec<String> {
     names
 }
 
-fn facts(fitted: &Fitted, written: Written) -> Facts {
+/// What stored samples call for.
+pub(super) fn facts(setup: Setup, faces: FaceSizes, turned: bool) -> Facts {
     Facts {
-        setup: fitted.setup,
+        setup,
         source: FactsSource::Samples,
         maps: MapFacts::default(),
-        faces: fitted.faces,
-        turned: written.turned,
+        faces,
+        turned,
         square_rim: false,
         budget: Budget::Exact,
         ..Facts::default()

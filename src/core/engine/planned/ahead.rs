@@ -1,0 +1,347 @@
+//! Plans whose tapes are compiled ahead, each by itself, as Rust that is printed from the rules.
+//!
+//! A machine that reads a list of instructions keeps every number in memory between two of them; the compiler keeps them
+//! in registers. So the plans that most fits ask for ([`PLANS`]) are printed as Rust ([`crate::program::print`]) into
+//! `ahead/tapes.rs`, which is part of the sources. Nobody writes there: a test prints them anew and compares. A fit runs
+//! the plan that yields all it asks for with the least that it does not; what no plan yields, and what has changed since
+//! they were printed, runs on the [machine](super::machine).
+
+#[rustfmt::skip]
+#[allow(unused_mut, unused_variables, clippy::all, clippy::pedantic, clippy::nursery, reason = "it is printed")]
+mod tapes;
+
+use super::block::Block;
+use super::pass::{Fitted, facts};
+use crate::model::effects::{Effect, Effects, Form, Silhouette};
+use crate::model::evaluate::Setup;
+use crate::model::params::Param;
+use crate::program::print::statements;
+use crate::program::tape::Tape;
+use crate::shader::facts::{FaceSizes, Facts};
+use crate::simd::Simd;
+
+/// Parameters that move what is looked up. The others cost a product or two, and are free in every plan.
+const MOVING: [Param; 5] = [
+    Param::NormalStrength,
+    Param::SpecularLobe,
+    Param::EnvironmentRotation,
+    Param::KeyAzimuth,
+    Param::KeyElevation,
+];
+
+/// A plan that is compiled ahead.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan {
+    name: &'static str,
+    form: Form,
+    silhouette: Silhouette,
+    effects: Effects,
+    /// Those of [`MOVING`] that are free.
+    moving: &'static [Param],
+    /// Whether what does not move is kept from pass to pass.
+    keeps: bool,
+}
+
+const fn plan(
+    name: &'static str,
+    form: Form,
+    silhouette: Silhouette,
+    effects: Effects,
+    moving: &'static [Param],
+) -> Plan {
+    Plan { name, form, silhouette, effects, moving, keeps: true }
+}
+
+/// The paper's effects and its haze, as scenes and the race beside other programs have them.
+const HAZY: Effects = Effects::SURFACE.with(Effect::Haze);
+/// Of a mesh without a normal map.
+const SMOOTH: Effects = Effects::of(&[
+    Effect::Diffuse,
+    Effect::Occlusion,
+    Effect::Rim,
+    Effect::SideSpecular,
+    Effect::Hilite,
+    Effect::Reflection,
+]);
+
+/// What moves a mesh or comes after shading, and is nothing that a sample's radiance knows of.
+const ELSEWHERE: [Effect; 3] = [Effect::Morph, Effect::Skin, Effect::Bloom];
+
+use self::{Form::Corrected, Form::Listing, Silhouette::Bumped, Silhouette::Fragment, Silhouette::Vertex};
+use Param as P;
+
+const STRENGTH_AND_LOBE: &[Param] = &[P::NormalStrength, P::SpecularLobe];
+const ALL_MOVE: &[Param] = &[P::NormalStrength, P::SpecularLobe, P::EnvironmentRotation];
+
+/// The plans, of those with the same effects the ones with less that moves first.
+static PLANS: [Plan; 22] = [
+    plan("surface", Corrected, Fragment, Effects::SURFACE, &[]),
+    plan("surface_lobe", Corrected, Fragment, Effects::SURFACE, &[P::SpecularLobe]),
+    plan("surface_strength", Corrected, Fragment, Effects::SURFACE, &[P::NormalStrength]),
+    plan("surface_strength_lobe", Corrected, Fragment, Effects::SURFACE, STRENGTH_AND_LOBE),
+    plan("surface_all", Corrected, Fragment, Effects::SURFACE, ALL_MOVE),
+    plan("bumped", Corrected, Bumped, Effects::SURFACE, &[]),
+    plan("bumped_lobe", Corrected, Bumped, Effects::SURFACE, &[P::SpecularLobe]),
+    plan("bumped_strength", Corrected, Bumped, Effects::SURFACE, &[P::NormalStrength]),
+    plan("bumped_strength_lobe", Corrected, Bumped, Effects::SURFACE, STRENGTH_AND_LOBE),
+    plan("smooth", Corrected, Fragment, SMOOTH, &[]),
+    plan("smooth_lobe", Corrected, Fragment, SMOOTH, &[P::SpecularLobe]),
+    plan("hazy", Corrected, Fragment, HAZY, &[]),
+    plan("hazy_strength", Corrected, Fragment, HAZY, &[P::NormalStrength]),
+    plan("hazy_strength_lobe", Corrected, Fragment, HAZY, STRENGTH_AND_LOBE),
+    plan("hazy_bumped", Corrected, Bumped, HAZY, &[]),
+    plan("hazy_bumped_strength", Corrected, Bumped, HAZY, &[P::NormalStrength]),
+    plan("hazy_bumped_strength_lobe", Corrected, Bumped, HAZY, STRENGTH_AND_LOBE),
+    // What benchmarks time that look everything up in each pass.
+    plan("hazy_bumped_anew", Corrected, Bumped, HAZY, &[P::NormalStrength]).keeping_nothing(),
+    plan("surface_anew", Corrected, Fragment, Effects::SURFACE, STRENGTH_AND_LOBE).keeping_nothing(),
+    plan("listing", Listing, Vertex, Effects::SURFACE, &[]),
+    plan("listing_lobe", Listing, Vertex, Effects::SURFACE, &[P::SpecularLobe]),
+    plan("listing_strength_lobe", Listing, Vertex, Effects::SURFACE, STRENGTH_AND_LOBE),
+];
+
+impl Plan {
+    const fn keeping_nothing(self) -> Self {
+        Self { keeps: false, ..self }
+    }
+
+    fn setup(&self) -> Setup {
+        Setup::new(self.form, self.silhouette, self.effects)
+    }
+
+    /// What its tapes yield the movement of.
+    pub(super) fn free(&self) -> Vec<Param> {
+        let free = |param: &Param| !MOVING.contains(param) || self.moving.contains(param);
+        Param::all().filter(|param| param.asked_for(self.effects)).filter(free).collect()
+    }
+
+    fn turned(&self) -> bool {
+        self.moving.contains(&Param::EnvironmentRotation)
+    }
+
+    pub(super) const fn keeps(&self) -> bool {
+        self.keeps
+    }
+
+    pub(super) fn channels(&self) -> usize {
+        if self.effects.has(Effect::Haze) { 4 } else { 3 }
+    }
+
+    pub(super) fn facts(&self) -> Facts {
+        // Lookups take the size from the cube; the rules' text wants some number.
+        let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1) };
+        facts(self.setup(), any, self.turned())
+    }
+}
+
+/// The plan for what moves along `free`, if one is compiled ahead.
+pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<&'static Plan> {
+    let effects = ELSEWHERE.into_iter().fold(fitted.setup.effects, Effects::without);
+    let setup = Setup { effects, ..fitted.setup };
+    let yields = |plan: &&Plan| {
+        let yielded = plan.free();
+        plan.setup() == setup
+            && plan.keeps == fitted.keep
+            && plan.channels() >= fitted.channels
+            && (plan.turned() || !turned)
+            && free.iter().all(|param| yielded.contains(param))
+    };
+    PLANS.iter().find(yields)
+}
+
+/// A tape's statements and outputs as they are printed, and what they are known by.
+fn printed(tape: &Tape) -> (String, Vec<String>, u64) {
+    let (statements, outputs) = statements(tape, "            ");
+    // FNV-1a: what differs has another key but once in 2^64.
+    let mut key = 0xcbf2_9ce4_8422_2325_u64;
+    for byte in statements.bytes().chain(outputs.iter().flat_map(|output| output.bytes().chain([b';']))) {
+        key = (key ^ u64::from(byte)).wrapping_mul(0x0100_0000_01b3);
+    }
+    (statements, outputs, key)
+}
+
+/// The place of a tape among those that are compiled.
+pub(super) fn find(tape: &Tape) -> Option<usize> {
+    let key = printed(tape).2;
+    tapes::KEYS.iter().position(|known| *known == key)
+}
+
+/// Run a compiled tape over a block.
+#[inline(always)]
+pub(super) fn run<S: Simd>(tape: usize, simd: S, block: Block<'_>) {
+    tapes::run(tape, simd, block);
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Write as _;
+
+    use rand::rngs::StdRng;
+    use rand::{RngExt, SeedableRng};
+
+    use super::*;
+    use crate::engine::planned::machine::{self, BATCH, Bound, File, Program, Stream};
+    use crate::engine::planned::pass::{StreamOf, Tapes};
+    use crate::model::cube::Cube;
+    use crate::program::cut::KEPT;
+    use crate::program::evaluate::Shared;
+    use crate::program::graph::Input;
+    use crate::samples::LANES;
+    use crate::samples::rows::Row;
+    use crate::simd::{levels, name};
+    use crate::with_simd;
+
+    const HEAD: &str = "\
+// Printed from the rules by the test beside it. Do not edit.
+//
+// Each function runs one tape over a block of records, a record of sixteen samples at a time: `samples` are fields of
+// stored samples, `kept` numbers that no free parameter moves, `u` numbers that all samples share.
+
+use super::super::block::{Block, along};
+use crate::engine::lanes::Lanes;
+use crate::model::cube::CubePoint;
+use crate::model::real::{Real, select};
+use crate::program::evaluate::{binary, unary};
+use crate::program::graph::{Binary, Unary};
+use crate::program::native::Unit;
+use crate::simd::Simd;
+";
+
+    /// A tape as a function.
+    fn function(name: &str, tape: &Tape) -> String {
+        let (statements, outputs, _) = printed(tape);
+        let kept =
+            tape.fields.iter().filter(|field| field.name == KEPT).map(|field| field.component + 1).max();
+        let (fields, uniforms) = (tape.fields.len(), tape.uniform_values(|_| 0.0).len());
+        let mut text = format!("\n#[inline(never)]\nfn {name}<S: Simd>(simd: S, block: Block<'_>) {{\n");
+        text.push_str("    simd.vectorize(\n        #[inline(always)]\n        || {\n");
+        let mut line = |line: &str| {
+            let _ = writeln!(text, "        {line}");
+        };
+        line("let lit = |x: f64| Lanes::splat(simd, x as f32);");
+        line(&format!("let numbers: &[f32; {uniforms}] = block.uniforms();"));
+        line("let u = |k: usize| Lanes::splat(simd, numbers[k]);");
+        line(&format!("let fields = block.fields::<{fields}>();"));
+        line("let cubes = block.cubes;");
+        line("for i in 0..block.count {");
+        line("    let at = i * block.stride();");
+        line("    let samples = |k: usize| block.number(simd, fields[k], at);");
+        if let Some(kept) = kept {
+            line(&format!("    let rows = block.kept::<{kept}>(i);"));
+            line("    let kept = |k: usize| Lanes::of_row(simd, &rows[k]);");
+        }
+        text.push_str(&statements);
+        for (k, output) in outputs.iter().enumerate() {
+            let _ = writeln!(text, "            block.put({k}, i, {output});");
+        }
+        text.push_str("        }\n        },\n    );\n}\n");
+        text
+    }
+
+    fn all_tapes() -> String {
+        let mut functions: Vec<(u64, String, String)> = Vec::new();
+        for (name, tape) in every_tape() {
+            let key = printed(&tape).2;
+            // A plan that keeps nothing, or two that keep the same.
+            if !tape.outputs.is_empty() && functions.iter().all(|known| known.0 != key) {
+                functions.push((key, function(&name, &tape), name));
+            }
+        }
+        let mut text = HEAD.to_owned();
+        let _ = write!(text, "\npub(super) const KEYS: [u64; {}] = [\n", functions.len());
+        functions.iter().for_each(|(key, ..)| text.push_str(&format!("    {key:#018x},\n")));
+        text.push_str("];\n\n#[inline(always)]\n");
+        text.push_str(
+            "pub(super) fn run<S: Simd>(tape: usize, simd: S, block: Block<'_>) {\n    match tape {\n",
+        );
+        for (k, (.., name)) in functions.iter().enumerate() {
+            let _ = writeln!(text, "        {k} => {name}(simd, block),");
+        }
+        text.push_str("        _ => {}\n    }\n}\n");
+        functions.iter().for_each(|(_, function, _)| text.push_str(function));
+        text
+    }
+
+    #[test]
+    fn what_is_compiled_is_what_the_rules_say_today() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/engine/planned/ahead/tapes.rs");
+        let text = all_tapes();
+        if std::env::var_os("SKINFIT_PRINT_PLANS").is_some() {
+            std::fs::write(path, &text).unwrap();
+        }
+        let stale = "the rules have changed since their plans were printed: run \
+                     `SKINFIT_PRINT_PLANS=1 cargo test -p skinfit-core --lib what_is_compiled`, then build again";
+        assert!(
+            include_str!("ahead/tapes.rs") == text || std::fs::read_to_string(path).unwrap() == text,
+            "{stale}"
+        );
+    }
+    /// The tapes of all plans.
+    fn every_tape() -> impl Iterator<Item = (String, Tape)> {
+        PLANS.iter().flat_map(|plan| {
+            let tapes =
+                Tapes::new(&plan.facts(), &plan.free(), plan.channels(), |_| true, plan.keeps).unwrap();
+            [("keep", tapes.keep), ("value", tapes.value), ("moved", tapes.moved)]
+                .map(|(part, tape)| (format!("{}_{part}", plan.name), tape))
+        })
+    }
+
+    #[test]
+    fn what_is_compiled_computes_what_the_tape_says() {
+        let mut rng = StdRng::seed_from_u64(21);
+        // A block that is not full, behind some records that are not asked for.
+        let (first, count) = (3, BATCH - 3);
+        for (of, tape) in every_tape() {
+            let (fields, kept) = (tape.fields.len(), 24);
+            let mut drawn = |rows: usize| -> Vec<Row> {
+                (0..rows).map(|_| Row::of(std::array::from_fn(|_| rng.random_range(0.05..0.95)))).collect()
+            };
+            let (samples, keeps) = (drawn((first + count) * fields), drawn((first + count) * kept));
+            let cubes: Vec<Cube<f64>> = (0..tape.resources.len())
+                .map(|_| Cube::from_fn(4, |_, _, _| std::array::from_fn(|_| rng.random_range(0.1..1.0))))
+                .collect();
+            let narrow: Vec<Cube<f32>> = cubes.iter().map(|cube| cube.map(|t| t.map(|x| x as f32))).collect();
+            // Every uniform 0.6 but the turn, which is of a circle.
+            let uniform =
+                |input: &Input| if input.name == "turn" && input.component == 0 { 0.8 } else { 0.6 };
+            let uniforms = tape.uniform_values(uniform);
+            let shared = Shared { uniforms: uniforms.clone(), cubes: cubes.iter().collect() };
+            let place = |input: &Input| tape.fields.iter().position(|field| field == input).unwrap();
+            let loads: Vec<(StreamOf, usize)> = tape
+                .fields
+                .iter()
+                .map(|input| match input.name.as_str() {
+                    KEPT => (StreamOf::Kept, input.component),
+                    _ => (StreamOf::Samples, place(input)),
+                })
+                .collect();
+            let program = Program::new(tape.clone(), true);
+            assert!(program.is_compiled() || tape.outputs.is_empty(), "{of} is not compiled");
+            let uniforms = uniforms.into_iter().map(|x| x as f32).collect();
+            let bound = Bound { program: &program, loads: &loads, cubes: narrow.iter().collect(), uniforms };
+            let streams = [(&samples[..], fields), (&keeps[..], kept), (&[], 0)]
+                .map(|(rows, stride)| Stream { rows, stride });
+            for level in levels() {
+                let mut file = File::default();
+                file.prepare(&bound);
+                with_simd!(level, simd => machine::run(simd, &bound, &file, &streams, first, count));
+                for i in 0..count {
+                    for lane in [0, LANES - 1] {
+                        let number = |input: &Input| {
+                            let (stream, place) = loads[place(input)];
+                            let Stream { rows, stride } = streams[stream as usize];
+                            f64::from(rows[(first + i) * stride + place][lane])
+                        };
+                        for (k, want) in tape.run(&shared, 0.0_f64, number).into_iter().enumerate() {
+                            let got = f64::from(file.columns()[k][i].get()[lane]);
+                            // Roundings of f32 over some two hundred operations; slopes between texels of up to 4 times
+                            // their difference.
+                            let close = (got - want).abs() <= 2e-4 * (1.0 + want.abs());
+                            assert!(close, "{} {of}, output {k}: {got} {want}", name(level));
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,87 @@
+//! A block of records as a function sees it that is compiled ahead.
+
+use prefetch_index::prefetch_index;
+
+use super::machine::{AHEAD, BATCH, Bound, Column, Stream, store};
+use super::pass::{NEUTRALS, StreamOf};
+use crate::engine::lanes::Lanes;
+use crate::model::cube::Cube;
+use crate::model::real::Real;
+use crate::samples::rows::{Row, prefetch_rows};
+use crate::simd::Simd;
+
+/// `count` records from `first` on, at most [`BATCH`], and where their outputs go.
+#[derive(Clone, Copy)]
+pub(super) struct Block<'a> {
+    pub(super) bound: &'a Bound<'a>,
+    pub(super) streams: &'a [Stream<'a>],
+    pub(super) first: usize,
+    pub(super) count: usize,
+    pub(super) cubes: &'a [&'a Cube<f32>],
+    pub(super) columns: &'a [Column],
+}
+
+impl<'a> Block<'a> {
+    fn stream(&self, stream: StreamOf) -> Stream<'a> {
+        self.streams[stream as usize]
+    }
+
+    /// The numbers that all samples share.
+    #[inline(always)]
+    pub(super) fn uniforms<const N: usize>(&self) -> &'a [f32; N] {
+        self.bound.uniforms.first_chunk().unwrap_or(&[0.0; N])
+    }
+
+    /// Rows between one record's numbers and the next one's.
+    #[inline(always)]
+    pub(super) fn stride(&self) -> usize {
+        self.stream(StreamOf::Samples).stride
+    }
+
+    /// Each field's rows, from the first record's on. Fields that samples lack have rows of what stands in.
+    #[inline(always)]
+    pub(super) fn fields<const N: usize>(&self) -> [&'a [Row]; N] {
+        let stride = self.stride();
+        std::array::from_fn(|k| {
+            let (stream, place) = self.bound.loads[k];
+            match stream {
+                StreamOf::Samples => &self.stream(stream).rows[self.first * stride + place..],
+                StreamOf::Neutral => &self.stream(stream).rows[place * BATCH * stride..],
+                // It is read by [`Self::kept`].
+                StreamOf::Kept => &[],
+            }
+        })
+    }
+
+    /// The kept numbers of record `i` of the block. Asks for a later record's as well.
+    #[inline(always)]
+    pub(super) fn kept<const N: usize>(&self, i: usize) -> &'a [Row; N] {
+        let Stream { rows, stride } = self.stream(StreamOf::Kept);
+        prefetch_rows(rows, (self.first + i + AHEAD) * stride, N);
+        rows[(self.first + i) * stride..].first_chunk().unwrap_or(&[Row::ZERO; N])
+    }
+
+    /// A field's number, of the record whose row that is. Asks for a later record's as well.
+    #[inline(always)]
+    pub(super) fn number<S: Simd>(&self, simd: S, field: &[Row], at: usize) -> Lanes<S> {
+        prefetch_index(field, at + AHEAD * self.stride());
+        Lanes::of_row(simd, &field[at])
+    }
+
+    /// Record `i`'s number of an output.
+    #[inline(always)]
+    pub(super) fn put<S: Simd>(&self, output: usize, i: usize, value: Lanes<S>) {
+        store(&self.columns[output][i], value);
+    }
+}
+
+/// How a lookup moves that is `ds` and `dt` texels further.
+#[inline(always)]
+pub(super) fn along<R: Real>([ds, dt]: [R; 2], across: [R; 4], down: [R; 4]) -> [R; 4] {
+    std::array::from_fn(|c| ds.mul_add(across[c], dt * down[c]))
+}
+
+/// Rows of what stands in for fields that samples of `stride` rows lack.
+pub(super) fn neutral_rows(stride: usize) -> Vec<Row> {
+    NEUTRALS.iter().flat_map(|&value| std::iter::repeat_n(Row::of([value; 16]), BATCH * stride)).collect()
+}

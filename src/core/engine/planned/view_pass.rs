@@ -1,0 +1,322 @@
+//! A view's blocks of records: from what tapes yield to the sums of loss, gradient and normal equations.
+
+use super::machine::{self, BATCH, Bound, Column, File, FileColumns, Stream};
+use super::pass::ChannelColumns;
+use crate::engine::BLOCK;
+use crate::engine::cpu::sums::{Sums, Wish, fold};
+use crate::engine::gram::add_gram;
+use crate::engine::lanes::Lanes;
+use crate::engine::residual::weighted_residual;
+use crate::engine::view::ObservedView;
+use crate::model::real::Real;
+use crate::samples::rows::Row;
+use crate::scene::Loss;
+use crate::simd::Simd;
+
+/// What the blocks of a view read in one pass.
+pub(super) struct ViewPass<'a> {
+    pub(super) view: &'a ObservedView,
+    pub(super) streams: [Stream<'a>; 3],
+    pub(super) bound: Bound<'a>,
+    /// The tape's outputs that are wanted.
+    pub(super) read: &'a [usize],
+    pub(super) loss: Loss,
+    pub(super) gain: f32,
+}
+
+/// What a thread computes in.
+#[derive(Default)]
+pub(super) struct Scratch {
+    file: File,
+    /// Sums over the samples of a pixel, of each output.
+    pixels: Vec<Column>,
+    /// Whether a pixel has several samples.
+    several: bool,
+    compared: [Compared; 4],
+    /// Columns of the Jacobian, weighted.
+    weighed: Vec<Column>,
+    sums: Vec<Row>,
+}
+
+/// The residuals of a channel as the normal equations see them.
+#[derive(Default)]
+struct Compared {
+    /// What the row of the value's derivative is scaled by, where residuals do not all count alike.
+    scale: Column,
+    residual: Column,
+}
+
+/// The streams of a view, in the order of `pass::StreamOf`.
+pub(super) fn streams<'a>(
+    view: &'a ObservedView,
+    kept: &'a [Row],
+    kept_stride: usize,
+    neutral: &'a [Row],
+) -> [Stream<'a>; 3] {
+    let samples = view.samples.surface.rows();
+    [
+        Stream { rows: samples.all(), stride: samples.stride() },
+        Stream { rows: kept, stride: kept_stride },
+        Stream { rows: neutral, stride: 0 },
+    ]
+}
+
+impl Scratch {
+    pub(super) fn prepare(&mut self, pass: &ViewPass<'_>) {
+        let outputs = pass.bound.program.tape.outputs.len();
+        self.file.prepare(&pass.bound);
+        self.several = pass.several();
+        self.pixels.resize_with(if self.several { outputs } else { 0 }, Column::default);
+        self.weighed.resize_with(outputs + 1, Column::default);
+    }
+
+    fn shown(&self) -> &[Column] {
+        if self.several { &self.pixels } else { self.file.columns() }
+    }
+}
+
+impl ViewPass<'_> {
+    /// Whether a pixel has several samples.
+    fn several(&self) -> bool {
+        let samples = &self.view.samples;
+        samples.records() != samples.groups() || samples.surface.places().weight.is_some()
+    }
+
+    /// Whether every residual counts alike, and as it is.
+    fn is_plain(&self) -> bool {
+        self.loss == Loss::L2 && self.view.weight.is_empty() && self.view.clip.is_none() && self.gain == 1.0
+    }
+
+    /// The outputs of `count` groups from `first` on.
+    #[inline(always)]
+    pub(super) fn shown<'s, S: Simd>(
+        &self,
+        simd: S,
+        scratch: &'s Scratch,
+        first: usize,
+        count: usize,
+    ) -> &'s [Column] {
+        if scratch.several {
+            self.add_samples(simd, scratch, first, count);
+        } else {
+            machine::run(simd, &self.bound, &scratch.file, &self.streams, first, count);
+        }
+        scratch.shown()
+    }
+
+    /// Add up the samples of each pixel, by their shares.
+    #[inline(always)]
+    fn add_samples<S: Simd>(&self, simd: S, scratch: &Scratch, first: usize, count: usize) {
+        let Scratch { file, pixels, .. } = scratch;
+        let surface = &self.view.samples.surface;
+        let starts = &self.view.samples.group_start;
+        self.read.iter().flat_map(|&output| &pixels[output][..count]).for_each(|cell| cell.set(Row::ZERO));
+        let (mut record, end) = (starts[first] as usize, starts[first + count] as usize);
+        let mut group = first;
+        while record < end {
+            let block = BATCH.min(end - record);
+            machine::run(simd, &self.bound, file, &self.streams, record, block);
+            for i in 0..block {
+                while starts[group + 1] as usize <= record + i {
+                    group += 1;
+                }
+                let share = match surface.places().weight {
+                    Some(at) => Lanes::of_row(simd, &surface.rows().record(record + i)[at]),
+                    None => Lanes::splat(simd, 1.0),
+                };
+                for &output in self.read {
+                    let sum = &pixels[output][group - first];
+                    let value = machine::load(simd, &file.columns()[output][i]);
+                    machine::store(sum, share.mul_add(value, machine::load(simd, sum)));
+                }
+            }
+            record += block;
+        }
+    }
+
+    /// Residuals of a channel of `count` groups from `first` on; the sum of their losses.
+    #[inline(always)]
+    fn compare<S: Simd>(
+        &self,
+        simd: S,
+        channel: usize,
+        (shown, compared): (&[Column], &Compared),
+        first: usize,
+        count: usize,
+    ) -> Lanes<S> {
+        let (one, gain) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, self.gain));
+        let mut loss = Lanes::splat(simd, 0.0);
+        if self.is_plain() {
+            // The root of a weight takes as long as all else.
+            for i in 0..count {
+                let value = machine::load(simd, &shown[channel][i]);
+                let residual = value - Lanes::of_row(simd, &self.view.target.record(first + i)[channel]);
+                loss = residual.mul_add(residual, loss);
+                machine::store(&compared.residual[i], residual);
+            }
+            return loss;
+        }
+        for i in 0..count {
+            let value = gain * machine::load(simd, &shown[channel][i]);
+            let wanted = Lanes::of_row(simd, &self.view.target.record(first + i)[channel]);
+            let weight = self.view.weight.get(first + i).map_or(one, |row| Lanes::of_row(simd, row));
+            let row = weighted_residual(self.loss, self.view.clip, value, wanted, weight);
+            loss = loss + row.loss;
+            machine::store(&compared.scale[i], row.scale);
+            machine::store(&compared.residual[i], row.residual);
+        }
+        loss
+    }
+
+    /// Residuals of all channels, and how they are scaled, in the scratch.
+    pub(super) fn residuals<S: Simd>(
+        &self,
+        simd: S,
+        channels: &[ChannelColumns],
+        scratch: &Scratch,
+        first: usize,
+        count: usize,
+    ) {
+        let shown = self.shown(simd, scratch, first, count);
+        for (c, compared) in scratch.compared.iter().enumerate().take(channels.len()) {
+            self.compare(simd, c, (shown, compared), first, count);
+        }
+    }
+
+    /// Group `i`'s row of a channel's column, weighted, or (after the last column) of its residual.
+    pub(super) fn row(
+        &self,
+        scratch: &Scratch,
+        channel: &ChannelColumns,
+        (c, column): (usize, usize),
+        i: usize,
+    ) -> Row {
+        let compared = &scratch.compared[c];
+        let Some(&tangent) = channel.tangents.get(column) else { return compared.residual[i].get() };
+        let mut row = scratch.shown()[tangent][i].get();
+        if self.is_plain() {
+            return row;
+        }
+        let (scale, gain) = (compared.scale[i].get(), self.gain_of(channel.unknowns[column]));
+        row.iter_mut().zip(scale.iter()).for_each(|(x, scale)| *x *= gain * scale);
+        row
+    }
+
+    /// The sums over a few blocks.
+    #[inline(always)]
+    pub(super) fn chunk<S: Simd>(
+        &self,
+        simd: S,
+        channels: &[ChannelColumns],
+        blocks: &[usize],
+        wish: Wish,
+        scratch: &mut Scratch,
+    ) -> Sums {
+        let groups = self.view.samples.groups();
+        let size = |channel: &ChannelColumns| match (wish, channel.unknowns.len() + 1) {
+            (Wish::Loss, _) => 0,
+            (Wish::Gradient, count) => count,
+            (Wish::Normal, count) => count * (count + 1) / 2,
+        };
+        let mut sums = std::mem::take(&mut scratch.sums);
+        sums.clear();
+        sums.resize(channels.iter().map(size).sum(), Row::ZERO);
+        let wanted = if wish == Wish::Normal { channels } else { &[] };
+        let columns: Vec<Vec<&Column>> =
+            wanted.iter().enumerate().map(|(c, channel)| self.columns(scratch, channel, c)).collect();
+        let mut loss = Lanes::splat(simd, 0.0);
+        for &block in blocks {
+            let end = groups.min((block + 1) * BLOCK);
+            for first in (block * BLOCK..end).step_by(BATCH) {
+                let count = BATCH.min(end - first);
+                // While the model is computed, what it is compared with comes.
+                (first..first + count).for_each(|group| self.view.target.prefetch(group));
+                let shown = self.shown(simd, scratch, first, count);
+                let mut base = 0;
+                for (c, channel) in channels.iter().enumerate() {
+                    let compared = &scratch.compared[c];
+                    loss = loss + self.compare(simd, c, (shown, compared), first, count);
+                    let sums = &mut sums[base..];
+                    match wish {
+                        Wish::Loss => {}
+                        Wish::Gradient => self.add_slope(simd, channel, (shown, compared), count, sums),
+                        Wish::Normal => {
+                            self.weigh(simd, channel, scratch, c, count);
+                            add_gram(simd, FileColumns { columns: &columns[c], groups: count }, sums);
+                        }
+                    }
+                    base += size(channel);
+                }
+            }
+        }
+        let mut folded: Vec<f64> = sums.iter().map(|row| fold(row)).collect();
+        folded.push(fold(&loss.to_array()));
+        drop(columns);
+        scratch.sums = sums;
+        Sums(folded)
+    }
+
+    /// Where the columns of a channel's normal equations stand, and after them the residual.
+    fn columns<'s>(&self, scratch: &'s Scratch, channel: &ChannelColumns, c: usize) -> Vec<&'s Column> {
+        let shown = scratch.shown();
+        let column = |(k, &tangent): (usize, &usize)| {
+            if self.is_plain() { &shown[tangent] } else { &scratch.weighed[k] }
+        };
+        let columns = channel.tangents.iter().enumerate().map(column);
+        columns.chain([&scratch.compared[c].residual]).collect()
+    }
+
+    /// Weight the columns of a channel.
+    #[inline(always)]
+    fn weigh<S: Simd>(&self, simd: S, channel: &ChannelColumns, scratch: &Scratch, c: usize, count: usize) {
+        if self.is_plain() {
+            return;
+        }
+        let (shown, scale) = (scratch.shown(), &scratch.compared[c].scale);
+        for ((&tangent, unknown), weighed) in
+            channel.tangents.iter().zip(&channel.unknowns).zip(&scratch.weighed)
+        {
+            let gain = Lanes::splat(simd, self.gain_of(*unknown));
+            for i in 0..count {
+                let scale = gain * machine::load(simd, &scale[i]);
+                machine::store(&weighed[i], scale * machine::load(simd, &shown[tangent][i]));
+            }
+        }
+    }
+
+    /// What multiplies a column: the value moves by the view's gain times what the model's does, and along the gain
+    /// itself by the model's value.
+    fn gain_of(&self, unknown: Option<usize>) -> f32 {
+        if unknown.is_some() { self.gain } else { 1.0 }
+    }
+
+    /// Add J^T r of a channel, and after it r^T r.
+    #[inline(always)]
+    fn add_slope<S: Simd>(
+        &self,
+        simd: S,
+        channel: &ChannelColumns,
+        (shown, compared): (&[Column], &Compared),
+        count: usize,
+        sums: &mut [Row],
+    ) {
+        let mut factors = [Lanes::splat(simd, 0.0); BATCH];
+        let last = channel.tangents.len();
+        let mut squares = Lanes::of_row(simd, &sums[last]);
+        for i in 0..count {
+            let residual = machine::load(simd, &compared.residual[i]);
+            let scaled = residual * machine::load(simd, &compared.scale[i]);
+            factors[i] = if self.is_plain() { residual } else { scaled };
+            squares = residual.mul_add(residual, squares);
+        }
+        squares.store(&mut sums[last]);
+        for ((&tangent, unknown), sum) in channel.tangents.iter().zip(&channel.unknowns).zip(sums) {
+            let mut slope = Lanes::splat(simd, 0.0);
+            for i in 0..count {
+                slope = machine::load(simd, &shown[tangent][i]).mul_add(factors[i], slope);
+            }
+            let gain = Lanes::splat(simd, self.gain_of(*unknown));
+            gain.mul_add(slope, Lanes::of_row(simd, sum)).store(sum);
+        }
+    }
+}

@@ -1,0 +1,196 @@
+//! Tapes as Rust: what the compiler makes instructions of, once, where a machine would read a list again and again.
+//!
+//! The text is generic over [`Real`](crate::model::real::Real). Around it stand `lit(x)`, a constant; `u(k)`, a number
+//! that all samples share, by its place in [`Tape::uniform_values`]; `samples(k)`, field k of the tape; `kept(k)`, the k-th
+//! number that is kept; and `cubes`, those that are looked up.
+
+use std::fmt::Write as _;
+
+use super::cut::KEPT;
+use super::graph::{Binary, Native, Node, Unary};
+use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
+
+/// A tape's instructions as statements, each line indented by `indent`; the outputs' expressions.
+#[must_use]
+pub fn statements(tape: &Tape, indent: &str) -> (String, Vec<String>) {
+    let mut printer = Printer { tape, text: String::new(), indent: indent.to_owned(), ends: Vec::new() };
+    for (at, instruction) in tape.instructions.iter().enumerate() {
+        printer.close(at);
+        printer.instruction(at, instruction);
+    }
+    printer.close(tape.instructions.len());
+    let outputs = tape.outputs.iter().map(|slot| printer.slot(slot)).collect();
+    (printer.text, outputs)
+}
+
+struct Printer<'a> {
+    tape: &'a Tape,
+    text: String,
+    indent: String,
+    /// The instructions before which blocks end that are seldom run.
+    ends: Vec<usize>,
+}
+
+impl Printer<'_> {
+    fn line(&mut self, line: &str) {
+        let _ = writeln!(self.text, "{}{line}", self.indent);
+    }
+
+    fn close(&mut self, at: usize) {
+        while self.ends.last() == Some(&at) {
+            self.ends.pop();
+            self.indent.truncate(self.indent.len() - 4);
+            self.line("}");
+        }
+    }
+
+    fn slot(&self, slot: &Slot) -> String {
+        match *slot {
+            Slot::Register(at) => format!("r{at}"),
+            Slot::Uniform(at) => match self.tape.uniforms[at] {
+                Operand::Of(id) if let Node::Constant(bits) = self.tape.graph.node(id) => {
+                    format!("lit({:?})", f64::from_bits(bits))
+                }
+                _ => format!("u({at})"),
+            },
+        }
+    }
+
+    fn slots(&self, slots: &[Slot]) -> String {
+        slots.iter().map(|slot| self.slot(slot)).collect::<Vec<_>>().join(", ")
+    }
+
+    fn instruction(&mut self, at: usize, instruction: &Instruction) {
+        let of = |slot: &Slot| self.slot(slot);
+        let (expression, out) = match instruction {
+            Instruction::Load(field, out) => {
+                let input = &self.tape.fields[*field];
+                let kept = input.name == KEPT;
+                (if kept { format!("kept({})", input.component) } else { format!("samples({field})") }, out)
+            }
+            Instruction::Unary(op, a, out) => (unary(*op, &of(a)), out),
+            Instruction::Binary(op, a, b, out) => (binary(*op, &of(a), &of(b)), out),
+            Instruction::MultiplyAdd([a, b, c], out) => {
+                (format!("{}.mul_add({}, {})", of(a), of(b), of(c)), out)
+            }
+            Instruction::SubtractProduct([a, b, c], out) => {
+                (format!("(-{}).mul_add({}, {})", of(a), of(b), of(c)), out)
+            }
+            Instruction::Select(test, yes, no, out) => {
+                (format!("select({}, {}, {})", self.test(test), of(yes), of(no)), out)
+            }
+            Instruction::Call(call) => {
+                call_lines(self, call, false);
+                return;
+            }
+            Instruction::Unit(call, flag, skip) => {
+                call_lines(self, call, true);
+                self.line(&format!("let r{flag} = unit.has_direction;"));
+                self.line("if !unit.all {");
+                self.indent.push_str("    ");
+                self.ends.push(at + 1 + skip);
+                return;
+            }
+            Instruction::Mend(mend) => {
+                self.mend(mend);
+                return;
+            }
+        };
+        self.line(&format!("let r{out} = {expression};"));
+    }
+
+    fn test(&self, test: &Test) -> String {
+        let of = |slot: &Slot| self.slot(slot);
+        match test {
+            Test::Less(a, b) => format!("{}.lt({})", of(a), of(b)),
+            Test::GreaterEqual(a, b) => format!("{}.ge({})", of(a), of(b)),
+            Test::IsFinite(a) => format!("{}.is_finite()", of(a)),
+            Test::Holds(a) => format!("{}.ge(lit(0.5))", of(a)),
+        }
+    }
+
+    fn mend(&mut self, mend: &Mend) {
+        for (part, fallback) in mend.parts.iter().zip(&mend.fallback) {
+            if let Some(part) = part {
+                let fallback = self.slot(fallback);
+                self.line(&format!("r{part} = select(r{}, r{part}, {fallback});", mend.flag));
+            }
+        }
+    }
+}
+
+fn unary(op: Unary, a: &str) -> String {
+    match op {
+        Unary::Negate => format!("-{a}"),
+        Unary::Abs => format!("{a}.abs()"),
+        Unary::Sqrt => format!("{a}.sqrt()"),
+        Unary::Log2 => format!("{a}.log2()"),
+        Unary::Exp2 => format!("{a}.exp2()"),
+        Unary::Floor => format!("{a}.floor()"),
+        Unary::Reciprocal | Unary::IsFinite => format!("unary(Unary::{op:?}, {a})"),
+    }
+}
+
+fn binary(op: Binary, a: &str, b: &str) -> String {
+    match op {
+        Binary::Add => format!("{a} + {b}"),
+        Binary::Subtract => format!("{a} - {b}"),
+        Binary::Multiply => format!("{a} * {b}"),
+        Binary::Divide => format!("{a} / {b}"),
+        Binary::Min => format!("{a}.min({b})"),
+        Binary::Max => format!("{a}.max({b})"),
+        Binary::Less | Binary::GreaterEqual => format!("binary(Binary::{op:?}, {a}, {b})"),
+    }
+}
+
+/// The registers of a call's parts, as a pattern.
+fn parts(parts: &[Option<usize>], count: usize, mended: bool) -> String {
+    let part = |k: usize| match parts.get(k).copied().flatten() {
+        Some(register) if mended => format!("mut r{register}"),
+        Some(register) => format!("r{register}"),
+        None => "_".to_owned(),
+    };
+    (0..count).map(part).collect::<Vec<_>>().join(", ")
+}
+
+fn call_lines(printer: &mut Printer<'_>, call: &CallOf, mended: bool) {
+    let arguments = printer.slots(&call.arguments);
+    let along: Vec<(String, &Vec<Option<usize>>)> =
+        call.along.iter().map(|d| printer.slots(d)).zip(&call.slopes).collect();
+    match call.native {
+        Native::Unit => {
+            printer.line(&format!("let unit = Unit::new([{arguments}]);"));
+            printer.line(&format!("let [{}] = unit.direction;", parts(&call.parts, 3, mended)));
+            for (d, slopes) in along {
+                printer.line(&format!("let [{}] = unit.along([{d}]);", parts(slopes, 3, false)));
+            }
+        }
+        Native::Place => {
+            printer.line(&format!("let point = CubePoint::of_unit([{arguments}]);"));
+            printer.line(&format!("let [{}] = point.place();", parts(&call.parts, 3, false)));
+            for (d, slopes) in along {
+                printer.line(&format!("let [{}] = point.tangent([{d}]);", parts(slopes, 2, false)));
+            }
+        }
+        Native::Lookup(resource) => {
+            let value = parts(&call.parts, 4, false);
+            printer.line(&format!("let cube = cubes[{resource}];"));
+            printer.line(&format!("let at = cube.footprint_at({arguments});"));
+            match &along[..] {
+                [] => printer.line(&format!("let [{value}] = cube.sample_at(&at);")),
+                [(d, slopes)] => printer.line(&format!(
+                    "let ([{value}], [{}]) = cube.sample_with_slope(&at, cube.texels([{d}]));",
+                    parts(slopes, 4, false)
+                )),
+                several => {
+                    printer.line("let [value, across, down] = cube.sample_with_gradient(&at);");
+                    printer.line(&format!("let [{value}] = value;"));
+                    for (d, slopes) in several {
+                        let slopes = parts(slopes, 4, false);
+                        printer.line(&format!("let [{slopes}] = along(cube.texels([{d}]), across, down);"));
+                    }
+                }
+            }
+        }
+    }
+}
