@@ -534,9 +534,6 @@ mod tests {
             let (a, b, c) = (pick(), pick(), pick());
             let size = graph.unary(Unary::Abs, b);
             let above = graph.binary(Binary::Add, size, one);
-            // So that comparisons of what is equal but for roundings are none.
-            let apart = graph.constant(0.0123);
-            let beside = graph.binary(Binary::Add, b, apart);
             let made = match rng.random_range(0..14) {
                 0 => graph.binary(Binary::Add, a, b),
                 1 => graph.binary(Binary::Subtract, a, b),
@@ -544,10 +541,10 @@ mod tests {
                 3 => graph.binary(Binary::Divide, a, above),
                 4 => graph.binary(Binary::Min, a, b),
                 5 => graph.binary(Binary::Max, a, b),
-                6 => graph.binary(Binary::Less, a, beside),
-                7 => graph.binary(Binary::GreaterEqual, a, beside),
+                6 => graph.binary(Binary::Less, a, b),
+                7 => graph.binary(Binary::GreaterEqual, a, b),
                 8 => {
-                    let less = graph.binary(Binary::Less, c, beside);
+                    let less = graph.binary(Binary::Less, a, c);
                     graph.select(less, b, c)
                 }
                 9 => graph.unary(Unary::Sqrt, above),
@@ -563,7 +560,8 @@ mod tests {
                 _ => {
                     // Some vectors are 0: the fallback stands in, which may be made of anything.
                     let unit = graph.call(Native::Unit, vec![a, b, a, c, b, one], Vec::new());
-                    let moved = graph.call(Native::Unit, vec![a, b, a, c, b, one], vec![c, a, b]);
+                    // Never along itself: of a 0 that is a matter of roundings there is no direction to compare.
+                    let moved = graph.call(Native::Unit, vec![a, b, a, c, b, one], vec![c, a, above]);
                     let turned = graph.call(Native::Place, unit.clone(), moved);
                     pool.extend(&unit);
                     turned[0]
@@ -581,6 +579,7 @@ mod tests {
     #[test]
     fn the_machine_computes_what_the_tape_says_of_graphs_drawn_at_random() {
         let mut rng = StdRng::seed_from_u64(8);
+        let (mut compared, mut skipped) = (0, 0);
         for draw in 0..300 {
             let (graph, outputs) = drawn(&mut rng);
             let tape = Tape::new(&graph, &outputs);
@@ -596,6 +595,13 @@ mod tests {
             let uniform = |input: &Input| UNIFORMS[input.component];
             let uniforms: Vec<f64> = tape.uniform_values(uniform);
             let shared = Shared { uniforms: uniforms.clone(), cubes: Vec::new() };
+            // In f32 with numbers a little beside these, each by another share.
+            let nudged = [0.0, 1e-6, -2e-6, 3e-6].map(|share: f32| {
+                let beside =
+                    |input: &Input| uniform(input) * f64::from(1.0 + share * (5 + input.component) as f32);
+                let uniforms = tape.uniform_values(beside).into_iter().map(|x| x as f32).collect();
+                (share, Shared { uniforms, cubes: Vec::new() })
+            });
             let loads: Vec<(StreamOf, usize)> =
                 tape.fields.iter().map(|input| (StreamOf::Samples, input.component)).collect();
             let program = Program::new(tape.clone(), false);
@@ -610,19 +616,36 @@ mod tests {
                     with_simd!(level, simd => run(simd, &bound, &file, &streams, first, count));
                     for i in 0..count {
                         for lane in 0..LANES {
-                            let at =
-                                |input: &Input| f64::from(rows[(first + i) * FIELDS + input.component][lane]);
-                            let want = tape.run(&shared, 0.0_f64, at);
-                            for (k, want) in want.into_iter().enumerate() {
+                            let field = |input: &Input| rows[(first + i) * FIELDS + input.component][lane];
+                            let wanted = tape.run(&shared, 0.0_f64, |input| f64::from(field(input)));
+                            let single: Vec<Vec<f32>> = nudged
+                                .iter()
+                                .map(|(share, shared)| {
+                                    let at = |input: &Input| {
+                                        field(input) * (1.0 + share * (1 + input.component) as f32)
+                                    };
+                                    tape.run(shared, 0.0_f32, at)
+                                })
+                                .collect();
+                            for (k, want) in wanted.into_iter().enumerate() {
+                                // The direction of what is 0 but for roundings, for instance, is nothing to compare.
+                                let sure =
+                                    |x: &Vec<f32>| (f64::from(x[k]) - want).abs() < 1e-4 * (1.0 + want.abs());
+                                if !single.iter().all(sure) {
+                                    skipped += 1;
+                                    continue;
+                                }
                                 let got = f64::from(file.columns()[k][i].get()[lane]);
                                 // Roundings of f32 over some sixty operations of slopes up to 4.
                                 let close = (got - want).abs() <= 1e-3 * (1.0 + want.abs());
                                 assert!(close, "{} graph {draw}, output {k}: {got} {want}", name(level));
+                                compared += 1;
                             }
                         }
                     }
                 }
             }
         }
+        assert!(skipped * 20 < compared, "{skipped} were not compared, and {compared} were");
     }
 }
