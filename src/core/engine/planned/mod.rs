@@ -1,28 +1,33 @@
-//! The engine that the rules make: loss, gradient and normal equations on the processor, of any plan.
+//! The engine on the processor: loss, gradient and normal equations of what the planner chose.
 //!
 //! The planner's rules for stored samples, their tangents and the loss become tapes ([`crate::program`]): one that
-//! makes what is kept, and one for each kind of pass. Sums are added as in [`super::cpu`]: lanes of at most 64 terms in
-//! f32, then f64 in a fixed tree, so that results do not depend on the number of threads.
+//! makes what is kept, and one for each kind of pass. Samples are cut into chunks of a fixed number of groups. Within a
+//! chunk products are summed in f32 lanes (at most 64 terms a lane), then folded to f64; the chunks' sums are added
+//! pairwise in their order. So the order of additions never depends on threads, and the rounding error stays that of
+//! short sums however many samples there are.
 //!
 //! - `pass`: what a pass computes, as tapes
 //! - `code`: tapes as the code of a machine that has an accumulator
 //! - `machine`: that machine, over blocks of records, on SIMD
+//! - `lobe`: the specular cube of the last exponent
+//! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
 
 mod code;
+mod lobe;
 mod machine;
 mod pass;
+mod sums;
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use fearless_simd::Level;
 use rayon::prelude::*;
 
+use self::lobe::Lobe;
 use self::machine::{BATCH, Bound, Column, File, FileColumns, Stream};
 use self::pass::{CLIP_HIGH, CLIP_LOW, Fitted, GAIN, Pass, Reading, Stages, Written};
-use super::cpu::image::by_chunk;
-use super::cpu::lobe::Lobe;
-use super::cpu::sums::{CHUNK, Sums, Wish, fold, pairwise};
+use self::sums::{CHUNK, Sums, Wish, by_chunk, fold, pairwise};
 use super::gram::{add_gram, add_last, pair};
 use super::lanes::Lanes;
 use super::pulls::{Gathered, Pulls};
@@ -52,6 +57,8 @@ pub struct PlannedEngine {
     passes: Mutex<BTreeMap<Written, Arc<Pass>>>,
     lobe: Mutex<Option<Arc<Lobe>>>,
     kept: Mutex<Option<Arc<Kept>>>,
+    /// Why a pass could not be made.
+    fault: OnceLock<String>,
 }
 
 /// Kept numbers, and what they were made with.
@@ -102,7 +109,23 @@ impl PlannedEngine {
         loss: Loss,
         unknowns: Vec<Unknown>,
     ) -> Result<Self, ShadingError> {
+        Self::with_kept_terms(setup, illumination, views, loss, unknowns, true)
+    }
+
+    /// As [`Self::new`]; with `keep` false every number is computed anew in each pass.
+    ///
+    /// # Errors
+    /// As of [`Self::new`].
+    pub fn with_kept_terms(
+        setup: Setup,
+        illumination: Illumination,
+        views: Vec<ObservedView>,
+        loss: Loss,
+        unknowns: Vec<Unknown>,
+        keep: bool,
+    ) -> Result<Self, ShadingError> {
         let mut fitted = Fitted::new(setup, unknowns, loss, &views);
+        fitted.keep = keep;
         fitted.faces = super::face_sizes(&illumination);
         let mut engine = Self {
             illumination,
@@ -114,6 +137,7 @@ impl PlannedEngine {
             passes: Mutex::default(),
             lobe: Mutex::default(),
             kept: Mutex::default(),
+            fault: OnceLock::new(),
         };
         engine.set_stride(1);
         // What cannot be computed shows here, and not in the midst of a fit.
@@ -122,7 +146,7 @@ impl PlannedEngine {
         Ok(engine)
     }
 
-    /// Let each pass read only every `stride`-th block of pixels.
+    /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
     pub fn set_stride(&mut self, stride: usize) {
         self.stride = stride.max(1);
         self.weight = (0.0, 0);
@@ -135,24 +159,30 @@ impl PlannedEngine {
         }
     }
 
-    /// Run with the instructions of `level` and not with the best that the processor has.
+    /// Run with the instructions of `level` and not with the best that the processor has: so that one machine can show
+    /// what others will compute.
     pub fn set_level(&mut self, level: Level) {
         self.level = level;
         // What was kept was made with other instructions.
         (self.lobe, self.kept) = (Mutex::default(), Mutex::default());
     }
 
-    /// With `keep` false every number is computed anew in each pass.
-    pub fn set_keep(&mut self, keep: bool) {
-        self.fitted.keep = keep;
-        self.passes.get_mut().unwrap_or_else(PoisonError::into_inner).clear();
-        *self.kept.get_mut().unwrap_or_else(PoisonError::into_inner) = None;
-    }
-
     /// The views.
     #[must_use]
     pub fn views(&self) -> &[ObservedView] {
         &self.views
+    }
+
+    /// Surface samples of positive weight, over all views.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.views.iter().map(|view| view.samples.count() as u64).sum()
+    }
+
+    /// How many blocks of pixels there are in all views.
+    #[must_use]
+    pub fn blocks(&self) -> usize {
+        self.views.iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
     }
 
     fn read_blocks(&self, view: &ObservedView) -> impl Iterator<Item = usize> + use<> {
@@ -174,7 +204,8 @@ impl PlannedEngine {
         if let Some(pass) = passes.get(&written) {
             return Ok(Arc::clone(pass));
         }
-        let pass = Arc::new(Pass::new(&self.fitted, written)?);
+        let pass = Pass::new(&self.fitted, written);
+        let pass = Arc::new(pass.inspect_err(|error| drop(self.fault.set(error.to_string())))?);
         passes.insert(written, Arc::clone(&pass));
         Ok(pass)
     }
@@ -323,7 +354,7 @@ impl PlannedEngine {
         });
     }
 
-    pub(super) fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
         let channels = self.fitted.channels;
         let k = self.fitted.unknowns.len();
         let mut total = NormalEquations {
@@ -583,6 +614,10 @@ impl Objective for PlannedEngine {
 
     fn rounding(&self) -> f64 {
         super::rounding(&self.views, self.fitted.loss, self.stride)
+    }
+
+    fn fault(&self) -> Option<String> {
+        self.fault.get().cloned()
     }
 
     fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
