@@ -15,7 +15,6 @@ use racer::Racer;
 use serde_json::{Value, json};
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::gpu::{GpuEngine, Memory, Task};
-use skinfit::engine::planned::PlannedEngine;
 use skinfit::engine::{Point, Unknown};
 use skinfit::fit::coordinates::Coordinates;
 use skinfit::fit::{FitOptions, bounded, fit};
@@ -34,7 +33,7 @@ struct Arguments {
     #[arg(long, default_value = "sampled", value_parser = ["sampled", "pre"])]
     mode: String,
     /// What makes the passes.
-    #[arg(long, default_value = "cpu", value_parser = ["cpu", "planned", "gpu"])]
+    #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
     engine: String,
     /// Where the row is written; standard output when left out.
     #[arg(short, long)]
@@ -81,14 +80,8 @@ fn with_engine<T>(
     let illumination = data::illumination(&arguments.data, manifest)?;
     let views = vec![data::view(&arguments.data, manifest, which)?];
     if arguments.engine == "cpu" {
-        let mut engine = CpuEngine::with_kept_terms(SETUP, illumination, views, Loss::L2, unknowns, keep);
-        let target = engine.views()[0].target.clone();
-        return then(&mut engine, &target);
-    }
-    if arguments.engine == "planned" {
-        let made = PlannedEngine::new(SETUP, illumination, views, Loss::L2, unknowns);
-        let mut engine = made.map_err(|error| error.to_string())?;
-        engine.set_keep(keep);
+        let engine = CpuEngine::with_kept_terms(SETUP, illumination, views, Loss::L2, unknowns, keep);
+        let mut engine = engine.map_err(|error| error.to_string())?;
         let target = engine.views()[0].target.clone();
         return then(&mut engine, &target);
     }

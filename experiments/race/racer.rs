@@ -1,7 +1,6 @@
 //! Both engines, as the race drives them.
 
 use skinfit::engine::cpu::CpuEngine;
-use skinfit::engine::planned::PlannedEngine;
 use skinfit::engine::{Objective, Point};
 
 /// An engine over one view.
@@ -34,25 +33,6 @@ impl Racer for CpuEngine {
     }
     fn version(&self) -> String {
         "rustc, f32 lanes".to_owned()
-    }
-}
-
-impl Racer for PlannedEngine {
-    fn read_every(&mut self, stride: usize) {
-        self.set_stride(stride);
-    }
-    fn forward(&self, point: &Point, planes: &mut Vec<Vec<f32>>) {
-        self.image_into(0, point, planes);
-        std::hint::black_box(planes);
-    }
-    fn image_planes(&self, point: &Point) -> Vec<Vec<f32>> {
-        self.image(0, point)
-    }
-    fn device(&self) -> &'static str {
-        "cpu"
-    }
-    fn version(&self) -> String {
-        "rustc, planned rules, f32 lanes".to_owned()
     }
 }
 

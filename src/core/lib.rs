@@ -2,8 +2,8 @@
 //!
 //! Data flows one way through the modules, as `docs/architecture.md` draws it:
 //!
-//! - [`model`]: the skin model of *Skin in the "Dawn" Demo* (GPU Gems, chapter 3), generic over
-//!   the scalar; its parameter table and its effects. Knows nothing of files or meshes.
+//! - [`model`]: what the rules of *Skin in the "Dawn" Demo* (GPU Gems, chapter 3) are about: the parameter table,
+//!   effects, terms, cubes, kinds of numbers. Knows nothing of files or meshes.
 //! - [`scene`]: scene files, meshes, maps, cameras: everything that is read.
 //! - [`builtin`]: the scene that the program makes by itself.
 //! - [`bake`]: environment to cube maps, ambient occlusion, and their cache.
@@ -13,11 +13,11 @@
 //! - [`render`]: images from samples, and image files.
 //! - [`prepare`]: the stages up to the samples, run once and timed.
 //! - [`demo`]: the built-in scene as files, its targets rendered.
-//! - [`shader`]: the planner of the renderer's shaders, and their rules in WGSL.
+//! - [`shader`]: the model's formulas as rules in WGSL, and the planner that makes shaders of them.
 //! - [`program`]: planned rules as arithmetic on numbers, for the processor.
 //! - [`export`]: constants and shaders as text for other engines.
 //! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
-//!   instructions kernels are compiled for.
+//!   SIMD instructions there are.
 
 pub mod bake;
 pub mod builtin;

@@ -13,6 +13,7 @@ use crate::fit::params_file::{ParamsFile, ParamsFileError};
 use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Column, Param, Params};
+use crate::program::shading::ShadingError;
 use crate::samples::{self, SampleError, TargetRows, ViewSamples};
 use crate::scene::error::SceneError;
 use crate::scene::load::LoadOptions;
@@ -128,6 +129,9 @@ pub enum PrepareError {
          together. Correct them in the mesh file, or the scene's morph_weights and time."
     )]
     Collapsed { scene: String },
+    /// Rules that the processor cannot compute.
+    #[error("{scene}: {error}.")]
+    Shading { scene: String, error: ShadingError },
     /// No view of that name.
     #[error("{scene}: there is no view `{view}`. {suggestion}.")]
     NoView { scene: String, view: String, suggestion: String },
@@ -273,17 +277,21 @@ impl Prepared {
     /// The CPU engine over the views that have a target; views without one are dropped from the scene.
     ///
     /// # Errors
-    /// As of [`Self::observed`].
+    /// As of [`Self::observed`] and [`Self::engine_over`].
     pub fn engine(&mut self) -> Result<CpuEngine, PrepareError> {
         let observed = self.observed()?;
-        Ok(self.engine_over(observed))
+        self.engine_over(observed)
     }
 
     /// The CPU engine over views that [`Self::observed`] gave.
-    #[must_use]
-    pub fn engine_over(&self, observed: Vec<ObservedView>) -> CpuEngine {
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
+    pub fn engine_over(&self, observed: Vec<ObservedView>) -> Result<CpuEngine, PrepareError> {
         let illumination = self.illumination.clone();
-        CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns())
+        let engine =
+            CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns());
+        engine.map_err(|error| PrepareError::Shading { scene: self.scene.path.display().to_string(), error })
     }
 
     /// The views that have a target, with their samples; views without one are dropped from the scene.

@@ -3,7 +3,7 @@
 use glam::{DMat4, DVec4};
 
 use super::targets::Tile;
-use crate::model::lights::KeyLight;
+use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 use crate::scene::view::Camera;
 use crate::shader::Constant;
@@ -49,7 +49,7 @@ pub(crate) fn model_block(constants: &[Constant], params: &Params) -> Vec<f32> {
 
 /// A constant that the parameters give; a camera's or a mesh's is 0.
 fn of_params(constant: Constant, params: &Params) -> [f64; 3] {
-    let key = || KeyLight::new(params, 0.0_f64);
+    let key = || KeyLight::new(params);
     match constant {
         Constant::Param(param) => params.rgb(param),
         Constant::Turn => {

@@ -3,9 +3,11 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::StudyError;
 use super::significance::LossMap;
-use crate::engine::residual::weighted_residual;
+use crate::engine::residual::Residuals;
 use crate::engine::view::ObservedView;
+use crate::model::batch::Batch;
 use crate::render::image::Image;
 use crate::report::metrics::{COVERED, Comparison, PSNR_OF_EQUALS, Scores};
 use crate::report::pictures::Picture;
@@ -124,21 +126,23 @@ impl ReferenceView {
     }
 
     /// How far `image` is off.
-    #[must_use]
-    pub fn errors(&self, image: &Image, loss: Loss) -> ViewErrors {
+    ///
+    /// # Errors
+    /// When the loss cannot be computed on the processor.
+    pub fn errors(&self, image: &Image, loss: Loss) -> Result<ViewErrors, StudyError> {
         let comparison = Comparison::new(&self.image, image, &self.coverage);
         let (squares, size, count) = sums(&self.image, image, &self.coverage);
-        ViewErrors {
+        Ok(ViewErrors {
             linear: (squares / count.max(1) as f64).sqrt(),
             relative: relative(squares, size),
             scores: comparison.scores(),
-            map: self.losses(image, loss),
+            map: self.losses(image, &Residuals::new(loss)),
             flip: Picture::of_error(&comparison, image.width),
-        }
+        })
     }
 
     /// The loss of each pixel. As in a fit, colours are those of the covered share of a pixel.
-    fn losses(&self, image: &Image, loss: Loss) -> LossMap {
+    fn losses(&self, image: &Image, residuals: &Residuals) -> LossMap {
         let colour = |image: &Image, i: usize, c: usize| match f64::from(image.alpha[i]) {
             alpha if alpha > 0.0 => f64::from(image.rgb[i][c]) / alpha,
             _ => 0.0,
@@ -148,11 +152,8 @@ impl ReferenceView {
             if weight == 0.0 {
                 return 0.0;
             }
-            let channel = |c| {
-                let (model, target) = (colour(image, i, c), colour(&self.image, i, c));
-                weighted_residual(loss, self.clip, model, target, weight).loss
-            };
-            (0..3).map(channel).sum()
+            let [model, target] = [image, &self.image].map(|of| Batch([0, 1, 2].map(|c| colour(of, i, c))));
+            residuals.weigh(self.clip, model, target, Batch([weight; 3])).loss.0.iter().sum()
         };
         LossMap {
             width: image.width,

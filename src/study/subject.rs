@@ -99,11 +99,14 @@ impl Subject {
 
     /// An engine over the same samples that keeps nothing from pass to pass: every lookup is done anew, as in
     /// a renderer. For timing.
-    #[must_use]
-    pub fn live_engine(&self) -> CpuEngine {
+    ///
+    /// # Errors
+    /// When a rule cannot be computed on the processor.
+    pub fn live_engine(&self) -> Result<CpuEngine, StudyError> {
         let (illumination, views) = (self.prepared.illumination.clone(), self.engine.views().to_vec());
         let loss = self.prepared.scene.fit.loss;
-        CpuEngine::with_kept_terms(self.prepared.setup(), illumination, views, loss, Vec::new(), false)
+        let setup = self.prepared.setup();
+        Ok(CpuEngine::with_kept_terms(setup, illumination, views, loss, Vec::new(), false)?)
     }
 }
 

@@ -11,7 +11,7 @@
 //! - [`sparse`]: fixed linear maps, forwards and transposed: how maps are sampled, and how pixels are averaged
 
 // What other members of the workspace hold stands under the names that it has there.
-use skinfit_core::{bake, engine, fit, model, prepare, render, samples, scene, shader};
+use skinfit_core::{bake, engine, fit, model, prepare, program, render, samples, scene, shader};
 use skinfit_gpu as gpu;
 
 pub mod adjoint;

@@ -12,7 +12,6 @@ use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::fragment::Fragment;
-use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Column, Param};
 use skinfit::render::shade::Shader;
 use skinfit::samples::LANES;
@@ -22,7 +21,7 @@ use skinfit::shader::term::{Problem, Term, register};
 use skinfit::shader::{Facts, Resource, Source, plan};
 
 use crate::engine::{EVERYTHING, illumination, params, single, view};
-use crate::evaluators::shade;
+use crate::evaluators::ByWitness;
 use crate::fixtures::camera;
 
 /// Schlick's Fresnel factor on the mirrored environment.
@@ -115,20 +114,14 @@ fn wide(f: &Fragment<f32>) -> Fragment<f64> {
     }
 }
 
-/// A view's image in f64, plane by plane: the built-in model, and the term on top.
+/// A view's image in f64, plane by plane: the built-in model by the witness, and the term on top.
 fn formula(setup: Setup, view: &ObservedView, point: &Point) -> Vec<Vec<f64>> {
     let built_in = Setup { effects: setup.effects.without(term().effect), ..setup };
     let light = illumination();
     let double = |cube: &Cube<f32>| cube.map(|texel| texel.map(f64::from));
     let specular = double(&light.lobes.unwrap().at(point.params.scalar(Param::SpecularLobe)).0);
     let (irradiance, hilite) = (double(&light.irradiance.unwrap()), double(&light.hilite.unwrap()));
-    let cubes = Cubes {
-        irradiance: Some(&irradiance),
-        specular: Some(&specular),
-        lobe_slope: None,
-        hilite: Some(&hilite),
-    };
-    let lights = Lights::new(built_in, &point.params, cubes, false, 0.0_f64);
+    let witness = ByWitness::new(built_in, [&irradiance, &specular, &hilite], &point.params);
     let samples = &view.samples;
     let mut planes = vec![vec![0.0; samples.groups() * LANES]; 4];
     for slot in 0..samples.groups() * LANES {
@@ -136,7 +129,7 @@ fn formula(setup: Setup, view: &ObservedView, point: &Point) -> Vec<Vec<f64>> {
         for at in records.map(|record| record as usize * LANES + slot % LANES) {
             let fragment = wide(&samples.surface.fragment(at));
             let share = f64::from(samples.surface.weight(at));
-            let rgba = shade(built_in, &lights, &fragment, &point.params);
+            let rgba = witness.shade(&fragment);
             let added = fresnel(&fragment, &specular, point);
             for c in 0..4 {
                 planes[c][slot] += share * (rgba[c] + added.get(c).copied().unwrap_or(0.0));
@@ -242,7 +235,7 @@ fn assert_fit(engine: &dyn Objective, what: &str) {
 }
 
 fn cpu(setup: Setup, views: &[ObservedView], unknowns: &[Unknown]) -> CpuEngine {
-    CpuEngine::new(setup, illumination(), views.to_vec(), Loss::L2, unknowns.to_vec())
+    CpuEngine::new(setup, illumination(), views.to_vec(), Loss::L2, unknowns.to_vec()).unwrap()
 }
 
 #[test]
@@ -285,11 +278,8 @@ fn the_reference_in_f64_and_the_renderer_on_the_processor_are_the_formula() {
         for slot in 0..planes[0].len() {
             let pixel = plain.pixel(0, slot, &point().params);
             for c in 0..4 {
-                // Both are in f64: a few hundred roundings.
-                assert!(
-                    (pixel[c].0 - planes[c][slot]).abs() < 1e-12,
-                    "{silhouette:?}: channel {c} of {slot}"
-                );
+                // Both are in f64, but the library's cubes hold the mean of the texels at a corner in f32.
+                assert!((pixel[c].0 - planes[c][slot]).abs() < 2e-7, "{silhouette:?}: channel {c} of {slot}");
             }
             for c in 0..3 {
                 let (got, want) = (shaded.image.rgb[slot][c], planes[c][slot]);
@@ -306,7 +296,7 @@ fn the_reference_in_f64_and_the_renderer_on_the_processor_are_the_formula() {
 mod on_an_adapter {
     use skinfit::engine::gpu::{GpuEngine, Memory, Task};
     use skinfit::gpu::Renderer;
-    use skinfit::model::compose::TermName;
+    use skinfit::model::terms::TermName;
 
     use super::*;
     use crate::graphics::bench::{EXACT, SURFACE, built_in, content, gpu, prepared};

@@ -3,7 +3,7 @@
 //! A scene of the [witness](crate::witness) goes in; out come images, losses, gradients and normal equations.
 //!
 //! - `Plain`: the f64 reference that `--verify` compares with
-//! - `Single`: single fragments, in f64, f32 and sixteen SIMD lanes of each instruction set
+//! - `Single`: the rules over single fragments, in f64, f32 and sixteen SIMD lanes of each instruction set
 //! - `Cpu`: the CPU engine at each of them
 //! - `OnAdapter`: the engine on a graphics adapter
 //! - `Tensors`: the model on burn's tensors, with reverse-mode derivatives
@@ -12,31 +12,30 @@ use fearless_simd::Level;
 use skinfit::bake::{Illumination, LobeStack};
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::lanes::Lanes;
-use skinfit::engine::planned::PlannedEngine;
 use skinfit::engine::reference::Reference;
-use skinfit::engine::residual::weighted_residual;
+use skinfit::engine::residual::Residuals;
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{self, Objective, Point};
 use skinfit::fit::{self, FitOptions, Tolerances};
-use skinfit::model::compose::{Composition, Weights};
 use skinfit::model::cube::{Channel, Cube};
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{self, Effect, Effects};
 use skinfit::model::evaluate::Setup;
-use skinfit::model::fragment::{Fragment, guarded, shading};
-use skinfit::model::lights::{Cubes, Lights};
+use skinfit::model::fragment::{Fragment, guarded};
 use skinfit::model::params::{Channels, Column, Param, Params};
-use skinfit::model::real::Real;
-use skinfit::model::terms::{LookupParam, Wanted, terms, terms_tangent};
 use skinfit::samples::rows::{Row, Rows};
 use skinfit::samples::surface_records::{Asked, Unmade};
 use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::scene;
 use skinfit::scene::view::Clip;
 use skinfit::simd::levels;
+use skinfit_core::program::graph::Input;
 
+use crate::by_rules::{Cubes, Fragments, Number, Wanted};
 use crate::witness::cube::Cube as WitnessCube;
-use crate::witness::fragment::{Constants, Form, Silhouette, Surface, Variant};
+use crate::witness::fragment::{
+    Constants, Form, Lights as WitnessLights, Silhouette, Surface, Variant, shade,
+};
 use crate::witness::losses::Loss;
 use crate::witness::scene::{At, Pixel, Scene, Unknown, View};
 
@@ -72,11 +71,6 @@ pub(crate) trait Evaluator {
     fn computes(&self) -> Width;
     /// In which numbers surfaces and cubes are stored.
     fn stores(&self) -> Width;
-    /// Whether it knows more than the paper's first version, of which alone the model is written by hand.
-    fn knows(&self, variant: Variant) -> bool {
-        let _ = variant;
-        true
-    }
     /// Each view's image, gains applied.
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>>;
     /// Loss, gradient and normal equations.
@@ -90,7 +84,6 @@ pub(crate) fn on_cpu() -> Vec<Box<dyn Evaluator>> {
     for level in levels() {
         all.push(Box::new(AtLevel(level)));
         all.push(Box::new(Cpu(level)));
-        all.push(Box::new(Planned(level)));
     }
     all
 }
@@ -116,7 +109,7 @@ pub(crate) fn parameters() -> Vec<(&'static str, bool)> {
 /// One residual: its loss, d loss / d model, and what its square counts in J^T J.
 pub(crate) fn residual<R: Number>(like: R, loss: Loss, clip: Option<[f64; 2]>, given: [f64; 3]) -> [f64; 3] {
     let [model, target, weight] = given.map(|x| like.lit(x));
-    let row = weighted_residual(loss_of(loss), clip.map(clip_of), model, target, weight);
+    let row = residuals(loss).weigh(clip.map(clip_of), model, target, weight);
     let first = |x: R| x.unpack()[0];
     let scale = first(row.scale);
     [first(row.loss), 2.0 * scale * first(row.residual), scale * scale]
@@ -177,6 +170,10 @@ fn loss_of(loss: Loss) -> scene::Loss {
     }
 }
 
+fn residuals(loss: Loss) -> Residuals {
+    Residuals::new(loss_of(loss))
+}
+
 fn clip_of([low, high]: [f64; 2]) -> Clip {
     Clip { low: low as f32, high: high as f32 }
 }
@@ -223,6 +220,69 @@ fn illumination(scene: &Scene) -> Illumination {
             cubes: scene.lights.lobes.iter().map(|(_, cube)| single(cube)).collect(),
         }),
         hilite: Some(single(&scene.lights.hilite)),
+    }
+}
+
+/// The witness' formulas in the library's words: all built-in terms.
+pub(crate) struct ByWitness {
+    form: Form,
+    silhouette: Silhouette,
+    lights: WitnessLights,
+    constants: Constants,
+}
+
+impl ByWitness {
+    /// At `params`, in the light of E_d, of E_s at their exponent and of E_h; what is off among a setup's effects has a
+    /// weight of 0.
+    pub(crate) fn new(
+        setup: Setup,
+        [irradiance, specular, hilite]: [&Cube<f64>; 3],
+        params: &Params,
+    ) -> Self {
+        let form = match setup.form {
+            effects::Form::Listing => Form::Listing,
+            effects::Form::Corrected => Form::Corrected,
+        };
+        let silhouette = match setup.silhouette {
+            effects::Silhouette::Vertex => Silhouette::Vertex,
+            effects::Silhouette::Fragment => Silhouette::Fragment,
+            effects::Silhouette::Bumped => Silhouette::Bumped,
+        };
+        let mut constants = Constants::defaults(form);
+        for param in Param::built_in() {
+            let asked_for = param.asked_for(setup.effects);
+            *constants.of(param.name()) = if asked_for { params.rgb(param) } else { [0.0; 3] };
+        }
+        let cube = |cube: &Cube<f64>| {
+            let size = cube.size();
+            let texel = |i: usize| cube.texel(i / (size * size), i % size, i / size % size);
+            WitnessCube::of_numbers(size, &(0..6 * size * size).flat_map(texel).collect::<Vec<_>>())
+        };
+        let lights = WitnessLights {
+            irradiance: cube(irradiance),
+            lobes: vec![(params.scalar(Param::SpecularLobe), cube(specular))],
+            hilite: cube(hilite),
+        };
+        Self { form, silhouette, lights, constants }
+    }
+
+    /// Radiance and haze of a fragment.
+    pub(crate) fn shade(&self, f: &Fragment<f64>) -> [f64; 4] {
+        let surface = Surface {
+            base: f.base,
+            bump: f.bump,
+            normal: f.normal,
+            view: f.view,
+            open: f.occlusion,
+            silhouette: f.silhouette,
+            corners: [[f.silhouette; 3], [1.0, 0.0, 0.0]],
+            dapple: f.dapple,
+            albedo: f.albedo,
+            specular: f.specular,
+            attenuator: f.attenuator,
+        };
+        let Self { form, silhouette, lights, constants } = self;
+        shade(*form, *silhouette, Variant::default(), &surface, lights, constants).rgba
     }
 }
 
@@ -316,9 +376,6 @@ impl Evaluator for Plain {
     fn stores(&self) -> Width {
         Width::Single
     }
-    fn knows(&self, variant: Variant) -> bool {
-        variant == Variant::default()
-    }
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
         let (light, views, point) = (illumination(scene), all_observed(scene), point(at));
         let plain = Reference::new(setup(scene), &light, &views, scene::Loss::L2, &[]).unwrap();
@@ -338,40 +395,10 @@ impl Evaluator for Plain {
 
 fn cpu_engine(scene: &Scene, unknowns: &[Unknown], level: Level) -> CpuEngine {
     let (views, loss) = (all_observed(scene), loss_of(scene.loss));
-    let mut engine = CpuEngine::new(setup(scene), illumination(scene), views, loss, unknowns_of(unknowns));
-    engine.set_level(level);
-    engine
-}
-
-fn planned_engine(scene: &Scene, unknowns: &[Unknown], level: Level) -> PlannedEngine {
-    let (views, loss) = (all_observed(scene), loss_of(scene.loss));
-    let made = PlannedEngine::new(setup(scene), illumination(scene), views, loss, unknowns_of(unknowns));
+    let made = CpuEngine::new(setup(scene), illumination(scene), views, loss, unknowns_of(unknowns));
     let mut engine = made.unwrap();
     engine.set_level(level);
     engine
-}
-
-/// The engine that the planner's rules make, with the instructions of a level.
-struct Planned(Level);
-
-impl Evaluator for Planned {
-    fn name(&self) -> String {
-        format!("engine::planned at {:?}", self.0)
-    }
-    fn computes(&self) -> Width {
-        Width::Single
-    }
-    fn stores(&self) -> Width {
-        Width::Single
-    }
-    fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
-        let (engine, point) = (planned_engine(scene, &[], self.0), point(at));
-        let image = |(v, view): (usize, &View)| pixels(view, &engine.image(v, &point));
-        scene.views.iter().enumerate().map(image).collect()
-    }
-    fn equations(&self, scene: &Scene, at: &At, unknowns: &[Unknown]) -> Found {
-        of_objective(&planned_engine(scene, unknowns, self.0), at)
-    }
 }
 
 /// The CPU engine with the instructions of a level.
@@ -397,187 +424,78 @@ impl Evaluator for Cpu {
     }
 }
 
-/// A number of the model that holds one or more of f64's.
-pub(crate) trait Number: Real<Texel: Channel> {
-    /// How many.
-    const COUNT: usize;
-    fn texel(x: f64) -> Self::Texel;
-    /// Of [`Self::COUNT`] numbers.
-    fn pack(self, numbers: &[f64]) -> Self;
-    fn unpack(self) -> Vec<f64>;
-}
-
-impl Number for f64 {
-    const COUNT: usize = 1;
-    fn texel(x: f64) -> f64 {
-        x
-    }
-    fn pack(self, numbers: &[f64]) -> Self {
-        numbers[0]
-    }
-    fn unpack(self) -> Vec<f64> {
-        vec![self]
-    }
-}
-
-impl Number for f32 {
-    const COUNT: usize = 1;
-    fn texel(x: f64) -> f32 {
-        x as f32
-    }
-    fn pack(self, numbers: &[f64]) -> Self {
-        numbers[0] as f32
-    }
-    fn unpack(self) -> Vec<f64> {
-        vec![self.into()]
-    }
-}
-
-impl<S: fearless_simd::Simd> Number for Lanes<S> {
-    const COUNT: usize = LANES;
-    fn texel(x: f64) -> f32 {
-        x as f32
-    }
-    fn pack(self, numbers: &[f64]) -> Self {
-        Self::of_row(self.0.simd, &std::array::from_fn(|lane| numbers[lane] as f32))
-    }
-    fn unpack(self) -> Vec<f64> {
-        self.to_array().map(f64::from).to_vec()
-    }
-}
-
-// The model is inlined wherever it is called; here, where speed is nothing, once for each kind of number.
-
-/// Colour and alpha of a fragment.
-#[inline(never)]
-pub(crate) fn shade<R: Real>(
-    setup: Setup,
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    params: &Params,
-) -> [R; 4] {
-    let composition = composed(setup, lights, f, params);
-    [composition.result(0), composition.result(1), composition.result(2), composition.alpha()]
-}
-
-/// A fragment's terms and their sum, from the pieces that the kernel is made of.
-pub(crate) fn composed<R: Real>(
-    setup: Setup,
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    params: &Params,
-) -> Composition<R> {
-    let like = f.occlusion;
-    let s = shading(setup.form, setup.silhouette, f, like.lit(params.scalar(Param::NormalStrength)));
-    let terms = terms(lights, f, &s, Wanted::ALL);
-    Composition::new(terms, f.occlusion, Weights::new(params, setup.effects, like))
-}
-
-/// How they move with a parameter.
-#[inline(never)]
-pub(crate) fn derivative<R: Real>(
-    setup: Setup,
-    lights: &Lights<'_, R>,
-    f: &Fragment<R>,
-    params: &Params,
-    param: Param,
-) -> [R; 4] {
-    let composition = composed(setup, lights, f, params);
-    if let Some(lookup) = LookupParam::from_param(param) {
-        let strength = f.occlusion.lit(params.scalar(Param::NormalStrength));
-        let slope = terms_tangent(lights, f, &shading(setup.form, setup.silhouette, f, strength), lookup);
-        let along = |c| composition.along(&slope, c);
-        return [along(0), along(1), along(2), composition.alpha_along(&slope)];
-    }
-    let by = |c| composition.derivative(param, c);
-    let alpha = if param == Param::HazeWeight { composition.terms.haze } else { f.occlusion.lit(0.0) };
-    [by(0), by(1), by(2), alpha]
-}
-
-/// Single fragments, in the numbers that one of them stands for.
+/// The rules over single fragments, in the numbers that one of them stands for.
 struct Single<R>(R);
 
-/// Cubes in the numbers of an evaluator.
-struct NumberCubes<R: Number> {
-    irradiance: Cube<R::Texel>,
-    lobe: Cube<R::Texel>,
-    lobe_slope: Cube<R::Texel>,
-    hilite: Cube<R::Texel>,
+/// The cubes of a scene in the texels of a kind of number.
+fn number_cubes<R: Number>(scene: &Scene, at: &At) -> Cubes<R::Texel> {
+    let own = |of: &WitnessCube| cube(of, R::texel);
+    // A single cube is taken as it is; between cubes stands what the library puts there, in f32.
+    let (specular, specular_slope) = match &scene.lights.lobes[..] {
+        [(_, only)] => (own(only), own(only).map(|_| [R::texel(0.0); 4])),
+        _ => {
+            let (value, slope) = illumination(scene).lobes.unwrap().at(at.constants.specular_lobe[0]);
+            let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(|x| R::texel(x.into())));
+            (wide(&value), wide(&slope))
+        }
+    };
+    Cubes {
+        irradiance: own(&scene.lights.irradiance),
+        specular,
+        specular_slope,
+        hilite: own(&scene.lights.hilite),
+    }
 }
 
-impl<R: Number> NumberCubes<R> {
-    fn new(scene: &Scene, at: &At) -> Self {
-        let own = |of: &WitnessCube| cube(of, R::texel);
-        // A single cube is taken as it is; between cubes stands what the library puts there, in f32.
-        let (lobe, lobe_slope) = match &scene.lights.lobes[..] {
-            [(_, only)] => (own(only), own(only).map(|_| [R::texel(0.0); 4])),
-            _ => {
-                let (value, slope) = illumination(scene).lobes.unwrap().at(at.constants.specular_lobe[0]);
-                let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(|x| R::texel(x.into())));
-                (wide(&value), wide(&slope))
-            }
+/// A number of a sample by the rules' name.
+fn field(f: &Surface, Input { name, component }: &Input) -> f64 {
+    match name.as_str() {
+        "base" => f.base[*component],
+        "bump" => f.bump[*component],
+        "normal" | "dapple_normal" => f.normal[*component],
+        "view" => f.view[*component],
+        "albedo" => f.albedo[*component],
+        "open" => f.open,
+        "silhouette" => f.silhouette,
+        "corner_silhouettes" => f.corners[0][*component],
+        "corner_shares" => f.corners[1][*component],
+        "dapple" => f.dapple,
+        "specular" => f.specular,
+        "attenuator" => f.attenuator,
+        other => panic!("a sample has no {other}"),
+    }
+}
+
+/// Means over the samples of as many pixels as a number holds: of radiance and haze, and of how they move.
+fn means<R: Number>(fragments: &Fragments<'_, R>, like: R, pixels: &[Pixel]) -> Vec<[R; 4]> {
+    let most = pixels.iter().map(|pixel| pixel.samples.len()).max().unwrap_or(0);
+    let mut means: Vec<[R; 4]> = Vec::new();
+    for k in 0..most {
+        // A pixel without sample `k` has no share of it.
+        let lane = |i: usize| {
+            let pixel = &pixels[i.min(pixels.len() - 1)];
+            let sample = &pixel.samples[k.min(pixel.samples.len() - 1)];
+            (&sample.surface, if k < pixel.samples.len() { sample.share } else { 0.0 })
         };
-        Self {
-            irradiance: own(&scene.lights.irradiance),
-            lobe,
-            lobe_slope,
-            hilite: own(&scene.lights.hilite),
+        let lanes: Vec<(&Surface, f64)> = (0..R::COUNT).map(lane).collect();
+        let pack =
+            |of: &dyn Fn(&(&Surface, f64)) -> f64| like.pack(&lanes.iter().map(of).collect::<Vec<_>>());
+        let shaded = fragments.shade(|input| pack(&|(surface, _)| field(surface, input)));
+        let share = pack(&|(_, share)| *share);
+        means.resize(1 + shaded.slopes.len(), [like.lit(0.0); 4]);
+        for (mean, numbers) in means.iter_mut().zip([shaded.rgba].into_iter().chain(shaded.slopes)) {
+            (0..4).for_each(|c| mean[c] = share.mul_add(numbers[c], mean[c]));
         }
     }
-
-    fn lights(&self, scene: &Scene, params: &Params, like: R) -> Lights<'_, R> {
-        let cubes = Cubes {
-            irradiance: Some(&self.irradiance),
-            specular: Some(&self.lobe),
-            lobe_slope: Some(&self.lobe_slope),
-            hilite: Some(&self.hilite),
-        };
-        Lights::new(setup(scene), params, cubes, true, like)
-    }
-}
-
-/// Sample `k` of as many pixels as a number holds, and each one's share; a pixel without it has none.
-fn packed<R: Number>(like: R, pixels: &[Pixel], k: usize) -> (Fragment<R>, R) {
-    let lane = |i: usize| {
-        let pixel = &pixels[i.min(pixels.len() - 1)];
-        let sample = &pixel.samples[k.min(pixel.samples.len() - 1)];
-        (sample.surface, if k < pixel.samples.len() { sample.share } else { 0.0 })
-    };
-    let lanes: Vec<(Surface, f64)> = (0..R::COUNT).map(lane).collect();
-    let one = |of: &dyn Fn(&Surface) -> f64| like.pack(&lanes.iter().map(|(f, _)| of(f)).collect::<Vec<_>>());
-    let three = |of: &dyn Fn(&Surface) -> [f64; 3]| [0, 1, 2].map(|c| one(&|f| of(f)[c]));
-    let fragment = Fragment {
-        base: three(&|f| f.base),
-        bump: three(&|f| f.bump),
-        normal: three(&|f| f.normal),
-        view: three(&|f| f.view),
-        occlusion: one(&|f| f.open),
-        silhouette: one(&|f| f.silhouette),
-        dapple: one(&|f| f.dapple),
-        albedo: three(&|f| f.albedo),
-        specular: one(&|f| f.specular),
-        attenuator: one(&|f| f.attenuator),
-    };
-    (fragment, like.pack(&lanes.iter().map(|(_, share)| *share).collect::<Vec<_>>()))
-}
-
-/// The mean over the samples of as many pixels as a number holds.
-fn mean<R: Number>(like: R, pixels: &[Pixel], of: impl Fn(&Fragment<R>) -> [R; 4]) -> [R; 4] {
-    let most = pixels.iter().map(|pixel| pixel.samples.len()).max().unwrap_or(0);
-    (0..most).fold([like.lit(0.0); 4], |mean, k| {
-        let (fragment, share) = packed(like, pixels, k);
-        let light = of(&fragment);
-        std::array::from_fn(|c| share.mul_add(light[c], mean[c]))
-    })
+    means
 }
 
 fn image_in<R: Number>(like: R, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
-    let (setup, params, cubes) = (setup(scene), params(&at.constants), NumberCubes::<R>::new(scene, at));
-    let lights = cubes.lights(scene, &params, like);
+    let cubes = number_cubes::<R>(scene, at);
+    let fragments = Fragments::new(setup(scene), &cubes, &params(&at.constants), &Wanted::default(), like);
     let view = |(view, gain): (&View, &f64)| {
         let chunk = |pixels: &[Pixel]| {
-            let light = mean(like, pixels, |f| shade(setup, &lights, f, &params))
-                .map(|x| (like.lit(*gain) * x).unpack());
+            let light = means(&fragments, like, pixels)[0].map(|x| (like.lit(*gain) * x).unpack());
             (0..pixels.len()).map(|i| [0, 1, 2, 3].map(|c| light[c][i])).collect::<Vec<_>>()
         };
         view.pixels.chunks(R::COUNT).flat_map(chunk).collect()
@@ -587,15 +505,23 @@ fn image_in<R: Number>(like: R, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
 
 /// Normal equations from single fragments' values and derivatives; only the sums over residuals are in f64.
 fn equations_in<R: Number>(like: R, scene: &Scene, at: &At, unknowns: &[Unknown]) -> Found {
-    let (setup, params, cubes) = (setup(scene), params(&at.constants), NumberCubes::<R>::new(scene, at));
-    let lights = cubes.lights(scene, &params, like);
+    let mut wanted = Wanted::default();
+    for Column { param, .. } in unknowns.iter().filter_map(|&unknown| column(unknown)) {
+        if !wanted.free.contains(&param) {
+            wanted.free.push(param);
+        }
+    }
+    let cubes = number_cubes::<R>(scene, at);
+    let fragments = Fragments::new(setup(scene), &cubes, &params(&at.constants), &wanted, like);
+    let residuals = residuals(scene.loss);
     let k = unknowns.len();
     let (mut loss, mut weights, mut square) = (0.0, 0.0, 0.0);
     let (mut jtr, mut jtj) = (vec![0.0; k], vec![0.0; k * k]);
     for (v, view) in scene.views.iter().enumerate() {
         let gain = like.lit(at.gains[v]);
         for pixels in view.pixels.chunks(R::COUNT) {
-            let value = mean(like, pixels, |f| shade(setup, &lights, f, &params));
+            let means = means(&fragments, like, pixels);
+            let (value, moved) = (means[0], &means[1..]);
             let slopes: Vec<[R; 4]> = unknowns
                 .iter()
                 .map(|&unknown| match unknown {
@@ -603,7 +529,7 @@ fn equations_in<R: Number>(like: R, scene: &Scene, at: &At, unknowns: &[Unknown]
                     Unknown::Gain(_) => [like.lit(0.0); 4],
                     other => {
                         let Column { param, channels } = column(other).unwrap();
-                        let all = mean(like, pixels, |f| derivative(setup, &lights, f, &params, param));
+                        let all = moved[wanted.free.iter().position(|&free| free == param).unwrap()];
                         // Alpha has no channels of its own.
                         let own = |c: usize| c == 3 || channels.includes(c);
                         std::array::from_fn(|c| if own(c) { gain * all[c] } else { like.lit(0.0) })
@@ -617,7 +543,7 @@ fn equations_in<R: Number>(like: R, scene: &Scene, at: &At, unknowns: &[Unknown]
             for c in 0..4 {
                 let target = lanes(&|pixel| pixel.target[c]);
                 let clip = view.clip.map(clip_of);
-                let row = weighted_residual(loss_of(scene.loss), clip, gain * value[c], target, weight);
+                let row = residuals.weigh(clip, gain * value[c], target, weight);
                 let (scale, residual) = (row.scale.unpack(), row.residual.unpack());
                 let slopes: Vec<Vec<f64>> = slopes.iter().map(|slope| slope[c].unpack()).collect();
                 loss += row.loss.unpack().iter().sum::<f64>();
@@ -643,16 +569,13 @@ fn equations_in<R: Number>(like: R, scene: &Scene, at: &At, unknowns: &[Unknown]
 
 impl<R: Number> Evaluator for Single<R> {
     fn name(&self) -> String {
-        format!("single fragments, {}", std::any::type_name::<R>())
+        format!("rules over single fragments, {}", std::any::type_name::<R>())
     }
     fn computes(&self) -> Width {
         if size_of::<R>() == size_of::<f64>() { Width::Double } else { Width::Single }
     }
     fn stores(&self) -> Width {
         self.computes()
-    }
-    fn knows(&self, variant: Variant) -> bool {
-        variant == Variant::default()
     }
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
         image_in(self.0, scene, at)
@@ -662,21 +585,18 @@ impl<R: Number> Evaluator for Single<R> {
     }
 }
 
-/// Single fragments in SIMD lanes, with the instructions of a level.
+/// The rules over single fragments in SIMD lanes, with the instructions of a level.
 struct AtLevel(Level);
 
 impl Evaluator for AtLevel {
     fn name(&self) -> String {
-        format!("sixteen lanes at {:?}", self.0)
+        format!("rules in sixteen lanes at {:?}", self.0)
     }
     fn computes(&self) -> Width {
         Width::Single
     }
     fn stores(&self) -> Width {
         Width::Single
-    }
-    fn knows(&self, variant: Variant) -> bool {
-        variant == Variant::default()
     }
     fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
         skinfit_core::with_simd!(self.0, simd => image_in(Lanes::splat(simd, 0.0), scene, at))
@@ -748,8 +668,8 @@ mod tensors {
     use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
 
     use super::{
-        At, Evaluator, Found, Scene, Unknown, Width, all_observed, clip_of, column, illumination, loss_of,
-        params, setup, weighted_residual,
+        At, Evaluator, Found, Scene, Unknown, Width, all_observed, clip_of, column, illumination, params,
+        residuals, setup,
     };
 
     /// The model on burn's tensors: reverse mode, so that there is no J^T J.
@@ -825,6 +745,7 @@ mod tensors {
             let (columns, of) = columns(unknowns);
             let (shade, inputs) = self.operation(scene, at, &columns);
             let image = Self::unscaled(scene, &shade, &inputs);
+            let residuals = residuals(scene.loss);
             let (mut loss, mut weights, mut adjoint) = (0.0, 0.0, Vec::new());
             let mut by_gain = vec![0.0; scene.views.len()];
             for (v, view) in scene.views.iter().enumerate() {
@@ -832,7 +753,7 @@ mod tensors {
                     for c in 0..4 {
                         let (model, target) = (at.gains[v] * shown[c], pixel.target[c]);
                         let clip = view.clip.map(clip_of);
-                        let row = weighted_residual(loss_of(scene.loss), clip, model, target, pixel.weight);
+                        let row = residuals.weigh(clip, model, target, pixel.weight);
                         let slope = 2.0 * row.scale * row.residual;
                         loss += row.loss;
                         weights += pixel.weight;

@@ -8,6 +8,7 @@ mod animated;
 mod bakes;
 mod borders;
 mod builtin;
+mod by_rules;
 mod cli;
 mod common;
 mod damage;

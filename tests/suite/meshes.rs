@@ -7,14 +7,25 @@ use std::path::{Path, PathBuf};
 use glam::{DMat4, DVec3, DVec4, Vec3};
 use serde_json::Value;
 use skinfit::model::real::Real;
-use skinfit::model::vertex::{Bone, Delta, Vertex, deform, sight};
+use skinfit::model::vertex::{Bone, Delta, Vertex, deform};
 use skinfit::scene::mesh::Mesh;
 use skinfit::scene::{LoadOptions, Scene, Warning};
 
+use super::by_rules::Function;
 use super::common;
 use super::vectors::reader::{Node, Vectors};
 
-/// Every output of listing 3-3 for a vector file's inputs, evaluated in `R`.
+/// What the rules see of a vertex: V, S.z, its square, and S.w.
+const SIGHT: [&str; 5] = [
+    include_str!("../../src/core/shader/rules/lib/vector.wgsl"),
+    include_str!("../../src/core/shader/rules/vertex/vertex_view.wgsl"),
+    include_str!("../../src/core/shader/rules/vertex/vertex_silhouette.wgsl"),
+    include_str!("../../src/core/shader/rules/vertex/vertex_rim_squared.wgsl"),
+    include_str!("../../src/core/shader/rules/fragment/dapple_cosine.wgsl"),
+];
+
+/// Every output of listing 3-3 for a vector file's inputs, evaluated in `R`: the vertex as meshes are posed, and the
+/// rules of what the eye sees of it.
 fn vertex_stage<R: Real>(
     inputs: &Node<'_>,
     zero: R,
@@ -46,7 +57,15 @@ fn vertex_stage<R: Real>(
     let influences = list("boneWeight").into_iter().zip(indices.iter().map(|&i| &bones[i as usize]));
     let surface = deform(&vertex, deltas, influences);
     let dapple = inputs.at("dapple").item(2).three().map(|x| zero.lit(x));
-    let seen = sight(&surface, inputs.at("cam_pos").three().map(|x| zero.lit(x)), dapple);
+    let [view_of, silhouette_of, square_of, dapple_of] = [
+        ("view_at_vertex", &[3, 3][..]),
+        ("silhouette_at_vertex", &[3, 3]),
+        ("squared_rim_at_vertex", &[1]),
+        ("dapple_along_axis", &[3, 3]),
+    ]
+    .map(|(name, arguments)| Function::new(&SIGHT, name, arguments));
+    let view_from = |eye: [R; 3]| view_of.of(zero, &[&surface.position, &eye]);
+    let view = view_from(inputs.at("cam_pos").three().map(|x| zero.lit(x)));
     // The vectors' view matrix stands elsewhere than their cam_pos, and the listing takes |N.V| there.
     let matrix = |name: &str| {
         DMat4::from_cols_array(&<[f64; 16]>::try_from(inputs.at(name).numbers()).unwrap()).transpose()
@@ -54,14 +73,17 @@ fn vertex_stage<R: Real>(
     let w: f64 = inputs.at("boneWeight").numbers().iter().sum();
     // Weights that do not sum to 1 scale the listing's view translation by their sum.
     let eye = (matrix("view").inverse().w_axis.truncate() * w).to_array().map(|x| zero.lit(x));
-    let silhouette = sight(&surface, eye, dapple).silhouette;
+    let silhouette = silhouette_of.of(zero, &[&surface.normal, &view_from(eye)])[0];
+    let square = square_of.of(zero, &[&[silhouette]])[0];
+    let leaves = dapple_of.of(zero, &[&surface.normal, &dapple])[0];
+    let silhouette = [surface.occlusion, square, silhouette, leaves];
     let out = |v: &[R]| -> Vec<f64> { v.iter().map(|&x| wide(x)).collect() };
     let world = DVec3::from(surface.position.map(&wide)).extend(w);
     let tbn = |i: usize| out(&[surface.tangent[i], surface.bitangent[i], surface.normal[i]]);
     let place: DVec4 = matrix("proj") * (matrix("view") * world);
     [
         ("HPOS", place.to_array().to_vec()),
-        ("WorldEyeDir", out(&seen.view)),
+        ("WorldEyeDir", out(&view)),
         ("SkinSilhouetteVec", out(&silhouette)),
         ("WorldTanMatrixX", tbn(0)),
         ("WorldTanMatrixY", tbn(1)),

@@ -4,7 +4,7 @@
 use glam::Vec3;
 use skinfit::bake::{Illumination, LobeStack};
 use skinfit::engine::Point;
-use skinfit::engine::planned::PlannedEngine;
+use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::view::ObservedView;
 use skinfit::model::cube::Cube;
 use skinfit::model::dapple::Dapple;
@@ -48,7 +48,7 @@ fn shown(scene: &Scene) -> Vec<[f32; 3]> {
     assert!(there.len() > 500);
     let target = skinfit::samples::rows::Rows::new(3, samples.groups());
     let view = ObservedView { samples, target, ..ObservedView::default() };
-    let engine = PlannedEngine::new(scene.setup(), white(), vec![view], Loss::L2, Vec::new()).unwrap();
+    let engine = CpuEngine::new(scene.setup(), white(), vec![view], Loss::L2, Vec::new()).unwrap();
     let planes = engine.image(0, &Point { params: scene.params.clone(), gains: vec![1.0] });
     there.into_iter().map(|slot| [0, 1, 2].map(|c| planes[c][slot])).collect()
 }

@@ -98,11 +98,7 @@ fn the_dapple_is_the_third_row_of_its_matrix_and_turns_with_the_environment() {
         let text = text.replacen("[fit]", &format!("[fit]\nfree = [\"{free}\"]"), 1);
         scene_folder.write("scene.toml", text.as_bytes());
         let (scene, _) = scene_folder.load().unwrap();
-        assert_eq!(
-            (scene.setup().dapple.turns(), scene.setup().hand_written()),
-            (turns, !turns),
-            "{key} {free}"
-        );
+        assert_eq!(scene.setup().dapple.turns(), turns, "{key} {free}");
     }
 }
 
@@ -112,24 +108,23 @@ fn a_normal_map_that_nothing_sees_is_not_read_and_a_warning_says_so() {
     let smooth = "[model]\nlookups = \"smooth\"";
     let (scene, warnings) = scene_folder.edited("[model]", smooth).unwrap();
     assert!(scene.maps.normal.is_none() && scene.mesh.tangents.is_empty());
-    assert!(scene.setup().hand_written(), "n is the smooth normal, and that is all");
+    assert!(!scene.setup().smooth_lookups(), "n is the smooth normal, and that is all");
     let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
     assert!(said.len() == 1 && said[0].contains("`normal_map` does nothing without `key_light`"), "{said:?}");
-    for (keys, hand_written) in [
-        ("effects = [\"diffuse\", \"normal_map\", \"key_light\"]", false),
-        ("effects = [\"normal_map\", \"key_light\"]", true),
-        ("silhouette = \"bumped\"", false),
+    for keys in [
+        "effects = [\"diffuse\", \"normal_map\", \"key_light\"]",
+        "effects = [\"normal_map\", \"key_light\"]",
+        "silhouette = \"bumped\"",
     ] {
         let (scene, warnings) = scene_folder.edited("[model]", &format!("{smooth}\n{keys}")).unwrap();
         assert!(scene.maps.normal.is_some() && warnings.is_empty(), "{keys}: {warnings:?}");
-        assert_eq!(scene.setup().hand_written(), hand_written, "{keys}");
+        assert!(scene.setup().smooth_lookups(), "{keys}");
     }
-    // No first version has two normals.
     let (listing, _) = scene_folder.edited("[model]", "[model]\nform = \"listing\"").unwrap();
-    assert!(listing.setup().interpolated_rim && !listing.setup().hand_written());
+    assert!(listing.setup().interpolated_rim && listing.setup().rim_of_corners());
     let fragment = "[model]\nform = \"listing\"\nsilhouette = \"fragment\"";
     let (listing, _) = scene_folder.edited("[model]", fragment).unwrap();
-    assert!(listing.setup().hand_written());
+    assert!(!listing.setup().rim_of_corners());
 }
 
 #[test]

@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 use rayon::prelude::*;
-use skinfit::model::compose::TermName;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::evaluate::Setup;
+use skinfit::model::terms::TermName;
 use skinfit::shader::facts::{FaceSizes, MapFacts};
 use skinfit::shader::{Budget, Facts, Plan, Resource, Source, plan};
 

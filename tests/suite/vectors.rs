@@ -1,4 +1,4 @@
-//! The conformance vectors of an independent float64 oracle (tests/vectors), run through every evaluator: the model
+//! The conformance vectors of an independent float64 oracle (tests/vectors), run through every evaluator: the rules
 //! in f64, in f32 and in SIMD lanes here, the engines by way of the witness' scenes. Nothing in them may go unread.
 
 pub(crate) mod reader;
@@ -9,26 +9,18 @@ use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::formats::{Declared, Emulated, Format, Half, to_fixed, to_half};
-use skinfit::model::fragment::{self, Fragment, Shading as FragmentShading, decode_normal, unit_view};
-use skinfit::model::lights::Lights;
+use skinfit::model::fragment::{Fragment, decode_normal, unit_view};
 use skinfit::model::params::{Param, Params};
 use skinfit::model::real::Real;
-use skinfit::model::rim::rim;
+use skinfit::model::vector::dot;
 use skinfit::render::format::FormatShader;
 use skinfit::samples::surface_records::Asked;
 use skinfit::samples::{SurfaceRecords, ViewSamples};
-use skinfit::shader::facts::{FaceSizes, MapFacts};
-use skinfit::shader::tangent::chain::Seed;
-use skinfit::shader::{Facts, Source};
 use skinfit_core::program::graph::Input;
-use skinfit_core::program::lower::Natives;
-use skinfit_core::program::shading::{Shading, constant};
-use skinfit_core::program::steps::{Rounding, Steps};
 
 use self::reader::{Node, Tolerance, Vectors};
-use crate::common;
-use crate::evaluators::{self, Number, composed, derivative, shade};
-use crate::{bakes, meshes, witness};
+use crate::by_rules::{Cubes, Fragments, Function, Number, Shaded, Wanted};
+use crate::{bakes, common, evaluators, meshes, witness};
 
 /// Numbers as the vectors are compared with: how each evaluator makes them, and the files' tolerance for it.
 #[track_caller]
@@ -58,20 +50,12 @@ pub(crate) fn cube<R: Number>(vectors: &Vectors, file: &Node<'_>, which: &str) -
     })
 }
 
-fn lights<'a, R: Real>(
-    diffuse: &'a Cube<R::Texel>,
-    spec: &'a Cube<R::Texel>,
-    hilite: &'a Cube<R::Texel>,
-) -> Lights<'a, R> {
-    Lights {
-        irradiance: Some(diffuse),
-        side: Some(spec),
-        mirror: Some(spec),
-        lobe_slope: None,
-        hilite: Some(hilite),
-        turn: None,
-        key: None,
-    }
+/// The cubes of a file; nothing is fitted that acts through the slope of one.
+fn cubes<R: Number>(vectors: &Vectors, file: &Node<'_>) -> Cubes<R::Texel> {
+    let [irradiance, specular, hilite] =
+        ["diffuse", "spec", "hilite"].map(|which| cube::<R>(vectors, file, which));
+    let specular_slope = specular.map(|_| [R::texel(0.0); 4]);
+    Cubes { irradiance, specular, specular_slope, hilite }
 }
 
 const ALL_TERMS: Effects = Effects::SURFACE.with(Effect::Haze);
@@ -113,6 +97,13 @@ const ORACLE_COLUMNS: [(&str, Param, Option<usize>); 10] = [
     ("haze", Param::HazeWeight, None),
 ];
 
+/// The parameters of those columns.
+fn oracle_params() -> Vec<Param> {
+    let mut params = ORACLE_COLUMNS.map(|(_, param, _)| param).to_vec();
+    params.dedup();
+    params
+}
+
 /// The parameters of a point that is given column by column, under the oracle's names.
 pub(crate) fn column_params(values: &Node<'_>) -> Params {
     let mut params = Params::defaults(Form::Corrected);
@@ -130,27 +121,55 @@ pub(crate) fn column_params(values: &Node<'_>) -> Params {
     params
 }
 
-#[inline(never)]
-fn rim_of<R: Real>(setup: Setup, lights: &Lights<'_, R>, f: &Fragment<R>, params: &Params) -> R {
-    composed(setup, lights, f, params).rim()
+/// The rules' setup for a form. The key light's rules are what reads a sample's own N; it is dark.
+fn setup(form: Form, silhouette: Silhouette) -> Setup {
+    Setup::new(form, silhouette, ALL_TERMS.with(Effect::KeyLight))
 }
 
-#[inline(never)]
-fn shading<R: Real>(setup: Setup, f: &Fragment<R>, strength: R) -> FragmentShading<R> {
-    fragment::shading(setup.form, setup.silhouette, f, strength)
+/// The rules at `params`, with the oracle's ten columns.
+fn fragments<'a, R: Number>(
+    setup: Setup,
+    cubes: &'a Cubes<R::Texel>,
+    params: &Params,
+    quantities: &[&'static str],
+    like: R,
+) -> Fragments<'a, R> {
+    let mut params = params.clone();
+    params.set(Param::KeyColor, 0.0);
+    Fragments::new(
+        setup,
+        cubes,
+        &params,
+        &Wanted { free: oracle_params(), quantities: quantities.to_vec() },
+        like,
+    )
 }
 
-/// `[rgba][column]`
-fn jacobian<R: Real>(setup: Setup, lights: &Lights<'_, R>, f: &Fragment<R>, params: &Params) -> [[R; 10]; 4] {
-    let zero = f.occlusion.lit(0.0);
-    let mut rows = [[zero; 10]; 4];
-    for (k, (_, param, channel)) in ORACLE_COLUMNS.into_iter().enumerate() {
-        let column = derivative(setup, lights, f, params, param);
-        for c in 0..4 {
-            rows[c][k] = if channel.is_none_or(|own| own == c) { column[c] } else { zero };
-        }
+/// A number of a fragment by the rules' name.
+fn field<R: Real>(f: &Fragment<R>, Input { name, component }: &Input) -> R {
+    match name.as_str() {
+        "base" => f.base[*component],
+        "bump" => f.bump[*component],
+        "normal" => f.normal[*component],
+        "view" => f.view[*component],
+        "albedo" => f.albedo[*component],
+        "open" => f.occlusion,
+        "silhouette" => f.silhouette,
+        "dapple" => f.dapple,
+        "specular" => f.specular,
+        "attenuator" => f.attenuator,
+        other => panic!("a fragment has no {other}"),
     }
-    rows
+}
+
+/// `[rgba][column]`, row after row.
+fn jacobian<R: Number>(shaded: &Shaded<R>, like: R) -> Vec<R> {
+    let free = oracle_params();
+    let entry = |c: usize, (_, param, channel): (&str, Param, Option<usize>)| {
+        let slope = shaded.slopes[free.iter().position(|free| *free == param).unwrap()];
+        if channel.is_none_or(|own| own == c) { slope[c] } else { like.lit(0.0) }
+    };
+    (0..4).flat_map(|c| ORACLE_COLUMNS.map(|column| entry(c, column))).collect()
 }
 
 fn fragment_at<R: Real>(form: Form, inputs: &Node<'_>, like: R) -> Fragment<R> {
@@ -180,9 +199,14 @@ fn fragment_at<R: Real>(form: Form, inputs: &Node<'_>, like: R) -> Fragment<R> {
     }
 }
 
+/// The rules' power, and how it moves.
+const RIM: [&str; 2] = [
+    include_str!("../../src/core/shader/rules/lib/rim.wgsl"),
+    include_str!("../../src/core/shader/rules/tangent/rim_power.wgsl"),
+];
+
 fn fragment_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
-    let cubes = ["diffuse", "spec", "hilite"].map(|which| cube::<R>(vectors, file, which));
-    let lights = lights::<R>(&cubes[0], &cubes[1], &cubes[2]);
+    let cubes = cubes::<R>(vectors, file);
     let expected = file.at("expected");
     for (form, silhouette, name) in
         [(Form::Corrected, Silhouette::Bumped, "corrected"), (Form::Listing, Silhouette::Vertex, "literal")]
@@ -192,46 +216,59 @@ fn fragment_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
         if want.is_null() {
             continue;
         }
-        let setup = Setup::new(form, silhouette, ALL_TERMS);
         let f = fragment_at(form, &file.at("inputs"), like);
-        let s = shading(setup, &f, like.lit(p.scalar(Param::NormalStrength)));
-        check("n", &s.n, &want.at("n"));
-        check("n.V", &[s.n_dot_v], &want.at("nDotV"));
-        check("reflection", &s.reflection, &want.at("reflVect"));
-        let places = [("D", 0, s.n), ("S_n", 1, s.n), ("S_r", 1, s.reflection), ("H", 2, f.view)];
-        for (name, which, along) in places {
-            check(name, &look_up(&cubes[which], along), &want.at(name));
+        let rules = fragments(setup(form, silhouette), &cubes, &p, &["n", "reflected", "rim"], like);
+        let shaded = rules.shade(|input| field(&f, input));
+        let three = |first: usize| [0, 1, 2].map(|c| shaded.quantities[first + c]);
+        let (n, reflection) = (three(0), three(3));
+        check("n", &n, &want.at("n"));
+        check("n.V", &[dot(n, f.view)], &want.at("nDotV"));
+        check("reflection", &reflection, &want.at("reflVect"));
+        let places = [
+            ("D", &cubes.irradiance, n),
+            ("S_n", &cubes.specular, n),
+            ("S_r", &cubes.specular, reflection),
+            ("H", &cubes.hilite, f.view),
+        ];
+        for (name, cube, along) in places {
+            check(name, &look_up(cube, along), &want.at(name));
         }
-        check("rgba", &shade(setup, &lights, &f, &p), &want.at("rgba"));
+        check("rgba", &shaded.rgba, &want.at("rgba"));
         if form == Form::Corrected {
-            check("rim", &[rim_of(setup, &lights, &f, &p)], &want.at("rim"));
+            check("rim", &shaded.quantities[6..], &want.at("rim"));
             let j = expected.at("corrected_jacobian");
             j.at("rows").assert_text("rgba");
             let names = j.at("columns").items();
             names.iter().zip(ORACLE_COLUMNS).for_each(|(name, (want, ..))| name.assert_text(want));
-            check("Jacobian", &jacobian(setup, &lights, &f, &p).concat(), &j.at("J"));
+            check("Jacobian", &jacobian(&shaded, like), &j.at("J"));
         }
     }
     // S.y is S.z to the power of 2, the listing's exponent.
     let silhouette = file.at("inputs").at("SkinSilhouetteVec");
-    let squared = rim(like.lit(silhouette.item(2).number()), like.lit(2.0)).value;
-    check("S.y", &[squared], &silhouette.item(1));
+    let rim = Function::new(&RIM, "rim_power", &[1, 1]);
+    let squared = rim.of(like, &[&[like.lit(silhouette.item(2).number())], &[like.lit(2.0)]]);
+    check("S.y", &squared, &silhouette.item(1));
 }
 
 #[inline(never)]
 fn look_up<R: Real>(cube: &Cube<R::Texel>, along: [R; 3]) -> [R; 4] {
-    cube.sample(along.map(|x| x))
+    cube.sample(along)
 }
 
 fn rim_vector<R: Number>(file: &Node<'_>, like: R) {
     let list = |name: &str| file.at("inputs").at(name).numbers();
     let (z, exponents) = (list("f"), list("exponent"));
-    let table = |pick: fn(skinfit::model::rim::Rim<R>) -> R| -> Vec<R> {
-        let each = |z: f64, e: f64| pick(rim(like.lit(z), like.lit(e)));
-        z.iter().flat_map(|&z| exponents.iter().map(move |&e| each(z, e))).collect()
+    let [power, tangent] = [("rim_power", 2), ("rim_power_tangent", 4)]
+        .map(|(name, count)| Function::new(&RIM, name, &vec![1; count]));
+    let table = |of: &dyn Fn(R, R) -> Vec<R>| -> Vec<R> {
+        let each = |z: f64, e: f64| of(like.lit(z), like.lit(e));
+        z.iter().flat_map(|&z| exponents.iter().flat_map(move |&e| each(z, e))).collect()
     };
-    check("rim", &table(|r| r.value), &file.at("expected").at("rim"));
-    check("d rim / d exponent", &table(|r| r.by_exponent), &file.at("expected").at("d_exponent"));
+    let [zero, one] = [0.0, 1.0].map(|x| like.lit(x));
+    let value = |z: R, e: R| power.of(like, &[&[z], &[e]]);
+    let by_exponent = |z: R, e: R| tangent.of(like, &[&[z], &[e], &[zero], &[one]]);
+    check("rim", &table(&value), &file.at("expected").at("rim"));
+    check("d rim / d exponent", &table(&by_exponent), &file.at("expected").at("d_exponent"));
 }
 
 fn cube_sample_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
@@ -249,11 +286,12 @@ fn border_vector(vectors: &Vectors, file: &Node<'_>) {
 }
 
 fn bench_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
-    let cubes = ["diffuse", "spec", "hilite"].map(|which| cube::<R>(vectors, file, which));
-    let lights = lights::<R>(&cubes[0], &cubes[1], &cubes[2]);
-    let setup = Setup::new(Form::Corrected, Silhouette::Bumped, ALL_TERMS);
+    let cubes = cubes::<R>(vectors, file);
+    let [truth, start] = ["params", "params_init"].map(|which| {
+        let params = column_params(&file.at("inputs").at(which));
+        fragments(setup(Form::Corrected, Silhouette::Bumped), &cubes, &params, &[], like)
+    });
     let g = file.at("inputs").at("gbuffer");
-    let [truth, start] = ["params", "params_init"].map(|which| column_params(&file.at("inputs").at(which)));
     let (mut forward, mut at_start, mut rows) = (Vec::new(), Vec::new(), Vec::new());
     for i in 0..16 {
         let v = |name: &str| g.at(name).item(i).three().map(|x| like.lit(x));
@@ -270,9 +308,10 @@ fn bench_vector<R: Number>(vectors: &Vectors, file: &Node<'_>, like: R) {
             specular: s("p"),
             attenuator: s("a"),
         };
-        forward.extend(shade(setup, &lights, &f, &truth));
-        at_start.extend(shade(setup, &lights, &f, &start));
-        rows.extend(jacobian(setup, &lights, &f, &start).concat());
+        let [true_image, image] = [&truth, &start].map(|rules| rules.shade(|input| field(&f, input)));
+        forward.extend(true_image.rgba);
+        at_start.extend(image.rgba);
+        rows.extend(jacobian(&image, like));
     }
     let expected = file.at("expected");
     check("forward", &forward, &expected.at("forward"));
@@ -348,87 +387,6 @@ fn the_listing_holds_in_its_declared_types_and_in_binary16() {
 #[test]
 fn number_formats_round_as_the_vectors_say() {
     formats_vector(&Vectors::read(&common::vectors()).one("formats"));
-}
-
-/// A number of a fragment by the rules' name.
-fn field(f: &Fragment<f64>, input: &Input) -> f64 {
-    let Input { name, component } = input;
-    match name.as_str() {
-        "base" => f.base[*component],
-        "bump" => f.bump[*component],
-        "normal" => f.normal[*component],
-        "view" => f.view[*component],
-        "albedo" => f.albedo[*component],
-        "open" => f.occlusion,
-        "silhouette" => f.silhouette,
-        "dapple" => f.dapple,
-        "specular" => f.specular,
-        "attenuator" => f.attenuator,
-        other => panic!("a fragment has no {other}"),
-    }
-}
-
-/// A fragment through the rules themselves, their tangents included, with all of its numbers in f64.
-fn by_rules(vectors: &Vectors, file: &Node<'_>) {
-    let cubes = ["diffuse", "spec", "hilite"].map(|which| cube::<f64>(vectors, file, which));
-    let [diffuse, spec, hilite] = &cubes;
-    let faces = FaceSizes {
-        irradiance: Some(diffuse.size()),
-        specular: Some(spec.size()),
-        hilite: Some(hilite.size()),
-    };
-    // The key light's rules are what reads a sample's own N; it is dark.
-    let effects = ALL_TERMS.with(Effect::KeyLight);
-    let expected = file.at("expected");
-    for (form, silhouette, name) in
-        [(Form::Corrected, Silhouette::Bumped, "corrected"), (Form::Listing, Silhouette::Vertex, "literal")]
-    {
-        let want = expected.at(name);
-        let mut p = params(form, &file.at("constants").at(name));
-        p.set(Param::KeyColor, 0.0);
-        if want.is_null() {
-            continue;
-        }
-        let setup = Setup::new(form, silhouette, effects);
-        let maps = MapFacts::default();
-        let facts = Facts { setup, source: Source::Samples, maps, faces, ..Facts::default() };
-        let seeds = ORACLE_COLUMNS.map(|(_, param, _)| Seed::of_param(param));
-        let shading = Shading::new(&facts, &seeds, |_| None, Natives::Written).unwrap();
-        let mut outputs = [&[shading.value], &shading.tangents[..]].concat().concat();
-        outputs.extend(["n", "reflected", "rim"].iter().flat_map(|name| &shading.quantities[name]));
-        let steps = Steps::new(&shading.graph, &outputs, |_| Rounding::Plain);
-        let f = fragment_at(form, &file.at("inputs"), 0.0_f64);
-        let found = |name: &str| match name {
-            "irradiance_faces" => diffuse,
-            "specular_faces" => spec,
-            "hilite_faces" => hilite,
-            other => panic!("the vectors have no {other}"),
-        };
-        let setting = steps.setting(0.0_f64, |input| constant(input, &p).unwrap(), found);
-        let mut registers = Vec::new();
-        steps.run(&setting, 0.0, &mut registers, |place| field(&f, &steps.fields()[place]));
-        let numbers: Vec<f64> = steps.outputs(&setting, &registers).collect();
-        let (light, way) = numbers.split_at(4 * (1 + ORACLE_COLUMNS.len()));
-        check("n", &way[..3], &want.at("n"));
-        check("reflection", &way[3..6], &want.at("reflVect"));
-        check("rgba", &light[..4], &want.at("rgba"));
-        if form == Form::Corrected {
-            check("rim", &way[6..], &want.at("rim"));
-            let entry = |c: usize, k: usize| match ORACLE_COLUMNS[k].2 {
-                Some(own) if own != c => 0.0,
-                _ => light[4 * (1 + k) + c],
-            };
-            let rows = (0..4).flat_map(|c| (0..ORACLE_COLUMNS.len()).map(move |k| (c, k)));
-            let jacobian: Vec<f64> = rows.map(|(c, k)| entry(c, k)).collect();
-            check("Jacobian", &jacobian, &expected.at("corrected_jacobian").at("J"));
-        }
-    }
-}
-
-#[test]
-fn vectors_of_fragments_hold_in_the_rules_in_f64() {
-    let vectors = Vectors::read(&common::vectors());
-    vectors.of_kind("fragment").iter().for_each(|file| by_rules(&vectors, file));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Sixteen f32 lanes as one [`Real`]: the model's formulas, on whatever SIMD the processor has.
+//! Sixteen f32 lanes as one [`Real`], on whatever SIMD the processor has.
 //!
 //! The width is fixed, so that results are the same whichever instructions run (up to the fused
 //! multiply-add, which SSE2 lacks).

@@ -1,28 +1,21 @@
 //! Loss, gradient and normal equations over samples.
 //!
 //! - [`Objective`]: all that the solvers see of an engine
-//! - [`cpu`]: the CPU engine; its parts are `plan` (what a pass computes), `kernel` (groups of pixels
-//!   to columns), `window` (where these stand), `gram` (columns to products) and [`residual`] (the losses)
-//! - [`pulls`]: where residuals stand in the images
-//! - [`lanes`]: sixteen f32 lanes as one number of the model; `corners`: their lookups in cubes
-//! - [`planned`]: the engine that the rules make; [`rules`]: rules over samples in any kind of number
-//! - [`mod@reference`]: the same in f64, plainly: what both are held against
-//! - [`view`]: samples beside what was observed; `records`: the same as the kernel reads them
+//! - [`cpu`]: the engine on the processor
+//! - `gram`: columns to products; [`residual`]: the losses; [`pulls`]: where residuals stand in the images
+//! - [`lanes`]: sixteen f32 lanes as one number; `corners`: their lookups in cubes
+//! - [`rules`]: rules over samples in any kind of number; [`mod@reference`]: passes of them in f64, plainly
+//! - [`view`]: samples beside what was observed
 
 mod corners;
 pub mod cpu;
 mod gram;
-mod kernel;
 pub mod lanes;
-mod plan;
-pub mod planned;
 pub mod pulls;
-mod records;
 pub mod reference;
 pub mod residual;
 pub mod rules;
 pub mod view;
-mod window;
 
 use crate::model::params::{Column, Params};
 
@@ -100,12 +93,14 @@ pub fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: 
     use rayon::prelude::*;
     // A fixed number of blocks a sum, so that it does not depend on threads.
     const BLOCKS: usize = 512;
+    // An engine's own passes are made of the loss' text: it is there.
+    let residuals = residual::Residuals::new(loss);
     let power = |view: &view::ObservedView| {
         let groups = view.samples.groups();
         let read: Vec<usize> = (0..groups.div_ceil(BLOCK)).step_by(stride).collect();
         let sums = read.par_chunks(BLOCKS).map(|blocks| {
             let groups = blocks.iter().flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK));
-            view.power(groups, loss)
+            view.power(groups, &residuals)
         });
         sums.collect::<Vec<f64>>().iter().sum::<f64>()
     };

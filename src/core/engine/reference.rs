@@ -3,11 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::residual::weighted_residual;
+use super::residual::Residuals;
 use super::rules::{CubesAt, Loads, Registers, SampleSteps, Setting, sample_facts};
 use super::view::ObservedView;
 use super::{HALF_UNIT, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
+use crate::model::batch::Batch;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::program::lower::Natives;
@@ -29,7 +30,7 @@ const CHUNK: usize = 64;
 pub struct Reference<'a> {
     illumination: &'a Illumination,
     views: &'a [ObservedView],
-    loss: Loss,
+    residuals: Residuals,
     unknowns: Vec<Unknown>,
     /// Yields the value, and how it moves with each of `free`.
     steps: SampleSteps,
@@ -70,7 +71,8 @@ impl<'a> Reference<'a> {
             Shading::new(&sample_facts(setup, illumination, true), &seeds, |_| None, Natives::Written)?;
         let outputs = [&[shading.value], &shading.tangents[..]].concat().concat();
         let steps = SampleSteps::new(&shading.graph, &outputs, |_| Rounding::Plain);
-        Ok(Self { illumination, views, loss, unknowns: unknowns.to_vec(), steps, free })
+        let residuals = Residuals::new(loss);
+        Ok(Self { illumination, views, residuals, unknowns: unknowns.to_vec(), steps, free })
     }
 
     fn cubes(&self, params: &Params) -> CubesAt<f64> {
@@ -193,20 +195,23 @@ impl<'a> Reference<'a> {
             if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(view)) {
                 row[g] = value;
             }
-            let at = |model: f64| weighted_residual(self.loss, observed.clip, model, target, weight);
-            let (model, r) = (gain * value, at(gain * value));
+            let model = gain * value;
             let off = ROUNDINGS * HALF_UNIT * model.abs();
-            let by = |model: f64| (at(model).scale.powi(2) - r.scale.powi(2)).abs();
-            let reweighted = by(model + off).max(by(model - off));
-            sums.loss += r.loss;
-            sums.residual += r.residual * r.residual;
+            // As it is, and where its roundings may have put it.
+            let [shown, wanted, counted] = [[model, model + off, model - off], [target; 3], [weight; 3]];
+            let all = self.residuals.weigh(observed.clip, Batch(shown), Batch(wanted), Batch(counted));
+            let (loss, scale, residual) = (all.loss.0[0], all.scale.0[0], all.residual.0[0]);
+            let by = |k: usize| (all.scale.0[k].powi(2) - scale.powi(2)).abs();
+            let reweighted = by(1).max(by(2));
+            sums.loss += loss;
+            sums.residual += residual * residual;
             sums.weight += weight;
             sums.count += u64::from(weight > 0.0);
             for a in 0..k {
                 moved[a] += reweighted * row[a] * row[a];
-                sums.jtr[a] += r.scale * row[a] * r.residual;
+                sums.jtr[a] += scale * row[a] * residual;
                 for b in 0..k {
-                    sums.jtj[a * k + b] += r.scale * row[a] * r.scale * row[b];
+                    sums.jtj[a * k + b] += scale * row[a] * scale * row[b];
                 }
             }
         }

@@ -1,6 +1,12 @@
 //! The losses: from a pixel's model and target values to the weight of its row in the normal
 //! equations.
 
+#[rustfmt::skip]
+#[path = "loss/printed.rs"]
+#[allow(unused_variables, clippy::all, clippy::pedantic, clippy::nursery, reason = "it is printed")]
+mod printed;
+
+use crate::model::batch::Batch;
 use crate::model::real::Real;
 use crate::scene::Loss;
 use crate::scene::view::Clip;
@@ -13,9 +19,11 @@ pub const RELATIVE_FLOOR: f64 = 0.1;
 pub const SMAPE_FLOOR: f64 = 0.01;
 /// SMAPE's residuals below this are treated as quadratic, so that their weight stays finite.
 pub const SMAPE_CORNER: f64 = 1e-4;
+/// Below this share of the sum of two numbers their difference is small: the relative loss takes a series there.
+const SMALL_SHARE: f64 = 0.25;
 
-/// The loss as WGSL: `weighted_residual(shown, observed, weight)`, and the constants that it names. Both engines' passes
-/// are made from it.
+/// The loss as WGSL: `weighted_residual(shown, observed, weight)`, and the constants that it names: the one
+/// text of the losses.
 #[must_use]
 pub fn loss_text(loss: Loss) -> String {
     let function = match loss {
@@ -42,76 +50,19 @@ pub struct Weighted<R> {
     pub residual: R,
 }
 
-/// The residual as the normal equations see it, of a pixel with weight `weight` (not yet the loss').
-#[inline(always)]
-pub fn weighted_residual<R: Real>(
-    loss: Loss,
-    clip: Option<Clip>,
-    model: R,
-    target: R,
-    weight: R,
-) -> Weighted<R> {
-    let (zero, one) = (model.lit(0.0), model.lit(1.0));
-    let r = model - target;
-    let weight = match clip {
-        None => weight,
-        // A clipped target only says "at least" or "at most" (MODEL 7).
-        Some(clip) => {
-            let low = R::and(model.lit(f64::from(clip.low)).ge(target), zero.ge(r));
-            let high = R::and(target.ge(model.lit(f64::from(clip.high))), r.ge(zero));
-            R::select(low, zero, R::select(high, zero, weight))
-        }
-    };
-    match loss {
-        Loss::L2 => quadratic(r, weight),
-        Loss::RelativeL2 => {
-            let share = one / (lit_part(model) + model.lit(RELATIVE_FLOOR));
-            let scale = weight.sqrt() * share;
-            Weighted { loss: weight * relative_deviance(model, target), scale, residual: scale * r }
-        }
-        Loss::Huber => {
-            let threshold = model.lit(HUBER_THRESHOLD);
-            let size = r.abs();
-            let inside = threshold.ge(size);
-            let reweight = R::select(inside, one, threshold / size.max(threshold));
-            let beyond = threshold * (size + size - threshold);
-            let scale = (weight * reweight).sqrt();
-            Weighted { loss: weight * R::select(inside, r * r, beyond), scale, residual: scale * r }
-        }
-        Loss::Smape => {
-            let corner = model.lit(SMAPE_CORNER);
-            let size = r.abs();
-            let inverse = one / (model.abs() + target.abs() + model.lit(SMAPE_FLOOR));
-            // |r| is rounded off below the corner: r^2 / (2 corner) + corner / 2.
-            let inside = corner.ge(size);
-            let half = model.lit(0.5);
-            let rounded = R::select(inside, half * (r * r / corner + corner), size);
-            let value = rounded * inverse;
-            let reweight = half * inverse / size.max(corner);
-            let scale = (weight * reweight).sqrt();
-            // d/dm (|r| / D) = sign(r) / D - |r| sign(m) / D^2, as a multiple of the reweight. Where both have a
-            // sign, 1 - |r| / D is written as what is left of D, for a bright model would cancel in it.
-            let with_sign = |x: R| R::select(model.ge(zero), x, -x);
-            let one_side = R::select((model * target).ge(zero), model.abs().min(target.abs()), zero);
-            let left = (one_side + one_side + model.lit(SMAPE_FLOOR)) * inverse;
-            let beyond = r * R::select(with_sign(r).ge(zero), left, one + size * inverse);
-            let slope = R::select(corner.ge(size), r - with_sign(value * corner), beyond);
-            Weighted { loss: weight * value, scale, residual: scale * slope }
-        }
+impl<const N: usize> Weighted<Batch<f64, N>> {
+    /// Each of some residuals.
+    pub fn each(&self) -> impl Iterator<Item = Weighted<f64>> {
+        let Self { loss, scale, residual } = *self;
+        (0..N).map(move |k| Weighted { loss: loss.0[k], scale: scale.0[k], residual: residual.0[k] })
     }
 }
 
-/// max(x, 0), of NaN NaN.
-#[inline(always)]
-fn lit_part<R: Real>(x: R) -> R {
-    let zero = x.lit(0.0);
-    R::select(x.lt(zero), zero, x)
-}
-
-/// Below this share of the sum of two numbers their difference is small.
-const SMALL_SHARE: f64 = 0.25;
-
-/// The relative loss of a pixel: `2 int_t^m (x - t) / (max(x, 0) + e)^2 dx`, with e = [`RELATIVE_FLOOR`].
+/// A loss in any kind of number: its WGSL, printed as Rust ([`crate::program::print`]).
+///
+/// # The relative loss
+///
+/// It is `2 int_t^m (x - t) / (max(x, 0) + e)^2 dx`, with e = [`RELATIVE_FLOOR`].
 ///
 /// Dividing the squared residual by the *target* favours pixels that noise made darker; dividing it by the model's own
 /// value, moved along with it, favours models that are too bright. A quasi-likelihood does neither (Wedderburn 1974,
@@ -123,55 +74,111 @@ const SMALL_SHARE: f64 = 0.25;
 /// taken as its integral needs no arctangent. Below 0, where only noise and odd constants lead, the weight stays `1 / e^2`.
 ///
 /// With `s = (p - q) / (p + q)` it is `2 s (p - q) / p + 4 (artanh s - s)`: no digit is lost where m is near t.
-#[inline(always)]
-fn relative_deviance<R: Real>(model: R, target: R) -> R {
-    let (zero, one, half) = (model.lit(0.0), model.lit(1.0), model.lit(0.5));
-    let floor = model.lit(RELATIVE_FLOOR);
-    let (a, b) = (lit_part(model), lit_part(target));
-    let (dark_model, dark_target) = (model.min(zero), target.min(zero));
-    let (p, q) = (a + floor, b + floor);
-    let of_model = (a - b) / p;
-    // Halves, so that the sum of huge numbers is finite.
-    let share = half * (a - b) / (half * p + half * q);
-    let square = share * share;
-    // artanh s - s = s^3 / 3 + s^5 / 5 + ...: what is left out is 1e-17 of it at most.
-    let mut series = model.lit(1.0 / 27.0);
-    for odd in (1..=12).rev() {
-        series = series.mul_add(square, model.lit(1.0 / f64::from(2 * odd + 1)));
+#[derive(Clone, Copy, Debug)]
+pub struct Residuals(Loss);
+
+impl Residuals {
+    /// Of a loss.
+    #[must_use]
+    pub const fn new(loss: Loss) -> Self {
+        Self(loss)
     }
-    let by_log = model.lit(0.5 * std::f64::consts::LN_2) * (p / q).log2() - share;
-    let small = model.lit(SMALL_SHARE).ge(share.abs());
-    let beyond = R::select(small, series * square * share, by_log);
-    let two = one + one;
-    let bright = two * (share * of_model + two * beyond) - two * dark_target * of_model / q;
-    let inverse = one / floor;
-    // In this order no digit is lost where both are dark.
-    let slopes = (dark_model - target) + (dark_target - target);
-    let below = (dark_model - dark_target) * inverse * (slopes * inverse);
-    bright + below
+
+    /// The residual of a pixel's value, with the weight `weight` (not yet the loss').
+    #[inline(always)]
+    pub fn weigh<R: Real>(&self, clip: Option<Clip>, model: R, target: R, weight: R) -> Weighted<R> {
+        let weight = match clip {
+            None => weight,
+            Some(clip) => counted(clip, model, target, weight),
+        };
+        let [loss, scale, residual] = match self.0 {
+            Loss::L2 => printed::l2([model, target, weight]),
+            Loss::RelativeL2 => printed::relative_l2([model, target, weight]),
+            Loss::Huber => printed::huber([model, target, weight]),
+            Loss::Smape => printed::smape([model, target, weight]),
+        };
+        Weighted { loss, scale, residual }
+    }
 }
 
+/// A clipped target only says "at least" or "at most" (MODEL 7): beyond it nothing counts.
 #[inline(always)]
-fn quadratic<R: Real>(r: R, weight: R) -> Weighted<R> {
-    let scale = weight.sqrt();
-    let residual = scale * r;
-    Weighted { loss: residual * residual, scale, residual }
+fn counted<R: Real>(clip: Clip, model: R, target: R, weight: R) -> R {
+    let [zero, low, high] = [0.0, clip.low, clip.high].map(|x| model.lit(f64::from(x)));
+    let below = R::and(low.ge(target), target.ge(model));
+    let above = R::and(target.ge(high), model.ge(target));
+    R::select(below, zero, R::select(above, zero, weight))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::program::evaluate::Shared;
-    use crate::program::graph::{Graph, Input};
+    use crate::program::graph::Graph;
     use crate::program::lower::{Natives, Source, Value};
+    use crate::program::print::statements;
     use crate::program::tape::Tape;
+
+    /// The functions of all losses.
+    fn all_losses() -> String {
+        let mut text = "\
+// Printed from the WGSL beside it by a test of `residual`. Do not edit.
+//
+// Each function takes the model's value, what was observed and the weight; it yields the loss, and what scales the row of
+// the value's derivative and stands for the residual in it.
+
+use crate::model::real::{Real, select};
+use crate::program::evaluate::unary;
+use crate::program::graph::Unary;
+"
+        .to_owned();
+        for loss in Loss::ALL {
+            let mut graph = Graph::default();
+            let arguments: Vec<Value> =
+                ["shown", "observed", "weight"].map(|name| Value::Numbers(vec![graph.field(name, 0)])).into();
+            let source = Source::new(&loss_text(loss), Natives::Written).unwrap();
+            let outputs = source.call(&mut graph, "weighted_residual", arguments).unwrap();
+            let tape = Tape::new(&graph, &outputs);
+            // Nothing but constants is the same for all.
+            assert!(tape.uniform_values(|_| f64::NAN).iter().all(|x| x.is_finite()));
+            let (statements, outputs) = statements(&tape, "    ");
+            let order: Vec<&str> = tape.fields.iter().map(|field| field.name.as_str()).collect();
+            assert_eq!(order, ["shown", "observed", "weight"]);
+            text.push_str(&format!(
+                "\n#[inline(always)]\npub(super) fn {}<R: Real>(given: [R; 3]) -> [R; 3] {{\n    let lit = |x: f64| \
+                 given[0].lit(x);\n    let samples = |k: usize| given[k];\n{statements}    [{}]\n}}\n",
+                loss.name(),
+                outputs.join(", ")
+            ));
+        }
+        text
+    }
+
+    #[test]
+    fn the_printed_losses_are_what_their_wgsl_says() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/engine/loss/printed.rs");
+        let text = all_losses();
+        if std::env::var_os("SKINFIT_PRINT_PLANS").is_some() {
+            std::fs::write(path, &text).unwrap();
+        }
+        let stale = "a loss has changed since it was printed: run `SKINFIT_PRINT_PLANS=1 cargo test -p skinfit-core \
+                     --lib the_printed_losses`, then build again";
+        assert!(
+            include_str!("loss/printed.rs") == text || std::fs::read_to_string(path).unwrap() == text,
+            "{stale}"
+        );
+    }
+
+    fn weighted_residual<R: Real>(loss: Loss, clip: Option<Clip>, given: [R; 3]) -> Weighted<R> {
+        let [model, target, weight] = given;
+        Residuals::new(loss).weigh(clip, model, target, weight)
+    }
 
     #[test]
     fn rows_carry_the_slope_of_their_loss() {
         for loss in Loss::ALL {
             for target in [-0.05_f64, 0.0, 0.02, 0.7] {
                 for model in [-0.1, 0.01, 0.3, 0.69, 0.9, 4.0] {
-                    let at = |m: f64| weighted_residual(loss, None, m, target, 0.5);
+                    let at = |m: f64| weighted_residual(loss, None, [m, target, 0.5]);
                     let h = 1e-7;
                     let slope = (at(model + h).loss - at(model - h).loss) / (2.0 * h);
                     let Weighted { scale, residual, .. } = at(model);
@@ -207,9 +214,11 @@ mod tests {
         for target in numbers {
             for model in numbers {
                 let want = integrated(model, target);
-                let double = weighted_residual(Loss::RelativeL2, None, model, target, 1.0).loss;
-                let single = weighted_residual(Loss::RelativeL2, None, model as f32, target as f32, 1.0).loss;
-                // Simpson's rule to some 1e-12 of the integrals of both signs, which of near numbers nearly cancel.
+                let double = weighted_residual(Loss::RelativeL2, None, [model, target, 1.0]).loss;
+                let single =
+                    weighted_residual(Loss::RelativeL2, None, [model as f32, target as f32, 1.0]).loss;
+                // Numbers of the series are decimals of f32, 2e-8 off, and it ends where f32 does: of a twentieth of the
+                // loss at most. Simpson's rule to some 1e-12 of integrals of both signs, which of near numbers nearly cancel.
                 assert!(
                     (double - want).abs() <= 2e-9 * (want.abs() + 1e-3),
                     "{model} {target}: {double} {want}"
@@ -233,14 +242,14 @@ mod tests {
         for target in sizes.into_iter().flat_map(signed) {
             for model in sizes.into_iter().flat_map(signed) {
                 let Weighted { loss, scale, residual } =
-                    weighted_residual(Loss::RelativeL2, None, model, target, 1.0);
+                    weighted_residual(Loss::RelativeL2, None, [model, target, 1.0]);
                 assert!(loss >= 0.0 && loss.is_finite(), "{model} {target}: {loss}");
                 assert!(scale > 0.0 && residual.is_finite(), "{model} {target}");
                 // The square of less is no f32.
                 assert!(loss > 0.0 || (model - target).abs() < 1e-18, "{model} {target}: {loss}");
             }
         }
-        assert!(weighted_residual(Loss::RelativeL2, None, f32::NAN, 0.3, 1.0).loss.is_nan());
+        assert!(weighted_residual(Loss::RelativeL2, None, [f32::NAN, 0.3, 1.0]).loss.is_nan());
     }
 
     #[test]
@@ -248,7 +257,7 @@ mod tests {
         // A constant m fitted to t = 0.3 (1 + noise): by weights of the model's own value it is the mean of the targets.
         let targets = [0.21, 0.24, 0.3, 0.33, 0.42];
         let slope = |m: f64| -> f64 {
-            let row = |t: f64| weighted_residual(Loss::RelativeL2, None, m, t, 1.0);
+            let row = |t: f64| weighted_residual(Loss::RelativeL2, None, [m, t, 1.0]);
             targets.iter().map(|&t| row(t).scale * row(t).residual).sum()
         };
         // Roundings of five terms; a weight by the target has its zero at 0.275.
@@ -256,38 +265,10 @@ mod tests {
     }
 
     #[test]
-    fn the_wgsl_of_each_loss_is_its_rust() {
-        for loss in Loss::ALL {
-            let mut graph = Graph::default();
-            let fields =
-                ["shown", "observed", "weight"].map(|name| Value::Numbers(vec![graph.field(name, 0)]));
-            let source = Source::new(&loss_text(loss), Natives::Called).unwrap();
-            let outputs = source.call(&mut graph, "weighted_residual", fields.to_vec()).unwrap();
-            let tape = Tape::new(&graph, &outputs);
-            let shared = Shared { uniforms: tape.uniform_values(|_| 0.0), cubes: Vec::new() };
-            let numbers = [-2.0, -0.07, 0.0, 3e-5, 0.09, 0.3, 0.301, 0.5, 7.0, 400.0];
-            for (model, target) in numbers.iter().flat_map(|&m| numbers.map(|t| (m, t))) {
-                let want = weighted_residual(loss, None, model, target, 0.4);
-                let field = |input: &Input| match input.name.as_str() {
-                    "shown" => model,
-                    "observed" => target,
-                    _ => 0.4,
-                };
-                let got = tape.run(&shared, 0.0_f64, field);
-                for (got, want) in got.into_iter().zip([want.loss, want.scale, want.residual]) {
-                    // Its numbers are decimals of f32, and a series ends where f32 does.
-                    let near = 2e-7 * want.abs() + 1e-15;
-                    assert!((got - want).abs() <= near, "{loss:?} {model} {target}: {got} {want}");
-                }
-            }
-        }
-    }
-
-    #[test]
     fn clipped_targets_ask_for_nothing_beyond_the_clip() {
         let clip = Some(Clip { low: 0.001, high: 0.99 });
         for loss in Loss::ALL {
-            let size = |model: f64, target: f64| weighted_residual(loss, clip, model, target, 1.0).loss;
+            let size = |model: f64, target: f64| weighted_residual(loss, clip, [model, target, 1.0]).loss;
             assert_eq!(size(3.0, 1.0), 0.0);
             assert_eq!(size(-0.5, 0.0), 0.0);
             assert!(size(0.5, 1.0) > 0.0 && size(0.5, 0.0) > 0.0 && size(0.5, 0.6) > 0.0);

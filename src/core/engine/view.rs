@@ -1,9 +1,9 @@
 //! One view as the engine sees it: its samples beside what was observed there.
 
-use super::residual::weighted_residual;
+use super::residual::Residuals;
+use crate::model::batch::Batch;
 use crate::samples::rows::{Row, Rows};
 use crate::samples::{LANES, ViewSamples};
-use crate::scene::Loss;
 use crate::scene::view::Clip;
 
 /// Samples of a view, and the target at its pixel slots.
@@ -34,16 +34,20 @@ impl ObservedView {
     }
 
     /// Sum of the squared target, weighted as the residuals of a perfect fit are.
-    pub(super) fn power(&self, groups: impl Iterator<Item = usize>, loss: Loss) -> f64 {
-        let of = |slot: usize| {
-            let weight = f64::from(self.pixel_weight(slot));
+    pub(super) fn power(&self, groups: impl Iterator<Item = usize>, residuals: &Residuals) -> f64 {
+        let of = |group: usize| {
+            let slots = |number: &dyn Fn(usize) -> f32| {
+                Batch::<f64, LANES>(std::array::from_fn(|lane| number(group * LANES + lane).into()))
+            };
+            let weight = slots(&|slot| self.pixel_weight(slot));
             let square = |channel: usize| {
-                let target = f64::from(self.target.number(channel, slot));
-                (weighted_residual(loss, self.clip, target, target, weight).scale * target).powi(2)
+                let target = slots(&|slot| self.target.number(channel, slot));
+                let scaled = residuals.weigh(self.clip, target, target, weight).scale * target;
+                scaled.0.iter().map(|x| x * x).sum::<f64>()
             };
             (0..self.target.stride()).map(square).sum::<f64>()
         };
-        slots(groups).map(of).sum()
+        groups.map(of).sum()
     }
 
     /// Sum of the pixels' weights, and how many count at all.

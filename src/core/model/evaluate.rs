@@ -58,15 +58,4 @@ impl Setup {
     pub fn rim_of_corners(&self) -> bool {
         self.interpolated_rim && self.silhouette == Silhouette::Vertex
     }
-
-    /// Whether the engine's kernel, which is written by hand, says what the rules say.
-    #[must_use]
-    pub fn hand_written(&self) -> bool {
-        let needs = self.needs();
-        let two_normals = self.smooth_lookups() && self.effects.looks_up_n();
-        let turning_dapple = self.dapple.turns() && needs.dapple;
-        let rim_of_corners = self.rim_of_corners() && needs.rim;
-        let added = self.effects.added().next().is_some();
-        !(added || two_normals || turning_dapple || rim_of_corners)
-    }
 }

@@ -1,16 +1,13 @@
-//! The fragment stage (listing 3-4): from interpolated values and texels to what the lights see.
-//!
-//! A [`Fragment`] is shaded in three steps: its [`Shading`] normal and reflection, the light's terms
-//! along them (see [`super::terms`]), and their weighted sum (see [`super::compose`]). Only the first
-//! two depend on the non-linear parameters `normal_strength`, `specular_lobe` and
-//! `environment_rotation`.
+//! A fragment as samples hold it: interpolated values and texels, made ready for the rules.
 
-use super::effects::{Form, Silhouette};
+use super::effects::Form;
 use super::real::Real;
-use super::rim::{silhouette, silhouette_slope};
-use super::vector::{V3, dot, normalize_or, scale, scale_add, select, sub};
+use super::vector::{V3, normalize_or, scale, scale_add, select};
 
-/// One fragment, as the model reads it.
+/// A decoded z that is positive is at least this, so that the normal never vanishes.
+const LEAST_Z: f64 = 1e-6;
+
+/// One fragment, as the rules read it.
 #[derive(Clone, Copy, Debug)]
 pub struct Fragment<R> {
     /// The part of the shading normal that the normal map's strength leaves alone.
@@ -39,7 +36,7 @@ pub struct Fragment<R> {
 /// tangent-to-world matrix: n is the direction of `base + normal_strength bump`.
 ///
 /// `listing` takes the texel as it is (oddity 5), `corrected` decodes it; one that is not finite or is nothing then
-/// gives the smooth normal (MODEL 7).
+/// gives the smooth normal, and a positive z never vanishes (MODEL 7).
 #[inline(always)]
 pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V3<R>) -> (V3<R>, V3<R>) {
     let (zero, one, two) = (n[0].lit(0.0), n[0].lit(1.0), n[0].lit(2.0));
@@ -49,8 +46,10 @@ pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V
     };
     let size = d[0].abs() + d[1].abs() + d[2].abs();
     let ok = R::and(size.is_finite(), zero.lt(size));
-    let d = select::<R>(ok, d, [zero, zero, one]);
-    (scale(d[2], n), scale_add(d[0], t, scale(d[1], b)))
+    let [x, y, z] = select::<R>(ok, d, [zero, zero, one]);
+    let least = one.lit(LEAST_Z);
+    let z = R::select(R::and(z.ge(zero), z.lt(least)), least, z);
+    (scale(z, n), scale_add(x, t, scale(y, b)))
 }
 
 /// Base and bump as a sample holds them: where no base is left (below 1e-37 it is noise) the side that faces
@@ -70,70 +69,4 @@ pub fn guarded<R: Real>(base: V3<R>, bump: V3<R>, view: V3<R>) -> (V3<R>, V3<R>)
 pub fn unit_view<R: Real>(view: V3<R>) -> V3<R> {
     let (zero, one) = (view[0].lit(0.0), view[0].lit(1.0));
     normalize_or(view, [zero, zero, -one]).0
-}
-
-/// The shading normal, the reflection, and how both move with the normal map's strength.
-#[derive(Clone, Copy, Debug)]
-pub struct Shading<R> {
-    /// n, unit length in the corrected form.
-    pub n: V3<R>,
-    /// n . V
-    pub n_dot_v: R,
-    /// The reflection vector.
-    pub reflection: V3<R>,
-    /// S.z, as the silhouette asks.
-    pub silhouette: R,
-    /// d n / d normal_strength.
-    pub n_tangent: V3<R>,
-    /// d reflection / d normal_strength.
-    pub reflection_tangent: V3<R>,
-    /// d S.z / d normal_strength.
-    pub silhouette_tangent: R,
-}
-
-/// The most by which a normal that all but vanishes turns with its map's strength: beyond, the squares of
-/// derivatives would overflow an f32.
-const STEEPEST: f64 = 1e6;
-
-/// The shading normal at `strength` and what follows from it.
-#[inline(always)]
-pub fn shading<R: Real>(form: Form, at: Silhouette, f: &Fragment<R>, strength: R) -> Shading<R> {
-    let two = strength.lit(2.0);
-    let v = f.view;
-    let m = scale_add(strength, f.bump, f.base);
-    let (n, n_tangent) = match form {
-        Form::Listing => (m, f.bump),
-        Form::Corrected => {
-            let (n, inverse_length) = unit_normal(m, f.normal, v);
-            // d (m / |m|) = (dm - n (n . dm)) / |m|
-            let turning = scale(inverse_length, scale_add(-dot(n, f.bump), n, f.bump));
-            let (least, most) = (strength.lit(-STEEPEST), strength.lit(STEEPEST));
-            (n, turning.map(|x| x.max(least).min(most)))
-        }
-    };
-    let (q, dq) = (dot(n, v), dot(n_tangent, v));
-    let (reflection, reflection_tangent) = match form {
-        // Oddity 3: the two dot products look swapped.
-        Form::Listing => (sub(scale(q, v), scale(two, n)), sub(scale(dq, v), scale(two, n_tangent))),
-        Form::Corrected => (scale_add(-two * q, n, v), scale(-two, scale_add(dq, n, scale(q, n_tangent)))),
-    };
-    let (silhouette, silhouette_tangent) = match at {
-        Silhouette::Bumped => (silhouette(q), silhouette_slope(q) * dq),
-        Silhouette::Vertex | Silhouette::Fragment => (f.silhouette, strength.lit(0.0)),
-    };
-    Shading { n, n_dot_v: q, reflection, silhouette, n_tangent, reflection_tangent, silhouette_tangent }
-}
-
-/// m / |m| and 1 / |m|; without a direction, the smooth normal's; without that, -V (MODEL 7).
-#[inline(always)]
-fn unit_normal<R: Real>(m: V3<R>, smooth: V3<R>, view: V3<R>) -> (V3<R>, R) {
-    let (least, most) = (view[0].lit(1e-20), view[0].lit(1e20));
-    let square = dot(m, m);
-    // All lanes ordinary, as nearly always: no scaling, no fallbacks.
-    if R::all(R::and(square.ge(least), most.ge(square))) {
-        let inverse_length = square.sqrt().recip();
-        return (scale(inverse_length, m), inverse_length);
-    }
-    let (normal, _) = normalize_or(smooth, [-view[0], -view[1], -view[2]]);
-    normalize_or(m, normal)
 }

@@ -1,5 +1,5 @@
-//! What the model asks of a number. The formulas are written once over [`Real`]; f32 and f64
-//! stand here, SIMD lanes in the engine, reduced number formats in [`super::formats`].
+//! What is asked of a number. The rules' operations run on any [`Real`]; f32 and f64 stand here, SIMD lanes in the
+//! engine, reduced number formats in [`super::formats`].
 
 use std::ops::{Add, Div, Mul, Neg, Sub};
 

@@ -1,4 +1,4 @@
-//! The few 3-vector operations that the formulas use, over any [`Real`].
+//! A few operations of 3-vectors, over any [`Real`].
 
 use super::real::Real;
 
@@ -39,12 +39,6 @@ pub fn scale<R: Real>(s: R, a: V3<R>) -> V3<R> {
 #[inline(always)]
 pub fn scale_add<R: Real>(s: R, a: V3<R>, b: V3<R>) -> V3<R> {
     [s.mul_add(a[0], b[0]), s.mul_add(a[1], b[1]), s.mul_add(a[2], b[2])]
-}
-
-/// The product of each channel.
-#[inline(always)]
-pub fn mul<R: Real>(a: V3<R>, b: V3<R>) -> V3<R> {
-    [a[0] * b[0], a[1] * b[1], a[2] * b[2]]
 }
 
 /// `yes` where `mask` holds, else `no`.

@@ -1,8 +1,6 @@
-//! The vertex stage (listing 3-3): what morphs and bones make of a vertex ([`deform`]), and what the
-//! eye sees of it ([`sight`]).
+//! The vertex stage (listing 3-3) of meshes: what morphs and bones make of a vertex.
 
 use super::real::Real;
-use super::rim::silhouette;
 use super::vector::{V3, add, cross, dot, normalize_or, scale, scale_add, select, sub};
 
 /// A vertex at rest, as it stands in the vertex buffer; of any length where unit length is meant.
@@ -177,25 +175,6 @@ pub fn perpendicular<R: Real>(n: V3<R>) -> V3<R> {
     let sign = R::select(n[2].ge(one.lit(0.0)), one, -one);
     let a = -one / (sign + n[2]);
     [(sign * n[0] * n[0]).mul_add(a, one), sign * n[0] * n[1] * a, -(sign * n[0])]
-}
-
-/// What the eye sees of a vertex: listing 3-3's `WorldEyeDir` and `SkinSilhouetteVec`.
-#[derive(Clone, Copy, Debug)]
-pub struct Sight<R> {
-    /// V: unit vector from the eye to the surface.
-    pub view: V3<R>,
-    /// S = (o, S.z^2, 1 - |N.V|, dapple).
-    pub silhouette: [R; 4],
-}
-
-/// V and S of a vertex seen from `eye`. `dapple` is the third row of the listing's `DappleXf`: the
-/// direction from which light falls through leaves. An eye on the vertex itself sees along -Z.
-#[inline]
-pub fn sight<R: Real>(surface: &Surface<R>, eye: V3<R>, dapple: V3<R>) -> Sight<R> {
-    let zero = eye[0].lit(0.0);
-    let (view, _) = normalize_or(sub(surface.position, eye), [zero, zero, zero.lit(-1.0)]);
-    let z = silhouette(dot(surface.normal, view));
-    Sight { view, silhouette: [surface.occlusion, z * z, z, dot(dapple, surface.normal)] }
 }
 
 #[cfg(test)]

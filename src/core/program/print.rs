@@ -13,7 +13,16 @@ use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
 /// A tape's instructions as statements, each line indented by `indent`; the outputs' expressions.
 #[must_use]
 pub fn statements(tape: &Tape, indent: &str) -> (String, Vec<String>) {
-    let mut printer = Printer { tape, text: String::new(), indent: indent.to_owned(), ends: Vec::new() };
+    let differs = tape.graph.made_of(|graph, id| matches!(graph.node(id), Node::Uniform(_)));
+    let constant = |operand: &Operand| match *operand {
+        Operand::Of(id) | Operand::ReciprocalOf(id) | Operand::FlagOf(id) => !differs[id.index()],
+    };
+    // What is made of no input has the same value whatever they are.
+    let values = tape.uniform_values(|_| 0.0);
+    let constants =
+        tape.uniforms.iter().zip(values).map(|(operand, value)| constant(operand).then_some(value)).collect();
+    let mut printer =
+        Printer { tape, constants, text: String::new(), indent: indent.to_owned(), ends: Vec::new() };
     for (at, instruction) in tape.instructions.iter().enumerate() {
         printer.close(at);
         printer.instruction(at, instruction);
@@ -25,6 +34,8 @@ pub fn statements(tape: &Tape, indent: &str) -> (String, Vec<String>) {
 
 struct Printer<'a> {
     tape: &'a Tape,
+    /// The values of numbers that all samples share and that no input changes.
+    constants: Vec<Option<f64>>,
     text: String,
     indent: String,
     /// The instructions before which blocks end that are seldom run.
@@ -47,11 +58,9 @@ impl Printer<'_> {
     fn slot(&self, slot: &Slot) -> String {
         match *slot {
             Slot::Register(at) => format!("r{at}"),
-            Slot::Uniform(at) => match self.tape.uniforms[at] {
-                Operand::Of(id) if let Node::Constant(bits) = self.tape.graph.node(id) => {
-                    format!("lit({:?})", f64::from_bits(bits))
-                }
-                _ => format!("u({at})"),
+            Slot::Uniform(at) => match self.constants[at] {
+                Some(value) => format!("lit({value:?})"),
+                None => format!("u({at})"),
             },
         }
     }

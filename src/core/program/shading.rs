@@ -5,9 +5,9 @@ use std::fmt::Write as _;
 
 use super::graph::{Binary, Graph, Id, Input, Node};
 use super::lower::{LowerError, Natives, Source, Value};
-use crate::model::compose::TermName;
-use crate::model::lights::KeyLight;
+use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
+use crate::model::terms::TermName;
 use crate::shader::emit::{Plan, hazy, parts, sample_fields};
 use crate::shader::module::{sample_struct, uniform};
 use crate::shader::rule::Stage;
@@ -259,7 +259,7 @@ fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
 /// The value of a constant of the rules at `params`; `None` for one that no parameter gives.
 #[must_use]
 pub fn constant(input: &Input, params: &Params) -> Option<f64> {
-    let key = || KeyLight::new(params, 0.0_f64);
+    let key = || KeyLight::new(params);
     let value = match Constant::from_name(&input.name)? {
         Constant::Param(param) => params.rgb(param),
         Constant::Turn => {

@@ -5,8 +5,8 @@ use rayon::prelude::*;
 
 use crate::bake::Illumination;
 use crate::model::cube::Cube;
+use crate::model::effects::Effect;
 use crate::model::evaluate::Setup;
-use crate::model::lights::{Cubes, Lights};
 use crate::model::params::{Param, Params};
 use crate::model::vector::{V3, dot, normalize_or, scale_add};
 use crate::samples::{LANES, ViewSamples};
@@ -35,20 +35,19 @@ pub fn places(
     [width, height]: [usize; 2],
 ) -> Places {
     let lobe = illumination.lobes.as_ref().map(|stack| stack.at(params.scalar(Param::SpecularLobe)).0);
-    let cubes = Cubes {
-        irradiance: illumination.irradiance.as_ref(),
-        specular: lobe.as_ref(),
-        lobe_slope: None,
-        hilite: None,
+    let (needs, side) = (setup.needs(), setup.effects.has(Effect::SideSpecular));
+    let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
+    let lights = Lights {
+        irradiance: illumination.irradiance.as_ref().filter(|_| needs.irradiance),
+        specular: lobe.as_ref().filter(|_| side || needs.dapple),
+        turn: [cos as f32, sin as f32],
     };
-    let lights = Lights::new(setup, params, cubes, false, 0.0_f32);
-    let mirror = lights.side.or(lights.mirror);
     let plane = |there: bool| vec![0.0; if there { width * height } else { 0 }];
     let mut places = Places {
         open: plane(samples.surface.places().occlusion.is_some()),
         facing: plane(true),
         lit: plane(lights.irradiance.is_some()),
-        mirrored: plane(mirror.is_some()),
+        mirrored: plane(lights.specular.is_some()),
     };
     let groups = (0..samples.groups()).into_par_iter();
     let found: Vec<Vec<(usize, [f32; 4])>> = groups.map(|group| of_group(samples, group, &lights)).collect();
@@ -63,8 +62,26 @@ pub fn places(
     places
 }
 
+/// The cubes that are looked at, and the cosine and sine of the environment's turn.
+#[derive(Clone, Copy)]
+struct Lights<'a> {
+    irradiance: Option<&'a Cube<f32>>,
+    specular: Option<&'a Cube<f32>>,
+    turn: [f32; 2],
+}
+
+impl Lights<'_> {
+    /// Luminance along a direction of the world; 0 without the cube.
+    fn luminance(&self, cube: Option<&Cube<f32>>, [x, y, z]: V3<f32>) -> f32 {
+        let [cos, sin] = self.turn;
+        let along = [cos * x - sin * z, y, sin * x + cos * z];
+        let [r, g, b, _] = cube.map_or([0.0; 4], |cube| cube.sample(along));
+        0.2126 * r + 0.7152 * g + 0.0722 * b
+    }
+}
+
 /// Index and means of each pixel of a group: open, facing, lit, mirrored.
-fn of_group(samples: &ViewSamples, group: usize, lights: &Lights<'_, f32>) -> Vec<(usize, [f32; 4])> {
+fn of_group(samples: &ViewSamples, group: usize, lights: &Lights<'_>) -> Vec<(usize, [f32; 4])> {
     let records = samples.group_start[group] as usize..samples.group_start[group + 1] as usize;
     let pixel = |lane: usize| {
         let index = samples.pixel[group * LANES + lane];
@@ -81,18 +98,15 @@ fn of_group(samples: &ViewSamples, group: usize, lights: &Lights<'_, f32>) -> Ve
     (0..LANES).filter_map(pixel).collect()
 }
 
-fn of_sample(samples: &ViewSamples, slot: usize, lights: &Lights<'_, f32>) -> [f32; 4] {
+fn of_sample(samples: &ViewSamples, slot: usize, lights: &Lights<'_>) -> [f32; 4] {
     let fragment = samples.surface.fragment(slot);
     let (view, _) = normalize_or(fragment.view, [0.0, 0.0, -1.0]);
     let (normal, _) = normalize_or(fragment.normal, view.map(|x| -x));
     let cosine = dot(normal, view);
     let reflection = scale_add(-2.0 * cosine, normal, view);
-    let luminance = |cube: Option<&Cube<f32>>, along: V3<f32>| {
-        let [r, g, b, _] = cube.map_or([0.0; 4], |cube| cube.sample(lights.turned(along)));
-        0.2126 * r + 0.7152 * g + 0.0722 * b
-    };
-    let mirror = lights.side.or(lights.mirror);
-    [fragment.occlusion, cosine.abs(), luminance(lights.irradiance, normal), luminance(mirror, reflection)]
+    let lit = lights.luminance(lights.irradiance, normal);
+    let mirrored = lights.luminance(lights.specular, reflection);
+    [fragment.occlusion, cosine.abs(), lit, mirrored]
 }
 
 #[cfg(test)]
@@ -100,7 +114,7 @@ mod tests {
     use super::*;
     use crate::bake::LobeStack;
     use crate::model::cube::texel_direction;
-    use crate::model::effects::{Effect, Effects, Form, Silhouette};
+    use crate::model::effects::{Effects, Form, Silhouette};
     use crate::model::fragment::Fragment;
     use crate::samples::SurfaceRecords;
     use crate::samples::surface_records::{Asked, NEUTRAL};

@@ -7,15 +7,12 @@ use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
 use crate::model::effects::{Form, Silhouette};
 use crate::model::evaluate::Setup;
-use crate::model::fragment::{Fragment, guarded};
+use crate::model::fragment::{Fragment, decode_normal, guarded};
 use crate::model::params::Param;
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
 use crate::scene::maps::Maps;
 use crate::scene::mesh::PosedMesh;
-
-/// A decoded z that is positive is at least this, so that the normal never vanishes.
-const LEAST_Z: f32 = 1e-6;
 
 /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads its neutral
 /// value, which it does not decode.
@@ -149,16 +146,9 @@ impl<'a> Surface<'a> {
     /// The normal map's part along N, and its part along T and B.
     fn bumped(&self, uv: Vec2, n: Vec3, t: Vec3, b: Vec3) -> (Vec3, Vec3) {
         let texel = self.maps.normal.as_ref().map_or([0.5, 0.5, 1.0], |map| map.sample(uv.x, uv.y));
-        let texel = Vec3::from(texel);
-        let d = match self.form {
-            Form::Listing => texel,
-            Form::Corrected => 2.0 * texel - 1.0,
-        };
-        if d == Vec3::ZERO || !d.is_finite() {
-            return (n, Vec3::ZERO);
-        }
-        let z = if (0.0..LEAST_Z).contains(&d.z) { LEAST_Z } else { d.z };
-        (z * n, d.x * t + d.y * b)
+        let [t, b, n] = [t, b, n].map(|v| v.to_array());
+        let (base, bump) = decode_normal(self.form, texel, t, b, n);
+        (base.into(), bump.into())
     }
 
     /// The unit vector from the eye to the point.

@@ -7,7 +7,7 @@ use super::kept::kept_fields;
 use super::quantity::{Attribute, Constant, Kind, Resource};
 use super::rule::{LIBRARY, Rule, Stage, rules};
 use super::search::{INTERPOLATION_COST, PlanError, VERTEX_SHARE, components, search};
-use crate::model::compose::TermName;
+use crate::model::terms::TermName;
 
 /// The shader that a scene gets.
 #[derive(Clone, Debug)]

@@ -1,9 +1,9 @@
 //! What a scene calls for: the input of the planner.
 
-use crate::model::compose::TermName;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::terms::TermName;
 use crate::shader::quantity::Resource;
 
 /// How far the output may be off, relative to white diffuse light of unit irradiance.
@@ -26,7 +26,7 @@ pub enum Source {
     Raster,
     /// Stored samples: what `model::fragment::Fragment` holds, read in a compute shader.
     Samples,
-    /// Stored terms: what `model::terms::Terms` holds, and S.x. That is all that shading reads where
+    /// Stored terms: each light's before its weight, S.z and S.x. That is all that shading reads where
     /// nothing changes that needs a lookup.
     Terms,
 }

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use super::emit::{Plan, hazy, parts, sample_fields};
 use super::quantity::{Constant, Kind, Resource};
 use super::rule::Stage;
-use crate::model::lights::KeyLight;
+use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 
 impl Plan {
@@ -170,7 +170,7 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
             let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
             Some(("vec2f", vec![cos, sin]))
         }
-        Constant::KeyDirection => Some(("vec3f", KeyLight::new(params, 0.0_f64).direction.to_vec())),
+        Constant::KeyDirection => Some(("vec3f", KeyLight::new(params).direction.to_vec())),
         Constant::Eye
         | Constant::ViewProjection
         | Constant::KeyByAzimuth

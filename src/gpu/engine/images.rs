@@ -9,7 +9,7 @@ use super::lights::Inputs;
 use super::parts::{PART_BYTES, Parts};
 use super::pipeline::{Uniform, bind_part, buffer, encoder, part_layout, pipeline};
 use super::{GpuEngine, OnDevice};
-use crate::model::compose::TermName;
+use crate::model::terms::TermName;
 use crate::readback::read_floats;
 use crate::timing::Timer;
 use crate::{Gpu, GpuError};

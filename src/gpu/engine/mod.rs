@@ -32,9 +32,9 @@ use self::program::Program;
 pub use self::samples::{DeviceSampleError, DeviceSamples};
 use self::terms::replace_samples;
 use crate::bake::Illumination;
-use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
+use crate::model::terms::TermName;
 use crate::scene::Loss;
 use crate::shader::facts::FaceSizes;
 use crate::{Gpu, GpuError};
@@ -411,8 +411,9 @@ impl Objective for GpuEngine<'_> {
             let mut alone = vec![ObservedView::default(); self.views.len()];
             alone[index] = self.views[index].clone();
             let (illumination, unknowns) = (self.illumination.clone(), self.unknowns.clone());
-            let mut engine =
+            let engine =
                 CpuEngine::with_kept_terms(self.setup, illumination, alone, self.loss, unknowns, false);
+            let mut engine = engine.ok()?;
             engine.set_stride(self.stride);
             let mut of_view = engine.pulls(point, widths)?;
             pulls.residuals.push(of_view.residuals.swap_remove(index));

@@ -20,13 +20,13 @@ impl<'a> Clocks<'a> {
     /// Of the whole model, and of its renderer `when` that is wished for.
     ///
     /// # Errors
-    /// When an adapter was wished for and there is none, or it fails.
+    /// When an adapter was wished for and there is none, or it fails, or a rule cannot be computed on the processor.
     pub fn new(whole: &'a Subject, point: &Point, when: GpuTiming) -> Result<Self, StudyError> {
         let (gpu, warning) = match when {
             GpuTiming::Never => (gpu::Clock::none(), None),
             GpuTiming::Auto | GpuTiming::Always => gpu::Clock::open(whole, point, when == GpuTiming::Always)?,
         };
-        Ok(Self { engine: whole.live_engine(), point: point.clone(), gpu, warning })
+        Ok(Self { engine: whole.live_engine()?, point: point.clone(), gpu, warning })
     }
 
     /// What the renderer is timed on.
@@ -39,9 +39,9 @@ impl<'a> Clocks<'a> {
     /// whole model's.
     ///
     /// # Errors
-    /// When the adapter fails.
+    /// When the adapter fails, or a rule cannot be computed on the processor.
     pub fn time(&self, case: &Subject, point: &Point) -> Result<(Timed, Option<Timed>), StudyError> {
-        let own = case.live_engine();
+        let own = case.live_engine()?;
         let mut whole_pass = || Ok::<f64, StudyError>(seconds_of(|| self.engine.loss(&self.point)));
         let mut own_pass = || Ok(seconds_of(|| own.loss(point)));
         let cpu = interleaved(Rounds::default(), &mut [&mut whole_pass, &mut own_pass])?;

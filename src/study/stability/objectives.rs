@@ -61,9 +61,9 @@ pub trait EngineFactory {
 pub struct Cpu;
 
 impl Cpu {
-    fn engine(inputs: &EngineInputs) -> CpuEngine {
+    fn engine(inputs: &EngineInputs) -> Result<CpuEngine, String> {
         let EngineInputs { setup, illumination, views, loss, unknowns } = inputs.clone();
-        CpuEngine::new(setup, illumination, views, loss, unknowns)
+        CpuEngine::new(setup, illumination, views, loss, unknowns).map_err(|error| error.to_string())
     }
 }
 
@@ -77,11 +77,11 @@ impl EngineFactory for Cpu {
         _: &Point,
         then: &mut dyn FnMut(&dyn Objective),
     ) -> Result<(), String> {
-        then(&Self::engine(inputs));
+        then(&Self::engine(inputs)?);
         Ok(())
     }
     fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
-        Ok(Self::engine(inputs).image(0, point))
+        Ok(Self::engine(inputs)?.image(0, point))
     }
 }
 

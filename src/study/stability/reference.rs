@@ -15,8 +15,9 @@ use super::case::{Batch, FragmentInputs, Setting};
 use super::evaluate::{Rgba, Slopes, TARGET};
 use super::lights::LightBox;
 use super::rules::{Rules, Shading};
-use crate::engine::residual::{Weighted, weighted_residual};
+use crate::engine::residual::{Residuals, Weighted};
 use crate::engine::rules::CubesAt;
+use crate::model::batch::Batch as Several;
 use crate::model::effects::Silhouette;
 use crate::model::fragment::Fragment;
 use crate::model::params::{Param, Params};
@@ -80,12 +81,11 @@ struct Contribution {
 impl Contribution {
     const NOTHING: Self = Self { loss: 0.0, residual: 0.0, jtr: [0.0; Param::COUNT], jtj: [0.0; PAIRS] };
 
-    fn of(setting: &Setting, value: &Rgba, slopes: &Slopes) -> Self {
+    fn of(residuals: &Residuals, value: &Rgba, slopes: &Slopes) -> Self {
         let mut sum = Self::NOTHING;
-        for c in 0..4 {
-            let target = f64::from(TARGET[c]);
-            let Weighted { loss, scale, residual } =
-                weighted_residual(setting.loss, None, value[c], target, 1.0);
+        let target = TARGET.map(f64::from);
+        let all = residuals.weigh(None, Several(*value), Several(target), Several([1.0; 4]));
+        for (c, Weighted { loss, scale, residual }) in all.each().enumerate() {
             sum.loss += loss;
             sum.residual += residual * residual;
             let mut at = 0;
@@ -138,6 +138,7 @@ impl Reference {
         let setting = &batch.setting;
         let light = lights.of(setting.lights);
         let rules = Rules::of(setting.setup, light)?;
+        let residuals = Residuals::new(setting.loss);
         let cubes = CubesAt::new(light, &setting.params, f64::from);
         let mut rng = StdRng::seed_from_u64(0);
         let mut rounded = || {
@@ -147,8 +148,16 @@ impl Reference {
         // With few of them the worst rounding of a difference of texels may not be among them.
         let others: Vec<_> = (0..(moves / 2).clamp(3, MOST_CUBES)).map(|_| rounded()).collect();
         // The same moves for each, so that a fragment fares alike alone and among others.
-        let each =
-            |inputs| one(setting, &rules, (&cubes, &others), inputs, moves, &mut StdRng::seed_from_u64(1));
+        let each = |inputs| {
+            one(
+                setting,
+                (&rules, &residuals),
+                (&cubes, &others),
+                inputs,
+                moves,
+                &mut StdRng::seed_from_u64(1),
+            )
+        };
         Ok(Self { fragments: batch.fragments.par_iter().map(each).collect() })
     }
 
@@ -190,7 +199,7 @@ pub const fn pair(a: usize, b: usize) -> usize {
 
 fn one(
     setting: &Setting,
-    rules: &Rules,
+    (rules, residuals): (&Rules, &Residuals),
     (cubes, others): (&CubesAt<f64>, &[CubesAt<f64>]),
     inputs: &FragmentInputs,
     moves: usize,
@@ -226,7 +235,7 @@ fn one(
             SUMMED * (2.0 * slopes[p][c].abs() + parts) + TINY
         })
     });
-    let contribution = Contribution::of(setting, &value, &slopes);
+    let contribution = Contribution::of(residuals, &value, &slopes);
     let mut contribution_tolerance = Contribution::NOTHING;
     let (mut value_size, mut slope_size) = (value.map(f64::abs), slopes.map(|slope| slope.map(f64::abs)));
     for number in 0..moves {
@@ -245,7 +254,7 @@ fn one(
                 slope_size[p][c] = slope_size[p][c].max(other_slopes[p][c].abs());
             }
         }
-        let mut difference = Contribution::of(setting, &other, &other_slopes);
+        let mut difference = Contribution::of(residuals, &other, &other_slopes);
         difference.combine(&contribution, |a, b| *a = SPREAD * (*a - b).abs());
         contribution_tolerance.combine(&difference, |a, b| *a = a.max(b));
     }

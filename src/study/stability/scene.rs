@@ -2,11 +2,11 @@
 
 use super::case::{Batch, FragmentInputs, Setting};
 use super::lights::LightKind;
-use crate::model::compose::TermName;
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;
 use crate::model::params::Param;
+use crate::model::terms::TermName;
 use crate::prepare::Prepared;
 use crate::samples::{LANES, ViewSamples};
 

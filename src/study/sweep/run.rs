@@ -78,6 +78,7 @@ fn run_fit(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, Job
     let outcome = fit(&engine, &prepared.start(), &options, &mut |_| {})?;
     let (setup, light) = (prepared.setup(), prepared.illumination.clone());
     let squares = CpuEngine::new(setup, light, engine.views().to_vec(), Loss::L2, Vec::new());
+    let squares = squares.map_err(StudyError::from)?;
     let view = |index: usize| prepared.scene.views.get(index).map_or("?", |view| &view.name);
     Ok(fit_figures(&outcome, squares.loss(&outcome.end).sqrt(), view))
 }

@@ -129,7 +129,7 @@ impl<'a> Bench<'a> {
         let images = evaluated.images(&self.point())?;
         std::hint::black_box(Difference::of_all(&images, &images));
         let images = since.elapsed().as_secs_f64();
-        let engine = evaluated.live_engine();
+        let engine = evaluated.live_engine()?;
         let pass = seconds_of(|| engine.loss(&self.point()));
         Ok(Rates { trace: self.prepared.seconds.samples, images, pass })
     }
@@ -304,21 +304,17 @@ impl Evaluated {
     }
 
     /// An engine over the samples that does every lookup anew, as a renderer does; its targets are black.
-    #[must_use]
-    pub fn live_engine(&self) -> CpuEngine {
+    ///
+    /// # Errors
+    /// When a rule cannot be computed on the processor.
+    pub fn live_engine(&self) -> Result<CpuEngine, StudyError> {
         let observed = |samples: &ViewSamples| ObservedView {
             target: Rows::new(3, samples.groups()),
             samples: samples.clone(),
             ..ObservedView::default()
         };
         let views = self.samples.iter().map(observed).collect();
-        CpuEngine::with_kept_terms(
-            self.setup(),
-            self.illumination.clone(),
-            views,
-            Loss::L2,
-            Vec::new(),
-            false,
-        )
+        let illumination = self.illumination.clone();
+        Ok(CpuEngine::with_kept_terms(self.setup(), illumination, views, Loss::L2, Vec::new(), false)?)
     }
 }

@@ -164,7 +164,7 @@ impl<'a> Fixed<'a> {
             views[view].weight = vec![Row::ZERO; groups];
         }
         let loss = self.scene.fit.loss;
-        let engine = CpuEngine::new(self.setup, illumination.clone(), views, loss, self.unknowns.clone());
+        let engine = CpuEngine::new(self.setup, illumination.clone(), views, loss, self.unknowns.clone())?;
         let options = FitOptions { interrupt: self.interrupt.clone(), ..FitOptions::default() };
         let outcome = fit::fit(&engine, start, &options, &mut |_| {})?;
         Ok((outcome.end, (outcome.loss_start, outcome.loss_end)))

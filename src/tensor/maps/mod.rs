@@ -29,6 +29,7 @@ pub use task::MapTask;
 use crate::TensorError;
 use crate::fit::FitError;
 use crate::gpu::GpuError;
+use crate::program::shading::ShadingError;
 
 /// A fit of maps that cannot be done.
 #[derive(Debug, thiserror::Error)]
@@ -61,6 +62,9 @@ pub enum MapError {
     /// The constants cannot be fitted.
     #[error(transparent)]
     Constants(#[from] FitError),
+    /// The rules cannot be computed on the processor.
+    #[error(transparent)]
+    Shading(#[from] ShadingError),
     /// A map that no enabled effect reads.
     #[error("no enabled effect reads {map}: it cannot be fitted. Leave it out, or enable {effects}.")]
     Unread {

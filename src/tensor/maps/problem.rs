@@ -1,14 +1,15 @@
 //! The loss of images and priors as a function of one layer's texels, and its slope.
 //!
 //! The loss is the engine's: the mean of weighted squared residuals, where a robust loss is fitted by reweighting.
-//! Weights and working targets are taken on the CPU from the very functions that the engine uses.
+//! Weights and working targets are taken on the CPU from the very text that the engine uses.
 
 use burn::tensor::{Tensor, TensorData};
 
 use super::MapError;
 use super::layer::Layer;
-use crate::engine::residual::weighted_residual;
+use crate::engine::residual::{Residuals, Weighted};
 use crate::engine::view::ObservedView;
+use crate::model::batch::Batch;
 use crate::samples::LANES;
 use crate::scene::Loss;
 use crate::{Input, Inputs, Shade, SharedDevice, TensorError};
@@ -32,6 +33,17 @@ struct Part {
     /// Working targets and their weights (which add up to 1 over all parts): \[slots, 4\].
     target: Tensor<2>,
     weight: Tensor<2>,
+}
+
+/// What a pixel slot of an image shows, times its view's gain.
+fn shown(image: &[f32], slot: usize, gain: f64) -> Batch<f64, 4> {
+    Batch(std::array::from_fn(|c| gain * f64::from(image[4 * slot + c])))
+}
+
+/// The target at a view's slot; 0 in channels that are not compared.
+fn wanted(view: &ObservedView, slot: usize) -> Batch<f64, 4> {
+    let channel = |c| if c < view.target.stride() { f64::from(view.target.number(c, slot)) } else { 0.0 };
+    Batch(std::array::from_fn(channel))
 }
 
 /// A view's part in the loss.
@@ -85,13 +97,14 @@ impl Problem {
     /// Take gains, weights and working targets anew, at the present image.
     ///
     /// # Errors
-    /// When the device does not take it.
+    /// When the device does not take it, or the loss cannot be computed on the processor.
     pub fn reweight(
         &mut self,
         shared: &SharedDevice,
         views: &[Observed<'_>],
         loss: Loss,
-    ) -> Result<(), TensorError> {
+    ) -> Result<(), MapError> {
+        let residuals = Residuals::new(loss);
         let image = self.image()?;
         let (mut gains, mut targets, mut weights) = (Vec::new(), Vec::new(), Vec::new());
         let mut total = 0.0;
@@ -100,14 +113,13 @@ impl Problem {
             for slot in 0..view.samples.groups() * LANES {
                 let pixel = if *counts { f64::from(view.pixel_weight(slot)) } else { 0.0 };
                 total += pixel * channels as f64;
-                for c in 0..4 {
-                    let shown = gain * f64::from(image[4 * gains.len() + c]);
+                let shown = shown(&image, gains.len(), *gain);
+                let rows = residuals.weigh(view.clip, shown, wanted(view, slot), Batch([pixel; 4]));
+                for (c, Weighted { scale, residual, .. }) in rows.each().enumerate() {
                     let (target, weight) = if c < channels && pixel > 0.0 {
-                        let target = f64::from(view.target.number(c, slot));
-                        let row = weighted_residual(loss, view.clip, shown, target, pixel);
                         // Where the slope of a robust loss is not its weight times the residual, the target gives way.
-                        let residual = if row.scale > 0.0 { row.residual / row.scale } else { 0.0 };
-                        (shown - residual, row.scale * row.scale)
+                        let residual = if scale > 0.0 { residual / scale } else { 0.0 };
+                        (shown.0[c] - residual, scale * scale)
                     } else {
                         (0.0, 0.0)
                     };
@@ -146,8 +158,9 @@ impl Problem {
     /// stand for it.
     ///
     /// # Errors
-    /// When the device does not give the image.
-    pub fn loss(&self, views: &[Observed<'_>], loss: Loss) -> Result<f64, TensorError> {
+    /// When the device does not give the image, or the loss cannot be computed on the processor.
+    pub fn loss(&self, views: &[Observed<'_>], loss: Loss) -> Result<f64, MapError> {
+        let residuals = Residuals::new(loss);
         let image = self.image()?;
         let (mut sum, mut total, mut first) = (0.0, 0.0, 0);
         for Observed { view, gain, counts } in views {
@@ -156,11 +169,9 @@ impl Problem {
             for slot in (0..slots).filter(|&slot| *counts && view.pixel_weight(slot) > 0.0) {
                 let pixel = f64::from(view.pixel_weight(slot));
                 total += pixel * channels as f64;
-                for c in 0..channels {
-                    let shown = gain * f64::from(image[4 * (first + slot) + c]);
-                    let target = f64::from(view.target.number(c, slot));
-                    sum += weighted_residual(loss, view.clip, shown, target, pixel).loss;
-                }
+                let shown = shown(&image, first + slot, *gain);
+                let rows = residuals.weigh(view.clip, shown, wanted(view, slot), Batch([pixel; 4]));
+                sum += rows.loss.0[..channels].iter().sum::<f64>();
             }
             first += slots;
         }

@@ -2,8 +2,8 @@
 
 use skinfit::bake::bake_pose;
 use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
-use skinfit::model::compose::TermName;
 use skinfit::model::effects::Effect;
+use skinfit::model::terms::TermName;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
 use skinfit::scene::animation::Animation;

@@ -8,10 +8,10 @@ use skinfit::engine::view::ObservedView;
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
 use skinfit::fit::{FitOptions, Tolerances, fit};
 use skinfit::gpu::{Choice, Gpu, GpuError};
-use skinfit::model::compose::TermName;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Column, Param};
+use skinfit::model::terms::TermName;
 use skinfit::prepare::{PrepareOptions, Prepared};
 use skinfit::samples::rows::Rows;
 use skinfit::samples::surface_records::Asked;
@@ -455,7 +455,7 @@ fn fit_on_both(gpu: &Gpu, scene: &Path) {
     };
     let start = prepared.start();
     let ours = GpuEngine::new(gpu, task, &start, Memory::default()).unwrap();
-    let theirs = prepared.engine_over(observed.clone());
+    let theirs = prepared.engine_over(observed.clone()).unwrap();
     let [ours, theirs] = [&ours as &dyn Objective, &theirs]
         .map(|engine| fit(engine, &start, &to_the_end(), &mut |_| {}).unwrap());
     let what = scene.display();
@@ -495,8 +495,7 @@ fn fits_of_built_in_and_shared_scenes_end_where_the_cpu_engines_do() {
 #[test]
 fn tiles_of_every_view_pull_as_the_cpu_engines_do() {
     let Some(gpu) = gpu() else { return };
-    // The printed listing interpolates its rim, which the rules alone know: as in the corrected form, but by another of
-    // the CPU's engines.
+    // The printed listing interpolates its rim.
     let scene = built_in();
     let text = std::fs::read_to_string(&scene).unwrap();
     let listing = scene.with_file_name("listing.toml");
@@ -517,7 +516,7 @@ fn tiles_of_every_view_pull_as_the_cpu_engines_do() {
         };
         let (start, widths) = (prepared.start(), prepared.image_widths());
         let ours = GpuEngine::new(gpu, task, &start, Memory::default()).unwrap();
-        let theirs = prepared.engine_over(observed.clone());
+        let theirs = prepared.engine_over(observed.clone()).unwrap();
         let [ours, theirs] =
             [&ours as &dyn Objective, &theirs].map(|engine| engine.pulls(&start, &widths).unwrap());
         assert_eq!(ours.tiles.len(), theirs.tiles.len());

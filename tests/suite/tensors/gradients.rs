@@ -6,14 +6,13 @@ use skinfit::model::cube::Cube;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::fragment::Fragment;
-use skinfit::model::lights::{Cubes, Lights};
 use skinfit::model::params::{Column, Param, Params};
 use skinfit::samples::surface_records::{Asked, NEUTRAL};
 use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
 use skinfit::tensor::footprint::cube_border;
 use skinfit::tensor::{Input, Inputs, Scatter, Shade, Shaded, Sparse};
 
-use crate::evaluators::shade;
+use crate::evaluators::ByWitness;
 
 use super::bench::{Random, assert_near, matrix, numbers, shared};
 
@@ -82,7 +81,7 @@ impl Case {
         Self { setup: Setup::new(form, silhouette, effects), params, columns, samples, numbers }
     }
 
-    /// The image in f64.
+    /// The image in f64, by the witness.
     fn image(&self, numbers: &Numbers) -> Vec<f64> {
         let mut params = self.params.clone();
         for (column, &value) in self.columns.iter().zip(&numbers[0]) {
@@ -96,13 +95,7 @@ impl Case {
             })
         };
         let (irradiance, lobe, hilite) = (cube(0), cube(1), cube(2));
-        let cubes = Cubes {
-            irradiance: Some(&irradiance),
-            specular: Some(&lobe),
-            lobe_slope: None,
-            hilite: Some(&hilite),
-        };
-        let lights = Lights::new(self.setup, &params, cubes, true, 0.0_f64);
+        let witness = ByWitness::new(self.setup, [&irradiance, &lobe, &hilite], &params);
         let mut image = vec![0.0; 4 * GROUPS * LANES];
         for slot in 0..GROUPS * LANES {
             let group = slot / LANES;
@@ -122,7 +115,7 @@ impl Case {
                     specular: numbers[2][s],
                     attenuator: numbers[3][s],
                 };
-                let shown = shade(self.setup, &lights, &fragment, &params);
+                let shown = witness.shade(&fragment);
                 let share = f64::from(self.samples.surface.weight(s));
                 (0..4).for_each(|c| image[4 * slot + c] += share * shown[c]);
             }

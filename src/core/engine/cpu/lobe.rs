@@ -7,19 +7,15 @@ use crate::model::cube::Cube;
 
 /// The specular cube at an exponent, and how it moves with that.
 #[derive(Debug)]
-pub(in crate::engine) struct Lobe {
+pub(super) struct Lobe {
     exponent: f64,
-    pub(in crate::engine) cube: Cube<f32>,
-    pub(in crate::engine) slope: Cube<f32>,
+    pub(super) cube: Cube<f32>,
+    pub(super) slope: Cube<f32>,
 }
 
 impl Lobe {
     /// The one in `slot` where its exponent is that; else a new one, left there.
-    pub(in crate::engine) fn at(
-        stack: &LobeStack,
-        exponent: f64,
-        slot: &mut Option<Arc<Self>>,
-    ) -> Option<Arc<Self>> {
+    pub(super) fn at(stack: &LobeStack, exponent: f64, slot: &mut Option<Arc<Self>>) -> Option<Arc<Self>> {
         if let Some(lobe) = slot.as_ref().filter(|lobe| lobe.exponent == exponent) {
             return Some(Arc::clone(lobe));
         }

@@ -1,128 +1,140 @@
-//! The CPU engine: all cores, SIMD, and the same sums for any number of threads.
+//! The engine on the processor: loss, gradient and normal equations of what the planner chose.
 //!
-//! Samples are cut into chunks of a fixed number of groups. Within a chunk products are summed in
-//! f32 lanes (at most 64 terms a lane), then folded to f64; the chunks' sums are added pairwise in
-//! their order. So the order of additions never depends on threads, and the rounding error stays
-//! that of short sums however many samples there are.
+//! The planner's rules for stored samples, their tangents and the loss become tapes ([`crate::program`]): one that
+//! makes what is kept, and one for each kind of pass. Samples are cut into chunks of a fixed number of groups. Within a
+//! chunk products are summed in f32 lanes (at most 64 terms a lane), then folded to f64; the chunks' sums are added
+//! pairwise in their order. So the order of additions never depends on threads, and the rounding error stays that of
+//! short sums however many samples there are.
 //!
-//! - `kept`: what stays from pass to pass: the lobe's cube, and terms that no free parameter moves
+//! - `pass`: what a pass computes, as tapes
+//! - `ahead`: plans whose tapes are compiled ahead; `block`: what their functions read
+//! - `code`: other tapes as the code of a machine that has an accumulator; `machine`: that machine, on SIMD
+//! - `view_pass`: a view's blocks of records, from tapes' outputs to sums
+//! - `lobe`: the specular cube of the last exponent
 //! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
-//! - `image`: the forward pass
-//! - `pulls`: a pass that keeps the tiles of the images apart
 
-pub(super) mod image;
-mod kept;
-pub(super) mod lobe;
-mod pulls;
-pub(super) mod sums;
+mod ahead;
+mod block;
+mod code;
+mod lobe;
+mod machine;
+mod pass;
+mod sums;
+mod view_pass;
 
-use std::sync::{Arc, Mutex};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use self::kept::Kept;
+use self::block::neutral_rows;
 use self::lobe::Lobe;
-use self::sums::{BLOCK, Blocks, CHUNK, Scratch, Sums, Wish, pairwise};
+use self::machine::{BATCH, Bound, File};
+use self::pass::{Fitted, Pass, Reading};
+use self::sums::{CHUNK, Sums, Wish, by_chunk, pairwise};
+use self::view_pass::{Scratch, ViewPass, streams};
 use super::gram::pair;
-use super::kernel::Kernel;
 use super::lanes::Lanes;
-use super::plan::Plan;
-use super::planned::PlannedEngine;
-use super::pulls::Pulls;
-use super::records::Records;
+use super::pulls::{Gathered, Pulls};
 use super::view::ObservedView;
-use super::{NormalEquations, Objective, Point, Unknown};
+use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
-use crate::model::compose::Weights;
+use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
-use crate::model::lights::{Cubes, Lights};
-use crate::model::params::{Param, Params};
-use crate::model::terms::LookupParam;
+use crate::model::params::Param;
+use crate::program::graph::Input;
+use crate::program::shading::{ShadingError, constant};
+use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::scene::Loss;
-use crate::simd::Simd;
 use crate::with_simd;
 
-/// Loss, gradient and normal equations on the CPU.
+/// Loss, gradient and normal equations on the CPU, of whatever rules the planner chose.
 #[derive(Debug)]
 pub struct CpuEngine {
-    setup: Setup,
     illumination: Illumination,
     views: Vec<ObservedView>,
+    fitted: Fitted,
     loss: Loss,
-    unknowns: Vec<Unknown>,
-    plan: Plan,
     level: Level,
-    /// Each pass reads every `stride`-th block of groups only.
     stride: usize,
-    /// Sum of weights over the pixels that a pass reads, and how many of them count.
     weight: (f64, u64),
-    /// The specular cube of the last exponent, and its slope.
+    /// For an environment that is turned, and for one that is not.
+    passes: Mutex<BTreeMap<bool, Arc<Pass>>>,
+    /// Rows of what stands in for fields that samples lack.
+    neutral: Vec<Row>,
     lobe: Mutex<Option<Arc<Lobe>>>,
-    /// Kept terms, and the parameters that they were made with.
     kept: Mutex<Option<Arc<Kept>>>,
-    /// What runs in the place of the kernel where the rules say what the kernel does not know; or why the processor
-    /// cannot compute them.
-    planned: Option<Result<PlannedEngine, String>>,
+    /// Why a pass could not be made.
+    fault: OnceLock<String>,
+}
+
+/// Kept numbers, and what they were made with.
+#[derive(Debug)]
+struct Kept {
+    turned: bool,
+    /// The numbers that all samples shared, and the specular cube's exponent.
+    made_with: (Vec<f64>, f64),
+    /// For each view, rows of each record.
+    views: Vec<Vec<Row>>,
 }
 
 impl CpuEngine {
     /// An engine over `views` for the `unknowns`.
-    #[must_use]
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
     pub fn new(
         setup: Setup,
         illumination: Illumination,
         views: Vec<ObservedView>,
         loss: Loss,
         unknowns: Vec<Unknown>,
-    ) -> Self {
+    ) -> Result<Self, ShadingError> {
         Self::with_kept_terms(setup, illumination, views, loss, unknowns, true)
     }
 
-    /// As [`Self::new`]; with `keep` false every lookup is done anew in each pass.
-    #[must_use]
+    /// As [`Self::new`]; with `keep` false every number is computed anew in each pass.
+    ///
+    /// # Errors
+    /// As of [`Self::new`].
     pub fn with_kept_terms(
         setup: Setup,
         illumination: Illumination,
-        mut views: Vec<ObservedView>,
+        views: Vec<ObservedView>,
         loss: Loss,
         unknowns: Vec<Unknown>,
         keep: bool,
-    ) -> Self {
-        let compare_alpha = views.iter().any(ObservedView::compares_alpha);
-        let plan = Plan::new(setup, &unknowns, compare_alpha, keep);
-        let planned = (!setup.hand_written()).then(|| {
-            let views = std::mem::take(&mut views);
-            let engine = PlannedEngine::new(setup, illumination.clone(), views, loss, unknowns.clone());
-            let mut engine = engine.map_err(|error| error.to_string())?;
-            engine.set_keep(keep);
-            Ok(engine)
-        });
+    ) -> Result<Self, ShadingError> {
+        let mut fitted = Fitted::new(setup, unknowns, &views);
+        fitted.keep = keep;
+        fitted.faces = super::face_sizes(&illumination);
+        let stride = views.iter().map(|view| view.samples.surface.rows().stride()).max();
         let mut engine = Self {
-            setup,
             illumination,
             views,
+            fitted,
             loss,
-            unknowns,
-            plan,
             level: Level::new(),
             stride: 1,
             weight: (0.0, 0),
-            lobe: Mutex::new(None),
-            kept: Mutex::new(None),
-            planned,
+            passes: Mutex::default(),
+            neutral: neutral_rows(stride.unwrap_or(0)),
+            lobe: Mutex::default(),
+            kept: Mutex::default(),
+            fault: OnceLock::new(),
         };
         engine.set_stride(1);
-        engine
+        // What cannot be computed shows here, and not in the midst of a fit.
+        engine.pass_for(false)?;
+        engine.pass_for(true)?;
+        Ok(engine)
     }
 
     /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
     pub fn set_stride(&mut self, stride: usize) {
         self.stride = stride.max(1);
-        if let Some(Ok(planned)) = &mut self.planned {
-            planned.set_stride(stride);
-        }
         self.weight = (0.0, 0);
         for view in &self.views {
             let groups = view.samples.groups();
@@ -137,109 +149,207 @@ impl CpuEngine {
     /// what others will compute.
     pub fn set_level(&mut self, level: Level) {
         self.level = level;
-        if let Some(Ok(planned)) = &mut self.planned {
-            planned.set_level(level);
-        }
         // What was kept was made with other instructions.
-        (self.lobe, self.kept) = (Mutex::new(None), Mutex::new(None));
-    }
-
-    /// The blocks that a pass reads.
-    fn read_blocks(&self, view: &ObservedView) -> impl Iterator<Item = usize> + use<> {
-        (0..view.samples.groups().div_ceil(BLOCK)).step_by(self.stride)
+        (self.lobe, self.kept) = (Mutex::default(), Mutex::default());
     }
 
     /// The views.
     #[must_use]
     pub fn views(&self) -> &[ObservedView] {
-        match &self.planned {
-            Some(Ok(planned)) => planned.views(),
-            _ => &self.views,
-        }
+        &self.views
     }
 
     /// Surface samples of positive weight, over all views.
     #[must_use]
     pub fn samples(&self) -> u64 {
-        self.views().iter().map(|view| view.samples.count() as u64).sum()
+        self.views.iter().map(|view| view.samples.count() as u64).sum()
     }
 
     /// How many blocks of pixels there are in all views.
     #[must_use]
     pub fn blocks(&self) -> usize {
-        self.views().iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
+        self.views.iter().map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
     }
 
-    #[inline(always)]
-    fn kernel<'a, S: Simd>(
+    fn read_blocks(&self, view: &ObservedView) -> impl Iterator<Item = usize> + use<> {
+        (0..view.samples.groups().div_ceil(BLOCK)).step_by(self.stride)
+    }
+
+    fn turned(&self, point: &Point) -> bool {
+        let turns = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
+        point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.fitted.unknowns.iter().any(turns)
+    }
+
+    fn pass_for(&self, turned: bool) -> Result<Arc<Pass>, ShadingError> {
+        let mut passes = self.passes.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(pass) = passes.get(&turned) {
+            return Ok(Arc::clone(pass));
+        }
+        let pass = Pass::new(&self.fitted, turned);
+        let pass = Arc::new(pass.inspect_err(|error| drop(self.fault.set(error.to_string())))?);
+        passes.insert(turned, Arc::clone(&pass));
+        Ok(pass)
+    }
+
+    fn lobe(&self, exponent: f64) -> Option<Arc<Lobe>> {
+        let mut slot = self.lobe.lock().unwrap_or_else(PoisonError::into_inner);
+        Lobe::at(self.illumination.lobes.as_ref()?, exponent, &mut slot)
+    }
+
+    /// A tape with what is the same for all records of a pass.
+    fn bound<'a>(&'a self, reading: &'a Reading, point: &Point, lobe: Option<&'a Lobe>) -> Bound<'a> {
+        let value = |input: &Input| constant(input, &point.params).unwrap_or(0.0);
+        let uniforms = reading.program.tape.uniform_values(value).into_iter().map(|x| x as f32).collect();
+        let cubes = reading.program.tape.resources.iter().filter_map(|name| self.cube(name, lobe)).collect();
+        Bound { program: &reading.program, loads: &reading.loads, cubes, uniforms }
+    }
+
+    fn cube<'a>(&'a self, name: &str, lobe: Option<&'a Lobe>) -> Option<&'a Cube<f32>> {
+        match name {
+            "irradiance_faces" => self.illumination.irradiance.as_ref(),
+            "hilite_faces" => self.illumination.hilite.as_ref(),
+            "specular_faces" => lobe.map(|lobe| &lobe.cube),
+            "specular_slope_faces" => lobe.map(|lobe| &lobe.slope),
+            _ => None,
+        }
+    }
+
+    /// What no free parameter changes, made on the first pass, and again should a held parameter differ.
+    fn kept(&self, pass: &Pass, turned: bool, point: &Point, lobe: Option<&Lobe>) -> Arc<Kept> {
+        let shared = |input: &Input| constant(input, &point.params).unwrap_or(0.0);
+        let exponent = pass.keep.program.tape.resources.iter().any(|name| name.starts_with("specular"));
+        let exponent = if exponent { point.params.scalar(Param::SpecularLobe) } else { 0.0 };
+        let made_with = (pass.keep.program.tape.uniform_values(shared), exponent);
+        let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(kept) = slot.as_ref().filter(|kept| kept.turned == turned && kept.made_with == made_with)
+        {
+            return Arc::clone(kept);
+        }
+        let views = (0..self.views.len()).map(|view| self.make_kept(pass, point, view, lobe)).collect();
+        let kept = Arc::new(Kept { turned, made_with, views });
+        *slot = Some(Arc::clone(&kept));
+        kept
+    }
+
+    fn make_kept(&self, pass: &Pass, point: &Point, view: usize, lobe: Option<&Lobe>) -> Vec<Row> {
+        let (stride, observed) = (pass.kept, &self.views[view]);
+        let records = observed.samples.records();
+        let mut kept = vec![Row::ZERO; records * stride];
+        if stride == 0 {
+            return kept;
+        }
+        let bound = self.bound(&pass.keep, point, lobe);
+        let streams = streams(observed, &[], 0, &self.neutral);
+        let size = BLOCK * CHUNK;
+        kept.par_chunks_mut(stride * size).enumerate().for_each_init(File::default, |file, (chunk, rows)| {
+            file.prepare(&bound);
+            with_simd!(self.level, simd => {
+                for (k, rows) in rows.chunks_mut(stride * BATCH).enumerate() {
+                    let count = rows.len() / stride;
+                    machine::run(simd, &bound, file, &streams, chunk * size + k * BATCH, count);
+                    for (output, column) in file.columns().iter().enumerate() {
+                        for i in 0..count {
+                            rows[i * stride + output] = column[i].get();
+                        }
+                    }
+                }
+            });
+        });
+        kept
+    }
+
+    /// What the blocks of a view read in a pass over one of the tapes, of whose outputs `read` are wanted.
+    fn view_pass<'a>(
         &'a self,
-        simd: S,
-        view: &'a ObservedView,
-        kept: &'a [Row],
-        params: &Params,
+        (reading, read): (&'a Reading, &'a [usize]),
+        (kept, stride): (&'a [Row], usize),
+        point: &Point,
+        view: usize,
         lobe: Option<&'a Lobe>,
-        gain: f64,
-    ) -> Kernel<'a, S> {
-        let like = Lanes::splat(simd, 0.0);
-        let cubes = Cubes {
-            irradiance: self.illumination.irradiance.as_ref(),
-            specular: lobe.map(|l| &l.cube),
-            lobe_slope: lobe.map(|l| &l.slope),
-            hilite: self.illumination.hilite.as_ref(),
-        };
-        let turning = self.plan.lookups.contains(&LookupParam::EnvironmentRotation);
-        Kernel {
-            simd,
-            plan: &self.plan,
-            view: Records::new(view),
-            kept,
-            lights: Lights::new(self.setup, params, cubes, turning, like),
-            weights: Weights::new(params, self.setup.effects, like),
-            strength: params.scalar(Param::NormalStrength) as f32,
-            gain: gain as f32,
+    ) -> ViewPass<'a> {
+        ViewPass {
+            view: &self.views[view],
+            streams: streams(&self.views[view], kept, stride, &self.neutral),
+            bound: self.bound(reading, point, lobe),
+            read,
             loss: self.loss,
+            gain: point.gains.get(view).copied().unwrap_or(1.0) as f32,
         }
     }
 
-    /// One pass: sums over every chunk of every view.
-    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
-        match &self.planned {
-            None => self.sum(point, wish),
-            Some(Ok(planned)) => planned.pass(point, wish),
-            // Told by `fault`; nothing takes the number for the loss.
-            Some(Err(_)) => NormalEquations { loss: f64::NAN, ..self.sum(point, wish) },
-        }
+    /// The image of view `index` at `point`: for each pixel slot the mean over its visible samples, colour and (where
+    /// the haze is compared) alpha, times the view's gain. A plane a channel.
+    #[must_use]
+    pub fn image(&self, index: usize, point: &Point) -> Vec<Vec<f32>> {
+        let mut planes = Vec::new();
+        self.image_into(index, point, &mut planes);
+        planes
     }
 
-    fn sum(&self, point: &Point, wish: Wish) -> NormalEquations {
+    /// As [`Self::image`], into the planes of an earlier image: memory that is new costs more than the pass.
+    pub fn image_into(&self, index: usize, point: &Point, planes: &mut Vec<Vec<f32>>) {
+        let turned = self.turned(point);
+        let Ok(pass) = self.pass_for(turned) else { return };
         let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
-        let kept = self.kept(&point.params, lobe.as_deref());
-        let k = self.unknowns.len();
+        let kept = self.kept(&pass, turned, point, lobe.as_deref());
+        let kept = (&kept.views[index][..], pass.kept);
+        let channels: Vec<usize> = (0..self.fitted.channels).collect();
+        let of_view = self.view_pass((&pass.value, &channels), kept, point, index, lobe.as_deref());
+        let groups = of_view.view.samples.groups();
+        planes.resize_with(channels.len(), Vec::new);
+        planes.iter_mut().for_each(|plane| plane.resize(groups * LANES, 0.0));
+        by_chunk(planes).par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (chunk, parts)| {
+            scratch.prepare(&of_view);
+            let first = chunk * BLOCK * CHUNK;
+            let end = groups.min(first + BLOCK * CHUNK);
+            with_simd!(self.level, simd => {
+                for start in (first..end).step_by(BATCH) {
+                    let count = BATCH.min(end - start);
+                    let shown = of_view.shown(simd, scratch, start, count);
+                    let gain = Lanes::splat(simd, of_view.gain);
+                    for (column, part) in shown.iter().zip(parts.iter_mut()) {
+                        for i in 0..count {
+                            let row = &mut part[(start - first + i) * LANES..][..LANES];
+                            row.copy_from_slice(&(gain * Lanes::of_row(simd, &column[i].get())).to_array());
+                        }
+                    }
+                }
+            });
+        });
+    }
+
+    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+        let channels = self.fitted.channels;
+        let k = self.fitted.unknowns.len();
         let mut total = NormalEquations {
             loss: 0.0,
             residual: 0.0,
-            weight: self.weight.0 * self.plan.channels.len() as f64,
-            count: self.weight.1 * self.plan.channels.len() as u64,
+            weight: self.weight.0 * channels as f64,
+            count: self.weight.1 * channels as u64,
             jtr: vec![0.0; k],
             jtj: vec![0.0; k * k],
         };
-        for (index, view) in self.views.iter().enumerate() {
-            let gain = point.gains.get(index).copied().unwrap_or(1.0);
-            let groups = view.samples.groups();
-            let blocks: Vec<usize> = self.read_blocks(view).collect();
+        let turned = self.turned(point);
+        let Ok(pass) = self.pass_for(turned) else {
+            total.loss = f64::NAN;
+            return total;
+        };
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let kept = self.kept(&pass, turned, point, lobe.as_deref());
+        let every: Vec<usize> = (0..channels).collect();
+        let of = if wish == Wish::Loss { (&pass.value, &every[..]) } else { (&pass.moved, &pass.read[..]) };
+        for view in 0..self.views.len() {
+            let kept = (&kept.views[view][..], pass.kept);
+            let of_view = self.view_pass(of, kept, point, view, lobe.as_deref());
+            let blocks: Vec<usize> = self.read_blocks(&self.views[view]).collect();
             let sums: Vec<Sums> = blocks
                 .par_chunks(CHUNK)
-                .map_init(
-                    || Scratch::new(&self.plan),
-                    |scratch, blocks| {
-                        with_simd!(self.level, simd => {
-                            let kernel = self.kernel(simd, view, &kept.views[index], &point.params, lobe.as_deref(), gain);
-                            sums::chunk(&kernel, Blocks { blocks, groups }, wish, scratch)
-                        })
-                    },
-                )
+                .map_init(Scratch::default, |scratch, blocks| {
+                    scratch.prepare(&of_view);
+                    with_simd!(self.level, simd => of_view.chunk(simd, &pass.channels, blocks, wish, scratch))
+                })
                 .collect();
-            self.add(index, &pairwise(sums), wish, &mut total);
+            self.add(view, &pass, &pairwise(sums), wish, &mut total);
         }
         if total.weight > 0.0 {
             total.loss /= total.weight;
@@ -247,71 +357,89 @@ impl CpuEngine {
         total
     }
 
+    /// A pass that keeps the tiles of the images apart.
+    fn tiled_pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
+        let turned = self.turned(point);
+        let pass = self.pass_for(turned).ok()?;
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let kept = self.kept(&pass, turned, point, lobe.as_deref());
+        let mut pulls = Pulls::default();
+        for (index, (view, &width)) in self.views.iter().zip(widths).enumerate() {
+            let kept = (&kept.views[index][..], pass.kept);
+            let of_view = self.view_pass((&pass.moved, &pass.read), kept, point, index, lobe.as_deref());
+            let own = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(index));
+            let columns: Vec<Vec<Option<usize>>> =
+                pass.channels.iter().map(|c| c.unknowns.iter().map(|u| u.or(own)).collect()).collect();
+            let groups = view.samples.groups();
+            let blocks: Vec<usize> = self.read_blocks(view).collect();
+            let parts = blocks.par_iter().map_init(Scratch::default, |scratch, &block| {
+                scratch.prepare(&of_view);
+                let mut gathered = Gathered::new(view, width, &columns, self.fitted.unknowns.len());
+                let end = groups.min((block + 1) * BLOCK);
+                for first in (block * BLOCK..end).step_by(BATCH) {
+                    let count = BATCH.min(end - first);
+                    with_simd!(self.level, simd => of_view.residuals(simd, &pass.channels, scratch, first, count));
+                    for i in 0..count {
+                        gathered.add(first + i, |channel, column| of_view.row(scratch, &pass.channels[channel], (channel, column), i));
+                    }
+                }
+                gathered
+            });
+            let parts: Vec<Gathered<'_>> = parts.collect();
+            pulls.add_view(index, width, parts);
+        }
+        Some(pulls)
+    }
+
     /// One view's packed sums into the full matrices.
-    fn add(&self, view: usize, sums: &Sums, wish: Wish, total: &mut NormalEquations) {
+    fn add(&self, view: usize, pass: &Pass, sums: &Sums, wish: Wish, total: &mut NormalEquations) {
         let Some(loss) = sums.0.last() else { return };
         total.loss += loss;
-        let k = self.unknowns.len();
-        let gain = self.unknowns.iter().position(|u| *u == Unknown::Gain(view));
+        let k = self.fitted.unknowns.len();
+        let gain = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(view));
         let mut base = 0;
-        for channel in &self.plan.channels {
-            let count = channel.columns + 1;
+        for channel in pass.channels.iter().filter(|_| wish != Wish::Loss) {
+            let (columns, count) = (channel.unknowns.len(), channel.unknowns.len() + 1);
             let unknown: Vec<Option<usize>> = channel.unknowns.iter().map(|u| u.or(gain)).collect();
-            match wish {
-                Wish::Loss => {}
-                Wish::Gradient => {
-                    for i in 0..channel.columns {
-                        if let Some(a) = unknown[i] {
-                            total.jtr[a] += sums.0[base + i];
-                        }
+            // Of a gradient there is the last column alone.
+            let entry = |i: usize, j: usize| if wish == Wish::Gradient { i } else { pair(i, j, count) };
+            for i in 0..columns {
+                let Some(a) = unknown[i] else { continue };
+                total.jtr[a] += sums.0[base + entry(i, columns)];
+                for j in (i..columns).filter(|_| wish == Wish::Normal) {
+                    let Some(b) = unknown[j] else { continue };
+                    let value = sums.0[base + entry(i, j)];
+                    total.jtj[a * k + b] += value;
+                    if a != b {
+                        total.jtj[b * k + a] += value;
                     }
-                    total.residual += sums.0[base + channel.columns];
-                    base += count;
-                }
-                Wish::Normal => {
-                    for i in 0..channel.columns {
-                        let Some(a) = unknown[i] else { continue };
-                        total.jtr[a] += sums.0[base + pair(i, channel.columns, count)];
-                        for j in i..channel.columns {
-                            let Some(b) = unknown[j] else { continue };
-                            let value = sums.0[base + pair(i, j, count)];
-                            total.jtj[a * k + b] += value;
-                            if a != b {
-                                total.jtj[b * k + a] += value;
-                            }
-                        }
-                    }
-                    total.residual += sums.0[base + pair(channel.columns, channel.columns, count)];
-                    base += channel.pairs();
                 }
             }
+            total.residual += sums.0[base + entry(columns, columns)];
+            base += if wish == Wish::Gradient { count } else { count * (count + 1) / 2 };
         }
     }
 }
 
 impl Objective for CpuEngine {
     fn unknowns(&self) -> &[Unknown] {
-        &self.unknowns
+        &self.fitted.unknowns
     }
 
     fn is_quadratic(&self) -> bool {
-        self.loss == Loss::L2 && self.views().iter().all(|view| view.clip.is_none())
+        self.loss == Loss::L2 && self.views.iter().all(|view| view.clip.is_none())
     }
 
     fn rounding(&self) -> f64 {
-        super::rounding(self.views(), self.loss, self.stride)
+        super::rounding(&self.views, self.loss, self.stride)
     }
 
     fn fault(&self) -> Option<String> {
-        self.planned.as_ref().and_then(|planned| planned.as_ref().err()).cloned()
+        self.fault.get().cloned()
     }
 
     fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
-        match &self.planned {
-            _ if widths.len() != self.views().len() => None,
-            None => Some(self.kernel_pulls(point, widths)),
-            Some(planned) => planned.as_ref().ok()?.pulls(point, widths),
-        }
+        if widths.len() == self.views.len() { self.tiled_pulls(point, widths) } else { None }
     }
 
     fn normal_equations(&self, point: &Point) -> NormalEquations {

@@ -4,7 +4,7 @@ fn lit_part(x: f32) -> f32 {
 }
 
 // 2 int_t^m (x - t) / (max(x, 0) + RELATIVE_FLOOR)^2 dx: near m = t the square relative to the model's own value, and a
-// loss whose slope is that of this square with its denominator held. Why: `relative_deviance` in residual.rs.
+// loss whose slope is that of this square with its denominator held. Why: `Residuals` in residual.rs.
 fn relative_deviance(shown: f32, observed: f32) -> f32 {
     let a = lit_part(shown);
     let b = lit_part(observed);
@@ -19,7 +19,8 @@ fn relative_deviance(shown: f32, observed: f32) -> f32 {
     // artanh(share) - share, by its series where the logarithm would cancel.
     let high = 0.1111111111 + square * (0.0909090909 + square * (0.0769230769 + square * 0.0666666667));
     let series = 0.3333333333 + square * (0.2 + square * (0.1428571429 + square * high));
-    let by_log = 0.34657359 * log2(p / q) - share;
+    // ln 2 as the library knows it, to all digits of any number.
+    let by_log = 0.5 * (0.6931472 * log2(p / q)) - share;
     let beyond = select(by_log, series * square * share, abs(share) <= RELATIVE_SMALL_SHARE);
     let bright = 2.0 * (share * of_model + 2.0 * beyond) - 2.0 * dark_observed * of_model / q;
     let inverse = 1.0 / RELATIVE_FLOOR;

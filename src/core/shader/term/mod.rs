@@ -38,10 +38,10 @@ use std::sync::{Mutex, PoisonError};
 use self::declaration::Declaration;
 pub use self::error::{Problem, TermError};
 use super::rule::{Rule, Stage};
-use crate::model::compose::{TermInfo, TermName};
 use crate::model::effects::{Effect, EffectInfo};
 use crate::model::params::{Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
+use crate::model::terms::{TermInfo, TermName};
 
 /// A term that was registered.
 #[derive(Debug)]

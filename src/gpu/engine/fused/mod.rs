@@ -23,9 +23,9 @@ pub use self::layout::Layout;
 pub use self::reduce::gather_module;
 pub use self::terms::{held_parameters, terms_module};
 
-use crate::model::compose::TermName;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param};
+use crate::model::terms::TermName;
 use crate::samples::LANES;
 use crate::scene::Loss;
 use crate::shader::emit::{Plan, plan, sample_fields};

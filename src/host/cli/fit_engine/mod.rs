@@ -228,7 +228,7 @@ impl FitEngineArguments {
         selection: Selection,
         then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
     ) -> Result<T, Refusal> {
-        let engine = FitEngine::Cpu(prepared.engine_over(observed));
+        let engine = FitEngine::Cpu(prepared.engine_over(observed)?);
         self.verify(prepared, &engine)?;
         then(&SelectedEngine { engine, selection })
     }

@@ -112,7 +112,9 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
     let option = match error {
         MapError::TooLarge { .. } | MapError::OutOfMemory { .. } => Some("--adapter"),
         MapError::Unread { .. } | MapError::NotUnwrapped { .. } => Some("--maps"),
-        MapError::Tensor(_) | MapError::NotFinite { .. } | MapError::Constants(_) => None,
+        MapError::Tensor(_) | MapError::NotFinite { .. } | MapError::Constants(_) | MapError::Shading(_) => {
+            None
+        }
     };
     let option = option.map(|option| format!(" ({option})")).unwrap_or_default();
     let words = format!("{}: {}{option}.", scene.display(), what.trim_end_matches('.'));
@@ -121,6 +123,7 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
             Refusal::failure(words)
         }
         MapError::Constants(_)
+        | MapError::Shading(_)
         | MapError::TooLarge { .. }
         | MapError::Unread { .. }
         | MapError::NotUnwrapped { .. } => Refusal::new(words),

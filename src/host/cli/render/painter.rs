@@ -129,7 +129,7 @@ mod gpu {
     use crate::gpu::timing::PassTime;
     use crate::gpu::upload::Content;
     use crate::gpu::{Gpu, GpuError, RenderOptions, Renderer};
-    use crate::model::compose::TermName;
+    use crate::model::terms::TermName;
 
     /// The production renderer.
     pub(in crate::cli::render) struct GpuPainter<'a> {

@@ -42,7 +42,7 @@ impl Axis for Formats {
                 _ => shader.shade(samples, camera, gain, Emulated::<Fixed>::new(0.0)),
             })
         };
-        let engine = evaluated.live_engine();
+        let engine = evaluated.live_engine()?;
         let mut wide = || {
             Ok::<f64, StudyError>(seconds_of(|| {
                 images_in(&evaluated, bench, |s, c, g| shader.shade(s, c, g, 0.0_f64))

@@ -64,6 +64,6 @@ fn swept<'a>(count: &'a dyn Fn(u32) -> f64) -> Swept<'a> {
 fn trace(bench: &Bench<'_>, settings: Settings) -> Result<f64, StudyError> {
     let mut evaluated = None;
     let tracing = seconds_of(|| evaluated = Some(bench.evaluate_anew(settings)));
-    let engine = evaluated.transpose()?.map(|evaluated| evaluated.live_engine());
+    let engine = evaluated.transpose()?.map(|evaluated| evaluated.live_engine()).transpose()?;
     Ok(tracing + engine.map_or(0.0, |engine| seconds_of(|| engine.loss(&bench.point()))))
 }

@@ -145,7 +145,7 @@ impl Fits {
             self.subject.engine.views().to_vec(),
             scene.fit.loss,
             self.subject.prepared.unknowns(),
-        );
+        )?;
         for &stride in strides {
             engine.set_stride(stride);
             let options = FitOptions {

@@ -2,11 +2,11 @@
 
 use super::machine::{self, BATCH, Bound, Column, File, FileColumns, Stream};
 use super::pass::ChannelColumns;
+use super::sums::{Sums, Wish, fold};
 use crate::engine::BLOCK;
-use crate::engine::cpu::sums::{Sums, Wish, fold};
 use crate::engine::gram::add_gram;
 use crate::engine::lanes::Lanes;
-use crate::engine::residual::weighted_residual;
+use crate::engine::residual::Residuals;
 use crate::engine::view::ObservedView;
 use crate::model::real::Real;
 use crate::samples::rows::Row;
@@ -160,7 +160,7 @@ impl ViewPass<'_> {
             let value = gain * machine::load(simd, &shown[channel][i]);
             let wanted = Lanes::of_row(simd, &self.view.target.record(first + i)[channel]);
             let weight = self.view.weight.get(first + i).map_or(one, |row| Lanes::of_row(simd, row));
-            let row = weighted_residual(self.loss, self.view.clip, value, wanted, weight);
+            let row = Residuals::new(self.loss).weigh(self.view.clip, value, wanted, weight);
             loss = loss + row.loss;
             machine::store(&compared.scale[i], row.scale);
             machine::store(&compared.residual[i], row.residual);

@@ -32,6 +32,7 @@ const MOVING: [Param; 5] = [
 /// A plan that is compiled ahead.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan {
+    #[cfg_attr(not(test), allow(dead_code, reason = "functions are printed by it"))]
     name: &'static str,
     form: Form,
     silhouette: Silhouette,
@@ -180,8 +181,8 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
-    use crate::engine::planned::machine::{self, BATCH, Bound, File, Program, Stream};
-    use crate::engine::planned::pass::{StreamOf, Tapes};
+    use crate::engine::cpu::machine::{self, BATCH, Bound, File, Program, Stream};
+    use crate::engine::cpu::pass::{StreamOf, Tapes};
     use crate::model::cube::Cube;
     use crate::program::cut::KEPT;
     use crate::program::evaluate::Shared;
@@ -264,7 +265,7 @@ use crate::simd::Simd;
 
     #[test]
     fn what_is_compiled_is_what_the_rules_say_today() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/engine/planned/ahead/tapes.rs");
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/engine/cpu/ahead/tapes.rs");
         let text = all_tapes();
         if std::env::var_os("SKINFIT_PRINT_PLANS").is_some() {
             std::fs::write(path, &text).unwrap();

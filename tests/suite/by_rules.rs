@@ -1,0 +1,197 @@
+//! The planned rules over single fragments, and functions of theirs alone, in any kind of number: f64, f32, and sixteen
+//! SIMD lanes of each instruction set.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use skinfit::engine::lanes::Lanes;
+use skinfit::model::cube::{Channel, Cube};
+use skinfit::model::evaluate::Setup;
+use skinfit::model::params::{Param, Params};
+use skinfit::model::real::Real;
+use skinfit::samples::LANES;
+use skinfit::shader::facts::{FaceSizes, MapFacts};
+use skinfit::shader::tangent::chain::Seed;
+use skinfit::shader::{Facts, Source};
+use skinfit_core::program::graph::{Graph, Input};
+use skinfit_core::program::lower::{self, Natives, Value};
+use skinfit_core::program::shading::{Shading, constant};
+use skinfit_core::program::steps::{self, Rounding, Steps};
+
+/// A number that holds one or more of f64's.
+pub(crate) trait Number: Real<Texel: Channel> {
+    /// How many.
+    const COUNT: usize;
+    fn texel(x: f64) -> Self::Texel;
+    /// Of [`Self::COUNT`] numbers.
+    fn pack(self, numbers: &[f64]) -> Self;
+    fn unpack(self) -> Vec<f64>;
+}
+
+impl Number for f64 {
+    const COUNT: usize = 1;
+    fn texel(x: f64) -> f64 {
+        x
+    }
+    fn pack(self, numbers: &[f64]) -> Self {
+        numbers[0]
+    }
+    fn unpack(self) -> Vec<f64> {
+        vec![self]
+    }
+}
+
+impl Number for f32 {
+    const COUNT: usize = 1;
+    fn texel(x: f64) -> f32 {
+        x as f32
+    }
+    fn pack(self, numbers: &[f64]) -> Self {
+        numbers[0] as f32
+    }
+    fn unpack(self) -> Vec<f64> {
+        vec![self.into()]
+    }
+}
+
+impl<S: fearless_simd::Simd> Number for Lanes<S> {
+    const COUNT: usize = LANES;
+    fn texel(x: f64) -> f32 {
+        x as f32
+    }
+    fn pack(self, numbers: &[f64]) -> Self {
+        Self::of_row(self.0.simd, &std::array::from_fn(|lane| numbers[lane] as f32))
+    }
+    fn unpack(self) -> Vec<f64> {
+        self.to_array().map(f64::from).to_vec()
+    }
+}
+
+/// The cubes that rules look up.
+#[derive(Clone, Debug)]
+pub(crate) struct Cubes<T> {
+    pub(crate) irradiance: Cube<T>,
+    pub(crate) specular: Cube<T>,
+    pub(crate) specular_slope: Cube<T>,
+    pub(crate) hilite: Cube<T>,
+}
+
+impl<T: Copy> Cubes<T> {
+    fn faces(&self) -> FaceSizes {
+        FaceSizes {
+            irradiance: Some(self.irradiance.size()),
+            specular: Some(self.specular.size()),
+            hilite: Some(self.hilite.size()),
+        }
+    }
+
+    fn named(&self, name: &str) -> &Cube<T> {
+        match name {
+            "irradiance_faces" => &self.irradiance,
+            "specular_faces" => &self.specular,
+            "specular_slope_faces" => &self.specular_slope,
+            "hilite_faces" => &self.hilite,
+            other => panic!("there is no cube {other}"),
+        }
+    }
+}
+
+/// What rules are asked for beside radiance and haze: how these move with parameters, and quantities on the way.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Wanted {
+    pub(crate) free: Vec<Param>,
+    pub(crate) quantities: Vec<&'static str>,
+}
+
+/// The rules of a setup for stored samples, with all that fragments share.
+pub(crate) struct Fragments<'a, R: Number> {
+    steps: Arc<Steps>,
+    setting: steps::Setting<'a, R>,
+    like: R,
+    slopes: usize,
+}
+
+/// A shaded fragment.
+#[derive(Clone, Debug)]
+pub(crate) struct Shaded<R> {
+    /// Radiance and haze.
+    pub(crate) rgba: [R; 4],
+    /// How they move with each of [`Wanted::free`].
+    pub(crate) slopes: Vec<[R; 4]>,
+    /// The numbers of [`Wanted::quantities`], one after another.
+    pub(crate) quantities: Vec<R>,
+}
+
+/// Plans, and what they were made for: they are the same in every kind of number.
+type Known = Vec<((Setup, FaceSizes, Wanted), Arc<Steps>)>;
+
+fn steps_of(setup: Setup, faces: FaceSizes, wanted: &Wanted) -> Arc<Steps> {
+    static KNOWN: Mutex<Known> = Mutex::new(Vec::new());
+    let key = (setup, faces, wanted.clone());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some((_, steps)) = known.iter().find(|(other, _)| *other == key) {
+        return Arc::clone(steps);
+    }
+    let maps = MapFacts::default();
+    let facts = Facts { setup, source: Source::Samples, maps, faces, turned: true, ..Facts::default() };
+    let seeds: Vec<Seed> = wanted.free.iter().map(|&param| Seed::of_param(param)).collect();
+    let shading = Shading::new(&facts, &seeds, |_| None, Natives::Written).unwrap();
+    let mut outputs = [&[shading.value], &shading.tangents[..]].concat().concat();
+    outputs.extend(wanted.quantities.iter().flat_map(|name| &shading.quantities[name]));
+    let steps = Arc::new(Steps::new(&shading.graph, &outputs, |_| Rounding::Plain));
+    known.push((key, Arc::clone(&steps)));
+    steps
+}
+
+impl<'a, R: Number> Fragments<'a, R> {
+    /// Of a setup at `params`, in numbers of `like`'s kind.
+    pub(crate) fn new(
+        setup: Setup,
+        cubes: &'a Cubes<R::Texel>,
+        params: &Params,
+        wanted: &Wanted,
+        like: R,
+    ) -> Self {
+        let steps = steps_of(setup, cubes.faces(), wanted);
+        let setting = steps.setting(like, |input| constant(input, params).unwrap(), |name| cubes.named(name));
+        Self { steps, setting, like, slopes: wanted.free.len() }
+    }
+
+    /// A fragment, whose numbers `field` gives by the rules' names.
+    pub(crate) fn shade(&self, field: impl Fn(&Input) -> R) -> Shaded<R> {
+        let mut registers = Vec::new();
+        self.steps.run(&self.setting, self.like, &mut registers, |place| field(&self.steps.fields()[place]));
+        let numbers: Vec<R> = self.steps.outputs(&self.setting, &registers).collect();
+        let (light, quantities) = numbers.split_at(4 * (1 + self.slopes));
+        let mut fours = light.chunks(4).map(|four| [four[0], four[1], four[2], four[3]]);
+        let rgba = fours.next().unwrap();
+        Shaded { rgba, slopes: fours.collect(), quantities: quantities.to_vec() }
+    }
+}
+
+/// A function of the rules, alone.
+pub(crate) struct Function(Steps);
+
+impl Function {
+    /// The function of that name in some texts, whose arguments have so many components.
+    pub(crate) fn new(texts: &[&str], name: &str, arguments: &[usize]) -> Self {
+        let source = lower::Source::new(&texts.concat(), Natives::Written).unwrap();
+        let mut graph = Graph::default();
+        let mut argument = |(at, &width): (usize, &usize)| {
+            Value::Numbers((0..width).map(|component| graph.field(&at.to_string(), component)).collect())
+        };
+        let arguments = arguments.iter().enumerate().map(&mut argument).collect();
+        let outputs = source.call(&mut graph, name, arguments).unwrap();
+        Self(Steps::new(&graph, &outputs, |_| Rounding::Plain))
+    }
+
+    /// Its value.
+    pub(crate) fn of<R: Real>(&self, like: R, arguments: &[&[R]]) -> Vec<R> {
+        let setting = self.0.setting(like, |_| 0.0, |name| panic!("it looks {name} up"));
+        let mut registers = Vec::new();
+        self.0.run(&setting, like, &mut registers, |place| {
+            let Input { name, component } = &self.0.fields()[place];
+            arguments[name.parse::<usize>().unwrap()][*component]
+        });
+        self.0.outputs(&setting, &registers).collect()
+    }
+}
