@@ -2,6 +2,7 @@
 
 use super::Scene;
 use crate::model::params::{Param, Params};
+use crate::shader::domain::Work;
 use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source};
 
 impl Facts {
@@ -32,6 +33,8 @@ impl Facts {
             square_rim: params.scalar(Param::RimExponent) == 2.0,
             f16,
             tessellation: tessellation_error(scene),
+            atlas: None,
+            work: Work::default(),
             budget,
             output: None,
         }

@@ -2,11 +2,13 @@
 
 use std::fmt::Write as _;
 
+use super::atlas::{self, Level, Pass};
+use super::domain::{Domain, UV};
 use super::facts::{Facts, Source};
 use super::kept::kept_fields;
 use super::quantity::{Attribute, Constant, Kind, Resource};
-use super::rule::{LIBRARY, Rule, Stage, rules};
-use super::search::{INTERPOLATION_COST, PlanError, VERTEX_SHARE, components, search};
+use super::rule::{LIBRARY, Rule, rules};
+use super::search::{Carried, PlanError, search};
 use crate::model::compose::TermName;
 
 /// The shader that a scene gets.
@@ -14,19 +16,24 @@ use crate::model::compose::TermName;
 pub struct Plan {
     /// What it was made for.
     pub facts: Facts,
-    /// The chosen rules, in the order of their evaluation, the vertex stage first.
+    /// The chosen rules of the module, in the order of their evaluation, the vertex stage first. Rules of texels are
+    /// steps of [`passes`](Self::passes).
     pub steps: Vec<Step>,
+    /// Passes over the UV atlas that go before, in their order.
+    pub passes: Vec<Pass>,
     /// Vertex attributes; the shader location is the place in this list.
     pub attributes: Vec<Attribute>,
     /// What is bound in group 0; the binding is 1 + the place in this list.
     pub resources: Vec<Resource>,
     /// The members of the uniform block at binding 0, in its order.
     pub constants: Vec<Constant>,
+    /// Textures of the atlas that it reads, bound in group 0 after the resources, in this order.
+    pub levels: Vec<Level>,
     /// Quantities that the rasteriser interpolates, with their WGSL types.
     pub varyings: Vec<(&'static str, &'static str)>,
     /// The module; `vs_main` and `fs_main` are its entry points, or `shade` its function.
     pub wgsl: String,
-    /// Operations a fragment, about, vertices counted by [`VERTEX_SHARE`].
+    /// Operations a fragment, about: vertices and texels by [their work](super::domain::Work), passes with them.
     pub cost: f64,
     /// How far the output may be off, relative to white.
     pub error: f64,
@@ -146,18 +153,52 @@ impl Plan {
         goals: &[&'static str],
         given: &[&'static str],
     ) -> Result<Self, PlanError> {
-        let rules = search(facts, vertex_goals, goals, given)?;
-        let of_vertex =
-            |q: &str| rules.iter().any(|r| r.stage == Stage::Vertex && r.gives.iter().any(|g| g.0 == q));
+        let found = search(facts, vertex_goals, goals, given)?;
+        let passes = atlas::passes(facts, &found)?;
+        if passes.is_empty() {
+            return Ok(Self::of_rules(facts, &found.rules, &found.carried, Vec::new()));
+        }
+        let of_fragments = |rule: &&&'static Rule| rule.domain == Domain::Fragment;
+        let fragments: Vec<&'static Rule> = found.rules.iter().filter(of_fragments).copied().collect();
+        let sampled = found.carried.iter().filter(|on| on.edge.from == Domain::Texel);
+        let levels = sampled.map(|on| Level { name: on.quantity.to_owned(), kind: level_type(on.numbers) });
+        let goals = [vertex_goals, &[UV]].concat();
+        let rules = atlas::with_vertices(&found, Domain::Fragment, &goals, fragments);
+        let mut plan = Self::of_rules(facts, &rules, &found.carried, levels.collect());
+        plan.cost += passes.iter().map(|pass| pass.plan.cost).sum::<f64>();
+        plan.error = found.rules.iter().map(|rule| rule.error(facts)).sum::<f64>()
+            + found.carried.iter().map(|on| on.error).sum::<f64>();
+        plan.passes = passes;
+        Ok(plan)
+    }
+
+    /// What rules of vertices and of one other domain read; the module is left empty. `levels` are bound.
+    pub(super) fn of_rules(
+        facts: &Facts,
+        rules: &[&'static Rule],
+        carried: &[Carried],
+        levels: Vec<Level>,
+    ) -> Self {
+        let arrives = |domain: Domain, quantity: &str| {
+            let on = carried.iter().find(|on| on.edge.to == domain && on.quantity == quantity);
+            on.filter(|on| on.edge.from == Domain::Vertex)
+        };
+        let shading = || rules.iter().filter(|rule| rule.domain != Domain::Vertex && rule.blur.is_none());
         let mut varyings: Vec<(&'static str, &'static str)> = Vec::new();
-        for (quantity, kind) in
-            rules.iter().filter(|r| r.stage == Stage::Fragment).flat_map(|r| r.needs.iter().copied())
-        {
-            if of_vertex(quantity) && !given.contains(&quantity) && !varyings.iter().any(|v| v.0 == quantity)
+        let mut interpolated = 0.0;
+        let needs = shading().flat_map(|rule| rule.needs.iter().map(|need| (rule.domain, *need)));
+        // Fragments look levels up by their texture coordinates.
+        let looks_up = !levels.is_empty() && shading().all(|rule| rule.domain == Domain::Fragment);
+        let by = looks_up.then_some((Domain::Fragment, (UV, "vec2f")));
+        for (domain, (quantity, kind)) in needs.chain(by) {
+            if let Some(on) = arrives(domain, quantity)
+                && !varyings.iter().any(|varying| varying.0 == quantity)
             {
                 varyings.push((quantity, kind));
+                interpolated += on.cost(facts);
             }
         }
+        let looked_up = carried.iter().filter(|on| on.edge.from == Domain::Texel && looks_up);
         let needed = |name: &str| rules.iter().any(|rule| rule.needs.iter().any(|(q, _)| *q == name));
         let read = |name: &str| rules.iter().any(|rule| rule.reads.contains(&name));
         let params = crate::model::params::Param::all().map(Constant::Param);
@@ -170,20 +211,26 @@ impl Plan {
             .iter()
             .map(|&rule| Step { rule, cost: rule.cost(facts), error: rule.error(facts) })
             .collect();
-        let interpolated: usize = varyings.iter().map(|(_, kind)| components(kind)).sum();
-        let share = |step: &Step| if step.rule.stage == Stage::Vertex { VERTEX_SHARE } else { 1.0 };
-        Ok(Self {
+        let share = |step: &Step| facts.work.share(step.rule.domain) * step.cost;
+        Self {
             facts: *facts,
             attributes: Attribute::ALL.into_iter().filter(|a| needed(a.name())).collect(),
             resources: Resource::ALL.into_iter().filter(|r| read(r.name())).collect(),
             constants,
             varyings,
+            levels,
+            passes: Vec::new(),
             wgsl: String::new(),
-            cost: steps.iter().map(|step| share(step) * step.cost).sum::<f64>()
-                + INTERPOLATION_COST * interpolated as f64,
+            cost: steps.iter().map(share).sum::<f64>()
+                + (interpolated + looked_up.map(|on| on.cost(facts)).sum::<f64>()),
             error: steps.iter().map(|step| step.error).sum(),
             steps,
-        })
+        }
+    }
+
+    /// Every chosen rule: those of the passes over the atlas, then those of the image.
+    pub fn all_steps(&self) -> impl Iterator<Item = &Step> {
+        self.passes.iter().flat_map(|pass| &pass.plan.steps).chain(&self.steps)
     }
 
     /// Whether the module computes in 16 bits.
@@ -195,16 +242,22 @@ impl Plan {
     /// Every rule that was left out, and why.
     #[must_use]
     pub fn left_out(&self) -> Vec<(&'static Rule, String)> {
-        let chosen = |rule: &Rule| self.steps.iter().any(|step| step.rule.name == rule.name);
-        let given = |rule: &Rule| {
-            rule.gives.iter().any(|(q, _)| self.steps.iter().any(|s| s.rule.gives.iter().any(|g| g.0 == *q)))
+        let chosen = |rule: &Rule| self.all_steps().any(|step| std::ptr::eq(step.rule, rule));
+        let same = |step: &Step, rule: &Rule, q: &str| {
+            step.rule.domain == rule.domain && step.rule.gives_quantity(q)
         };
+        let given =
+            |rule: &Rule| rule.gives.iter().any(|(q, _)| self.all_steps().any(|step| same(step, rule, q)));
+        // Where there is no atlas its rules are no choice.
+        let atlas = self.facts.holds("atlas") == Some(true);
+        let choice = |rule: &&Rule| atlas || rule.domain != Domain::Texel;
         let why = |rule: &Rule| match rule.refusal(&self.facts) {
             Some(reason) => reason,
             None if given(rule) => "dearer".to_owned(),
             None => "nothing asks for it".to_owned(),
         };
-        rules(self.facts.setup.effects).filter(|rule| !chosen(rule)).map(|rule| (rule, why(rule))).collect()
+        let left = rules(self.facts.setup.effects).filter(choice).filter(|rule| !chosen(rule));
+        left.map(|rule| (rule, why(rule))).collect()
     }
 
     /// Declarations that every module shares: extensions, constants, resources, functions. The block of
@@ -233,19 +286,23 @@ impl Plan {
             let (space, kind) = resource.kind().wgsl();
             let _ = writeln!(wgsl, "@group(0) @binding({}) {space} {}: {kind};", i + 1, resource.name());
         }
-        wgsl.push_str(&self.functions(&[Stage::Vertex, Stage::Fragment]));
+        for (i, level) in self.levels.iter().enumerate() {
+            let binding = 1 + self.resources.len() + i;
+            let _ = writeln!(wgsl, "@group(0) @binding({binding}) var {}: texture_2d<f32>;", level.bound());
+        }
+        wgsl.push_str(&self.functions(&Domain::ALL));
         wgsl
     }
 
-    /// The functions of the stages' rules, and those that they call.
-    pub(super) fn functions(&self, stages: &[Stage]) -> String {
+    /// The functions of the domains' rules, and those that they call.
+    pub(super) fn functions(&self, domains: &[Domain]) -> String {
         let mut wgsl = String::new();
-        let steps = || self.steps.iter().filter(|step| stages.contains(&step.rule.stage));
+        let steps = || self.steps.iter().filter(|step| domains.contains(&step.rule.domain));
         let used = |name: &str| steps().any(|step| step.rule.uses.contains(&name));
         for (_, text) in LIBRARY.iter().filter(|(name, _)| used(name)) {
             let _ = write!(wgsl, "\n{text}");
         }
-        if stages.contains(&Stage::Fragment) {
+        if domains.contains(&Domain::Fragment) {
             wgsl.push_str(&self.face_sizes());
             wgsl.push_str(&self.dapple_axis());
         }
@@ -288,9 +345,9 @@ impl Plan {
         )
     }
 
-    /// The rules of a stage, in the order of their evaluation.
-    pub(super) fn rules(&self, stage: Stage) -> impl Iterator<Item = &'static Rule> {
-        self.steps.iter().map(|step| step.rule).filter(move |rule| rule.stage == stage)
+    /// The rules of a domain, in the order of their evaluation.
+    pub(super) fn rules(&self, domain: Domain) -> impl Iterator<Item = &'static Rule> {
+        self.steps.iter().map(|step| step.rule).filter(move |rule| rule.domain == domain)
     }
 
     /// What a rule's function is called with; see [`Self::calls`].
@@ -300,7 +357,9 @@ impl Plan {
         constant: &impl Fn(Constant, &str) -> String,
         leaf: &impl Fn(&'static str) -> String,
     ) -> Vec<String> {
-        let local = |q: &str| self.rules(rule.stage).any(|r| r.gives.iter().any(|(given, _)| *given == q));
+        let level =
+            |q: &str| rule.domain != Domain::Vertex && self.levels.iter().any(|level| level.name == q);
+        let local = |q: &str| self.rules(rule.domain).any(|r| r.gives_quantity(q)) || level(q);
         let argument = |&(name, kind): &(&'static str, &'static str)| match Constant::from_name(name) {
             Some(known) => constant(known, kind),
             None if local(name) => name.to_owned(),
@@ -309,16 +368,16 @@ impl Plan {
         rule.needs.iter().map(argument).collect()
     }
 
-    /// The calls of a stage's rules, one a line; `constant` and `leaf` write what is there without a rule,
+    /// The calls of a domain's rules, one a line; `constant` and `leaf` write what is there without a rule,
     /// by its name and WGSL type.
     pub fn calls(
         &self,
-        stage: Stage,
+        domain: Domain,
         constant: impl Fn(Constant, &str) -> String,
         leaf: impl Fn(&'static str) -> String,
     ) -> String {
         let mut wgsl = String::new();
-        for rule in self.rules(stage) {
+        for rule in self.rules(domain) {
             let arguments = self.arguments(rule, &constant, &leaf);
             let call = match rule.plain_value() {
                 Some("") => arguments.concat(),
@@ -340,6 +399,15 @@ impl Plan {
             }
         }
         wgsl
+    }
+}
+
+/// The WGSL type of that many numbers of a level.
+const fn level_type(numbers: usize) -> &'static str {
+    match numbers {
+        1 => "f32",
+        2 => "vec2f",
+        _ => "vec3f",
     }
 }
 

@@ -16,9 +16,12 @@
 //!
 //! Nothing that the [`Plan`] does not name is uploaded, bound or compiled.
 
+pub mod atlas;
 mod bits;
+pub mod domain;
 pub mod emit;
 pub mod facts;
+mod graph;
 pub mod kept;
 pub mod module;
 pub mod probe;
@@ -28,6 +31,7 @@ pub mod search;
 pub mod tangent;
 pub mod term;
 
+pub use domain::{Domain, Work};
 pub use emit::{Plan, Step, plan};
 pub use facts::{Budget, Facts, Source};
 pub use quantity::{Attribute, Constant, Resource};

@@ -9,7 +9,7 @@ use crate::fit::params_file::{Foreign, ParamsFile};
 use crate::model::effects::Effects;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
-use crate::shader::rule::Stage;
+use crate::shader::atlas::{Axis, Pass, PassKind};
 use crate::shader::{Budget, Facts, Plan, plan};
 
 /// Print the shader that a scene gets, and the plan behind it
@@ -100,7 +100,7 @@ fn table(plan: &Plan, margin: &str) -> String {
     };
     line(format!(
         "{} rules, about {:.0} operations a fragment, error at most {:.1e}",
-        plan.steps.len(),
+        plan.all_steps().count(),
         plan.cost,
         plan.error
     ));
@@ -108,13 +108,16 @@ fn table(plan: &Plan, margin: &str) -> String {
     line(format!("interpolated: {}", list(plan.varyings.iter().map(|(name, _)| *name))));
     line(format!("bound: {}", list(plan.resources.iter().map(|r| r.name()))));
     line(format!("constants: {}", list(plan.constants.iter().map(|c| c.name()))));
+    for (i, pass) in plan.passes.iter().enumerate() {
+        line(format!("pass {} over the atlas: {}", i + 1, told(pass)));
+    }
     line(String::new());
     line(format!("{:<10} {:<26} {:<28} {:>5} {:>8}", "where", "quantity", "rule", "cost", "error"));
-    for step in &plan.steps {
-        let stage = if step.rule.stage == Stage::Vertex { "vertex" } else { "fragment" };
+    for step in plan.all_steps() {
+        let domain = step.rule.domain.name();
         let gives = list(step.rule.gives.iter().map(|(quantity, _)| *quantity));
         let (name, cost, error) = (step.rule.name, step.cost, step.error);
-        line(format!("{stage:<10} {gives:<26} {name:<28} {cost:>5.0} {error:>8.1e}"));
+        line(format!("{domain:<10} {gives:<26} {name:<28} {cost:>5.0} {error:>8.1e}"));
     }
     line(String::new());
     line("left out:".to_owned());
@@ -122,6 +125,16 @@ fn table(plan: &Plan, margin: &str) -> String {
         line(format!("  {:<28} {reason}", rule.name));
     }
     text
+}
+
+/// What a pass does, in words.
+fn told(pass: &Pass) -> String {
+    let leaves = list(pass.leaves.iter().map(|level| level.name.as_str()));
+    match pass.kind {
+        PassKind::Draw => format!("{leaves}, drawn"),
+        PassKind::Blur(Axis::U) => format!("{leaves}, blurred along u"),
+        PassKind::Blur(Axis::V) => format!("{leaves}, blurred along v"),
+    }
 }
 
 fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {

@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::{TangentError, Tangents};
+use crate::shader::domain::Domain;
 use crate::shader::emit::{Plan, hazy, parts};
 use crate::shader::module::uniform;
 use crate::shader::quantity::{Constant, Resource};
-use crate::shader::rule::{Rule, Stage};
+use crate::shader::rule::Rule;
 
 /// What moves.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -78,13 +79,14 @@ impl Chain {
     ) -> Result<BTreeMap<&'static str, String>, TangentError> {
         let mut moved: BTreeMap<&'static str, String> = BTreeMap::new();
         if let Seed::Named { name, tangent } = seed {
-            let typed = plan.rules(Stage::Fragment).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
+            let typed =
+                plan.rules(Domain::Fragment).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
             if let Some((_, kind)) = typed {
                 let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
                 moved.insert(name, format!("d{k}_{name}"));
             }
         }
-        for rule in plan.rules(Stage::Fragment) {
+        for rule in plan.rules(Domain::Fragment) {
             let call = match seed {
                 Seed::Resource { resource, slope } if rule.reads.contains(&resource.name()) => {
                     Some(self.slope_call(plan, rule, *resource, *slope))

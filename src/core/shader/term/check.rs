@@ -2,19 +2,21 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::declaration::Declaration;
+use super::declaration::{Declaration, LEVEL_TYPES};
 use super::error::{Problem, TermError};
 use super::terms;
 use crate::model::compose::TermName;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
+use crate::shader::domain::Domain;
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::Facts;
+use crate::shader::graph::is_of_the_eye;
 use crate::shader::quantity::{Attribute, Constant, Resource};
-use crate::shader::rule::{LIBRARY, RULES, Rule, Stage};
+use crate::shader::rule::{LIBRARY, RULES, Rule};
 
 /// Words that the modules which rules are built into give a meaning of their own.
-const TAKEN: [&str; 34] = [
+const TAKEN: [&str; 44] = [
     "at",
     "part",
     "samples",
@@ -49,6 +51,16 @@ const TAKEN: [&str; 34] = [
     "read",
     "slots",
     "i",
+    "tap",
+    "axis",
+    "here",
+    "middle",
+    "sum",
+    "place",
+    "side",
+    "size",
+    "texel",
+    "clip",
 ];
 
 /// The declaration, where it fits.
@@ -129,7 +141,12 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
         let functions = RULES.iter().chain(terms().into_iter().flat_map(|term| &term.rules));
         let mut functions = functions.map(|rule| rule.function);
         let library = LIBRARY.iter().any(|(_, text)| text.contains(&format!("fn {}(", rule.function)));
-        let twice = declaration.rules.iter().filter(|other| other.function == rule.function).count() > 1;
+        let twice = declaration
+            .rules
+            .iter()
+            .filter(|other| other.function == rule.function && other.line != rule.line)
+            .count()
+            > 0;
         if library || twice || functions.any(|function| function == rule.function) {
             return taken("function", rule.function, rule.line);
         }
@@ -202,15 +219,28 @@ fn types(declaration: &Declaration) -> Result<(), TermError> {
     types.extend(declaration.parameters.iter().map(|(_, p)| (p.name, param_type(p.rgb))));
     for rule in &declaration.rules {
         let given = rule.gives.iter().map(|(quantity, components)| (*quantity, rule.given_type(components)));
-        for (quantity, kind) in given.chain(rule.needs.iter().copied()) {
+        for (quantity, kind) in given.clone().chain(rule.needs.iter().copied()) {
             let wanted = *types.entry(quantity).or_insert(kind);
             if wanted != kind {
                 let (quantity, given, wanted) = (quantity.to_owned(), kind.to_owned(), wanted.to_owned());
                 return Err(Problem::Type { quantity, given, wanted }.at(rule.line));
             }
         }
+        // What a pass' kernel or a fragment reads stands in the atlas.
+        let of_kernel =
+            rule.needs.iter().copied().filter(|(name, _)| rule.blur.is_some() && !is_uniform(name));
+        let mut stands = given.filter(|_| rule.sampled.is_some()).chain(of_kernel);
+        if let Some((quantity, kind)) = stands.find(|(_, kind)| !LEVEL_TYPES.contains(kind)) {
+            let (quantity, kind) = (quantity.to_owned(), kind.to_owned());
+            return Err(Problem::NoLevel { quantity, kind }.at(rule.line));
+        }
     }
     Ok(())
+}
+
+/// Whether a quantity is a constant: a parameter, or one that is there for stored samples.
+fn is_uniform(name: &str) -> bool {
+    Param::from_identifier(name).is_some() || is_constant(name)
 }
 
 const fn param_type(rgb: bool) -> &'static str {
@@ -255,7 +285,7 @@ fn of_samples<'a>(rules: &(impl Iterator<Item = &'a Rule> + Clone)) -> BTreeSet<
     loop {
         let before = there.len();
         for rule in
-            rules.clone().filter(|rule| rule.stage == Stage::Fragment && !rule.when.contains(&"raster"))
+            rules.clone().filter(|rule| rule.domain == Domain::Fragment && !rule.when.contains(&"raster"))
         {
             let met = |name: &str| {
                 there.contains(name) || Param::from_identifier(name).is_some() || is_constant(name)
@@ -270,31 +300,72 @@ fn of_samples<'a>(rules: &(impl Iterator<Item = &'a Rule> + Clone)) -> BTreeSet<
     }
 }
 
+/// What rules give of texels: all that no eye moves.
+fn of_texels() -> BTreeSet<&'static str> {
+    let of_vertices = || RULES.iter().filter(|rule| rule.domain == Domain::Vertex);
+    let unmet = |name: &str| is_of_the_eye(name);
+    let mut seen: BTreeSet<&'static str> = BTreeSet::new();
+    let mut there: BTreeSet<&'static str> = BTreeSet::new();
+    loop {
+        let before = seen.len() + there.len();
+        for rule in of_vertices() {
+            let moved = rule.needs.iter().any(|(name, _)| unmet(name) || seen.contains(name));
+            if moved { &mut seen } else { &mut there }.extend(rule.gives.iter().map(|(name, _)| *name));
+        }
+        there.retain(|name| !seen.contains(name));
+        for rule in RULES.iter().filter(|rule| rule.domain == Domain::Texel) {
+            if rule.needs.iter().all(|(name, _)| there.contains(name) || is_uniform(name)) {
+                there.extend(rule.gives.iter().map(|(name, _)| *name));
+            }
+        }
+        if seen.len() + there.len() == before {
+            return there;
+        }
+    }
+}
+
 /// Whether a constant that is no parameter is there for stored samples.
 fn is_constant(name: &str) -> bool {
     [Constant::Turn, Constant::KeyDirection].iter().any(|constant| constant.name() == name)
 }
 
-/// Everything that the rules need is there, for fragments and for samples; every parameter is needed.
+/// Everything that the rules need is there, for fragments and for samples, or for texels; every parameter is needed.
 fn there(declaration: &Declaration) -> Result<(), TermError> {
     let own: BTreeSet<&str> = declaration.parameters.iter().map(|(_, parameter)| parameter.name).collect();
-    let given: BTreeSet<&str> =
-        declaration.rules.iter().flat_map(|r| r.gives.iter().map(|(q, _)| *q)).collect();
-    let samples = of_samples(&RULES.iter());
+    let (samples, texels) = (of_samples(&RULES.iter()), of_texels());
     for rule in &declaration.rules {
+        let there = if rule.domain == Domain::Texel { &texels } else { &samples };
         for &(need, _) in &rule.needs {
+            let mut givers = declaration.rules.iter().filter(|giver| giver.gives_quantity(need)).peekable();
             let constant = Param::from_identifier(need).is_some_and(Param::is_built_in) || is_constant(need);
-            if own.contains(need) || given.contains(need) || samples.contains(need) || constant {
+            let quantity = need.to_owned();
+            if givers.peek().is_some() {
+                // Only texels of one file feed its texels; fragments look up what may be sampled.
+                let feeds = |giver: &Rule| giver.domain == rule.domain || giver.sampled.is_some();
+                let feeds = |giver: &Rule| feeds(giver) && giver.domain <= rule.domain;
+                if givers.any(feeds) {
+                    continue;
+                }
+                let problem = match rule.domain {
+                    Domain::Texel => Problem::NotOfTexels { quantity },
+                    _ => Problem::TexelsAlone { quantity },
+                };
+                return Err(problem.at(rule.line));
+            }
+            if own.contains(need) || there.contains(need) || constant {
                 continue;
             }
-            let somewhere = RULES.iter().any(|rule| rule.gives.iter().any(|(quantity, _)| *quantity == need))
+            let somewhere = RULES.iter().any(|rule| rule.gives_quantity(need))
                 || Constant::from_name(need).is_some()
                 || Attribute::ALL.iter().any(|attribute| attribute.name() == need);
-            let quantity = need.to_owned();
+            if somewhere && rule.domain == Domain::Texel {
+                return Err(Problem::NotOfTexels { quantity }.at(rule.line));
+            }
             if somewhere {
                 return Err(Problem::RasterOnly { quantity }.at(rule.line));
             }
-            let all = own.iter().chain(&given).copied().chain(samples.iter().copied());
+            let given = declaration.rules.iter().flat_map(|rule| rule.gives.iter().map(|(name, _)| *name));
+            let all = own.iter().copied().chain(given).chain(there.iter().copied());
             let near = nearest(need, all.chain(Param::built_in().map(Param::name)));
             return Err(Problem::Unknown { quantity, near }.at(rule.line));
         }

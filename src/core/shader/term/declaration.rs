@@ -2,7 +2,8 @@
 
 use super::error::{Problem, TermError};
 use crate::model::params::{LARGEST, Scale};
-use crate::shader::rule::{Error, Rule, Stage};
+use crate::shader::domain::Domain;
+use crate::shader::rule::{Blur, Error, KERNEL, Rule};
 
 /// What a file of rules holds.
 #[derive(Clone, Debug)]
@@ -37,8 +38,11 @@ pub(super) struct DeclaredParameter {
     pub(super) source: &'static str,
 }
 
+/// WGSL types of what a texel of the atlas can hold: beside it stands whether it holds anything.
+pub(super) const LEVEL_TYPES: [&str; 3] = ["f32", "vec2f", "vec3f"];
+
 /// The keys that a header may have.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 15] = [
     "effect",
     "parameter",
     "gives",
@@ -51,13 +55,20 @@ const KEYS: [&str; 12] = [
     "uses",
     "reads",
     "fallback",
+    "domain",
+    "sampled",
+    "pass",
 ];
 
-/// Read a file of rules of one stage, which is called `name`.
+/// Read a file of rules, which is called `name`. They are of `domain` but where they declare another.
 ///
 /// # Errors
 /// When it is not as [`super`] says.
-pub(crate) fn parse(stage: Stage, name: &'static str, text: &'static str) -> Result<Declaration, TermError> {
+pub(crate) fn parse(
+    domain: Domain,
+    name: &'static str,
+    text: &'static str,
+) -> Result<Declaration, TermError> {
     let mut declaration = Declaration { effect: None, parameters: Vec::new(), rules: Vec::new() };
     let mut header: Vec<(usize, &'static str)> = Vec::new();
     let mut lines = text.lines().enumerate();
@@ -68,14 +79,14 @@ pub(crate) fn parse(stage: Stage, name: &'static str, text: &'static str) -> Res
             let last = lines.by_ref().find(|(_, line)| line.trim_end() == "}").map(|(_, line)| line);
             let last = last.ok_or(Problem::Endless.at(at + 1))?;
             let body = between(text, line, last);
-            let rule = declaration.rule(stage, at + 1, &header, body)?;
-            declaration.rules.push(rule);
+            let (rule, domains) = declaration.rule(domain, at + 1, &header, body)?;
+            declaration.rules.extend(domains.into_iter().map(|domain| rule.in_domain(domain)));
             header.clear();
         } else if !line.trim().is_empty() {
             return Err(Problem::Stray(line.trim().to_owned()).at(at + 1));
         }
     }
-    let alone = declaration.rules.len() == 1;
+    let alone = declaration.rules.iter().all(|rule| rule.line == declaration.rules[0].line);
     for rule in &mut declaration.rules {
         rule.name = if alone { name } else { rule.function };
     }
@@ -91,15 +102,16 @@ fn between(text: &'static str, first: &str, last: &str) -> &'static str {
 }
 
 impl Declaration {
-    /// The rule of a function under its header; declarations of the file stand in the first rule's.
+    /// The rule of a function under its header, and where it holds; declarations of the file stand in the first rule's.
     fn rule(
         &mut self,
-        stage: Stage,
+        domain: Domain,
         line: usize,
         header: &[(usize, &'static str)],
         body: &'static str,
-    ) -> Result<Rule, TermError> {
-        let mut rule = Rule::bare(stage, line, body).ok_or(Problem::Head.at(line))?;
+    ) -> Result<(Rule, Vec<Domain>), TermError> {
+        let mut domains = vec![domain];
+        let mut rule = Rule::bare(domain, line, body).ok_or(Problem::Head.at(line))?;
         for &(at, words) in header {
             let (key, value) = words.split_once(": ").map_or(("", words), |(key, value)| (key, value.trim()));
             match KEYS.iter().find(|known| **known == key) {
@@ -108,6 +120,7 @@ impl Declaration {
                     // What stood before belongs to the file.
                     rule.about.clear();
                 }
+                Some(&"domain") => domains = domains_of(value).map_err(|problem| problem.at(at))?,
                 Some(&key) => rule_line(&mut rule, key, value).map_err(|problem| problem.at(at))?,
                 None => {
                     if let Some(&nearest) = KEYS.iter().find(|known| misspelt(key, known)) {
@@ -127,7 +140,12 @@ impl Declaration {
         if !rule.has_cost() {
             return Err(lacks("cost"));
         }
-        Ok(rule)
+        kernel(&mut rule, &domains).map_err(|problem| problem.at(line))?;
+        let astray = rule.sampled.is_some() && !domains.contains(&Domain::Texel);
+        if astray {
+            return Err(Problem::OfTexels { key: "sampled" }.at(line));
+        }
+        Ok((rule, domains))
     }
 
     fn declare(&mut self, line: usize, key: &str, value: &'static str) -> Result<(), TermError> {
@@ -165,6 +183,46 @@ fn number(text: &str) -> Option<f64> {
     text.trim().parse::<f64>().ok().filter(|number| number.is_finite())
 }
 
+/// `texel`, `fragment`, or both: vertices have no rules but the built-in ones.
+fn domains_of(value: &'static str) -> Result<Vec<Domain>, Problem> {
+    let wanted = "`texel`, `fragment`, or `texel, fragment`";
+    let unread = || Problem::Value { key: "domain", given: value.to_owned(), wanted };
+    let known = |name| Domain::from_name(name).filter(|domain| *domain != Domain::Vertex).ok_or_else(unread);
+    let mut domains = list(value).map(known).collect::<Result<Vec<_>, _>>()?;
+    domains.sort_unstable();
+    domains.dedup();
+    if domains.is_empty() { Err(unread()) } else { Ok(domains) }
+}
+
+/// `glow_light: vec3f, 7 taps`, and the type.
+fn blur(value: &'static str) -> Option<(Blur, &'static str)> {
+    let (source, taps) = value.split_once(',')?;
+    let (of, kind) = source.split_once(':').map(|(of, kind)| (of.trim(), kind.trim()))?;
+    let taps: u32 = taps.trim().strip_suffix(" taps")?.trim().parse().ok()?;
+    let fits = LEVEL_TYPES.contains(&kind) && taps % 2 == 1 && (3..=255).contains(&taps);
+    fits.then(|| (Blur { of, taps, parameters: Vec::new() }, kind))
+}
+
+/// Of a rule whose function is a kernel: what it is called with, and what it needs.
+fn kernel(rule: &mut Rule, domains: &[Domain]) -> Result<(), Problem> {
+    let Some(blur) = &mut rule.blur else { return Ok(()) };
+    if domains != [Domain::Texel] {
+        return Err(Problem::OfTexels { key: "pass" });
+    }
+    let head = rule.body.split('{').next().unwrap_or_default();
+    let returns = head.rsplit("->").next().unwrap_or_default().trim();
+    let [(_, "")] = rule.gives.as_slice() else { return Err(Problem::Kernel) };
+    // Weights that depended on what they weigh would make no linear pass.
+    let own = rule.needs.iter().any(|(need, _)| *need == blur.of);
+    if own || returns != "vec2f" || !rule.needs.contains(&KERNEL[0]) {
+        return Err(Problem::Kernel);
+    }
+    blur.parameters.clone_from(&rule.needs);
+    rule.needs.retain(|need| !KERNEL.contains(need));
+    rule.needs.insert(0, (blur.of, rule.returns));
+    Ok(())
+}
+
 /// A line of a rule's header into the rule.
 fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<(), Problem> {
     let unread = |wanted| Problem::Value { key, given: value.to_owned(), wanted };
@@ -179,6 +237,15 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
         "fallback" => rule.fallback = list(value).collect(),
         "paper" => rule.paper = value == "yes",
         "error" if value == "tessellation" => rule.error = Error::Tessellation,
+        "sampled" => {
+            rule.sampled = Some(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
+        }
+        "pass" => {
+            let wanted = "QUANTITY: TYPE, TAPS taps: what is blurred, an f32, vec2f or vec3f, and how many places count, \
+                          an odd number from 3 to 255";
+            let (blur, kind) = blur(value).ok_or_else(|| unread(wanted))?;
+            (rule.blur, rule.returns) = (Some(blur), kind);
+        }
         "error" => {
             rule.error = Error::Fixed(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
         }
@@ -246,7 +313,7 @@ mod tests {
         // gives: sheen_a.x, sheen_b.y\n// cost: 3\nfn both() -> vec2f {\n    return vec2f(1.0);\n}\n";
 
     fn read(text: &str) -> Result<Declaration, TermError> {
-        parse(Stage::Fragment, "file", crate::model::registry::leaked(text))
+        parse(Domain::Fragment, "file", crate::model::registry::leaked(text))
     }
 
     #[test]

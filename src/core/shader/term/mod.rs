@@ -37,9 +37,10 @@ use std::sync::{Mutex, PoisonError};
 
 use self::declaration::Declaration;
 pub use self::error::{Problem, TermError};
-use super::rule::{Rule, Stage};
+use super::domain::Domain;
+use super::rule::Rule;
 use crate::model::compose::{TermInfo, TermName};
-use crate::model::effects::{Effect, EffectInfo};
+use crate::model::effects::{Effect, EffectInfo, Effects};
 use crate::model::params::{Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
 
@@ -65,6 +66,16 @@ pub fn terms() -> Vec<&'static Term> {
     TERMS.rows()
 }
 
+/// An added effect of a set that has rules for texels of the atlas.
+pub fn of_texels(effects: Effects) -> Option<Effect> {
+    let enabled = |term: &&Term| effects.has(term.effect);
+    let term = terms()
+        .into_iter()
+        .filter(enabled)
+        .find(|term| term.rules.iter().any(|rule| rule.domain == Domain::Texel));
+    term.map(|term| term.effect)
+}
+
 /// Make a term known to this process for as long as it runs, from the text of the file that declares it; `name` is
 /// what the file is called. A text that was registered before is not registered again.
 ///
@@ -78,7 +89,7 @@ pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
         return Ok(known);
     }
     let text = leaked(text);
-    let declaration = declaration::parse(Stage::Fragment, leaked(name), text)?;
+    let declaration = declaration::parse(Domain::Fragment, leaked(name), text)?;
     let declaration = check::checked(declaration)?;
     wgsl::check(&declaration.rules)?;
     enter(declaration, text)

@@ -40,8 +40,13 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     let held = |name: &str| held(name) && !(name == "silhouette" && setup.rim_of_corners());
     let given: Vec<&'static str> =
         SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name).filter(|name| held(name)).collect();
-    // What cannot be planned is told when it is.
-    let chosen = search(&facts, &[], goals, &given).unwrap_or_default();
+    // What is computed in texels is of no stored sample: it is asked for as the renderer asks. What cannot be planned is
+    // told when it is.
+    let drawn = Facts { source: Source::Raster, atlas: Some(1), ..facts };
+    let found = search(&facts, &[], goals, &given).map(|found| (found, true));
+    let found = found.or_else(|_| search(&drawn, &[], goals, &[]).map(|found| (found, false)));
+    let (found, stored) = found.unwrap_or_default();
+    let chosen = found.rules;
     let needed = |name: &str| {
         let mut rules = chosen.iter().filter(|rule| !rule.fallback.contains(&name));
         rules.any(|rule| rule.needs.iter().any(|(need, _)| *need == name))
@@ -60,7 +65,7 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
         rim: needed("silhouette") || needed("corner_silhouettes"),
         dapple: needed("dapple"),
         haze: false,
-        smooth_normal: needed("normal"),
+        smooth_normal: stored && needed("normal"),
         key_light: false,
     }
 }

@@ -44,7 +44,7 @@ fn check_rule(rule: &Rule) -> Result<(), TermError> {
         other => Problem::Wgsl(one_line(&other.to_string())).at(rule.line),
     };
     let moving: Vec<bool> =
-        rule.needs.iter().map(|(_, kind)| *kind == "f32" || kind.ends_with('f')).collect();
+        rule.parameters().iter().map(|(_, kind)| *kind == "f32" || kind.ends_with('f')).collect();
     let mut tangents = Tangents::new(&text).map_err(underivable)?;
     tangents.of(rule.function, &moving).map_err(underivable)?;
     // What was written has to be valid beside it.
