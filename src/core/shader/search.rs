@@ -119,6 +119,7 @@ pub fn search(
             Means::Edge(carried) => found.carried.push(carried),
         }
     }
+    found.carried.reverse();
     found.rules.reverse();
     found.rules.sort_by_key(|rule| rule.domain);
     Ok(found)

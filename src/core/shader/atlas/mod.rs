@@ -7,7 +7,11 @@
 //! computed anew in each draw.
 //!
 //! - this module: from the rules that a search has found to passes; `text`: their WGSL
+//! - [`tangent`]: passes that leave how levels move
 
+pub mod tangent;
+#[cfg(test)]
+mod tests;
 pub(super) mod text;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -58,6 +62,16 @@ pub enum Axis {
     U,
     /// From top to bottom.
     V,
+}
+
+impl Axis {
+    /// From a texel to its neighbour, as WGSL.
+    pub(super) const fn step(self) -> &'static str {
+        match self {
+            Self::U => "vec2i(1, 0)",
+            Self::V => "vec2i(0, 1)",
+        }
+    }
 }
 
 /// How a pass is drawn.

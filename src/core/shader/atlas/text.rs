@@ -73,10 +73,7 @@ pub(super) fn blur(plan: &Plan, rule: &Rule, axis: Axis, source: &Level) -> Stri
 
 /// The text of one direction of a blur, its markers replaced, after the plan's declarations.
 pub(super) fn filled(template: &str, plan: &Plan, rule: &Rule, axis: Axis, source: &Level) -> String {
-    let axis = match axis {
-        Axis::U => "vec2i(1, 0)",
-        Axis::V => "vec2i(0, 1)",
-    };
+    let axis = axis.step();
     let reach = rule.blur.as_ref().map_or(0, |blur| blur.taps / 2);
     let kernel = format!("{}({})", rule.function, arguments(rule, axis).join(", "));
     let body = template
