@@ -72,9 +72,9 @@ pub(super) fn draws(facts: &Facts, places: &Places) -> Result<Vec<Draw>, PlanErr
     sets.into_iter().map(|fields| Draw::new(&facts, fields)).collect()
 }
 
-/// Fragments of the rasteriser, filtered in the shader: what the CPU's samples are.
+/// Fragments of the rasteriser, filtered in the shader, and no atlas: what the CPU's samples are.
 fn raster(facts: &Facts) -> Facts {
-    Facts { source: Source::Raster, output: None, ..*facts }
+    Facts { source: Source::Raster, output: None, atlas: None, ..*facts }
 }
 
 impl Draw {

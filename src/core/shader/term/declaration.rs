@@ -1,9 +1,10 @@
 //! A file of rules: what its comments declare, and its functions.
 
 use super::error::{Problem, TermError};
+use super::texels::{blur, domains_of, kernel};
 use crate::model::params::{LARGEST, Scale};
 use crate::shader::domain::Domain;
-use crate::shader::rule::{Blur, Error, KERNEL, Rule};
+use crate::shader::rule::{Error, Rule};
 
 /// What a file of rules holds.
 #[derive(Clone, Debug)]
@@ -37,9 +38,6 @@ pub(super) struct DeclaredParameter {
     pub(super) meaning: &'static str,
     pub(super) source: &'static str,
 }
-
-/// WGSL types of what a texel of the atlas can hold: beside it stands whether it holds anything.
-pub(super) const LEVEL_TYPES: [&str; 3] = ["f32", "vec2f", "vec3f"];
 
 /// The keys that a header may have.
 const KEYS: [&str; 15] = [
@@ -175,52 +173,12 @@ fn misspelt(word: &str, key: &str) -> bool {
     lower && strsim::damerau_levenshtein(word, key) == 1
 }
 
-fn list(value: &'static str) -> impl Iterator<Item = &'static str> {
+pub(super) fn list(value: &'static str) -> impl Iterator<Item = &'static str> {
     value.split(',').map(str::trim).filter(|word| !word.is_empty())
 }
 
 fn number(text: &str) -> Option<f64> {
     text.trim().parse::<f64>().ok().filter(|number| number.is_finite())
-}
-
-/// `texel`, `fragment`, or both: vertices have no rules but the built-in ones.
-fn domains_of(value: &'static str) -> Result<Vec<Domain>, Problem> {
-    let wanted = "`texel`, `fragment`, or `texel, fragment`";
-    let unread = || Problem::Value { key: "domain", given: value.to_owned(), wanted };
-    let known = |name| Domain::from_name(name).filter(|domain| *domain != Domain::Vertex).ok_or_else(unread);
-    let mut domains = list(value).map(known).collect::<Result<Vec<_>, _>>()?;
-    domains.sort_unstable();
-    domains.dedup();
-    if domains.is_empty() { Err(unread()) } else { Ok(domains) }
-}
-
-/// `glow_light: vec3f, 7 taps`, and the type.
-fn blur(value: &'static str) -> Option<(Blur, &'static str)> {
-    let (source, taps) = value.split_once(',')?;
-    let (of, kind) = source.split_once(':').map(|(of, kind)| (of.trim(), kind.trim()))?;
-    let taps: u32 = taps.trim().strip_suffix(" taps")?.trim().parse().ok()?;
-    let fits = LEVEL_TYPES.contains(&kind) && taps % 2 == 1 && (3..=255).contains(&taps);
-    fits.then(|| (Blur { of, taps, parameters: Vec::new() }, kind))
-}
-
-/// Of a rule whose function is a kernel: what it is called with, and what it needs.
-fn kernel(rule: &mut Rule, domains: &[Domain]) -> Result<(), Problem> {
-    let Some(blur) = &mut rule.blur else { return Ok(()) };
-    if domains != [Domain::Texel] {
-        return Err(Problem::OfTexels { key: "pass" });
-    }
-    let head = rule.body.split('{').next().unwrap_or_default();
-    let returns = head.rsplit("->").next().unwrap_or_default().trim();
-    let [(_, "")] = rule.gives.as_slice() else { return Err(Problem::Kernel) };
-    // Weights that depended on what they weigh would make no linear pass.
-    let own = rule.needs.iter().any(|(need, _)| *need == blur.of);
-    if own || returns != "vec2f" || !rule.needs.contains(&KERNEL[0]) {
-        return Err(Problem::Kernel);
-    }
-    blur.parameters.clone_from(&rule.needs);
-    rule.needs.retain(|need| !KERNEL.contains(need));
-    rule.needs.insert(0, (blur.of, rule.returns));
-    Ok(())
 }
 
 /// A line of a rule's header into the rule.

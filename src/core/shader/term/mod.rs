@@ -22,15 +22,21 @@
 //! layer of that name. What the effect asks of the stages before (maps, cubes, fields of samples) follows from what
 //! its rules need.
 //!
-//! - `declaration`: the file's text; [`error`]: what is wrong with it
-//! - `check`: whether its names, types and needs fit the built-in rules; `wgsl`: whether its functions are valid and
-//!   have derivatives
+//! A rule is of fragments, of texels of the UV atlas, or both (`domain: texel, fragment`); a blur of a texel's quantity is
+//! a rule, too, whose function is the kernel (`pass: light_map: vec3f, 7 taps`, see [`Blur`](super::rule::Blur)).
+//! Fragments look up what a rule of texels gives where it says how far that is off (`sampled: 0`).
+//!
+//! - `declaration`: the file's text, `texels`: what it says of texels; [`error`]: what is wrong with it
+//! - `check`: whether its names and types fit the built-in rules, `there`: whether what it needs is there; `wgsl`:
+//!   whether its functions are valid and have derivatives
 //! - `needs`: what its effect asks for
 
 mod check;
 pub(crate) mod declaration;
 pub mod error;
 mod needs;
+mod texels;
+mod there;
 mod wgsl;
 
 use std::sync::{Mutex, PoisonError};

@@ -5,6 +5,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::shader::domain::Domain;
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
@@ -67,6 +68,7 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
         haze: false,
         smooth_normal: stored && needed("normal"),
         key_light: false,
+        atlas: chosen.iter().any(|rule| rule.domain == Domain::Texel),
     }
 }
 
