@@ -3,17 +3,19 @@
 use std::collections::HashMap;
 
 use wgpu::{
-    Color, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment, RenderPassDescriptor, StoreOp,
-    TextureFormat, TextureView,
+    Color, CommandEncoder, CommandEncoderDescriptor, LoadOp, Operations, RenderPassColorAttachment,
+    RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
 };
 
 use super::constants::Values;
 use super::device::Gpu;
 use super::error::{GpuError, Oversized};
 use super::program::{Outputs, Program};
-use super::targets::texture;
+use super::readback::Copy;
+use super::targets::{Tile, texture};
 use super::timing::Timer;
-use super::upload::{Bound, Uploads};
+use super::upload::{Bound, Content, Uploads};
+use crate::scene::view::Camera;
 use crate::shader::Plan;
 use crate::shader::atlas::{Level, Pass};
 
@@ -87,6 +89,30 @@ impl Atlas {
             program.draw(&mut pass);
         }
     }
+}
+
+/// The levels that a plan's passes leave of `content`, by name: four numbers a texel, row by row. Active morph targets
+/// are summed.
+///
+/// # Errors
+/// When the atlas is too large, the mesh does not lie in it, or the device fails.
+pub fn levels(gpu: &Gpu, plan: &Plan, content: Content<'_>) -> Result<HashMap<String, Vec<f32>>, GpuError> {
+    let morphs = &content.scene.mesh.morphs;
+    let targets: Vec<usize> = (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0).collect();
+    let morph_weights: Vec<f32> = targets.iter().map(|&i| morphs[i].weight).collect();
+    let mut uploads = Uploads::new(gpu, content, targets)?;
+    let Some(atlas) = Atlas::new(gpu, plan, &mut uploads)? else { return Ok(HashMap::new()) };
+    // Nobody sees a texel: any camera does.
+    let camera = Camera { world_to_camera: glam::DMat4::IDENTITY, fov_y: 1.0, width: 1, height: 1 };
+    let tile = Tile { x: 0, y: 0, width: 1, height: 1 };
+    atlas.set(gpu, &Values { params: content.params, camera: &camera, tile, morph_weights: &morph_weights });
+    let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("atlas") });
+    atlas.draw(&mut encoder, None);
+    let copies: Vec<(String, Copy)> =
+        atlas.levels.iter().map(|(name, view)| (name.clone(), Copy::new(gpu, &mut encoder, view))).collect();
+    gpu.queue.submit([encoder.finish()]);
+    gpu.check()?;
+    copies.into_iter().map(|(name, copy)| Ok((name, copy.read(gpu)?))).collect()
 }
 
 /// Whether the adapter takes an atlas of that size, and the mesh lies in it.

@@ -15,7 +15,9 @@ use skinfit::render::image::Image;
 use skinfit::scene::Scene;
 use skinfit::scene::mesh::Mesh;
 use skinfit::scene::view::{Background, Camera, View};
+use skinfit::shader::atlas::tangent::Along;
 use skinfit::shader::atlas::{Axis, PassKind};
+use skinfit::shader::tangent::chain::Seed;
 use skinfit::shader::term::{Term, register};
 use skinfit::shader::{Budget, Domain, Facts, Plan, PlanError, Source, Work, plan};
 
@@ -69,6 +71,49 @@ fn glow_light(glow_soft: vec3f, glow_detail: vec3f, glow_weight: vec3f) -> vec3f
 }
 ";
 
+/// A blur as wide on the surface as its radius says, of what a parameter moves.
+const VEINED: &str = "\
+// effect: veins, light under a stretched skin
+// parameter: veins_radius = 0.05 in [0.001, 30]; standard deviation, in the scene's unit; a test
+// parameter: veins_depth = 1.5 in [0.1, 10]; exponent of the light map; a test
+//
+// gives: veins_light
+// domain: texel
+// cost: 12
+fn veins_map(vertex_uv: vec2f, veins_depth: f32) -> vec3f {
+    let power: f32 = exp(veins_depth * log(0.1 + vertex_uv.x));
+    return vec3f(power, power * vertex_uv.y, vertex_uv.y * vertex_uv.y);
+}
+
+// gives: veins_stretch
+// domain: texel
+// cost: 20
+fn veins_stretch_map(vertex_position: vec3f) -> vec2f {
+    let along: vec3f = dpdx(vertex_position);
+    let down: vec3f = dpdy(vertex_position);
+    return sqrt(vec2f(dot(along, along), dot(down, down)));
+}
+
+// gives: veins_soft
+// domain: texel
+// pass: veins_light: vec3f, 5 taps
+// sampled: 0
+// cost: 8
+fn veins_kernel(tap: f32, axis: vec2f, veins_radius: f32, veins_stretch: vec2f) -> vec2f {
+    let step: f32 = dot(veins_stretch, axis);
+    return vec2f(tap * veins_radius / max(step, 1e-6), exp(-0.5 * tap * tap));
+}
+
+// gives: veins_part
+// adds: veins
+// cost: 1
+fn veins_shown(veins_soft: vec3f) -> vec3f {
+    return veins_soft;
+}
+";
+
+static VEINS: OnceLock<&'static Term> = OnceLock::new();
+
 fn term() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
     TERM.get_or_init(|| register("glow", GLOW).unwrap_or_else(|error| panic!("{error}")))
@@ -94,7 +139,12 @@ fn validate(plan: &Plan) {
 
 /// Where the plan computes a quantity of the term's.
 fn domain_of(plan: &Plan, quantity: &str) -> Vec<Domain> {
-    plan.all_steps().map(|step| step.rule).filter(|r| r.gives_quantity(quantity)).map(|r| r.domain).collect()
+    plan.all_steps()
+        .into_iter()
+        .map(|step| step.rule)
+        .filter(|r| r.gives_quantity(quantity))
+        .map(|r| r.domain)
+        .collect()
 }
 
 #[test]
@@ -220,6 +270,58 @@ fn looked_up(texels: &Texels, uv: DVec2) -> Option<DVec3> {
         (share(x, f.x) * share(y, f.y), at(texels, low.x as i64 + x, low.y as i64 + y))
     });
     mean(corners.into_iter())
+}
+
+/// Texels of a level that hold something.
+fn held(level: &[f32]) -> Vec<[f64; 3]> {
+    let texels = level.chunks_exact(4).filter(|texel| texel[3] > 0.0);
+    texels.map(|texel| [0, 1, 2].map(|c| f64::from(texel[c]))).collect()
+}
+
+#[test]
+fn levels_move_as_their_differences_do() {
+    let Some(gpu) = gpu() else { return };
+    let veined = VEINS.get_or_init(|| register("veins", VEINED).unwrap_or_else(|error| panic!("{error}")));
+    let mut scene = scene();
+    scene.effects = Effects::of(&[veined.effect]);
+    let facts = Facts { atlas: Some(64), ..Facts::of_scene(&scene, &scene.params, Budget::Exact, false) };
+    let planned = plan(&facts).unwrap();
+    let illumination = Illumination { irradiance: None, lobes: None, hilite: None };
+    let levels = |plan: &Plan, scene: &Scene| {
+        let content = Content { scene, illumination: &illumination, occlusion: None, params: &scene.params };
+        skinfit::gpu::atlas::levels(gpu, plan, content).unwrap()
+    };
+    // The square's side over the texels that it covers: rounded at most by what 1e-7 is of a texel's 1e-2.
+    for [u, v, _] in held(&levels(&planned, &scene)["veins_stretch"]) {
+        let step = 2.0 / (64.0 * (HIGH - LOW));
+        assert!((u - step).abs() < 1e-4 * step && (v - step).abs() < 1e-4 * step, "{u} {v} {step}");
+    }
+    for &param in &veined.params[..2] {
+        let along = Along::new(&planned, &Seed::of_param(param)).unwrap();
+        assert!(along.moved.contains_key("veins_soft"), "{along:?}");
+        let mut both = planned.clone();
+        both.passes.extend(along.passes);
+        let tangent = held(&levels(&both, &scene)["d_veins_soft"]);
+        let at = |by: f64| {
+            let mut moved = scene.clone();
+            moved.params.set(param, scene.params.scalar(param) + by);
+            held(&levels(&planned, &moved)["veins_soft"])
+        };
+        let step = 2e-3;
+        let (more, less) = (at(step), at(-step));
+        assert!(tangent.len() > 2000 && tangent.len() == more.len());
+        let mut largest = 0.0_f64;
+        for ((tangent, more), less) in
+            tangent.iter().flatten().zip(more.iter().flatten()).zip(less.iter().flatten())
+        {
+            let difference = (more - less) / (2.0 * step);
+            largest = largest.max(difference.abs());
+            // Levels near 1 round to 1e-7, over a step of 4e-3; and where a tap passes from one texel to the next within
+            // the step, its slope changes by a share of what neighbours differ.
+            assert!((tangent - difference).abs() < 5e-3, "{}: {tangent} {difference}", param.name());
+        }
+        assert!(largest > 0.05, "{}: {largest}", param.name());
+    }
 }
 
 fn drawn(scene: &Scene, options: RenderOptions) -> Option<(Image, Plan)> {

@@ -226,9 +226,16 @@ impl Plan {
         }
     }
 
-    /// Every chosen rule: those of the passes over the atlas, then those of the image.
-    pub fn all_steps(&self) -> impl Iterator<Item = &Step> {
-        self.passes.iter().flat_map(|pass| &pass.plan.steps).chain(&self.steps)
+    /// Every chosen rule, each once: those of the passes over the atlas, then those of the image.
+    #[must_use]
+    pub fn all_steps(&self) -> Vec<&Step> {
+        let mut all: Vec<&Step> = Vec::new();
+        for step in self.passes.iter().flat_map(|pass| &pass.plan.steps).chain(&self.steps) {
+            if !all.iter().any(|known| std::ptr::eq(known.rule, step.rule)) {
+                all.push(step);
+            }
+        }
+        all
     }
 
     /// Whether the module computes in 16 bits.
@@ -240,12 +247,12 @@ impl Plan {
     /// Every rule that was left out, and why.
     #[must_use]
     pub fn left_out(&self) -> Vec<(&'static Rule, String)> {
-        let chosen = |rule: &Rule| self.all_steps().any(|step| std::ptr::eq(step.rule, rule));
+        let all = self.all_steps();
+        let chosen = |rule: &Rule| all.iter().any(|step| std::ptr::eq(step.rule, rule));
         let same = |step: &Step, rule: &Rule, q: &str| {
             step.rule.domain == rule.domain && step.rule.gives_quantity(q)
         };
-        let given =
-            |rule: &Rule| rule.gives.iter().any(|(q, _)| self.all_steps().any(|step| same(step, rule, q)));
+        let given = |rule: &Rule| rule.gives.iter().any(|(q, _)| all.iter().any(|step| same(step, rule, q)));
         // Where there is no atlas its rules are no choice.
         let atlas = self.facts.holds("atlas") == Some(true);
         let choice = |rule: &&Rule| atlas || rule.domain != Domain::Texel;

@@ -10,7 +10,7 @@ use crate::model::effects::Effects;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
 use crate::shader::atlas::{Axis, Pass, PassKind};
-use crate::shader::{Budget, Facts, Plan, plan};
+use crate::shader::{Budget, Domain, Facts, Plan, plan};
 
 /// Print the shader that a scene gets, and the plan behind it
 #[derive(clap::Args)]
@@ -57,8 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let plan = plan(&Facts::of_scene(&scene, &params, arguments.accuracy, arguments.f16))?;
     let text = match arguments.show.as_str() {
         "plan" => table(&plan, ""),
-        "wgsl" => plan.wgsl.clone(),
-        _ => format!("{}\n{}", table(&plan, "// "), plan.wgsl),
+        "wgsl" => modules(&plan),
+        _ => format!("{}\n{}", table(&plan, "// "), modules(&plan)),
     };
     write_or_say(arguments.output.as_deref(), &text)?;
     Ok(Exit::Done)
@@ -100,7 +100,7 @@ fn table(plan: &Plan, margin: &str) -> String {
     };
     line(format!(
         "{} rules, about {:.0} operations a fragment, error at most {:.1e}",
-        plan.all_steps().count(),
+        plan.all_steps().len(),
         plan.cost,
         plan.error
     ));
@@ -122,9 +122,20 @@ fn table(plan: &Plan, margin: &str) -> String {
     line(String::new());
     line("left out:".to_owned());
     for (rule, reason) in plan.left_out() {
-        line(format!("  {:<28} {reason}", rule.name));
+        // A rule of several domains is left out of each by itself.
+        let domain = if rule.domain == Domain::Texel { ", in texels" } else { "" };
+        line(format!("  {:<28} {reason}{domain}", rule.name));
     }
     text
+}
+
+/// The image's module; those of passes over the atlas go before, each under a line of its own.
+fn modules(plan: &Plan) -> String {
+    let Some(_) = plan.passes.first() else { return plan.wgsl.clone() };
+    let pass =
+        |(i, pass): (usize, &Pass)| format!("// Pass {}: {}\n\n{}\n", i + 1, told(pass), pass.plan.wgsl);
+    let passes: String = plan.passes.iter().enumerate().map(pass).collect();
+    format!("{passes}// The image\n\n{}", plan.wgsl)
 }
 
 /// What a pass does, in words.
