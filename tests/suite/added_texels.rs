@@ -346,7 +346,8 @@ fn the_renderer_draws_its_passes() {
     let base = scene.params.rgb(skinfit::model::params::Param::BaseWeight);
     let mut seen = 0;
     for (i, (rgb, alpha)) in image.rgb.iter().zip(&image.alpha).enumerate() {
-        let pixel = DVec2::new((i as u32 % PIXELS) as f64 + 0.5, (i as u32 / PIXELS) as f64 + 0.5);
+        let at = |place: u32| f64::from(place) + 0.5;
+        let pixel = DVec2::new(at(i as u32 % PIXELS), at(i as u32 / PIXELS));
         let on_square = (2.0 * pixel / f64::from(PIXELS) - 1.0) * half;
         let inside = on_square.abs().max_element() < 1.0;
         assert_eq!(*alpha, if inside { 1.0 } else { 0.0 }, "pixel {i}");
