@@ -113,6 +113,16 @@ pub enum GpuError {
         /// What was refused.
         reason: String,
     },
+    /// A mesh does not lie in the atlas in whose texels something is computed.
+    #[error(
+        "the mesh has texture coordinates in the tile ({u}, {v}), but what is computed in texels needs them within the unit square."
+    )]
+    OutsideAtlas {
+        /// The tile's number along u.
+        u: f32,
+        /// The tile's number along v.
+        v: f32,
+    },
     /// There is nothing to compute.
     #[error("none of the enabled effects shows anything.")]
     NothingShown,

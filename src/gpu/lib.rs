@@ -6,7 +6,7 @@
 //!   `vertices`: the mesh at rest, its morph targets and bones)
 //! - `constants`: the uniform block
 //! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
-//! - `program`: a plan as a pipeline
+//! - `program`: a plan as a pipeline; [`atlas`]: its passes over the UV atlas
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
 //! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
 //! - `records`: where the numbers of a stored sample stand on the device
@@ -23,6 +23,7 @@
 use skinfit_core::{bake, model, render, samples, scene, shader};
 
 pub mod adapter;
+pub mod atlas;
 mod bloom;
 pub(crate) mod constants;
 pub mod device;

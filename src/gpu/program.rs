@@ -1,19 +1,21 @@
-//! A plan as a pipeline, with what it reads bound to it.
+//! A plan as a pipeline, with what it reads bound to it, and the passes over the atlas that go before.
 
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferUsages, ColorTargetState,
-    ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, FragmentState, IndexFormat,
-    MultisampleState, PipelineCompilationOptions, PipelineLayoutDescriptor, PrimitiveState, RenderPass,
-    RenderPipeline, RenderPipelineDescriptor, SamplerBindingType, ShaderModuleDescriptor, ShaderSource,
-    ShaderStages, StencilState, TextureFormat, TextureSampleType, TextureViewDimension, VertexAttribute,
-    VertexBufferLayout, VertexFormat, VertexState, VertexStepMode,
+    ColorWrites, CommandEncoder, CompareFunction, DepthBiasState, DepthStencilState, FragmentState,
+    IndexFormat, MultisampleState, PipelineCompilationOptions, PipelineLayoutDescriptor, PrimitiveState,
+    RenderPass, RenderPipeline, RenderPipelineDescriptor, SamplerBindingType, ShaderModuleDescriptor,
+    ShaderSource, ShaderStages, StencilState, TextureFormat, TextureSampleType, TextureViewDimension,
+    VertexAttribute, VertexBufferLayout, VertexFormat, VertexState, VertexStepMode,
 };
 
+use super::atlas::Atlas;
 use super::constants::{self, Values};
 use super::device::Gpu;
 use super::error::GpuError;
 use super::targets::DEPTH;
+use super::timing::Timer;
 use super::upload::{Bound, Uploads};
 use crate::shader::quantity::Kind;
 use crate::shader::{Attribute, Plan};
@@ -26,10 +28,21 @@ pub(super) struct Program {
     /// The uniform block, where the plan has constants.
     constants: Option<Buffer>,
     attributes: Vec<Buffer>,
-    indices: Buffer,
-    index_count: u32,
+    /// The mesh's triangles and how many indices they have; without them three vertices cover the target.
+    mesh: Option<(Buffer, u32)>,
     /// Targets that it draws into.
     targets: usize,
+    /// Passes that go before.
+    atlas: Option<Atlas>,
+}
+
+/// What a program draws into.
+#[derive(Clone, Copy)]
+pub(super) struct Outputs<'a> {
+    pub(super) formats: &'a [TextureFormat],
+    pub(super) multisamples: u32,
+    /// Whether what is nearer hides what is behind.
+    pub(super) depth: bool,
 }
 
 impl Program {
@@ -42,19 +55,34 @@ impl Program {
         formats: &[TextureFormat],
         multisamples: u32,
     ) -> Result<Self, GpuError> {
+        let atlas = Atlas::new(gpu, &plan, uploads)?;
+        let levels = atlas.as_ref().map(|atlas| atlas.bound(&plan.levels)).unwrap_or_default();
+        let program = Self::over(gpu, plan, uploads, levels, Outputs { formats, multisamples, depth: true })?;
+        Ok(Self { atlas, ..program })
+    }
+
+    /// The plan's pipeline without the passes that go before, whose levels are given.
+    pub(super) fn over(
+        gpu: &Gpu,
+        plan: Plan,
+        uploads: &mut Uploads<'_>,
+        levels: Vec<Bound>,
+        outputs: Outputs<'_>,
+    ) -> Result<Self, GpuError> {
         let attributes =
             plan.attributes.iter().map(|&a| uploads.attribute(gpu, a)).collect::<Result<Vec<_>, _>>()?;
-        let resources =
+        let mut resources =
             plan.resources.iter().map(|&r| uploads.resource(gpu, r)).collect::<Result<Vec<_>, _>>()?;
+        resources.extend(levels);
         let constants = constant_buffer(gpu, &plan);
         let layout = layout(gpu, &plan);
-        let pipeline = pipeline(gpu, &plan, &layout, formats, multisamples);
+        let pipeline = pipeline(gpu, &plan, &layout, outputs);
         let bound = bind(gpu, &layout, constants.as_ref(), &resources);
         gpu.check()?;
-        let indices = uploads.indices().clone();
         let index_count = 3 * uploads.content().scene.mesh.triangles.len() as u32;
-        let targets = formats.len();
-        Ok(Self { plan, pipeline, bound, constants, attributes, indices, index_count, targets })
+        let mesh = (!attributes.is_empty()).then(|| (uploads.indices().clone(), index_count));
+        let targets = outputs.formats.len();
+        Ok(Self { plan, pipeline, bound, constants, attributes, mesh, targets, atlas: None })
     }
 
     /// Targets that it draws into, depth aside.
@@ -68,17 +96,32 @@ impl Program {
             let block = constants::block(&self.plan.constants, values);
             gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&block));
         }
+        if let Some(atlas) = &self.atlas {
+            atlas.set(gpu, values);
+        }
     }
 
-    /// Draw the mesh.
+    /// Draw the passes that go before.
+    pub(super) fn prepare(&self, encoder: &mut CommandEncoder, timer: Option<&mut Timer>) {
+        if let Some(atlas) = &self.atlas {
+            atlas.draw(encoder, timer);
+        }
+    }
+
+    /// Draw the mesh, or over the whole target.
     pub(super) fn draw(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.pipeline);
         pass.set_bind_group(0, &self.bound, &[]);
         for (slot, buffer) in self.attributes.iter().enumerate() {
             pass.set_vertex_buffer(slot as u32, buffer.slice(..));
         }
-        pass.set_index_buffer(self.indices.slice(..), IndexFormat::Uint32);
-        pass.draw_indexed(0..self.index_count, 0, 0..1);
+        match &self.mesh {
+            Some((indices, count)) => {
+                pass.set_index_buffer(indices.slice(..), IndexFormat::Uint32);
+                pass.draw_indexed(0..*count, 0, 0..1);
+            }
+            None => pass.draw(0..3, 0..1),
+        }
     }
 }
 
@@ -104,7 +147,11 @@ fn layout(gpu: &Gpu, plan: &Plan) -> BindGroupLayout {
         let stage = if kind == Kind::Storage { ShaderStages::VERTEX } else { ShaderStages::FRAGMENT };
         entry(1 + i as u32, stage, binding_type(kind))
     });
-    let entries: Vec<_> = constants.into_iter().chain(resources).collect();
+    let first = 1 + plan.resources.len() as u32;
+    let levels = (first..).zip(&plan.levels);
+    let levels =
+        levels.map(|(binding, _)| entry(binding, ShaderStages::FRAGMENT, binding_type(Kind::Texels)));
+    let entries: Vec<_> = constants.into_iter().chain(resources).chain(levels).collect();
     gpu.device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some("plan"), entries: &entries })
 }
 
@@ -153,8 +200,7 @@ fn pipeline(
     gpu: &Gpu,
     plan: &Plan,
     layout: &BindGroupLayout,
-    formats: &[TextureFormat],
-    multisamples: u32,
+    Outputs { formats, multisamples, depth }: Outputs<'_>,
 ) -> RenderPipeline {
     let device = &gpu.device;
     let module = device.create_shader_module(ShaderModuleDescriptor {
@@ -195,7 +241,7 @@ fn pipeline(
         },
         // Both sides of a triangle are seen, as on the CPU.
         primitive: PrimitiveState { cull_mode: None, ..PrimitiveState::default() },
-        depth_stencil: Some(DepthStencilState {
+        depth_stencil: depth.then(|| DepthStencilState {
             format: DEPTH,
             depth_write_enabled: Some(true),
             depth_compare: Some(CompareFunction::Greater),

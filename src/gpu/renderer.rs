@@ -398,6 +398,9 @@ impl Stage {
         first: bool,
         mut timer: Option<&mut Timer>,
     ) {
+        if first {
+            program.prepare(encoder, timer.as_deref_mut());
+        }
         let targets = &self.targets;
         let drawn = targets.samples.as_ref().unwrap_or(&targets.pixels);
         let attachments = match &targets.multisampled {

@@ -8,6 +8,7 @@ use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::terms::TermName;
+use skinfit::shader::domain::Work;
 use skinfit::shader::facts::{FaceSizes, MapFacts};
 use skinfit::shader::{Budget, Facts, Plan, Resource, Source, plan};
 
@@ -215,6 +216,8 @@ fn shaders_of_every_combination_of_facts_validate() {
         square_rim: bit(bits, 7),
         f16: bit(bits, 8),
         tessellation: 0.003,
+        atlas: None,
+        work: Work::default(),
         budget,
         output: None,
     };

@@ -378,6 +378,7 @@ impl Setup {
             haze: effects.has_any(&[E::Haze, E::Bloom]),
             smooth_normal: effects.has(E::KeyLight) || (looked_up && self.smooth_lookups()),
             key_light: effects.has(E::KeyLight),
+            atlas: false,
         };
         let added = effects.added().filter_map(|effect| Some(effect.info().needs?(effect, self)));
         added.fold(built_in, Needs::or)
@@ -427,6 +428,8 @@ pub struct Needs {
     pub smooth_normal: bool,
     /// The key light's direction and colour.
     pub key_light: bool,
+    /// The texture coordinates of an atlas in whose texels something is computed.
+    pub atlas: bool,
 }
 
 impl Needs {
@@ -448,6 +451,7 @@ impl Needs {
             haze: self.haze || other.haze,
             smooth_normal: self.smooth_normal || other.smooth_normal,
             key_light: self.key_light || other.key_light,
+            atlas: self.atlas || other.atlas,
         }
     }
 

@@ -8,9 +8,9 @@ use super::lower::{LowerError, Natives, Source, Value};
 use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 use crate::model::terms::TermName;
+use crate::shader::Domain;
 use crate::shader::emit::{Plan, hazy, parts, sample_fields};
 use crate::shader::module::{sample_struct, uniform};
-use crate::shader::rule::Stage;
 use crate::shader::search::{PlanError, components};
 use crate::shader::tangent::TangentError;
 use crate::shader::tangent::chain::{Chain, Seed};
@@ -198,7 +198,7 @@ struct Listed {
 impl Listed {
     fn new(plan: &Plan, chain: &Chain) -> Self {
         let mut given = Vec::new();
-        for rule in plan.steps.iter().map(|step| step.rule).filter(|rule| rule.stage == Stage::Fragment) {
+        for rule in plan.steps.iter().map(|step| step.rule).filter(|rule| rule.domain == Domain::Fragment) {
             for &(quantity, swizzle) in &rule.gives {
                 let kind = if swizzle.is_empty() { rule.returns } else { VECTORS[swizzle.len() - 1] };
                 given.push((quantity, kind));
@@ -249,7 +249,7 @@ fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
         let _ = writeln!(wgsl, "    {name}: {kind},");
     }
     let _ = writeln!(wgsl, "}}\n\nfn {ENTRY}(at: Sample) -> Shaded {{");
-    wgsl.push_str(&plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+    wgsl.push_str(&plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
     chain.lines.iter().for_each(|lines| wgsl.push_str(lines));
     let values: Vec<&str> = members.iter().map(|(_, _, value)| value.as_str()).collect();
     let _ = write!(wgsl, "    return Shaded({});\n}}\n", values.join(", "));

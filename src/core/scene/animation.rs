@@ -110,7 +110,7 @@ impl Pose {
 pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
     let Maps { color, normal, specular, attenuator } = maps;
     let looked_up = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
-    let uvs = match (needs.maps(), looked_up) {
+    let uvs = match (needs.maps() || needs.atlas, looked_up || needs.atlas) {
         (false, _) => Uvs::None,
         (true, false) => Uvs::Optional,
         (true, true) => Uvs::Required,

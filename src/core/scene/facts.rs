@@ -1,7 +1,9 @@
 //! What a scene calls for of the shader planner.
 
 use super::Scene;
+use super::mesh::Mesh;
 use crate::model::params::{Param, Params};
+use crate::shader::domain::{Domain, Work};
 use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source};
 
 impl Facts {
@@ -9,6 +11,7 @@ impl Facts {
     #[must_use]
     pub fn of_scene(scene: &Scene, params: &Params, budget: Budget, f16: bool) -> Self {
         let Scene { maps, mesh, .. } = scene;
+        let atlas = scene.needs().atlas && !mesh.uvs.is_empty();
         let same = |a: Option<(usize, usize)>, b: Option<(usize, usize)>| a.is_some() && a == b;
         let color = maps.color.as_ref().map(|map| (map.width, map.height));
         let normal = maps.normal.as_ref().map(|map| (map.width, map.height));
@@ -32,10 +35,35 @@ impl Facts {
             square_rim: params.scalar(Param::RimExponent) == 2.0,
             f16,
             tessellation: tessellation_error(scene),
+            atlas: atlas.then_some(ATLAS_SIZE),
+            work: if atlas { work(scene) } else { Work::default() },
             budget,
             output: None,
         }
     }
+}
+
+/// Texels along a side of the UV atlas.
+const ATLAS_SIZE: u32 = 512;
+
+/// How many vertices, texels of the atlas and fragments an image of the first view takes. Where the charts overlap,
+/// texels are counted again.
+fn work(scene: &Scene) -> Work {
+    let Mesh { positions, uvs, triangles, .. } = &scene.mesh;
+    let corner = |i: u32| uvs.get(i as usize).copied().unwrap_or_default();
+    let area = |[a, b, c]: [u32; 3]| {
+        let [a, b, c] = [a, b, c].map(corner);
+        f64::from((b - a).perp_dot(c - a).abs()) / 2.0
+    };
+    let covered: f64 = triangles.iter().copied().map(area).sum();
+    let vertices = positions.len() as f64;
+    // Without a view, as many as a character's mesh has beside its vertices.
+    let usual = vertices / Work::default().share(Domain::Vertex);
+    let fragments = scene
+        .views
+        .first()
+        .map_or(usual, |view| f64::from(view.camera.width) * f64::from(view.camera.height));
+    Work { vertices, texels: covered.min(1.0) * f64::from(ATLAS_SIZE).powi(2), fragments }
 }
 
 /// The 99th percentile over a mesh's triangles of how far an interpolated 1 - |N.V| is off: where the

@@ -1,12 +1,12 @@
-//! A plan: the chosen rules as one WGSL module, and what it reads.
+//! A plan: the chosen rules, the passes that go before, and what they read.
 
-use std::fmt::Write as _;
-
+use super::atlas::{self, Level, Pass};
+use super::domain::{Domain, UV};
 use super::facts::{Facts, Source};
 use super::kept::kept_fields;
-use super::quantity::{Attribute, Constant, Kind, Resource};
-use super::rule::{LIBRARY, Rule, Stage, rules};
-use super::search::{INTERPOLATION_COST, PlanError, VERTEX_SHARE, components, search};
+use super::quantity::{Attribute, Constant, Resource};
+use super::rule::{Rule, rules};
+use super::search::{Carried, PlanError, search};
 use crate::model::terms::TermName;
 
 /// The shader that a scene gets.
@@ -14,19 +14,24 @@ use crate::model::terms::TermName;
 pub struct Plan {
     /// What it was made for.
     pub facts: Facts,
-    /// The chosen rules, in the order of their evaluation, the vertex stage first.
+    /// The chosen rules of the module, in the order of their evaluation, the vertex stage first. Rules of texels are
+    /// steps of [`passes`](Self::passes).
     pub steps: Vec<Step>,
+    /// Passes over the UV atlas that go before, in their order.
+    pub passes: Vec<Pass>,
     /// Vertex attributes; the shader location is the place in this list.
     pub attributes: Vec<Attribute>,
     /// What is bound in group 0; the binding is 1 + the place in this list.
     pub resources: Vec<Resource>,
     /// The members of the uniform block at binding 0, in its order.
     pub constants: Vec<Constant>,
+    /// Textures of the atlas that it reads, bound in group 0 after the resources, in this order.
+    pub levels: Vec<Level>,
     /// Quantities that the rasteriser interpolates, with their WGSL types.
     pub varyings: Vec<(&'static str, &'static str)>,
     /// The module; `vs_main` and `fs_main` are its entry points, or `shade` its function.
     pub wgsl: String,
-    /// Operations a fragment, about, vertices counted by [`VERTEX_SHARE`].
+    /// Operations a fragment, about: vertices and texels by [their work](super::domain::Work), passes with them.
     pub cost: f64,
     /// How far the output may be off, relative to white.
     pub error: f64,
@@ -146,18 +151,52 @@ impl Plan {
         goals: &[&'static str],
         given: &[&'static str],
     ) -> Result<Self, PlanError> {
-        let rules = search(facts, vertex_goals, goals, given)?;
-        let of_vertex =
-            |q: &str| rules.iter().any(|r| r.stage == Stage::Vertex && r.gives.iter().any(|g| g.0 == q));
+        let found = search(facts, vertex_goals, goals, given)?;
+        let passes = atlas::passes(facts, &found)?;
+        if passes.is_empty() {
+            return Ok(Self::of_rules(facts, &found.rules, &found.carried, Vec::new()));
+        }
+        let of_fragments = |rule: &&&'static Rule| rule.domain == Domain::Fragment;
+        let fragments: Vec<&'static Rule> = found.rules.iter().filter(of_fragments).copied().collect();
+        let sampled = found.carried.iter().filter(|on| on.edge.from == Domain::Texel);
+        let levels = sampled.map(|on| Level { name: on.quantity.to_owned(), kind: level_type(on.numbers) });
+        let goals = [vertex_goals, &[UV]].concat();
+        let rules = atlas::with_vertices(&found, Domain::Fragment, &goals, fragments);
+        let mut plan = Self::of_rules(facts, &rules, &found.carried, levels.collect());
+        plan.cost += passes.iter().map(|pass| pass.plan.cost).sum::<f64>();
+        plan.error = found.rules.iter().map(|rule| rule.error(facts)).sum::<f64>()
+            + found.carried.iter().map(|on| on.error).sum::<f64>();
+        plan.passes = passes;
+        Ok(plan)
+    }
+
+    /// What rules of vertices and of one other domain read; the module is left empty. `levels` are bound.
+    pub(super) fn of_rules(
+        facts: &Facts,
+        rules: &[&'static Rule],
+        carried: &[Carried],
+        levels: Vec<Level>,
+    ) -> Self {
+        let arrives = |domain: Domain, quantity: &str| {
+            let on = carried.iter().find(|on| on.edge.to == domain && on.quantity == quantity);
+            on.filter(|on| on.edge.from == Domain::Vertex)
+        };
+        let shading = || rules.iter().filter(|rule| rule.domain != Domain::Vertex && rule.blur.is_none());
         let mut varyings: Vec<(&'static str, &'static str)> = Vec::new();
-        for (quantity, kind) in
-            rules.iter().filter(|r| r.stage == Stage::Fragment).flat_map(|r| r.needs.iter().copied())
-        {
-            if of_vertex(quantity) && !given.contains(&quantity) && !varyings.iter().any(|v| v.0 == quantity)
+        let mut interpolated = 0.0;
+        let needs = shading().flat_map(|rule| rule.needs.iter().map(|need| (rule.domain, *need)));
+        // Fragments look levels up by their texture coordinates.
+        let looks_up = !levels.is_empty() && shading().all(|rule| rule.domain == Domain::Fragment);
+        let by = looks_up.then_some((Domain::Fragment, (UV, "vec2f")));
+        for (domain, (quantity, kind)) in needs.chain(by) {
+            if let Some(on) = arrives(domain, quantity)
+                && !varyings.iter().any(|varying| varying.0 == quantity)
             {
                 varyings.push((quantity, kind));
+                interpolated += on.cost(facts);
             }
         }
+        let looked_up = carried.iter().filter(|on| on.edge.from == Domain::Texel && looks_up);
         let needed = |name: &str| rules.iter().any(|rule| rule.needs.iter().any(|(q, _)| *q == name));
         let read = |name: &str| rules.iter().any(|rule| rule.reads.contains(&name));
         let params = crate::model::params::Param::all().map(Constant::Param);
@@ -170,20 +209,33 @@ impl Plan {
             .iter()
             .map(|&rule| Step { rule, cost: rule.cost(facts), error: rule.error(facts) })
             .collect();
-        let interpolated: usize = varyings.iter().map(|(_, kind)| components(kind)).sum();
-        let share = |step: &Step| if step.rule.stage == Stage::Vertex { VERTEX_SHARE } else { 1.0 };
-        Ok(Self {
+        let share = |step: &Step| facts.work.share(step.rule.domain) * step.cost;
+        Self {
             facts: *facts,
             attributes: Attribute::ALL.into_iter().filter(|a| needed(a.name())).collect(),
             resources: Resource::ALL.into_iter().filter(|r| read(r.name())).collect(),
             constants,
             varyings,
+            levels,
+            passes: Vec::new(),
             wgsl: String::new(),
-            cost: steps.iter().map(|step| share(step) * step.cost).sum::<f64>()
-                + INTERPOLATION_COST * interpolated as f64,
+            cost: steps.iter().map(share).sum::<f64>()
+                + (interpolated + looked_up.map(|on| on.cost(facts)).sum::<f64>()),
             error: steps.iter().map(|step| step.error).sum(),
             steps,
-        })
+        }
+    }
+
+    /// Every chosen rule, each once: those of the passes over the atlas, then those of the image.
+    #[must_use]
+    pub fn all_steps(&self) -> Vec<&Step> {
+        let mut all: Vec<&Step> = Vec::new();
+        for step in self.passes.iter().flat_map(|pass| &pass.plan.steps).chain(&self.steps) {
+            if !all.iter().any(|known| std::ptr::eq(known.rule, step.rule)) {
+                all.push(step);
+            }
+        }
+        all
     }
 
     /// Whether the module computes in 16 bits.
@@ -195,165 +247,30 @@ impl Plan {
     /// Every rule that was left out, and why.
     #[must_use]
     pub fn left_out(&self) -> Vec<(&'static Rule, String)> {
-        let chosen = |rule: &Rule| self.steps.iter().any(|step| step.rule.name == rule.name);
-        let given = |rule: &Rule| {
-            rule.gives.iter().any(|(q, _)| self.steps.iter().any(|s| s.rule.gives.iter().any(|g| g.0 == *q)))
+        let all = self.all_steps();
+        let chosen = |rule: &Rule| all.iter().any(|step| std::ptr::eq(step.rule, rule));
+        let same = |step: &Step, rule: &Rule, q: &str| {
+            step.rule.domain == rule.domain && step.rule.gives_quantity(q)
         };
+        let given = |rule: &Rule| rule.gives.iter().any(|(q, _)| all.iter().any(|step| same(step, rule, q)));
+        // Where there is no atlas its rules are no choice.
+        let atlas = self.facts.holds("atlas") == Some(true);
+        let choice = |rule: &&Rule| atlas || rule.domain != Domain::Texel;
         let why = |rule: &Rule| match rule.refusal(&self.facts) {
             Some(reason) => reason,
             None if given(rule) => "dearer".to_owned(),
             None => "nothing asks for it".to_owned(),
         };
-        rules(self.facts.setup.effects).filter(|rule| !chosen(rule)).map(|rule| (rule, why(rule))).collect()
-    }
-
-    /// Declarations that every module shares: extensions, constants, resources, functions. The block of
-    /// uniform constants is left out where they stand in the text.
-    pub fn declarations(&self, uniform: bool) -> String {
-        let mut wgsl = String::new();
-        if self.uses_f16() {
-            wgsl.push_str("enable f16;\n\n");
-        }
-        if self.facts.morphs > 0 && self.constants.contains(&Constant::MorphWeights) {
-            let _ = writeln!(wgsl, "const MORPHS = {}u;\n", self.facts.morphs);
-        }
-        if uniform && !self.constants.is_empty() {
-            wgsl.push_str("struct Constants {\n");
-            for constant in &self.constants {
-                let kind = match constant {
-                    Constant::ViewProjection => "mat4x4f",
-                    Constant::MorphWeights => "array<vec4f, MORPHS>",
-                    _ => "vec4f",
-                };
-                let _ = writeln!(wgsl, "    {}: {kind},", constant.name());
-            }
-            wgsl.push_str("}\n\n@group(0) @binding(0) var<uniform> constants: Constants;\n");
-        }
-        for (i, resource) in self.resources.iter().enumerate() {
-            let (space, kind) = resource.kind().wgsl();
-            let _ = writeln!(wgsl, "@group(0) @binding({}) {space} {}: {kind};", i + 1, resource.name());
-        }
-        wgsl.push_str(&self.functions(&[Stage::Vertex, Stage::Fragment]));
-        wgsl
-    }
-
-    /// The functions of the stages' rules, and those that they call.
-    pub(super) fn functions(&self, stages: &[Stage]) -> String {
-        let mut wgsl = String::new();
-        let steps = || self.steps.iter().filter(|step| stages.contains(&step.rule.stage));
-        let used = |name: &str| steps().any(|step| step.rule.uses.contains(&name));
-        for (_, text) in LIBRARY.iter().filter(|(name, _)| used(name)) {
-            let _ = write!(wgsl, "\n{text}");
-        }
-        if stages.contains(&Stage::Fragment) {
-            wgsl.push_str(&self.face_sizes());
-            wgsl.push_str(&self.dapple_axis());
-        }
-        for step in steps().filter(|step| step.rule.plain_value().is_none()) {
-            if !step.rule.about.is_empty() {
-                wgsl.push('\n');
-                wrapped_comment(&mut wgsl, &step.rule.about);
-                wgsl.push_str(step.rule.body);
-            } else {
-                let _ = write!(wgsl, "\n{}", step.rule.body);
-            }
-        }
-        wgsl
-    }
-
-    /// `NAME_size()` for each resource of faces, which rules hand to `sample_faces`: texels along a side, without the
-    /// border.
-    fn face_sizes(&self) -> String {
-        let faces = self.resources.iter().filter(|resource| resource.kind() == Kind::Faces);
-        let function = |resource: &Resource| {
-            let name = resource.name();
-            let size = match self.facts.faces.of(*resource) {
-                Some(size) => format!("{:?}", size as f32),
-                None => format!("f32(textureDimensions({name}).x - 2u)"),
-            };
-            format!("\nfn {name}_size() -> f32 {{\n    return {size};\n}}\n")
-        };
-        faces.map(function).collect()
-    }
-
-    /// `axis_of_dapple()`, where a rule asks for it.
-    fn dapple_axis(&self) -> String {
-        if !self.steps.iter().any(|step| step.rule.body.contains("axis_of_dapple()")) {
-            return String::new();
-        }
-        let [x, y, z] = self.facts.setup.dapple.axis();
-        format!(
-            "\n// The third row of DappleXf in the world, before environment_rotation (MODEL 2).\n\
-             fn axis_of_dapple() -> vec3f {{\n    return vec3f({x:?}, {y:?}, {z:?});\n}}\n"
-        )
-    }
-
-    /// The rules of a stage, in the order of their evaluation.
-    pub(super) fn rules(&self, stage: Stage) -> impl Iterator<Item = &'static Rule> {
-        self.steps.iter().map(|step| step.rule).filter(move |rule| rule.stage == stage)
-    }
-
-    /// What a rule's function is called with; see [`Self::calls`].
-    pub(super) fn arguments(
-        &self,
-        rule: &Rule,
-        constant: &impl Fn(Constant, &str) -> String,
-        leaf: &impl Fn(&'static str) -> String,
-    ) -> Vec<String> {
-        let local = |q: &str| self.rules(rule.stage).any(|r| r.gives.iter().any(|(given, _)| *given == q));
-        let argument = |&(name, kind): &(&'static str, &'static str)| match Constant::from_name(name) {
-            Some(known) => constant(known, kind),
-            None if local(name) => name.to_owned(),
-            None => leaf(name),
-        };
-        rule.needs.iter().map(argument).collect()
-    }
-
-    /// The calls of a stage's rules, one a line; `constant` and `leaf` write what is there without a rule,
-    /// by its name and WGSL type.
-    pub fn calls(
-        &self,
-        stage: Stage,
-        constant: impl Fn(Constant, &str) -> String,
-        leaf: impl Fn(&'static str) -> String,
-    ) -> String {
-        let mut wgsl = String::new();
-        for rule in self.rules(stage) {
-            let arguments = self.arguments(rule, &constant, &leaf);
-            let call = match rule.plain_value() {
-                Some("") => arguments.concat(),
-                Some(value) => value.to_owned(),
-                None => format!("{}({})", rule.function, arguments.join(", ")),
-            };
-            match rule.gives.as_slice() {
-                [(quantity, "")] => {
-                    let _ = writeln!(wgsl, "    let {quantity}: {} = {call};", rule.returns);
-                }
-                several => {
-                    let both = format!("{}_and_more", several[0].0);
-                    let _ = writeln!(wgsl, "    let {both}: {} = {call};", rule.returns);
-                    for (quantity, swizzle) in several {
-                        let kind = ["f32", "f32", "vec2f", "vec3f"][swizzle.len()];
-                        let _ = writeln!(wgsl, "    let {quantity}: {kind} = {both}.{swizzle};");
-                    }
-                }
-            }
-        }
-        wgsl
+        let left = rules(self.facts.setup.effects).filter(choice).filter(|rule| !chosen(rule));
+        left.map(|rule| (rule, why(rule))).collect()
     }
 }
 
-fn wrapped_comment(wgsl: &mut String, words: &str) {
-    let mut line = String::from("//");
-    for word in words.split_whitespace() {
-        if line.len() + word.len() > 108 {
-            wgsl.push_str(&line);
-            wgsl.push('\n');
-            line = String::from("//");
-        }
-        line.push(' ');
-        line.push_str(word);
+/// The WGSL type of that many numbers of a level.
+const fn level_type(numbers: usize) -> &'static str {
+    match numbers {
+        1 => "f32",
+        2 => "vec2f",
+        _ => "vec3f",
     }
-    wgsl.push_str(&line);
-    wgsl.push('\n');
 }

@@ -4,6 +4,7 @@ use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::terms::TermName;
+use crate::shader::domain::Work;
 use crate::shader::quantity::Resource;
 
 /// How far the output may be off, relative to white diffuse light of unit irradiance.
@@ -97,6 +98,10 @@ pub struct Facts {
     /// How far 1 - |N.V| is off inside a triangle when it is interpolated: the 99th percentile over
     /// the mesh.
     pub tessellation: f64,
+    /// Texels along a side of the UV atlas; without one nothing is computed in texels.
+    pub atlas: Option<u32>,
+    /// How often each domain is evaluated.
+    pub work: Work,
     /// The accuracy allowed.
     pub budget: Budget,
     /// One term alone, instead of the whole.
@@ -125,6 +130,8 @@ impl Default for Facts {
             square_rim: false,
             f16: false,
             tessellation: 0.0,
+            atlas: None,
+            work: Work::default(),
             budget: Budget::Exact,
             output: None,
         }
@@ -139,7 +146,7 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 21] = [
+    pub const CONDITIONS: [&'static str; 22] = [
         "vertex_silhouette",
         "fragment_silhouette",
         "bumped_silhouette",
@@ -161,6 +168,7 @@ impl Facts {
         "turned",
         "square_rim",
         "f16",
+        "atlas",
     ];
 
     /// Whether a condition of a rule's `when` line holds; `None` for one that is not known.
@@ -199,6 +207,7 @@ impl Facts {
             "turned" => self.turned,
             "square_rim" => self.square_rim,
             "f16" => self.f16,
+            "atlas" => self.source == Source::Raster && self.atlas.is_some_and(|size| size > 0),
             _ => return None,
         })
     }

@@ -5,10 +5,11 @@
 
 use std::collections::BTreeSet;
 
+use super::domain::Domain;
 use super::emit::{Fields, Plan, hazy, parts, sample_fields};
 use super::facts::{Facts, Source};
 use super::quantity::{Constant, Resource};
-use super::rule::{Rule, Stage};
+use super::rule::Rule;
 use super::search::PlanError;
 use crate::model::params::Param;
 
@@ -115,7 +116,7 @@ fn frontier(facts: &Facts, kept: &Fields) -> Result<Fields, PlanError> {
     };
     let kept = names(kept);
     let mut moving: BTreeSet<&'static str> = BTreeSet::new();
-    for rule in whole.rules(Stage::Fragment) {
+    for rule in whole.rules(Domain::Fragment) {
         let moves =
             |name: &str| moving.contains(name) || Constant::from_name(name).is_some_and(|c| !is_held(c));
         if rule.needs.iter().any(|(name, _)| moves(name)) {
@@ -125,13 +126,13 @@ fn frontier(facts: &Facts, kept: &Fields) -> Result<Fields, PlanError> {
     // What needs nothing is there anyway.
     let free = |name: &str| {
         let mut given =
-            whole.rules(Stage::Fragment).filter(|rule| rule.gives.iter().any(|(given, _)| *given == name));
+            whole.rules(Domain::Fragment).filter(|rule| rule.gives.iter().any(|(given, _)| *given == name));
         given.any(|rule| rule.needs.is_empty() && rule.reads.is_empty())
     };
     let moved = |rule: &&Rule| rule.gives.iter().any(|(name, _)| moving.contains(name));
     // A part that nothing moves is kept as it is.
     let parts = goals.iter().filter(|goal| !moving.contains(*goal)).map(|goal| (*goal, "vec3f"));
-    let needed = whole.rules(Stage::Fragment).filter(moved).flat_map(|rule| rule.needs.iter().copied());
+    let needed = whole.rules(Domain::Fragment).filter(moved).flat_map(|rule| rule.needs.iter().copied());
     let mut frontier = Fields::new();
     for (name, kind) in needed.chain(parts) {
         let constant = Constant::from_name(name).is_some();

@@ -1,14 +1,17 @@
 //! The shader planner: from what a scene calls for to the WGSL that computes just that.
 //!
 //! The paper's vertex shaders were generated: a rules file, the character's set-up and what the
-//! fragment shader asks for went in, a search gave the cheapest shader. Here both stages are.
+//! fragment shader asks for went in, a search gave the cheapest shader. Here both stages are, and what is computed in
+//! texels of the UV atlas.
 //!
 //! - [`facts`]: what a scene calls for, and the accuracy that it allows
 //! - [`quantity`]: what shaders compute, bind and read: quantities, [`Resource`]s, [`Constant`]s
 //! - `rules/*.wgsl`: the rules, a file each; [`rule`] reads them
-//! - [`search`]: the cheapest set of rules within the accuracy budget (A*)
-//! - [`emit`]: the plan: the chosen rules, and what they read; `module`: its WGSL, for rasterised
-//!   fragments, for stored samples, or as a function for other engines
+//! - [`domain`]: where quantities are computed, and the edges between domains
+//! - [`search`]: the cheapest set of rules within the accuracy budget (A*); `graph`: what it searches
+//! - [`emit`]: the plan: the chosen rules, and what they read; `calls`: declarations, functions and calls; `module`: its
+//!   WGSL, for rasterised fragments, for stored samples, or as a function for other engines
+//! - [`atlas`]: passes over the UV atlas, their text and their tangents
 //! - [`kept`]: what of stored samples need not be computed anew in each pass
 //! - [`term`]: effects, parameters and rules that a file adds
 //! - [`probe`]: its rules one by one, for given numbers
@@ -16,9 +19,13 @@
 //!
 //! Nothing that the [`Plan`] does not name is uploaded, bound or compiled.
 
+pub mod atlas;
 mod bits;
+mod calls;
+pub mod domain;
 pub mod emit;
 pub mod facts;
+mod graph;
 pub mod kept;
 pub mod module;
 pub mod probe;
@@ -28,6 +35,7 @@ pub mod search;
 pub mod tangent;
 pub mod term;
 
+pub use domain::{Domain, Work};
 pub use emit::{Plan, Step, plan};
 pub use facts::{Budget, Facts, Source};
 pub use quantity::{Attribute, Constant, Resource};

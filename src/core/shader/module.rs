@@ -3,15 +3,21 @@
 
 use std::fmt::Write as _;
 
+use super::atlas::text::{SAMPLE_LEVEL, sampled};
+use super::domain::Domain;
 use super::emit::{Plan, hazy, parts, sample_fields};
 use super::quantity::{Constant, Kind, Resource};
-use super::rule::Stage;
 use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 
 impl Plan {
     /// Declarations, and the vertex stage; its position has these attributes.
     pub fn vertex_module(&self, position: &str) -> String {
+        self.vertex_module_at(position, "clip")
+    }
+
+    /// As [`vertex_module`](Self::vertex_module), the position being `clip`, a `vec4f`.
+    pub(super) fn vertex_module_at(&self, position: &str, clip: &str) -> String {
         let mut wgsl = self.declarations(true);
         wgsl.push_str("\nstruct Vertex {\n    @builtin(vertex_index) vertex_index: u32,\n");
         for (i, attribute) in self.attributes.iter().enumerate() {
@@ -22,14 +28,17 @@ impl Plan {
             let _ = writeln!(wgsl, "    @location({i}) {name}: {kind},");
         }
         wgsl.push_str("}\n\n@vertex\nfn vs_main(vertex: Vertex) -> Varyings {\n");
-        wgsl.push_str(&self.calls(Stage::Vertex, uniform, |name| format!("vertex.{name}")));
+        wgsl.push_str(&self.calls(Domain::Vertex, uniform, |name| format!("vertex.{name}")));
         let varyings: String = self.varyings.iter().map(|(name, _)| format!(", {name}")).collect();
-        let _ = write!(wgsl, "    return Varyings(clip{varyings});\n}}\n");
+        let _ = write!(wgsl, "    return Varyings({clip}{varyings});\n}}\n");
         wgsl
     }
 
     pub(super) fn raster_module(&self, parts: &[&str]) -> String {
         let mut wgsl = self.vertex_module("");
+        if !self.levels.is_empty() {
+            let _ = write!(wgsl, "\n{SAMPLE_LEVEL}");
+        }
         if hazy(&self.facts) {
             wgsl.push_str(
                 "\nstruct Fragment {\n    @location(0) color: vec4f,\n    @location(1) coverage: f32,\n}\n",
@@ -38,7 +47,8 @@ impl Plan {
         } else {
             wgsl.push_str("\n@fragment\nfn fs_main(at: Varyings) -> @location(0) vec4f {\n");
         }
-        wgsl.push_str(&self.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        wgsl.push_str(&sampled(&self.levels));
+        wgsl.push_str(&self.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         let sum = sum(parts);
         let returned = if hazy(&self.facts) {
             format!("Fragment(vec4f({sum}, haze), 1.0)")
@@ -56,7 +66,7 @@ impl Plan {
         let fetches: Vec<String> = self
             .steps
             .iter()
-            .filter(|step| step.rule.stage == Stage::Fragment)
+            .filter(|step| step.rule.domain == Domain::Fragment)
             .filter_map(|step| {
                 let read = |kind| {
                     let found = |r: &&Resource| step.rule.reads.contains(&r.name()) && r.kind() == kind;
@@ -98,7 +108,7 @@ impl Plan {
         let mut wgsl = self.declarations(true);
         wgsl.push_str(&sample_struct(&sample_fields(&self.facts)));
         wgsl.push_str("\n// Radiance, and the haze in alpha.\nfn shade(at: Sample) -> vec4f {\n");
-        wgsl.push_str(&self.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        wgsl.push_str(&self.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         let haze = if hazy(&self.facts) { "haze" } else { "0.0" };
         let _ = write!(wgsl, "    return vec4f({}, {haze});\n}}\n", sum(parts));
         wgsl
@@ -108,7 +118,7 @@ impl Plan {
     /// It names parameters in capitals ([`literals`](Self::literals)) and resources as they are.
     #[must_use]
     pub fn function(&self) -> String {
-        let mut wgsl = self.functions(&[Stage::Fragment]).trim_start().to_owned();
+        let mut wgsl = self.functions(&[Domain::Fragment]).trim_start().to_owned();
         let eye = self.in_fragment(Constant::Eye);
         wgsl.push_str(
             "\n// What the vertex stage hands over: world space, interpolated.\nstruct Surface {\n",
@@ -126,7 +136,7 @@ impl Plan {
             Constant::Eye if eye => "at.eye".to_owned(),
             other => literal_name(other),
         };
-        wgsl.push_str(&self.calls(Stage::Fragment, constant, |name| format!("at.{name}")));
+        wgsl.push_str(&self.calls(Domain::Fragment, constant, |name| format!("at.{name}")));
         let _ = write!(wgsl, "    return vec4f({}, {alpha});\n}}\n", sum(&parts(&self.facts)));
         wgsl
     }
@@ -151,7 +161,7 @@ impl Plan {
 
     /// Whether a rule of the fragment stage reads a constant.
     fn in_fragment(&self, constant: Constant) -> bool {
-        let fragment = self.steps.iter().filter(|step| step.rule.stage == Stage::Fragment);
+        let fragment = self.steps.iter().filter(|step| step.rule.domain == Domain::Fragment);
         fragment.map(|step| step.rule).any(|rule| rule.needs.iter().any(|(name, _)| *name == constant.name()))
     }
 }

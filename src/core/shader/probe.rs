@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
+use super::domain::Domain;
 use super::emit::Plan;
 use super::facts::Facts;
 use super::quantity::Attribute;
-use super::rule::Stage;
 use super::search::{PlanError, components};
 
 /// Rules that yield wanted quantities from given ones, item by item.
@@ -31,23 +31,25 @@ impl Probe {
     /// When no rules yield them.
     pub fn new(
         facts: &Facts,
-        stage: Stage,
+        domain: Domain,
         given: &[(&'static str, &'static str)],
         wanted: &[(&'static str, &'static str)],
     ) -> Result<Self, PlanError> {
         let names =
             |list: &[(&'static str, &'static str)]| list.iter().map(|(name, _)| *name).collect::<Vec<_>>();
         let (goals, there) = (names(wanted), names(given));
-        let plan = match stage {
-            Stage::Vertex => Plan::search(facts, &goals, &[], &[])?,
-            Stage::Fragment => Plan::search(facts, &[], &goals, &there)?,
+        let plan = match domain {
+            Domain::Vertex => Plan::search(facts, &goals, &[], &[])?,
+            // No probe stands for an atlas.
+            Domain::Texel => return Err(PlanError::NoPlan { goals: goals.join(", ") }),
+            Domain::Fragment => Plan::search(facts, &[], &goals, &there)?,
         };
-        let given = match stage {
-            Stage::Vertex => plan.attributes.iter().map(|a: &Attribute| (a.name(), a.wgsl())).collect(),
-            Stage::Fragment => given.to_vec(),
+        let given = match domain {
+            Domain::Vertex => plan.attributes.iter().map(|a: &Attribute| (a.name(), a.wgsl())).collect(),
+            Domain::Texel | Domain::Fragment => given.to_vec(),
         };
         let mut probe = Self { plan, given, wanted: wanted.to_vec() };
-        probe.plan.wgsl = probe.module(stage);
+        probe.plan.wgsl = probe.module(domain);
         Ok(probe)
     }
 
@@ -63,7 +65,7 @@ impl Probe {
         self.wanted.iter().map(|(_, kind)| components(kind)).sum()
     }
 
-    fn module(&self, stage: Stage) -> String {
+    fn module(&self, domain: Domain) -> String {
         let mut wgsl = self.plan.declarations(true);
         let binding = self.plan.resources.len() + 1;
         let (stride, width) = (self.stride(), self.width());
@@ -84,7 +86,7 @@ impl Probe {
             };
             at += numbers.len();
         }
-        wgsl.push_str(&self.plan.calls(stage, super::module::uniform, |name| match name {
+        wgsl.push_str(&self.plan.calls(domain, super::module::uniform, |name| match name {
             "vertex_index" => name.to_owned(),
             given => format!("at_{given}"),
         }));

@@ -1,6 +1,6 @@
 //! The rules: what each gives, from what, where, at what cost and with what error.
 //!
-//! A rule is a WGSL function in a file under `rules/`, in the folder of its stage, or in a file of a scene
+//! A rule is a WGSL function in a file under `rules/`, in the folder of its domain, or in a file of a scene
 //! ([`term`]): comments that say what it is for, header lines, and the function.
 //!
 //! ```wgsl
@@ -14,27 +14,21 @@
 //! }
 //! ```
 //!
-//! Its parameters are the quantities that it needs. A quantity of the vertex stage that a fragment rule
-//! names is interpolated. Other header lines: `reads` (resources and constants that the body names),
-//! `uses` (files of `rules/lib`), `error` (relative to white; a number or `tessellation`), `paper: yes`
-//! (the paper's own programs made this approximation), `adds` (the quantity is a part of the sum that the
-//! radiance is, and holds these terms), `shows` (it is that term alone), `fallback` (quantities that it takes where
-//! others fail, and for which nothing needs to be stored).
+//! Its parameters are the quantities that it needs, of its own domain; one of another domain comes there along an edge
+//! ([`domain`](super::domain)): a vertex' quantity that a fragment rule names is interpolated. Other header lines:
+//! `domain` (where it holds, in the place of the folder's; one function may be a rule of several), `reads` (resources
+//! and constants that the body names), `uses` (files of `rules/lib`), `error` (relative to white; a number or
+//! `tessellation`), `paper: yes` (the paper's own programs made this approximation), `adds` (the quantity is a part of
+//! the sum that the radiance is, and holds these terms), `shows` (it is that term alone), `fallback` (quantities that it
+//! takes where others fail, and for which nothing needs to be stored), `sampled` (fragments may look a texel's quantity
+//! up, which is off by so much), `pass` (a blur of a texel's quantity; the function is its kernel, see [`Blur`]).
 
 use std::sync::LazyLock;
 
+use super::domain::{DIRECTIONS, Domain, TAP_COST};
 use super::facts::{Budget, Facts};
 use super::term::{self, declaration};
 use crate::model::effects::Effects;
-
-/// Where a rule is evaluated.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Stage {
-    /// Once a vertex.
-    Vertex,
-    /// Once a fragment or stored sample.
-    Fragment,
-}
 
 /// One rule.
 #[derive(Clone, Debug)]
@@ -43,8 +37,8 @@ pub struct Rule {
     pub name: &'static str,
     /// The line of its function in its file.
     pub line: usize,
-    /// Where it is evaluated.
-    pub stage: Stage,
+    /// Where it is evaluated; a function that is a rule of several domains is listed once for each.
+    pub domain: Domain,
     /// What it is, in words.
     pub about: String,
     /// Quantities that it gives, each with the components of the function's value that hold it.
@@ -61,6 +55,11 @@ pub struct Rule {
     pub(super) error: Error,
     /// Whether the paper's own programs made this approximation.
     pub paper: bool,
+    /// How far its quantities are off, relative to white, where a fragment looks them up in the atlas; `None` where
+    /// none may.
+    pub sampled: Option<f64>,
+    /// The pass over the atlas whose kernel it is.
+    pub blur: Option<Blur>,
     /// Library files that it calls.
     pub uses: Vec<&'static str>,
     /// Resources and constants that the body names.
@@ -69,13 +68,32 @@ pub struct Rule {
     pub fallback: Vec<&'static str>,
     /// The function's name.
     pub function: &'static str,
-    /// The function's parameters: quantity and WGSL type.
+    /// The quantities that it needs, with their WGSL types: the function's parameters, and what a blur is of.
     pub needs: Vec<(&'static str, &'static str)>,
-    /// The WGSL type of the function's value.
+    /// The WGSL type of the function's value; of a blur, that of what it is of.
     pub returns: &'static str,
     /// The function.
     pub body: &'static str,
 }
+
+/// A separable blur over the atlas, along u and then along v.
+///
+/// In each direction a texel becomes the weighted mean of `taps` places along it. The rule's function is the kernel:
+/// of the quantities that it needs at that texel, `tap`, from -(taps - 1) / 2 to (taps - 1) / 2 in whole steps (`f32`),
+/// and `axis`, (1, 0) or (0, 1) (`vec2f`), it makes how many texels away the place is, and what it weighs (`vec2f`).
+/// Between two texels both count by their nearness. Texels that hold nothing, or are of another chart, weigh nothing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Blur {
+    /// What is blurred.
+    pub of: &'static str,
+    /// Places that count, an odd number.
+    pub taps: u32,
+    /// The function's parameters, in their order, with their WGSL types.
+    pub parameters: Vec<(&'static str, &'static str)>,
+}
+
+/// What a kernel is called with beside quantities, with WGSL types.
+pub const KERNEL: [(&str, &str); 2] = [("tap", "f32"), ("axis", "vec2f")];
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Error {
@@ -87,7 +105,8 @@ impl Rule {
     /// Operations in a scene.
     #[must_use]
     pub fn cost(&self, facts: &Facts) -> f64 {
-        self.cost + self.cost_a_morph * f64::from(facts.morphs)
+        let once = self.cost + self.cost_a_morph * f64::from(facts.morphs);
+        self.blur.as_ref().map_or(once, |blur| DIRECTIONS * f64::from(blur.taps) * (once + TAP_COST))
     }
 
     /// How far it is off in a scene, relative to white.
@@ -103,6 +122,9 @@ impl Rule {
     /// function needs to be written for it.
     #[must_use]
     pub fn plain_value(&self) -> Option<&'static str> {
+        if self.blur.is_some() {
+            return None;
+        }
         let value = self.body.trim_end().strip_suffix(";\n}")?.split_once("{\n    return ")?.1;
         match self.needs.as_slice() {
             [] => Some(value),
@@ -114,6 +136,9 @@ impl Rule {
     /// Why it cannot be used in a scene; `None` when it can.
     #[must_use]
     pub fn refusal(&self, facts: &Facts) -> Option<String> {
+        if self.domain == Domain::Texel && facts.holds("atlas") != Some(true) {
+            return Some("only with atlas".to_owned());
+        }
         if let Some(condition) = self.when.iter().find(|c| facts.holds(c) != Some(true)) {
             let (only, fact) = condition.strip_prefix('!').map_or(("only", *condition), |fact| ("not", fact));
             return Some(format!(
@@ -134,8 +159,20 @@ impl Rule {
         }
     }
 
+    /// The function's parameters, with their WGSL types.
+    #[must_use]
+    pub fn parameters(&self) -> &[(&'static str, &'static str)] {
+        self.blur.as_ref().map_or(&self.needs, |blur| &blur.parameters)
+    }
+
+    /// Whether it gives a quantity.
+    #[must_use]
+    pub fn gives_quantity(&self, quantity: &str) -> bool {
+        self.gives.iter().any(|(given, _)| *given == quantity)
+    }
+
     /// A function without what its header says; `None` where its head is not that of one. `line` is its first.
-    pub(super) fn bare(stage: Stage, line: usize, body: &'static str) -> Option<Self> {
+    pub(super) fn bare(domain: Domain, line: usize, body: &'static str) -> Option<Self> {
         let (function, rest) = body.strip_prefix("fn ")?.split_once('(')?;
         let (parameters, rest) = rest.split_once(')')?;
         let (returns, _) = rest.trim_start().strip_prefix("->")?.split_once('{')?;
@@ -143,7 +180,7 @@ impl Rule {
         let typed = |p: &'static str| p.split_once(':').map(|(name, kind)| (name.trim(), kind.trim()));
         Some(Self {
             name: function.trim(),
-            stage,
+            domain,
             line,
             about: String::new(),
             gives: Vec::new(),
@@ -154,6 +191,8 @@ impl Rule {
             cost_a_morph: 0.0,
             error: Error::Fixed(0.0),
             paper: false,
+            sampled: None,
+            blur: None,
             uses: Vec::new(),
             reads: Vec::new(),
             fallback: Vec::new(),
@@ -162,6 +201,11 @@ impl Rule {
             returns: returns.trim(),
             body,
         })
+    }
+
+    /// The same rule in another domain.
+    pub(super) fn in_domain(&self, domain: Domain) -> Self {
+        Self { domain, ..self.clone() }
     }
 
     /// Set the operations that it takes, and those for each morph target.
@@ -191,7 +235,7 @@ impl Rule {
     }
 }
 
-/// Every file of rules: stage, name and text.
+/// Every file of rules: domain, name and text.
 const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
@@ -206,8 +250,8 @@ pub const LIBRARY: [(&str, &str); 5] = [
 /// The built-in rules.
 pub static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
     let read = |&(folder, name, text): &(&str, &'static str, &'static str)| {
-        let stage = if folder == "vertex" { Stage::Vertex } else { Stage::Fragment };
-        let read = declaration::parse(stage, name, text);
+        let domain = Domain::from_name(folder).unwrap_or(Domain::Fragment);
+        let read = declaration::parse(domain, name, text);
         read.unwrap_or_else(|error| panic!("rules/{folder}/{name}.wgsl: {error}")).rules
     };
     FILES.iter().flat_map(read).collect()

@@ -1,26 +1,24 @@
 //! The cheapest set of rules that yields what is wanted, within the accuracy budget: A*, backwards from
 //! the goal.
 //!
-//! A state is what is still wanted. Of that, the quantity that lies furthest from the inputs is taken, and
-//! each rule that gives it leads to a state where its own needs are wanted instead; as needs always lie
+//! A state is what is still wanted, and in which domain. Of that, the quantity that lies furthest from the inputs is
+//! taken. Each rule that gives it there leads to a state where its own needs are wanted instead; each edge
+//! ([`domain`](super::domain)) to one where the quantity is wanted in the domain that the edge comes from. So the search
+//! decides where a quantity is computed as it decides how: a rule costs its operations times how often its domain is
+//! evaluated ([`Work`](super::domain::Work)), an edge what it takes to bring the quantity over. As needs always lie
 //! nearer to the inputs, no quantity is decided upon twice. A rule that gives several quantities pays once.
 //! A state's least cost is the sum, over what it still wants, of the cheapest rule's share: never more than
 //! the true cost, so the first solution found is the best.
 
-use std::collections::BTreeMap;
-
 use pathfinding::directed::astar::astar;
 
 use super::bits::Bits;
+use super::domain::Domain;
 use super::facts::{Budget, Facts};
-use super::quantity::{Attribute, Constant};
-use super::rule::{Rule, Stage, rules};
-
-/// How much work a vertex counts beside a fragment: a character's mesh has about a vertex for every four
-/// pixels that it covers.
-pub const VERTEX_SHARE: f64 = 0.25;
-/// Operations that interpolating a number takes.
-pub const INTERPOLATION_COST: f64 = 1.0;
+pub use super::graph::Carried;
+use super::graph::{Graph, Means};
+use super::rule::Rule;
+use super::term;
 
 /// Costs and errors in the search are whole numbers: so many to one.
 const COST_STEPS: f64 = 16.0;
@@ -47,6 +45,14 @@ pub enum PlanError {
         /// What the search tells apart.
         most: usize,
     },
+    /// Quantities of an atlas where there is none.
+    #[error(
+        "the effect {effect} is computed in texels of the UV atlas, which is not drawn for stored samples, exports and scenes without one. Leave the effect out there."
+    )]
+    NoAtlas {
+        /// The effect.
+        effect: &'static str,
+    },
     /// Quantities that need one another.
     #[error(
         "shader rules need one another in a circle, among {goals}. This is a fault of skinfit: please report it."
@@ -55,27 +61,6 @@ pub enum PlanError {
         /// Among which.
         goals: String,
     },
-}
-
-/// A wanted quantity, and the stage where it is wanted.
-type Want = (Stage, &'static str);
-
-/// What a rule, or the rasteriser, does in the graph of quantities.
-#[derive(Clone, Debug)]
-enum Means {
-    Rule(&'static Rule),
-    /// Interpolation of a quantity of the vertex stage, of so many components.
-    Interpolate(&'static str, usize),
-}
-
-/// The graph of all quantities under one set of facts.
-struct Graph<'a> {
-    facts: &'a Facts,
-    /// The wants, by rank: what lies further from the inputs has the greater number.
-    wants: Vec<Want>,
-    /// For each want, the means that give it.
-    means: Vec<Vec<Means>>,
-    given: &'a [&'static str],
 }
 
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -88,10 +73,19 @@ struct State {
     error: u64,
 }
 
-/// The rules that yield `goals` in the fragment stage (and `vertex_goals` in the vertex stage) at the
-/// least cost, in an order in which they can be evaluated, the vertex stage first.
+/// What a search has found.
+#[derive(Clone, Debug, Default)]
+pub struct Found {
+    /// The rules, in an order in which they can be evaluated, by domain.
+    pub rules: Vec<&'static Rule>,
+    /// The edges that quantities take from one domain to another.
+    pub carried: Vec<Carried>,
+}
+
+/// The rules and edges that yield `goals` for fragments (and `vertex_goals` for vertices) at the least cost.
 ///
-/// `given` quantities of the fragment stage are there already.
+/// `given` quantities of fragments are there already. A vertex rule that both the image and the atlas need is counted
+/// once.
 ///
 /// # Errors
 /// When there are none.
@@ -100,12 +94,15 @@ pub fn search(
     vertex_goals: &[&'static str],
     goals: &[&'static str],
     given: &[&'static str],
-) -> Result<Vec<&'static Rule>, PlanError> {
+) -> Result<Found, PlanError> {
     let graph = Graph::new(facts, given)?;
-    let no_plan = || PlanError::NoPlan { goals: [vertex_goals, goals].concat().join(", ") };
+    let no_plan = || match term::of_texels(facts.setup.effects) {
+        Some(effect) if facts.holds("atlas") != Some(true) => PlanError::NoAtlas { effect: effect.name() },
+        _ => PlanError::NoPlan { goals: [vertex_goals, goals].concat().join(", ") },
+    };
     let mut start = State { open: Bits::default(), have: Bits::default(), error: 0 };
-    let wanted = vertex_goals.iter().map(|q| (Stage::Vertex, *q));
-    for want in wanted.chain(goals.iter().map(|q| (Stage::Fragment, *q))) {
+    let wanted = vertex_goals.iter().map(|q| (Domain::Vertex, *q));
+    for want in wanted.chain(goals.iter().map(|q| (Domain::Fragment, *q))) {
         start.open = start.open.or(graph.bit(want).ok_or_else(no_plan)?);
     }
     let (path, _) = astar(
@@ -115,17 +112,17 @@ pub fn search(
         |s| s.open.is_empty(),
     )
     .ok_or_else(no_plan)?;
-    let mut rules: Vec<&'static Rule> = path.windows(2).filter_map(|pair| graph.between(pair)).collect();
-    rules.reverse();
-    rules.sort_by_key(|rule| rule.stage);
-    Ok(rules)
-}
-
-/// Whether a quantity is there without any rule: an attribute, a constant, or the vertex' index.
-fn is_input(quantity: &str) -> bool {
-    quantity == "vertex_index"
-        || Attribute::ALL.iter().any(|attribute| attribute.name() == quantity)
-        || Constant::from_name(quantity).is_some()
+    let mut found = Found::default();
+    for means in path.windows(2).filter_map(|pair| graph.between(pair)) {
+        match means {
+            Means::Rule(rule) => found.rules.push(rule),
+            Means::Edge(carried) => found.carried.push(carried),
+        }
+    }
+    found.carried.reverse();
+    found.rules.reverse();
+    found.rules.sort_by_key(|rule| rule.domain);
+    Ok(found)
 }
 
 /// How many numbers a WGSL type holds.
@@ -138,70 +135,10 @@ pub fn components(wgsl: &str) -> usize {
     }
 }
 
-impl<'a> Graph<'a> {
-    fn new(facts: &'a Facts, given: &'a [&'static str]) -> Result<Self, PlanError> {
-        let mut means: BTreeMap<Want, Vec<Means>> = BTreeMap::new();
-        let usable = || rules(facts.setup.effects).filter(|rule| rule.refusal(facts).is_none());
-        for rule in usable() {
-            for (quantity, swizzle) in &rule.gives {
-                means.entry((rule.stage, quantity)).or_default().push(Means::Rule(rule));
-                if rule.stage == Stage::Vertex {
-                    let size = if swizzle.is_empty() { components(rule.returns) } else { swizzle.len() };
-                    let interpolate = means.entry((Stage::Fragment, quantity)).or_default();
-                    if interpolate.is_empty() {
-                        interpolate.push(Means::Interpolate(quantity, size));
-                    }
-                }
-            }
-        }
-        let ranks = ranks(&means, given)?;
-        let mut wants: Vec<Want> = means.keys().copied().collect();
-        wants.retain(|want| ranks.contains_key(want));
-        wants.sort_by_key(|want| (ranks[want], *want));
-        if wants.len() > Bits::MOST {
-            return Err(PlanError::TooMany { quantities: wants.len(), most: Bits::MOST });
-        }
-        let means = wants.iter().map(|want| means.remove(want).unwrap_or_default()).collect();
-        Ok(Self { facts, wants, means, given })
-    }
-
-    fn bit(&self, want: Want) -> Option<Bits> {
-        self.wants.iter().position(|&w| w == want).map(Bits::one)
-    }
-
-    fn is_given(&self, (stage, quantity): Want) -> bool {
-        is_input(quantity) || (stage == Stage::Fragment && self.given.contains(&quantity))
-    }
-
-    /// The wants of a means; `None` when one of them cannot be met.
-    fn needs(&self, means: &Means) -> Option<Bits> {
-        let needs: Vec<Want> = match means {
-            Means::Rule(rule) => rule.needs.iter().map(|(q, _)| (rule.stage, *q)).collect(),
-            Means::Interpolate(quantity, _) => vec![(Stage::Vertex, *quantity)],
-        };
-        needs
-            .into_iter()
-            .filter(|&want| !self.is_given(want))
-            .try_fold(Bits::default(), |bits, want| Some(bits.or(self.bit(want)?)))
-    }
-
-    fn cost(&self, means: &Means) -> u64 {
-        let cost = match means {
-            Means::Rule(rule) if rule.stage == Stage::Vertex => VERTEX_SHARE * rule.cost(self.facts),
-            Means::Rule(rule) => rule.cost(self.facts),
-            Means::Interpolate(_, components) => INTERPOLATION_COST * *components as f64,
-        };
-        (cost * COST_STEPS).round() as u64
-    }
-
-    /// All that a means gives.
-    fn gives(&self, means: &Means, want: Bits) -> Bits {
-        match means {
-            Means::Rule(rule) => {
-                rule.gives.iter().filter_map(|(q, _)| self.bit((rule.stage, q))).fold(want, Bits::or)
-            }
-            Means::Interpolate(..) => want,
-        }
+impl Graph<'_> {
+    /// A means' cost in whole steps.
+    fn steps(&self, means: &Means) -> u64 {
+        (self.cost(means) * COST_STEPS).round() as u64
     }
 
     /// The open want that lies furthest from the inputs.
@@ -211,7 +148,7 @@ impl<'a> Graph<'a> {
 
     fn successors(&self, state: &State) -> Vec<(State, u64)> {
         let Some(at) = self.next(state) else { return Vec::new() };
-        self.means[at].iter().filter_map(|means| self.step(state, at, means)).collect()
+        self.means(at).iter().filter_map(|means| self.step(state, at, means)).collect()
     }
 
     fn step(&self, state: &State, at: usize, means: &Means) -> Option<(State, u64)> {
@@ -220,10 +157,7 @@ impl<'a> Graph<'a> {
         let open = state.open.or(self.needs(means)?).without(have);
         // What lies beyond is never wanted again: forgetting it makes more states alike.
         let have = have.below(at);
-        let error = match means {
-            Means::Rule(rule) => (rule.error(self.facts) * ERROR_STEPS).ceil() as u64,
-            Means::Interpolate(..) => 0,
-        };
+        let error = (self.error(means) * ERROR_STEPS).ceil() as u64;
         let error = match self.facts.budget {
             Budget::Within(most) => {
                 let sum = state.error + error;
@@ -232,66 +166,26 @@ impl<'a> Graph<'a> {
             // Told by each rule's `refusal`; states that differ by it alone are the same.
             Budget::Exact | Budget::Paper => 0,
         };
-        Some((State { open, have, error }, self.cost(means)))
+        Some((State { open, have, error }, self.steps(means)))
     }
 
     /// A bound on what the open wants cost at the least.
     fn least(&self, open: Bits) -> u64 {
         let cheapest = |at: usize| {
             let share =
-                |means: &Means| self.cost(means) / u64::from(self.gives(means, Bits::one(at)).count());
-            self.means[at].iter().map(share).min().unwrap_or(0)
+                |means: &Means| self.steps(means) / u64::from(self.gives(means, Bits::one(at)).count());
+            self.means(at).iter().map(share).min().unwrap_or(0)
         };
         open.iter().map(cheapest).sum()
     }
 
-    /// The rule that leads from one state of a path to the next.
-    fn between(&self, pair: &[State]) -> Option<&'static Rule> {
+    /// The means that leads from one state of a path to the next.
+    fn between(&self, pair: &[State]) -> Option<Means> {
         let at = self.next(&pair[0])?;
-        let taken = self.means[at].iter().filter_map(|means| Some((means, self.step(&pair[0], at, means)?)));
-        // Of rules that lead to the same state the path's cost chose the cheapest.
+        let taken = self.means(at).iter().filter_map(|means| Some((means, self.step(&pair[0], at, means)?)));
+        // Of means that lead to the same state the path's cost chose the cheapest.
         let (means, _) =
             taken.filter(|(_, (state, _))| *state == pair[1]).min_by_key(|(_, (_, cost))| *cost)?;
-        match means {
-            Means::Rule(rule) => Some(rule),
-            Means::Interpolate(..) => None,
-        }
+        Some(*means)
     }
-}
-
-/// How far each want lies from the inputs: one more than the furthest of its needs, over all means. Wants
-/// that cannot be met have no rank.
-fn ranks(
-    means: &BTreeMap<Want, Vec<Means>>,
-    given: &[&'static str],
-) -> Result<BTreeMap<Want, usize>, PlanError> {
-    let mut ranks: BTreeMap<Want, usize> = BTreeMap::new();
-    let there = |(stage, q): Want| is_input(q) || (stage == Stage::Fragment && given.contains(&q));
-    // Each round settles at least one more; cycles would never end, so rounds are counted.
-    for _ in 0..=means.len() {
-        let mut changed = false;
-        for (want, ways) in means {
-            let rank = ways.iter().filter_map(|way| {
-                let needs: Vec<Want> = match way {
-                    Means::Rule(rule) => rule.needs.iter().map(|(q, _)| (rule.stage, *q)).collect(),
-                    Means::Interpolate(quantity, _) => vec![(Stage::Vertex, *quantity)],
-                };
-                needs
-                    .into_iter()
-                    .filter(|&need| !there(need))
-                    .try_fold(0, |rank: usize, need| Some(rank.max(ranks.get(&need)? + 1)))
-            });
-            if let Some(rank) = rank.max()
-                && ranks.get(want) != Some(&rank)
-            {
-                ranks.insert(*want, rank);
-                changed = true;
-            }
-        }
-        if !changed {
-            return Ok(ranks);
-        }
-    }
-    let goals = means.keys().map(|(_, quantity)| *quantity).collect::<Vec<_>>().join(", ");
-    Err(PlanError::Circle { goals })
 }

@@ -10,9 +10,9 @@ use std::fmt::Write as _;
 use crate::records::StoredRecords;
 use crate::samples::LANES;
 use crate::samples::surface_records::Places;
+use crate::shader::Domain;
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::module::uniform;
-use crate::shader::rule::Stage;
 use crate::shader::{Facts, Plan, PlanError, Source};
 
 /// Numbers of a target's texel.
@@ -72,9 +72,9 @@ pub(super) fn draws(facts: &Facts, places: &Places) -> Result<Vec<Draw>, PlanErr
     sets.into_iter().map(|fields| Draw::new(&facts, fields)).collect()
 }
 
-/// Fragments of the rasteriser, filtered in the shader: what the CPU's samples are.
+/// Fragments of the rasteriser, filtered in the shader, and no atlas: what the CPU's samples are.
 fn raster(facts: &Facts) -> Facts {
-    Facts { source: Source::Raster, output: None, ..*facts }
+    Facts { source: Source::Raster, output: None, atlas: None, ..*facts }
 }
 
 impl Draw {
@@ -96,7 +96,7 @@ impl Draw {
             let _ = writeln!(wgsl, "    @location({i}) texel{i}: vec4f,");
         }
         wgsl.push_str("}\n\n@fragment\nfn fs_main(at: Varyings) -> Surface {\n");
-        wgsl.push_str(&plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        wgsl.push_str(&plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         let _ = write!(wgsl, "    return Surface({});\n}}\n", texels.join(", "));
         Ok(Self { plan: Plan { wgsl, ..plan }, fields })
     }

@@ -59,6 +59,9 @@ impl Task {
                     self.without().map_or(String::new(), |without| format!(", and {without} meanwhile"));
                 format!("This is a fault of skinfit or of the driver: please report it{without}")
             }
+            GpuError::OutsideAtlas { .. } => {
+                "Unwrap the mesh into the unit square, or leave the effect out".to_owned()
+            }
             GpuError::NothingShown => {
                 let without = self.without().map_or(String::new(), |without| format!(", or {without}"));
                 format!("Add one that does to the scene's effects, such as diffuse{without}")
@@ -136,6 +139,7 @@ mod tests {
             GpuError::Lost { adapter: adapter(), reason: reason() },
             GpuError::Refused { adapter: adapter(), reason: reason() },
             GpuError::NothingShown,
+            GpuError::OutsideAtlas { u: 1.0, v: -2.0 },
             GpuError::Plan("no rule.".to_owned()),
         ];
         sizes.chain(others).collect()

@@ -9,8 +9,8 @@ use crate::fit::params_file::{Foreign, ParamsFile};
 use crate::model::effects::Effects;
 use crate::scene::Scene;
 use crate::scene::load::LoadOptions;
-use crate::shader::rule::Stage;
-use crate::shader::{Budget, Facts, Plan, plan};
+use crate::shader::atlas::{Axis, Pass, PassKind};
+use crate::shader::{Budget, Domain, Facts, Plan, plan};
 
 /// Print the shader that a scene gets, and the plan behind it
 #[derive(clap::Args)]
@@ -57,8 +57,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let plan = plan(&Facts::of_scene(&scene, &params, arguments.accuracy, arguments.f16))?;
     let text = match arguments.show.as_str() {
         "plan" => table(&plan, ""),
-        "wgsl" => plan.wgsl.clone(),
-        _ => format!("{}\n{}", table(&plan, "// "), plan.wgsl),
+        "wgsl" => modules(&plan),
+        _ => format!("{}\n{}", table(&plan, "// "), modules(&plan)),
     };
     write_or_say(arguments.output.as_deref(), &text)?;
     Ok(Exit::Done)
@@ -100,7 +100,7 @@ fn table(plan: &Plan, margin: &str) -> String {
     };
     line(format!(
         "{} rules, about {:.0} operations a fragment, error at most {:.1e}",
-        plan.steps.len(),
+        plan.all_steps().len(),
         plan.cost,
         plan.error
     ));
@@ -108,20 +108,44 @@ fn table(plan: &Plan, margin: &str) -> String {
     line(format!("interpolated: {}", list(plan.varyings.iter().map(|(name, _)| *name))));
     line(format!("bound: {}", list(plan.resources.iter().map(|r| r.name()))));
     line(format!("constants: {}", list(plan.constants.iter().map(|c| c.name()))));
+    for (i, pass) in plan.passes.iter().enumerate() {
+        line(format!("pass {} over the atlas: {}", i + 1, told(pass)));
+    }
     line(String::new());
     line(format!("{:<10} {:<26} {:<28} {:>5} {:>8}", "where", "quantity", "rule", "cost", "error"));
-    for step in &plan.steps {
-        let stage = if step.rule.stage == Stage::Vertex { "vertex" } else { "fragment" };
+    for step in plan.all_steps() {
+        let domain = step.rule.domain.name();
         let gives = list(step.rule.gives.iter().map(|(quantity, _)| *quantity));
         let (name, cost, error) = (step.rule.name, step.cost, step.error);
-        line(format!("{stage:<10} {gives:<26} {name:<28} {cost:>5.0} {error:>8.1e}"));
+        line(format!("{domain:<10} {gives:<26} {name:<28} {cost:>5.0} {error:>8.1e}"));
     }
     line(String::new());
     line("left out:".to_owned());
     for (rule, reason) in plan.left_out() {
-        line(format!("  {:<28} {reason}", rule.name));
+        // A rule of several domains is left out of each by itself.
+        let domain = if rule.domain == Domain::Texel { ", in texels" } else { "" };
+        line(format!("  {:<28} {reason}{domain}", rule.name));
     }
     text
+}
+
+/// The image's module; those of passes over the atlas go before, each under a line of its own.
+fn modules(plan: &Plan) -> String {
+    let Some(_) = plan.passes.first() else { return plan.wgsl.clone() };
+    let pass =
+        |(i, pass): (usize, &Pass)| format!("// Pass {}: {}\n\n{}\n", i + 1, told(pass), pass.plan.wgsl);
+    let passes: String = plan.passes.iter().enumerate().map(pass).collect();
+    format!("{passes}// The image\n\n{}", plan.wgsl)
+}
+
+/// What a pass does, in words.
+fn told(pass: &Pass) -> String {
+    let leaves = list(pass.leaves.iter().map(|level| level.name.as_str()));
+    match pass.kind {
+        PassKind::Draw => format!("{leaves}, drawn"),
+        PassKind::Blur(Axis::U) => format!("{leaves}, blurred along u"),
+        PassKind::Blur(Axis::V) => format!("{leaves}, blurred along v"),
+    }
 }
 
 fn list<'a>(names: impl Iterator<Item = &'a str>) -> String {

@@ -15,10 +15,10 @@ use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
+use crate::shader::Domain;
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;
 use crate::shader::probe::Probe;
-use crate::shader::rule::Stage;
 
 /// An adapter whose device is opened anew when it was lost: software drivers do lose one now and then, and
 /// the case at hand is then not to blame. A case that loses it twice is.
@@ -131,7 +131,8 @@ impl Evaluator for Rules {
         if wanted.is_empty() {
             return Ok(Answer { values: Some(vec![[0.0; 4]; batch.fragments.len()]), ..Answer::default() });
         }
-        let probe = Probe::new(&facts, Stage::Fragment, given, &wanted).map_err(|error| error.to_string())?;
+        let probe =
+            Probe::new(&facts, Domain::Fragment, given, &wanted).map_err(|error| error.to_string())?;
         let numbers: Vec<f32> =
             batch.fragments.iter().flat_map(|f| numbers(f, form).into_iter().take(probe.stride())).collect();
         let got = self.run(&probe, lights.of(setting.lights), &setting.params, &numbers)?;
@@ -149,7 +150,7 @@ impl Evaluator for Rules {
         let facts =
             Facts { setup, maps: MapFacts { normal: true, ..MapFacts::default() }, ..Facts::default() };
         let wanted = [("vertex_normal", "vec3f"), ("vertex_tangent", "vec3f"), ("vertex_bitangent", "vec3f")];
-        let probe = Probe::new(&facts, Stage::Vertex, &[], &wanted).map_err(|error| error.to_string())?;
+        let probe = Probe::new(&facts, Domain::Vertex, &[], &wanted).map_err(|error| error.to_string())?;
         let mut given = Vec::new();
         for VertexInputs { normal, tangent, handedness } in vertices {
             for (name, _) in &probe.given {

@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use super::text::{HEAD, Text};
 use super::{Adjoint, AdjointError, Binding, Input, LOOKUPS, Module, WORKGROUP};
 use crate::model::params::{Channels, Param};
+use crate::shader::Domain;
 use crate::shader::module::uniform;
-use crate::shader::rule::Stage;
 use crate::shader::tangent::chain::{Chain, Seed};
 
 /// What becomes of a seed's tangent.
@@ -53,7 +53,7 @@ impl Adjoint {
         wgsl.push_str("    if (slot < part.slots) {\n    let pixel = vec4f(image_adjoint[4u * slot], image_adjoint[4u * slot + 1u], image_adjoint[4u * slot + 2u], image_adjoint[4u * slot + 3u]);\n");
         wgsl.push_str(&text.record());
         wgsl.push_str("        let adjoint = share * pixel;\n");
-        wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         chain.lines.iter().for_each(|lines| wgsl.push_str(lines));
         for (k, gains) in gains.iter().enumerate() {
             for gain in gains {

@@ -19,12 +19,12 @@ use std::fmt::Write as _;
 use self::text::{HEAD, Text};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
+use crate::shader::Domain;
 use crate::shader::PlanError;
 use crate::shader::emit::{Plan, hazy, parts, plan, sample_fields};
 use crate::shader::facts::{Budget, Facts, MapFacts, Source};
 use crate::shader::module::uniform;
 use crate::shader::quantity::Constant;
-use crate::shader::rule::Stage;
 use crate::shader::search::components;
 use crate::shader::tangent::TangentError;
 
@@ -180,7 +180,7 @@ impl Adjoint {
         wgsl.push_str(HEAD);
         wgsl.push_str("    if (slot >= part.slots) {\n        return;\n    }\n    var shown = vec4f();\n");
         wgsl.push_str(&text.record());
-        wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         let _ = writeln!(wgsl, "        shown += share * {};", self.shown());
         wgsl.push_str("    }\n");
         for c in 0..4 {

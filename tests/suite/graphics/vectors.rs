@@ -10,9 +10,9 @@ use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
 use skinfit::scene::mesh::{Mesh, Morph};
+use skinfit::shader::Domain;
 use skinfit::shader::facts::MapFacts;
 use skinfit::shader::probe::Probe;
-use skinfit::shader::rule::Stage;
 use skinfit::shader::{Constant, Facts};
 
 use super::bench;
@@ -105,7 +105,7 @@ fn fragment(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>, form: Form) {
         ("specular", "f32"),
         ("attenuator", "f32"),
     ];
-    let probe = Probe::new(&facts(form, silhouette), Stage::Fragment, &given, &PARTS).unwrap();
+    let probe = Probe::new(&facts(form, silhouette), Domain::Fragment, &given, &PARTS).unwrap();
     let inputs = file.at("inputs");
     let rows = ["X", "Y", "Z"].map(|row| inputs.at(&format!("WorldTanMatrix{row}")).three());
     let column = |i: usize| [rows[0][i], rows[1][i], rows[2][i]];
@@ -134,7 +134,7 @@ fn rim(gpu: &Gpu, file: &Node<'_>) {
     let given = [("silhouette", "f32")];
     let wanted = [("rim", "f32")];
     let facts = facts(Form::Corrected, Silhouette::Fragment);
-    let probe = Probe::new(&facts, Stage::Fragment, &given, &wanted).unwrap();
+    let probe = Probe::new(&facts, Domain::Fragment, &given, &wanted).unwrap();
     let z = file.at("inputs").at("f").numbers();
     let mut got = vec![Vec::new(); z.len()];
     for exponent in file.at("inputs").at("exponent").numbers() {
@@ -150,7 +150,7 @@ fn cube_sample(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>) {
     let given = [("reflected", "vec3f")];
     let wanted = [("mirror_light", "vec4f")];
     let facts = facts(Form::Corrected, Silhouette::Fragment);
-    let probe = Probe::new(&facts, Stage::Fragment, &given, &wanted).unwrap();
+    let probe = Probe::new(&facts, Domain::Fragment, &given, &wanted).unwrap();
     let directions = file.at("inputs").at("directions").numbers();
     let got = run(gpu, &probe, &illumination(vectors, file), &Params::defaults(Form::Corrected), &directions);
     check("seamless lookups", &got, &file.at("expected").at("seamless"));
@@ -170,7 +170,7 @@ fn bench(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>) {
         ("attenuator", "f32"),
     ];
     let probe =
-        Probe::new(&facts(Form::Corrected, Silhouette::Bumped), Stage::Fragment, &given, &PARTS).unwrap();
+        Probe::new(&facts(Form::Corrected, Silhouette::Bumped), Domain::Fragment, &given, &PARTS).unwrap();
     let params = column_params(&file.at("inputs").at("params"));
     let g = file.at("inputs").at("gbuffer");
     let mut items = Vec::new();
@@ -236,7 +236,7 @@ fn vertex(gpu: &Gpu, file: &Node<'_>) {
         ("vertex_view", "vec3f"),
         ("vertex_occlusion", "f32"),
     ];
-    let probe = Probe::new(&facts, Stage::Vertex, &[], &wanted).unwrap();
+    let probe = Probe::new(&facts, Domain::Vertex, &[], &wanted).unwrap();
     let scene = skinfit::scene::Scene { mesh, ..bare_scene(EFFECTS) };
     let params = Params::defaults(Form::Corrected);
     let light = Illumination::default();

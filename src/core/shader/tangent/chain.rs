@@ -4,10 +4,11 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::{TangentError, Tangents};
+use crate::shader::domain::Domain;
 use crate::shader::emit::{Plan, hazy, parts};
 use crate::shader::module::uniform;
 use crate::shader::quantity::{Constant, Resource};
-use crate::shader::rule::{Rule, Stage};
+use crate::shader::rule::Rule;
 
 /// What moves.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -55,7 +56,7 @@ impl Chain {
         let mut chain = Self::default();
         for (k, seed) in seeds.iter().enumerate() {
             chain.lines.push(String::new());
-            let moved = chain.follow(plan, k, seed, &mut tangents)?;
+            let moved = chain.follow(plan, Domain::Fragment, k, seed, BTreeMap::new(), &mut tangents)?;
             let along: Vec<&str> = parts(&plan.facts)
                 .into_iter()
                 .filter_map(|part| moved.get(part).map(String::as_str))
@@ -68,23 +69,39 @@ impl Chain {
         Ok(chain)
     }
 
+    /// Of the texels of a draw into the atlas along one seed; `moved` are quantities whose tangents stand there. The
+    /// quantities that move are `moved[0]`.
+    pub(in crate::shader) fn of_texels(
+        plan: &Plan,
+        seed: &Seed,
+        moved: BTreeMap<&'static str, String>,
+    ) -> Result<Self, TangentError> {
+        let mut tangents = Tangents::new(&plan.declarations(true))?;
+        let mut chain = Self { lines: vec![String::new()], ..Self::default() };
+        let moved = chain.follow(plan, Domain::Texel, 0, seed, moved, &mut tangents)?;
+        chain.moved.push(moved);
+        chain.functions.push_str(tangents.text());
+        Ok(chain)
+    }
+
     /// The lines of one seed; returns the quantities that move with it, and how.
     fn follow(
         &mut self,
         plan: &Plan,
+        domain: Domain,
         k: usize,
         seed: &Seed,
+        mut moved: BTreeMap<&'static str, String>,
         tangents: &mut Tangents,
     ) -> Result<BTreeMap<&'static str, String>, TangentError> {
-        let mut moved: BTreeMap<&'static str, String> = BTreeMap::new();
         if let Seed::Named { name, tangent } = seed {
-            let typed = plan.rules(Stage::Fragment).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
+            let typed = plan.rules(domain).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
             if let Some((_, kind)) = typed {
                 let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
                 moved.insert(name, format!("d{k}_{name}"));
             }
         }
-        for rule in plan.rules(Stage::Fragment) {
+        for rule in plan.rules(domain) {
             let call = match seed {
                 Seed::Resource { resource, slope } if rule.reads.contains(&resource.name()) => {
                     Some(self.slope_call(plan, rule, *resource, *slope))

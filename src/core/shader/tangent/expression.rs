@@ -2,8 +2,8 @@
 
 use naga::proc::TypeResolution;
 use naga::{
-    BinaryOperator as B, Expression as E, Handle, ImageQuery, Literal, MathFunction as M, Scalar, ScalarKind,
-    TypeInner, UnaryOperator as U, VectorSize,
+    BinaryOperator as B, DerivativeAxis, DerivativeControl, Expression as E, Handle, ImageQuery, Literal,
+    MathFunction as M, Scalar, ScalarKind, TypeInner, UnaryOperator as U, VectorSize,
 };
 
 use super::TangentError;
@@ -120,6 +120,9 @@ impl Writer<'_> {
                     .collect();
                 format!("textureLoad({})", self.values(&arguments)?)
             }
+            E::Derivative { axis, ctrl, expr } => {
+                format!("{}({})", slope_name(*axis, *ctrl), self.value(*expr)?)
+            }
             E::ImageQuery { image, query: ImageQuery::Size { level: None } } => {
                 format!("textureDimensions({})", self.value(*image)?)
             }
@@ -189,6 +192,13 @@ impl Writer<'_> {
             }
             E::As { expr, .. } if moved(*expr).is_some() => {
                 return Err(self.unsupported("a conversion of what moves"));
+            }
+            // Between neighbours values and tangents are told apart alike; their size is no linear function.
+            E::Derivative { axis: DerivativeAxis::Width, expr, .. } if moved(*expr).is_some() => {
+                return Err(self.unsupported("fwidth of what moves"));
+            }
+            E::Derivative { axis, ctrl, expr } => {
+                moved(*expr).map(|d| format!("{}({d})", slope_name(*axis, *ctrl)))
             }
             E::ImageSample { .. } => return Err(self.unsupported("the hardware's filtering")),
             _ => None,
@@ -279,6 +289,23 @@ impl Writer<'_> {
 
 fn swizzle(size: VectorSize, pattern: &[naga::SwizzleComponent; 4]) -> String {
     pattern[..size as usize].iter().map(|&c| COMPONENTS[c as usize]).collect()
+}
+
+/// The name of a difference between neighbouring fragments or texels.
+const fn slope_name(axis: DerivativeAxis, control: DerivativeControl) -> &'static str {
+    use DerivativeAxis::{Width, X, Y};
+    use DerivativeControl::{Coarse, Fine, None};
+    match (axis, control) {
+        (X, None) => "dpdx",
+        (X, Coarse) => "dpdxCoarse",
+        (X, Fine) => "dpdxFine",
+        (Y, None) => "dpdy",
+        (Y, Coarse) => "dpdyCoarse",
+        (Y, Fine) => "dpdyFine",
+        (Width, None) => "fwidth",
+        (Width, Coarse) => "fwidthCoarse",
+        (Width, Fine) => "fwidthFine",
+    }
 }
 
 const fn operator(op: B) -> &'static str {

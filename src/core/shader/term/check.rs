@@ -5,16 +5,18 @@ use std::collections::{BTreeMap, BTreeSet};
 use super::declaration::Declaration;
 use super::error::{Problem, TermError};
 use super::terms;
+use super::texels::LEVEL_TYPES;
+use super::there::{is_uniform, there};
 use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::Facts;
 use crate::shader::quantity::{Attribute, Constant, Resource};
-use crate::shader::rule::{LIBRARY, RULES, Rule, Stage};
+use crate::shader::rule::{LIBRARY, RULES, Rule};
 
 /// Words that the modules which rules are built into give a meaning of their own.
-const TAKEN: [&str; 34] = [
+const TAKEN: [&str; 44] = [
     "at",
     "part",
     "samples",
@@ -49,6 +51,16 @@ const TAKEN: [&str; 34] = [
     "read",
     "slots",
     "i",
+    "tap",
+    "axis",
+    "here",
+    "middle",
+    "sum",
+    "place",
+    "side",
+    "size",
+    "texel",
+    "clip",
 ];
 
 /// The declaration, where it fits.
@@ -129,7 +141,12 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
         let functions = RULES.iter().chain(terms().into_iter().flat_map(|term| &term.rules));
         let mut functions = functions.map(|rule| rule.function);
         let library = LIBRARY.iter().any(|(_, text)| text.contains(&format!("fn {}(", rule.function)));
-        let twice = declaration.rules.iter().filter(|other| other.function == rule.function).count() > 1;
+        let twice = declaration
+            .rules
+            .iter()
+            .filter(|other| other.function == rule.function && other.line != rule.line)
+            .count()
+            > 0;
         if library || twice || functions.any(|function| function == rule.function) {
             return taken("function", rule.function, rule.line);
         }
@@ -202,12 +219,20 @@ fn types(declaration: &Declaration) -> Result<(), TermError> {
     types.extend(declaration.parameters.iter().map(|(_, p)| (p.name, param_type(p.rgb))));
     for rule in &declaration.rules {
         let given = rule.gives.iter().map(|(quantity, components)| (*quantity, rule.given_type(components)));
-        for (quantity, kind) in given.chain(rule.needs.iter().copied()) {
+        for (quantity, kind) in given.clone().chain(rule.needs.iter().copied()) {
             let wanted = *types.entry(quantity).or_insert(kind);
             if wanted != kind {
                 let (quantity, given, wanted) = (quantity.to_owned(), kind.to_owned(), wanted.to_owned());
                 return Err(Problem::Type { quantity, given, wanted }.at(rule.line));
             }
+        }
+        // What a pass' kernel or a fragment reads stands in the atlas.
+        let of_kernel =
+            rule.needs.iter().copied().filter(|(name, _)| rule.blur.is_some() && !is_uniform(name));
+        let mut stands = given.filter(|_| rule.sampled.is_some()).chain(of_kernel);
+        if let Some((quantity, kind)) = stands.find(|(_, kind)| !LEVEL_TYPES.contains(kind)) {
+            let (quantity, kind) = (quantity.to_owned(), kind.to_owned());
+            return Err(Problem::NoLevel { quantity, kind }.at(rule.line));
         }
     }
     Ok(())
@@ -247,70 +272,4 @@ fn circle<'a>(rules: &'a [Rule], path: &mut Vec<&'a Rule>, depth: usize) -> Opti
         }
     }
     None
-}
-
-/// The fields of stored samples, and all that rules give of them.
-fn of_samples<'a>(rules: &(impl Iterator<Item = &'a Rule> + Clone)) -> BTreeSet<&'static str> {
-    let mut there: BTreeSet<&'static str> = SAMPLE.iter().map(|(name, _)| *name).collect();
-    loop {
-        let before = there.len();
-        for rule in
-            rules.clone().filter(|rule| rule.stage == Stage::Fragment && !rule.when.contains(&"raster"))
-        {
-            let met = |name: &str| {
-                there.contains(name) || Param::from_identifier(name).is_some() || is_constant(name)
-            };
-            if rule.needs.iter().all(|(name, _)| met(name)) {
-                there.extend(rule.gives.iter().map(|(quantity, _)| *quantity));
-            }
-        }
-        if there.len() == before {
-            return there;
-        }
-    }
-}
-
-/// Whether a constant that is no parameter is there for stored samples.
-fn is_constant(name: &str) -> bool {
-    [Constant::Turn, Constant::KeyDirection].iter().any(|constant| constant.name() == name)
-}
-
-/// Everything that the rules need is there, for fragments and for samples; every parameter is needed.
-fn there(declaration: &Declaration) -> Result<(), TermError> {
-    let own: BTreeSet<&str> = declaration.parameters.iter().map(|(_, parameter)| parameter.name).collect();
-    let given: BTreeSet<&str> =
-        declaration.rules.iter().flat_map(|r| r.gives.iter().map(|(q, _)| *q)).collect();
-    let samples = of_samples(&RULES.iter());
-    for rule in &declaration.rules {
-        for &(need, _) in &rule.needs {
-            let constant = Param::from_identifier(need).is_some_and(Param::is_built_in) || is_constant(need);
-            if own.contains(need) || given.contains(need) || samples.contains(need) || constant {
-                continue;
-            }
-            let somewhere = RULES.iter().any(|rule| rule.gives.iter().any(|(quantity, _)| *quantity == need))
-                || Constant::from_name(need).is_some()
-                || Attribute::ALL.iter().any(|attribute| attribute.name() == need);
-            let quantity = need.to_owned();
-            if somewhere {
-                return Err(Problem::RasterOnly { quantity }.at(rule.line));
-            }
-            let all = own.iter().chain(&given).copied().chain(samples.iter().copied());
-            let near = nearest(need, all.chain(Param::built_in().map(Param::name)));
-            return Err(Problem::Unknown { quantity, near }.at(rule.line));
-        }
-    }
-    let idle = declaration.parameters.iter().find(|(_, parameter)| {
-        !declaration.rules.iter().any(|rule| rule.needs.iter().any(|(need, _)| *need == parameter.name))
-    });
-    idle.map_or(Ok(()), |&(line, parameter)| Err(Problem::Idle(parameter.name.to_owned()).at(line)))
-}
-
-/// The nearest of the known names, where any is near.
-fn nearest<'a>(given: &str, known: impl Iterator<Item = &'a str>) -> Vec<String> {
-    let distance = |name: &str| strsim::damerau_levenshtein(given, name);
-    let near = known.map(|name| (distance(name), name)).min();
-    near.filter(|(distance, name)| *distance <= 1 + name.len() / 3)
-        .map(|(_, name)| name.to_owned())
-        .into_iter()
-        .collect()
 }

@@ -1,8 +1,10 @@
 //! A file of rules: what its comments declare, and its functions.
 
 use super::error::{Problem, TermError};
+use super::texels::{blur, domains_of, kernel};
 use crate::model::params::{LARGEST, Scale};
-use crate::shader::rule::{Error, Rule, Stage};
+use crate::shader::domain::Domain;
+use crate::shader::rule::{Error, Rule};
 
 /// What a file of rules holds.
 #[derive(Clone, Debug)]
@@ -38,7 +40,7 @@ pub(super) struct DeclaredParameter {
 }
 
 /// The keys that a header may have.
-const KEYS: [&str; 12] = [
+const KEYS: [&str; 15] = [
     "effect",
     "parameter",
     "gives",
@@ -51,13 +53,20 @@ const KEYS: [&str; 12] = [
     "uses",
     "reads",
     "fallback",
+    "domain",
+    "sampled",
+    "pass",
 ];
 
-/// Read a file of rules of one stage, which is called `name`.
+/// Read a file of rules, which is called `name`. They are of `domain` but where they declare another.
 ///
 /// # Errors
 /// When it is not as [`super`] says.
-pub(crate) fn parse(stage: Stage, name: &'static str, text: &'static str) -> Result<Declaration, TermError> {
+pub(crate) fn parse(
+    domain: Domain,
+    name: &'static str,
+    text: &'static str,
+) -> Result<Declaration, TermError> {
     let mut declaration = Declaration { effect: None, parameters: Vec::new(), rules: Vec::new() };
     let mut header: Vec<(usize, &'static str)> = Vec::new();
     let mut lines = text.lines().enumerate();
@@ -68,14 +77,14 @@ pub(crate) fn parse(stage: Stage, name: &'static str, text: &'static str) -> Res
             let last = lines.by_ref().find(|(_, line)| line.trim_end() == "}").map(|(_, line)| line);
             let last = last.ok_or(Problem::Endless.at(at + 1))?;
             let body = between(text, line, last);
-            let rule = declaration.rule(stage, at + 1, &header, body)?;
-            declaration.rules.push(rule);
+            let (rule, domains) = declaration.rule(domain, at + 1, &header, body)?;
+            declaration.rules.extend(domains.into_iter().map(|domain| rule.in_domain(domain)));
             header.clear();
         } else if !line.trim().is_empty() {
             return Err(Problem::Stray(line.trim().to_owned()).at(at + 1));
         }
     }
-    let alone = declaration.rules.len() == 1;
+    let alone = declaration.rules.iter().all(|rule| rule.line == declaration.rules[0].line);
     for rule in &mut declaration.rules {
         rule.name = if alone { name } else { rule.function };
     }
@@ -91,15 +100,16 @@ fn between(text: &'static str, first: &str, last: &str) -> &'static str {
 }
 
 impl Declaration {
-    /// The rule of a function under its header; declarations of the file stand in the first rule's.
+    /// The rule of a function under its header, and where it holds; declarations of the file stand in the first rule's.
     fn rule(
         &mut self,
-        stage: Stage,
+        domain: Domain,
         line: usize,
         header: &[(usize, &'static str)],
         body: &'static str,
-    ) -> Result<Rule, TermError> {
-        let mut rule = Rule::bare(stage, line, body).ok_or(Problem::Head.at(line))?;
+    ) -> Result<(Rule, Vec<Domain>), TermError> {
+        let mut domains = vec![domain];
+        let mut rule = Rule::bare(domain, line, body).ok_or(Problem::Head.at(line))?;
         for &(at, words) in header {
             let (key, value) = words.split_once(": ").map_or(("", words), |(key, value)| (key, value.trim()));
             match KEYS.iter().find(|known| **known == key) {
@@ -108,6 +118,7 @@ impl Declaration {
                     // What stood before belongs to the file.
                     rule.about.clear();
                 }
+                Some(&"domain") => domains = domains_of(value).map_err(|problem| problem.at(at))?,
                 Some(&key) => rule_line(&mut rule, key, value).map_err(|problem| problem.at(at))?,
                 None => {
                     if let Some(&nearest) = KEYS.iter().find(|known| misspelt(key, known)) {
@@ -127,7 +138,12 @@ impl Declaration {
         if !rule.has_cost() {
             return Err(lacks("cost"));
         }
-        Ok(rule)
+        kernel(&mut rule, &domains).map_err(|problem| problem.at(line))?;
+        let astray = rule.sampled.is_some() && !domains.contains(&Domain::Texel);
+        if astray {
+            return Err(Problem::OfTexels { key: "sampled" }.at(line));
+        }
+        Ok((rule, domains))
     }
 
     fn declare(&mut self, line: usize, key: &str, value: &'static str) -> Result<(), TermError> {
@@ -157,7 +173,7 @@ fn misspelt(word: &str, key: &str) -> bool {
     lower && strsim::damerau_levenshtein(word, key) == 1
 }
 
-fn list(value: &'static str) -> impl Iterator<Item = &'static str> {
+pub(super) fn list(value: &'static str) -> impl Iterator<Item = &'static str> {
     value.split(',').map(str::trim).filter(|word| !word.is_empty())
 }
 
@@ -179,6 +195,15 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
         "fallback" => rule.fallback = list(value).collect(),
         "paper" => rule.paper = value == "yes",
         "error" if value == "tessellation" => rule.error = Error::Tessellation,
+        "sampled" => {
+            rule.sampled = Some(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
+        }
+        "pass" => {
+            let wanted = "QUANTITY: TYPE, TAPS taps: what is blurred, an f32, vec2f or vec3f, and how many places count, \
+                          an odd number from 3 to 255";
+            let (blur, kind) = blur(value).ok_or_else(|| unread(wanted))?;
+            (rule.blur, rule.returns) = (Some(blur), kind);
+        }
         "error" => {
             rule.error = Error::Fixed(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
         }
@@ -246,7 +271,7 @@ mod tests {
         // gives: sheen_a.x, sheen_b.y\n// cost: 3\nfn both() -> vec2f {\n    return vec2f(1.0);\n}\n";
 
     fn read(text: &str) -> Result<Declaration, TermError> {
-        parse(Stage::Fragment, "file", crate::model::registry::leaked(text))
+        parse(Domain::Fragment, "file", crate::model::registry::leaked(text))
     }
 
     #[test]

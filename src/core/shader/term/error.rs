@@ -46,6 +46,16 @@ pub enum Problem {
         "{quantity} is there for rasterised fragments alone, not for the stored samples that a fit reads"
     )]
     RasterOnly { quantity: String },
+    #[error("{quantity} is not there for texels of the atlas")]
+    NotOfTexels { quantity: String },
+    #[error("{quantity} is there for texels alone")]
+    TexelsAlone { quantity: String },
+    #[error("`{key}:` belongs to a rule of texels alone")]
+    OfTexels { key: &'static str },
+    #[error("the function of a pass is not its kernel")]
+    Kernel,
+    #[error("{quantity} is a {kind}, which a texel of the atlas does not hold")]
+    NoLevel { quantity: String, kind: String },
     #[error("{quantity} is of the type {given} here, but it is {wanted}")]
     Type { quantity: String, given: String, wanted: String },
     #[error("the rules need one another in a circle: {0}")]
@@ -88,6 +98,21 @@ impl Problem {
             }
             Self::Unknown { .. } => "Write a rule that gives it, or declare it as a parameter".to_owned(),
             Self::RasterOnly { .. } => "Use what fragments and samples both have, such as n, view or albedo".to_owned(),
+            Self::NotOfTexels { .. } => {
+                "A texel is lit, not seen: use what no eye moves, such as n, irradiance or albedo, or write a rule with \
+                 `domain: texel` that gives it"
+                    .to_owned()
+            }
+            Self::TexelsAlone { .. } => {
+                "Add `// sampled: ERROR` to the rule that gives it, or `// domain: texel, fragment`".to_owned()
+            }
+            Self::OfTexels { .. } => "Add a line `// domain: texel` above it".to_owned(),
+            Self::Kernel => {
+                "Let it give one quantity, take `tap: f32` (and `axis: vec2f`), and return a vec2f: how many texels \
+                 away a tap is, and what it weighs"
+                    .to_owned()
+            }
+            Self::NoLevel { .. } => "Make it an f32, a vec2f or a vec3f".to_owned(),
             Self::Type { wanted, .. } => format!("Make it {wanted}"),
             Self::Circle(_) => "Take one of the needs out".to_owned(),
             Self::NotThere { known: names, .. } => known(names),

@@ -22,23 +22,30 @@
 //! layer of that name. What the effect asks of the stages before (maps, cubes, fields of samples) follows from what
 //! its rules need.
 //!
-//! - `declaration`: the file's text; [`error`]: what is wrong with it
-//! - `check`: whether its names, types and needs fit the built-in rules; `wgsl`: whether its functions are valid and
-//!   have derivatives
+//! A rule is of fragments, of texels of the UV atlas, or both (`domain: texel, fragment`); a blur of a texel's quantity is
+//! a rule, too, whose function is the kernel (`pass: light_map: vec3f, 7 taps`, see [`Blur`](super::rule::Blur)).
+//! Fragments look up what a rule of texels gives where it says how far that is off (`sampled: 0`).
+//!
+//! - `declaration`: the file's text, `texels`: what it says of texels; [`error`]: what is wrong with it
+//! - `check`: whether its names and types fit the built-in rules, `there`: whether what it needs is there; `wgsl`:
+//!   whether its functions are valid and have derivatives
 //! - `needs`: what its effect asks for
 
 mod check;
 pub(crate) mod declaration;
 pub mod error;
 mod needs;
+mod texels;
+mod there;
 mod wgsl;
 
 use std::sync::{Mutex, PoisonError};
 
 use self::declaration::Declaration;
 pub use self::error::{Problem, TermError};
-use super::rule::{Rule, Stage};
-use crate::model::effects::{Effect, EffectInfo};
+use super::domain::Domain;
+use super::rule::Rule;
+use crate::model::effects::{Effect, EffectInfo, Effects};
 use crate::model::params::{Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
 use crate::model::terms::{TermInfo, TermName};
@@ -65,6 +72,16 @@ pub fn terms() -> Vec<&'static Term> {
     TERMS.rows()
 }
 
+/// An added effect of a set that has rules for texels of the atlas.
+pub fn of_texels(effects: Effects) -> Option<Effect> {
+    let enabled = |term: &&Term| effects.has(term.effect);
+    let term = terms()
+        .into_iter()
+        .filter(enabled)
+        .find(|term| term.rules.iter().any(|rule| rule.domain == Domain::Texel));
+    term.map(|term| term.effect)
+}
+
 /// Make a term known to this process for as long as it runs, from the text of the file that declares it; `name` is
 /// what the file is called. A text that was registered before is not registered again.
 ///
@@ -78,7 +95,7 @@ pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
         return Ok(known);
     }
     let text = leaked(text);
-    let declaration = declaration::parse(Stage::Fragment, leaked(name), text)?;
+    let declaration = declaration::parse(Domain::Fragment, leaked(name), text)?;
     let declaration = check::checked(declaration)?;
     wgsl::check(&declaration.rules)?;
     enter(declaration, text)

@@ -5,6 +5,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::shader::domain::Domain;
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
@@ -40,8 +41,13 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     let held = |name: &str| held(name) && !(name == "silhouette" && setup.rim_of_corners());
     let given: Vec<&'static str> =
         SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name).filter(|name| held(name)).collect();
-    // What cannot be planned is told when it is.
-    let chosen = search(&facts, &[], goals, &given).unwrap_or_default();
+    // What is computed in texels is of no stored sample: it is asked for as the renderer asks. What cannot be planned is
+    // told when it is.
+    let drawn = Facts { source: Source::Raster, atlas: Some(1), ..facts };
+    let found = search(&facts, &[], goals, &given).map(|found| (found, true));
+    let found = found.or_else(|_| search(&drawn, &[], goals, &[]).map(|found| (found, false)));
+    let (found, stored) = found.unwrap_or_default();
+    let chosen = found.rules;
     let needed = |name: &str| {
         let mut rules = chosen.iter().filter(|rule| !rule.fallback.contains(&name));
         rules.any(|rule| rule.needs.iter().any(|(need, _)| *need == name))
@@ -60,8 +66,9 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
         rim: needed("silhouette") || needed("corner_silhouettes"),
         dapple: needed("dapple"),
         haze: false,
-        smooth_normal: needed("normal"),
+        smooth_normal: stored && needed("normal"),
         key_light: false,
+        atlas: chosen.iter().any(|rule| rule.domain == Domain::Texel),
     }
 }
 

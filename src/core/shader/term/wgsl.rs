@@ -7,6 +7,7 @@ use naga::front::wgsl;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::error::{Problem, TermError};
+use crate::shader::domain::Domain;
 use crate::shader::quantity::{Kind, Resource};
 use crate::shader::rule::{LIBRARY, Rule};
 use crate::shader::tangent::{TangentError, Tangents};
@@ -35,6 +36,13 @@ fn check_rule(rule: &Rule) -> Result<(), TermError> {
         }
         Problem::Wgsl(one_line(&words)).at(line(at))
     })?;
+    let slopes = |(_, function): (_, &naga::Function)| {
+        function.expressions.iter().any(|(_, e)| matches!(e, naga::Expression::Derivative { .. }))
+    };
+    if rule.domain != Domain::Texel && module.functions.iter().any(slopes) {
+        // A stored sample knows no neighbours.
+        return Err(Problem::Derivative("what lies between neighbouring fragments".to_owned()).at(rule.line));
+    }
     if !rule.is_exact() {
         // No fit runs it.
         return Ok(());
@@ -44,7 +52,7 @@ fn check_rule(rule: &Rule) -> Result<(), TermError> {
         other => Problem::Wgsl(one_line(&other.to_string())).at(rule.line),
     };
     let moving: Vec<bool> =
-        rule.needs.iter().map(|(_, kind)| *kind == "f32" || kind.ends_with('f')).collect();
+        rule.parameters().iter().map(|(_, kind)| *kind == "f32" || kind.ends_with('f')).collect();
     let mut tangents = Tangents::new(&text).map_err(underivable)?;
     tangents.of(rule.function, &moving).map_err(underivable)?;
     // What was written has to be valid beside it.

@@ -7,11 +7,11 @@ use super::{Fitted, WORKGROUP, facts};
 use crate::model::params::Param;
 use crate::records::StoredRecords;
 use crate::samples::LANES;
+use crate::shader::Domain;
 use crate::shader::emit::{Plan, sample_fields};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::kept::{held, plan_terms};
 use crate::shader::module::{sample_struct, uniform};
-use crate::shader::rule::Stage;
 use crate::shader::search::components;
 
 /// The parameters that terms are made with.
@@ -59,7 +59,7 @@ pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), S
     if let Some(share) = fitted.layout.share {
         let _ = writeln!(wgsl, "    let share = {};", samples.number("record", share));
     }
-    wgsl.push_str(&plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+    wgsl.push_str(&plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
     for (name, kind) in wanted {
         let Some(place) = terms.place(name) else { continue };
         let value = if fields.iter().any(|(field, _)| *field == name) {

@@ -4,9 +4,9 @@ use std::fmt::Write as _;
 
 use super::reduce::{functions, reduction};
 use super::{ColumnOf, Fused, Moved, Sum, WORKGROUP};
+use crate::shader::Domain;
 use crate::shader::emit::{hazy, parts};
 use crate::shader::module::{sample_struct, uniform};
-use crate::shader::rule::Stage;
 use skinfit_core::engine::residual::loss_text;
 
 impl Fused {
@@ -93,7 +93,7 @@ impl Fused {
     fn samples(&self, seeds: &[usize], compares: bool) -> String {
         let mut wgsl = String::new();
         wgsl.push_str(&self.each_sample(compares));
-        wgsl.push_str(&self.plan.calls(Stage::Fragment, uniform, |name| format!("at.{name}")));
+        wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
         let parts = parts(&self.plan.facts);
         let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };

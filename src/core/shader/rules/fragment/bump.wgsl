@@ -1,6 +1,7 @@
 // The part of the shading normal that the normal map's strength scales.
 //
 // gives: bump
+// domain: texel, fragment
 // when: bumped, raster
 // cost: 10
 // uses: vector

@@ -1,6 +1,7 @@
 // Albedo, linear Rec.709, filtered by the hardware; stored in 8 bits.
 //
 // gives: albedo
+// domain: texel, fragment
 // when: has_color_map
 // cost: 8
 // error: 0.004

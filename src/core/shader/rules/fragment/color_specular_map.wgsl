@@ -1,6 +1,7 @@
 // Albedo and side-specular intensity from one 8-bit map, packed when it is loaded; filtered by the hardware.
 //
 // gives: albedo.xyz, specular.w
+// domain: texel, fragment
 // when: color_specular_one_size
 // cost: 9
 // error: 0.004

@@ -1,6 +1,7 @@
 // Albedo and side-specular intensity from one map, packed when it is loaded; filtered in the shader.
 //
 // gives: albedo.xyz, specular.w
+// domain: texel, fragment
 // when: color_specular_one_size
 // cost: 36
 // uses: texels

@@ -1,6 +1,7 @@
 // Albedo, linear Rec.709, filtered in the shader.
 //
 // gives: albedo
+// domain: texel, fragment
 // when: has_color_map
 // cost: 34
 // uses: texels

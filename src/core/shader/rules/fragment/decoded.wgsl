@@ -2,6 +2,7 @@
 // normal (MODEL 7); a positive z never vanishes, so that the normal does not either.
 //
 // gives: decoded
+// domain: texel, fragment
 // when: corrected, bumped
 // cost: 10
 // uses: vector

@@ -2,6 +2,7 @@
 // leaves a trace of it, as in the corrected form.
 //
 // gives: decoded
+// domain: texel, fragment
 // when: listing, bumped
 // cost: 7
 // uses: vector

@@ -1,6 +1,7 @@
 // E_d(n), the irradiance; filtered by the hardware.
 //
 // gives: irradiance
+// domain: texel, fragment
 // cost: 12
 // error: 0.004
 // paper: yes

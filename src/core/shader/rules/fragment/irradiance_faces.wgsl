@@ -1,6 +1,7 @@
 // E_d(n), the irradiance; filtered in the shader.
 //
 // gives: irradiance
+// domain: texel, fragment
 // cost: 22
 // uses: cube, vector
 // reads: irradiance_faces

@@ -1,6 +1,7 @@
 // Where the normal meets the cubes: a unit vector.
 //
 // gives: n_place
+// domain: texel, fragment
 // when: corrected
 // cost: 16
 // uses: vector, cube

@@ -1,6 +1,7 @@
 // Where the normal meets the cubes, of any length in the listing.
 //
 // gives: n_place
+// domain: texel, fragment
 // when: listing
 // cost: 16
 // uses: vector, cube

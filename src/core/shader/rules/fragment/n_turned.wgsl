@@ -1,6 +1,7 @@
 // The normal of lookups in the environment's frame: Ry(r)^-1 d (MODEL 1).
 //
 // gives: n_in_environment
+// domain: texel, fragment
 // when: turned
 // cost: 5
 fn turned_n(lookup_normal: vec3f, turn: vec2f) -> vec3f {

@@ -1,6 +1,7 @@
 // Normal map and attenuator from one 8-bit map, packed when it is loaded; filtered by the hardware.
 //
 // gives: normal_texel.xyz, attenuator.w
+// domain: texel, fragment
 // when: normal_attenuator_one_size
 // cost: 9
 // error: 0.004

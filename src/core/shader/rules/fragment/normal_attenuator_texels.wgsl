@@ -1,6 +1,7 @@
 // Normal map and attenuator from one map, packed when it is loaded; filtered in the shader.
 //
 // gives: normal_texel.xyz, attenuator.w
+// domain: texel, fragment
 // when: normal_attenuator_one_size
 // cost: 36
 // uses: texels

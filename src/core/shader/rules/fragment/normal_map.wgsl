@@ -1,6 +1,7 @@
 // The normal map's texel, in [0, 1], filtered by the hardware; stored in 8 bits.
 //
 // gives: normal_texel
+// domain: texel, fragment
 // when: has_normal_map
 // cost: 8
 // error: 0.004

@@ -1,6 +1,7 @@
 // The normal map's texel, in [0, 1], filtered in the shader.
 //
 // gives: normal_texel
+// domain: texel, fragment
 // when: has_normal_map
 // cost: 34
 // uses: texels

@@ -1,6 +1,7 @@
 // E_s(n), what shines from the side; filtered by the hardware.
 //
 // gives: side_light
+// domain: texel, fragment
 // cost: 12
 // error: 0.004
 // paper: yes

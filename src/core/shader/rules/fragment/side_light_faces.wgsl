@@ -1,6 +1,7 @@
 // E_s(n), what shines from the side; filtered in the shader.
 //
 // gives: side_light
+// domain: texel, fragment
 // cost: 22
 // uses: cube, vector
 // reads: specular_faces

@@ -1,6 +1,7 @@
 // The side-specular intensity s, filtered by the hardware; stored in 8 bits.
 //
 // gives: specular
+// domain: texel, fragment
 // when: has_specular_map
 // cost: 8
 // error: 0.004

@@ -1,6 +1,7 @@
 // The side-specular intensity s, filtered in the shader.
 //
 // gives: specular
+// domain: texel, fragment
 // when: has_specular_map
 // cost: 34
 // uses: texels

@@ -1,0 +1,33 @@
+
+// A triangle that covers the atlas.
+@vertex
+fn vs_main(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
+    return vec4f(f32(4u * (corner & 1u)) - 1.0, f32(2u * (corner & 2u)) - 1.0, 0.0, 1.0);
+}
+
+// The weighted mean along one axis of the taps that fall on texels of the same chart (the same w); where none weighs
+// anything, the texel as it is (MODEL 6).
+@fragment
+fn fs_main(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let size = vec2i(textureDimensions({source}));
+    let here = vec2i(at.xy);
+    let middle = textureLoad({source}, here, 0);
+    if (middle.w == 0.0) {
+        return vec4f(0.0);
+    }
+{reads}    var sum = vec4f(0.0);
+    for (var i = -{reach}; i <= {reach}; i++) {
+        let tap: vec2f = {kernel};
+        let low = floor(tap.x);
+        let f = tap.x - low;
+        for (var side = 0; side < 2; side++) {
+            let place = here + (i32(low) + side) * {axis};
+            let inside = all(place >= vec2i(0)) && all(place < size);
+            let texel = textureLoad({source}, clamp(place, vec2i(0), size - 1), 0);
+            let share = select(1.0 - f, f, side == 1);
+            sum += select(0.0, tap.y * share, inside && texel.w == middle.w) * vec4f(texel.xyz, 1.0);
+        }
+    }
+    let weighs = sum.w > 0.0;
+    return vec4f(select(middle.xyz, sum.xyz / select(1.0, sum.w, weighs), weighs), middle.w);
+}

@@ -1,0 +1,42 @@
+
+// A triangle that covers the atlas.
+@vertex
+fn vs_main(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
+    return vec4f(f32(4u * (corner & 1u)) - 1.0, f32(2u * (corner & 2u)) - 1.0, 0.0, 1.0);
+}
+
+// How the weighted mean moves: by its texels, as the mean itself is linear in them, and by the taps' places and weights.
+@fragment
+fn fs_main(@builtin(position) at: vec4f) -> @location(0) vec4f {
+    let size = vec2i(textureDimensions({source}));
+    let here = vec2i(at.xy);
+    let middle = textureLoad({source}, here, 0);
+    if (middle.w == 0.0) {
+        return vec4f(0.0);
+    }
+{reads}    var sum = vec4f(0.0);
+    // How the sum moves, and the sum of weights in w.
+    var change = vec4f(0.0);
+    for (var i = -{reach}; i <= {reach}; i++) {
+        let tap: vec2f = {kernel};
+        let slope: vec2f = {slope};
+        let low = floor(tap.x);
+        let f = tap.x - low;
+        for (var side = 0; side < 2; side++) {
+            let place = here + (i32(low) + side) * {axis};
+            let inside = all(place >= vec2i(0)) && all(place < size);
+            let near = clamp(place, vec2i(0), size - 1);
+            let texel = textureLoad({source}, near, 0);
+            let share = select(1.0 - f, f, side == 1);
+            let counts = inside && texel.w == middle.w;
+            let weight = select(0.0, tap.y * share, counts);
+            let moved = select(0.0, slope.y * share + tap.y * select(-slope.x, slope.x, side == 1), counts);
+            sum += weight * vec4f(texel.xyz, 1.0);
+            change += moved * vec4f(texel.xyz, 1.0) + weight * vec4f({moved}, 0.0);
+        }
+    }
+    let weighs = sum.w > 0.0;
+    let whole = select(1.0, sum.w, weighs);
+    let slope = (change.xyz - change.w * sum.xyz / whole) / whole;
+    return vec4f(select({moved_here}, slope, weighs), middle.w);
+}

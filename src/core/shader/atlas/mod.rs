@@ -1,0 +1,235 @@
+//! Passes over the UV atlas: texels' quantities, and blurs of them, in the order in which they are made.
+//!
+//! A *level* is a texture of the atlas' size, four 32-bit floats a texel: a quantity, and in w the texel's chart, 0 where
+//! the mesh has no surface. (All of a mesh is one chart so far.) A *draw* draws the mesh with its texture coordinates as
+//! positions, and leaves the levels that a pass or a fragment reads. A *blur* reads a level and leaves another, along u
+//! or along v. Draws and blurs take turns where texels' rules need what was blurred; texels that need nothing of that are
+//! computed anew in each draw.
+//!
+//! - this module: from the rules that a search has found to passes; `text`: their WGSL
+//! - [`tangent`]: passes that leave how levels move
+
+pub mod tangent;
+#[cfg(test)]
+mod tests;
+pub(super) mod text;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use super::domain::{DIRECTIONS, Domain, UV};
+use super::emit::Plan;
+use super::facts::Facts;
+use super::rule::Rule;
+use super::search::{Carried, Found, PlanError};
+
+/// Levels that a draw leaves: an adapter draws into 32 bytes a sample at once, by WebGPU's defaults.
+const LEVELS_A_DRAW: usize = 2;
+
+/// A texture of the atlas: a quantity of its texels, or one that is blurred along u alone.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Level {
+    /// Its name; bound as `NAME_level`.
+    pub name: String,
+    /// The quantity's WGSL type: an `f32`, `vec2f` or `vec3f`.
+    pub kind: &'static str,
+}
+
+impl Level {
+    fn new(name: impl Into<String>, kind: &'static str) -> Self {
+        Self { name: name.into(), kind }
+    }
+
+    /// Its name as it is bound.
+    #[must_use]
+    pub fn bound(&self) -> String {
+        format!("{}_level", self.name)
+    }
+
+    /// The components of a texel that hold it.
+    pub(super) fn swizzle(&self) -> &'static str {
+        match self.kind {
+            "f32" => "x",
+            "vec2f" => "xy",
+            _ => "xyz",
+        }
+    }
+}
+
+/// Along which axis of the atlas.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Axis {
+    /// From left to right.
+    U,
+    /// From top to bottom.
+    V,
+}
+
+impl Axis {
+    /// From a texel to its neighbour, as WGSL.
+    pub(super) const fn step(self) -> &'static str {
+        match self {
+            Self::U => "vec2i(1, 0)",
+            Self::V => "vec2i(0, 1)",
+        }
+    }
+}
+
+/// How a pass is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PassKind {
+    /// The mesh, its texture coordinates as positions, without depth and culling.
+    Draw,
+    /// Three vertices without attributes, which cover the atlas: a blur along an axis.
+    Blur(Axis),
+}
+
+/// A pass over the atlas.
+#[derive(Clone, Debug)]
+pub struct Pass {
+    /// How it is drawn.
+    pub kind: PassKind,
+    /// What it leaves: a target each, cleared to 0.
+    pub leaves: Vec<Level>,
+    /// Its rules, and what they read. The module's entry points are `vs_main` and `fs_main`.
+    pub plan: Plan,
+}
+
+/// The passes that yield the texels' quantities which fragments look up; none where nothing is computed in texels.
+///
+/// # Errors
+/// When a mesh has no texture coordinates to be drawn with.
+pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanError> {
+    let texels: Vec<&'static Rule> =
+        found.rules.iter().copied().filter(|rule| rule.domain == Domain::Texel).collect();
+    if texels.is_empty() {
+        return Ok(Vec::new());
+    }
+    if !found.rules.iter().any(|rule| rule.domain == Domain::Vertex && rule.gives_quantity(UV)) {
+        return Err(PlanError::NoPlan { goals: UV.to_owned() });
+    }
+    let depths = depths(&texels);
+    let depth = |rule: &Rule| rule.gives.iter().filter_map(|(q, _)| depths.get(q)).max().copied();
+    let stored = stored(&texels, &found.carried);
+    let mut passes = Vec::new();
+    for layer in 0..=depths.values().copied().max().unwrap_or(0) {
+        let drawn = texels.iter().filter(|rule| rule.blur.is_none() && depth(rule) == Some(layer));
+        let given = drawn.flat_map(|rule| {
+            rule.gives.iter().map(|(quantity, swizzle)| Level::new(*quantity, rule.given_type(swizzle)))
+        });
+        let leaves: Vec<Level> = given.filter(|level| stored.contains(level.name.as_str())).collect();
+        passes.extend(leaves.chunks(LEVELS_A_DRAW).map(|leaves| draw(facts, found, &texels, leaves)));
+        let blurs = texels.iter().filter(|rule| rule.blur.is_some() && depth(rule) == Some(layer + 1));
+        passes.extend(blurs.flat_map(|rule| blurs_of(facts, rule)));
+    }
+    Ok(passes)
+}
+
+/// How many blurs lie before each of the texels' quantities, itself with them.
+fn depths(texels: &[&'static Rule]) -> BTreeMap<&'static str, usize> {
+    let mut depths = BTreeMap::new();
+    // Each round settles at least one more.
+    for _ in texels {
+        for rule in texels {
+            let before = rule.needs.iter().filter_map(|(need, _)| depths.get(need)).max().copied();
+            let depth = before.unwrap_or(0) + usize::from(rule.blur.is_some());
+            depths.extend(rule.gives.iter().map(|(quantity, _)| (*quantity, depth)));
+        }
+    }
+    depths
+}
+
+/// The texels' quantities that stand in the atlas: what fragments look up, and what blurs and their kernels read.
+fn stored(texels: &[&'static Rule], carried: &[Carried]) -> BTreeSet<&'static str> {
+    let sampled = carried.iter().filter(|on| on.edge.from == Domain::Texel).map(|on| on.quantity);
+    let blurs = texels.iter().filter(|rule| rule.blur.is_some());
+    let read = blurs.flat_map(|rule| rule.needs.iter().map(|(need, _)| *need));
+    sampled.chain(read).collect()
+}
+
+/// The rules of `domain` among `rules` that yield `goals` there, in their order; what is in `stops` is there already.
+pub(super) fn upstream(
+    rules: &[&'static Rule],
+    domain: Domain,
+    goals: &[&str],
+    stops: &dyn Fn(&Rule) -> bool,
+) -> Vec<&'static Rule> {
+    let of_domain = || rules.iter().filter(|rule| rule.domain == domain && !stops(rule));
+    let mut wanted: BTreeSet<&str> = goals.iter().copied().collect();
+    loop {
+        let before = wanted.len();
+        for rule in of_domain() {
+            if rule.gives.iter().any(|(quantity, _)| wanted.contains(quantity)) {
+                wanted.extend(rule.needs.iter().map(|(need, _)| *need));
+            }
+        }
+        if wanted.len() == before {
+            let chosen = |rule: &&&Rule| rule.gives.iter().any(|(quantity, _)| wanted.contains(quantity));
+            return of_domain().filter(chosen).copied().collect();
+        }
+    }
+}
+
+/// The vertices' rules that `goals` and the quantities on edges to `domain` take, then `shading`.
+pub(super) fn with_vertices(
+    found: &Found,
+    domain: Domain,
+    goals: &[&'static str],
+    shading: Vec<&'static Rule>,
+) -> Vec<&'static Rule> {
+    let needed =
+        |quantity: &str| shading.iter().any(|rule| rule.needs.iter().any(|(need, _)| *need == quantity));
+    let carried = found.carried.iter().filter(|on| on.edge.from == Domain::Vertex && on.edge.to == domain);
+    let arriving = carried.map(|on| on.quantity).filter(|quantity| needed(quantity));
+    let goals: Vec<&str> = goals.iter().copied().chain(arriving).collect();
+    let mut rules = upstream(&found.rules, Domain::Vertex, &goals, &|_| false);
+    rules.extend(shading);
+    rules
+}
+
+fn draw(facts: &Facts, found: &Found, texels: &[&'static Rule], leaves: &[Level]) -> Pass {
+    let goals: Vec<&str> = leaves.iter().map(|level| level.name.as_str()).collect();
+    let shading = upstream(texels, Domain::Texel, &goals, &|rule| rule.blur.is_some());
+    let blurred = texels.iter().filter(|rule| rule.blur.is_some());
+    let read = |rule: &Rule| {
+        let mut needs = shading.iter().flat_map(|shading| &shading.needs);
+        needs.any(|(need, _)| rule.gives_quantity(need))
+    };
+    let levels =
+        blurred.filter(|rule| read(rule)).map(|rule| Level::new(rule.gives[0].0, rule.returns)).collect();
+    let rules = with_vertices(found, Domain::Texel, &[UV], shading);
+    let mut plan = Plan::of_rules(facts, &rules, &found.carried, levels);
+    plan.wgsl = text::draw(&plan, leaves);
+    Pass { kind: PassKind::Draw, leaves: leaves.to_vec(), plan }
+}
+
+/// The name of what a blur leaves along u.
+fn halfway(rule: &Rule) -> String {
+    format!("{}_along_u", rule.gives[0].0)
+}
+
+/// A blur along u, then along v.
+fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
+    let Some(blur) = &rule.blur else { return Vec::new() };
+    let kind = rule.returns;
+    let directions = [
+        (Axis::U, Level::new(blur.of, kind), Level::new(halfway(rule), kind)),
+        (Axis::V, Level::new(halfway(rule), kind), Level::new(rule.gives[0].0, kind)),
+    ];
+    let pass = |(axis, source, leaves): (Axis, Level, Level)| {
+        let mut plan = blur_plan(facts, rule, &source);
+        plan.wgsl = text::blur(&plan, rule, axis, &source);
+        Pass { kind: PassKind::Blur(axis), leaves: vec![leaves], plan }
+    };
+    directions.into_iter().map(pass).collect()
+}
+
+/// What one direction of a blur reads: the level that it blurs, and those that its kernel needs.
+fn blur_plan(facts: &Facts, rule: &'static Rule, source: &Level) -> Plan {
+    let uniform = |name: &str| super::quantity::Constant::from_name(name).is_some();
+    let needs = rule.needs.iter().skip(1).filter(|(need, _)| !uniform(need) && *need != source.name);
+    let mut levels = vec![source.clone()];
+    levels.extend(needs.map(|&(need, kind)| Level::new(need, kind)));
+    let mut plan = Plan::of_rules(facts, &[rule], &[], levels);
+    plan.cost /= DIRECTIONS;
+    plan
+}

@@ -1,0 +1,124 @@
+//! Whether all that a declared term's rules need is there: for fragments, for stored samples, for texels.
+
+use std::collections::BTreeSet;
+
+use super::declaration::Declaration;
+use super::error::{Problem, TermError};
+use crate::model::params::Param;
+use crate::shader::domain::Domain;
+use crate::shader::emit::SAMPLE;
+use crate::shader::graph::is_of_the_eye;
+use crate::shader::quantity::{Attribute, Constant};
+use crate::shader::rule::{RULES, Rule};
+
+/// The fields of stored samples, and all that rules give of them.
+fn of_samples<'a>(rules: &(impl Iterator<Item = &'a Rule> + Clone)) -> BTreeSet<&'static str> {
+    let mut there: BTreeSet<&'static str> = SAMPLE.iter().map(|(name, _)| *name).collect();
+    loop {
+        let before = there.len();
+        for rule in
+            rules.clone().filter(|rule| rule.domain == Domain::Fragment && !rule.when.contains(&"raster"))
+        {
+            let met = |name: &str| {
+                there.contains(name) || Param::from_identifier(name).is_some() || is_constant(name)
+            };
+            if rule.needs.iter().all(|(name, _)| met(name)) {
+                there.extend(rule.gives.iter().map(|(quantity, _)| *quantity));
+            }
+        }
+        if there.len() == before {
+            return there;
+        }
+    }
+}
+
+/// What rules give of texels: all that no eye moves.
+fn of_texels() -> BTreeSet<&'static str> {
+    let of_vertices = || RULES.iter().filter(|rule| rule.domain == Domain::Vertex);
+    let unmet = |name: &str| is_of_the_eye(name);
+    let mut seen: BTreeSet<&'static str> = BTreeSet::new();
+    let mut there: BTreeSet<&'static str> = BTreeSet::new();
+    loop {
+        let before = seen.len() + there.len();
+        for rule in of_vertices() {
+            let moved = rule.needs.iter().any(|(name, _)| unmet(name) || seen.contains(name));
+            if moved { &mut seen } else { &mut there }.extend(rule.gives.iter().map(|(name, _)| *name));
+        }
+        there.retain(|name| !seen.contains(name));
+        for rule in RULES.iter().filter(|rule| rule.domain == Domain::Texel) {
+            if rule.needs.iter().all(|(name, _)| there.contains(name) || is_uniform(name)) {
+                there.extend(rule.gives.iter().map(|(name, _)| *name));
+            }
+        }
+        if seen.len() + there.len() == before {
+            return there;
+        }
+    }
+}
+
+/// Whether a constant that is no parameter is there for stored samples.
+fn is_constant(name: &str) -> bool {
+    [Constant::Turn, Constant::KeyDirection].iter().any(|constant| constant.name() == name)
+}
+
+/// Everything that the rules need is there, for fragments and for samples, or for texels; every parameter is needed.
+pub(super) fn there(declaration: &Declaration) -> Result<(), TermError> {
+    let own: BTreeSet<&str> = declaration.parameters.iter().map(|(_, parameter)| parameter.name).collect();
+    let (samples, texels) = (of_samples(&RULES.iter()), of_texels());
+    for rule in &declaration.rules {
+        let there = if rule.domain == Domain::Texel { &texels } else { &samples };
+        for &(need, _) in &rule.needs {
+            let mut givers = declaration.rules.iter().filter(|giver| giver.gives_quantity(need)).peekable();
+            let constant = Param::from_identifier(need).is_some_and(Param::is_built_in) || is_constant(need);
+            let quantity = need.to_owned();
+            if givers.peek().is_some() {
+                // Only texels of one file feed its texels; fragments look up what may be sampled.
+                let feeds = |giver: &Rule| giver.domain == rule.domain || giver.sampled.is_some();
+                let feeds = |giver: &Rule| feeds(giver) && giver.domain <= rule.domain;
+                if givers.any(feeds) {
+                    continue;
+                }
+                let problem = match rule.domain {
+                    Domain::Texel => Problem::NotOfTexels { quantity },
+                    _ => Problem::TexelsAlone { quantity },
+                };
+                return Err(problem.at(rule.line));
+            }
+            if own.contains(need) || there.contains(need) || constant {
+                continue;
+            }
+            let somewhere = RULES.iter().any(|rule| rule.gives_quantity(need))
+                || Constant::from_name(need).is_some()
+                || Attribute::ALL.iter().any(|attribute| attribute.name() == need);
+            if somewhere && rule.domain == Domain::Texel {
+                return Err(Problem::NotOfTexels { quantity }.at(rule.line));
+            }
+            if somewhere {
+                return Err(Problem::RasterOnly { quantity }.at(rule.line));
+            }
+            let given = declaration.rules.iter().flat_map(|rule| rule.gives.iter().map(|(name, _)| *name));
+            let all = own.iter().copied().chain(given).chain(there.iter().copied());
+            let near = nearest(need, all.chain(Param::built_in().map(Param::name)));
+            return Err(Problem::Unknown { quantity, near }.at(rule.line));
+        }
+    }
+    let idle = declaration.parameters.iter().find(|(_, parameter)| {
+        !declaration.rules.iter().any(|rule| rule.needs.iter().any(|(need, _)| *need == parameter.name))
+    });
+    idle.map_or(Ok(()), |&(line, parameter)| Err(Problem::Idle(parameter.name.to_owned()).at(line)))
+}
+
+/// The nearest of the known names, where any is near.
+fn nearest<'a>(given: &str, known: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let distance = |name: &str| strsim::damerau_levenshtein(given, name);
+    let near = known.map(|name| (distance(name), name)).min();
+    near.filter(|(distance, name)| *distance <= 1 + name.len() / 3)
+        .map(|(_, name)| name.to_owned())
+        .into_iter()
+        .collect()
+}
+
+/// Whether a quantity is a constant: a parameter, or one that is there for stored samples.
+pub(super) fn is_uniform(name: &str) -> bool {
+    Param::from_identifier(name).is_some() || is_constant(name)
+}

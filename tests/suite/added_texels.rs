@@ -1,0 +1,381 @@
+//! A term that is computed in texels of the UV atlas and blurred there, through the door by which every term comes in:
+//! planned, each of its passes valid, drawn by the renderer and held against the same passes written here.
+
+use std::sync::OnceLock;
+
+use glam::{DMat4, DVec2, DVec3, Vec2, Vec3};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+use skinfit::bake::Illumination;
+use skinfit::gpu::upload::Content;
+use skinfit::gpu::{RenderOptions, Renderer};
+use skinfit::model::effects::{Effects, Form, Silhouette};
+use skinfit::model::evaluate::Setup;
+use skinfit::render::antialias::Antialias;
+use skinfit::render::image::Image;
+use skinfit::scene::Scene;
+use skinfit::scene::mesh::Mesh;
+use skinfit::scene::view::{Background, Camera, View};
+use skinfit::shader::atlas::tangent::Along;
+use skinfit::shader::atlas::{Axis, PassKind};
+use skinfit::shader::tangent::chain::Seed;
+use skinfit::shader::term::{Term, register};
+use skinfit::shader::{Budget, Domain, Facts, Plan, PlanError, Source, Work, plan};
+
+use crate::fixtures::bare_scene;
+use crate::graphics::bench::{EXACT, gpu};
+
+/// A light map, a blur of it, and what is added: the blurred map, and a detail that may be computed in either domain.
+const GLOW: &str = "\
+// Light that wanders under the surface.
+//
+// effect: glow, light that wanders under the surface
+// parameter: glow_weight = 0.5 in [0, inf), rgb, linear; weight of what wandered; a test
+// parameter: glow_radius = 1.3 in [0.1, 30], unit texels; how far it wandered; a test
+//
+// The light map: hills over the atlas.
+//
+// gives: glow_light
+// domain: texel
+// cost: 12
+fn glow_light_map(vertex_uv: vec2f) -> vec3f {
+    let within: vec2f = fract(12.0 * vertex_uv);
+    return vec3f(4.0 * within * (1.0 - within), vertex_uv.x * vertex_uv.y);
+}
+
+// A Gaussian of seven taps, a standard deviation apart.
+//
+// gives: glow_soft
+// domain: texel
+// pass: glow_light: vec3f, 7 taps
+// sampled: 0
+// cost: 8
+fn glow_kernel(tap: f32, glow_radius: f32) -> vec2f {
+    return vec2f(glow_radius * tap, exp(-0.5 * tap * tap));
+}
+
+// Slow, and smooth enough to be looked up.
+//
+// gives: glow_detail
+// domain: texel, fragment
+// sampled: 0.01
+// cost: 300
+fn glow_slow_detail(albedo: vec3f, base_weight: vec3f) -> vec3f {
+    return albedo * base_weight;
+}
+
+// gives: glow_part
+// adds: glow
+// cost: 6
+fn glow_light(glow_soft: vec3f, glow_detail: vec3f, glow_weight: vec3f) -> vec3f {
+    return glow_weight * glow_soft + glow_detail;
+}
+";
+
+/// A blur as wide on the surface as its radius says, of what a parameter moves.
+const VEINED: &str = "\
+// effect: veins, light under a stretched skin
+// parameter: veins_radius = 0.05 in [0.001, 30]; standard deviation, in the scene's unit; a test
+// parameter: veins_depth = 1.5 in [0.1, 10]; exponent of the light map; a test
+//
+// gives: veins_light
+// domain: texel
+// cost: 12
+fn veins_map(vertex_uv: vec2f, veins_depth: f32) -> vec3f {
+    let power: f32 = exp(veins_depth * log(0.1 + vertex_uv.x));
+    return vec3f(power, power * vertex_uv.y, vertex_uv.y * vertex_uv.y);
+}
+
+// gives: veins_stretch
+// domain: texel
+// cost: 20
+fn veins_stretch_map(vertex_position: vec3f) -> vec2f {
+    let along: vec3f = dpdx(vertex_position);
+    let down: vec3f = dpdy(vertex_position);
+    return sqrt(vec2f(dot(along, along), dot(down, down)));
+}
+
+// gives: veins_soft
+// domain: texel
+// pass: veins_light: vec3f, 5 taps
+// sampled: 0
+// cost: 8
+fn veins_kernel(tap: f32, axis: vec2f, veins_radius: f32, veins_stretch: vec2f) -> vec2f {
+    let step: f32 = dot(veins_stretch, axis);
+    return vec2f(tap * veins_radius / max(step, 1e-6), exp(-0.5 * tap * tap));
+}
+
+// gives: veins_part
+// adds: veins
+// cost: 1
+fn veins_shown(veins_soft: vec3f) -> vec3f {
+    return veins_soft;
+}
+";
+
+static VEINS: OnceLock<&'static Term> = OnceLock::new();
+
+fn term() -> &'static Term {
+    static TERM: OnceLock<&'static Term> = OnceLock::new();
+    TERM.get_or_init(|| register("glow", GLOW).unwrap_or_else(|error| panic!("{error}")))
+}
+
+fn setup() -> Setup {
+    Setup::new(Form::Corrected, Silhouette::Fragment, Effects::of(&[term().effect]))
+}
+
+/// As a close look at a character is: a texel for every twenty fragments.
+const CLOSE: Work = Work { vertices: 1e4, texels: 1e5, fragments: 2e6 };
+
+fn planned(work: Work, budget: Budget) -> Plan {
+    plan(&Facts { setup: setup(), work, budget, atlas: Some(512), ..Facts::default() }).unwrap()
+}
+
+fn validate(plan: &Plan) {
+    let module = naga::front::wgsl::parse_str(&plan.wgsl)
+        .unwrap_or_else(|error| panic!("{}\n{}", error.emit_to_string(&plan.wgsl), plan.wgsl));
+    let valid = Validator::new(ValidationFlags::all(), Capabilities::empty()).validate(&module);
+    valid.unwrap_or_else(|error| panic!("{}\n{}", error.emit_to_string(&plan.wgsl), plan.wgsl));
+}
+
+/// Where the plan computes a quantity of the term's.
+fn domain_of(plan: &Plan, quantity: &str) -> Vec<Domain> {
+    plan.all_steps()
+        .into_iter()
+        .map(|step| step.rule)
+        .filter(|r| r.gives_quantity(quantity))
+        .map(|r| r.domain)
+        .collect()
+}
+
+#[test]
+fn the_planner_decides_where_and_every_pass_is_valid() {
+    let within = Budget::Within(0.02);
+    let many = Work { texels: 1e7, ..CLOSE };
+    for (work, budget, domain) in [
+        (CLOSE, within, Domain::Texel),
+        (many, within, Domain::Fragment),
+        (CLOSE, Budget::Exact, Domain::Fragment),
+        (CLOSE, Budget::Within(0.005), Domain::Fragment),
+    ] {
+        let plan = planned(work, budget);
+        assert_eq!(domain_of(&plan, "glow_detail"), [domain], "{work:?} {budget:?}");
+        // What is blurred is computed nowhere else.
+        assert_eq!(domain_of(&plan, "glow_light"), [Domain::Texel]);
+        let kinds: Vec<PassKind> = plan.passes.iter().map(|pass| pass.kind).collect();
+        assert_eq!(kinds, [PassKind::Draw, PassKind::Blur(Axis::U), PassKind::Blur(Axis::V)]);
+        let sampled: Vec<&str> = plan.levels.iter().map(|level| level.name.as_str()).collect();
+        assert_eq!(sampled.contains(&"glow_detail"), domain == Domain::Texel);
+        assert!(sampled.contains(&"glow_soft") && !sampled.contains(&"glow_light"));
+        validate(&plan);
+        plan.passes.iter().for_each(|pass| validate(&pass.plan));
+    }
+    assert!(planned(CLOSE, within).cost < planned(CLOSE, Budget::Exact).cost);
+}
+
+#[test]
+fn what_has_no_atlas_is_told() {
+    let effect = term().effect.name();
+    let facts = Facts { setup: setup(), source: Source::Samples, ..Facts::default() };
+    let refused = PlanError::NoAtlas { effect };
+    assert_eq!(plan(&facts).unwrap_err(), refused);
+    assert_eq!(plan(&Facts { source: Source::Raster, ..facts }).unwrap_err(), refused);
+    assert!(refused.to_string().contains("glow") && setup().needs().atlas);
+}
+
+/// Texture coordinates of the square's corners: within the atlas, and between texels.
+const LOW: f64 = 0.1;
+const HIGH: f64 = 0.85;
+/// Texels along a side of the atlas.
+const SIZE: usize = 512;
+/// Pixels along a side of the image.
+const PIXELS: u32 = 96;
+/// From the camera to the square.
+const DISTANCE: f64 = 3.5;
+/// The camera's field of view, radians.
+const FOV: f64 = 0.6;
+
+/// A square from -1 to 1 that faces the camera and fills most of the image.
+fn scene() -> Scene {
+    let (low, high) = (LOW as f32, HIGH as f32);
+    let mesh = Mesh {
+        positions: [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]
+            .map(|[x, y]| Vec3::new(x, y, 0.0))
+            .to_vec(),
+        normals: vec![Vec3::Z; 4],
+        uvs: [[low, low], [high, low], [high, high], [low, high]].map(Vec2::from).to_vec(),
+        triangles: vec![[0, 3, 2], [0, 2, 1]],
+        ..Mesh::default()
+    };
+    let camera = Camera {
+        world_to_camera: DMat4::from_translation(DVec3::new(0.0, 0.0, -DISTANCE)),
+        fov_y: FOV,
+        width: PIXELS,
+        height: PIXELS,
+    };
+    let view = View { name: "front".to_owned(), camera, target: None, background: Background::None };
+    Scene { mesh, views: vec![view], ..bare_scene(Effects::of(&[term().effect])) }
+}
+
+type Texels = Vec<Option<DVec3>>;
+
+/// The light map: what the mesh covers of the atlas.
+fn light_map() -> Texels {
+    let texel = |i: usize| {
+        let uv = DVec2::new((i % SIZE) as f64 + 0.5, (i / SIZE) as f64 + 0.5) / SIZE as f64;
+        let within = (12.0 * uv).fract();
+        let inside = uv.min_element() > LOW && uv.max_element() < HIGH;
+        inside.then(|| (4.0 * within * (1.0 - within)).extend(uv.x * uv.y))
+    };
+    (0..SIZE * SIZE).map(texel).collect()
+}
+
+fn at(texels: &Texels, x: i64, y: i64) -> Option<DVec3> {
+    let size = SIZE as i64;
+    let inside = (0..size).contains(&x) && (0..size).contains(&y);
+    if inside { texels[(y * size + x) as usize] } else { None }
+}
+
+/// The mean of places with weights, of those that hold something.
+fn mean(places: impl Iterator<Item = (f64, Option<DVec3>)>) -> Option<DVec3> {
+    let sum = places.filter_map(|(weight, value)| Some((weight, value?)));
+    let (weights, sum) =
+        sum.fold((0.0, DVec3::ZERO), |(w, sum), (weight, value)| (w + weight, sum + weight * value));
+    (weights > 0.0).then(|| sum / weights)
+}
+
+/// One direction of the blur, by its definition.
+fn blurred(texels: &Texels, radius: f64, [across, down]: [i64; 2]) -> Texels {
+    let texel = |i: usize| {
+        let (x, y) = ((i % SIZE) as i64, (i / SIZE) as i64);
+        at(texels, x, y)?;
+        let taps = (-3..=3).flat_map(|tap| {
+            let (place, weight) = (radius * f64::from(tap), (-0.5 * f64::from(tap * tap)).exp());
+            let low = place.floor();
+            [(0, 1.0 - (place - low)), (1, place - low)].map(|(side, share)| {
+                let step = low as i64 + side;
+                (weight * share, at(texels, x + step * across, y + step * down))
+            })
+        });
+        mean(taps)
+    };
+    (0..SIZE * SIZE).map(texel).collect()
+}
+
+/// The bilinear value at texture coordinates.
+fn looked_up(texels: &Texels, uv: DVec2) -> Option<DVec3> {
+    let place = SIZE as f64 * uv - 0.5;
+    let (low, f) = (place.floor(), place - place.floor());
+    let corners = [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(x, y)| {
+        let share = |side: i64, f: f64| if side == 1 { f } else { 1.0 - f };
+        (share(x, f.x) * share(y, f.y), at(texels, low.x as i64 + x, low.y as i64 + y))
+    });
+    mean(corners.into_iter())
+}
+
+/// Texels of a level that hold something.
+fn held(level: &[f32]) -> Vec<[f64; 3]> {
+    let texels = level.chunks_exact(4).filter(|texel| texel[3] > 0.0);
+    texels.map(|texel| [0, 1, 2].map(|c| f64::from(texel[c]))).collect()
+}
+
+#[test]
+fn levels_move_as_their_differences_do() {
+    let Some(gpu) = gpu() else { return };
+    let veined = VEINS.get_or_init(|| register("veins", VEINED).unwrap_or_else(|error| panic!("{error}")));
+    let mut scene = scene();
+    scene.effects = Effects::of(&[veined.effect]);
+    let facts = Facts { atlas: Some(64), ..Facts::of_scene(&scene, &scene.params, Budget::Exact, false) };
+    let planned = plan(&facts).unwrap();
+    let illumination = Illumination { irradiance: None, lobes: None, hilite: None };
+    let levels = |plan: &Plan, scene: &Scene| {
+        let content = Content { scene, illumination: &illumination, occlusion: None, params: &scene.params };
+        skinfit::gpu::atlas::levels(gpu, plan, content).unwrap()
+    };
+    // The square's side over the texels that it covers: rounded at most by what 1e-7 is of a texel's 1e-2.
+    for [u, v, _] in held(&levels(&planned, &scene)["veins_stretch"]) {
+        let step = 2.0 / (64.0 * (HIGH - LOW));
+        assert!((u - step).abs() < 1e-4 * step && (v - step).abs() < 1e-4 * step, "{u} {v} {step}");
+    }
+    for &param in &veined.params[..2] {
+        let along = Along::new(&planned, &Seed::of_param(param)).unwrap();
+        assert!(along.moved.contains_key("veins_soft"), "{along:?}");
+        let mut both = planned.clone();
+        both.passes.extend(along.passes);
+        let tangent = held(&levels(&both, &scene)["d_veins_soft"]);
+        let at = |by: f64| {
+            let mut moved = scene.clone();
+            moved.params.set(param, scene.params.scalar(param) + by);
+            held(&levels(&planned, &moved)["veins_soft"])
+        };
+        let step = 2e-3;
+        let (more, less) = (at(step), at(-step));
+        assert!(tangent.len() > 2000 && tangent.len() == more.len());
+        let mut largest = 0.0_f64;
+        for ((tangent, more), less) in
+            tangent.iter().flatten().zip(more.iter().flatten()).zip(less.iter().flatten())
+        {
+            let difference = (more - less) / (2.0 * step);
+            largest = largest.max(difference.abs());
+            // Levels near 1 round to 1e-7, over a step of 4e-3; and where a tap passes from one texel to the next within
+            // the step, its slope changes by a share of what neighbours differ.
+            assert!((tangent - difference).abs() < 5e-3, "{}: {tangent} {difference}", param.name());
+        }
+        assert!(largest > 0.05, "{}: {largest}", param.name());
+    }
+}
+
+fn drawn(scene: &Scene, options: RenderOptions) -> Option<(Image, Plan)> {
+    let illumination = Illumination { irradiance: None, lobes: None, hilite: None };
+    let content = Content { scene, illumination: &illumination, occlusion: None, params: &scene.params };
+    let mut renderer = Renderer::new(gpu()?, content, options).unwrap();
+    let image = renderer.render(&scene.views[0].camera, 1.0).unwrap().image;
+    Some((image, renderer.plan().clone()))
+}
+
+#[test]
+fn the_renderer_draws_its_passes() {
+    let mut scene = scene();
+    let (weight, radius) = ([0.9, 0.6, 0.4], 1.7);
+    scene.params.set_rgb(term().params[0], weight);
+    scene.params.set(term().params[1], radius);
+    let options = RenderOptions { antialias: Antialias::Grid(1), ..EXACT };
+    let Some((image, exact)) = drawn(&scene, options) else { return };
+    assert_eq!(exact.passes.len(), 3);
+    let soft = blurred(&blurred(&light_map(), radius, [1, 0]), radius, [0, 1]);
+    let half = DISTANCE * (0.5 * FOV).tan();
+    let base = scene.params.rgb(skinfit::model::params::Param::BaseWeight);
+    let mut seen = 0;
+    for (i, (rgb, alpha)) in image.rgb.iter().zip(&image.alpha).enumerate() {
+        let at = |place: u32| f64::from(place) + 0.5;
+        let pixel = DVec2::new(at(i as u32 % PIXELS), at(i as u32 / PIXELS));
+        let on_square = (2.0 * pixel / f64::from(PIXELS) - 1.0) * half;
+        let inside = on_square.abs().max_element() < 1.0;
+        assert_eq!(*alpha, if inside { 1.0 } else { 0.0 }, "pixel {i}");
+        if !inside {
+            continue;
+        }
+        seen += 1;
+        let uv = LOW + (on_square + 1.0) / 2.0 * (HIGH - LOW);
+        let want = looked_up(&soft, uv).unwrap().to_array();
+        for c in 0..3 {
+            // The scene has no colour map: the detail is the base's weight.
+            let want = weight[c] * want[c] + base[c];
+            // Texture coordinates round to 1e-7, 5e-5 of a texel, over which the hills rise by a tenth of that at most;
+            // some tens of roundings of f32 beside.
+            assert!((f64::from(rgb[c]) - want).abs() < 2e-5, "pixel {i}, channel {c}: {} {want}", rgb[c]);
+        }
+    }
+    assert!(seen > 5000 && seen < image.rgb.len(), "{seen}");
+
+    // So close that there are more fragments than texels: the detail is looked up, and is off by no more than it says.
+    let camera = &mut scene.views[0].camera;
+    (camera.width, camera.height) = (1024, 1024);
+    let (exact, _) = drawn(&scene, options).unwrap();
+    let loose = RenderOptions { budget: Budget::Within(0.01), ..options };
+    let (loose, plan) = drawn(&scene, loose).unwrap();
+    assert_eq!(domain_of(&plan, "glow_detail"), [Domain::Texel]);
+    for (a, b) in exact.rgb.iter().flatten().zip(loose.rgb.iter().flatten()) {
+        // Such an image is kept in 16 bits, which round to 2^-11 of up to 2.
+        assert!((a - b).abs() <= 0.01 + 1e-3, "{a} {b}");
+    }
+}
