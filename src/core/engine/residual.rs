@@ -160,8 +160,7 @@ use crate::program::graph::Unary;
         if std::env::var_os("SKINFIT_PRINT_PLANS").is_some() {
             std::fs::write(path, &text).unwrap();
         }
-        let stale = "a loss has changed since it was printed: run `SKINFIT_PRINT_PLANS=1 cargo test -p skinfit-core \
-                     --lib the_printed_losses`, then build again";
+        let stale = "a loss has changed since it was printed: docs/building.md says how to print it anew";
         assert!(
             include_str!("loss/printed.rs") == text || std::fs::read_to_string(path).unwrap() == text,
             "{stale}"

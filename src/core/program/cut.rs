@@ -3,7 +3,7 @@
 //! Where such a number meets one that moves, the graph is cut: the number is computed once, kept beside the sample,
 //! and read by later passes like a field. What is cheaper to compute anew than to read is not kept.
 
-use super::graph::{Graph, Id, Input, Node};
+use super::graph::{Binary, Graph, Id, Input, Node, Unary};
 
 /// The name under which kept numbers are read.
 pub const KEPT: &str = "kept";
@@ -62,7 +62,7 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
                     .into_iter()
                     .for_each(|leaf| kept.push(leaf));
             }
-        } else if !kept.contains(&id) {
+        } else if !kept.contains(&id) && !is_one_operation_on(graph, id, &kept, &varies) {
             kept.push(id);
         }
     }
@@ -70,6 +70,16 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
     let instead = |id: Id| place(id).map(|component| Input { name: KEPT.to_owned(), component });
     let (rest, outputs) = graph.rebuilt(outputs, instead);
     Cut { kept, graph: rest, outputs }
+}
+
+/// Whether a number is one operation on numbers that are kept, and on such as do not vary: as cheap to make as to read.
+fn is_one_operation_on(graph: &Graph, id: Id, kept: &[Id], varies: &[bool]) -> bool {
+    let plain = match graph.node(id) {
+        Node::Unary(op, _) => !matches!(op, Unary::Log2 | Unary::Exp2 | Unary::Sqrt),
+        Node::Binary(op, ..) => op != Binary::Divide,
+        _ => false,
+    };
+    plain && graph.operands(id).into_iter().all(|operand| !varies[operand.index()] || kept.contains(&operand))
 }
 
 /// Whether a number is a field, or a few operations on one.

@@ -259,8 +259,14 @@ fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
 /// The value of a constant of the rules at `params`; `None` for one that no parameter gives.
 #[must_use]
 pub fn constant(input: &Input, params: &Params) -> Option<f64> {
+    component(Constant::from_name(&input.name)?, input.component, params)
+}
+
+/// A component of a constant of the rules at `params`; `None` for one that no parameter gives.
+#[must_use]
+pub fn component(constant: Constant, component: usize, params: &Params) -> Option<f64> {
     let key = || KeyLight::new(params);
-    let value = match Constant::from_name(&input.name)? {
+    let value = match constant {
         Constant::Param(param) => params.rgb(param),
         Constant::Turn => {
             let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
@@ -271,5 +277,5 @@ pub fn constant(input: &Input, params: &Params) -> Option<f64> {
         Constant::KeyByElevation => key().by_elevation,
         Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => return None,
     };
-    Some(value.get(input.component).copied().unwrap_or(0.0))
+    Some(value.get(component).copied().unwrap_or(0.0))
 }

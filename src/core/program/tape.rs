@@ -116,6 +116,18 @@ impl Tape {
     /// The numbers that are the same for all samples, in the order of their slots.
     #[must_use]
     pub fn uniform_values(&self, value: impl Fn(&Input) -> f64) -> Vec<f64> {
+        self.uniform_values_by(|at| value(&self.graph.uniforms[at]))
+    }
+
+    /// What [`Self::uniform_values`] are made of.
+    #[must_use]
+    pub fn inputs(&self) -> &[Input] {
+        &self.graph.uniforms
+    }
+
+    /// [`Self::uniform_values`], by the place of each input among [`Self::inputs`].
+    #[must_use]
+    pub fn uniform_values_by(&self, value: impl Fn(usize) -> f64) -> Vec<f64> {
         let mut known: Vec<Option<f64>> = vec![None; self.graph.len()];
         let mut of = |operand| match operand {
             Operand::Of(id) => self.uniform(id, &value, &mut known),
@@ -125,14 +137,14 @@ impl Tape {
         self.uniforms.iter().map(|&operand| of(operand)).collect()
     }
 
-    fn uniform(&self, id: Id, value: &impl Fn(&Input) -> f64, known: &mut Vec<Option<f64>>) -> f64 {
+    fn uniform(&self, id: Id, value: &impl Fn(usize) -> f64, known: &mut Vec<Option<f64>>) -> f64 {
         if let Some(x) = known[id.index()] {
             return x;
         }
         let mut of = |id| self.uniform(id, value, known);
         let x = match self.graph.node(id) {
             Node::Constant(bits) => f64::from_bits(bits),
-            Node::Uniform(at) => value(&self.graph.uniforms[at as usize]),
+            Node::Uniform(at) => value(at as usize),
             Node::Unary(op, a) => apply_unary(op, of(a)),
             Node::Binary(op, a, b) => apply_binary(op, of(a), of(b)),
             Node::Select { condition, yes, no } => {

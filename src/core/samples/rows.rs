@@ -105,13 +105,6 @@ impl Rows {
     pub fn plane_mut(&mut self, place: usize) -> impl Iterator<Item = &mut f32> {
         self.rows.chunks_exact_mut(self.stride).flat_map(move |record| record[place].iter_mut())
     }
-
-    /// Ask for a record that will be read soon: pages are small, and the processor's prefetcher ends
-    /// at each.
-    #[inline(always)]
-    pub(crate) fn prefetch(&self, index: usize) {
-        prefetch_rows(&self.rows, index * self.stride, self.stride);
-    }
 }
 
 /// Ask for `count` rows from `first` on; they may lie beyond the end.

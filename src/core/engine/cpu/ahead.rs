@@ -225,7 +225,7 @@ use crate::simd::Simd;
         line(&format!("let fields = block.fields::<{fields}>();"));
         line("let cubes = block.cubes;");
         line("for i in 0..block.count {");
-        line("    let at = i * block.stride();");
+        line("    let at = block.begin(i);");
         line("    let samples = |k: usize| block.number(simd, fields[k], at);");
         if let Some(kept) = kept {
             line(&format!("    let rows = block.kept::<{kept}>(i);"));
@@ -270,8 +270,7 @@ use crate::simd::Simd;
         if std::env::var_os("SKINFIT_PRINT_PLANS").is_some() {
             std::fs::write(path, &text).unwrap();
         }
-        let stale = "the rules have changed since their plans were printed: run \
-                     `SKINFIT_PRINT_PLANS=1 cargo test -p skinfit-core --lib what_is_compiled`, then build again";
+        let stale = "the rules have changed since their plans were printed: docs/building.md says how to print them anew";
         assert!(
             include_str!("ahead/tapes.rs") == text || std::fs::read_to_string(path).unwrap() == text,
             "{stale}"
@@ -320,7 +319,7 @@ use crate::simd::Simd;
             assert!(program.is_compiled() || tape.outputs.is_empty(), "{of} is not compiled");
             let uniforms = uniforms.into_iter().map(|x| x as f32).collect();
             let bound = Bound { program: &program, loads: &loads, cubes: narrow.iter().collect(), uniforms };
-            let streams = [(&samples[..], fields), (&keeps[..], kept), (&[], 0)]
+            let streams = [(&samples[..], fields), (&keeps[..], kept), (&[], 0), (&[], 0)]
                 .map(|(rows, stride)| Stream { rows, stride });
             for level in levels() {
                 let mut file = File::default();

@@ -32,9 +32,17 @@ impl<'a> Block<'a> {
         self.bound.uniforms.first_chunk().unwrap_or(&[0.0; N])
     }
 
+    /// The row of record `i` of the block among a field's. Asks for what its pixel is compared with.
+    #[inline(always)]
+    pub(super) fn begin(&self, i: usize) -> usize {
+        let Stream { rows, stride } = self.stream(StreamOf::Targets);
+        prefetch_rows(rows, (self.first + i) * stride, stride);
+        i * self.stride()
+    }
+
     /// Rows between one record's numbers and the next one's.
     #[inline(always)]
-    pub(super) fn stride(&self) -> usize {
+    fn stride(&self) -> usize {
         self.stream(StreamOf::Samples).stride
     }
 
@@ -47,8 +55,8 @@ impl<'a> Block<'a> {
             match stream {
                 StreamOf::Samples => &self.stream(stream).rows[self.first * stride + place..],
                 StreamOf::Neutral => &self.stream(stream).rows[place * BATCH * stride..],
-                // It is read by [`Self::kept`].
-                StreamOf::Kept => &[],
+                // They are read by [`Self::kept`], and by no tape.
+                StreamOf::Kept | StreamOf::Targets => &[],
             }
         })
     }

@@ -33,7 +33,7 @@ use self::lobe::Lobe;
 use self::machine::{BATCH, Bound, File};
 use self::pass::{Fitted, Pass, Reading};
 use self::sums::{CHUNK, Sums, Wish, by_chunk, pairwise};
-use self::view_pass::{Scratch, ViewPass, streams};
+use self::view_pass::{Lent, Scratch, ViewPass, streams};
 use super::gram::pair;
 use super::lanes::Lanes;
 use super::pulls::{Gathered, Pulls};
@@ -43,8 +43,7 @@ use crate::bake::Illumination;
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
-use crate::program::graph::Input;
-use crate::program::shading::{ShadingError, constant};
+use crate::program::shading::ShadingError;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::scene::Loss;
@@ -66,6 +65,8 @@ pub struct CpuEngine {
     neutral: Vec<Row>,
     lobe: Mutex<Option<Arc<Lobe>>>,
     kept: Mutex<Option<Arc<Kept>>>,
+    /// What threads computed in, for those of the next pass.
+    scratches: Mutex<Vec<Scratch>>,
     /// Why a pass could not be made.
     fault: OnceLock<String>,
 }
@@ -123,6 +124,7 @@ impl CpuEngine {
             neutral: neutral_rows(stride.unwrap_or(0)),
             lobe: Mutex::default(),
             kept: Mutex::default(),
+            scratches: Mutex::default(),
             fault: OnceLock::new(),
         };
         engine.set_stride(1);
@@ -198,8 +200,7 @@ impl CpuEngine {
 
     /// A tape with what is the same for all records of a pass.
     fn bound<'a>(&'a self, reading: &'a Reading, point: &Point, lobe: Option<&'a Lobe>) -> Bound<'a> {
-        let value = |input: &Input| constant(input, &point.params).unwrap_or(0.0);
-        let uniforms = reading.program.tape.uniform_values(value).into_iter().map(|x| x as f32).collect();
+        let uniforms = reading.uniforms(&point.params).into_iter().map(|x| x as f32).collect();
         let cubes = reading.program.tape.resources.iter().filter_map(|name| self.cube(name, lobe)).collect();
         Bound { program: &reading.program, loads: &reading.loads, cubes, uniforms }
     }
@@ -216,10 +217,9 @@ impl CpuEngine {
 
     /// What no free parameter changes, made on the first pass, and again should a held parameter differ.
     fn kept(&self, pass: &Pass, turned: bool, point: &Point, lobe: Option<&Lobe>) -> Arc<Kept> {
-        let shared = |input: &Input| constant(input, &point.params).unwrap_or(0.0);
         let exponent = pass.keep.program.tape.resources.iter().any(|name| name.starts_with("specular"));
         let exponent = if exponent { point.params.scalar(Param::SpecularLobe) } else { 0.0 };
-        let made_with = (pass.keep.program.tape.uniform_values(shared), exponent);
+        let made_with = (pass.keep.uniforms(&point.params), exponent);
         let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) = slot.as_ref().filter(|kept| kept.turned == turned && kept.made_with == made_with)
         {
@@ -298,7 +298,8 @@ impl CpuEngine {
         let groups = of_view.view.samples.groups();
         planes.resize_with(channels.len(), Vec::new);
         planes.iter_mut().for_each(|plane| plane.resize(groups * LANES, 0.0));
-        by_chunk(planes).par_iter_mut().enumerate().for_each_init(Scratch::default, |scratch, (chunk, parts)| {
+        by_chunk(planes).par_iter_mut().enumerate().for_each_init(|| Lent::new(&self.scratches), |lent, (chunk, parts)| {
+            let scratch = &mut lent.scratch;
             scratch.prepare(&of_view);
             let first = chunk * BLOCK * CHUNK;
             let end = groups.min(first + BLOCK * CHUNK);
@@ -344,7 +345,8 @@ impl CpuEngine {
             let blocks: Vec<usize> = self.read_blocks(&self.views[view]).collect();
             let sums: Vec<Sums> = blocks
                 .par_chunks(CHUNK)
-                .map_init(Scratch::default, |scratch, blocks| {
+                .map_init(|| Lent::new(&self.scratches), |lent, blocks| {
+                    let scratch = &mut lent.scratch;
                     scratch.prepare(&of_view);
                     with_simd!(self.level, simd => of_view.chunk(simd, &pass.channels, blocks, wish, scratch))
                 })
@@ -372,7 +374,8 @@ impl CpuEngine {
                 pass.channels.iter().map(|c| c.unknowns.iter().map(|u| u.or(own)).collect()).collect();
             let groups = view.samples.groups();
             let blocks: Vec<usize> = self.read_blocks(view).collect();
-            let parts = blocks.par_iter().map_init(Scratch::default, |scratch, &block| {
+            let parts = blocks.par_iter().map_init(|| Lent::new(&self.scratches), |lent, &block| {
+                let scratch = &mut lent.scratch;
                 scratch.prepare(&of_view);
                 let mut gathered = Gathered::new(view, width, &columns, self.fitted.unknowns.len());
                 let end = groups.min((block + 1) * BLOCK);

@@ -7,13 +7,14 @@ use super::machine::Program;
 use crate::engine::Unknown;
 use crate::engine::view::ObservedView;
 use crate::model::evaluate::Setup;
-use crate::model::params::{Channels, Param};
+use crate::model::params::{Channels, Param, Params};
 use crate::program::cut::{KEPT, cut};
 use crate::program::graph::{Graph, Id, Input, Node};
 use crate::program::lower::Natives;
-use crate::program::shading::{Shading, ShadingError};
+use crate::program::shading::{Shading, ShadingError, component};
 use crate::program::tape::Tape;
 use crate::samples::surface_records::{Places, neutral};
+use crate::shader::Constant;
 use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source as FactsSource};
 use crate::shader::tangent::chain::Seed;
 
@@ -24,6 +25,8 @@ pub(super) enum StreamOf {
     Kept,
     /// What stands in for fields that samples lack: [`NEUTRALS`], each for as many rows as a block has.
     Neutral,
+    /// What pixels are compared with, a record a pixel; no tape reads it, but it is asked for meanwhile.
+    Targets,
 }
 
 /// The numbers that stand in for fields.
@@ -79,6 +82,8 @@ pub(super) struct Reading {
     pub(super) program: Program,
     /// For each field, its stream and its row there.
     pub(super) loads: Vec<(StreamOf, usize)>,
+    /// For each input that all samples share, the rules' constant and its component.
+    constants: Vec<(Option<Constant>, usize)>,
 }
 
 /// The columns of one channel.
@@ -231,7 +236,18 @@ impl Reading {
             }
         };
         let loads = tape.fields.iter().map(load).collect();
-        Self { program: Program::new(tape, ahead), loads }
+        let constant = |input: &Input| (Constant::from_name(&input.name), input.component);
+        let constants = tape.inputs().iter().map(constant).collect();
+        Self { program: Program::new(tape, ahead), loads, constants }
+    }
+
+    /// The numbers that all samples share.
+    pub(super) fn uniforms(&self, params: &Params) -> Vec<f64> {
+        let value = |at: usize| {
+            let (constant, place) = self.constants[at];
+            constant.and_then(|constant| component(constant, place, params)).unwrap_or(0.0)
+        };
+        self.program.tape.uniform_values_by(value)
     }
 }
 

@@ -1,5 +1,7 @@
 //! A view's blocks of records: from what tapes yield to the sums of loss, gradient and normal equations.
 
+use std::sync::{Mutex, PoisonError};
+
 use super::machine::{self, BATCH, Bound, Column, File, FileColumns, Stream};
 use super::pass::ChannelColumns;
 use super::sums::{Sums, Wish, fold};
@@ -16,7 +18,7 @@ use crate::simd::Simd;
 /// What the blocks of a view read in one pass.
 pub(super) struct ViewPass<'a> {
     pub(super) view: &'a ObservedView,
-    pub(super) streams: [Stream<'a>; 3],
+    pub(super) streams: [Stream<'a>; 4],
     pub(super) bound: Bound<'a>,
     /// The tape's outputs that are wanted.
     pub(super) read: &'a [usize],
@@ -25,7 +27,7 @@ pub(super) struct ViewPass<'a> {
 }
 
 /// What a thread computes in.
-#[derive(Default)]
+#[derive(Debug, Default)]
 pub(super) struct Scratch {
     file: File,
     /// Sums over the samples of a pixel, of each output.
@@ -39,7 +41,7 @@ pub(super) struct Scratch {
 }
 
 /// The residuals of a channel as the normal equations see them.
-#[derive(Default)]
+#[derive(Debug, Default)]
 struct Compared {
     /// What the row of the value's derivative is scaled by, where residuals do not all count alike.
     scale: Column,
@@ -52,22 +54,50 @@ pub(super) fn streams<'a>(
     kept: &'a [Row],
     kept_stride: usize,
     neutral: &'a [Row],
-) -> [Stream<'a>; 3] {
+) -> [Stream<'a>; 4] {
     let samples = view.samples.surface.rows();
+    // Of several samples a pixel, records are not groups.
+    let targets = if several(view) { &[] } else { view.target.all() };
     [
         Stream { rows: samples.all(), stride: samples.stride() },
         Stream { rows: kept, stride: kept_stride },
         Stream { rows: neutral, stride: 0 },
+        Stream { rows: targets, stride: view.target.stride() },
     ]
+}
+
+/// Whether a pixel has several samples.
+fn several(view: &ObservedView) -> bool {
+    view.samples.records() != view.samples.groups() || view.samples.surface.places().weight.is_some()
+}
+
+/// A scratch that goes back to the pool that it came from: memory that is new in each pass costs more than its use.
+pub(super) struct Lent<'a> {
+    pool: &'a Mutex<Vec<Scratch>>,
+    pub(super) scratch: Scratch,
+}
+
+impl<'a> Lent<'a> {
+    pub(super) fn new(pool: &'a Mutex<Vec<Scratch>>) -> Self {
+        let scratch = pool.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
+        Self { pool, scratch }
+    }
+}
+
+impl Drop for Lent<'_> {
+    fn drop(&mut self) {
+        let scratch = std::mem::take(&mut self.scratch);
+        self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
+    }
 }
 
 impl Scratch {
     pub(super) fn prepare(&mut self, pass: &ViewPass<'_>) {
         let outputs = pass.bound.program.tape.outputs.len();
         self.file.prepare(&pass.bound);
-        self.several = pass.several();
+        self.several = several(pass.view);
         self.pixels.resize_with(if self.several { outputs } else { 0 }, Column::default);
-        self.weighed.resize_with(outputs + 1, Column::default);
+        self.weighed.resize_with(if pass.is_plain() { 0 } else { outputs }, Column::default);
     }
 
     fn shown(&self) -> &[Column] {
@@ -76,12 +106,6 @@ impl Scratch {
 }
 
 impl ViewPass<'_> {
-    /// Whether a pixel has several samples.
-    fn several(&self) -> bool {
-        let samples = &self.view.samples;
-        samples.records() != samples.groups() || samples.surface.places().weight.is_some()
-    }
-
     /// Whether every residual counts alike, and as it is.
     fn is_plain(&self) -> bool {
         self.loss == Loss::L2 && self.view.weight.is_empty() && self.view.clip.is_none() && self.gain == 1.0
@@ -229,8 +253,6 @@ impl ViewPass<'_> {
             let end = groups.min((block + 1) * BLOCK);
             for first in (block * BLOCK..end).step_by(BATCH) {
                 let count = BATCH.min(end - first);
-                // While the model is computed, what it is compared with comes.
-                (first..first + count).for_each(|group| self.view.target.prefetch(group));
                 let shown = self.shown(simd, scratch, first, count);
                 let mut base = 0;
                 for (c, channel) in channels.iter().enumerate() {

@@ -26,12 +26,12 @@ pub(super) const KEYS: [u64; 46] = [
     0xcee8a020a78523d2,
     0xd3c413917303094d,
     0x6a75b070e858071b,
-    0x742a45f81acd0e64,
+    0x443974704c6c1c83,
     0xcb4e43a6b510ef8a,
-    0x933cec12c296c781,
-    0xfadc13c10bd0ab90,
+    0x0238487d4674aa44,
+    0x4deddc96bed52330,
     0xdd9c7c4af13f6c24,
-    0x74fceeba55a63d4f,
+    0x827686b1da2a5935,
     0x011ac5d4af38d330,
     0x5d23884890a042e2,
     0x3cc08113f506bba0,
@@ -44,9 +44,9 @@ pub(super) const KEYS: [u64; 46] = [
     0x20dc02d4d197dc84,
     0x51a55172abd5a473,
     0xe7c6ec157dd441b9,
-    0x1afc1278f789cb5f,
+    0x297f3682b51370de,
     0x07817b3f206d0946,
-    0x0c7a2373674da581,
+    0x20d7b1b4b85e51e4,
     0xe697a227115c1ba6,
     0x65162e3d462e2644,
     0x01d250a64dce1969,
@@ -125,7 +125,7 @@ fn surface_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -237,7 +237,7 @@ fn surface_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<15>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -303,7 +303,7 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<15>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -432,7 +432,7 @@ fn surface_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -527,7 +527,7 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -607,7 +607,7 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -771,7 +771,7 @@ fn surface_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -809,7 +809,7 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<20>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -931,7 +931,7 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<20>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -1153,7 +1153,7 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<20>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -1396,7 +1396,7 @@ fn surface_all_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(10);
             let r0 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
@@ -1419,7 +1419,7 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<1>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -1559,7 +1559,7 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<1>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -1876,12 +1876,12 @@ fn bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
         #[inline(always)]
         || {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 5] = block.uniforms();
+        let numbers: &[f32; 4] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -1964,7 +1964,6 @@ fn bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r5 * r10;
             let r8 = r5 * r8;
             let r6 = r5 * r6;
-            let r5 = r15 * lit(0.6931471805599453);
             block.put(0, i, r2);
             block.put(1, i, r0);
             block.put(2, i, r12);
@@ -1980,7 +1979,6 @@ fn bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             block.put(12, i, r10);
             block.put(13, i, r8);
             block.put(14, i, r6);
-            block.put(15, i, r5);
         }
         },
     );
@@ -1994,12 +1992,12 @@ fn bumped_value<S: Simd>(simd: S, block: Block<'_>) {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
         let numbers: &[f32; 19] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
-        let fields = block.fields::<16>();
+        let fields = block.fields::<15>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
-            let rows = block.kept::<16>(i);
+            let rows = block.kept::<15>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
             let r0 = kept(5);
             let r0 = u(0) * r0;
@@ -2057,123 +2055,123 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
         #[inline(always)]
         || {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 20] = block.uniforms();
+        let numbers: &[f32; 21] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
-        let fields = block.fields::<16>();
+        let fields = block.fields::<15>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
-            let rows = block.kept::<16>(i);
+            let rows = block.kept::<15>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
             let r0 = kept(5);
-            let r0 = u(0) * r0;
-            let r0 = r0.exp2();
-            let r1 = kept(12);
-            let r2 = kept(1);
-            let r3 = kept(0);
-            let r4 = lit(1.0) - r3;
-            let r4 = (-u(2)).mul_add(r4, lit(1.0));
-            let r5 = kept(4);
-            let r6 = select(r5.ge(lit(0.5)), r0, u(3));
-            let r7 = r4 * r6;
-            let r8 = u(4) * r7;
-            let r9 = kept(9);
-            let r10 = kept(6);
-            let r11 = r6.mul_add(u(5), u(6));
-            let r12 = r4 * r11;
-            let r12 = r10 * r12;
-            let r12 = r9.mul_add(u(7), r12);
-            let r12 = r2.mul_add(r8, r12);
-            let r12 = r1.mul_add(u(8), r12);
-            let r8 = kept(13);
-            let r13 = kept(2);
-            let r14 = r7 * u(9);
-            let r15 = kept(10);
-            let r16 = kept(7);
-            let r17 = r6.mul_add(u(10), u(11));
-            let r18 = r4 * r17;
-            let r18 = r16 * r18;
-            let r18 = r15.mul_add(u(12), r18);
-            let r18 = r13.mul_add(r14, r18);
-            let r18 = r8.mul_add(u(13), r18);
-            let r14 = kept(14);
-            let r19 = kept(3);
-            let r20 = r7 * u(14);
-            let r21 = kept(11);
-            let r22 = kept(8);
-            let r23 = r6.mul_add(u(15), u(16));
-            let r24 = r4 * r23;
-            let r24 = r22 * r24;
-            let r24 = r21.mul_add(u(17), r24);
-            let r24 = r19.mul_add(r20, r24);
-            let r24 = r14.mul_add(u(18), r24);
-            let r20 = r4 * r10;
-            let r25 = r4 * r16;
-            let r26 = r4 * r22;
-            let r27 = r7 * r10;
-            let r28 = r7 * r16;
-            let r29 = r7 * r22;
-            let r30 = kept(15);
-            let r30 = r0 * r30;
-            let r30 = select(r5.ge(lit(0.5)), r30, lit(0.0));
-            let r5 = u(5) * r30;
-            let r5 = r4 * r5;
-            let r0 = r4 * r30;
-            let r31 = u(4) * r0;
-            let r31 = r2 * r31;
-            let r31 = r10.mul_add(r5, r31);
-            let r5 = u(10) * r30;
-            let r5 = r4 * r5;
-            let r32 = u(9) * r0;
-            let r32 = r13 * r32;
-            let r32 = r16.mul_add(r5, r32);
-            let r30 = u(15) * r30;
-            let r30 = r4 * r30;
-            let r0 = u(14) * r0;
-            let r0 = r19 * r0;
-            let r0 = r22.mul_add(r30, r0);
-            let r30 = r2 * r7;
-            let r4 = r7 * r13;
-            let r7 = r7 * r19;
-            let r3 = r3 - lit(1.0);
-            let r11 = r11 * r3;
-            let r6 = r6 * r3;
-            let r5 = u(4) * r6;
-            let r5 = r2 * r5;
-            let r5 = r10.mul_add(r11, r5);
-            let r17 = r17 * r3;
-            let r11 = u(9) * r6;
-            let r11 = r13 * r11;
-            let r11 = r16.mul_add(r17, r11);
-            let r3 = r23 * r3;
-            let r6 = u(14) * r6;
-            let r6 = r19 * r6;
-            let r6 = r22.mul_add(r3, r6);
-            block.put(0, i, r12);
-            block.put(1, i, r18);
-            block.put(2, i, r24);
-            block.put(3, i, r20);
-            block.put(4, i, r25);
-            block.put(5, i, r26);
-            block.put(6, i, r27);
-            block.put(7, i, r28);
-            block.put(8, i, r29);
+            let r1 = u(0) * r0;
+            let r1 = r1.exp2();
+            let r2 = kept(12);
+            let r3 = kept(1);
+            let r4 = kept(0);
+            let r5 = lit(1.0) - r4;
+            let r5 = (-u(2)).mul_add(r5, lit(1.0));
+            let r6 = kept(4);
+            let r7 = select(r6.ge(lit(0.5)), r1, u(3));
+            let r8 = r5 * r7;
+            let r9 = u(4) * r8;
+            let r10 = kept(9);
+            let r11 = kept(6);
+            let r12 = r7.mul_add(u(5), u(6));
+            let r13 = r5 * r12;
+            let r13 = r11 * r13;
+            let r13 = r10.mul_add(u(7), r13);
+            let r13 = r3.mul_add(r9, r13);
+            let r13 = r2.mul_add(u(8), r13);
+            let r9 = kept(13);
+            let r14 = kept(2);
+            let r15 = r8 * u(9);
+            let r16 = kept(10);
+            let r17 = kept(7);
+            let r18 = r7.mul_add(u(10), u(11));
+            let r19 = r5 * r18;
+            let r19 = r17 * r19;
+            let r19 = r16.mul_add(u(12), r19);
+            let r19 = r14.mul_add(r15, r19);
+            let r19 = r9.mul_add(u(13), r19);
+            let r15 = kept(14);
+            let r20 = kept(3);
+            let r21 = r8 * u(14);
+            let r22 = kept(11);
+            let r23 = kept(8);
+            let r24 = r7.mul_add(u(15), u(16));
+            let r25 = r5 * r24;
+            let r25 = r23 * r25;
+            let r25 = r22.mul_add(u(17), r25);
+            let r25 = r20.mul_add(r21, r25);
+            let r25 = r15.mul_add(u(18), r25);
+            let r21 = r5 * r11;
+            let r26 = r5 * r17;
+            let r27 = r5 * r23;
+            let r28 = r8 * r11;
+            let r29 = r8 * r17;
+            let r30 = r8 * r23;
+            let r0 = r0 * lit(0.6931471805599453);
+            let r0 = r1 * r0;
+            let r0 = select(r6.ge(lit(0.5)), r0, lit(0.0));
+            let r6 = u(5) * r0;
+            let r6 = r5 * r6;
+            let r1 = r5 * r0;
+            let r31 = u(4) * r1;
+            let r31 = r3 * r31;
+            let r31 = r11.mul_add(r6, r31);
+            let r6 = u(10) * r0;
+            let r6 = r5 * r6;
+            let r32 = u(9) * r1;
+            let r32 = r14 * r32;
+            let r32 = r17.mul_add(r6, r32);
+            let r0 = u(15) * r0;
+            let r0 = r5 * r0;
+            let r1 = u(14) * r1;
+            let r1 = r20 * r1;
+            let r1 = r23.mul_add(r0, r1);
+            let r0 = r3 * r8;
+            let r5 = r8 * r14;
+            let r8 = r8 * r20;
+            let r4 = r4 - lit(1.0);
+            let r12 = r12 * r4;
+            let r7 = r7 * r4;
+            let r6 = u(4) * r7;
+            let r6 = r3 * r6;
+            let r6 = r11.mul_add(r12, r6);
+            let r18 = r18 * r4;
+            let r12 = u(9) * r7;
+            let r12 = r14 * r12;
+            let r12 = r17.mul_add(r18, r12);
+            let r4 = r24 * r4;
+            let r7 = u(14) * r7;
+            let r7 = r20 * r7;
+            let r7 = r23.mul_add(r4, r7);
+            block.put(0, i, r13);
+            block.put(1, i, r19);
+            block.put(2, i, r25);
+            block.put(3, i, r21);
+            block.put(4, i, r26);
+            block.put(5, i, r27);
+            block.put(6, i, r28);
+            block.put(7, i, r29);
+            block.put(8, i, r30);
             block.put(9, i, r31);
             block.put(10, i, r32);
-            block.put(11, i, r0);
-            block.put(12, i, r30);
-            block.put(13, i, r4);
-            block.put(14, i, r7);
-            block.put(15, i, r1);
-            block.put(16, i, r8);
-            block.put(17, i, r14);
-            block.put(18, i, r9);
-            block.put(19, i, r15);
-            block.put(20, i, r21);
-            block.put(21, i, r5);
-            block.put(22, i, r11);
-            block.put(23, i, r6);
+            block.put(11, i, r1);
+            block.put(12, i, r0);
+            block.put(13, i, r5);
+            block.put(14, i, r8);
+            block.put(15, i, r2);
+            block.put(16, i, r9);
+            block.put(17, i, r15);
+            block.put(18, i, r10);
+            block.put(19, i, r16);
+            block.put(20, i, r22);
+            block.put(21, i, r6);
+            block.put(22, i, r12);
+            block.put(23, i, r7);
         }
         },
     );
@@ -2185,12 +2183,12 @@ fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         #[inline(always)]
         || {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 5] = block.uniforms();
+        let numbers: &[f32; 4] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -2258,7 +2256,6 @@ fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = r2 * r0;
             let r2 = samples(13);
             let r12 = r2 * r12;
-            let r2 = r5 * lit(0.6931471805599453);
             block.put(0, i, r7);
             block.put(1, i, r9);
             block.put(2, i, r11);
@@ -2273,7 +2270,6 @@ fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             block.put(11, i, r1);
             block.put(12, i, r0);
             block.put(13, i, r12);
-            block.put(14, i, r2);
         }
         },
     );
@@ -2287,12 +2283,12 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
         let numbers: &[f32; 19] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
-        let fields = block.fields::<18>();
+        let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
-            let rows = block.kept::<15>(i);
+            let rows = block.kept::<14>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
             let r0 = kept(8);
             let r1 = kept(9);
@@ -2364,14 +2360,14 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         #[inline(always)]
         || {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 20] = block.uniforms();
+        let numbers: &[f32; 21] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
-        let fields = block.fields::<18>();
+        let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
-            let rows = block.kept::<15>(i);
+            let rows = block.kept::<14>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
             let r0 = kept(8);
             let r1 = kept(9);
@@ -2380,139 +2376,139 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = kept(6);
             let r5 = kept(7);
             let r6 = kept(4);
-            let r6 = u(0) * r6;
-            let r6 = r6.exp2();
-            let r7 = samples(0);
+            let r7 = u(0) * r6;
+            let r7 = r7.exp2();
+            let r8 = samples(0);
             let cube = cubes[0];
             let at = cube.footprint_at(r0, r1, r2);
-            let [r8, r9, r10, _] = cube.sample_at(&at);
-            let r8 = r7 * r8;
-            let r11 = kept(0);
-            let r12 = samples(5);
-            let r13 = lit(1.0) - r12;
-            let r13 = (-u(2)).mul_add(r13, lit(1.0));
-            let r14 = kept(3);
-            let r15 = select(r14.ge(lit(0.5)), r6, u(3));
-            let r16 = r13 * r15;
-            let r17 = u(4) * r16;
-            let r18 = samples(9);
+            let [r9, r10, r11, _] = cube.sample_at(&at);
+            let r9 = r8 * r9;
+            let r12 = kept(0);
+            let r13 = samples(5);
+            let r14 = lit(1.0) - r13;
+            let r14 = (-u(2)).mul_add(r14, lit(1.0));
+            let r15 = kept(3);
+            let r16 = select(r15.ge(lit(0.5)), r7, u(3));
+            let r17 = r14 * r16;
+            let r18 = u(4) * r17;
+            let r19 = samples(9);
             let cube = cubes[0];
             let at = cube.footprint_at(r3, r4, r5);
-            let [r19, r20, r21, _] = cube.sample_at(&at);
-            let r19 = r18 * r19;
-            let r22 = kept(11);
-            let r23 = r15.mul_add(u(5), u(6));
-            let r24 = r13 * r23;
-            let r24 = r22 * r24;
-            let r24 = r19.mul_add(u(7), r24);
-            let r24 = r11.mul_add(r17, r24);
-            let r24 = r8.mul_add(u(8), r24);
-            let r9 = r7 * r9;
-            let r17 = kept(1);
-            let r25 = r16 * u(9);
-            let r20 = r18 * r20;
-            let r26 = kept(12);
-            let r27 = r15.mul_add(u(10), u(11));
-            let r28 = r13 * r27;
-            let r28 = r26 * r28;
-            let r28 = r20.mul_add(u(12), r28);
-            let r28 = r17.mul_add(r25, r28);
-            let r28 = r9.mul_add(u(13), r28);
-            let r10 = r7 * r10;
-            let r25 = kept(2);
-            let r29 = r16 * u(14);
-            let r21 = r18 * r21;
-            let r30 = kept(13);
-            let r31 = r15.mul_add(u(15), u(16));
-            let r32 = r13 * r31;
-            let r32 = r30 * r32;
-            let r32 = r21.mul_add(u(17), r32);
-            let r32 = r25.mul_add(r29, r32);
-            let r32 = r10.mul_add(u(18), r32);
-            let r29 = r13 * r22;
-            let r33 = r13 * r26;
-            let r34 = r13 * r30;
-            let r35 = r16 * r22;
-            let r36 = r16 * r26;
-            let r37 = r16 * r30;
-            let r38 = kept(14);
-            let r38 = r6 * r38;
-            let r38 = select(r14.ge(lit(0.5)), r38, lit(0.0));
-            let r14 = u(5) * r38;
-            let r14 = r13 * r14;
-            let r6 = r13 * r38;
-            let r39 = u(4) * r6;
-            let r39 = r11 * r39;
-            let r39 = r22.mul_add(r14, r39);
-            let r14 = u(10) * r38;
-            let r14 = r13 * r14;
-            let r40 = u(9) * r6;
-            let r40 = r17 * r40;
-            let r40 = r26.mul_add(r14, r40);
-            let r38 = u(15) * r38;
-            let r38 = r13 * r38;
-            let r6 = u(14) * r6;
-            let r6 = r25 * r6;
-            let r6 = r30.mul_add(r38, r6);
-            let r38 = r11 * r16;
-            let r13 = r16 * r17;
-            let r16 = r16 * r25;
-            let r12 = r12 - lit(1.0);
-            let r23 = r23 * r12;
-            let r15 = r15 * r12;
-            let r14 = u(4) * r15;
-            let r14 = r11 * r14;
-            let r14 = r22.mul_add(r23, r14);
-            let r27 = r27 * r12;
-            let r23 = u(9) * r15;
-            let r23 = r17 * r23;
-            let r23 = r26.mul_add(r27, r23);
-            let r12 = r31 * r12;
-            let r15 = u(14) * r15;
-            let r15 = r25 * r15;
-            let r15 = r30.mul_add(r12, r15);
+            let [r20, r21, r22, _] = cube.sample_at(&at);
+            let r20 = r19 * r20;
+            let r23 = kept(11);
+            let r24 = r16.mul_add(u(5), u(6));
+            let r25 = r14 * r24;
+            let r25 = r23 * r25;
+            let r25 = r20.mul_add(u(7), r25);
+            let r25 = r12.mul_add(r18, r25);
+            let r25 = r9.mul_add(u(8), r25);
+            let r10 = r8 * r10;
+            let r18 = kept(1);
+            let r26 = r17 * u(9);
+            let r21 = r19 * r21;
+            let r27 = kept(12);
+            let r28 = r16.mul_add(u(10), u(11));
+            let r29 = r14 * r28;
+            let r29 = r27 * r29;
+            let r29 = r21.mul_add(u(12), r29);
+            let r29 = r18.mul_add(r26, r29);
+            let r29 = r10.mul_add(u(13), r29);
+            let r11 = r8 * r11;
+            let r26 = kept(2);
+            let r30 = r17 * u(14);
+            let r22 = r19 * r22;
+            let r31 = kept(13);
+            let r32 = r16.mul_add(u(15), u(16));
+            let r33 = r14 * r32;
+            let r33 = r31 * r33;
+            let r33 = r22.mul_add(u(17), r33);
+            let r33 = r26.mul_add(r30, r33);
+            let r33 = r11.mul_add(u(18), r33);
+            let r30 = r14 * r23;
+            let r34 = r14 * r27;
+            let r35 = r14 * r31;
+            let r36 = r17 * r23;
+            let r37 = r17 * r27;
+            let r38 = r17 * r31;
+            let r6 = r6 * lit(0.6931471805599453);
+            let r6 = r7 * r6;
+            let r6 = select(r15.ge(lit(0.5)), r6, lit(0.0));
+            let r15 = u(5) * r6;
+            let r15 = r14 * r15;
+            let r7 = r14 * r6;
+            let r39 = u(4) * r7;
+            let r39 = r12 * r39;
+            let r39 = r23.mul_add(r15, r39);
+            let r15 = u(10) * r6;
+            let r15 = r14 * r15;
+            let r40 = u(9) * r7;
+            let r40 = r18 * r40;
+            let r40 = r27.mul_add(r15, r40);
+            let r6 = u(15) * r6;
+            let r6 = r14 * r6;
+            let r7 = u(14) * r7;
+            let r7 = r26 * r7;
+            let r7 = r31.mul_add(r6, r7);
+            let r6 = r12 * r17;
+            let r14 = r17 * r18;
+            let r17 = r17 * r26;
+            let r13 = r13 - lit(1.0);
+            let r24 = r24 * r13;
+            let r16 = r16 * r13;
+            let r15 = u(4) * r16;
+            let r15 = r12 * r15;
+            let r15 = r23.mul_add(r24, r15);
+            let r28 = r28 * r13;
+            let r24 = u(9) * r16;
+            let r24 = r18 * r24;
+            let r24 = r27.mul_add(r28, r24);
+            let r13 = r32 * r13;
+            let r16 = u(14) * r16;
+            let r16 = r26 * r16;
+            let r16 = r31.mul_add(r13, r16);
             let cube = cubes[1];
             let at = cube.footprint_at(r0, r1, r2);
-            let [r12, r30, r25, _] = cube.sample_at(&at);
-            let r12 = r7 * r12;
+            let [r13, r31, r26, _] = cube.sample_at(&at);
+            let r13 = r8 * r13;
             let cube = cubes[1];
             let at = cube.footprint_at(r3, r4, r5);
             let [r2, r1, r0, _] = cube.sample_at(&at);
-            let r2 = r18 * r2;
+            let r2 = r19 * r2;
             let r2 = u(7) * r2;
-            let r2 = u(8).mul_add(r12, r2);
-            let r30 = r7 * r30;
-            let r1 = r18 * r1;
+            let r2 = u(8).mul_add(r13, r2);
+            let r31 = r8 * r31;
+            let r1 = r19 * r1;
             let r1 = u(12) * r1;
-            let r1 = u(13).mul_add(r30, r1);
-            let r25 = r7 * r25;
-            let r0 = r18 * r0;
+            let r1 = u(13).mul_add(r31, r1);
+            let r26 = r8 * r26;
+            let r0 = r19 * r0;
             let r0 = u(17) * r0;
-            let r0 = u(18).mul_add(r25, r0);
-            block.put(0, i, r24);
-            block.put(1, i, r28);
-            block.put(2, i, r32);
-            block.put(3, i, r29);
-            block.put(4, i, r33);
-            block.put(5, i, r34);
-            block.put(6, i, r35);
-            block.put(7, i, r36);
-            block.put(8, i, r37);
+            let r0 = u(18).mul_add(r26, r0);
+            block.put(0, i, r25);
+            block.put(1, i, r29);
+            block.put(2, i, r33);
+            block.put(3, i, r30);
+            block.put(4, i, r34);
+            block.put(5, i, r35);
+            block.put(6, i, r36);
+            block.put(7, i, r37);
+            block.put(8, i, r38);
             block.put(9, i, r39);
             block.put(10, i, r40);
-            block.put(11, i, r6);
-            block.put(12, i, r38);
-            block.put(13, i, r13);
-            block.put(14, i, r16);
-            block.put(15, i, r8);
-            block.put(16, i, r9);
-            block.put(17, i, r10);
-            block.put(18, i, r19);
-            block.put(19, i, r20);
-            block.put(20, i, r21);
-            block.put(21, i, r14);
-            block.put(22, i, r23);
-            block.put(23, i, r15);
+            block.put(11, i, r7);
+            block.put(12, i, r6);
+            block.put(13, i, r14);
+            block.put(14, i, r17);
+            block.put(15, i, r9);
+            block.put(16, i, r10);
+            block.put(17, i, r11);
+            block.put(18, i, r20);
+            block.put(19, i, r21);
+            block.put(20, i, r22);
+            block.put(21, i, r15);
+            block.put(22, i, r24);
+            block.put(23, i, r16);
             block.put(24, i, r2);
             block.put(25, i, r1);
             block.put(26, i, r0);
@@ -2532,7 +2528,7 @@ fn bumped_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -2565,7 +2561,7 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -2689,7 +2685,7 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -2940,7 +2936,7 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<18>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -3212,7 +3208,7 @@ fn smooth_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
             let r1 = samples(4);
@@ -3318,7 +3314,7 @@ fn smooth_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<14>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
             let r1 = samples(4);
@@ -3407,7 +3403,7 @@ fn hazy_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -3522,7 +3518,7 @@ fn hazy_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<16>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -3591,7 +3587,7 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<16>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -3724,7 +3720,7 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<21>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -3851,7 +3847,7 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<21>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -4083,7 +4079,7 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<21>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -4335,12 +4331,12 @@ fn hazy_bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
         #[inline(always)]
         || {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 5] = block.uniforms();
+        let numbers: &[f32; 4] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = samples(7);
@@ -4425,7 +4421,6 @@ fn hazy_bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r4 * r10;
             let r8 = r4 * r8;
             let r6 = r4 * r6;
-            let r4 = r15 * lit(0.6931471805599453);
             block.put(0, i, r2);
             block.put(1, i, r0);
             block.put(2, i, r12);
@@ -4442,7 +4437,6 @@ fn hazy_bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             block.put(13, i, r10);
             block.put(14, i, r8);
             block.put(15, i, r6);
-            block.put(16, i, r4);
         }
         },
     );
@@ -4456,12 +4450,12 @@ fn hazy_bumped_value<S: Simd>(simd: S, block: Block<'_>) {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
         let numbers: &[f32; 20] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
-        let fields = block.fields::<17>();
+        let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
-            let rows = block.kept::<17>(i);
+            let rows = block.kept::<16>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
             let r0 = kept(5);
             let r0 = u(0) * r0;
@@ -4522,127 +4516,127 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
         #[inline(always)]
         || {
         let lit = |x: f64| Lanes::splat(simd, x as f32);
-        let numbers: &[f32; 21] = block.uniforms();
+        let numbers: &[f32; 22] = block.uniforms();
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
-        let fields = block.fields::<17>();
+        let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
-            let rows = block.kept::<17>(i);
+            let rows = block.kept::<16>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
             let r0 = kept(5);
-            let r0 = u(0) * r0;
-            let r0 = r0.exp2();
-            let r1 = kept(13);
-            let r2 = kept(1);
-            let r3 = kept(0);
-            let r4 = lit(1.0) - r3;
-            let r4 = (-u(2)).mul_add(r4, lit(1.0));
-            let r5 = kept(4);
-            let r6 = select(r5.ge(lit(0.5)), r0, u(3));
-            let r7 = r4 * r6;
-            let r8 = u(4) * r7;
-            let r9 = kept(9);
-            let r10 = kept(6);
-            let r11 = r6.mul_add(u(5), u(6));
-            let r12 = r4 * r11;
-            let r12 = r10 * r12;
-            let r12 = r9.mul_add(u(7), r12);
-            let r12 = r2.mul_add(r8, r12);
-            let r12 = r1.mul_add(u(8), r12);
-            let r8 = kept(14);
-            let r13 = kept(2);
-            let r14 = r7 * u(9);
-            let r15 = kept(10);
-            let r16 = kept(7);
-            let r17 = r6.mul_add(u(10), u(11));
-            let r18 = r4 * r17;
-            let r18 = r16 * r18;
-            let r18 = r15.mul_add(u(12), r18);
-            let r18 = r13.mul_add(r14, r18);
-            let r18 = r8.mul_add(u(13), r18);
-            let r14 = kept(15);
-            let r19 = kept(3);
-            let r20 = r7 * u(14);
-            let r21 = kept(11);
-            let r22 = kept(8);
-            let r23 = r6.mul_add(u(15), u(16));
-            let r24 = r4 * r23;
-            let r24 = r22 * r24;
-            let r24 = r21.mul_add(u(17), r24);
-            let r24 = r19.mul_add(r20, r24);
-            let r24 = r14.mul_add(u(18), r24);
-            let r20 = kept(12);
-            let r25 = r20 * u(19);
-            let r26 = r4 * r10;
-            let r27 = r4 * r16;
-            let r28 = r4 * r22;
-            let r29 = r7 * r10;
-            let r30 = r7 * r16;
-            let r31 = r7 * r22;
-            let r32 = kept(16);
-            let r32 = r0 * r32;
-            let r32 = select(r5.ge(lit(0.5)), r32, lit(0.0));
-            let r5 = u(5) * r32;
-            let r5 = r4 * r5;
-            let r0 = r4 * r32;
-            let r33 = u(4) * r0;
-            let r33 = r2 * r33;
-            let r33 = r10.mul_add(r5, r33);
-            let r5 = u(10) * r32;
-            let r5 = r4 * r5;
-            let r34 = u(9) * r0;
-            let r34 = r13 * r34;
-            let r34 = r16.mul_add(r5, r34);
-            let r32 = u(15) * r32;
-            let r32 = r4 * r32;
-            let r0 = u(14) * r0;
-            let r0 = r19 * r0;
-            let r0 = r22.mul_add(r32, r0);
-            let r32 = r2 * r7;
-            let r4 = r7 * r13;
-            let r7 = r7 * r19;
-            let r3 = r3 - lit(1.0);
-            let r11 = r11 * r3;
-            let r6 = r6 * r3;
-            let r5 = u(4) * r6;
-            let r5 = r2 * r5;
-            let r5 = r10.mul_add(r11, r5);
-            let r17 = r17 * r3;
-            let r11 = u(9) * r6;
-            let r11 = r13 * r11;
-            let r11 = r16.mul_add(r17, r11);
-            let r3 = r23 * r3;
-            let r6 = u(14) * r6;
-            let r6 = r19 * r6;
-            let r6 = r22.mul_add(r3, r6);
-            block.put(0, i, r12);
-            block.put(1, i, r18);
-            block.put(2, i, r24);
-            block.put(3, i, r25);
-            block.put(4, i, r26);
-            block.put(5, i, r27);
-            block.put(6, i, r28);
-            block.put(7, i, r29);
-            block.put(8, i, r30);
-            block.put(9, i, r31);
+            let r1 = u(0) * r0;
+            let r1 = r1.exp2();
+            let r2 = kept(13);
+            let r3 = kept(1);
+            let r4 = kept(0);
+            let r5 = lit(1.0) - r4;
+            let r5 = (-u(2)).mul_add(r5, lit(1.0));
+            let r6 = kept(4);
+            let r7 = select(r6.ge(lit(0.5)), r1, u(3));
+            let r8 = r5 * r7;
+            let r9 = u(4) * r8;
+            let r10 = kept(9);
+            let r11 = kept(6);
+            let r12 = r7.mul_add(u(5), u(6));
+            let r13 = r5 * r12;
+            let r13 = r11 * r13;
+            let r13 = r10.mul_add(u(7), r13);
+            let r13 = r3.mul_add(r9, r13);
+            let r13 = r2.mul_add(u(8), r13);
+            let r9 = kept(14);
+            let r14 = kept(2);
+            let r15 = r8 * u(9);
+            let r16 = kept(10);
+            let r17 = kept(7);
+            let r18 = r7.mul_add(u(10), u(11));
+            let r19 = r5 * r18;
+            let r19 = r17 * r19;
+            let r19 = r16.mul_add(u(12), r19);
+            let r19 = r14.mul_add(r15, r19);
+            let r19 = r9.mul_add(u(13), r19);
+            let r15 = kept(15);
+            let r20 = kept(3);
+            let r21 = r8 * u(14);
+            let r22 = kept(11);
+            let r23 = kept(8);
+            let r24 = r7.mul_add(u(15), u(16));
+            let r25 = r5 * r24;
+            let r25 = r23 * r25;
+            let r25 = r22.mul_add(u(17), r25);
+            let r25 = r20.mul_add(r21, r25);
+            let r25 = r15.mul_add(u(18), r25);
+            let r21 = kept(12);
+            let r26 = r21 * u(19);
+            let r27 = r5 * r11;
+            let r28 = r5 * r17;
+            let r29 = r5 * r23;
+            let r30 = r8 * r11;
+            let r31 = r8 * r17;
+            let r32 = r8 * r23;
+            let r0 = r0 * lit(0.6931471805599453);
+            let r0 = r1 * r0;
+            let r0 = select(r6.ge(lit(0.5)), r0, lit(0.0));
+            let r6 = u(5) * r0;
+            let r6 = r5 * r6;
+            let r1 = r5 * r0;
+            let r33 = u(4) * r1;
+            let r33 = r3 * r33;
+            let r33 = r11.mul_add(r6, r33);
+            let r6 = u(10) * r0;
+            let r6 = r5 * r6;
+            let r34 = u(9) * r1;
+            let r34 = r14 * r34;
+            let r34 = r17.mul_add(r6, r34);
+            let r0 = u(15) * r0;
+            let r0 = r5 * r0;
+            let r1 = u(14) * r1;
+            let r1 = r20 * r1;
+            let r1 = r23.mul_add(r0, r1);
+            let r0 = r3 * r8;
+            let r5 = r8 * r14;
+            let r8 = r8 * r20;
+            let r4 = r4 - lit(1.0);
+            let r12 = r12 * r4;
+            let r7 = r7 * r4;
+            let r6 = u(4) * r7;
+            let r6 = r3 * r6;
+            let r6 = r11.mul_add(r12, r6);
+            let r18 = r18 * r4;
+            let r12 = u(9) * r7;
+            let r12 = r14 * r12;
+            let r12 = r17.mul_add(r18, r12);
+            let r4 = r24 * r4;
+            let r7 = u(14) * r7;
+            let r7 = r20 * r7;
+            let r7 = r23.mul_add(r4, r7);
+            block.put(0, i, r13);
+            block.put(1, i, r19);
+            block.put(2, i, r25);
+            block.put(3, i, r26);
+            block.put(4, i, r27);
+            block.put(5, i, r28);
+            block.put(6, i, r29);
+            block.put(7, i, r30);
+            block.put(8, i, r31);
+            block.put(9, i, r32);
             block.put(10, i, r33);
             block.put(11, i, r34);
-            block.put(12, i, r0);
-            block.put(13, i, r32);
-            block.put(14, i, r4);
-            block.put(15, i, r7);
-            block.put(16, i, r1);
-            block.put(17, i, r8);
-            block.put(18, i, r14);
-            block.put(19, i, r9);
-            block.put(20, i, r15);
-            block.put(21, i, r21);
-            block.put(22, i, r5);
-            block.put(23, i, r11);
-            block.put(24, i, r6);
-            block.put(25, i, r20);
+            block.put(12, i, r1);
+            block.put(13, i, r0);
+            block.put(14, i, r5);
+            block.put(15, i, r8);
+            block.put(16, i, r2);
+            block.put(17, i, r9);
+            block.put(18, i, r15);
+            block.put(19, i, r10);
+            block.put(20, i, r16);
+            block.put(21, i, r22);
+            block.put(22, i, r6);
+            block.put(23, i, r12);
+            block.put(24, i, r7);
+            block.put(25, i, r21);
         }
         },
     );
@@ -4659,7 +4653,7 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -4788,7 +4782,7 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -5049,7 +5043,7 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<19>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -5335,7 +5329,7 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
             let r1 = samples(2);
@@ -5467,7 +5461,7 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<16>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
             let r1 = samples(2);
@@ -5731,7 +5725,7 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
             let r1 = samples(2);
@@ -5857,7 +5851,7 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
             let r1 = samples(2);
@@ -6104,7 +6098,7 @@ fn listing_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = r0.abs();
@@ -6244,7 +6238,7 @@ fn listing_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = r0.abs();
@@ -6367,7 +6361,7 @@ fn listing_strength_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<17>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = r0.abs();
@@ -6435,7 +6429,7 @@ fn listing_strength_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<23>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<7>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
@@ -6570,7 +6564,7 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let fields = block.fields::<23>();
         let cubes = block.cubes;
         for i in 0..block.count {
-            let at = i * block.stride();
+            let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<7>(i);
             let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
