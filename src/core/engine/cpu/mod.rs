@@ -33,9 +33,8 @@ use self::lobe::Lobe;
 use self::machine::{BATCH, Bound, File};
 use self::pass::{Fitted, Pass, Reading};
 use self::sums::{CHUNK, Sums, Wish, by_chunk, pairwise};
-use self::view_pass::{Lent, Scratch, ViewPass, streams};
+use self::view_pass::{ViewPass, streams, with_scratch};
 use super::gram::pair;
-use super::lanes::Lanes;
 use super::pulls::{Gathered, Pulls};
 use super::view::ObservedView;
 use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
@@ -65,8 +64,6 @@ pub struct CpuEngine {
     neutral: Vec<Row>,
     lobe: Mutex<Option<Arc<Lobe>>>,
     kept: Mutex<Option<Arc<Kept>>>,
-    /// What threads computed in, for those of the next pass.
-    scratches: Mutex<Vec<Scratch>>,
     /// Why a pass could not be made.
     fault: OnceLock<String>,
 }
@@ -124,7 +121,6 @@ impl CpuEngine {
             neutral: neutral_rows(stride.unwrap_or(0)),
             lobe: Mutex::default(),
             kept: Mutex::default(),
-            scratches: Mutex::default(),
             fault: OnceLock::new(),
         };
         engine.set_stride(1);
@@ -298,23 +294,11 @@ impl CpuEngine {
         let groups = of_view.view.samples.groups();
         planes.resize_with(channels.len(), Vec::new);
         planes.iter_mut().for_each(|plane| plane.resize(groups * LANES, 0.0));
-        by_chunk(planes).par_iter_mut().enumerate().for_each_init(|| Lent::new(&self.scratches), |lent, (chunk, parts)| {
-            let scratch = &mut lent.scratch;
-            scratch.prepare(&of_view);
+        by_chunk(planes).par_iter_mut().enumerate().for_each(|(chunk, parts)| {
             let first = chunk * BLOCK * CHUNK;
-            let end = groups.min(first + BLOCK * CHUNK);
-            with_simd!(self.level, simd => {
-                for start in (first..end).step_by(BATCH) {
-                    let count = BATCH.min(end - start);
-                    let shown = of_view.shown(simd, scratch, start, count);
-                    let gain = Lanes::splat(simd, of_view.gain);
-                    for (column, part) in shown.iter().zip(parts.iter_mut()) {
-                        for i in 0..count {
-                            let row = &mut part[(start - first + i) * LANES..][..LANES];
-                            row.copy_from_slice(&(gain * Lanes::of_row(simd, &column[i].get())).to_array());
-                        }
-                    }
-                }
+            let groups = first..groups.min(first + BLOCK * CHUNK);
+            with_scratch(&of_view, |scratch| {
+                with_simd!(self.level, simd => of_view.shade(simd, scratch, groups, parts));
             });
         });
     }
@@ -345,10 +329,12 @@ impl CpuEngine {
             let blocks: Vec<usize> = self.read_blocks(&self.views[view]).collect();
             let sums: Vec<Sums> = blocks
                 .par_chunks(CHUNK)
-                .map_init(|| Lent::new(&self.scratches), |lent, blocks| {
-                    let scratch = &mut lent.scratch;
-                    scratch.prepare(&of_view);
-                    with_simd!(self.level, simd => of_view.chunk(simd, &pass.channels, blocks, wish, scratch))
+                .map(|blocks| {
+                    with_scratch(&of_view, |scratch| {
+                        with_simd!(self.level, simd => {
+                            of_view.chunk(simd, &pass.channels, blocks, wish, scratch)
+                        })
+                    })
                 })
                 .collect();
             self.add(view, &pass, &pairwise(sums), wish, &mut total);
@@ -374,18 +360,19 @@ impl CpuEngine {
                 pass.channels.iter().map(|c| c.unknowns.iter().map(|u| u.or(own)).collect()).collect();
             let groups = view.samples.groups();
             let blocks: Vec<usize> = self.read_blocks(view).collect();
-            let parts = blocks.par_iter().map_init(|| Lent::new(&self.scratches), |lent, &block| {
-                let scratch = &mut lent.scratch;
-                scratch.prepare(&of_view);
+            let parts = blocks.par_iter().map(|&block| {
                 let mut gathered = Gathered::new(view, width, &columns, self.fitted.unknowns.len());
                 let end = groups.min((block + 1) * BLOCK);
-                for first in (block * BLOCK..end).step_by(BATCH) {
-                    let count = BATCH.min(end - first);
-                    with_simd!(self.level, simd => of_view.residuals(simd, &pass.channels, scratch, first, count));
-                    for i in 0..count {
-                        gathered.add(first + i, |channel, column| of_view.row(scratch, &pass.channels[channel], (channel, column), i));
+                with_scratch(&of_view, |scratch| {
+                    for first in (block * BLOCK..end).step_by(BATCH) {
+                        let count = BATCH.min(end - first);
+                        let channels = &pass.channels;
+                        with_simd!(self.level, simd => of_view.residuals(simd, channels, scratch, first, count));
+                        for i in 0..count {
+                            gathered.add(first + i, |c, column| of_view.row(scratch, &channels[c], (c, column), i));
+                        }
                     }
-                }
+                });
                 gathered
             });
             let parts: Vec<Gathered<'_>> = parts.collect();

@@ -1,6 +1,7 @@
 //! A view's blocks of records: from what tapes yield to the sums of loss, gradient and normal equations.
 
-use std::sync::{Mutex, PoisonError};
+use std::cell::RefCell;
+use std::ops::Range;
 
 use super::machine::{self, BATCH, Bound, Column, File, FileColumns, Stream};
 use super::pass::ChannelColumns;
@@ -11,6 +12,7 @@ use crate::engine::lanes::Lanes;
 use crate::engine::residual::Residuals;
 use crate::engine::view::ObservedView;
 use crate::model::real::Real;
+use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::scene::Loss;
 use crate::simd::Simd;
@@ -27,7 +29,7 @@ pub(super) struct ViewPass<'a> {
 }
 
 /// What a thread computes in.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub(super) struct Scratch {
     file: File,
     /// Sums over the samples of a pixel, of each output.
@@ -41,7 +43,7 @@ pub(super) struct Scratch {
 }
 
 /// The residuals of a channel as the normal equations see them.
-#[derive(Debug, Default)]
+#[derive(Default)]
 struct Compared {
     /// What the row of the value's derivative is scaled by, where residuals do not all count alike.
     scale: Column,
@@ -71,28 +73,21 @@ fn several(view: &ObservedView) -> bool {
     view.samples.records() != view.samples.groups() || view.samples.surface.places().weight.is_some()
 }
 
-/// A scratch that goes back to the pool that it came from: memory that is new in each pass costs more than its use.
-pub(super) struct Lent<'a> {
-    pool: &'a Mutex<Vec<Scratch>>,
-    pub(super) scratch: Scratch,
+thread_local! {
+    /// Memory that is new in each pass costs more than its use, and a pool that threads share has them wait.
+    static SCRATCH: RefCell<Scratch> = RefCell::default();
 }
 
-impl<'a> Lent<'a> {
-    pub(super) fn new(pool: &'a Mutex<Vec<Scratch>>) -> Self {
-        let scratch = pool.lock().unwrap_or_else(PoisonError::into_inner).pop().unwrap_or_default();
-        Self { pool, scratch }
-    }
-}
-
-impl Drop for Lent<'_> {
-    fn drop(&mut self) {
-        let scratch = std::mem::take(&mut self.scratch);
-        self.pool.lock().unwrap_or_else(PoisonError::into_inner).push(scratch);
-    }
+/// Call `then` with the thread's scratch, prepared for a pass.
+pub(super) fn with_scratch<T>(pass: &ViewPass<'_>, then: impl FnOnce(&mut Scratch) -> T) -> T {
+    SCRATCH.with_borrow_mut(|scratch| {
+        scratch.prepare(pass);
+        then(scratch)
+    })
 }
 
 impl Scratch {
-    pub(super) fn prepare(&mut self, pass: &ViewPass<'_>) {
+    fn prepare(&mut self, pass: &ViewPass<'_>) {
         let outputs = pass.bound.program.tape.outputs.len();
         self.file.prepare(&pass.bound);
         self.several = several(pass.view);
@@ -126,6 +121,28 @@ impl ViewPass<'_> {
             machine::run(simd, &self.bound, &scratch.file, &self.streams, first, count);
         }
         scratch.shown()
+    }
+
+    /// The channels' values of some groups, times the gain, a plane each.
+    #[inline(always)]
+    pub(super) fn shade<S: Simd>(
+        &self,
+        simd: S,
+        scratch: &Scratch,
+        groups: Range<usize>,
+        planes: &mut [&mut [f32]],
+    ) {
+        let gain = Lanes::splat(simd, self.gain);
+        for start in groups.clone().step_by(BATCH) {
+            let count = BATCH.min(groups.end - start);
+            let shown = self.shown(simd, scratch, start, count);
+            for (column, plane) in shown.iter().zip(planes.iter_mut()) {
+                let rows = plane[(start - groups.start) * LANES..].chunks_exact_mut(LANES);
+                for (i, row) in rows.enumerate().take(count) {
+                    row.copy_from_slice(&(gain * machine::load(simd, &column[i])).to_array());
+                }
+            }
+        }
     }
 
     /// Add up the samples of each pixel, by their shares.
