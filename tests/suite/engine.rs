@@ -244,6 +244,60 @@ fn any_subset_of_free_parameters_keeps_the_same_answers() {
     }
 }
 
+#[test]
+fn plans_that_are_compiled_ahead_say_what_the_rules_say() {
+    let light = illumination();
+    let hazy = Effects::SURFACE.with(Effect::Haze);
+    let smooth = Effects::SURFACE.without(Effect::NormalMap);
+    let setups = [
+        (Form::Corrected, Silhouette::Fragment, Effects::SURFACE, true),
+        (Form::Corrected, Silhouette::Fragment, hazy, false),
+        (Form::Corrected, Silhouette::Bumped, hazy, false),
+        (Form::Corrected, Silhouette::Fragment, smooth, false),
+        (Form::Listing, Silhouette::Vertex, Effects::SURFACE, false),
+    ];
+    // One of several samples a pixel, and one of which every pixel is a sample and counts alike.
+    let mut alike = single(6, 5);
+    let mut surface = SurfaceRecords::new(Asked { weight: false, ..Asked::EVERYTHING }, 6);
+    for slot in 0..6 * LANES {
+        surface.set(slot, &alike.samples.surface.fragment(slot), 1.0);
+    }
+    (alike.samples.surface, alike.weight) = (surface, Vec::new());
+    let views = [alike, view(9, 4)];
+    let weights = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param.info().linear || c.param == Param::RimExponent);
+    let moving: [&[Param]; 4] = [
+        &[],
+        &[Param::SpecularLobe],
+        &[Param::NormalStrength, Param::SpecularLobe],
+        &[Param::NormalStrength, Param::SpecularLobe, Param::EnvironmentRotation],
+    ];
+    for (form, silhouette, effects, turns) in setups {
+        let setup = Setup::new(form, silhouette, effects);
+        for moving in moving.iter().take(if turns { 4 } else { 3 }) {
+            // A parameter that no effect asks for is free beside those that are.
+            let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if moving.contains(&c.param));
+            let unknowns: Vec<Unknown> = all_unknowns(2)
+                .into_iter()
+                .filter(|u| weights(u) || moves(u) || matches!(u, Unknown::Gain(_)))
+                .collect();
+            for loss in [Loss::L2, Loss::RelativeL2] {
+                let mut point = Point { params: params(), gains: vec![1.0, 1.2] };
+                let turned = moving.contains(&Param::EnvironmentRotation);
+                point.params.set(Param::EnvironmentRotation, if turned { 20.0 } else { 0.0 });
+                let what = format!("{setup:?} {moving:?} {loss:?}");
+                let engine = engine(setup, &views, loss, &unknowns, true);
+                assert!(engine.is_compiled_ahead(&point), "{what}");
+                let plain = Reference::new(setup, &light, &views, loss, &unknowns).unwrap();
+                assert_passes_equal(&engine, &plain.normal_equations(&point), &point, &what);
+                // Held at an angle, the environment is turned by rules that no plan of these has.
+                point.params.set(Param::EnvironmentRotation, 20.0);
+                let want = plain.normal_equations(&point);
+                assert_equal(&engine.normal_equations(&point), &want, &names(&unknowns), &what);
+            }
+        }
+    }
+}
+
 /// Loss, gradient and normal equations of an engine, each by its own pass, against the plain model's.
 pub(crate) fn assert_passes_equal(
     engine: &dyn Objective,

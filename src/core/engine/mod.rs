@@ -93,7 +93,6 @@ pub fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: 
     use rayon::prelude::*;
     // A fixed number of blocks a sum, so that it does not depend on threads.
     const BLOCKS: usize = 512;
-    // An engine's own passes are made of the loss' text: it is there.
     let residuals = residual::Residuals::new(loss);
     let power = |view: &view::ObservedView| {
         let groups = view.samples.groups();

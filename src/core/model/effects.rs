@@ -325,7 +325,7 @@ impl Effects {
         (0..=u8::MAX).map(Effect).filter(move |&effect| self.has(effect))
     }
 
-    /// Those of them that are not built in: evaluators that know the built-in model alone cannot show them.
+    /// Those of them that files have added.
     pub fn added(self) -> impl Iterator<Item = Effect> {
         self.iter().filter(|effect| !effect.is_built_in())
     }

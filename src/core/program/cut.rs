@@ -55,12 +55,11 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
         if !edge[at] || is_cheap(graph, id) {
             let leaves = leaves(graph, id);
             if !looks_up {
-                leaves
-                    .into_iter()
-                    .filter(|leaf| !kept.contains(leaf))
-                    .collect::<Vec<_>>()
-                    .into_iter()
-                    .for_each(|leaf| kept.push(leaf));
+                for leaf in leaves {
+                    if !kept.contains(&leaf) {
+                        kept.push(leaf);
+                    }
+                }
             }
         } else if !kept.contains(&id) && !is_one_operation_on(graph, id, &kept, &varies) {
             kept.push(id);
@@ -75,7 +74,7 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
 /// Whether a number is one operation on numbers that are kept, and on such as do not vary: as cheap to make as to read.
 fn is_one_operation_on(graph: &Graph, id: Id, kept: &[Id], varies: &[bool]) -> bool {
     let plain = match graph.node(id) {
-        Node::Unary(op, _) => !matches!(op, Unary::Log2 | Unary::Exp2 | Unary::Sqrt),
+        Node::Unary(op, _) => !matches!(op, Unary::Log2 | Unary::Exp2 | Unary::Sqrt | Unary::Reciprocal),
         Node::Binary(op, ..) => op != Binary::Divide,
         _ => false,
     };

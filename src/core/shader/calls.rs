@@ -140,7 +140,7 @@ impl Plan {
                     let both = format!("{}_and_more", several[0].0);
                     let _ = writeln!(wgsl, "    let {both}: {} = {call};", rule.returns);
                     for (quantity, swizzle) in several {
-                        let kind = ["f32", "f32", "vec2f", "vec3f"][swizzle.len()];
+                        let kind = rule.given_type(swizzle);
                         let _ = writeln!(wgsl, "    let {quantity}: {kind} = {both}.{swizzle};");
                     }
                 }

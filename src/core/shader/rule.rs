@@ -230,7 +230,8 @@ impl Rule {
             0 => self.returns,
             1 => "f32",
             2 => "vec2f",
-            _ => "vec3f",
+            3 => "vec3f",
+            _ => "vec4f",
         }
     }
 }

@@ -3,8 +3,8 @@
 //! A machine that reads a list of instructions keeps every number in memory between two of them; the compiler keeps them
 //! in registers. So the plans that most fits ask for ([`PLANS`]) are printed as Rust ([`crate::program::print`]) into
 //! `ahead/tapes.rs`, which is part of the sources. Nobody writes there: a test prints them anew and compares. A fit runs
-//! the plan that yields all it asks for with the least that it does not; what no plan yields, and what has changed since
-//! they were printed, runs on the [machine](super::machine).
+//! the plan with its effects that moves the same lookups; what has none, and what has changed since they were printed,
+//! runs on the [machine](super::machine).
 
 #[rustfmt::skip]
 #[allow(unused_mut, unused_variables, clippy::all, clippy::pedantic, clippy::nursery, reason = "it is printed")]
@@ -21,13 +21,7 @@ use crate::shader::facts::{FaceSizes, Facts};
 use crate::simd::Simd;
 
 /// Parameters that move what is looked up. The others cost a product or two, and are free in every plan.
-const MOVING: [Param; 5] = [
-    Param::NormalStrength,
-    Param::SpecularLobe,
-    Param::EnvironmentRotation,
-    Param::KeyAzimuth,
-    Param::KeyElevation,
-];
+const MOVING: [Param; 3] = [Param::NormalStrength, Param::SpecularLobe, Param::EnvironmentRotation];
 
 /// A plan that is compiled ahead.
 #[derive(Clone, Copy, Debug)]
@@ -75,7 +69,7 @@ const STRENGTH_AND_LOBE: &[Param] = &[P::NormalStrength, P::SpecularLobe];
 const ALL_MOVE: &[Param] = &[P::NormalStrength, P::SpecularLobe, P::EnvironmentRotation];
 
 /// The plans, of those with the same effects the ones with less that moves first.
-static PLANS: [Plan; 22] = [
+static PLANS: [Plan; 25] = [
     plan("surface", Corrected, Fragment, Effects::SURFACE, &[]),
     plan("surface_lobe", Corrected, Fragment, Effects::SURFACE, &[P::SpecularLobe]),
     plan("surface_strength", Corrected, Fragment, Effects::SURFACE, &[P::NormalStrength]),
@@ -88,9 +82,11 @@ static PLANS: [Plan; 22] = [
     plan("smooth", Corrected, Fragment, SMOOTH, &[]),
     plan("smooth_lobe", Corrected, Fragment, SMOOTH, &[P::SpecularLobe]),
     plan("hazy", Corrected, Fragment, HAZY, &[]),
+    plan("hazy_lobe", Corrected, Fragment, HAZY, &[P::SpecularLobe]),
     plan("hazy_strength", Corrected, Fragment, HAZY, &[P::NormalStrength]),
     plan("hazy_strength_lobe", Corrected, Fragment, HAZY, STRENGTH_AND_LOBE),
     plan("hazy_bumped", Corrected, Bumped, HAZY, &[]),
+    plan("hazy_bumped_lobe", Corrected, Bumped, HAZY, &[P::SpecularLobe]),
     plan("hazy_bumped_strength", Corrected, Bumped, HAZY, &[P::NormalStrength]),
     plan("hazy_bumped_strength_lobe", Corrected, Bumped, HAZY, STRENGTH_AND_LOBE),
     // What benchmarks time that look everything up in each pass.
@@ -98,6 +94,7 @@ static PLANS: [Plan; 22] = [
     plan("surface_anew", Corrected, Fragment, Effects::SURFACE, STRENGTH_AND_LOBE).keeping_nothing(),
     plan("listing", Listing, Vertex, Effects::SURFACE, &[]),
     plan("listing_lobe", Listing, Vertex, Effects::SURFACE, &[P::SpecularLobe]),
+    plan("listing_strength", Listing, Vertex, Effects::SURFACE, &[P::NormalStrength]),
     plan("listing_strength_lobe", Listing, Vertex, Effects::SURFACE, STRENGTH_AND_LOBE),
 ];
 
@@ -144,7 +141,9 @@ pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<
         plan.setup() == setup
             && plan.keeps == fitted.keep
             && plan.channels() >= fitted.channels
-            && (plan.turned() || !turned)
+            && plan.turned() == turned
+            // Else lookups would be made anew that could be kept.
+            && plan.moving.iter().all(|param| free.contains(param))
             && free.iter().all(|param| yielded.contains(param))
     };
     PLANS.iter().find(yields)
@@ -276,6 +275,7 @@ use crate::simd::Simd;
             "{stale}"
         );
     }
+
     /// The tapes of all plans.
     fn every_tape() -> impl Iterator<Item = (String, Tape)> {
         PLANS.iter().flat_map(|plan| {
@@ -284,6 +284,28 @@ use crate::simd::Simd;
             [("keep", tapes.keep), ("value", tapes.value), ("moved", tapes.moved)]
                 .map(|(part, tape)| (format!("{}_{part}", plan.name), tape))
         })
+    }
+
+    #[test]
+    fn a_plan_moves_the_lookups_that_a_fit_moves() {
+        let weights = vec![Param::BaseWeight, Param::Hilite, Param::RimExponent];
+        let fitted = |effects| {
+            let mut fitted = Fitted::new(Setup::new(Corrected, Fragment, effects), Vec::new(), &[]);
+            fitted.keep = true;
+            fitted
+        };
+        let name =
+            |effects, free: &[Param], turned| plan_for(&fitted(effects), free, turned).map(|plan| plan.name);
+        let with = |more: &[Param]| [&weights[..], more].concat();
+        assert_eq!(name(Effects::SURFACE, &weights, false), Some("surface"));
+        assert_eq!(
+            name(Effects::SURFACE.with(Effect::Skin), &with(&[P::SpecularLobe]), false),
+            Some("surface_lobe")
+        );
+        // A held turn moves nothing: the machine keeps what a plan that turns would look up again and again.
+        assert_eq!(name(Effects::SURFACE, &weights, true), None);
+        assert_eq!(name(Effects::SURFACE, &with(ALL_MOVE), true), Some("surface_all"));
+        assert_eq!(name(Effects::SURFACE.with(Effect::KeyLight), &weights, false), None);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use super::pass::{NEUTRALS, StreamOf};
 use crate::engine::lanes::Lanes;
 use crate::model::cube::Cube;
 use crate::model::real::Real;
+use crate::samples::LANES;
 use crate::samples::rows::{Row, prefetch_rows};
 use crate::simd::Simd;
 
@@ -54,7 +55,10 @@ impl<'a> Block<'a> {
             let (stream, place) = self.bound.loads[k];
             match stream {
                 StreamOf::Samples => &self.stream(stream).rows[self.first * stride + place..],
-                StreamOf::Neutral => &self.stream(stream).rows[place * BATCH * stride..],
+                StreamOf::Neutral => {
+                    let rows = self.stream(stream).rows;
+                    &rows[first_neutral(rows, place)..]
+                }
                 // They are read by [`Self::kept`], and by no tape.
                 StreamOf::Kept | StreamOf::Targets => &[],
             }
@@ -89,7 +93,13 @@ pub(super) fn along<R: Real>([ds, dt]: [R; 2], across: [R; 4], down: [R; 4]) -> 
     std::array::from_fn(|c| ds.mul_add(across[c], dt * down[c]))
 }
 
-/// Rows of what stands in for fields that samples of `stride` rows lack.
+/// Rows of what stands in for fields that samples of at most `stride` rows lack.
 pub(super) fn neutral_rows(stride: usize) -> Vec<Row> {
-    NEUTRALS.iter().flat_map(|&value| std::iter::repeat_n(Row::of([value; 16]), BATCH * stride)).collect()
+    let rows = |&value: &f32| std::iter::repeat_n(Row::of([value; LANES]), BATCH * stride.max(1));
+    NEUTRALS.iter().flat_map(rows).collect()
+}
+
+/// The first of the rows of one of [`NEUTRALS`].
+pub(super) const fn first_neutral(rows: &[Row], which: usize) -> usize {
+    which * (rows.len() / NEUTRALS.len())
 }

@@ -10,7 +10,7 @@ use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
 
 use super::ahead;
-use super::block::Block;
+use super::block::{Block, first_neutral};
 use super::code::{CallOf, Choice, Code, Heavy, Op, Register};
 use super::pass::StreamOf;
 use crate::engine::gram::Source as GramSource;
@@ -68,7 +68,6 @@ impl Program {
     }
 
     /// Whether a function that was compiled ahead runs it.
-    #[cfg(test)]
     pub(super) const fn is_compiled(&self) -> bool {
         matches!(self.runs, Runs::Compiled(_))
     }
@@ -239,6 +238,7 @@ fn run_each<S: Simd>(
             Op::Load(field, out) => {
                 let (stream, place) = bound.loads[*field];
                 let Stream { rows, stride } = streams[stream as usize];
+                let place = if stream == StreamOf::Neutral { first_neutral(rows, place) } else { place };
                 let out = &file.registers[*out];
                 if count == WIDTH {
                     let start = first * stride + place;

@@ -62,6 +62,8 @@ pub struct CpuEngine {
     passes: Mutex<BTreeMap<bool, Arc<Pass>>>,
     /// Rows of what stands in for fields that samples lack.
     neutral: Vec<Row>,
+    /// What stands in for a cube that was not baked.
+    dark: Cube<f32>,
     lobe: Mutex<Option<Arc<Lobe>>>,
     kept: Mutex<Option<Arc<Kept>>>,
     /// Why a pass could not be made.
@@ -119,13 +121,16 @@ impl CpuEngine {
             weight: (0.0, 0),
             passes: Mutex::default(),
             neutral: neutral_rows(stride.unwrap_or(0)),
+            dark: Cube::from_fn(1, |_, _, _| [0.0; 4]),
             lobe: Mutex::default(),
             kept: Mutex::default(),
             fault: OnceLock::new(),
         };
         engine.set_stride(1);
         // What cannot be computed shows here, and not in the midst of a fit.
-        engine.pass_for(false)?;
+        if !engine.turns() {
+            engine.pass_for(false)?;
+        }
         engine.pass_for(true)?;
         Ok(engine)
     }
@@ -173,9 +178,25 @@ impl CpuEngine {
         (0..view.samples.groups().div_ceil(BLOCK)).step_by(self.stride)
     }
 
-    fn turned(&self, point: &Point) -> bool {
+    /// Whether the environment's rotation is free.
+    fn turns(&self) -> bool {
         let turns = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
-        point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.fitted.unknowns.iter().any(turns)
+        self.fitted.unknowns.iter().any(turns)
+    }
+
+    fn turned(&self, point: &Point) -> bool {
+        point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.turns()
+    }
+
+    /// Whether passes at `point` run functions that were compiled ahead.
+    #[must_use]
+    pub fn is_compiled_ahead(&self, point: &Point) -> bool {
+        let is_compiled = |reading: &Reading| {
+            let program = &reading.program;
+            program.is_compiled() || program.tape.outputs.is_empty()
+        };
+        self.pass_for(self.turned(point))
+            .is_ok_and(|pass| [&pass.keep, &pass.value, &pass.moved].into_iter().all(is_compiled))
     }
 
     fn pass_for(&self, turned: bool) -> Result<Arc<Pass>, ShadingError> {
@@ -197,7 +218,13 @@ impl CpuEngine {
     /// A tape with what is the same for all records of a pass.
     fn bound<'a>(&'a self, reading: &'a Reading, point: &Point, lobe: Option<&'a Lobe>) -> Bound<'a> {
         let uniforms = reading.uniforms(&point.params).into_iter().map(|x| x as f32).collect();
-        let cubes = reading.program.tape.resources.iter().filter_map(|name| self.cube(name, lobe)).collect();
+        let cubes = reading
+            .program
+            .tape
+            .resources
+            .iter()
+            .map(|name| self.cube(name, lobe).unwrap_or(&self.dark))
+            .collect();
         Bound { program: &reading.program, loads: &reading.loads, cubes, uniforms }
     }
 

@@ -14,6 +14,7 @@ use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::Facts;
 use crate::shader::quantity::{Attribute, Constant, Resource};
 use crate::shader::rule::{LIBRARY, RULES, Rule};
+use crate::shader::search::components;
 
 /// Words that the modules which rules are built into give a meaning of their own.
 const TAKEN: [&str; 44] = [
@@ -131,8 +132,13 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
     }
     let params = own.clone();
     for rule in &declaration.rules {
-        for (quantity, _) in &rule.gives {
+        for (quantity, swizzle) in &rule.gives {
             quantity_name(quantity, rule.line)?;
+            if !is_swizzle(swizzle, rule.returns) {
+                let given = format!("{quantity}.{swizzle}");
+                let wanted = "QUANTITY or QUANTITY.COMPONENTS, of the components that the function returns";
+                return Err(Problem::Value { key: "gives", given, wanted }.at(rule.line));
+            }
             let there = known.contains(quantity) || Param::from_identifier(quantity).is_some();
             if there || params.contains(quantity) {
                 return taken("quantity", quantity, rule.line);
@@ -272,4 +278,11 @@ fn circle<'a>(rules: &'a [Rule], path: &mut Vec<&'a Rule>, depth: usize) -> Opti
         }
     }
     None
+}
+
+/// Whether these are components of a number or vector of that type; none are all of it.
+fn is_swizzle(swizzle: &str, of: &str) -> bool {
+    let width = components(of);
+    let within = |names: &str| swizzle.chars().all(|c| names[..width.min(4)].contains(c));
+    swizzle.is_empty() || (width > 1 && swizzle.len() <= 4 && (within("xyzw") || within("rgba")))
 }

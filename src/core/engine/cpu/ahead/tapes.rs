@@ -12,7 +12,7 @@ use crate::program::graph::{Binary, Unary};
 use crate::program::native::Unit;
 use crate::simd::Simd;
 
-pub(super) const KEYS: [u64; 46] = [
+pub(super) const KEYS: [u64; 51] = [
     0x2b907a95a4c0373d,
     0xd23bb9802aa04a24,
     0xf1d45136e8debdca,
@@ -41,12 +41,16 @@ pub(super) const KEYS: [u64; 46] = [
     0x411a77fb0f40008c,
     0x15d1e3603badb5eb,
     0x4628ecfa7bcb9cef,
+    0xf9e06f834b155426,
+    0x461b4fe8bfb2dc67,
     0x20dc02d4d197dc84,
     0x51a55172abd5a473,
     0xe7c6ec157dd441b9,
     0x297f3682b51370de,
     0x07817b3f206d0946,
     0x20d7b1b4b85e51e4,
+    0x4f499e9450336b29,
+    0x0c094a9cab3e5f6e,
     0xe697a227115c1ba6,
     0x65162e3d462e2644,
     0x01d250a64dce1969,
@@ -58,6 +62,7 @@ pub(super) const KEYS: [u64; 46] = [
     0x25478c4765868b08,
     0xd15d4b031725f81a,
     0x9ea1c6dfcf719b28,
+    0x4fa94358cdff5951,
     0xb6c997c60b201fe5,
 ];
 
@@ -92,24 +97,29 @@ pub(super) fn run<S: Simd>(tape: usize, simd: S, block: Block<'_>) {
         25 => hazy_keep(simd, block),
         26 => hazy_value(simd, block),
         27 => hazy_moved(simd, block),
-        28 => hazy_strength_value(simd, block),
-        29 => hazy_strength_moved(simd, block),
-        30 => hazy_strength_lobe_moved(simd, block),
-        31 => hazy_bumped_keep(simd, block),
-        32 => hazy_bumped_value(simd, block),
-        33 => hazy_bumped_moved(simd, block),
-        34 => hazy_bumped_strength_value(simd, block),
-        35 => hazy_bumped_strength_moved(simd, block),
-        36 => hazy_bumped_strength_lobe_moved(simd, block),
-        37 => hazy_bumped_anew_value(simd, block),
-        38 => hazy_bumped_anew_moved(simd, block),
-        39 => surface_anew_value(simd, block),
-        40 => surface_anew_moved(simd, block),
-        41 => listing_keep(simd, block),
-        42 => listing_lobe_keep(simd, block),
-        43 => listing_strength_lobe_keep(simd, block),
-        44 => listing_strength_lobe_value(simd, block),
-        45 => listing_strength_lobe_moved(simd, block),
+        28 => hazy_lobe_value(simd, block),
+        29 => hazy_lobe_moved(simd, block),
+        30 => hazy_strength_value(simd, block),
+        31 => hazy_strength_moved(simd, block),
+        32 => hazy_strength_lobe_moved(simd, block),
+        33 => hazy_bumped_keep(simd, block),
+        34 => hazy_bumped_value(simd, block),
+        35 => hazy_bumped_moved(simd, block),
+        36 => hazy_bumped_lobe_value(simd, block),
+        37 => hazy_bumped_lobe_moved(simd, block),
+        38 => hazy_bumped_strength_value(simd, block),
+        39 => hazy_bumped_strength_moved(simd, block),
+        40 => hazy_bumped_strength_lobe_moved(simd, block),
+        41 => hazy_bumped_anew_value(simd, block),
+        42 => hazy_bumped_anew_moved(simd, block),
+        43 => surface_anew_value(simd, block),
+        44 => surface_anew_moved(simd, block),
+        45 => listing_keep(simd, block),
+        46 => listing_lobe_keep(simd, block),
+        47 => listing_strength_keep(simd, block),
+        48 => listing_strength_value(simd, block),
+        49 => listing_strength_moved(simd, block),
+        50 => listing_strength_lobe_moved(simd, block),
         _ => {}
     }
 }
@@ -3710,6 +3720,265 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
 }
 
 #[inline(never)]
+fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let numbers: &[f32; 21] = block.uniforms();
+        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let fields = block.fields::<18>();
+        let cubes = block.cubes;
+        for i in 0..block.count {
+            let at = block.begin(i);
+            let samples = |k: usize| block.number(simd, fields[k], at);
+            let rows = block.kept::<13>(i);
+            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            let r0 = kept(6);
+            let r1 = kept(7);
+            let r2 = kept(8);
+            let r3 = kept(3);
+            let r4 = kept(4);
+            let r5 = kept(5);
+            let r6 = samples(6);
+            let r7 = select(r6.ge(lit(1.2e-38)), r6, lit(1.0));
+            let r7 = r7.log2();
+            let r7 = u(2) * r7;
+            let r7 = r7.exp2();
+            let r8 = samples(0);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r0, r1, r2);
+            let [r9, r10, r11, r12] = cube.sample_at(&at);
+            let r9 = r8 * r9;
+            let r2 = kept(0);
+            let r1 = samples(5);
+            let r1 = lit(1.0) - r1;
+            let r1 = (-u(3)).mul_add(r1, lit(1.0));
+            let r7 = select(r6.ge(lit(1.2e-38)), r7, u(4));
+            let r6 = r1 * r7;
+            let r0 = u(5) * r6;
+            let r13 = samples(8);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r3, r4, r5);
+            let [r14, r15, r16, _] = cube.sample_at(&at);
+            let r14 = r13 * r14;
+            let r5 = kept(9);
+            let r4 = r7.mul_add(u(6), u(7));
+            let r4 = r1 * r4;
+            let r4 = r5 * r4;
+            let r4 = r14.mul_add(u(8), r4);
+            let r4 = r2.mul_add(r0, r4);
+            let r4 = r9.mul_add(u(9), r4);
+            let r10 = r8 * r10;
+            let r9 = kept(1);
+            let r0 = r6 * u(10);
+            let r15 = r13 * r15;
+            let r2 = kept(10);
+            let r14 = r7.mul_add(u(11), u(12));
+            let r14 = r1 * r14;
+            let r14 = r2 * r14;
+            let r14 = r15.mul_add(u(13), r14);
+            let r14 = r9.mul_add(r0, r14);
+            let r14 = r10.mul_add(u(14), r14);
+            let r11 = r8 * r11;
+            let r10 = kept(2);
+            let r6 = r6 * u(15);
+            let r16 = r13 * r16;
+            let r13 = kept(11);
+            let r7 = r7.mul_add(u(16), u(17));
+            let r7 = r1 * r7;
+            let r7 = r13 * r7;
+            let r7 = r16.mul_add(u(18), r7);
+            let r7 = r10.mul_add(r6, r7);
+            let r7 = r11.mul_add(u(19), r7);
+            let r11 = samples(16);
+            let r12 = r8 * r12;
+            let r12 = r11 * r12;
+            let r12 = r12 * u(20);
+            block.put(0, i, r4);
+            block.put(1, i, r14);
+            block.put(2, i, r7);
+            block.put(3, i, r12);
+        }
+        },
+    );
+}
+
+#[inline(never)]
+fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let numbers: &[f32; 22] = block.uniforms();
+        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let fields = block.fields::<18>();
+        let cubes = block.cubes;
+        for i in 0..block.count {
+            let at = block.begin(i);
+            let samples = |k: usize| block.number(simd, fields[k], at);
+            let rows = block.kept::<13>(i);
+            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            let r0 = kept(6);
+            let r1 = kept(7);
+            let r2 = kept(8);
+            let r3 = kept(3);
+            let r4 = kept(4);
+            let r5 = kept(5);
+            let r6 = samples(6);
+            let r7 = select(r6.ge(lit(1.2e-38)), r6, lit(1.0));
+            let r7 = r7.log2();
+            let r7 = u(2) * r7;
+            let r7 = r7.exp2();
+            let r8 = samples(0);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r0, r1, r2);
+            let [r9, r10, r11, r12] = cube.sample_at(&at);
+            let r9 = r8 * r9;
+            let r13 = kept(0);
+            let r14 = samples(5);
+            let r15 = lit(1.0) - r14;
+            let r15 = (-u(3)).mul_add(r15, lit(1.0));
+            let r16 = select(r6.ge(lit(1.2e-38)), r7, u(4));
+            let r17 = r15 * r16;
+            let r18 = u(5) * r17;
+            let r19 = samples(8);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r3, r4, r5);
+            let [r20, r21, r22, _] = cube.sample_at(&at);
+            let r20 = r19 * r20;
+            let r23 = kept(9);
+            let r24 = r16.mul_add(u(6), u(7));
+            let r25 = r15 * r24;
+            let r25 = r23 * r25;
+            let r25 = r20.mul_add(u(8), r25);
+            let r25 = r13.mul_add(r18, r25);
+            let r25 = r9.mul_add(u(9), r25);
+            let r10 = r8 * r10;
+            let r18 = kept(1);
+            let r26 = r17 * u(10);
+            let r21 = r19 * r21;
+            let r27 = kept(10);
+            let r28 = r16.mul_add(u(11), u(12));
+            let r29 = r15 * r28;
+            let r29 = r27 * r29;
+            let r29 = r21.mul_add(u(13), r29);
+            let r29 = r18.mul_add(r26, r29);
+            let r29 = r10.mul_add(u(14), r29);
+            let r11 = r8 * r11;
+            let r26 = kept(2);
+            let r30 = r17 * u(15);
+            let r22 = r19 * r22;
+            let r31 = kept(11);
+            let r32 = r16.mul_add(u(16), u(17));
+            let r33 = r15 * r32;
+            let r33 = r31 * r33;
+            let r33 = r22.mul_add(u(18), r33);
+            let r33 = r26.mul_add(r30, r33);
+            let r33 = r11.mul_add(u(19), r33);
+            let r30 = samples(16);
+            let r12 = r8 * r12;
+            let r12 = r30 * r12;
+            let r34 = r12 * u(20);
+            let r35 = r15 * r23;
+            let r36 = r15 * r27;
+            let r37 = r15 * r31;
+            let r38 = r17 * r23;
+            let r39 = r17 * r27;
+            let r40 = r17 * r31;
+            let r41 = kept(12);
+            let r41 = r7 * r41;
+            let r41 = select(r6.ge(lit(1.2e-38)), r41, lit(0.0));
+            let r6 = u(6) * r41;
+            let r6 = r15 * r6;
+            let r7 = r15 * r41;
+            let r42 = u(5) * r7;
+            let r42 = r13 * r42;
+            let r42 = r23.mul_add(r6, r42);
+            let r6 = u(11) * r41;
+            let r6 = r15 * r6;
+            let r43 = u(10) * r7;
+            let r43 = r18 * r43;
+            let r43 = r27.mul_add(r6, r43);
+            let r41 = u(16) * r41;
+            let r41 = r15 * r41;
+            let r7 = u(15) * r7;
+            let r7 = r26 * r7;
+            let r7 = r31.mul_add(r41, r7);
+            let r41 = r13 * r17;
+            let r15 = r17 * r18;
+            let r17 = r17 * r26;
+            let r14 = r14 - lit(1.0);
+            let r24 = r24 * r14;
+            let r16 = r16 * r14;
+            let r6 = u(5) * r16;
+            let r6 = r13 * r6;
+            let r6 = r23.mul_add(r24, r6);
+            let r28 = r28 * r14;
+            let r24 = u(10) * r16;
+            let r24 = r18 * r24;
+            let r24 = r27.mul_add(r28, r24);
+            let r14 = r32 * r14;
+            let r16 = u(15) * r16;
+            let r16 = r26 * r16;
+            let r16 = r31.mul_add(r14, r16);
+            let cube = cubes[1];
+            let at = cube.footprint_at(r0, r1, r2);
+            let [r14, r31, r26, r32] = cube.sample_at(&at);
+            let r14 = r8 * r14;
+            let cube = cubes[1];
+            let at = cube.footprint_at(r3, r4, r5);
+            let [r2, r1, r0, _] = cube.sample_at(&at);
+            let r2 = r19 * r2;
+            let r2 = u(8) * r2;
+            let r2 = u(9).mul_add(r14, r2);
+            let r31 = r8 * r31;
+            let r1 = r19 * r1;
+            let r1 = u(13) * r1;
+            let r1 = u(14).mul_add(r31, r1);
+            let r26 = r8 * r26;
+            let r0 = r19 * r0;
+            let r0 = u(18) * r0;
+            let r0 = u(19).mul_add(r26, r0);
+            let r32 = r8 * r32;
+            let r32 = r30 * r32;
+            let r32 = u(20) * r32;
+            block.put(0, i, r25);
+            block.put(1, i, r29);
+            block.put(2, i, r33);
+            block.put(3, i, r34);
+            block.put(4, i, r35);
+            block.put(5, i, r36);
+            block.put(6, i, r37);
+            block.put(7, i, r38);
+            block.put(8, i, r39);
+            block.put(9, i, r40);
+            block.put(10, i, r42);
+            block.put(11, i, r43);
+            block.put(12, i, r7);
+            block.put(13, i, r41);
+            block.put(14, i, r15);
+            block.put(15, i, r17);
+            block.put(16, i, r9);
+            block.put(17, i, r10);
+            block.put(18, i, r11);
+            block.put(19, i, r20);
+            block.put(20, i, r21);
+            block.put(21, i, r22);
+            block.put(22, i, r6);
+            block.put(23, i, r24);
+            block.put(24, i, r16);
+            block.put(25, i, r2);
+            block.put(26, i, r1);
+            block.put(27, i, r0);
+            block.put(28, i, r32);
+            block.put(29, i, r12);
+        }
+        },
+    );
+}
+
+#[inline(never)]
 fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
@@ -4637,6 +4906,263 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             block.put(23, i, r12);
             block.put(24, i, r7);
             block.put(25, i, r21);
+        }
+        },
+    );
+}
+
+#[inline(never)]
+fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let numbers: &[f32; 20] = block.uniforms();
+        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let fields = block.fields::<18>();
+        let cubes = block.cubes;
+        for i in 0..block.count {
+            let at = block.begin(i);
+            let samples = |k: usize| block.number(simd, fields[k], at);
+            let rows = block.kept::<14>(i);
+            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            let r0 = kept(8);
+            let r1 = kept(9);
+            let r2 = kept(10);
+            let r3 = kept(5);
+            let r4 = kept(6);
+            let r5 = kept(7);
+            let r6 = kept(4);
+            let r6 = u(0) * r6;
+            let r6 = r6.exp2();
+            let r7 = samples(0);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r0, r1, r2);
+            let [r8, r9, r10, r11] = cube.sample_at(&at);
+            let r8 = r7 * r8;
+            let r2 = kept(0);
+            let r1 = samples(5);
+            let r1 = lit(1.0) - r1;
+            let r1 = (-u(2)).mul_add(r1, lit(1.0));
+            let r0 = kept(3);
+            let r6 = select(r0.ge(lit(0.5)), r6, u(3));
+            let r0 = r1 * r6;
+            let r12 = u(4) * r0;
+            let r13 = samples(9);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r3, r4, r5);
+            let [r14, r15, r16, _] = cube.sample_at(&at);
+            let r14 = r13 * r14;
+            let r5 = kept(11);
+            let r4 = r6.mul_add(u(5), u(6));
+            let r4 = r1 * r4;
+            let r4 = r5 * r4;
+            let r4 = r14.mul_add(u(7), r4);
+            let r4 = r2.mul_add(r12, r4);
+            let r4 = r8.mul_add(u(8), r4);
+            let r9 = r7 * r9;
+            let r8 = kept(1);
+            let r12 = r0 * u(9);
+            let r15 = r13 * r15;
+            let r2 = kept(12);
+            let r14 = r6.mul_add(u(10), u(11));
+            let r14 = r1 * r14;
+            let r14 = r2 * r14;
+            let r14 = r15.mul_add(u(12), r14);
+            let r14 = r8.mul_add(r12, r14);
+            let r14 = r9.mul_add(u(13), r14);
+            let r10 = r7 * r10;
+            let r9 = kept(2);
+            let r0 = r0 * u(14);
+            let r16 = r13 * r16;
+            let r13 = kept(13);
+            let r6 = r6.mul_add(u(15), u(16));
+            let r6 = r1 * r6;
+            let r6 = r13 * r6;
+            let r6 = r16.mul_add(u(17), r6);
+            let r6 = r9.mul_add(r0, r6);
+            let r6 = r10.mul_add(u(18), r6);
+            let r10 = samples(17);
+            let r11 = r7 * r11;
+            let r11 = r10 * r11;
+            let r11 = r11 * u(19);
+            block.put(0, i, r4);
+            block.put(1, i, r14);
+            block.put(2, i, r6);
+            block.put(3, i, r11);
+        }
+        },
+    );
+}
+
+#[inline(never)]
+fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let numbers: &[f32; 22] = block.uniforms();
+        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let fields = block.fields::<18>();
+        let cubes = block.cubes;
+        for i in 0..block.count {
+            let at = block.begin(i);
+            let samples = |k: usize| block.number(simd, fields[k], at);
+            let rows = block.kept::<14>(i);
+            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            let r0 = kept(8);
+            let r1 = kept(9);
+            let r2 = kept(10);
+            let r3 = kept(5);
+            let r4 = kept(6);
+            let r5 = kept(7);
+            let r6 = kept(4);
+            let r7 = u(0) * r6;
+            let r7 = r7.exp2();
+            let r8 = samples(0);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r0, r1, r2);
+            let [r9, r10, r11, r12] = cube.sample_at(&at);
+            let r9 = r8 * r9;
+            let r13 = kept(0);
+            let r14 = samples(5);
+            let r15 = lit(1.0) - r14;
+            let r15 = (-u(2)).mul_add(r15, lit(1.0));
+            let r16 = kept(3);
+            let r17 = select(r16.ge(lit(0.5)), r7, u(3));
+            let r18 = r15 * r17;
+            let r19 = u(4) * r18;
+            let r20 = samples(9);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r3, r4, r5);
+            let [r21, r22, r23, _] = cube.sample_at(&at);
+            let r21 = r20 * r21;
+            let r24 = kept(11);
+            let r25 = r17.mul_add(u(5), u(6));
+            let r26 = r15 * r25;
+            let r26 = r24 * r26;
+            let r26 = r21.mul_add(u(7), r26);
+            let r26 = r13.mul_add(r19, r26);
+            let r26 = r9.mul_add(u(8), r26);
+            let r10 = r8 * r10;
+            let r19 = kept(1);
+            let r27 = r18 * u(9);
+            let r22 = r20 * r22;
+            let r28 = kept(12);
+            let r29 = r17.mul_add(u(10), u(11));
+            let r30 = r15 * r29;
+            let r30 = r28 * r30;
+            let r30 = r22.mul_add(u(12), r30);
+            let r30 = r19.mul_add(r27, r30);
+            let r30 = r10.mul_add(u(13), r30);
+            let r11 = r8 * r11;
+            let r27 = kept(2);
+            let r31 = r18 * u(14);
+            let r23 = r20 * r23;
+            let r32 = kept(13);
+            let r33 = r17.mul_add(u(15), u(16));
+            let r34 = r15 * r33;
+            let r34 = r32 * r34;
+            let r34 = r23.mul_add(u(17), r34);
+            let r34 = r27.mul_add(r31, r34);
+            let r34 = r11.mul_add(u(18), r34);
+            let r31 = samples(17);
+            let r12 = r8 * r12;
+            let r12 = r31 * r12;
+            let r35 = r12 * u(19);
+            let r36 = r15 * r24;
+            let r37 = r15 * r28;
+            let r38 = r15 * r32;
+            let r39 = r18 * r24;
+            let r40 = r18 * r28;
+            let r41 = r18 * r32;
+            let r6 = r6 * lit(0.6931471805599453);
+            let r6 = r7 * r6;
+            let r6 = select(r16.ge(lit(0.5)), r6, lit(0.0));
+            let r16 = u(5) * r6;
+            let r16 = r15 * r16;
+            let r7 = r15 * r6;
+            let r42 = u(4) * r7;
+            let r42 = r13 * r42;
+            let r42 = r24.mul_add(r16, r42);
+            let r16 = u(10) * r6;
+            let r16 = r15 * r16;
+            let r43 = u(9) * r7;
+            let r43 = r19 * r43;
+            let r43 = r28.mul_add(r16, r43);
+            let r6 = u(15) * r6;
+            let r6 = r15 * r6;
+            let r7 = u(14) * r7;
+            let r7 = r27 * r7;
+            let r7 = r32.mul_add(r6, r7);
+            let r6 = r13 * r18;
+            let r15 = r18 * r19;
+            let r18 = r18 * r27;
+            let r14 = r14 - lit(1.0);
+            let r25 = r25 * r14;
+            let r17 = r17 * r14;
+            let r16 = u(4) * r17;
+            let r16 = r13 * r16;
+            let r16 = r24.mul_add(r25, r16);
+            let r29 = r29 * r14;
+            let r25 = u(9) * r17;
+            let r25 = r19 * r25;
+            let r25 = r28.mul_add(r29, r25);
+            let r14 = r33 * r14;
+            let r17 = u(14) * r17;
+            let r17 = r27 * r17;
+            let r17 = r32.mul_add(r14, r17);
+            let cube = cubes[1];
+            let at = cube.footprint_at(r0, r1, r2);
+            let [r14, r32, r27, r33] = cube.sample_at(&at);
+            let r14 = r8 * r14;
+            let cube = cubes[1];
+            let at = cube.footprint_at(r3, r4, r5);
+            let [r2, r1, r0, _] = cube.sample_at(&at);
+            let r2 = r20 * r2;
+            let r2 = u(7) * r2;
+            let r2 = u(8).mul_add(r14, r2);
+            let r32 = r8 * r32;
+            let r1 = r20 * r1;
+            let r1 = u(12) * r1;
+            let r1 = u(13).mul_add(r32, r1);
+            let r27 = r8 * r27;
+            let r0 = r20 * r0;
+            let r0 = u(17) * r0;
+            let r0 = u(18).mul_add(r27, r0);
+            let r33 = r8 * r33;
+            let r33 = r31 * r33;
+            let r33 = u(19) * r33;
+            block.put(0, i, r26);
+            block.put(1, i, r30);
+            block.put(2, i, r34);
+            block.put(3, i, r35);
+            block.put(4, i, r36);
+            block.put(5, i, r37);
+            block.put(6, i, r38);
+            block.put(7, i, r39);
+            block.put(8, i, r40);
+            block.put(9, i, r41);
+            block.put(10, i, r42);
+            block.put(11, i, r43);
+            block.put(12, i, r7);
+            block.put(13, i, r6);
+            block.put(14, i, r15);
+            block.put(15, i, r18);
+            block.put(16, i, r9);
+            block.put(17, i, r10);
+            block.put(18, i, r11);
+            block.put(19, i, r21);
+            block.put(20, i, r22);
+            block.put(21, i, r23);
+            block.put(22, i, r16);
+            block.put(23, i, r25);
+            block.put(24, i, r17);
+            block.put(25, i, r2);
+            block.put(26, i, r1);
+            block.put(27, i, r0);
+            block.put(28, i, r33);
+            block.put(29, i, r12);
         }
         },
     );
@@ -6351,7 +6877,7 @@ fn listing_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
 }
 
 #[inline(never)]
-fn listing_strength_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -6419,7 +6945,7 @@ fn listing_strength_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
 }
 
 #[inline(never)]
-fn listing_strength_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
+fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
     simd.vectorize(
         #[inline(always)]
         || {
@@ -6548,6 +7074,236 @@ fn listing_strength_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             block.put(0, i, r16);
             block.put(1, i, r7);
             block.put(2, i, r6);
+        }
+        },
+    );
+}
+
+#[inline(never)]
+fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+        let lit = |x: f64| Lanes::splat(simd, x as f32);
+        let numbers: &[f32; 24] = block.uniforms();
+        let u = |k: usize| Lanes::splat(simd, numbers[k]);
+        let fields = block.fields::<23>();
+        let cubes = block.cubes;
+        for i in 0..block.count {
+            let at = block.begin(i);
+            let samples = |k: usize| block.number(simd, fields[k], at);
+            let rows = block.kept::<7>(i);
+            let kept = |k: usize| Lanes::of_row(simd, &rows[k]);
+            let r0 = samples(3);
+            let r1 = samples(2);
+            let r1 = r0.mul_add(u(0), r1);
+            let r2 = samples(1);
+            let r3 = samples(7);
+            let r4 = samples(9);
+            let r5 = samples(8);
+            let r5 = u(0).mul_add(r4, r5);
+            let r6 = samples(4);
+            let r7 = samples(6);
+            let r8 = samples(5);
+            let r8 = u(0).mul_add(r7, r8);
+            let r9 = r2 * r1;
+            let r9 = r6.mul_add(r8, r9);
+            let r9 = r3.mul_add(r5, r9);
+            let r2 = r2 * r9;
+            let r2 = (-r1).mul_add(lit(2.0), r2);
+            let r10 = r2.abs();
+            let r6 = r6 * r9;
+            let r6 = (-r8).mul_add(lit(2.0), r6);
+            let r11 = r6.abs();
+            let r11 = r10 + r11;
+            let r9 = r3 * r9;
+            let r9 = (-r5).mul_add(lit(2.0), r9);
+            let r3 = r9.abs();
+            let r3 = r11 + r3;
+            let r11 = unary(Unary::IsFinite, r2);
+            let r10 = unary(Unary::IsFinite, r6);
+            let r10 = r11 * r10;
+            let r11 = unary(Unary::IsFinite, r9);
+            let r11 = r10 * r11;
+            let r11 = select(r3.ge(lit(1e-36)), r11, lit(0.0));
+            let r11 = select(r3.ge(lit(1e-36)), r11, lit(0.0));
+            let r2 = select(r11.ge(lit(0.5)), r2, lit(0.0));
+            let r6 = select(r11.ge(lit(0.5)), r6, lit(0.0));
+            let r9 = select(r11.ge(lit(0.5)), r9, lit(1.0));
+            let r3 = kept(4);
+            let r3 = select(r11.ge(lit(0.5)), r3, lit(0.0));
+            let r10 = kept(5);
+            let r10 = select(r11.ge(lit(0.5)), r10, lit(0.0));
+            let r12 = kept(6);
+            let r12 = select(r11.ge(lit(0.5)), r12, lit(0.0));
+            let point = CubePoint::of_unit([r2, r6, r9]);
+            let [r11, r13, r14] = point.place();
+            let [r15, r16] = point.tangent([r3, r10, r12]);
+            let r12 = r1.abs();
+            let r10 = r8.abs();
+            let r10 = r12 + r10;
+            let r12 = r5.abs();
+            let r12 = r10 + r12;
+            let r10 = unary(Unary::IsFinite, r1);
+            let r3 = unary(Unary::IsFinite, r8);
+            let r3 = r10 * r3;
+            let r10 = unary(Unary::IsFinite, r5);
+            let r10 = r3 * r10;
+            let r10 = select(r12.ge(lit(1e-36)), r10, lit(0.0));
+            let r10 = select(r12.ge(lit(1e-36)), r10, lit(0.0));
+            let r1 = select(r10.ge(lit(0.5)), r1, lit(0.0));
+            let r8 = select(r10.ge(lit(0.5)), r8, lit(0.0));
+            let r5 = select(r10.ge(lit(0.5)), r5, lit(1.0));
+            let r0 = select(r10.ge(lit(0.5)), r0, lit(0.0));
+            let r7 = select(r10.ge(lit(0.5)), r7, lit(0.0));
+            let r4 = select(r10.ge(lit(0.5)), r4, lit(0.0));
+            let point = CubePoint::of_unit([r1, r8, r5]);
+            let [r10, r12, r3] = point.place();
+            let [r9, r6] = point.tangent([r0, r7, r4]);
+            let r4 = samples(12);
+            let r7 = select(r4.ge(lit(1.2e-38)), r4, lit(1.0));
+            let r7 = r7.log2();
+            let r7 = u(6) * r7;
+            let r7 = r7.exp2();
+            let r0 = samples(0);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r11, r13, r14);
+            let ([r5, r8, r1, _], [r2, r17, r18, _]) = cube.sample_with_slope(&at, cube.texels([r15, r16]));
+            let r5 = r0 * r5;
+            let r16 = kept(0);
+            let r15 = samples(11);
+            let r14 = lit(1.0) - r15;
+            let r14 = (-u(7)).mul_add(r14, lit(1.0));
+            let r13 = select(r4.ge(lit(1.2e-38)), r7, u(8));
+            let r11 = r14 * r13;
+            let r19 = u(9) * r11;
+            let r20 = samples(14);
+            let cube = cubes[0];
+            let at = cube.footprint_at(r10, r12, r3);
+            let ([r21, r22, r23, _], [r24, r25, r26, _]) = cube.sample_with_slope(&at, cube.texels([r9, r6]));
+            let r21 = r20 * r21;
+            let r27 = samples(13);
+            let cube = cubes[1];
+            let at = cube.footprint_at(r10, r12, r3);
+            let ([r28, r29, r30, _], [r31, r32, r33, _]) = cube.sample_with_slope(&at, cube.texels([r9, r6]));
+            let r28 = r27 * r28;
+            let r6 = r13.mul_add(u(10), u(11));
+            let r9 = r14 * r6;
+            let r3 = r28 * r9;
+            let r3 = r21.mul_add(u(12), r3);
+            let r3 = r16.mul_add(r19, r3);
+            let r3 = r5.mul_add(u(13), r3);
+            let r8 = r0 * r8;
+            let r19 = kept(1);
+            let r12 = r11 * u(14);
+            let r22 = r20 * r22;
+            let r10 = samples(16);
+            let r29 = r10 * r29;
+            let r34 = r13.mul_add(u(15), u(16));
+            let r35 = r14 * r34;
+            let r36 = r29 * r35;
+            let r36 = r22.mul_add(u(17), r36);
+            let r36 = r19.mul_add(r12, r36);
+            let r36 = r8.mul_add(u(18), r36);
+            let r1 = r0 * r1;
+            let r12 = kept(2);
+            let r37 = r11 * u(19);
+            let r23 = r20 * r23;
+            let r38 = samples(18);
+            let r30 = r38 * r30;
+            let r39 = r13.mul_add(u(20), u(21));
+            let r40 = r14 * r39;
+            let r41 = r30 * r40;
+            let r41 = r23.mul_add(u(22), r41);
+            let r41 = r12.mul_add(r37, r41);
+            let r41 = r1.mul_add(u(23), r41);
+            let r37 = r14 * r28;
+            let r42 = r14 * r29;
+            let r43 = r14 * r30;
+            let r44 = r11 * r28;
+            let r45 = r11 * r29;
+            let r46 = r11 * r30;
+            let r47 = kept(3);
+            let r47 = r7 * r47;
+            let r47 = select(r4.ge(lit(1.2e-38)), r47, lit(0.0));
+            let r4 = u(10) * r47;
+            let r4 = r14 * r4;
+            let r7 = r14 * r47;
+            let r48 = u(9) * r7;
+            let r48 = r16 * r48;
+            let r48 = r28.mul_add(r4, r48);
+            let r4 = u(15) * r47;
+            let r4 = r14 * r4;
+            let r49 = u(14) * r7;
+            let r49 = r19 * r49;
+            let r49 = r29.mul_add(r4, r49);
+            let r47 = u(20) * r47;
+            let r47 = r14 * r47;
+            let r7 = u(19) * r7;
+            let r7 = r12 * r7;
+            let r7 = r30.mul_add(r47, r7);
+            let r47 = r16 * r11;
+            let r14 = r11 * r19;
+            let r11 = r11 * r12;
+            let r15 = r15 - lit(1.0);
+            let r6 = r6 * r15;
+            let r13 = r13 * r15;
+            let r4 = u(9) * r13;
+            let r4 = r16 * r4;
+            let r4 = r28.mul_add(r6, r4);
+            let r34 = r34 * r15;
+            let r6 = u(14) * r13;
+            let r6 = r19 * r6;
+            let r6 = r29.mul_add(r34, r6);
+            let r15 = r39 * r15;
+            let r13 = u(19) * r13;
+            let r13 = r12 * r13;
+            let r13 = r30.mul_add(r15, r13);
+            let r2 = r0 * r2;
+            let r24 = r20 * r24;
+            let r31 = r27 * r31;
+            let r31 = r9 * r31;
+            let r31 = u(12).mul_add(r24, r31);
+            let r31 = u(13).mul_add(r2, r31);
+            let r17 = r0 * r17;
+            let r25 = r20 * r25;
+            let r32 = r10 * r32;
+            let r32 = r35 * r32;
+            let r32 = u(17).mul_add(r25, r32);
+            let r32 = u(18).mul_add(r17, r32);
+            let r18 = r0 * r18;
+            let r26 = r20 * r26;
+            let r33 = r38 * r33;
+            let r33 = r40 * r33;
+            let r33 = u(22).mul_add(r26, r33);
+            let r33 = u(23).mul_add(r18, r33);
+            block.put(0, i, r3);
+            block.put(1, i, r36);
+            block.put(2, i, r41);
+            block.put(3, i, r37);
+            block.put(4, i, r42);
+            block.put(5, i, r43);
+            block.put(6, i, r44);
+            block.put(7, i, r45);
+            block.put(8, i, r46);
+            block.put(9, i, r48);
+            block.put(10, i, r49);
+            block.put(11, i, r7);
+            block.put(12, i, r47);
+            block.put(13, i, r14);
+            block.put(14, i, r11);
+            block.put(15, i, r5);
+            block.put(16, i, r8);
+            block.put(17, i, r1);
+            block.put(18, i, r21);
+            block.put(19, i, r22);
+            block.put(20, i, r23);
+            block.put(21, i, r4);
+            block.put(22, i, r6);
+            block.put(23, i, r13);
+            block.put(24, i, r31);
+            block.put(25, i, r32);
+            block.put(26, i, r33);
         }
         },
     );
