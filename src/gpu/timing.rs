@@ -9,8 +9,8 @@ use super::device::Gpu;
 use super::error::GpuError;
 use super::readback::map;
 
-/// The passes of one tile.
-const MOST_PASSES: u32 = 8;
+/// The passes of one tile: an image's own few, and those over the atlas, two for each blur.
+const MOST_PASSES: u32 = 64;
 
 /// GPU time of a pass, over all tiles.
 #[derive(Clone, Debug, PartialEq)]

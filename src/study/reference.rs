@@ -3,7 +3,6 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::StudyError;
 use super::significance::LossMap;
 use crate::engine::residual::Residuals;
 use crate::engine::view::ObservedView;
@@ -126,19 +125,17 @@ impl ReferenceView {
     }
 
     /// How far `image` is off.
-    ///
-    /// # Errors
-    /// When the loss cannot be computed on the processor.
-    pub fn errors(&self, image: &Image, loss: Loss) -> Result<ViewErrors, StudyError> {
+    #[must_use]
+    pub fn errors(&self, image: &Image, loss: Loss) -> ViewErrors {
         let comparison = Comparison::new(&self.image, image, &self.coverage);
         let (squares, size, count) = sums(&self.image, image, &self.coverage);
-        Ok(ViewErrors {
+        ViewErrors {
             linear: (squares / count.max(1) as f64).sqrt(),
             relative: relative(squares, size),
             scores: comparison.scores(),
             map: self.losses(image, &Residuals::new(loss)),
             flip: Picture::of_error(&comparison, image.width),
-        })
+        }
     }
 
     /// The loss of each pixel. As in a fit, colours are those of the covered share of a pixel.

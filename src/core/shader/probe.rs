@@ -24,8 +24,8 @@ pub struct Probe {
 pub const WORKGROUP: u32 = 64;
 
 impl Probe {
-    /// The rules that yield the quantities `wanted` of a stage. In the vertex stage attributes are given; in
-    /// the fragment stage the quantities `given` are.
+    /// The rules that yield the quantities `wanted` of a domain. Of vertices attributes are given; of fragments the
+    /// quantities `given` are.
     ///
     /// # Errors
     /// When no rules yield them.

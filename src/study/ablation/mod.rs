@@ -188,7 +188,7 @@ pub fn ablate(scene: &Path, options: &AblationOptions) -> Result<Ablation, Study
     warnings.extend(clocks.warning.clone());
 
     let loss = whole.prepared.scene.fit.loss;
-    let errors = study.errors(&images, loss)?;
+    let errors = study.errors(&images, loss);
     let full = Evaluated { case: Case::default(), images, errors, point: point.clone(), outcome, starts };
     let before: Vec<LossMap> = full.errors.iter().map(|errors| errors.map.clone()).collect();
     let cases = Case::all(whole.prepared.scene.effects, options.pairs);
@@ -255,7 +255,7 @@ struct Study<'a> {
 }
 
 impl Study<'_> {
-    fn errors(&self, images: &[Image], loss: Loss) -> Result<Vec<ViewErrors>, StudyError> {
+    fn errors(&self, images: &[Image], loss: Loss) -> Vec<ViewErrors> {
         self.references.iter().zip(images).map(|(reference, image)| reference.errors(image, loss)).collect()
     }
 
@@ -282,7 +282,7 @@ impl Study<'_> {
         };
         let point = outcome.as_ref().map_or(from_whole, |outcome| outcome.end.clone());
         let images = subject.images(&point)?;
-        let errors = self.errors(&images, subject.prepared.scene.fit.loss)?;
+        let errors = self.errors(&images, subject.prepared.scene.fit.loss);
         Ok((subject, Evaluated { case, images, errors, point, outcome, starts }))
     }
 }

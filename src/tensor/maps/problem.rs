@@ -97,7 +97,7 @@ impl Problem {
     /// Take gains, weights and working targets anew, at the present image.
     ///
     /// # Errors
-    /// When the device does not take it, or the loss cannot be computed on the processor.
+    /// When the device does not take it.
     pub fn reweight(
         &mut self,
         shared: &SharedDevice,
@@ -158,7 +158,7 @@ impl Problem {
     /// stand for it.
     ///
     /// # Errors
-    /// When the device does not give the image, or the loss cannot be computed on the processor.
+    /// When the device does not give the image.
     pub fn loss(&self, views: &[Observed<'_>], loss: Loss) -> Result<f64, MapError> {
         let residuals = Residuals::new(loss);
         let image = self.image()?;

@@ -1,8 +1,8 @@
 //! A tape run for blocks of records, sixteen samples at a time.
 //!
-//! Every operation runs over all [`WIDTH`] rows of the accumulator before the next begins: what a row waits for (a logarithm,
-//! a texel) hides behind its neighbours, and finding out what to do costs little beside doing it. A register's rows
-//! stand together, so that a tape's file stays in the nearest cache.
+//! Every operation runs over all [`WIDTH`] rows of the accumulator before the next begins: what a row waits for (a
+//! logarithm, a texel) hides behind its neighbours, and finding out what to do costs little beside doing it. A register's
+//! rows stand together, so that a tape's file stays in the nearest cache.
 
 use std::cell::Cell;
 
@@ -171,12 +171,13 @@ pub(super) fn run<S: Simd>(
         || {
             for start in (0..count).step_by(WIDTH) {
                 let count = WIDTH.min(count - start);
-                run_each(simd, code, bound, file, streams, first + start, count, start);
+                run_each(simd, code, bound, file, streams, [first + start, count, start]);
             }
         },
     );
 }
 
+/// Run code for `count` records from `first` on; `start` says where in the columns their outputs begin.
 #[inline(always)]
 fn run_each<S: Simd>(
     simd: S,
@@ -184,9 +185,7 @@ fn run_each<S: Simd>(
     bound: &Bound<'_>,
     file: &File,
     streams: &[Stream<'_>],
-    first: usize,
-    count: usize,
-    start: usize,
+    [first, count, start]: [usize; 3],
 ) {
     let mut a = [Lanes::splat(simd, 0.0); WIDTH];
     // A = f(A) row by row; each operation has a loop of its own: the compiler then knows what it is.

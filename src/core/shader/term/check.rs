@@ -17,7 +17,11 @@ use crate::shader::rule::{LIBRARY, RULES, Rule};
 use crate::shader::search::components;
 
 /// Words that the modules which rules are built into give a meaning of their own.
-const TAKEN: [&str; 44] = [
+const TAKEN: [&str; 48] = [
+    "weighs",
+    "whole",
+    "change",
+    "slope",
     "at",
     "part",
     "samples",
