@@ -13,7 +13,7 @@
 //! - [`cut`]: what stays from pass to pass
 //! - [`steps`]: a graph evaluated node by node, in any kind of number
 //! - [`tape`]: instructions over registers, which `writer` finds
-//! - [`evaluate`]: a tape run for one sample; [`print`]: a tape as Rust
+//! - [`evaluate`]: a tape run for one sample; [`mod@print`]: a tape as Rust
 
 pub mod cut;
 pub mod evaluate;
