@@ -10,6 +10,10 @@
 #[allow(unused_mut, unused_variables, clippy::all, clippy::pedantic, clippy::nursery, reason = "it is printed")]
 mod tapes;
 
+use std::marker::PhantomData;
+
+use fearless_simd::SimdBase;
+
 use super::block::Block;
 use super::pass::{Fitted, facts};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
@@ -18,7 +22,8 @@ use crate::model::params::Param;
 use crate::program::print::statements;
 use crate::program::tape::Tape;
 use crate::shader::facts::{FaceSizes, Facts};
-use crate::simd::Simd;
+use crate::simd::{Level, Simd};
+use crate::with_simd;
 
 /// Parameters that move what is looked up. The others cost a product or two, and are free in every plan.
 const MOVING: [Param; 3] = [Param::NormalStrength, Param::SpecularLobe, Param::EnvironmentRotation];
@@ -166,10 +171,29 @@ pub(super) fn find(tape: &Tape) -> Option<usize> {
     tapes::KEYS.iter().position(|known| *known == key)
 }
 
-/// Run a compiled tape over a block.
+/// Whether functions are compiled for `S`: not for SSE2, as processors of the last ten years have AVX2, and a third of all
+/// that is compiled would be for the others, whose tapes run on the machine.
+struct Functions<S>(PhantomData<S>);
+
+impl<S: Simd> Functions<S> {
+    const COMPILED: bool = !cfg!(target_arch = "x86_64") || <S::f32s as SimdBase<S>>::LEN > 4;
+}
+
+/// Whether functions are compiled for the instructions of `level`.
+pub(super) fn compiled_for(level: Level) -> bool {
+    const fn of<S: Simd>(_: S) -> bool {
+        Functions::<S>::COMPILED
+    }
+    with_simd!(level, simd => of(simd))
+}
+
+/// Run a compiled tape over a block; `false` where none is compiled for `S`.
 #[inline(always)]
-pub(super) fn run<S: Simd>(tape: usize, simd: S, block: Block<'_>) {
-    tapes::run(tape, simd, block);
+pub(super) fn run<S: Simd>(tape: usize, simd: S, block: Block<'_>) -> bool {
+    if Functions::<S>::COMPILED {
+        tapes::run(tape, simd, block);
+    }
+    Functions::<S>::COMPILED
 }
 
 #[cfg(test)]
@@ -189,7 +213,6 @@ mod tests {
     use crate::samples::LANES;
     use crate::samples::rows::Row;
     use crate::simd::{levels, name};
-    use crate::with_simd;
 
     const HEAD: &str = "\
 // Printed from the rules by the test beside it. Do not edit.
@@ -338,12 +361,14 @@ use crate::simd::Simd;
                 })
                 .collect();
             let program = Program::new(tape.clone(), true);
-            assert!(program.is_compiled() || tape.outputs.is_empty(), "{of} is not compiled");
-            let uniforms = uniforms.into_iter().map(|x| x as f32).collect();
-            let bound = Bound { program: &program, loads: &loads, cubes: narrow.iter().collect(), uniforms };
+            let uniforms: Vec<f32> = uniforms.into_iter().map(|x| x as f32).collect();
             let streams = [(&samples[..], fields), (&keeps[..], kept), (&[], 0), (&[], 0)]
                 .map(|(rows, stride)| Stream { rows, stride });
             for level in levels() {
+                let compiled = program.is_compiled(level) || tape.outputs.is_empty();
+                assert_eq!(compiled, compiled_for(level) || tape.outputs.is_empty(), "{of}");
+                let (cubes, uniforms) = (narrow.iter().collect(), uniforms.clone());
+                let bound = Bound { program: &program, level, loads: &loads, cubes, uniforms };
                 let mut file = File::default();
                 file.prepare(&bound);
                 with_simd!(level, simd => machine::run(simd, &bound, &file, &streams, first, count));

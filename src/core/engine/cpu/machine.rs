@@ -5,6 +5,7 @@
 //! rows stand together, so that a tape's file stays in the nearest cache.
 
 use std::cell::Cell;
+use std::sync::OnceLock;
 
 use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
@@ -23,7 +24,7 @@ use crate::program::native::Unit;
 use crate::program::tape::Tape;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
-use crate::simd::Simd;
+use crate::simd::{Level, Simd};
 use prefetch_index::prefetch_index;
 
 /// Rows of a register: so many that dispatch costs little, so few that registers stay in the nearest cache.
@@ -48,28 +49,26 @@ pub(super) struct Stream<'a> {
 #[derive(Debug)]
 pub(super) struct Program {
     pub(super) tape: Tape,
-    runs: Runs,
-}
-
-#[derive(Debug)]
-enum Runs {
     /// A function that was compiled ahead, by its place.
-    Compiled(usize),
-    /// This machine.
-    Code(Code),
+    compiled: Option<usize>,
+    /// What the machine runs, made when it first does.
+    code: OnceLock<Code>,
 }
 
 impl Program {
     /// `ahead`: the tape is of a plan that is compiled ahead.
     pub(super) fn new(tape: Tape, ahead: bool) -> Self {
         let compiled = if ahead { ahead::find(&tape) } else { None };
-        let runs = compiled.map_or_else(|| Runs::Code(Code::new(&tape)), Runs::Compiled);
-        Self { tape, runs }
+        Self { tape, compiled, code: OnceLock::new() }
     }
 
-    /// Whether a function that was compiled ahead runs it.
-    pub(super) const fn is_compiled(&self) -> bool {
-        matches!(self.runs, Runs::Compiled(_))
+    /// Whether a function that was compiled ahead runs it with the instructions of `level`.
+    pub(super) fn is_compiled(&self, level: Level) -> bool {
+        self.compiled.is_some() && ahead::compiled_for(level)
+    }
+
+    fn code(&self) -> &Code {
+        self.code.get_or_init(|| Code::new(&self.tape))
     }
 }
 
@@ -77,6 +76,8 @@ impl Program {
 #[derive(Debug)]
 pub(super) struct Bound<'a> {
     pub(super) program: &'a Program,
+    /// The instructions that run it.
+    pub(super) level: Level,
     /// For each field, the stream that holds it and its row there.
     pub(super) loads: &'a [(StreamOf, usize)],
     pub(super) cubes: Vec<&'a Cube<f32>>,
@@ -96,7 +97,8 @@ pub(super) struct File {
 impl File {
     /// Have room for a tape (and for what nobody reads), and its uniform numbers in place.
     pub(super) fn prepare(&mut self, bound: &Bound<'_>) {
-        if let Runs::Code(code) = &bound.program.runs {
+        if !bound.program.is_compiled(bound.level) {
+            let code = bound.program.code();
             self.uniforms.clear();
             self.uniforms.extend(bound.uniforms.iter().map(|&value| Row::of([value; LANES])));
             self.nobody = code.registers;
@@ -159,13 +161,13 @@ pub(super) fn run<S: Simd>(
     first: usize,
     count: usize,
 ) {
-    let code = match &bound.program.runs {
-        Runs::Compiled(tape) => {
-            let block = Block { bound, streams, first, count, cubes: &bound.cubes, columns: &file.columns };
-            return ahead::run(*tape, simd, block);
+    if let Some(tape) = bound.program.compiled {
+        let block = Block { bound, streams, first, count, cubes: &bound.cubes, columns: &file.columns };
+        if ahead::run(tape, simd, block) {
+            return;
         }
-        Runs::Code(code) => code,
-    };
+    }
+    let code = bound.program.code();
     simd.vectorize(
         #[inline(always)]
         || {
@@ -604,9 +606,10 @@ mod tests {
             let loads: Vec<(StreamOf, usize)> =
                 tape.fields.iter().map(|input| (StreamOf::Samples, input.component)).collect();
             let program = Program::new(tape.clone(), false);
-            let uniforms = uniforms.into_iter().map(|x| x as f32).collect();
-            let bound = Bound { program: &program, loads: &loads, cubes: Vec::new(), uniforms };
+            let uniforms: Vec<f32> = uniforms.into_iter().map(|x| x as f32).collect();
             for level in levels() {
+                let (cubes, uniforms) = (Vec::new(), uniforms.clone());
+                let bound = Bound { program: &program, level, loads: &loads, cubes, uniforms };
                 let mut file = File::default();
                 file.prepare(&bound);
                 for first in (0..RECORDS).step_by(BATCH) {

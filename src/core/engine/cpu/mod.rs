@@ -193,7 +193,7 @@ impl CpuEngine {
     pub fn is_compiled_ahead(&self, point: &Point) -> bool {
         let is_compiled = |reading: &Reading| {
             let program = &reading.program;
-            program.is_compiled() || program.tape.outputs.is_empty()
+            program.is_compiled(self.level) || program.tape.outputs.is_empty()
         };
         self.pass_for(self.turned(point))
             .is_ok_and(|pass| [&pass.keep, &pass.value, &pass.moved].into_iter().all(is_compiled))
@@ -225,7 +225,7 @@ impl CpuEngine {
             .iter()
             .map(|name| self.cube(name, lobe).unwrap_or(&self.dark))
             .collect();
-        Bound { program: &reading.program, loads: &reading.loads, cubes, uniforms }
+        Bound { program: &reading.program, level: self.level, loads: &reading.loads, cubes, uniforms }
     }
 
     fn cube<'a>(&'a self, name: &str, lobe: Option<&'a Lobe>) -> Option<&'a Cube<f32>> {
