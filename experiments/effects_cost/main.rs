@@ -2,12 +2,13 @@
 //! `cargo run --release --example effects_cost -- SCENE -o table.csv`; see README.md beside this file.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Parser;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use skinfit::engine::Unknown;
-use skinfit::engine::gpu::{DeviceSamples, GpuEngine, Memory, Task};
+use skinfit::engine::gpu::{DeviceSamples, GpuEngine, Memory};
 use skinfit::engine::view::ObservedView;
+use skinfit::engine::{Task, Unknown};
 use skinfit::gpu::upload::Content;
 use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use skinfit::model::effects::{Effect, Effects};
@@ -127,17 +128,13 @@ fn measure(
     let camera =
         Camera { width: arguments.width, height: arguments.height, ..prepared.scene.views[0].camera };
     // As many samples as the renderer draws fragments.
-    prepared.scene.views[0].camera = camera;
-    prepared.scene.quality.samples_per_axis = 1;
-    let content = Content {
-        scene: &prepared.scene,
-        illumination: &prepared.illumination,
-        occlusion: prepared.occlusion.as_ref(),
-        params: &prepared.scene.params,
-    };
+    let scene = Arc::make_mut(&mut prepared.scene);
+    scene.views[0].camera = camera;
+    scene.quality.samples_per_axis = 1;
+    let content = Content::of(&prepared);
     let budget = if arguments.exact { Budget::Exact } else { Budget::Paper };
     let render = RenderOptions { antialias: Antialias::Grid(1), budget, timed: true, animated: false };
-    let mut renderer = Renderer::with_shader(gpu, content, render, change)?;
+    let mut renderer = Renderer::with_shader(gpu, content.clone(), render, change)?;
     let (made, groups) = DeviceSamples::new(gpu, content)?;
     let views = groups.into_iter().map(|samples| {
         // With alpha where the image has the haze there.
@@ -147,7 +144,7 @@ fn measure(
     });
     let views: Vec<ObservedView> = views.collect();
     let whole = renderer.plan().wgsl != renderer.plan().fetches_alone().wgsl;
-    let engine = if whole { over_samples(&made, &prepared, &views)? } else { None };
+    let engine = if whole { over_samples(made, &prepared, views)? } else { None };
     let start = prepared.start();
     // The first frames wake the adapter up.
     renderer.frame_times(&camera, arguments.frames)?;
@@ -180,20 +177,17 @@ fn measure(
 }
 
 /// The fused engine over the samples of the image, its lookups live; `None` where the effects show nothing.
-fn over_samples<'g>(
-    made: &'g DeviceSamples<'g>,
+fn over_samples(
+    made: DeviceSamples,
     prepared: &Prepared,
-    views: &'g [ObservedView],
-) -> Result<Option<GpuEngine<'g>>, GpuError> {
+    views: Vec<ObservedView>,
+) -> Result<Option<GpuEngine>, GpuError> {
     let task = Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views,
-        loss: prepared.scene.fit.loss,
         // What moves normals forbids to keep what they look up.
         unknowns: vec![Unknown::Param(Column::tied(Param::NormalStrength))],
+        ..prepared.task(views)
     };
-    match GpuEngine::over_device_samples(made, task, &prepared.start(), Memory::default()) {
+    match GpuEngine::over_device_samples(Arc::new(made), task, &prepared.start(), Memory::default()) {
         Ok(engine) => Ok(Some(engine)),
         Err(GpuError::Plan(_)) => Ok(None),
         Err(error) => Err(error),

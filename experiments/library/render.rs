@@ -31,15 +31,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             return Ok(());
         }
     };
-    let content = Content {
-        scene: &prepared.scene,
-        illumination: &prepared.illumination,
-        occlusion: prepared.occlusion.as_ref(),
-        params: &prepared.scene.params,
-    };
     let antialias = Antialias::Grid(prepared.scene.quality.samples_per_axis);
     let options = RenderOptions { antialias, budget: Budget::Exact, timed: false, animated: false };
-    let on_gpu = Renderer::new(&gpu, content, options)?.render(&view.camera, 1.0)?.image;
+    let on_gpu = Renderer::new(&gpu, Content::of(&prepared), options)?.render(&view.camera, 1.0)?.image;
     write_exr(Path::new("library_gpu.exr"), &on_gpu, &Default::default())?;
 
     // Silhouettes are where the rasteriser and rays may differ by a pixel: the share of pixels that differ tells.

@@ -2,6 +2,7 @@
 //! constants: what `builtin` makes, taken through the stages.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::builtin::{self, BuiltinError};
 use crate::model::params::Param;
@@ -103,7 +104,7 @@ pub fn write_scene(folder: &Path, cache: Option<&Path>) -> Result<PathBuf, DemoE
     let scene = folder.join("scene.toml");
     let options = PrepareOptions { cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
     let mut prepared = Prepared::new(&scene, &options)?;
-    prepared.scene.params = builtin::true_params();
+    Arc::make_mut(&mut prepared.scene).params = builtin::true_params();
     let lobe = prepared.scene.params.scalar(Param::SpecularLobe);
     prepared.bake(lobe..=lobe, cache)?;
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;

@@ -2,13 +2,14 @@
 
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use web_time::Instant;
 
 use crate::bake::rays::any_can_be_hit;
 use crate::bake::{self, BakeError, BakeStats, Illumination, VertexOcclusion};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
-use crate::engine::{Point, Unknown};
+use crate::engine::{Point, Task, Unknown};
 use crate::fit::params_file::{ParamsFile, ParamsFileError};
 use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
@@ -85,19 +86,19 @@ pub enum Views {
     Named(String),
 }
 
-/// A scene that is ready to be evaluated.
+/// A scene that is ready to be evaluated. Scene and bakes are shared with what is made of them.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     /// The scene; its params are those to start from.
-    pub scene: Scene,
+    pub scene: Arc<Scene>,
     /// The effects that the parameter file's values were fitted with, where it says.
     pub fitted: Option<Effects>,
     /// A factor on each view's image.
     pub gains: Vec<f64>,
     /// The cubes that its effects ask for.
-    pub illumination: Illumination,
+    pub illumination: Arc<Illumination>,
     /// Ambient occlusion, when asked for.
-    pub occlusion: Option<VertexOcclusion>,
+    pub occlusion: Option<Arc<VertexOcclusion>>,
     /// The visible surface, a view each.
     pub samples: Vec<ViewSamples>,
     /// What was baked, and what came from the cache.
@@ -160,7 +161,7 @@ impl Prepared {
     /// # Errors
     /// When a view sees nothing of the mesh, or the mesh lacks what the effects ask for.
     pub fn traced(&self) -> Result<Vec<ViewSamples>, SampleError> {
-        samples::sample_views(&self.scene, &self.scene.mesh.pose(), self.occlusion.as_ref())
+        samples::sample_views(&self.scene, &self.scene.mesh.pose(), self.occlusion.as_deref())
     }
 
     /// Read and bake the scene at `path`; no surface is sampled.
@@ -194,10 +195,10 @@ impl Prepared {
         options.set.iter().for_each(|assignment| assignment.apply(&mut scene.params));
         scene.fit.free = untied(&scene.fit.free, &scene.params, &options.set);
         let mut prepared = Self {
-            scene,
+            scene: Arc::new(scene),
             fitted,
             gains,
-            illumination: Illumination::default(),
+            illumination: Arc::default(),
             occlusion: None,
             samples: Vec::new(),
             baked: BakeStats::default(),
@@ -225,7 +226,7 @@ impl Prepared {
         let mesh = &self.scene.mesh;
         let pose = |weights: &[f32]| mesh.pose_with_weights(weights);
         let (bake, baked) = bake::bake(&self.scene, &pose, exponents, cache)?;
-        self.occlusion = bake.occlusion;
+        self.occlusion = bake.occlusion.map(Arc::new);
         self.take_light(bake.illumination, baked, start);
         Ok(())
     }
@@ -244,7 +245,7 @@ impl Prepared {
     fn take_light(&mut self, illumination: Illumination, baked: BakeStats, start: Instant) {
         self.warnings.extend(baked.warnings.iter().cloned());
         self.baked = baked;
-        self.illumination = illumination;
+        self.illumination = Arc::new(illumination);
         self.seconds.bake += start.elapsed().as_secs_f64();
     }
 
@@ -287,11 +288,21 @@ impl Prepared {
     ///
     /// # Errors
     /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
-    pub fn engine_over(&self, observed: Vec<ObservedView>) -> Result<CpuEngine, PrepareError> {
-        let illumination = self.illumination.clone();
-        let engine =
-            CpuEngine::new(self.setup(), illumination, observed, self.scene.fit.loss, self.unknowns());
-        engine.map_err(|error| PrepareError::Shading { scene: self.scene.path.display().to_string(), error })
+    pub fn engine_over(&self, observed: impl Into<Arc<[ObservedView]>>) -> Result<CpuEngine, PrepareError> {
+        CpuEngine::new(self.task(observed))
+            .map_err(|error| PrepareError::Shading { scene: self.scene.path.display().to_string(), error })
+    }
+
+    /// The scene's fit over views that [`Self::observed`] gave.
+    #[must_use]
+    pub fn task(&self, observed: impl Into<Arc<[ObservedView]>>) -> Task {
+        Task {
+            setup: self.setup(),
+            illumination: Arc::clone(&self.illumination),
+            views: observed.into(),
+            loss: self.scene.fit.loss,
+            unknowns: self.unknowns(),
+        }
     }
 
     /// The views that have a target, with their samples; views without one are dropped from the scene.
@@ -316,7 +327,7 @@ impl Prepared {
             format!("{path}: view \"{}\" has no target and takes no part in the fit.", view.name)
         };
         self.warnings.extend(without.map(warning));
-        retain(&mut self.scene.views, &has_target);
+        retain(&mut Arc::make_mut(&mut self.scene).views, &has_target);
         retain(&mut self.gains, &has_target);
         retain(&mut self.samples, &has_target);
         if self.scene.views.is_empty() {

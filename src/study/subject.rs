@@ -1,11 +1,12 @@
 //! A scene in one setting, ready to be evaluated: baked, sampled, and with something to compare with.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::StudyError;
 use super::reference::Source;
-use crate::engine::Point;
 use crate::engine::cpu::CpuEngine;
+use crate::engine::{Point, Task};
 use crate::fit::outcome::Outcome;
 use crate::fit::{self, FitOptions};
 use crate::model::effects::Effect;
@@ -62,7 +63,8 @@ impl Subject {
             }
             None => None,
         };
-        for (view, image) in prepared.scene.views.iter_mut().zip(made.into_iter().flatten()) {
+        let views = Arc::make_mut(&mut prepared.scene).views.iter_mut();
+        for (view, image) in views.zip(made.into_iter().flatten()) {
             let (rgb, alpha) = (image.rgb.clone(), Some(image.alpha.clone()));
             view.target = Some(Target { rgb, alpha, haze: None, mask: None, clipped_at: None });
         }
@@ -103,10 +105,9 @@ impl Subject {
     /// # Errors
     /// When a rule cannot be computed on the processor.
     pub fn live_engine(&self) -> Result<CpuEngine, StudyError> {
-        let (illumination, views) = (self.prepared.illumination.clone(), self.engine.views().to_vec());
-        let loss = self.prepared.scene.fit.loss;
-        let setup = self.prepared.setup();
-        Ok(CpuEngine::with_kept_terms(setup, illumination, views, loss, Vec::new(), false)?)
+        let views = Arc::clone(self.engine.views());
+        let task = Task { unknowns: Vec::new(), ..self.prepared.task(views) };
+        Ok(CpuEngine::with_kept_terms(task, false)?)
     }
 }
 

@@ -1,11 +1,11 @@
 //! A term that is computed in texels of the UV atlas and blurred there, through the door by which every term comes in:
 //! planned, each of its passes valid, drawn by the renderer and held against the same passes written here.
 
+use std::sync::Arc;
 use std::sync::OnceLock;
 
 use glam::{DMat4, DVec2, DVec3, Vec2, Vec3};
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use skinfit::bake::Illumination;
 use skinfit::gpu::upload::Content;
 use skinfit::gpu::{RenderOptions, Renderer};
 use skinfit::model::effects::{Effects, Form, Silhouette};
@@ -286,11 +286,7 @@ fn levels_move_as_their_differences_do() {
     scene.effects = Effects::of(&[veined.effect]);
     let facts = Facts { atlas: Some(64), ..Facts::of_scene(&scene, &scene.params, Budget::Exact, false) };
     let planned = plan(&facts).unwrap();
-    let illumination = Illumination { irradiance: None, lobes: None, hilite: None };
-    let levels = |plan: &Plan, scene: &Scene| {
-        let content = Content { scene, illumination: &illumination, occlusion: None, params: &scene.params };
-        skinfit::gpu::atlas::levels(gpu, plan, content).unwrap()
-    };
+    let levels = |plan: &Plan, scene: &Scene| skinfit::gpu::atlas::levels(gpu, plan, content(scene)).unwrap();
     // The square's side over the texels that it covers: rounded at most by what 1e-7 is of a texel's 1e-2.
     for [u, v, _] in held(&levels(&planned, &scene)["veins_stretch"]) {
         let step = 2.0 / (64.0 * (HIGH - LOW));
@@ -324,10 +320,14 @@ fn levels_move_as_their_differences_do() {
     }
 }
 
+/// The scene without any light.
+fn content(scene: &Scene) -> Content {
+    let (scene, params) = (Arc::new(scene.clone()), scene.params.clone());
+    Content { scene, illumination: Arc::default(), occlusion: None, params }
+}
+
 fn drawn(scene: &Scene, options: RenderOptions) -> Option<(Image, Plan)> {
-    let illumination = Illumination { irradiance: None, lobes: None, hilite: None };
-    let content = Content { scene, illumination: &illumination, occlusion: None, params: &scene.params };
-    let mut renderer = Renderer::new(gpu()?, content, options).unwrap();
+    let mut renderer = Renderer::new(gpu()?, content(scene), options).unwrap();
     let image = renderer.render(&scene.views[0].camera, 1.0).unwrap().image;
     Some((image, renderer.plan().clone()))
 }

@@ -115,7 +115,7 @@ impl Parts {
         views: &[ObservedView],
         traits: &Traits,
         memory: Memory,
-        made: Option<&DeviceSamples<'_>>,
+        made: Option<&DeviceSamples>,
     ) -> Result<Self, GpuError> {
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -222,7 +222,7 @@ impl Parts {
         &mut self,
         gpu: &Gpu,
         views: &[ObservedView],
-        made: Option<&DeviceSamples<'_>>,
+        made: Option<&DeviceSamples>,
     ) -> Result<(), GpuError> {
         for index in 0..self.parts.len() {
             let part = &self.parts[index];

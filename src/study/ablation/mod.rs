@@ -16,6 +16,7 @@ pub mod refit;
 mod units;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::Serialize;
 
@@ -236,7 +237,7 @@ fn words(options: &AblationOptions, source: Source) -> String {
 }
 
 fn references(whole: &Subject) -> Vec<ReferenceView> {
-    let views = whole.prepared.scene.views.iter().zip(whole.engine.views());
+    let views = whole.prepared.scene.views.iter().zip(whole.engine.views().iter());
     views.map(|(view, observed)| ReferenceView::new(view, observed)).collect()
 }
 
@@ -263,7 +264,7 @@ impl Study<'_> {
         let effects = case.effects(full);
         let prepare = PrepareOptions { effects: Some(effects), ..self.prepare.clone() };
         let subject = Subject::new(self.scene, &prepare, self.made.as_deref(), &|prepared| {
-            let scene = &mut prepared.scene;
+            let scene = Arc::make_mut(&mut prepared.scene);
             // What is fitted starts where the whole model ended.
             scene.params = self.point.params.clone();
             case.apply(effects, &mut scene.params, &mut scene.fit.free);
@@ -298,7 +299,7 @@ struct Evaluated {
 }
 
 impl Evaluated {
-    fn row(self, subject: &Subject, clocks: &Clocks<'_>, before: &[LossMap]) -> Result<Row, StudyError> {
+    fn row(self, subject: &Subject, clocks: &Clocks, before: &[LossMap]) -> Result<Row, StudyError> {
         let (cpu, gpu) = clocks.time(subject, &self.point)?;
         let maps: Vec<LossMap> = self.errors.iter().map(|errors| errors.map.clone()).collect();
         let keep = self.case.left_out.len() < 2;

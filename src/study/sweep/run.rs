@@ -1,6 +1,7 @@
 //! One job, from its scene to its figures.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use serde_json::Value;
 
@@ -10,7 +11,7 @@ use super::result::{Figures, Findings, number};
 use super::studies;
 use crate::StudyError;
 use crate::engine::cpu::CpuEngine;
-use crate::engine::{Objective as _, Unknown};
+use crate::engine::{Objective as _, Task, Unknown};
 use crate::fit::outcome::Outcome;
 use crate::fit::{FitError, FitOptions, SolverKind, fit};
 use crate::prepare::{PrepareError, PrepareOptions, Prepared};
@@ -76,9 +77,9 @@ fn run_fit(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, Job
         ..FitOptions::default()
     };
     let outcome = fit(&engine, &prepared.start(), &options, &mut |_| {})?;
-    let (setup, light) = (prepared.setup(), prepared.illumination.clone());
-    let squares = CpuEngine::new(setup, light, engine.views().to_vec(), Loss::L2, Vec::new());
-    let squares = squares.map_err(StudyError::from)?;
+    let views = Arc::clone(engine.views());
+    let squares = Task { loss: Loss::L2, unknowns: Vec::new(), ..prepared.task(views) };
+    let squares = CpuEngine::new(squares).map_err(StudyError::from)?;
     let view = |index: usize| prepared.scene.views.get(index).map_or("?", |view| &view.name);
     Ok(fit_figures(&outcome, squares.loss(&outcome.end).sqrt(), view))
 }

@@ -11,7 +11,7 @@ use crate::bake::rays::RayMesh;
 use crate::bake::{self, Illumination, VertexOcclusion};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
-use crate::engine::{Objective, Point};
+use crate::engine::{Objective, Point, Task};
 use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
@@ -87,7 +87,7 @@ pub struct Evaluated {
     /// The scene, with the settings.
     pub scene: Scene,
     /// Its cubes.
-    pub illumination: Illumination,
+    pub illumination: Arc<Illumination>,
     /// Its visible surface, a view each.
     pub samples: Surfaces,
 }
@@ -114,7 +114,7 @@ impl<'a> Bench<'a> {
     #[must_use]
     pub fn at(&self, params: Params) -> Self {
         let mut prepared = self.prepared.clone();
-        prepared.scene.params = params;
+        Arc::make_mut(&mut prepared.scene).params = params;
         let (surfaces, last, hits) = (Arc::clone(&self.surfaces), RefCell::default(), RefCell::default());
         Self { prepared, surfaces, last, hits, cache: self.cache.clone(), ..*self }
     }
@@ -172,7 +172,7 @@ impl<'a> Bench<'a> {
     /// The scene with these settings.
     #[must_use]
     pub fn scene(&self, settings: Settings) -> Scene {
-        let mut scene = self.prepared.scene.clone();
+        let mut scene = Scene::clone(&self.prepared.scene);
         (scene.silhouette, scene.quality) = (settings.silhouette, settings.quality);
         scene
     }
@@ -186,7 +186,7 @@ impl<'a> Bench<'a> {
         let scene = self.scene(settings);
         let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
         let samples = self.surfaces(&scene, settings.into(), bake.occlusion.as_ref())?;
-        Ok(Evaluated { scene, illumination: bake.illumination, samples })
+        Ok(Evaluated { scene, illumination: Arc::new(bake.illumination), samples })
     }
 
     /// As [`Self::evaluate`], with the surface traced anew.
@@ -197,7 +197,7 @@ impl<'a> Bench<'a> {
         let scene = self.scene(settings);
         let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
         let samples = Arc::new(traced(&scene, bake.occlusion.as_ref())?);
-        Ok(Evaluated { scene, illumination: bake.illumination, samples })
+        Ok(Evaluated { scene, illumination: Arc::new(bake.illumination), samples })
     }
 
     /// The samples of `scene`, which is this one at other settings.
@@ -314,7 +314,8 @@ impl Evaluated {
             ..ObservedView::default()
         };
         let views = self.samples.iter().map(observed).collect();
-        let illumination = self.illumination.clone();
-        Ok(CpuEngine::with_kept_terms(self.setup(), illumination, views, Loss::L2, Vec::new(), false)?)
+        let illumination = Arc::clone(&self.illumination);
+        let task = Task { setup: self.setup(), illumination, views, loss: Loss::L2, unknowns: Vec::new() };
+        Ok(CpuEngine::with_kept_terms(task, false)?)
     }
 }

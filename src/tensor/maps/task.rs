@@ -50,7 +50,7 @@ impl<'a> MapTask<'a> {
         Self {
             scene: &prepared.scene,
             posed,
-            illumination: prepared.illumination.clone(),
+            illumination: Illumination::clone(&prepared.illumination),
             open: prepared.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
             observed,
             held_out: None,

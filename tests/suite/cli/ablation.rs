@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use serde_json::Value;
 use skinfit::FitOptions;
@@ -284,7 +285,7 @@ fn the_sunrise_is_fitted_again_as_well_as_from_its_own_start() {
     let effects = whole.prepared.scene.effects.without(Effect::SideSpecular);
     let options = PrepareOptions { effects: Some(effects), ..options };
     let subject = Subject::new(&scene, &options, None, &|prepared| {
-        prepared.scene.fit.free.retain(|column| column.param.asked_for(effects));
+        Arc::make_mut(&mut prepared.scene).fit.free.retain(|column| column.param.asked_for(effects));
     })
     .unwrap();
     let own = subject.prepared.start();

@@ -1,6 +1,7 @@
 //! What a looser budget, multisampling and 16-bit targets may change.
 
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 use skinfit::gpu::{RenderOptions, Renderer};
 use skinfit::render::antialias::Antialias;
@@ -96,7 +97,7 @@ fn multisampling_smooths_the_outline_and_leaves_the_inside_as_it_is() {
 fn radiance_beyond_16_bits_is_cut_and_counted_and_none_is_lost_in_32() {
     let Some(gpu) = gpu() else { return };
     let mut prepared = prepared(&built_in(), SURFACE, 32);
-    prepared.scene.params.set(skinfit::model::params::Param::BaseWeight, 1e6);
+    Arc::make_mut(&mut prepared.scene).params.set(skinfit::model::params::Param::BaseWeight, 1e6);
     let camera = prepared.scene.views[0].camera;
     for (antialias, cut) in [(Antialias::Msaa4, true), (Antialias::Grid(2), false)] {
         let options = RenderOptions { antialias, ..EXACT };

@@ -1,6 +1,7 @@
 //! An adapter, scenes, and images of both engines.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::OnceLock;
 
 use skinfit::demo;
@@ -72,32 +73,28 @@ pub(crate) fn prepared(scene: &Path, effects: Effects, size: u32) -> Prepared {
         ..PrepareOptions::default()
     };
     let mut prepared = Prepared::baked(scene, &options).unwrap();
-    let camera = &mut prepared.scene.views[0].camera;
+    let camera = &mut Arc::make_mut(&mut prepared.scene).views[0].camera;
     (camera.width, camera.height) = (size, size);
     prepared
 }
 
 /// The scene read another way.
 pub(crate) fn read_as(mut prepared: Prepared, form: Form, silhouette: Silhouette) -> Prepared {
-    (prepared.scene.form, prepared.scene.silhouette) = (form, silhouette);
+    let scene = Arc::make_mut(&mut prepared.scene);
+    (scene.form, scene.silhouette) = (form, silhouette);
     prepared
 }
 
 /// What a renderer needs of a scene.
-pub(crate) fn content(prepared: &Prepared) -> Content<'_> {
-    Content {
-        scene: &prepared.scene,
-        illumination: &prepared.illumination,
-        occlusion: prepared.occlusion.as_ref(),
-        params: &prepared.scene.params,
-    }
+pub(crate) fn content(prepared: &Prepared) -> Content {
+    Content::of(prepared)
 }
 
 /// The CPU engine's image, with `n` x `n` samples a pixel.
 pub(crate) fn on_cpu(prepared: &mut Prepared, n: u32) -> Image {
-    prepared.scene.quality.samples_per_axis = n;
+    Arc::make_mut(&mut prepared.scene).quality.samples_per_axis = n;
     let posed = prepared.scene.mesh.pose();
-    let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
+    let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_deref()).unwrap();
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
     let mut shaded = shader.shade(&samples[0], &prepared.scene.views[0].camera, prepared.gains[0]);
     let (scene, view) = (&prepared.scene, &prepared.scene.views[0]);

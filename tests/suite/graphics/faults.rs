@@ -1,5 +1,7 @@
 //! What the renderer refuses, and lost devices.
 
+use std::sync::Arc;
+
 use skinfit::gpu::{Choice, Gpu, GpuError, Renderer};
 
 use super::bench::*;
@@ -24,7 +26,7 @@ fn an_image_or_a_map_beyond_the_adapters_limit_is_refused_and_the_device_goes_on
         panic!("a map of more than 512 texels was taken")
     };
     assert!(what.contains("texels"), "{what}");
-    prepared.scene.maps = Default::default();
+    Arc::make_mut(&mut prepared.scene).maps = Default::default();
     let mut renderer = Renderer::new(&small, content(&prepared), EXACT).unwrap();
     let mut camera = prepared.scene.views[0].camera;
     let seen = renderer.render(&camera, 1.0).unwrap();

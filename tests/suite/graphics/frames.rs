@@ -1,5 +1,7 @@
 //! Tiles, sequences of frames, layers.
 
+use std::sync::Arc;
+
 use skinfit::bake::bake_pose;
 use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use skinfit::model::effects::Effect;
@@ -19,7 +21,7 @@ fn an_image_in_tiles_is_the_image_in_one() {
     };
     for effects in [SURFACE, everything()] {
         let mut prepared = prepared(&built_in(), effects, 100);
-        prepared.scene.views[0].camera.width = 1100;
+        Arc::make_mut(&mut prepared.scene).views[0].camera.width = 1100;
         let options = RenderOptions { antialias: Antialias::Grid(3), ..EXACT };
         let (whole, tiled) = (on_gpu(gpu, &prepared, options), on_gpu(&small, &prepared, options));
         assert_eq!(whole.alpha, tiled.alpha, "{effects:?}");
@@ -69,9 +71,8 @@ fn goes_through_an_animation(gpu: &Gpu, of_its_own: bool) {
     let (first, last) = animation.seconds;
     assert!(last > first);
     let meshes = [0.0, 0.35, 0.8].map(|share| animation.mesh(first + share * (last - first)).unwrap());
-    let still = prepared.scene.clone();
-    let at_rest = skinfit::gpu::upload::Content { scene: &still, ..content(&prepared) };
-    let mut renderer = Renderer::new(gpu, at_rest, RenderOptions { animated: true, ..EXACT }).unwrap();
+    let mut renderer =
+        Renderer::new(gpu, content(&prepared), RenderOptions { animated: true, ..EXACT }).unwrap();
     let (mut frames, mut occlusions) = (Vec::new(), Vec::new());
     for mesh in &meshes {
         let occlusion = of_its_own.then(|| bake_pose(&prepared.scene, &mesh.pose(), Some(&cache())).0);
@@ -82,9 +83,9 @@ fn goes_through_an_animation(gpu: &Gpu, of_its_own: bool) {
     assert!(frames[0].rgb != frames[1].rgb, "nothing moves");
     drop(renderer);
     for (i, ((mesh, occlusion), frame)) in meshes.into_iter().zip(occlusions).zip(frames).enumerate() {
-        prepared.scene.mesh = mesh;
+        Arc::make_mut(&mut prepared.scene).mesh = mesh;
         if of_its_own {
-            prepared.occlusion = occlusion;
+            prepared.occlusion = occlusion.map(Arc::new);
         }
         let reference = on_cpu(&mut prepared, 2);
         let Difference { interior, .. } = Difference::new(&reference, &frame, 4);

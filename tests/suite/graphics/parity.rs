@@ -4,6 +4,7 @@
 //! the samples' centres, the adapter in f32 at what its rasteriser interpolates.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::{DMat4, Vec3};
 use skinfit::gpu::Gpu;
@@ -140,7 +141,7 @@ fn the_papers_other_readings_show_the_same_on_both_engines() {
         let mut prepared = prepared(&built_in(), everything(), SIZE);
         pose(&mut prepared);
         turn(&mut prepared);
-        read(&mut prepared.scene);
+        read(Arc::make_mut(&mut prepared.scene));
         compare(name, gpu, prepared);
     }
 }
@@ -189,25 +190,27 @@ pub(super) fn stand_back(prepared: &mut Prepared) {
     let high = positions.iter().copied().reduce(Vec3::max).unwrap();
     let eye = 0.5 * (low + high) + 2.0 * Vec3::new(0.3, 0.2, 1.0) * (high - low).max_element();
     let look = DMat4::from_rotation_x(0.19) * DMat4::from_rotation_y(-0.29);
-    prepared.scene.views[0].camera.world_to_camera = look * DMat4::from_translation(-eye.as_dvec3());
+    Arc::make_mut(&mut prepared.scene).views[0].camera.world_to_camera =
+        look * DMat4::from_translation(-eye.as_dvec3());
 }
 
 /// Morph weights of all signs, and the bones of the middle of the animation.
 pub(super) fn pose(prepared: &mut Prepared) {
     let weights = [0.8, 0.0, -0.3, 0.5, 1.1];
-    for (morph, weight) in prepared.scene.mesh.morphs.iter_mut().zip(weights) {
+    for (morph, weight) in Arc::make_mut(&mut prepared.scene).mesh.morphs.iter_mut().zip(weights) {
         morph.weight = weight;
     }
     if prepared.scene.effects.has(Effect::Skin) {
         let animation = skinfit::scene::animation::Animation::open(&prepared.scene).unwrap().unwrap();
         let (first, last) = animation.seconds;
-        prepared.scene.mesh.bones = animation.mesh(0.4 * first + 0.6 * last).unwrap().bones;
+        Arc::make_mut(&mut prepared.scene).mesh.bones =
+            animation.mesh(0.4 * first + 0.6 * last).unwrap().bones;
     }
 }
 
 /// Parameters away from their defaults, channels apart.
 pub(super) fn turn(prepared: &mut Prepared) {
-    let params = &mut prepared.scene.params;
+    let params = &mut Arc::make_mut(&mut prepared.scene).params;
     params.set_rgb(Param::BaseWeight, [0.9, 1.0, 1.1]);
     params.set_rgb(Param::RimWeight, [0.4, -0.1, 0.3]);
     params.set_rgb(Param::KeyColor, [0.3, 0.2, 0.1]);

@@ -1,5 +1,7 @@
 //! Backdrops, bloom and haze: both engines show the same, and what they should.
 
+use std::sync::Arc;
+
 use skinfit::gpu::{RenderOptions, Renderer};
 use skinfit::model::effects::Effect;
 use skinfit::render::antialias::Antialias;
@@ -20,8 +22,8 @@ fn backdrop_and_bloom_are_the_same_from_both_engines() {
     for background in BACKGROUNDS {
         for (effects, n) in [(everything(), 1), (everything(), 3), (SURFACE, 2)] {
             let mut prepared = prepared(&built_in(), effects, 64);
-            prepared.scene.views[0].background = background;
-            prepared.scene.bloom.sigma = 0.05;
+            Arc::make_mut(&mut prepared.scene).views[0].background = background;
+            Arc::make_mut(&mut prepared.scene).bloom.sigma = 0.05;
             prepared.gains[0] = 0.5;
             let options = RenderOptions { antialias: Antialias::Grid(n), ..EXACT };
             let (cpu, drawn) = (on_cpu(&mut prepared, n), on_gpu(gpu, &prepared, options));
@@ -44,9 +46,9 @@ fn backdrop_and_bloom_are_the_same_from_both_engines() {
 fn in_sixteen_bits_backdrop_and_bloom_differ_by_rounding_alone() {
     let Some(gpu) = gpu() else { return };
     let mut prepared = prepared(&built_in(), everything(), 64);
-    prepared.scene.views[0].background = Background::None;
+    Arc::make_mut(&mut prepared.scene).views[0].background = Background::None;
     let bare = on_gpu(gpu, &prepared, RenderOptions { antialias: Antialias::Grid(2), ..EXACT });
-    prepared.scene.views[0].background = Background::Environment;
+    Arc::make_mut(&mut prepared.scene).views[0].background = Background::Environment;
     // Multisampling shades the pixel's centre, as one sample does, but covers outlines otherwise: there and as far as
     // they bleed, some four pixels, pictures differ
     // (folds of the ear and the lips are outlines as well: there the median is asked for).
@@ -87,7 +89,7 @@ fn difference_off_the_outline(a: &Image, b: &Image, bare: &Image, margin: usize,
 #[test]
 fn the_glow_grows_with_the_gain_and_not_with_its_square() {
     let mut prepared = prepared(&built_in(), everything(), 64);
-    prepared.scene.views[0].background = Background::Color([2.0, 1.0, 0.5]);
+    Arc::make_mut(&mut prepared.scene).views[0].background = Background::Color([2.0, 1.0, 0.5]);
     let mut at = |gain: f64, on: &mut dyn FnMut(&mut skinfit::prepare::Prepared) -> Image| {
         prepared.gains[0] = gain;
         on(&mut prepared)
@@ -108,9 +110,9 @@ fn the_glow_grows_with_the_gain_and_not_with_its_square() {
 #[test]
 fn a_bright_backdrop_bleeds_over_the_silhouette_as_far_as_the_bloom_reaches() {
     let mut prepared = prepared(&built_in(), everything(), 96);
-    prepared.scene.bloom.sigma = 0.02;
+    Arc::make_mut(&mut prepared.scene).bloom.sigma = 0.02;
     let bare = on_cpu(&mut prepared, 2);
-    prepared.scene.views[0].background = Background::Color([4.0; 3]);
+    Arc::make_mut(&mut prepared.scene).views[0].background = Background::Color([4.0; 3]);
     let lit = on_cpu(&mut prepared, 2);
     // The kernel ends at three standard deviations, rounded up.
     let reach = (3.0_f64 * 0.02 * 96.0).ceil() as usize;
@@ -141,9 +143,9 @@ fn a_pixels_glow_is_the_mean_over_its_samples_of_radiance_times_haze() {
     // The samples of 3 x 3 pixels, one each, are those of one pixel of 3 x 3.
     let of = |size: u32, n: u32| {
         let mut prepared = prepared(&built_in(), everything(), size);
-        prepared.scene.quality.samples_per_axis = n;
+        Arc::make_mut(&mut prepared.scene).quality.samples_per_axis = n;
         let posed = prepared.scene.mesh.pose();
-        let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
+        let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_deref()).unwrap();
         let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
         shader.shade(&samples[0], &prepared.scene.views[0].camera, 1.0)
     };
@@ -168,9 +170,9 @@ fn the_haze_is_the_same_from_both_engines() {
     let Some(gpu) = gpu() else { return };
     let effects = SURFACE.with(Effect::Haze);
     let mut prepared = prepared(&built_in(), effects, 64);
-    prepared.scene.quality.samples_per_axis = 2;
+    Arc::make_mut(&mut prepared.scene).quality.samples_per_axis = 2;
     let posed = prepared.scene.mesh.pose();
-    let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
+    let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_deref()).unwrap();
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
     let camera = prepared.scene.views[0].camera;
     let want = shader.shade(&samples[0], &camera, 0.5).haze;

@@ -5,11 +5,12 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
-use skinfit::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory, Task};
+use skinfit::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory};
 use skinfit::engine::reference::Reference;
 use skinfit::engine::view::ObservedView;
-use skinfit::engine::{Objective, Point, Unknown};
+use skinfit::engine::{Objective, Point, Task, Unknown};
 use skinfit::fit::{FitOptions, fit};
 use skinfit::gpu::{Choice, Gpu, GpuError};
 use skinfit::model::dapple::Dapple;
@@ -85,7 +86,7 @@ fn by_pixel(samples: &ViewSamples) -> BTreeMap<u32, Vec<usize>> {
 /// The first view's samples as the CPU makes them.
 fn traced(prepared: &Prepared) -> ViewSamples {
     let posed = prepared.scene.mesh.pose();
-    sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap().remove(0)
+    sample_views(&prepared.scene, &posed, prepared.occlusion.as_deref()).unwrap().remove(0)
 }
 
 /// And as the adapter does.
@@ -177,13 +178,14 @@ fn every_field_holds_what_the_rays_hit() {
     }
     // Two normals, and a normal for the dapple in its place.
     let mut other = moved(Form::Corrected, Silhouette::Fragment);
-    other.scene.lookups = Lookups::Smooth;
-    other.scene.dapple = Dapple::new([0.48, -0.36, 0.8], 30.0, false);
-    other.scene.fit.free.push(Column::tied(Param::EnvironmentRotation));
+    let scene = Arc::make_mut(&mut other.scene);
+    scene.lookups = Lookups::Smooth;
+    scene.dapple = Dapple::new([0.48, -0.36, 0.8], 30.0, false);
+    scene.fit.free.push(Column::tied(Param::EnvironmentRotation));
     compare("smooth lookups, a dapple that turns", gpu, &other);
     let mut still = prepared(&built_in(), SURFACE, SIZE);
     compare("still", gpu, &still);
-    still.scene.quality.samples_per_axis = 1;
+    Arc::make_mut(&mut still.scene).quality.samples_per_axis = 1;
     compare("one sample a pixel", gpu, &still);
     // Without a normal map, the base is the whole normal: unit, or as interpolated.
     for form in Form::ALL {
@@ -205,7 +207,7 @@ fn what_is_beyond_a_texture_is_drawn_in_tiles() {
     let Some(gpu) = open(&Choice { max_side: Some(75), ..Choice::default() }) else { return };
     let mut prepared = prepared(&built_in(), SURFACE, SIZE);
     // Maps that such a device takes.
-    prepared.scene.maps = Default::default();
+    Arc::make_mut(&mut prepared.scene).maps = Default::default();
     prepared.illumination = Default::default();
     compare("tiles", &gpu, &prepared);
 }
@@ -229,6 +231,7 @@ fn passes_over_them_equal_the_plain_model_in_parts_and_when_terms_are_kept() {
     let Some(gpu) = gpu() else { return };
     let prepared = moved(Form::Corrected, Silhouette::Fragment);
     let (made, groups) = DeviceSamples::new(gpu, content(&prepared)).unwrap();
+    let made = Arc::new(made);
     let views = observed(&prepared, groups);
     let mut read = views.clone();
     read[0].samples.surface = made.read(0, &views[0].samples).unwrap();
@@ -242,15 +245,9 @@ fn passes_over_them_equal_the_plain_model_in_parts_and_when_terms_are_kept() {
     let bytes = 4 * LANES as u64 * read[0].samples.surface.rows().all().len() as u64;
     for (unknowns, part) in [(&kept, None), (&kept, Some(bytes / 3)), (&live, Some(bytes / 3))] {
         let mut point = prepared.start();
-        let task = Task {
-            setup: prepared.setup(),
-            illumination: prepared.illumination.clone(),
-            views: &views,
-            loss,
-            unknowns: unknowns.clone(),
-        };
+        let task = Task { loss, unknowns: unknowns.clone(), ..prepared.task(&*views) };
         let memory = Memory { part, resident: None };
-        let engine = GpuEngine::over_device_samples(&made, task, &point, memory).unwrap();
+        let engine = GpuEngine::over_device_samples(Arc::clone(&made), task, &point, memory).unwrap();
         let plain = Reference::new(prepared.setup(), &prepared.illumination, &read, loss, unknowns).unwrap();
         for strength in [1.4, 0.6] {
             point.params.set(Param::NormalStrength, strength);
@@ -272,16 +269,10 @@ fn fit_both_ways(gpu: &Gpu, scene: &Path, share: f64) {
     let (made, groups) = DeviceSamples::new(gpu, content(&prepared)).unwrap();
     let views = prepared.observed_with(groups).unwrap();
     let traced = prepared.observed_with(prepared.traced().unwrap()).unwrap();
-    let task = |views| Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views,
-        loss: prepared.scene.fit.loss,
-        unknowns: prepared.unknowns(),
-    };
     let start: Point = prepared.start();
-    let ours = GpuEngine::over_device_samples(&made, task(&views), &start, Memory::default()).unwrap();
-    let theirs = GpuEngine::new(gpu, task(&traced), &start, Memory::default()).unwrap();
+    let (made, task) = (Arc::new(made), prepared.task(views));
+    let ours = GpuEngine::over_device_samples(made, task, &start, Memory::default()).unwrap();
+    let theirs = GpuEngine::new(gpu, prepared.task(traced), &start, Memory::default()).unwrap();
     let [ours, theirs] =
         [&ours, &theirs].map(|engine| fit(engine, &start, &FitOptions::default(), &mut |_| {}).unwrap());
     let what = scene.display();
@@ -321,24 +312,18 @@ fn what_cannot_be_made_is_refused() {
     let mut prepared = prepared(&built_in(), SURFACE, SIZE);
     let (made, groups) = DeviceSamples::new(gpu, content(&prepared)).unwrap();
     let views = observed(&prepared, groups);
-    let task = Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views: &views,
-        loss: prepared.scene.fit.loss,
-        unknowns: Vec::new(),
-    };
+    let task = Task { unknowns: Vec::new(), ..prepared.task(views) };
     let memory = Memory { part: None, resident: Some(1000) };
-    let refused = GpuEngine::over_device_samples(&made, task, &prepared.start(), memory).map(|_| ());
+    let refused = GpuEngine::over_device_samples(Arc::new(made), task, &prepared.start(), memory).map(|_| ());
     assert!(matches!(refused, Err(GpuError::SamplesStay { most: 1000, .. })), "{refused:?}");
     let words = refused.unwrap_err().to_string();
     assert!(words.contains("1000 may stay there"), "{words}");
     let refusal = |prepared: &Prepared| DeviceSamples::new(gpu, content(prepared)).map(|_| ()).unwrap_err();
-    let camera = &mut prepared.scene.views[0].camera;
+    let camera = &mut Arc::make_mut(&mut prepared.scene).views[0].camera;
     camera.world_to_camera = glam::DMat4::from_rotation_y(3.1) * camera.world_to_camera;
     let error = refusal(&prepared);
     assert!(matches!(error, DeviceSampleError::Samples(SampleError::NothingVisible { .. })), "{error}");
-    prepared.scene.mesh.uvs.clear();
+    Arc::make_mut(&mut prepared.scene).mesh.uvs.clear();
     let error = refusal(&prepared);
     assert!(matches!(error, DeviceSampleError::Samples(SampleError::NoUvs { .. })), "{error}");
 }

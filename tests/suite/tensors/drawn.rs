@@ -1,6 +1,7 @@
 //! Samples that the adapter drew, as tensors without a way through the host.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use skinfit::demo;
 use skinfit::engine::gpu::DeviceSamples;
@@ -20,16 +21,11 @@ fn small(effects: Option<Effects>) -> Prepared {
     let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
     let options = PrepareOptions { effects, cache: Some(cache), ..PrepareOptions::default() };
     let mut prepared = Prepared::baked(&scene, &options).unwrap();
-    prepared.scene.views.truncate(2);
-    for view in &mut prepared.scene.views {
+    Arc::make_mut(&mut prepared.scene).views.truncate(2);
+    for view in &mut Arc::make_mut(&mut prepared.scene).views {
         (view.camera.width, view.camera.height) = (64, 48);
     }
     prepared
-}
-
-fn content(prepared: &Prepared) -> Content<'_> {
-    let Prepared { scene, illumination, occlusion, .. } = prepared;
-    Content { scene, illumination, occlusion: occlusion.as_ref(), params: &scene.params }
 }
 
 #[test]
@@ -41,7 +37,7 @@ fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded()
         let asked = |param: &Param| param.asked_for(prepared.setup().effects);
         let free = [Param::BaseWeight, Param::RimExponent, Param::Occlusion].into_iter().filter(asked);
         let columns: Vec<Column> = free.map(Column::tied).collect();
-        let (made, groups) = DeviceSamples::new(shared.gpu(), content(&prepared)).unwrap();
+        let (made, groups) = DeviceSamples::new(shared.gpu(), Content::of(&prepared)).unwrap();
         let read: Vec<ViewSamples> = groups
             .iter()
             .enumerate()
@@ -92,7 +88,7 @@ fn samples_of_another_device_and_other_views_are_refused_in_words() {
     let Some(shared) = shared() else { return };
     let prepared = small(Some(Effects::SURFACE));
     let other = Gpu::open(&Choice::default()).unwrap();
-    let (made, groups) = DeviceSamples::new(&other, content(&prepared)).unwrap();
+    let (made, groups) = DeviceSamples::new(&other, Content::of(&prepared)).unwrap();
     let shaded = Shaded {
         setup: prepared.setup(),
         params: &prepared.scene.params,
@@ -105,11 +101,11 @@ fn samples_of_another_device_and_other_views_are_refused_in_words() {
         assert!(matches!(error, TensorError::Foreign { what: "the samples", .. }), "{error:?}");
         assert!(error.to_string().contains(words), "{error}");
     };
-    let over = |made: &DeviceSamples<'_>, groups: &[&ViewSamples]| {
+    let over = |made: &DeviceSamples, groups: &[&ViewSamples]| {
         Shade::over_device_samples(shared, &shaded, made, groups, Scatter::Exact).map(|_| ())
     };
     refused(over(&made, &groups), "another device");
-    let (made, _) = DeviceSamples::new(shared.gpu(), content(&prepared)).unwrap();
+    let (made, _) = DeviceSamples::new(shared.gpu(), Content::of(&prepared)).unwrap();
     refused(over(&made, &groups[..1]), "came with them");
     refused(Shade::new(shared, &shaded, &groups, Scatter::Exact).map(|_| ()), "without a surface");
 }

@@ -40,18 +40,18 @@ fn small_of(views: usize) -> Prepared {
     let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
     let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
     let mut prepared = Prepared::baked(&scene, &options).unwrap();
-    prepared.scene.views.truncate(views);
+    Arc::make_mut(&mut prepared.scene).views.truncate(views);
     prepared.gains.truncate(views);
-    for View { camera, .. } in &mut prepared.scene.views {
+    for View { camera, .. } in &mut Arc::make_mut(&mut prepared.scene).views {
         (camera.width, camera.height) = (PIXELS, PIXELS);
     }
-    let maps = &mut prepared.scene.maps;
+    let maps = &mut Arc::make_mut(&mut prepared.scene).maps;
     maps.color = maps.color.as_ref().map(shrunk);
     maps.specular = maps.specular.as_ref().map(shrunk);
     maps.attenuator = maps.attenuator.as_ref().map(shrunk);
-    prepared.scene.fit.loss = Loss::L2;
-    prepared.scene.fit.maps.rounds = 1;
-    prepared.scene.fit.maps.steps = 30;
+    Arc::make_mut(&mut prepared.scene).fit.loss = Loss::L2;
+    Arc::make_mut(&mut prepared.scene).fit.maps.rounds = 1;
+    Arc::make_mut(&mut prepared.scene).fit.maps.steps = 30;
     for kind in MapKind::ALL {
         // Next to nothing is held: what the images say is to be found.
         let prior = prepared.scene.fit.maps.prior(kind);
@@ -72,7 +72,7 @@ fn shrunk<const C: usize>(map: &Map<C>) -> Map<C> {
 }
 
 fn sampled(prepared: &Prepared) -> Vec<ViewSamples> {
-    sample_views(&prepared.scene, &prepared.scene.mesh.pose(), prepared.occlusion.as_ref()).unwrap()
+    sample_views(&prepared.scene, &prepared.scene.mesh.pose(), prepared.occlusion.as_deref()).unwrap()
 }
 
 /// What the scene looks like as it is, to be met by the samples of another.
@@ -189,13 +189,27 @@ fn every_kind_of_map_explains_what_was_changed_in_it() {
                 .iter_mut()
                 .for_each(|t| *t = t.map(|x| 0.8 * x)),
             MapKind::Specular => {
-                changed.scene.maps.specular.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6);
+                Arc::make_mut(&mut changed.scene)
+                    .maps
+                    .specular
+                    .as_mut()
+                    .unwrap()
+                    .texels
+                    .iter_mut()
+                    .for_each(|t| t[0] *= 0.6);
             }
             MapKind::Attenuator => {
-                changed.scene.maps.attenuator.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6);
+                Arc::make_mut(&mut changed.scene)
+                    .maps
+                    .attenuator
+                    .as_mut()
+                    .unwrap()
+                    .texels
+                    .iter_mut()
+                    .for_each(|t| t[0] *= 0.6);
             }
             MapKind::Occlusion => {
-                let base = &mut changed.occlusion.as_mut().unwrap().base;
+                let base = &mut Arc::make_mut(changed.occlusion.as_mut().unwrap()).base;
                 base.iter_mut().for_each(|o| *o *= 0.8);
                 let weights: Vec<f32> = changed.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
                 open = changed.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights));
@@ -225,10 +239,17 @@ fn conjugate_gradients_and_adam_go_to_the_same_place() {
         return;
     }
     let (truth, mut changed) = (small(), small());
-    changed.scene.maps.color.as_mut().unwrap().texels.iter_mut().for_each(|t| *t = t.map(|x| 0.9 * x));
+    Arc::make_mut(&mut changed.scene)
+        .maps
+        .color
+        .as_mut()
+        .unwrap()
+        .texels
+        .iter_mut()
+        .for_each(|t| *t = t.map(|x| 0.9 * x));
     let by_cg = fit(&truth, &changed, MapKind::Color, None).unwrap();
-    changed.scene.fit.maps.solver = MapSolver::Adam;
-    changed.scene.fit.maps.steps = 200;
+    Arc::make_mut(&mut changed.scene).fit.maps.solver = MapSolver::Adam;
+    Arc::make_mut(&mut changed.scene).fit.maps.steps = 200;
     let by_adam = fit(&truth, &changed, MapKind::Color, None).unwrap();
     let apart = difference(&by_cg.observed[0].samples, &by_adam.observed[0].samples, albedo);
     let moved = difference(&by_cg.observed[0].samples, &sampled(&changed)[0], albedo);
@@ -242,7 +263,14 @@ fn bounds_and_priors_hold() {
         return;
     }
     let (truth, mut changed) = (small(), small());
-    changed.scene.maps.color.as_mut().unwrap().texels.iter_mut().for_each(|t| *t = t.map(|x| 0.5 * x));
+    Arc::make_mut(&mut changed.scene)
+        .maps
+        .color
+        .as_mut()
+        .unwrap()
+        .texels
+        .iter_mut()
+        .for_each(|t| *t = t.map(|x| 0.5 * x));
     let prior = changed.scene.fit.maps.prior(MapKind::Color);
     changed.scene.fit.maps.set_prior(MapKind::Color, MapPrior { upper: 0.25, ..prior });
     let fitted = fit(&truth, &changed, MapKind::Color, None).unwrap();
@@ -260,9 +288,16 @@ fn bounds_and_priors_hold() {
 /// Two views of a scene whose colour map is darker than in the targets.
 fn darker() -> (Prepared, Vec<(View, Target)>) {
     let (truth, mut changed) = (small_of(2), small_of(2));
-    changed.scene.maps.color.as_mut().unwrap().texels.iter_mut().for_each(|t| *t = t.map(|x| 0.9 * x));
-    changed.scene.fit.maps.rounds = 2;
-    changed.scene.fit.maps.steps = 3;
+    Arc::make_mut(&mut changed.scene)
+        .maps
+        .color
+        .as_mut()
+        .unwrap()
+        .texels
+        .iter_mut()
+        .for_each(|t| *t = t.map(|x| 0.9 * x));
+    Arc::make_mut(&mut changed.scene).fit.maps.rounds = 2;
+    Arc::make_mut(&mut changed.scene).fit.maps.steps = 3;
     let targets = targets(&truth);
     (changed, targets)
 }
@@ -395,7 +430,7 @@ fn a_map_that_nothing_reads_is_refused() {
         return;
     }
     let (truth, mut changed) = (small(), small());
-    changed.scene.effects = changed.scene.effects.without(Effect::SideSpecular);
+    Arc::make_mut(&mut changed.scene).effects = changed.scene.effects.without(Effect::SideSpecular);
     let truth =
         Prepared { scene: skinfit::scene::Scene { effects: changed.scene.effects, ..truth.scene }, ..truth };
     let Err(error) = fit(&truth, &changed, MapKind::Specular, None) else { panic!("it was fitted") };

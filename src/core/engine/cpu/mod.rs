@@ -37,10 +37,9 @@ use self::view_pass::{ViewPass, streams, with_scratch};
 use super::gram::pair;
 use super::pulls::{Gathered, Pulls};
 use super::view::ObservedView;
-use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
+use super::{BLOCK, Engine, EngineError, NormalEquations, Objective, Point, Task, Unknown};
 use crate::bake::Illumination;
 use crate::model::cube::Cube;
-use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::program::shading::ShadingError;
 use crate::samples::LANES;
@@ -51,8 +50,8 @@ use crate::with_simd;
 /// Loss, gradient and normal equations on the CPU, of whatever rules the planner chose.
 #[derive(Debug)]
 pub struct CpuEngine {
-    illumination: Illumination,
-    views: Vec<ObservedView>,
+    illumination: Arc<Illumination>,
+    views: Arc<[ObservedView]>,
     fitted: Fitted,
     loss: Loss,
     level: Level,
@@ -81,32 +80,20 @@ struct Kept {
 }
 
 impl CpuEngine {
-    /// An engine over `views` for the `unknowns`.
+    /// An engine for a task.
     ///
     /// # Errors
     /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
-    pub fn new(
-        setup: Setup,
-        illumination: Illumination,
-        views: Vec<ObservedView>,
-        loss: Loss,
-        unknowns: Vec<Unknown>,
-    ) -> Result<Self, ShadingError> {
-        Self::with_kept_terms(setup, illumination, views, loss, unknowns, true)
+    pub fn new(task: Task) -> Result<Self, ShadingError> {
+        Self::with_kept_terms(task, true)
     }
 
     /// As [`Self::new`]; with `keep` false every number is computed anew in each pass.
     ///
     /// # Errors
     /// As of [`Self::new`].
-    pub fn with_kept_terms(
-        setup: Setup,
-        illumination: Illumination,
-        views: Vec<ObservedView>,
-        loss: Loss,
-        unknowns: Vec<Unknown>,
-        keep: bool,
-    ) -> Result<Self, ShadingError> {
+    pub fn with_kept_terms(task: Task, keep: bool) -> Result<Self, ShadingError> {
+        let Task { setup, illumination, views, loss, unknowns } = task;
         let mut fitted = Fitted::new(setup, unknowns, &views);
         fitted.keep = keep;
         fitted.faces = super::face_sizes(&illumination);
@@ -139,7 +126,7 @@ impl CpuEngine {
     pub fn set_stride(&mut self, stride: usize) {
         self.stride = stride.max(1);
         self.weight = (0.0, 0);
-        for view in &self.views {
+        for view in self.views.iter() {
             let groups = view.samples.groups();
             let read = self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK));
             let (weight, count) = view.weight_and_count(read);
@@ -158,7 +145,7 @@ impl CpuEngine {
 
     /// The views.
     #[must_use]
-    pub fn views(&self) -> &[ObservedView] {
+    pub const fn views(&self) -> &Arc<[ObservedView]> {
         &self.views
     }
 
@@ -469,5 +456,34 @@ impl Objective for CpuEngine {
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
         self.pass(point, Wish::Gradient).loss_and_gradient()
+    }
+}
+
+impl Engine for CpuEngine {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn provenance(&self) -> Vec<(String, String)> {
+        vec![
+            ("threads".to_owned(), rayon::current_num_threads().to_string()),
+            ("instructions".to_owned(), crate::simd::instructions()),
+        ]
+    }
+
+    fn views(&self) -> &Arc<[ObservedView]> {
+        self.views()
+    }
+
+    fn surfaced_views(&self) -> Result<Arc<[ObservedView]>, EngineError> {
+        Ok(Arc::clone(&self.views))
+    }
+
+    fn samples(&self) -> u64 {
+        self.samples()
+    }
+
+    fn set_stride(&mut self, stride: usize) {
+        self.set_stride(stride);
     }
 }

@@ -7,12 +7,13 @@ use super::Arguments;
 use super::evidence::evidence;
 use super::solve::Solving;
 use super::words::{Times, advice, advice_on_maps, tell_run};
-use crate::cli::fit_engine::{FitEngine, SelectedEngine};
+use crate::cli::fit_engine::SelectedEngine;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::machine::made;
 use crate::cli::maps::MapsLeft;
 use crate::cli::run_folder::RunFolder;
 use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
+use crate::engine::Engine;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::params_file::{Origin, ParamsFile};
 use crate::prepare::Prepared;
@@ -34,10 +35,10 @@ pub(super) fn conclude(
     folder: &RunFolder,
     Fitted { path, maps, begun }: Fitted<'_>,
     prepared: &Prepared,
-    chosen: &SelectedEngine<'_>,
+    chosen: &SelectedEngine,
     outcome: &Outcome,
 ) -> Result<Exit, Refusal> {
-    let engine = &chosen.engine;
+    let engine = &*chosen.engine;
     let clock = Instant::now();
     let views = evidence(prepared, engine, outcome)?;
     let mut seconds = prepared.seconds;
@@ -81,7 +82,7 @@ pub(super) fn conclude(
 
 /// Where the fit differed from its scene file.
 fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> {
-    let Scene { form, params, fit, .. } = &prepared.scene;
+    let Scene { form, params, fit, .. } = &*prepared.scene;
     let start = Start { form: *form, params, free: &fit.free };
     Changes {
         loss: arguments.loss.as_deref(),
@@ -109,7 +110,7 @@ fn run_info(
     solving: Solving,
     path: &Path,
     prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    engine: &dyn Engine,
     views: Vec<ViewEvidence>,
 ) -> RunInfo {
     let scene = match &arguments.scene.scene {
@@ -122,7 +123,7 @@ fn run_info(
         scene,
         loss: prepared.scene.fit.loss,
         engine: engine.name().to_owned(),
-        samples: engine.samples() as u64,
+        samples: engine.samples(),
         seconds: prepared.seconds,
         views,
         warnings: prepared.warnings.clone(),

@@ -1,7 +1,8 @@
 //! The evidence: each view's target, fit and terms.
 
 use crate::cli::Refusal;
-use crate::cli::fit_engine::FitEngine;
+use crate::cli::fit_engine::surfaced_views;
+use crate::engine::Engine;
 use crate::engine::view::ObservedView;
 use crate::fit::outcome::Outcome;
 use crate::prepare::Prepared;
@@ -15,10 +16,10 @@ use crate::scene::view::View;
 /// For each view the target, the fit and its terms.
 pub(super) fn evidence(
     prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    engine: &dyn Engine,
     outcome: &Outcome,
 ) -> Result<Vec<ViewEvidence>, Refusal> {
-    let observed = engine.surfaced_views()?;
+    let observed = surfaced_views(engine)?;
     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params)?;
     let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
     let views = prepared.scene.views.iter().zip(observed.iter()).enumerate();

@@ -10,6 +10,7 @@ mod solve;
 mod words;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::fit_engine::FitEngineArguments;
@@ -95,7 +96,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let own = arguments.engine.makes_samples();
     let mut prepared = if own { Prepared::baked(&path, &options) } else { Prepared::new(&path, &options) }?;
     if let Some(loss) = &arguments.loss {
-        prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
+        let loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
+        Arc::make_mut(&mut prepared.scene).fit.loss = loss;
     }
     let solving = Solving::of(arguments, folder.path())?;
     let observed = if own { prepared.keep_targets().map(|()| None) } else { prepared.observed().map(Some) }?;
@@ -111,11 +113,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         }
         observed => (observed, None),
     };
-    arguments.engine.with_engine(&prepared, observed, |chosen| {
-        let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine, &interrupt)?;
-        folder.keep();
-        let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
-        let fitted = Fitted { path: &path, maps: maps.as_ref(), begun };
-        conclude(arguments, solving, &folder, fitted, &prepared, chosen, &outcome)
-    })
+    let chosen = arguments.engine.select(&prepared, observed.map(Into::into))?;
+    let outcome = solve(arguments, solving, &folder, &prepared, &*chosen.engine, &interrupt)?;
+    folder.keep();
+    let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
+    let fitted = Fitted { path: &path, maps: maps.as_ref(), begun };
+    conclude(arguments, solving, &folder, fitted, &prepared, &chosen, &outcome)
 }

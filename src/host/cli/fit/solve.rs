@@ -6,9 +6,9 @@ use std::path::Path;
 use super::Arguments;
 use crate::cli::Refusal;
 use crate::cli::fingerprint::fingerprint;
-use crate::cli::fit_engine::FitEngine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::run_folder::RunFolder;
+use crate::engine::Engine;
 use crate::fit::outcome::Outcome;
 use crate::fit::state::Saved;
 use crate::fit::state::StateError;
@@ -49,7 +49,7 @@ pub(super) fn solve(
     solving: Solving,
     folder: &RunFolder,
     prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    engine: &dyn Engine,
     interrupt: &Interrupt,
 ) -> Result<Outcome, Refusal> {
     let state = folder.path().join(STATE);
@@ -77,7 +77,7 @@ pub(super) fn solve(
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");
-    let outcome = fit::fit(engine.objective(), &prepared.start(), &options, &mut |iteration| {
+    let outcome = fit::fit(engine, &prepared.start(), &options, &mut |iteration| {
         bar.set_position(iteration.iteration);
         bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
     });

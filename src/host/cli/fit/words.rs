@@ -25,7 +25,7 @@ pub(super) struct Times {
 pub(super) fn tell_run(
     folder: &Path,
     views: &[View],
-    chosen: &SelectedEngine<'_>,
+    chosen: &SelectedEngine,
     outcome: &Outcome,
     misfit: &Misfit,
     times: Times,

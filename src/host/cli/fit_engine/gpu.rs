@@ -1,12 +1,11 @@
 //! The GPU engine: when it is taken, and over whose samples.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use super::super::graphics::Task as Doing;
-use super::{
-    FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, SelectedEngine, Selection, tell,
-};
-use crate::gpu::engine::{DeviceSampleError, DeviceSamples, GpuEngine, Memory, Task};
+use super::{Engine, FitEngineArguments, ObservedView, Prepared, Refusal, Selection, tell};
+use crate::gpu::engine::{DeviceSampleError, DeviceSamples, GpuEngine, Memory};
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError};
 
@@ -35,34 +34,32 @@ impl FitEngineArguments {
         }
     }
 
-    pub(super) fn with_gpu<T>(
+    /// The engine on an adapter; on the CPU where `auto` wanted one that does not make it faster.
+    pub(super) fn on_gpu(
         &self,
         prepared: &Prepared,
-        observed: Vec<ObservedView>,
+        observed: &Arc<[ObservedView]>,
         selection: Selection,
-        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
-    ) -> Result<T, Refusal> {
+    ) -> Result<(Box<dyn Engine>, Selection), Refusal> {
         let must = selection.why.is_none();
         let mut gpu = match self.open() {
             Ok(gpu) if must || !gpu.is_software() => gpu,
             Ok(gpu) => {
                 let selection = selection.but(&format!("{} is a program on the CPU", gpu.name()));
-                return self.on_cpu(prepared, observed, selection, then);
+                return Ok((Self::on_cpu(prepared, observed)?, selection));
             }
             Err(error) if must => return Err(refused(&error)),
             Err(error) => {
                 tell(&format!("{error} The CPU engine makes the passes."));
-                return self.on_cpu(prepared, observed, selection.but("none could be opened"), then);
+                return Ok((Self::on_cpu(prepared, observed)?, selection.but("none could be opened")));
             }
         };
         let mut resident = self.resident();
         loop {
-            match self.engine_on(&gpu, prepared, &observed, resident) {
-                Ok(engine) => {
-                    let engine = FitEngine::Gpu(engine);
-                    self.verify(prepared, &engine)?;
-                    return then(&SelectedEngine { engine, selection });
-                }
+            let memory = Memory { part: None, resident };
+            let task = prepared.task(Arc::clone(observed));
+            match GpuEngine::new(&gpu, task, &prepared.start(), memory) {
+                Ok(engine) => return Ok((Box::new(engine), selection)),
                 // A device that ran out of memory is not to be trusted any more; half as much may fit.
                 Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
                     let all: u64 = observed.iter().map(bytes).sum();
@@ -80,48 +77,38 @@ impl FitEngineArguments {
         }
     }
 
-    /// Call `then` with an engine over samples that the adapter makes; where they have no room on it, over the
-    /// CPU's, as many of which stay as may.
-    pub(super) fn with_own_samples<T>(
+    /// The engine over samples that the adapter makes; where they have no room on it, over the CPU's, as many of
+    /// which stay as may.
+    pub(super) fn over_own_samples(
         &self,
         prepared: &Prepared,
-        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
-    ) -> Result<T, Refusal> {
-        let gpu = self.open().map_err(|error| refused(&error))?;
-        let content = Content {
-            scene: &prepared.scene,
-            illumination: &prepared.illumination,
-            occlusion: prepared.occlusion.as_ref(),
-            params: &prepared.scene.params,
-        };
-        let resident = self.resident();
-        let error = match DeviceSamples::new(&gpu, content) {
-            Ok((made, groups)) => {
-                let observed = prepared.observed_with(groups)?;
-                let (task, memory) = (task(prepared, &observed), Memory { part: None, resident });
-                match GpuEngine::over_device_samples(&made, task, &prepared.start(), memory) {
-                    Ok(engine) => {
-                        let engine = FitEngine::Gpu(engine);
-                        self.verify(prepared, &engine)?;
-                        return then(&SelectedEngine { engine, selection: Selection::default() });
-                    }
-                    Err(error) => error,
-                }
-            }
-            Err(DeviceSampleError::Gpu(error)) => error,
-            Err(error) => return Err(error.into()),
+    ) -> Result<(Box<dyn Engine>, Selection), Refusal> {
+        let error = match self.with_own_samples(prepared)? {
+            Ok(engine) => return Ok((Box::new(engine), Selection::default())),
+            Err(error) => error,
         };
         if !matches!(error, GpuError::OutOfMemory { .. } | GpuError::SamplesStay { .. }) {
             return Err(refused(&error));
         }
-        drop(gpu);
         tell(&format!("{error} The CPU makes the samples."));
         let start = Instant::now();
         let samples = prepared.traced()?;
         let selection =
             Selection { traced_seconds: Some(start.elapsed().as_secs_f64()), ..Selection::default() };
-        let observed = prepared.observed_with(samples)?;
-        self.with_gpu(prepared, observed, selection, then)
+        self.on_gpu(prepared, &prepared.observed_with(samples)?.into(), selection)
+    }
+
+    /// The engine over the adapter's samples, or what the adapter refused.
+    fn with_own_samples(&self, prepared: &Prepared) -> Result<Result<GpuEngine, GpuError>, Refusal> {
+        let gpu = self.open().map_err(|error| refused(&error))?;
+        let (made, groups) = match DeviceSamples::new(&gpu, Content::of(prepared)) {
+            Ok(made) => made,
+            Err(DeviceSampleError::Gpu(error)) => return Ok(Err(error)),
+            Err(error) => return Err(error.into()),
+        };
+        let task = prepared.task(prepared.observed_with(groups)?);
+        let memory = Memory { part: None, resident: self.resident() };
+        Ok(GpuEngine::over_device_samples(Arc::new(made), task, &prepared.start(), memory))
     }
 
     /// Most bytes that stay on the adapter, where that is limited.
@@ -132,31 +119,10 @@ impl FitEngineArguments {
     fn open(&self) -> Result<Gpu, GpuError> {
         Gpu::open(&Choice { name: self.adapter.clone(), ..Choice::default() })
     }
-
-    fn engine_on<'g>(
-        &self,
-        gpu: &'g Gpu,
-        prepared: &Prepared,
-        observed: &'g [ObservedView],
-        resident: Option<u64>,
-    ) -> Result<GpuEngine<'g>, GpuError> {
-        let memory = Memory { part: None, resident };
-        GpuEngine::new(gpu, task(prepared, observed), &prepared.start(), memory)
-    }
 }
 
 fn refused(error: &GpuError) -> Refusal {
     Doing::Fit.refusal(error)
-}
-
-fn task<'v>(prepared: &Prepared, observed: &'v [ObservedView]) -> Task<'v> {
-    Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views: observed,
-        loss: prepared.scene.fit.loss,
-        unknowns: prepared.unknowns(),
-    }
 }
 
 fn bytes(view: &ObservedView) -> u64 {

@@ -43,7 +43,8 @@ impl MapArguments {
         let held_out = self.held_out(&prepared.scene.views, &prepared.scene.path)?;
         let choice = Choice { name: run.adapter.map(str::to_owned), ..Choice::default() };
         let shared = SharedDevice::open(&choice).map_err(|error| Refusal::new(tensor_words(&error)))?;
-        prepared.scene.fit.free = columns_beside(&kinds, &prepared.scene.fit.free);
+        let fit = &mut Arc::make_mut(&mut prepared.scene).fit;
+        fit.free = columns_beside(&kinds, &fit.free);
         let posed = prepared.scene.mesh.pose();
         let interrupt = Some(Arc::clone(&run.interrupt));
         let task = MapTask::new(prepared, &posed, observed.clone(), kinds);
@@ -54,11 +55,12 @@ impl MapArguments {
         let maps = found.layers.iter().map(|layer| MapPictures::new(layer, &posed));
         let maps = maps.collect::<Result<Vec<_>, _>>()?;
         let FittedMaps { illumination, mut observed, constants, history, interrupted, .. } = found;
-        prepared.illumination = illumination;
-        (prepared.scene.params, prepared.gains) = (constants.params, constants.gains);
+        prepared.illumination = Arc::new(illumination);
+        let scene = Arc::make_mut(&mut prepared.scene);
+        (scene.params, prepared.gains) = (constants.params, constants.gains);
         if let Some(view) = held_out {
             observed.remove(view);
-            prepared.scene.views.remove(view);
+            scene.views.remove(view);
             prepared.gains.remove(view);
         }
         prepared.seconds.maps = clock.elapsed().as_secs_f64();

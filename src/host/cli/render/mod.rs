@@ -9,6 +9,7 @@ mod frames;
 mod painter;
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::scene::{SceneArguments, parse_effects};
 use super::set::SetArguments;
@@ -106,7 +107,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let mut prepared = Prepared::baked(&path, &options)?;
     samples::check_uvs(&prepared.scene, &prepared.scene.mesh.uvs)?;
     if let Some((width, height)) = arguments.size {
-        let camera = &mut prepared.scene.views[0].camera;
+        let camera = &mut Arc::make_mut(&mut prepared.scene).views[0].camera;
         (camera.width, camera.height) = (width, height);
     }
     let animation = if arguments.animate { Some(animation(&prepared)?) } else { None };
@@ -119,25 +120,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let layers = is_exr && arguments.layers;
     let beside = Beside { layers, haze: layers || is_exr && prepared.scene.effects.has(Effect::Haze) };
     let painting = engine::Painting { animated: animation.is_some(), timed: arguments.stats };
-    arguments.engine.with_painter(&mut prepared, painting, |prepared, painter| {
-        let bar = progress::bar("frames", frames.len() as u64);
-        for frame in &frames {
-            if let (Some(animation), Some(time)) = (&animation, frame.time) {
-                let mesh = animation.mesh(time)?;
-                let occlusion = frame_occlusion(arguments, prepared, &mesh);
-                painter.set_mesh(&mesh, occlusion.as_ref())?;
-            }
-            let picture = painter.paint(&frame.camera, prepared.gains[0], beside)?;
-            if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
-                return Err(samples::nothing_visible(&prepared.scene, &prepared.scene.views[0]).into());
-            }
-            bar.suspend(|| tell_warnings(&picture.warnings));
-            write(arguments, &path, frame, &picture, &prepared.scene.params)?;
-            bar.inc(1);
+    let (prepared, mut painter) = arguments.engine.painter(prepared, painting)?;
+    let bar = progress::bar("frames", frames.len() as u64);
+    for frame in &frames {
+        if let (Some(animation), Some(time)) = (&animation, frame.time) {
+            let mesh = animation.mesh(time)?;
+            let occlusion = frame_occlusion(arguments, &prepared, &mesh);
+            painter.set_mesh(&mesh, occlusion.as_ref())?;
         }
-        bar.finish_and_clear();
-        tell_done(arguments, prepared, &frames, painter)
-    })?;
+        let picture = painter.paint(&frame.camera, prepared.gains[0], beside)?;
+        if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
+            return Err(samples::nothing_visible(&prepared.scene, &prepared.scene.views[0]).into());
+        }
+        bar.suspend(|| tell_warnings(&picture.warnings));
+        write(arguments, &path, frame, &picture, &prepared.scene.params)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    tell_done(arguments, &prepared, &frames, &*painter)?;
     Ok(Exit::Done)
 }
 

@@ -23,7 +23,7 @@ impl Remeshed {
     pub(super) fn of(bench: &Bench<'_>) -> Result<Self, StudyError> {
         let scene = &bench.prepared.scene;
         let mesh = scene.mesh.pose();
-        let occlusion = bench.prepared.occlusion.as_ref();
+        let occlusion = bench.prepared.occlusion.as_deref();
         let open = samples::posed_occlusion(scene, &scene.mesh.morphs, mesh.positions.len(), occlusion);
         Ok(Self { mesh, open: open.map_err(PrepareError::from)? })
     }

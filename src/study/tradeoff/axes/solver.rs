@@ -1,6 +1,7 @@
 //! How fast the solvers find the answer.
 
 use std::cell::RefCell;
+use std::sync::Arc;
 
 use super::quality::ROUNDS;
 use crate::StudyError;
@@ -139,13 +140,8 @@ impl Fits {
         let mut start = self.subject.prepared.start();
         let (mut seconds, mut passes, mut last) = (0.0, 0, None);
         // Terms that earlier fits kept would be a present.
-        let mut engine = CpuEngine::new(
-            self.subject.prepared.setup(),
-            self.subject.prepared.illumination.clone(),
-            self.subject.engine.views().to_vec(),
-            scene.fit.loss,
-            self.subject.prepared.unknowns(),
-        )?;
+        let views = Arc::clone(self.subject.engine.views());
+        let mut engine = CpuEngine::new(self.subject.prepared.task(views))?;
         for &stride in strides {
             engine.set_stride(stride);
             let options = FitOptions {
