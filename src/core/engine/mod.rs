@@ -5,6 +5,7 @@
 //! - [`cpu`]: the engine on the processor
 //! - `gram`: columns to products; [`residual`]: the losses; [`pulls`]: where residuals stand in the images
 //! - [`lanes`]: sixteen f32 lanes as one number; `corners`: their lookups in cubes
+//! - [`levels`]: what is computed in texels of the UV atlas, and what samples look up of it
 //! - [`rules`]: rules over samples in any kind of number; [`mod@reference`]: passes of them in f64, plainly
 //! - [`view`]: samples beside what was observed
 
@@ -12,6 +13,7 @@ mod corners;
 pub mod cpu;
 mod gram;
 pub mod lanes;
+pub mod levels;
 pub mod pulls;
 pub mod reference;
 pub mod residual;

@@ -44,7 +44,7 @@ impl Facts {
 }
 
 /// Texels along a side of the UV atlas.
-const ATLAS_SIZE: u32 = 512;
+pub(crate) const ATLAS_SIZE: u32 = 512;
 
 /// How many vertices, texels of the atlas and fragments an image of the first view takes. Where the charts overlap,
 /// texels are counted again.

@@ -15,7 +15,7 @@ use crate::program::shading::{Shading, ShadingError, component};
 use crate::program::tape::Tape;
 use crate::samples::surface_records::{Places, neutral};
 use crate::shader::Constant;
-use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source as FactsSource};
+use crate::shader::facts::{FaceSizes, Facts};
 use crate::shader::tangent::chain::Seed;
 
 /// The streams that tapes read.
@@ -178,7 +178,7 @@ impl Pass {
             // It reads every field; what samples lack stands in a stream of its own.
             Some(plan) => Tapes::new(&plan.facts(), &plan.free(), plan.channels(), |_| true, plan.keeps())?,
             None => Tapes::new(
-                &facts(fitted.setup, fitted.faces, turned),
+                &Facts::of_samples(fitted.setup, fitted.faces, turned),
                 &free,
                 fitted.channels,
                 held,
@@ -268,18 +268,4 @@ fn live_names(seeds: &[Seed]) -> Vec<String> {
         }
     }
     names
-}
-
-/// What stored samples call for.
-pub(super) fn facts(setup: Setup, faces: FaceSizes, turned: bool) -> Facts {
-    Facts {
-        setup,
-        source: FactsSource::Samples,
-        maps: MapFacts::default(),
-        faces,
-        turned,
-        square_rim: false,
-        budget: Budget::Exact,
-        ..Facts::default()
-    }
 }
