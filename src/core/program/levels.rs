@@ -18,8 +18,6 @@ pub struct LevelProgram {
     pub passes: Vec<LevelPass>,
     /// The levels that samples look up, each with how many numbers it has; what was found is a field of that name.
     pub looked_up: Vec<(String, usize)>,
-    /// Levels that move along one of the seeds.
-    pub moving: Vec<String>,
 }
 
 /// One pass.
@@ -66,7 +64,6 @@ impl LevelProgram {
         }
         let found = plan.looked_up(chain).into_iter();
         program.looked_up = found.map(|(name, kind)| (name, components(kind))).collect();
-        program.moving = chain.along.iter().flat_map(|along| along.moved.keys().cloned()).collect();
         Ok(program)
     }
 

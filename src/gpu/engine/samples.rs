@@ -18,6 +18,7 @@ use crate::samples::{
 };
 use crate::scene::Scene;
 use crate::scene::view::Camera;
+use crate::shader::PlanError;
 use crate::upload::Content;
 use crate::{Gpu, GpuError};
 
@@ -54,6 +55,10 @@ impl DeviceSamples {
         let start = Instant::now();
         let scene = Arc::clone(&content.scene);
         let scene = &*scene;
+        if scene.needs().atlas {
+            // Texels are the CPU's, as are the samples' places in them.
+            return Err(GpuError::Plan(PlanError::no_atlas(scene.effects).to_string()).into());
+        }
         check_uvs(scene, &scene.mesh.uvs)?;
         posed_occlusion(scene, &scene.mesh.morphs, scene.mesh.positions.len(), content.occlusion.as_deref())?;
         let records = asked_records(scene, 0);

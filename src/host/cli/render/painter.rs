@@ -60,6 +60,7 @@ pub(super) struct CpuPainter {
     rays: RayMesh,
     /// Open share of each vertex' hemisphere.
     open: Option<Vec<f32>>,
+    atlas: Option<Arc<Atlas>>,
     seconds: f64,
 }
 
@@ -69,7 +70,8 @@ impl CpuPainter {
         let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
         let (scene, occlusion) = (Arc::clone(&prepared.scene), prepared.occlusion.clone());
         let (posed, rays, open) = pose(&scene, &scene.mesh, occlusion.as_deref())?;
-        Ok(Self { scene, occlusion, shader, posed, rays, open, seconds: 0.0 })
+        let atlas = atlas_of(&scene, &posed, open.as_deref())?;
+        Ok(Self { scene, occlusion, shader, posed, rays, open, atlas, seconds: 0.0 })
     }
 }
 
@@ -93,13 +95,15 @@ impl Painter for CpuPainter {
     fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal> {
         let occlusion = occlusion.or(self.occlusion.as_deref());
         (self.posed, self.rays, self.open) = pose(&self.scene, mesh, occlusion)?;
+        self.atlas = atlas_of(&self.scene, &self.posed, self.open.as_deref())?;
         Ok(())
     }
 
     fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal> {
         let start = std::time::Instant::now();
         let scene = &*self.scene;
-        let samples = sample_view(scene, &self.posed, &self.rays, self.open.as_deref(), camera);
+        let mut samples = sample_view(scene, &self.posed, &self.rays, self.open.as_deref(), camera);
+        samples.atlas.clone_from(&self.atlas);
         let mut shaded = self.shader.shade(&samples, camera, gain);
         let mut layers: Vec<(String, Image)> =
             shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image)).collect();
