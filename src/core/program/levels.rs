@@ -121,9 +121,15 @@ impl LevelPass {
         let sample = source.argument(entry)?;
         let mut numbers: Vec<Id> = Vec::new();
         for (name, width) in sample {
+            let held = pass.plan.varyings.iter().any(|(held, _)| *held == name);
             let is_level = pass.plan.levels.iter().any(|level| level.name == name);
             let name = if is_level { rename(&name) } else { name };
-            numbers.extend((0..width).map(|component| graph.field(&name, component)));
+            // What is neither fills a structure that would be empty.
+            let number = |component| match held || is_level {
+                true => graph.field(&name, component),
+                false => graph.constant(0.0),
+            };
+            numbers.extend((0..width).map(number));
         }
         let outputs = source.call(&mut graph, entry, vec![Value::Numbers(numbers)])?;
         let level = |level: &Level| (rename(&level.name), components(level.kind));

@@ -10,7 +10,7 @@ use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 use crate::model::terms::TermName;
 use crate::shader::Domain;
-use crate::shader::atlas::text::stored;
+use crate::shader::atlas::stored;
 use crate::shader::emit::{Plan, hazy, parts, sample_fields};
 use crate::shader::module::{sample_struct, uniform};
 use crate::shader::search::{PlanError, components};

@@ -341,3 +341,62 @@ impl Field {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(uvs: &[[f32; 2]], triangles: &[[u32; 3]]) -> Textured<'static> {
+        let posed = PosedMesh {
+            positions: uvs.iter().map(|&[u, v]| Vec3::new(3.0 * u, v, 1.0)).collect(),
+            uvs: uvs.iter().copied().map(Vec2::from).collect(),
+            triangles: triangles.to_vec(),
+            ..PosedMesh::default()
+        };
+        let maps = Box::leak(Box::<Maps>::default());
+        Textured { posed: Box::leak(Box::new(posed)), occlusion: None, maps, size: 8.0 }
+    }
+
+    #[test]
+    fn centres_on_shared_edges_belong_to_one_triangle_and_on_outer_ones_to_the_top_and_left() {
+        // From centre to centre: a square whose edges and diagonal go through centres.
+        let [low, high] = [1.5 / 8.0, 4.5 / 8.0];
+        let corners = [[low, low], [high, low], [high, high], [low, high]];
+        for triangles in [[[0, 1, 2], [0, 2, 3]], [[2, 1, 0], [3, 2, 0]]] {
+            let shown = cover(&mesh(&corners, &triangles), 8);
+            for (i, shown) in shown.iter().enumerate() {
+                let inside = (1..4).contains(&(i % 8)) && (1..4).contains(&(i / 8));
+                assert_eq!(*shown != EMPTY, inside, "{} {}", i % 8, i / 8);
+            }
+        }
+    }
+
+    #[test]
+    fn of_triangles_that_overlap_the_later_one_stays_and_steps_are_exact() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let mesh = mesh(&corners, &[[0, 1, 2], [2, 1, 0], [0, 0, 1]]);
+        let shown = cover(&mesh, 8);
+        assert!(shown.iter().all(|&triangle| triangle == 1 || triangle == EMPTY));
+        assert!((27..=36).contains(&shown.iter().filter(|&&triangle| triangle == 1).count()));
+        let triangle = mesh.triangle(1);
+        let input = |name: &str, component| Input { name: name.to_owned(), component };
+        let value = |name, component| {
+            let field = Field::of(&input(name, component)).unwrap();
+            field.value(&mesh, &triangle, triangle.weights(DVec2::new(2.5, 1.5)))
+        };
+        // All of these are sums of few halves.
+        assert_eq!([value("vertex_position", 0), value("vertex_uv", 1)], [3.0 * 2.5 / 8.0, 1.5 / 8.0]);
+        assert_eq!([value("dpdx_vertex_position", 0), value("dpdy_vertex_position", 0)], [3.0 / 8.0, 0.0]);
+        assert_eq!(value("vertex_occlusion", 0), 1.0);
+        let error = Field::of(&input("dpdx_albedo", 0)).err().unwrap();
+        assert_eq!(error, AtlasError::NotStored { quantity: "albedo".to_owned() });
+    }
+
+    #[test]
+    fn a_mesh_must_lie_in_the_atlas() {
+        let uvs = vec![Vec2::new(0.5, 0.5), Vec2::new(1.5, -0.5)];
+        let tiled = PosedMesh { uvs, ..PosedMesh::default() };
+        assert_eq!(check(&tiled).unwrap_err(), AtlasError::Outside { u: 1.0, v: -1.0 });
+        assert_eq!(check(&PosedMesh::default()).unwrap_err(), AtlasError::NoUvs);
+    }
+}

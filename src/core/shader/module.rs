@@ -3,7 +3,8 @@
 
 use std::fmt::Write as _;
 
-use super::atlas::text::{SAMPLE_LEVEL, sampled, stored};
+use super::atlas::stored;
+use super::atlas::text::{SAMPLE_LEVEL, sampled};
 use super::domain::Domain;
 use super::emit::{Plan, hazy, parts, sample_fields};
 use super::quantity::{Constant, Kind, Resource};

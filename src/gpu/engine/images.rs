@@ -29,7 +29,7 @@ pub(super) struct Images {
 
 impl Images {
     pub(super) fn new(gpu: &Gpu, fused: &Fused, parts: &Parts) -> Result<Self, GpuError> {
-        let (inputs, layout) = (Inputs::new(gpu, &fused.plan), part_layout(gpu));
+        let (inputs, layout) = (Inputs::new(gpu, &fused.plan), part_layout(gpu, parts.have_levels()));
         let pipeline = pipeline(gpu, "forward pass", &fused.image_module(), &[&inputs.layout, &layout]);
         let channels = fused.channels();
         let images = parts.parts.iter().map(|part| {
@@ -191,6 +191,7 @@ impl GpuEngine {
         let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
+        self.look_up(point, &mut device)?;
         let OnDevice { parts, lights, images, .. } = &mut *device;
         if images.as_ref().is_none_or(|(of, _)| *of != (written, term)) {
             let fused = self.fused(written, lights.face_sizes(), term)?;

@@ -6,6 +6,7 @@
 //!   memory allowed is uploaded anew in each pass
 //! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
 //! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
+//! - `levels`: what samples look up of the UV atlas
 //! - `lights`: the cubes and the uniform block, as shaders are given them
 //! - `program`: the shaders of a wish, and one run of them
 //! - `images`: the forward pass: images, and how long they take
@@ -13,6 +14,7 @@
 
 pub mod fused;
 mod images;
+mod levels;
 mod lights;
 mod parts;
 mod pipeline;
@@ -26,6 +28,7 @@ use web_time::Instant;
 
 use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish, held_parameters};
 use self::images::Images;
+use self::levels::DeviceLevels;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
 use self::program::Program;
@@ -70,6 +73,9 @@ pub struct GpuEngine {
     weight: (f64, u64),
     alpha: bool,
     traits: Traits,
+    /// What samples look up of the UV atlas, each with how many numbers it has: where the environment is not turned, and
+    /// where it is.
+    looked_up: [Vec<(String, usize)>; 2],
     /// The parameters that terms are made with, where terms stand in the place of samples.
     held: Option<Vec<Param>>,
     /// What changes between passes; a pass at a time.
@@ -81,6 +87,8 @@ pub struct GpuEngine {
 struct OnDevice {
     parts: Parts,
     lights: DeviceLights,
+    /// Where something is computed in texels.
+    levels: Option<DeviceLevels>,
     /// By wish, and by what is written into the text.
     programs: BTreeMap<(Wish, Written), Program>,
     /// What the terms were made with that stand in the samples' place.
@@ -138,14 +146,10 @@ impl GpuEngine {
         }
         let alpha = views.iter().any(ObservedView::compares_alpha);
         let traits = Traits::of(gpu, &views)?;
-        let start_of_parts = Instant::now();
-        let parts = Parts::new(gpu, &views, &traits, memory, made.as_deref())?;
-        let own = |made: &Arc<DeviceSamples>| made.seconds() + start_of_parts.elapsed().as_secs_f64();
-        let made_seconds = made.as_ref().map_or(0.0, own);
         let mut engine = Self {
             gpu: gpu.clone(),
             made,
-            made_seconds,
+            made_seconds: 0.0,
             setup,
             illumination: Arc::clone(&illumination),
             loss,
@@ -154,10 +158,12 @@ impl GpuEngine {
             weight: (0.0, 0),
             alpha,
             traits,
+            looked_up: [Vec::new(), Vec::new()],
             held: None,
             device: Mutex::new(OnDevice {
-                parts,
+                parts: Parts::default(),
                 lights: DeviceLights::new(illumination),
+                levels: None,
                 programs: BTreeMap::new(),
                 terms: None,
                 replaced: false,
@@ -166,10 +172,12 @@ impl GpuEngine {
             fault: Mutex::new(None),
             views,
         };
+        engine.upload(memory)?;
         let samples = Layout::of_samples(&engine.traits.places, engine.traits.rows);
         let terms = Layout::of_terms(setup, &samples);
         let device = engine.device.get_mut().unwrap_or_else(PoisonError::into_inner);
-        if device.parts.all_hold(terms.rows, &engine.views) {
+        // What is looked up of the UV atlas stands beside samples, and not beside their terms.
+        if !device.parts.have_levels() && device.parts.all_hold(terms.rows, &engine.views) {
             let faces = device.lights.face_sizes();
             let held =
                 held_parameters(&engine.fitted(engine.written(start), faces)).map_err(GpuError::Plan)?;
@@ -180,6 +188,24 @@ impl GpuEngine {
         // Whatever the driver refuses shows here, and not in the midst of a fit.
         engine.sums(start, Wish::Normal)?;
         Ok(engine)
+    }
+
+    /// Have samples, targets, and room for what is looked up, on the device.
+    fn upload(&mut self, memory: Memory) -> Result<(), GpuError> {
+        let faces = self.lock().lights.face_sizes();
+        let fitted = |turned| self.fitted(Written { turned, gained: false }, faces);
+        let levels = DeviceLevels::new(fitted, &self.views)?;
+        if let Some(levels) = &levels {
+            self.traits.levels = levels.rows();
+            self.looked_up = [false, true].map(|turned| levels.fields(turned));
+        }
+        let start = Instant::now();
+        let parts = Parts::new(&self.gpu, &self.views, &self.traits, memory, self.made.as_deref())?;
+        let own = |made: &Arc<DeviceSamples>| made.seconds() + start.elapsed().as_secs_f64();
+        self.made_seconds = self.made.as_ref().map_or(0.0, own);
+        let device = self.device.get_mut().unwrap_or_else(PoisonError::into_inner);
+        (device.parts, device.levels) = (parts, levels);
+        Ok(())
     }
 
     /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
@@ -253,7 +279,8 @@ impl GpuEngine {
             turned: written.turned,
             gained: written.gained,
             faces,
-            layout: Layout::of_samples(&self.traits.places, self.traits.rows),
+            layout: Layout::of_samples(&self.traits.places, self.traits.rows)
+                .with_levels(self.looked_up[usize::from(written.turned)].clone(), self.traits.levels),
             several: self.traits.several,
             weighted: self.traits.weighted,
             clipped: self.traits.clipped,
@@ -268,6 +295,20 @@ impl GpuEngine {
         Fused::new(fitted).map_err(GpuError::Plan)
     }
 
+    /// Have on the device what samples look up of the UV atlas at `point`.
+    fn look_up(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
+        let OnDevice { parts, levels, .. } = device;
+        let Some(levels) = levels else { return Ok(()) };
+        let at = (self.written(point).turned, &point.params);
+        levels.set(&self.gpu, at, &self.illumination, &self.views, parts)
+    }
+
+    /// How often levels of the UV atlas were made: once for as long as nothing changes that moves them.
+    #[must_use]
+    pub fn levels_made(&self) -> u64 {
+        self.lock().levels.as_ref().map_or(0, DeviceLevels::count)
+    }
+
     /// Have the terms at `point` in the place of the samples, where that is how passes are made.
     fn keep(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
         let Some(held) = &self.held else { return Ok(()) };
@@ -275,7 +316,7 @@ impl GpuEngine {
         if device.terms.as_ref() == Some(&key) {
             return Ok(());
         }
-        let OnDevice { parts, lights, programs, images, terms, replaced } = device;
+        let OnDevice { parts, lights, programs, images, terms, replaced, .. } = device;
         *terms = None;
         if std::mem::replace(replaced, true) {
             parts.reload(&self.gpu, &self.views, self.made.as_deref())?;
@@ -295,6 +336,7 @@ impl GpuEngine {
         let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
+        self.look_up(point, &mut device)?;
         let OnDevice { parts, lights, programs, .. } = &mut *device;
         let program = match programs.entry((wish, written)) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),

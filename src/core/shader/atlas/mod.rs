@@ -15,10 +15,11 @@
 pub mod tangent;
 #[cfg(test)]
 mod tests;
-pub(crate) mod text;
+pub(super) mod text;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+pub use self::text::stored;
 use super::domain::{DIRECTIONS, Domain, UV};
 use super::emit::Plan;
 use super::facts::{Facts, Source};
@@ -129,7 +130,7 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
     }
     let depths = depths(&texels);
     let depth = |rule: &Rule| rule.gives.iter().filter_map(|(q, _)| depths.get(q)).max().copied();
-    let stored = stored(&texels, &found.carried);
+    let stored = in_levels(&texels, &found.carried);
     let mut passes = Vec::new();
     for layer in 0..=depths.values().copied().max().unwrap_or(0) {
         let drawn = texels.iter().filter(|rule| rule.blur.is_none() && depth(rule) == Some(layer));
@@ -159,7 +160,7 @@ fn depths(texels: &[&'static Rule]) -> BTreeMap<&'static str, usize> {
 }
 
 /// The texels' quantities that stand in the atlas: what fragments look up, and what blurs and their kernels read.
-fn stored(texels: &[&'static Rule], carried: &[Carried]) -> BTreeSet<&'static str> {
+fn in_levels(texels: &[&'static Rule], carried: &[Carried]) -> BTreeSet<&'static str> {
     let sampled = carried.iter().filter(|on| on.edge.from == Domain::Texel).map(|on| on.quantity);
     let blurs = texels.iter().filter(|rule| rule.blur.is_some());
     let read = blurs.flat_map(|rule| rule.needs.iter().map(|(need, _)| *need));

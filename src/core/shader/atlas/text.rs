@@ -89,8 +89,9 @@ pub(crate) fn sampled(levels: &[Level]) -> String {
     levels.iter().map(read).collect()
 }
 
-/// Levels' quantities as fields of a stored sample or texel.
-pub(crate) fn stored(levels: &[Level]) -> String {
+/// The lines that read levels' quantities of the fields of a stored sample or texel, `at`.
+#[must_use]
+pub fn stored(levels: &[Level]) -> String {
     levels.iter().map(|Level { name, kind }| format!("    let {name}: {kind} = at.{name};\n")).collect()
 }
 

@@ -11,7 +11,7 @@ use crate::render::backdrop::Backdrop;
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
-use crate::samples::{self, sample_view};
+use crate::samples::{self, Atlas, atlas_of, sample_view};
 use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, PosedMesh};
 use crate::scene::view::Camera;
