@@ -74,7 +74,7 @@ pub use skinfit_gpu::{Gpu, RenderOptions, Renderer};
 // The members' modules under one name, for the tests and experiments of the project.
 #[doc(hidden)]
 pub use skinfit_core::{
-    bake, builtin, demo, export, fit, model, output, prepare, render, samples, scene, shader, simd,
+    bake, builtin, demo, export, fit, model, output, prepare, program, render, samples, scene, shader, simd,
 };
 #[doc(hidden)]
 pub use skinfit_gpu as gpu;

@@ -1,7 +1,7 @@
 //! Passes over stored texels, as operations on numbers: what draws leave, and the taps of blurs.
 
 use super::graph::{Graph, Id, Input};
-use super::lower::{LowerError, Natives, Source, Value};
+use super::lower::{LowerError, Natives, STEP_ALONG_U, STEP_ALONG_V, Source, Value};
 use super::shading::ShadingError;
 use super::steps::{Rounding, Steps};
 use crate::model::terms::TermName;
@@ -132,6 +132,7 @@ impl LevelPass {
             numbers.extend((0..width).map(number));
         }
         let outputs = source.call(&mut graph, entry, vec![Value::Numbers(numbers)])?;
+        check_steps(pass, &graph)?;
         let level = |level: &Level| (rename(&level.name), components(level.kind));
         let blur = blur.map(|axis| BlurOf {
             axis,
@@ -144,6 +145,21 @@ impl LevelPass {
             leaves: pass.leaves.iter().map(level).collect(),
             blur,
         })
+    }
+}
+
+/// Refuse `dpdx` and `dpdy` of what no vertex holds: how that goes from texel to texel is not known.
+fn check_steps(pass: &Pass, graph: &Graph) -> Result<(), LowerError> {
+    let steps = |name: &str| {
+        let of = name.strip_prefix(STEP_ALONG_U).or_else(|| name.strip_prefix(STEP_ALONG_V));
+        of.filter(|of| !of.starts_with("vertex_")).map(str::to_owned)
+    };
+    match graph.fields.iter().find_map(|field| steps(&field.name)) {
+        Some(name) => Err(LowerError::Unsupported {
+            function: pass.plan.steps.first().map_or("", |step| step.rule.function).to_owned(),
+            what: format!("dpdx or dpdy of {name}, which is no vertex' quantity,"),
+        }),
+        None => Ok(()),
     }
 }
 

@@ -33,7 +33,6 @@ use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
 use crate::progress;
 use crate::scene::Scene;
-use crate::scene::facts::ATLAS_SIZE;
 use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
 pub use atlas::Atlas;
@@ -242,7 +241,7 @@ pub fn atlas_of(
     if !scene.needs().atlas {
         return Ok(None);
     }
-    let made = Atlas::new(&scene.setup(), posed, occlusion, &scene.maps, ATLAS_SIZE);
+    let made = Atlas::new(&scene.setup(), posed, occlusion, &scene.maps, scene.diffusion.light_map_size);
     let named = |error| SampleError::Atlas { scene: scene.path.display().to_string(), error };
     Ok(Some(Arc::new(made.map_err(named)?)))
 }

@@ -78,7 +78,7 @@ impl DeviceLevels {
         let cubes = || CubesAt::new(illumination, params, |x| x);
         let looked_up = |view: &ObservedView| {
             let found = maker.look_up(&view.samples, params, cubes, Row::of);
-            padded(found, maker.rows(), rows)
+            padded(found, maker.rows(), rows, view.samples.records())
         };
         let all = views.iter().map(looked_up).collect();
         self.made_with = None;
@@ -93,11 +93,15 @@ impl DeviceLevels {
     }
 }
 
-/// Records of `stride` rows, with rows of 0 up to `wanted`.
-fn padded(rows: Vec<Row>, stride: usize, wanted: usize) -> Vec<Row> {
+/// So many records of `stride` rows, with rows of 0 up to `wanted`.
+fn padded(rows: Vec<Row>, stride: usize, wanted: usize, records: usize) -> Vec<Row> {
     if stride == wanted {
         return rows;
     }
-    let rest = std::iter::repeat_n(Row::ZERO, wanted - stride);
-    rows.chunks(stride.max(1)).flat_map(|record| record.iter().copied().chain(rest.clone())).collect()
+    let mut all = vec![Row::ZERO; wanted * records];
+    if stride > 0 {
+        let of_records = all.chunks_mut(wanted).zip(rows.chunks(stride));
+        of_records.for_each(|(all, rows)| all[..stride].copy_from_slice(rows));
+    }
+    all
 }

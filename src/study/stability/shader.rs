@@ -15,7 +15,7 @@ use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
+use crate::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
 use crate::shader::Domain;
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;
@@ -209,5 +209,6 @@ fn scene() -> Scene {
         },
         quality: Quality::default(),
         bloom: Bloom::default(),
+        diffusion: Diffusion::default(),
     }
 }

@@ -133,7 +133,7 @@ impl<R: Number> LevelMaker<R> {
         Err(PlanError::no_atlas(effects))
     }
 
-    /// The levels of an atlas at `params`: the last ones, where nothing has changed that they are made with. `cubes` gives
+    /// The levels of an atlas that samples look up, at `params`: the last ones, where nothing has changed that they are made with. `cubes` gives
     /// the cubes at `params`.
     pub fn levels(
         &self,
@@ -150,7 +150,9 @@ impl<R: Number> LevelMaker<R> {
         self.count.fetch_add(1, Ordering::Relaxed);
         let reads = self.program.passes.iter().any(|pass| !pass.steps.resources().is_empty());
         let cubes = if reads { cubes() } else { CubesAt::dark(|x| R::from(x)) };
-        let levels = Arc::new(self.make(atlas, params, &cubes));
+        let mut levels = self.make(atlas, params, &cubes);
+        levels.retain(|name, _| self.program.looked_up.iter().any(|(found, _)| found == name));
+        let levels = Arc::new(levels);
         last.push(Made { atlas: Arc::clone(atlas), with, levels: Arc::clone(&levels) });
         levels
     }

@@ -3,12 +3,13 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::*;
-use crate::bake::Illumination;
+use crate::bake::{Illumination, LobeStack};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::reference::{Reference, deviation};
 use crate::engine::view::ObservedView;
 use crate::engine::{NormalEquations, Objective, Point, Task, Unknown};
 use crate::fit::{FitOptions, fit};
+use crate::model::cube::Cube;
 use crate::model::effects::{Effect, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Params};
@@ -105,6 +106,40 @@ fn furrows_shown(furrows_soft: vec3f, furrows_again: vec3f) -> vec3f {
 }
 ";
 
+/// A light map that cubes, their turn, the occlusion and the lobe's exponent move.
+const DUNES: &str = "\
+// effect: dunes, light of the environment under the surface
+// parameter: dunes_radius = 1.3 in [0.1, 30], unit texels; how far it wandered; a test
+//
+// gives: dunes_light
+// domain: texel
+// cost: 12
+fn dunes_light_map(albedo: vec3f, irradiance: vec3f, side_light: vec3f, occ: f32) -> vec3f {
+    return occ * albedo * (irradiance + 0.3 * side_light);
+}
+
+// gives: dunes_soft
+// domain: texel
+// pass: dunes_light: vec3f, 3 taps
+// sampled: 0
+// cost: 8
+fn dunes_kernel(tap: f32, dunes_radius: f32) -> vec2f {
+    return vec2f(dunes_radius * tap, exp(-0.5 * tap * tap));
+}
+
+// gives: dunes_part
+// adds: dunes
+// cost: 6
+fn dunes_shown(dunes_soft: vec3f, albedo: vec3f) -> vec3f {
+    return albedo * dunes_soft;
+}
+";
+
+fn dunes() -> &'static Term {
+    static TERM: OnceLock<&'static Term> = OnceLock::new();
+    TERM.get_or_init(|| register("dunes", DUNES).unwrap_or_else(|error| panic!("{error}")))
+}
+
 fn hills() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
     TERM.get_or_init(|| register("hills", HILLS).unwrap_or_else(|error| panic!("{error}")))
@@ -132,7 +167,9 @@ fn square() -> PosedMesh {
         positions: [[-1.0, 1.0], [1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]
             .map(|[x, y]| Vec3::new(x, y, 0.0))
             .to_vec(),
-        normals: vec![Vec3::Z; 4],
+        normals: [[-0.4, 0.5, 1.0], [0.3, 0.6, 1.0], [0.5, -0.3, 1.0], [-0.6, -0.2, 1.0]]
+            .map(|normal| Vec3::from(normal).normalize())
+            .to_vec(),
         uvs: [[LOW, LOW], [HIGH, LOW], [HIGH, HIGH], [LOW, HIGH]].map(Vec2::from).to_vec(),
         triangles: vec![[0, 3, 2], [0, 2, 1]],
         ..PosedMesh::default()
@@ -140,7 +177,8 @@ fn square() -> PosedMesh {
 }
 
 fn atlas(setup: &Setup) -> Arc<Atlas> {
-    Arc::new(Atlas::new(setup, &square(), None, &Maps::default(), SIZE).unwrap())
+    let open = [0.2, 0.9, 0.6, 0.4];
+    Arc::new(Atlas::new(setup, &square(), Some(&open), &Maps::default(), SIZE).unwrap())
 }
 
 /// Sixteen times sixteen pixels over the square, one sample each, the first of them beyond the chart.
@@ -325,15 +363,13 @@ fn the_engine_is_the_f64_model_and_its_gradient_the_losses_slope() {
     let truth = start(&[(weight, 0.7), (radius, 1.9), (width, 0.08), (depth, 1.2)]);
     let here = start(&[(weight, 0.5), (radius, 1.4), (width, 0.06), (depth, 1.5)]);
     let engine = engine(setup, unknowns.clone(), &truth);
-    let reference = Reference::new(setup, &engine_light(), engine.views(), Loss::L2, &unknowns)
-        .unwrap()
-        .normal_equations(&here);
+    let light = Illumination::default();
+    let model = Reference::new(setup, &light, engine.views(), Loss::L2, &unknowns).unwrap();
+    let reference = model.normal_equations(&here);
     let got = engine.normal_equations(&here);
     // Levels and what is made of them round to some 1e-7 of 1; residuals are a tenth of that 1.
     assert_alike(&got, &reference, &unknowns, 3e-5);
     let (_, gradient) = engine.gradient(&here);
-    let f64_model = engine_light();
-    let model = Reference::new(setup, &f64_model, engine.views(), Loss::L2, &unknowns).unwrap();
     for (unknown, slope) in unknowns.iter().zip(&gradient) {
         let at = |by: f64| {
             let mut moved = here.clone();
@@ -363,8 +399,56 @@ fn the_engine_is_the_f64_model_and_its_gradient_the_losses_slope() {
     assert_eq!(one, got);
 }
 
-fn engine_light() -> Illumination {
-    Illumination::default()
+#[test]
+fn levels_move_with_the_light_as_the_losses_do() {
+    // Smooth over the cube, so that differences tell its slope.
+    let cube = |k: f64| {
+        Cube::from_fn(16, |face, column, row| {
+            let [s, t] = [column, row].map(|i| (i as f64 + 0.5) / 16.0);
+            [1.0, 1.3, 1.7, 2.0].map(|c| (0.6 + 0.4 * (c * s + k * t + 0.5 * face as f64).sin()) as f32)
+        })
+    };
+    let lobes = LobeStack { exponents: vec![8.0, 16.0], cubes: vec![cube(0.7), cube(1.9)] };
+    let light = Illumination { irradiance: Some(cube(0.3)), lobes: Some(lobes), hilite: None };
+    let effects = Effects::of(&[dunes().effect, Effect::Occlusion]);
+    let setup = Setup::new(Form::Corrected, Silhouette::Fragment, effects);
+    let params = [Param::EnvironmentRotation, Param::SpecularLobe, Param::Occlusion, dunes().params[0]];
+    let unknowns = free(&params.map(Column::tied));
+    let mut target = Rows::new(3, LANES);
+    (0..3).for_each(|channel| target.plane_mut(channel).for_each(|x| *x = 0.3));
+    let task = Task { illumination: Arc::new(light.clone()), ..task(setup, target, unknowns.clone()) };
+    let here = start(&[(params[0], 11.0), (params[1], 11.0), (params[2], 0.7), (params[3], 1.4)]);
+    let model = Reference::new(setup, &light, &task.views, Loss::L2, &unknowns).unwrap();
+    let engine = CpuEngine::new(task.clone()).unwrap();
+    // As above; lookups round a little more.
+    assert_alike(&engine.normal_equations(&here), &model.normal_equations(&here), &unknowns, 1e-4);
+    let (_, gradient) = model.gradient(&here);
+    for (unknown, slope) in unknowns.iter().zip(gradient) {
+        let at = |by: f64| {
+            let mut moved = here.clone();
+            unknown.set(&mut moved, unknown.get(&here) + by);
+            model.loss(&moved)
+        };
+        let step = 1e-5;
+        let difference = (at(step) - at(-step)) / (2.0 * step);
+        // A lookup's slope changes from texel to texel: a few of the atlas' cross one within the step. The cubes between
+        // two exponents are made in f32.
+        let most = if *unknown == unknowns[1] { 2e-2 } else { 1e-3 };
+        assert!(
+            (slope - difference).abs() < most * (1e-3 + difference.abs()),
+            "{}: {slope} {difference}",
+            unknown.name()
+        );
+    }
+    // What moves them has them made again, and nothing else.
+    let made = engine.levels_made();
+    let mut moved = here.clone();
+    moved.params.set(Param::BaseWeight, 0.3);
+    engine.loss(&moved);
+    assert_eq!(engine.levels_made(), made);
+    moved.params.set(Param::EnvironmentRotation, 12.0);
+    engine.loss(&moved);
+    assert_eq!(engine.levels_made(), made + 1);
 }
 
 #[test]

@@ -199,7 +199,7 @@ fn without_an_atlas_the_effect_is_refused_and_others_have_no_passes() {
     for facts in [
         Facts { atlas: None, ..without },
         Facts { atlas: None, source: Source::Samples, ..without },
-        Facts { source: Source::Terms, ..without },
+        Facts { atlas: None, source: Source::Terms, ..without },
     ] {
         assert_eq!(plan(&facts).unwrap_err(), PlanError::NoAtlas { effect });
     }
