@@ -428,11 +428,15 @@ mod over_stored_texels {
 
     use super::*;
 
+    /// Texels along a side of the atlas.
+    const TEXELS: usize = 128;
+
     /// The square with both terms, seen by its camera with one sample a pixel.
     fn both() -> Scene {
         let mut scene = scene();
         scene.effects = Effects::of(&[term().effect, veined().effect]);
         scene.quality.samples_per_axis = 1;
+        scene.diffusion.light_map_size = TEXELS as u32;
         scene.views[0].camera.width = 64;
         scene.views[0].camera.height = 64;
         scene
@@ -454,12 +458,12 @@ mod over_stored_texels {
 
     fn truth(scene: &Scene) -> Point {
         let [weight, radius, width, depth] = parameters();
-        at(scene, &[(weight, 0.7), (radius, 1.9), (width, 0.008), (depth, 1.2)])
+        at(scene, &[(weight, 0.7), (radius, 1.9), (width, 0.03), (depth, 1.2)])
     }
 
     fn start(scene: &Scene) -> Point {
         let [weight, radius, width, depth] = parameters();
-        at(scene, &[(weight, 0.4), (radius, 1.4), (width, 0.006), (depth, 1.6)])
+        at(scene, &[(weight, 0.4), (radius, 1.4), (width, 0.022), (depth, 1.6)])
     }
 
     fn unknowns() -> Vec<Unknown> {
@@ -557,15 +561,15 @@ mod over_stored_texels {
             LevelMaker::<f32>::new(shading.levels).make(&atlas, &scene.params, &CubesAt::dark(|x| x));
         for name in ["glow_soft", "veins_stretch", "veins_soft"] {
             let drawn: Vec<&[f32]> = drawn_levels[name].chunks_exact(4).collect();
-            assert_eq!(drawn.len(), SIZE * SIZE);
+            assert_eq!(drawn.len(), TEXELS * TEXELS);
             assert_eq!(drawn.iter().filter(|texel| texel[3] > 0.0).count(), atlas.covered(), "{name}");
             for (place, texel) in levels[name].iter().enumerate() {
                 let [x, y] = atlas.texel(place).map(|x| x as usize);
                 for (c, value) in texel.iter().enumerate() {
                     // Adapters interpolate to some 1e-6 of the square, on which hills rise by 48 at most; and a tap at a
                     // texel's border takes either neighbour's share.
-                    let off = (value - drawn[y * SIZE + x][c]).abs();
-                    assert!(off < 1e-4, "{name} at ({x}, {y}): {value} {}", drawn[y * SIZE + x][c]);
+                    let off = (value - drawn[y * TEXELS + x][c]).abs();
+                    assert!(off < 1e-4, "{name} at ({x}, {y}): {value} {}", drawn[y * TEXELS + x][c]);
                 }
             }
         }
