@@ -445,7 +445,8 @@ fn number_cubes<R: Number>(scene: &Scene, at: &At) -> Cubes<R::Texel> {
     let (specular, specular_slope) = match &scene.lights.lobes[..] {
         [(_, only)] => (own(only), own(only).map(|_| [R::texel(0.0); 4])),
         _ => {
-            let (value, slope) = illumination(scene).lobes.as_ref().unwrap().at(at.constants.specular_lobe[0]);
+            let (value, slope) =
+                illumination(scene).lobes.as_ref().unwrap().at(at.constants.specular_lobe[0]);
             let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(|x| R::texel(x.into())));
             (wide(&value), wide(&slope))
         }
