@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::graphics::Task as Doing;
-use super::{FitEngineArguments, Observed, ObservedView, Refusal, SelectedEngine, Selection, on_cpu, tell};
+use super::{FitEngineArguments, Observed, ObservedView, Refusal, SelectedEngine, on_cpu, tell};
 use crate::gpu::engine::{DeviceSampleError, DeviceSamples, GpuEngine, Memory};
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError};
@@ -35,29 +35,25 @@ impl FitEngineArguments {
     }
 
     /// The engine on an adapter; on the CPU where `auto` wanted one that does not make it faster.
-    pub(super) fn on_gpu(
-        &self,
-        observed: &Observed,
-        selection: Selection,
-    ) -> Result<SelectedEngine, Refusal> {
-        let must = selection.why.is_none();
+    pub(super) fn on_gpu(&self, observed: &Observed, why: Option<String>) -> Result<SelectedEngine, Refusal> {
+        let must = why.is_none();
+        let but = |words: &str| why.as_ref().map(|why| format!("{why}, but {words}"));
         let mut gpu = match self.open() {
             Ok(gpu) if must || !gpu.is_software() => gpu,
             Ok(gpu) => {
-                let selection = selection.but(&format!("{} is a program on the CPU", gpu.name()));
-                return on_cpu(observed, selection);
+                return on_cpu(observed, but(&format!("{} is a program on the CPU", gpu.name())));
             }
             Err(error) if must => return Err(refused(&error)),
             Err(error) => {
                 tell(&format!("{error} The CPU engine makes the passes."));
-                return on_cpu(observed, selection.but("none could be opened"));
+                return on_cpu(observed, but("none could be opened"));
             }
         };
         let mut resident = self.resident();
         loop {
             let memory = Memory { part: None, resident };
             match GpuEngine::new(&gpu, observed.task(), &observed.start(), memory) {
-                Ok(engine) => return Ok(SelectedEngine { engine: Box::new(engine), selection }),
+                Ok(engine) => return Ok(SelectedEngine { engine: Box::new(engine), why }),
                 // A device that ran out of memory is not to be trusted any more; half as much may fit.
                 Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
                     let all: u64 = observed.views.iter().map(bytes).sum();
@@ -82,14 +78,11 @@ impl FitEngineArguments {
         baked: Baked,
     ) -> Result<(Observed, SelectedEngine), Refusal> {
         let (observed, chosen) = match self.with_own_samples(baked.clone())? {
-            Ok((observed, engine)) => {
-                let selection = Selection::default();
-                (observed, SelectedEngine { engine: Box::new(engine), selection })
-            }
+            Ok((observed, engine)) => (observed, SelectedEngine { engine: Box::new(engine), why: None }),
             Err(error @ (GpuError::OutOfMemory { .. } | GpuError::SamplesStay { .. })) => {
                 tell(&format!("{error} The CPU makes the samples."));
                 let observed = baked.sample()?.observe()?;
-                let chosen = self.on_gpu(&observed, Selection::default())?;
+                let chosen = self.on_gpu(&observed, None)?;
                 (observed, chosen)
             }
             Err(error) => return Err(refused(&error)),

@@ -46,20 +46,8 @@ pub(super) struct FitEngineArguments {
 /// An engine, and how it came to be taken.
 pub(super) struct SelectedEngine {
     pub(super) engine: Box<dyn Engine>,
-    pub(super) selection: Selection,
-}
-
-/// How an engine came to be taken.
-#[derive(Default)]
-pub(super) struct Selection {
     /// Why `auto` took it.
     pub(super) why: Option<String>,
-}
-
-impl Selection {
-    fn but(self, words: &str) -> Self {
-        Self { why: self.why.map(|why| format!("{why}, but {words}")) }
-    }
 }
 
 /// The views with what their samples show, wherever an engine has them.
@@ -117,8 +105,7 @@ impl FitEngineArguments {
     /// The requested engine over the scene's views.
     pub(super) fn select(&self, observed: &Observed) -> Result<SelectedEngine, Refusal> {
         let (gpu, why) = self.wants_gpu(&observed.views);
-        let selection = Selection { why };
-        let chosen = if gpu { self.on_gpu(observed, selection)? } else { on_cpu(observed, selection)? };
+        let chosen = if gpu { self.on_gpu(observed, why)? } else { on_cpu(observed, why)? };
         self.verified(observed, chosen)
     }
 
@@ -131,8 +118,8 @@ impl FitEngineArguments {
     }
 }
 
-fn on_cpu(observed: &Observed, selection: Selection) -> Result<SelectedEngine, Refusal> {
-    Ok(SelectedEngine { engine: Box::new(observed.engine()?), selection })
+fn on_cpu(observed: &Observed, why: Option<String>) -> Result<SelectedEngine, Refusal> {
+    Ok(SelectedEngine { engine: Box::new(observed.engine()?), why })
 }
 
 /// Hold an engine against the model in f64.
