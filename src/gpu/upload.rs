@@ -18,7 +18,7 @@ use crate::bake::Illumination;
 use crate::bake::VertexOcclusion;
 use crate::model::cube::Cube;
 use crate::model::params::{Param, Params};
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::scene::Scene;
 use crate::scene::mesh::Mesh;
 use crate::shader::{Attribute, Resource};
@@ -37,14 +37,14 @@ pub struct Content {
 }
 
 impl Content {
-    /// A scene as it was prepared, at its own constants.
+    /// A scene and its bakes, at its own constants.
     #[must_use]
-    pub fn of(prepared: &Prepared) -> Self {
+    pub fn of(baked: &Baked) -> Self {
         Self {
-            scene: Arc::clone(&prepared.scene),
-            illumination: Arc::clone(&prepared.illumination),
-            occlusion: prepared.occlusion.clone(),
-            params: prepared.scene.params.clone(),
+            scene: Arc::clone(&baked.scene),
+            illumination: Arc::clone(&baked.illumination),
+            occlusion: baked.occlusion.clone(),
+            params: baked.scene.params.clone(),
         }
     }
 }

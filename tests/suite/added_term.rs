@@ -1,7 +1,5 @@
 //! A term that only this test knows, through the door by which every term comes in: registered from its text, its
 //! value and derivatives held against a formula written here, fitted, drawn and exported.
-
-use std::sync::Arc;
 use std::sync::OnceLock;
 
 use skinfit::engine::cpu::CpuEngine;
@@ -301,7 +299,7 @@ mod on_an_adapter {
     use skinfit::model::terms::TermName;
 
     use super::*;
-    use crate::graphics::bench::{EXACT, SURFACE, built_in, content, gpu, prepared};
+    use crate::graphics::bench::{Content, EXACT, SURFACE, baked, built_in, gpu};
 
     fn engine(setup: Setup, views: &[ObservedView], unknowns: &[Unknown]) -> Option<GpuEngine> {
         let task = task(setup, views, Loss::L2, unknowns);
@@ -361,15 +359,15 @@ mod on_an_adapter {
     #[test]
     fn the_renderer_draws_it_and_its_layer() {
         let Some(gpu) = gpu() else { return };
-        let mut prepared = prepared(&built_in(), SURFACE.with(term().effect), 64);
-        Arc::make_mut(&mut prepared.scene).params.set_rgb(weight(), [0.9, 0.6, 0.4]);
-        let camera = prepared.scene.views[0].camera;
-        let mut renderer = Renderer::new(gpu, content(&prepared), EXACT).unwrap();
+        let baked = baked(&built_in(), SURFACE.with(term().effect), 64)
+            .with_scene(|scene| scene.params.set_rgb(weight(), [0.9, 0.6, 0.4]));
+        let camera = baked.scene.views[0].camera;
+        let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
         let whole = renderer.render(&camera, 1.0).unwrap().image;
         let layer = renderer.render_term(term().layers[0], &camera, 1.0).unwrap();
-        Arc::make_mut(&mut prepared.scene).effects = SURFACE;
+        let baked = baked.with_scene(|scene| scene.effects = SURFACE);
         let without =
-            Renderer::new(gpu, content(&prepared), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
+            Renderer::new(gpu, Content::of(&baked), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
         let most = layer.rgb.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
         assert!(most > 0.01, "the term shows: {most}");
         for (i, added) in layer.rgb.iter().enumerate() {

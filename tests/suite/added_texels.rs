@@ -589,13 +589,14 @@ mod over_stored_texels {
 
     #[test]
     fn the_heads_texels_and_image_are_the_renderers() {
-        use crate::graphics::bench::{built_in, content, on_cpu, on_gpu, prepared};
+        use crate::graphics::bench::{baked, built_in, on_cpu, on_gpu};
         let Some(gpu) = gpu() else { return };
         let effects = Effects::of(&[lit().effect, Effect::NormalMap, Effect::Occlusion]);
-        let mut head = prepared(&built_in(), effects, 96);
+        let head = baked(&built_in(), effects, 96);
         let (scene, params) = (Arc::clone(&head.scene), &head.scene.params);
         let facts = Facts::of_scene(&scene, params, Budget::Exact, false);
-        let drawn_levels = skinfit::gpu::atlas::levels(gpu, &plan(&facts).unwrap(), content(&head)).unwrap();
+        let drawn_levels =
+            skinfit::gpu::atlas::levels(gpu, &plan(&facts).unwrap(), Content::of(&head)).unwrap();
         let open = skinfit::samples::posed_occlusion(
             &scene,
             &scene.mesh.morphs,
@@ -630,7 +631,7 @@ mod over_stored_texels {
         let (usual, most) = (off[off.len() * 99 / 100], off[off.len() - 1]);
         assert!(usual < 1e-3 && most < 0.1, "{usual} {most}");
 
-        let cpu = on_cpu(&mut head, 2);
+        let cpu = on_cpu(&head, 2);
         let difference = crate::graphics::bench::Difference::new(&cpu, &on_gpu(gpu, &head, EXACT), 4);
         let usual = difference.interior[difference.interior.len() * 99 / 100];
         // Relative to the image's mean: the same, and samples at the edges of triangles.

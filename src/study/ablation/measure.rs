@@ -118,7 +118,7 @@ mod gpu {
 
     /// A subject at the constants of `point`.
     fn content(subject: &Subject, point: &Point) -> Content {
-        Content { params: point.params.clone(), ..Content::of(&subject.prepared) }
+        Content { params: point.params.clone(), ..Content::of(&subject.observed) }
     }
 
     fn renderer(gpu: &Gpu, content: Content) -> Result<Renderer, StudyError> {

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::gpu::{GpuEngine, Memory};
 use skinfit::engine::reference::{Reference, deviation};
 use skinfit::engine::view::ObservedView;
@@ -13,7 +12,7 @@ use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Column, Param};
 use skinfit::model::terms::TermName;
-use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::prepare::{Observed, PrepareOptions};
 use skinfit::samples::rows::Rows;
 use skinfit::samples::surface_records::Asked;
 use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
@@ -433,13 +432,11 @@ fn to_the_end() -> FitOptions {
 
 /// Fit a scene on both engines from its start.
 fn fit_on_both(gpu: &Gpu, scene: &Path) {
-    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(scene, &options).unwrap();
-    let observed = prepared.observed().unwrap();
-    let task = prepared.task(observed);
-    let start = prepared.start();
-    let ours = GpuEngine::new(gpu, task.clone(), &start, Memory::default()).unwrap();
-    let theirs = CpuEngine::new(task).unwrap();
+    let options = PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() };
+    let observed = Observed::new(scene, &options).unwrap();
+    let start = observed.start();
+    let ours = GpuEngine::new(gpu, observed.task(), &start, Memory::default()).unwrap();
+    let theirs = observed.engine().unwrap();
     let [ours, theirs] = [&ours as &dyn Objective, &theirs]
         .map(|engine| fit(engine, &start, &to_the_end(), &mut |_| {}).unwrap());
     let what = scene.display();
@@ -487,14 +484,12 @@ fn tiles_of_every_view_pull_as_the_cpu_engines_do() {
     assert_ne!(changed, text);
     std::fs::write(&listing, changed).unwrap();
     for scene in [scene, listing] {
-        let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
-        let mut prepared = Prepared::new(&scene, &options).unwrap();
-        let observed = prepared.observed().unwrap();
-        assert!(observed.len() > 1);
-        let task = prepared.task(observed);
-        let (start, widths) = (prepared.start(), prepared.image_widths());
-        let ours = GpuEngine::new(gpu, task.clone(), &start, Memory::default()).unwrap();
-        let theirs = CpuEngine::new(task).unwrap();
+        let options = PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() };
+        let observed = Observed::new(&scene, &options).unwrap();
+        assert!(observed.views.len() > 1);
+        let (start, widths) = (observed.start(), observed.image_widths());
+        let ours = GpuEngine::new(gpu, observed.task(), &start, Memory::default()).unwrap();
+        let theirs = observed.engine().unwrap();
         let [ours, theirs] =
             [&ours as &dyn Objective, &theirs].map(|engine| engine.pulls(&start, &widths).unwrap());
         assert_eq!(ours.tiles.len(), theirs.tiles.len());

@@ -9,7 +9,7 @@ use crate::engine::Engine;
 use crate::engine::reference::{Reference, deviation};
 use crate::engine::view::ObservedView;
 use crate::gpu::GpuError;
-use crate::prepare::Prepared;
+use crate::prepare::Observed;
 use crate::progress;
 
 /// How far an engine's sums may be from those in f64, relative to the geometric mean of the diagonal entries that
@@ -46,29 +46,8 @@ pub(super) struct FitEngineArguments {
 /// An engine, and how it came to be taken.
 pub(super) struct SelectedEngine {
     pub(super) engine: Box<dyn Engine>,
-    pub(super) selection: Selection,
-}
-
-/// How an engine came to be taken.
-#[derive(Default)]
-pub(super) struct Selection {
     /// Why `auto` took it.
     pub(super) why: Option<String>,
-    /// What it took to trace its samples, where the adapter had no room for its own.
-    traced_seconds: Option<f64>,
-}
-
-impl Selection {
-    fn but(self, words: &str) -> Self {
-        Self { why: self.why.map(|why| format!("{why}, but {words}")), ..self }
-    }
-}
-
-impl SelectedEngine {
-    /// The seconds that making the samples took, where it was done for the engine.
-    pub(super) fn sample_seconds(&self) -> Option<f64> {
-        self.engine.own_sample_seconds().or(self.selection.traced_seconds)
-    }
 }
 
 /// The views with what their samples show, wherever an engine has them.
@@ -123,44 +102,36 @@ impl FitEngineArguments {
         self.adapter.as_deref()
     }
 
-    /// The requested engine over the scene's views; without any, over samples that the adapter makes.
-    pub(super) fn select(
-        &self,
-        prepared: &Prepared,
-        observed: Option<Arc<[ObservedView]>>,
-    ) -> Result<SelectedEngine, Refusal> {
-        let (engine, selection) = match observed {
-            None => self.over_own_samples(prepared)?,
-            Some(observed) => {
-                let (gpu, why) = self.wants_gpu(&observed);
-                let selection = Selection { why, ..Selection::default() };
-                match gpu {
-                    true => self.on_gpu(prepared, &observed, selection)?,
-                    false => (Self::on_cpu(prepared, &observed)?, selection),
-                }
-            }
-        };
-        if self.verify {
-            verify(prepared, &*engine)?;
-        }
-        Ok(SelectedEngine { engine, selection })
+    /// The requested engine over the scene's views.
+    pub(super) fn select(&self, observed: &Observed) -> Result<SelectedEngine, Refusal> {
+        let (gpu, why) = self.wants_gpu(&observed.views);
+        let chosen = if gpu { self.on_gpu(observed, why)? } else { on_cpu(observed, why)? };
+        self.verified(observed, chosen)
     }
 
-    fn on_cpu(prepared: &Prepared, observed: &Arc<[ObservedView]>) -> Result<Box<dyn Engine>, Refusal> {
-        Ok(Box::new(prepared.engine_over(Arc::clone(observed))?))
+    /// An engine, held against the model in f64 where that is requested.
+    fn verified(&self, observed: &Observed, chosen: SelectedEngine) -> Result<SelectedEngine, Refusal> {
+        if self.verify {
+            verify(observed, &*chosen.engine)?;
+        }
+        Ok(chosen)
     }
 }
 
+fn on_cpu(observed: &Observed, why: Option<String>) -> Result<SelectedEngine, Refusal> {
+    Ok(SelectedEngine { engine: Box::new(observed.engine()?), why })
+}
+
 /// Hold an engine against the model in f64.
-fn verify(prepared: &Prepared, engine: &dyn Engine) -> Result<(), Refusal> {
-    let point = prepared.start();
+fn verify(observed: &Observed, engine: &dyn Engine) -> Result<(), Refusal> {
+    let point = observed.start();
     let bar = progress::spinner("verify");
     let views = surfaced_views(engine)?;
     let reference = Reference::new(
-        prepared.setup(),
-        &prepared.illumination,
+        observed.setup(),
+        &observed.illumination,
         &views,
-        prepared.scene.fit.loss,
+        observed.scene.fit.loss,
         engine.unknowns(),
     )
     .map_err(|error| Refusal::new(format!("--verify: {error}.")))?;
@@ -179,6 +150,6 @@ fn verify(prepared: &Prepared, engine: &dyn Engine) -> Result<(), Refusal> {
     };
     Err(Refusal::failure(format!(
         "{}: the first pass differs from the model in f64: {words}, where {most:.1e} is allowed. {remedy}",
-        prepared.scene.path.display()
+        observed.scene.path.display()
     )))
 }

@@ -1,7 +1,5 @@
 //! Which engine draws, and its options.
 
-use std::sync::Arc;
-
 use super::Refusal;
 use super::painter::{CpuPainter, GpuPainter, Painter};
 use crate::cli::graphics::Task;
@@ -9,7 +7,7 @@ use crate::cli::shader::parse_budget;
 use crate::cli::tell;
 use crate::gpu::error::SOFTWARE_DRIVER;
 use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::render::antialias::Antialias;
 use crate::shader::Budget;
 
@@ -52,31 +50,32 @@ impl EngineArguments {
         self.engine != "cpu"
     }
 
-    /// The requested engine with the scene in it, and the scene as it draws it.
-    pub(super) fn painter(
-        &self,
-        mut prepared: Prepared,
-        painting: Painting,
-    ) -> Result<(Prepared, Box<dyn Painter>), Refusal> {
-        let antialias = self.antialias.unwrap_or(Antialias::Grid(prepared.scene.quality.samples_per_axis));
+    /// Samples along a pixel's side, where they are not the scene's.
+    pub(super) const fn samples_per_axis(&self) -> Option<u32> {
+        match self.antialias {
+            Some(Antialias::Grid(n)) => Some(n),
+            _ => None,
+        }
+    }
+
+    /// The requested engine with the scene in it.
+    pub(super) fn painter(&self, baked: &Baked, painting: Painting) -> Result<Box<dyn Painter>, Refusal> {
+        let antialias = self.antialias.unwrap_or(Antialias::Grid(baked.scene.quality.samples_per_axis));
         if self.may_be_gpu()
             && let Some(gpu) = self.open()?
         {
             let Painting { animated, timed } = painting;
             let options = RenderOptions { antialias, budget: self.accuracy, timed, animated };
-            let painter =
-                GpuPainter::new(gpu, &prepared, options).map_err(|error| Task::Render.refusal(&error))?;
-            return Ok((prepared, Box::new(painter)));
+            let painter = GpuPainter::new(gpu, baked, options);
+            return Ok(Box::new(painter.map_err(|error| Task::Render.refusal(&error))?));
         }
-        let Antialias::Grid(n) = antialias else {
+        let Antialias::Grid(_) = antialias else {
             return Err(Refusal::new(
                 "--antialias msaa4 is a graphics adapter's; the CPU engine shades every sample. Give 2x2, or \
                  render on an adapter.",
             ));
         };
-        Arc::make_mut(&mut prepared.scene).quality.samples_per_axis = n;
-        let painter = CpuPainter::new(&prepared)?;
-        Ok((prepared, Box::new(painter)))
+        Ok(Box::new(CpuPainter::new(baked)?))
     }
 
     /// The adapter's device; none where `auto` finds no adapter that works, which it says.

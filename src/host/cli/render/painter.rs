@@ -6,7 +6,7 @@ use super::Refusal;
 use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
 use crate::model::effects::Effect;
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::render::backdrop::Backdrop;
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
@@ -66,9 +66,9 @@ pub(super) struct CpuPainter {
 
 impl CpuPainter {
     /// Of a scene at its own pose.
-    pub(super) fn new(prepared: &Prepared) -> Result<Self, Refusal> {
-        let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
-        let (scene, occlusion) = (Arc::clone(&prepared.scene), prepared.occlusion.clone());
+    pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
+        let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
+        let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
         let (posed, rays, open) = pose(&scene, &scene.mesh, occlusion.as_deref())?;
         let atlas = atlas_of(&scene, &posed, open.as_deref())?;
         Ok(Self { scene, occlusion, shader, posed, rays, open, atlas, seconds: 0.0 })
@@ -131,7 +131,7 @@ pub(super) use gpu::GpuPainter;
 
 mod gpu {
     use super::{
-        Arc, BACKGROUND, Backdrop, Beside, Camera, Image, Mesh, Painter, Picture, Prepared, Refusal, Scene,
+        Arc, BACKGROUND, Backdrop, Baked, Beside, Camera, Image, Mesh, Painter, Picture, Refusal, Scene,
         VertexOcclusion,
     };
     use crate::cli::graphics::Task;
@@ -155,13 +155,13 @@ mod gpu {
         /// Of a scene, on an adapter's device.
         pub(in crate::cli::render) fn new(
             gpu: Gpu,
-            prepared: &Prepared,
+            baked: &Baked,
             options: RenderOptions,
         ) -> Result<Self, GpuError> {
-            let mut renderer = Renderer::new(&gpu, Content::of(prepared), options)?;
-            renderer.set_background(prepared.scene.views[0].background);
-            let terms = TermName::of(prepared.scene.effects);
-            let scene = Arc::clone(&prepared.scene);
+            let mut renderer = Renderer::new(&gpu, Content::of(baked), options)?;
+            renderer.set_background(baked.scene.views[0].background);
+            let terms = TermName::of(baked.scene.effects);
+            let scene = Arc::clone(&baked.scene);
             Ok(Self { gpu, renderer, scene, terms, times: Vec::new(), told: false })
         }
 
