@@ -5,7 +5,7 @@
 //! built-in scene, reads a constant with its standard error, renders a view and exports the constants:
 //!
 //! ```
-//! use skinfit::{Constants, ExportTarget, FitOptions, PrepareOptions, Prepared, Shader};
+//! use skinfit::{Constants, ExportTarget, FitOptions, Observed, PrepareOptions, Shader};
 //! use skinfit::{built_in_scene, export_constants, fit, write_exr};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -13,21 +13,19 @@
 //!     let scene = built_in_scene(&folder)?; // or the path of your own scene file
 //!
 //!     // Read it, bake its light and occlusion, and sample the visible surface.
-//!     let options = PrepareOptions { fit: true, cache: Some(folder.clone()), ..PrepareOptions::default() };
-//!     let mut prepared = Prepared::new(&scene, &options)?;
-//!     let engine = prepared.engine()?;
-//!     let outcome = fit(&engine, &prepared.start(), &FitOptions::default(), &mut |_| {})?;
+//!     let options = PrepareOptions { cache: Some(folder.clone()), ..PrepareOptions::default() };
+//!     let observed = Observed::new(&scene, &options)?;
+//!     let outcome = fit(&observed.engine()?, &observed.start(), &FitOptions::default(), &mut |_| {})?;
 //!
 //!     let base = outcome.constant("base_weight").ok_or("base_weight is not free in this scene")?;
 //!     println!("base_weight = {:.4}, standard error {:?}", base.value, base.std_error);
 //!     assert!((base.value - 0.85).abs() < 1e-5); // the targets' own, but for roundings to 32 bits
 //!
-//!     let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params)?;
-//!     let (view, observed) = (&prepared.scene.views[0], &engine.views()[0]);
-//!     let image = shader.shade(&observed.samples, &view.camera, 1.0).image;
+//!     let shader = Shader::new(observed.setup(), &observed.illumination, &outcome.end.params)?;
+//!     let (scene, samples) = (&observed.scene, &observed.views[0].samples);
+//!     let image = shader.shade(samples, &scene.views[0].camera, 1.0).image;
 //!     write_exr(&folder.join("front.exr"), &image, &Default::default())?;
 //!
-//!     let scene = &prepared.scene;
 //!     let constants = Constants::new(scene.form, scene.effects, &outcome.end.params);
 //!     println!("{}", export_constants(ExportTarget::Glsl, constants, &Default::default()));
 //!     Ok(())
@@ -36,7 +34,7 @@
 //!
 //! | to | |
 //! | --- | --- |
-//! | read, bake and sample a scene | [`Prepared`], by [`PrepareOptions`]; [`built_in_scene`] writes one |
+//! | read, bake and sample a scene | [`Loaded`], [`Baked`], [`Sampled`], [`Observed`], each made from the one before or, by [`PrepareOptions`], from a file; [`built_in_scene`] writes one |
 //! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`]: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] |
 //! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name |
 //! | render | [`Shader`] on the CPU, [`Renderer`] on a graphics adapter; [`write_exr`] |
@@ -64,7 +62,7 @@ pub use skinfit_core::export::{
 pub use skinfit_core::fit::outcome::Outcome;
 pub use skinfit_core::fit::{FitOptions, fit};
 pub use skinfit_core::model::params::{Param, Params};
-pub use skinfit_core::prepare::{PrepareOptions, Prepared};
+pub use skinfit_core::prepare::{Baked, Loaded, Observed, PrepareOptions, Sampled};
 pub use skinfit_core::progress;
 pub use skinfit_core::render::files::write_exr;
 pub use skinfit_core::render::shade::Shader;
@@ -74,7 +72,7 @@ pub use skinfit_gpu::{Gpu, RenderOptions, Renderer};
 // The members' modules under one name, for the tests and experiments of the project.
 #[doc(hidden)]
 pub use skinfit_core::{
-    bake, builtin, demo, export, fit, model, output, prepare, render, samples, scene, shader, simd,
+    bake, builtin, demo, export, fit, model, output, prepare, program, render, samples, scene, shader, simd,
 };
 #[doc(hidden)]
 pub use skinfit_gpu as gpu;

@@ -11,22 +11,22 @@ use skinfit::bake::panorama::Radiance;
 use skinfit::bake::prefilter::Prefilter;
 use skinfit::bake::rays::RayMesh;
 use skinfit::engine::{Objective, Point};
-use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::prepare::{PrepareOptions, Sampled};
 use skinfit::render::shade::Shader;
 use skinfit::samples::sample_view;
 
 /// The built-in scene, written once below target/.
-fn prepared() -> Prepared {
+fn sampled() -> Sampled {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/bench-scene");
     let scene = skinfit::demo::kept_scene(&folder, Some(&folder)).expect("the built-in scene can be written");
     let options = PrepareOptions { fit: true, cache: Some(folder), ..PrepareOptions::default() };
-    Prepared::new(&scene, &options).expect("the built-in scene can be prepared")
+    Sampled::new(&scene, &options).expect("the built-in scene can be prepared")
 }
 
 fn passes(c: &mut Criterion) {
-    let mut prepared = prepared();
-    let start: Point = prepared.start();
-    let engine = prepared.engine().expect("the built-in scene has targets");
+    let observed = sampled().observe().expect("the built-in scene has targets");
+    let start: Point = observed.start();
+    let engine = observed.engine().expect("the built-in scene can be fitted");
     let mut group = c.benchmark_group("pass");
     group.throughput(Throughput::Elements(engine.samples()));
     group.bench_function("image", |b| b.iter(|| black_box(engine.image(0, &start))));
@@ -37,10 +37,10 @@ fn passes(c: &mut Criterion) {
 }
 
 fn sample(c: &mut Criterion) {
-    let prepared = prepared();
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)
+    let sampled = sampled();
+    let shader = Shader::new(sampled.setup(), &sampled.illumination, &sampled.scene.params)
         .expect("the built-in rules can be computed");
-    let (samples, camera) = (&prepared.samples[0], &prepared.scene.views[0].camera);
+    let (samples, camera) = (&sampled.samples[0], &sampled.scene.views[0].camera);
     let mut group = c.benchmark_group("sample");
     group.throughput(Throughput::Elements(samples.count() as u64));
     group.bench_function("the rules in f64, with every term", |b| {
@@ -50,8 +50,8 @@ fn sample(c: &mut Criterion) {
 }
 
 fn bakes(c: &mut Criterion) {
-    let prepared = prepared();
-    let environment = prepared.scene.environment.as_ref().expect("the built-in scene has an environment");
+    let sampled = sampled();
+    let environment = sampled.scene.environment.as_ref().expect("the built-in scene has an environment");
     let filter = Prefilter::of(&Radiance::new(environment));
     let mut group = c.benchmark_group("bake");
     group.sample_size(10);
@@ -61,7 +61,7 @@ fn bakes(c: &mut Criterion) {
             b.iter(|| black_box(filter.lobe(64, exponent, |_| {})));
         });
     }
-    let posed = prepared.scene.mesh.pose();
+    let posed = sampled.scene.mesh.pose();
     let rays = 32;
     group.throughput(Throughput::Elements(rays * posed.positions.len() as u64));
     group.bench_function("occlusion rays", |b| {
@@ -71,16 +71,16 @@ fn bakes(c: &mut Criterion) {
 }
 
 fn surface(c: &mut Criterion) {
-    let prepared = prepared();
-    let posed = prepared.scene.mesh.pose();
+    let sampled = sampled();
+    let posed = sampled.scene.mesh.pose();
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
-    let camera = &prepared.scene.views[0].camera;
+    let camera = &sampled.scene.views[0].camera;
     let mut group = c.benchmark_group("samples");
     group.sample_size(20);
-    let count = prepared.samples[0].count();
+    let count = sampled.samples[0].count();
     group.throughput(Throughput::Elements(count as u64));
     group.bench_function("one view", |b| {
-        b.iter(|| black_box(sample_view(&prepared.scene, &posed, &rays, None, camera)));
+        b.iter(|| black_box(sample_view(&sampled.scene, &posed, &rays, None, camera)));
     });
     group.finish();
 }

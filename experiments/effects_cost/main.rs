@@ -2,17 +2,18 @@
 //! `cargo run --release --example effects_cost -- SCENE -o table.csv`; see README.md beside this file.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Parser;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use skinfit::engine::Unknown;
-use skinfit::engine::gpu::{DeviceSamples, GpuEngine, Memory, Task};
+use skinfit::engine::gpu::{DeviceSamples, GpuEngine, Memory};
 use skinfit::engine::view::ObservedView;
+use skinfit::engine::{Task, Unknown};
 use skinfit::gpu::upload::Content;
 use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::model::params::{Column, Param};
-use skinfit::prepare::{PrepareOptions, Prepared, Views};
+use skinfit::prepare::{Baked, Loaded, PrepareOptions, Views};
 use skinfit::render::antialias::Antialias;
 use skinfit::samples::rows::Rows;
 use skinfit::scene::view::Camera;
@@ -65,7 +66,7 @@ const ROUNDS: usize = 4;
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments = Arguments::parse();
     let gpu = Gpu::open(&Choice::default())?;
-    let full = Prepared::baked(&arguments.scene, &options(None))?.scene.effects;
+    let full = Loaded::read(&arguments.scene, &options(None))?.scene.effects;
     let mut rows = Vec::new();
     if !arguments.full {
         for effect in Effect::BUILT_IN.into_iter().filter(|effect| *effect != Effect::Bloom) {
@@ -123,32 +124,27 @@ fn measure(
     effects: Effects,
     change: fn(&Plan) -> Plan,
 ) -> Result<Row, Box<dyn std::error::Error>> {
-    let mut prepared = Prepared::baked(&arguments.scene, &options(Some(effects)))?;
-    let camera =
-        Camera { width: arguments.width, height: arguments.height, ..prepared.scene.views[0].camera };
+    let mut loaded = Loaded::read(&arguments.scene, &options(Some(effects)))?;
+    let camera = Camera { width: arguments.width, height: arguments.height, ..loaded.scene.views[0].camera };
     // As many samples as the renderer draws fragments.
-    prepared.scene.views[0].camera = camera;
-    prepared.scene.quality.samples_per_axis = 1;
-    let content = Content {
-        scene: &prepared.scene,
-        illumination: &prepared.illumination,
-        occlusion: prepared.occlusion.as_ref(),
-        params: &prepared.scene.params,
-    };
+    loaded.scene.views[0].camera = camera;
+    loaded.scene.quality.samples_per_axis = 1;
+    let baked = loaded.bake()?;
+    let content = Content::of(&baked);
     let budget = if arguments.exact { Budget::Exact } else { Budget::Paper };
     let render = RenderOptions { antialias: Antialias::Grid(1), budget, timed: true, animated: false };
-    let mut renderer = Renderer::with_shader(gpu, content, render, change)?;
+    let mut renderer = Renderer::with_shader(gpu, content.clone(), render, change)?;
     let (made, groups) = DeviceSamples::new(gpu, content)?;
     let views = groups.into_iter().map(|samples| {
         // With alpha where the image has the haze there.
-        let hazy = prepared.scene.needs().haze;
+        let hazy = baked.scene.needs().haze;
         let target = Rows::new(if hazy { 4 } else { 3 }, samples.groups());
         ObservedView { samples, target, ..ObservedView::default() }
     });
     let views: Vec<ObservedView> = views.collect();
     let whole = renderer.plan().wgsl != renderer.plan().fetches_alone().wgsl;
-    let engine = if whole { over_samples(&made, &prepared, &views)? } else { None };
-    let start = prepared.start();
+    let engine = if whole { over_samples(made, &baked, views)? } else { None };
+    let start = baked.start();
     // The first frames wake the adapter up.
     renderer.frame_times(&camera, arguments.frames)?;
     let (mut times, mut compute) = (Vec::new(), Vec::new());
@@ -180,20 +176,17 @@ fn measure(
 }
 
 /// The fused engine over the samples of the image, its lookups live; `None` where the effects show nothing.
-fn over_samples<'g>(
-    made: &'g DeviceSamples<'g>,
-    prepared: &Prepared,
-    views: &'g [ObservedView],
-) -> Result<Option<GpuEngine<'g>>, GpuError> {
+fn over_samples(
+    made: DeviceSamples,
+    baked: &Baked,
+    views: Vec<ObservedView>,
+) -> Result<Option<GpuEngine>, GpuError> {
     let task = Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views,
-        loss: prepared.scene.fit.loss,
         // What moves normals forbids to keep what they look up.
         unknowns: vec![Unknown::Param(Column::tied(Param::NormalStrength))],
+        ..baked.task_over(views)
     };
-    match GpuEngine::over_device_samples(made, task, &prepared.start(), Memory::default()) {
+    match GpuEngine::over_device_samples(Arc::new(made), task, &baked.start(), Memory::default()) {
         Ok(engine) => Ok(Some(engine)),
         Err(GpuError::Plan(_)) => Ok(None),
         Err(error) => Err(error),

@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::path::PathBuf;
 
-use skinfit::{FitOptions, PrepareOptions, Prepared, built_in_scene, fit};
+use skinfit::{FitOptions, Observed, PrepareOptions, built_in_scene, fit};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cache = std::env::temp_dir().join("skinfit-library");
@@ -11,12 +11,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         Some(path) => PathBuf::from(path),
         None => built_in_scene(&cache)?,
     };
-    let options = PrepareOptions { fit: true, cache: Some(cache), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(&scene, &options)?;
-    let engine = prepared.engine()?;
-    prepared.warnings.iter().for_each(|warning| eprintln!("{warning}"));
+    let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
+    let observed = Observed::new(&scene, &options)?;
+    let engine = observed.engine()?;
+    observed.warnings.iter().for_each(|warning| eprintln!("{warning}"));
 
-    let outcome = fit(&engine, &prepared.start(), &FitOptions::default(), &mut |iteration| {
+    let outcome = fit(&engine, &observed.start(), &FitOptions::default(), &mut |iteration| {
         println!("iteration {:>2}: loss {:.6e}", iteration.iteration, iteration.loss);
     })?;
     println!("{} after {} passes", outcome.ending.words(), outcome.evaluations);

@@ -9,7 +9,7 @@ use burn::tensor::{Tensor, TensorData};
 use skinfit::gpu::Choice;
 use skinfit::model::params::Column;
 use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
-use skinfit::{Param, PrepareOptions, Prepared, built_in_scene};
+use skinfit::{Param, PrepareOptions, Sampled, built_in_scene};
 
 /// The free constants, and how far apart the loss is taken for a difference: the loss is a sum of f32, good to some
 /// 1e-6 of itself, and the differences of what is linear or square in a constant have no other error.
@@ -22,17 +22,17 @@ fn main() -> Result<(), Box<dyn Error>> {
     let cache = std::env::temp_dir().join("skinfit-library");
     let scene = built_in_scene(&cache)?;
     let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
-    let prepared = Prepared::new(&scene, &options)?;
+    let sampled = Sampled::new(&scene, &options)?;
 
     let shared = SharedDevice::open(&Choice::default())?;
     let columns = FREE.map(Column::tied);
     let shaded = Shaded {
-        setup: prepared.setup(),
-        params: &prepared.scene.params,
+        setup: sampled.setup(),
+        params: &sampled.scene.params,
         columns: &columns,
-        illumination: &prepared.illumination,
+        illumination: &sampled.illumination,
     };
-    let views: Vec<_> = prepared.samples.iter().collect();
+    let views: Vec<_> = sampled.samples.iter().collect();
     let (shade, inputs) = Shade::new(&shared, &shaded, &views, Scatter::Exact)?;
 
     // One backward pass: the slopes by three constants and by each sample's albedo.

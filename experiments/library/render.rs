@@ -8,7 +8,7 @@ use skinfit::gpu::Choice;
 use skinfit::gpu::upload::Content;
 use skinfit::render::antialias::Antialias;
 use skinfit::shader::Budget;
-use skinfit::{Gpu, PrepareOptions, Prepared, RenderOptions, Renderer, Shader, built_in_scene, write_exr};
+use skinfit::{Gpu, PrepareOptions, RenderOptions, Renderer, Sampled, Shader, built_in_scene, write_exr};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cache = std::env::temp_dir().join("skinfit-library");
@@ -17,11 +17,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         None => built_in_scene(&cache)?,
     };
     let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
-    let prepared = Prepared::new(&scene, &options)?;
-    let view = prepared.scene.views.first().ok_or("the scene has no view")?;
+    let sampled = Sampled::new(&scene, &options)?;
+    let view = sampled.scene.views.first().ok_or("the scene has no view")?;
 
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
-    let on_cpu = shader.shade(&prepared.samples[0], &view.camera, 1.0).image;
+    let shader = Shader::new(sampled.setup(), &sampled.illumination, &sampled.scene.params)?;
+    let on_cpu = shader.shade(&sampled.samples[0], &view.camera, 1.0).image;
     write_exr(Path::new("library_cpu.exr"), &on_cpu, &Default::default())?;
 
     let gpu = match Gpu::open(&Choice::default()) {
@@ -31,15 +31,9 @@ fn main() -> Result<(), Box<dyn Error>> {
             return Ok(());
         }
     };
-    let content = Content {
-        scene: &prepared.scene,
-        illumination: &prepared.illumination,
-        occlusion: prepared.occlusion.as_ref(),
-        params: &prepared.scene.params,
-    };
-    let antialias = Antialias::Grid(prepared.scene.quality.samples_per_axis);
+    let antialias = Antialias::Grid(sampled.scene.quality.samples_per_axis);
     let options = RenderOptions { antialias, budget: Budget::Exact, timed: false, animated: false };
-    let on_gpu = Renderer::new(&gpu, content, options)?.render(&view.camera, 1.0)?.image;
+    let on_gpu = Renderer::new(&gpu, Content::of(&sampled), options)?.render(&view.camera, 1.0)?.image;
     write_exr(Path::new("library_gpu.exr"), &on_gpu, &Default::default())?;
 
     // Silhouettes are where the rasteriser and rays may differ by a pixel: the share of pixels that differ tells.

@@ -7,6 +7,7 @@ mod data;
 mod racer;
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use clap::Parser;
@@ -14,14 +15,13 @@ use data::{Manifest, Result};
 use racer::Racer;
 use serde_json::{Value, json};
 use skinfit::engine::cpu::CpuEngine;
-use skinfit::engine::gpu::{GpuEngine, Memory, Task};
-use skinfit::engine::{Point, Unknown};
+use skinfit::engine::gpu::{GpuEngine, Memory};
+use skinfit::engine::{Point, Task, Unknown};
 use skinfit::fit::coordinates::Coordinates;
 use skinfit::fit::{FitOptions, bounded, fit};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::Param;
-use skinfit::samples::rows::Rows;
 use skinfit::scene::Loss;
 
 #[derive(Parser)]
@@ -66,33 +66,28 @@ fn peak_rss_mb() -> f64 {
     line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
 }
 
-/// Call `then` with the engine over the target `which`. With `keep` false the CPU's looks everything up anew
-/// in each pass; the GPU's does so where the bump strength is free.
-fn with_engine<T>(
-    arguments: &Arguments,
-    manifest: &Manifest,
-    which: &str,
-    keep: bool,
-    then: impl FnOnce(&mut dyn Racer, &Rows) -> Result<T>,
-) -> Result<T> {
+/// The engine over the target `which`. With `keep` false the CPU's looks everything up anew in each pass; the GPU's
+/// does so where the bump strength is free.
+fn engine(arguments: &Arguments, manifest: &Manifest, which: &str, keep: bool) -> Result<Box<dyn Racer>> {
     let columns = Manifest::columns(arguments.mode == "sampled");
-    let unknowns: Vec<Unknown> = columns.into_iter().map(Unknown::Param).collect();
-    let illumination = data::illumination(&arguments.data, manifest)?;
-    let views = vec![data::view(&arguments.data, manifest, which)?];
+    let task = Task {
+        setup: SETUP,
+        illumination: Arc::new(data::illumination(&arguments.data, manifest)?),
+        views: Arc::new([data::view(&arguments.data, manifest, which)?]),
+        loss: Loss::L2,
+        unknowns: columns.into_iter().map(Unknown::Param).collect(),
+    };
     if arguments.engine == "cpu" {
-        let engine = CpuEngine::with_kept_terms(SETUP, illumination, views, Loss::L2, unknowns, keep);
-        let mut engine = engine.map_err(|error| error.to_string())?;
-        let target = engine.views()[0].target.clone();
-        return then(&mut engine, &target);
+        let engine = CpuEngine::with_kept_terms(task, keep);
+        return Ok(Box::new(engine.map_err(|error| error.to_string())?));
     }
     let words = |error: skinfit::gpu::GpuError| error.to_string();
     let gpu = skinfit::gpu::Gpu::open(&skinfit::gpu::Choice::default()).map_err(words)?;
-    let task = Task { setup: SETUP, illumination, views: &views, loss: Loss::L2, unknowns };
     let start = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };
-    let mut engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(words)?;
+    let engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(words)?;
     let (resident, _) = engine.bytes();
     eprintln!("race: {:.1} bytes a pixel on the device", resident as f64 / manifest.pixels as f64);
-    then(&mut engine, &views[0].target)
+    Ok(Box::new(engine))
 }
 
 /// Pixels that the coarse stage of a fit reads, about.
@@ -121,11 +116,11 @@ fn criterion(manifest: &Manifest, which: &str, point: &Point) -> (f64, f64) {
 fn fit_to_criterion(engine: &mut dyn Racer, manifest: &Manifest, which: &str, start: &Point) -> Result<Run> {
     let clock = Instant::now();
     let stride = (manifest.pixels / COARSE_PIXELS).max(1);
-    engine.read_every(stride);
+    engine.set_stride(stride);
     let coarse = fit(engine, start, &FitOptions::default(), &mut |_| {}).map_err(|e| e.to_string())?;
     let mut evaluations = coarse.evaluations as f64 / stride as f64;
     let mut point = coarse.end;
-    engine.read_every(1);
+    engine.set_stride(1);
     let mut best = f64::INFINITY;
     for _ in 0..20 {
         let (error, tolerance) = criterion(manifest, which, &point);
@@ -165,21 +160,20 @@ fn gauss_newton_step(engine: &dyn Racer, point: &Point) -> Point {
 fn fits(arguments: &Arguments, manifest: &Manifest, start: &Point) -> Result<Value> {
     let mut fits = serde_json::Map::new();
     for which in ["clean", "noisy"] {
-        let row = with_engine(arguments, manifest, which, true, |engine, _| {
-            // The first pass makes the kept terms (mode `pre`: what peers are given in files).
-            engine.normal_equations(start);
-            let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
-            let runs = arguments.reps.max(5);
-            for _ in 0..runs {
-                let run = fit_to_criterion(engine, manifest, which, start)?;
-                seconds.extend(run.seconds);
-                (evaluations, best) = (run.evaluations, run.best);
-            }
-            seconds.sort_by(f64::total_cmp);
-            Ok(json!({"median": seconds.get(seconds.len() / 2), "min": seconds.first(),
-                      "evals": (evaluations * 100.0).round() / 100.0,
-                      "best": best, "ok": seconds.len(), "runs": runs}))
-        })?;
+        let mut engine = engine(arguments, manifest, which, true)?;
+        // The first pass makes the kept terms (mode `pre`: what peers are given in files).
+        engine.normal_equations(start);
+        let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
+        let runs = arguments.reps.max(5);
+        for _ in 0..runs {
+            let run = fit_to_criterion(&mut *engine, manifest, which, start)?;
+            seconds.extend(run.seconds);
+            (evaluations, best) = (run.evaluations, run.best);
+        }
+        seconds.sort_by(f64::total_cmp);
+        let row = json!({"median": seconds.get(seconds.len() / 2), "min": seconds.first(),
+                         "evals": (evaluations * 100.0).round() / 100.0,
+                         "best": best, "ok": seconds.len(), "runs": runs});
         fits.insert(format!("{which}/lm"), row);
     }
     Ok(Value::Object(fits))
@@ -196,33 +190,34 @@ fn run(arguments: &Arguments) -> Result<Value> {
     let before = peak_rss_mb();
     // In mode `sampled` every lookup is done anew; in mode `pre` what the bump strength decides is
     // kept from the first (untimed) pass, as the peers are given it in files.
-    let mut row = with_engine(arguments, &manifest, "clean", pre, |engine, target| {
-        let inputs = peak_rss_mb();
-        let first = Instant::now();
-        let image = engine.image_planes(&truth);
-        let first_forward = first.elapsed().as_secs_f64();
-        let error = |c: usize, i: usize| {
-            let want = target.number(c, i);
-            f64::from((image[c][i] - want).abs() / (1.0 + want.abs()))
-        };
-        let max_error = (0..4)
-            .flat_map(|c| (0..manifest.pixels).map(move |i| (c, i)))
-            .map(|(c, i)| error(c, i))
-            .fold(0.0, f64::max);
-        let mut planes = image;
-        let forward = timed(arguments.reps, || engine.forward(&start, &mut planes));
-        drop(planes);
-        let grad = timed(arguments.reps, || drop(std::hint::black_box(engine.gradient(&start))));
-        let normal = timed(arguments.reps, || drop(std::hint::black_box(engine.normal_equations(&start))));
-        engine.fault().map_or(Ok(()), Err)?;
-        Ok(json!({
-            "peer": "skinfit", "version": format!("skinfit {} ({})", env!("CARGO_PKG_VERSION"), engine.version()),
-            "pixels": manifest.pixels, "mode": arguments.mode, "device": engine.device(),
-            "forward": forward, "grad": grad, "normal": normal,
-            "first_forward_s": first_forward, "forward_max_err": max_error,
-            "rss_import_mb": before, "rss_before_fits_mb": inputs, "other_cpu": 0,
-        }))
-    })?;
+    let engine = engine(arguments, &manifest, "clean", pre)?;
+    let inputs = peak_rss_mb();
+    let first = Instant::now();
+    let image = engine.image_planes(&truth);
+    let first_forward = first.elapsed().as_secs_f64();
+    let error = |c: usize, i: usize| {
+        let want = engine.views()[0].target.number(c, i);
+        f64::from((image[c][i] - want).abs() / (1.0 + want.abs()))
+    };
+    let max_error = (0..4)
+        .flat_map(|c| (0..manifest.pixels).map(move |i| (c, i)))
+        .map(|(c, i)| error(c, i))
+        .fold(0.0, f64::max);
+    let mut planes = image;
+    let forward = timed(arguments.reps, || engine.forward(&start, &mut planes));
+    drop(planes);
+    let grad = timed(arguments.reps, || drop(std::hint::black_box(engine.gradient(&start))));
+    let normal = timed(arguments.reps, || drop(std::hint::black_box(engine.normal_equations(&start))));
+    engine.fault().map_or(Ok(()), Err)?;
+    let mut row = json!({
+        "peer": "skinfit", "version": format!("skinfit {} ({})", env!("CARGO_PKG_VERSION"), engine.version()),
+        "pixels": manifest.pixels, "mode": arguments.mode, "device": engine.name(),
+        "forward": forward, "grad": grad, "normal": normal,
+        "first_forward_s": first_forward, "forward_max_err": max_error,
+        "rss_import_mb": before, "rss_before_fits_mb": inputs, "other_cpu": 0,
+    });
+    // The fits have engines of their own.
+    drop(engine);
     if !arguments.passes_only {
         row["fits"] = fits(arguments, &manifest, &start)?;
     }

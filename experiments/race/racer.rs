@@ -1,26 +1,20 @@
 //! Both engines, as the race drives them.
 
 use skinfit::engine::cpu::CpuEngine;
-use skinfit::engine::{Objective, Point};
+use skinfit::engine::gpu::GpuEngine;
+use skinfit::engine::{Engine, Point};
 
 /// An engine over one view.
-pub(crate) trait Racer: Objective {
-    /// Read every so-many-th block of pixels.
-    fn read_every(&mut self, stride: usize);
+pub(crate) trait Racer: Engine {
     /// The image, in the engine's own memory; the CPU's is `planes`, which an earlier one has left.
     fn forward(&self, point: &Point, planes: &mut Vec<Vec<f32>>);
     /// The image, for the host.
     fn image_planes(&self, point: &Point) -> Vec<Vec<f32>>;
-    /// Of the table.
-    fn device(&self) -> &'static str;
     /// What it ran on.
     fn version(&self) -> String;
 }
 
 impl Racer for CpuEngine {
-    fn read_every(&mut self, stride: usize) {
-        self.set_stride(stride);
-    }
     fn forward(&self, point: &Point, planes: &mut Vec<Vec<f32>>) {
         self.image_into(0, point, planes);
         std::hint::black_box(planes);
@@ -28,27 +22,18 @@ impl Racer for CpuEngine {
     fn image_planes(&self, point: &Point) -> Vec<Vec<f32>> {
         self.image(0, point)
     }
-    fn device(&self) -> &'static str {
-        "cpu"
-    }
     fn version(&self) -> String {
         "rustc, f32 lanes".to_owned()
     }
 }
 
-impl Racer for skinfit::engine::gpu::GpuEngine<'_> {
-    fn read_every(&mut self, stride: usize) {
-        self.set_stride(stride);
-    }
+impl Racer for GpuEngine {
     fn forward(&self, point: &Point, _: &mut Vec<Vec<f32>>) {
         // A device that fails says so in the passes.
         let _ = self.shade(point);
     }
     fn image_planes(&self, point: &Point) -> Vec<Vec<f32>> {
         self.image(0, point).unwrap_or_default()
-    }
-    fn device(&self) -> &'static str {
-        "gpu"
     }
     fn version(&self) -> String {
         self.adapter().to_owned()

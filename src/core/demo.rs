@@ -4,9 +4,8 @@
 use std::path::{Path, PathBuf};
 
 use crate::builtin::{self, BuiltinError};
-use crate::model::params::Param;
 use crate::output::{self, OutputError};
-use crate::prepare::{PrepareError, PrepareOptions, Prepared};
+use crate::prepare::{Loaded, PrepareError, PrepareOptions};
 use crate::program::shading::ShadingError;
 use crate::progress;
 use crate::render::files::{ImageFileError, ImageOptions, write_exr};
@@ -102,13 +101,12 @@ pub fn write_scene(folder: &Path, cache: Option<&Path>) -> Result<PathBuf, DemoE
     builtin::write(folder)?;
     let scene = folder.join("scene.toml");
     let options = PrepareOptions { cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(&scene, &options)?;
-    prepared.scene.params = builtin::true_params();
-    let lobe = prepared.scene.params.scalar(Param::SpecularLobe);
-    prepared.bake(lobe..=lobe, cache)?;
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
-    let bar = progress::bar("targets", prepared.scene.views.len() as u64);
-    for (view, samples) in prepared.scene.views.iter().zip(&prepared.samples) {
+    let mut loaded = Loaded::read(&scene, &options)?;
+    loaded.scene.params = builtin::true_params();
+    let sampled = loaded.bake()?.sample()?;
+    let shader = Shader::new(sampled.setup(), &sampled.illumination, &sampled.scene.params)?;
+    let bar = progress::bar("targets", sampled.scene.views.len() as u64);
+    for (view, samples) in sampled.scene.views.iter().zip(&sampled.samples) {
         let image = shader.shade(samples, &view.camera, 1.0).image;
         let path = folder.join("targets").join(format!("{}.exr", view.name));
         write_exr(&path, &image, &ImageOptions::default())?;

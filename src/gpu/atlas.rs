@@ -36,7 +36,7 @@ impl Atlas {
     ///
     /// # Errors
     /// When the atlas is too large, the mesh does not lie in it, or the device does not take a pass.
-    pub(super) fn new(gpu: &Gpu, plan: &Plan, uploads: &mut Uploads<'_>) -> Result<Option<Self>, GpuError> {
+    pub(super) fn new(gpu: &Gpu, plan: &Plan, uploads: &mut Uploads) -> Result<Option<Self>, GpuError> {
         let Some(size) = plan.facts.atlas.filter(|_| !plan.passes.is_empty()) else { return Ok(None) };
         check(gpu, size, uploads)?;
         let mut atlas = Self { levels: HashMap::new(), passes: Vec::with_capacity(plan.passes.len()) };
@@ -46,7 +46,7 @@ impl Atlas {
         Ok(Some(atlas))
     }
 
-    fn push(&mut self, gpu: &Gpu, size: u32, pass: &Pass, uploads: &mut Uploads<'_>) -> Result<(), GpuError> {
+    fn push(&mut self, gpu: &Gpu, size: u32, pass: &Pass, uploads: &mut Uploads) -> Result<(), GpuError> {
         let mut left = Vec::with_capacity(pass.leaves.len());
         for level in &pass.leaves {
             let view = texture(gpu, &level.name, size, size, FORMAT, 1);
@@ -96,7 +96,7 @@ impl Atlas {
 ///
 /// # Errors
 /// When the atlas is too large, the mesh does not lie in it, or the device fails.
-pub fn levels(gpu: &Gpu, plan: &Plan, content: Content<'_>) -> Result<HashMap<String, Vec<f32>>, GpuError> {
+pub fn levels(gpu: &Gpu, plan: &Plan, content: Content) -> Result<HashMap<String, Vec<f32>>, GpuError> {
     let morphs = &content.scene.mesh.morphs;
     let targets: Vec<usize> = (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0).collect();
     let morph_weights: Vec<f32> = targets.iter().map(|&i| morphs[i].weight).collect();
@@ -105,7 +105,8 @@ pub fn levels(gpu: &Gpu, plan: &Plan, content: Content<'_>) -> Result<HashMap<St
     // Nobody sees a texel: any camera does.
     let camera = Camera { world_to_camera: glam::DMat4::IDENTITY, fov_y: 1.0, width: 1, height: 1 };
     let tile = Tile { x: 0, y: 0, width: 1, height: 1 };
-    atlas.set(gpu, &Values { params: content.params, camera: &camera, tile, morph_weights: &morph_weights });
+    let params = &uploads.content().params;
+    atlas.set(gpu, &Values { params, camera: &camera, tile, morph_weights: &morph_weights });
     let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("atlas") });
     atlas.draw(&mut encoder, None);
     let copies: Vec<(String, Copy)> =
@@ -116,7 +117,7 @@ pub fn levels(gpu: &Gpu, plan: &Plan, content: Content<'_>) -> Result<HashMap<St
 }
 
 /// Whether the adapter takes an atlas of that size, and the mesh lies in it.
-fn check(gpu: &Gpu, size: u32, uploads: &Uploads<'_>) -> Result<(), GpuError> {
+fn check(gpu: &Gpu, size: u32, uploads: &Uploads) -> Result<(), GpuError> {
     let limit = gpu.device.limits().max_texture_dimension_2d;
     if size > limit {
         let (adapter, what, side) = (gpu.name().to_owned(), "UV atlas".to_owned(), size as usize);

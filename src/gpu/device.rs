@@ -19,8 +19,8 @@ const EAGER: Duration = Duration::from_millis(2);
 const SHORTEST_SLEEP: Duration = Duration::from_micros(20);
 const LONGEST_SLEEP: Duration = Duration::from_millis(2);
 
-/// An adapter's device, open for work.
-#[derive(Debug)]
+/// An adapter's device, open for work: a handle, whose clones are of the same device.
+#[derive(Clone, Debug)]
 pub struct Gpu {
     /// The device, for passes of other libraries of the project.
     pub device: Device,
@@ -28,7 +28,7 @@ pub struct Gpu {
     pub queue: Queue,
     /// The adapter that it is of.
     pub adapter: Adapter,
-    info: AdapterInfo,
+    info: Arc<AdapterInfo>,
     /// The first thing that went wrong; errors after it are its consequences.
     fault: Arc<Mutex<Option<GpuError>>>,
 }
@@ -68,7 +68,7 @@ impl Gpu {
     /// [`Self::check`] from now on.
     #[must_use]
     pub fn adopt(adapter: Adapter, device: Device, queue: Queue) -> Self {
-        let info = adapter.get_info();
+        let info = Arc::new(adapter.get_info());
         let gpu = Self { device, queue, adapter, info, fault: Arc::default() };
         gpu.listen();
         gpu

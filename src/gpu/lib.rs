@@ -20,7 +20,7 @@
 //! Semantics are those of `samples` and `model`; images are compared with `render::shade` in the tests.
 
 // What other members of the workspace hold stands under the names that it has there.
-use skinfit_core::{bake, model, render, samples, scene, shader};
+use skinfit_core::{bake, model, prepare, render, samples, scene, shader};
 
 pub mod adapter;
 pub mod atlas;

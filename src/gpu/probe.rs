@@ -34,7 +34,7 @@ pub fn constants(probe: &Probe, params: &Params) -> Vec<f32> {
 pub fn evaluate(
     gpu: &Gpu,
     probe: &Probe,
-    content: Content<'_>,
+    content: Content,
     constants: &[f32],
     given: &[f32],
 ) -> Result<Vec<f32>, GpuError> {

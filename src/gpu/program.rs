@@ -51,7 +51,7 @@ impl Program {
     pub(super) fn new(
         gpu: &Gpu,
         plan: Plan,
-        uploads: &mut Uploads<'_>,
+        uploads: &mut Uploads,
         formats: &[TextureFormat],
         multisamples: u32,
     ) -> Result<Self, GpuError> {
@@ -65,7 +65,7 @@ impl Program {
     pub(super) fn over(
         gpu: &Gpu,
         plan: Plan,
-        uploads: &mut Uploads<'_>,
+        uploads: &mut Uploads,
         levels: Vec<Bound>,
         outputs: Outputs<'_>,
     ) -> Result<Self, GpuError> {

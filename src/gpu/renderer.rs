@@ -54,9 +54,9 @@ pub struct Frame {
 }
 
 /// A scene on a device, ready to be seen from anywhere.
-pub struct Renderer<'a> {
-    gpu: &'a Gpu,
-    uploads: Uploads<'a>,
+pub struct Renderer {
+    gpu: Gpu,
+    uploads: Uploads,
     options: RenderOptions,
     facts: Facts,
     /// Weights of the kept morph targets.
@@ -76,23 +76,23 @@ struct Stage {
     finish: Option<Finish>,
 }
 
-impl<'a> Renderer<'a> {
+impl Renderer {
     /// Plan the scene's shader, upload what it reads, and compile it.
     ///
     /// # Errors
     /// When no plan is within the budget, or the device does not take it.
-    pub fn new(gpu: &'a Gpu, content: Content<'a>, options: RenderOptions) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, content: Content, options: RenderOptions) -> Result<Self, GpuError> {
         let morphs = &content.scene.mesh.morphs;
         let kept = |i: &usize| options.animated || morphs[*i].weight != 0.0;
         let targets: Vec<usize> = (0..morphs.len()).filter(kept).collect();
         let morph_weights = targets.iter().map(|&i| morphs[i].weight).collect();
         let facts = Facts {
             morphs: targets.len() as u32,
-            ..Facts::of_scene(content.scene, content.params, options.budget, gpu.f16())
+            ..Facts::of_scene(&content.scene, &content.params, options.budget, gpu.f16())
         };
         let uploads = Uploads::new(gpu, content, targets)?;
         let mut renderer = Self {
-            gpu,
+            gpu: gpu.clone(),
             uploads,
             options,
             facts,
@@ -112,8 +112,8 @@ impl<'a> Renderer<'a> {
     /// # Errors
     /// As of [`Self::new`].
     pub fn with_shader(
-        gpu: &'a Gpu,
-        content: Content<'a>,
+        gpu: &Gpu,
+        content: Content,
         options: RenderOptions,
         change: impl FnOnce(&Plan) -> Plan,
     ) -> Result<Self, GpuError> {
@@ -159,7 +159,7 @@ impl<'a> Renderer<'a> {
     /// Move the mesh to another pose: the scene's at another time, with the occlusion of that pose where it has one of
     /// its own. Only with [`RenderOptions::animated`].
     pub fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
-        self.uploads.set_mesh(self.gpu, mesh, occlusion);
+        self.uploads.set_mesh(&self.gpu, mesh, occlusion);
         let weights = mesh.morphs.iter().map(|morph| morph.weight);
         self.morph_weights.iter_mut().zip(weights).for_each(|(old, new)| *old = new);
     }
@@ -184,7 +184,7 @@ impl<'a> Renderer<'a> {
         let (stage, copies) = self.submit(None, camera, gain, true, None)?;
         let mut planes = Vec::with_capacity(copies.len());
         for copy in &copies {
-            planes.push(copy.arrived(self.gpu).await?);
+            planes.push(copy.arrived(&self.gpu).await?);
         }
         let (image, clipped) = self.stages[stage].finished_image(&planes, gain);
         Ok(Frame { image, clipped, times: Vec::new() })
@@ -221,7 +221,7 @@ impl<'a> Renderer<'a> {
             return;
         }
         let (content, n) = (self.uploads.content(), self.backdrop_samples());
-        let backdrop = Backdrop::new(content.scene, content.params, self.background, camera, n);
+        let backdrop = Backdrop::new(&content.scene, &content.params, self.background, camera, n);
         if self.backdrop.is_none() {
             // Terms may have been drawn before, with nothing behind them.
             self.stages.clear();
@@ -233,7 +233,7 @@ impl<'a> Renderer<'a> {
             if let (Some(finish), Some((_, backdrop))) = (&stage.finish, &self.backdrop)
                 && (key.width, key.height) == size
             {
-                finish.set_backdrop(self.gpu, backdrop);
+                finish.set_backdrop(&self.gpu, backdrop);
             }
         }
     }
@@ -247,12 +247,12 @@ impl<'a> Renderer<'a> {
     pub fn frame_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
         let program = self.program(None)?;
         let stage = self.stage(camera, hazy(&self.programs[program].plan))?;
-        let (gpu, program, stage) = (self.gpu, &self.programs[program], &self.stages[stage]);
+        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[stage]);
         let mut timers = Vec::with_capacity(frames);
         for _ in 0..frames {
             for (i, &tile) in stage.targets.tiles.iter().enumerate() {
                 let mut timer = Timer::new(gpu);
-                let (params, morph_weights) = (self.uploads.content().params, self.morph_weights.as_slice());
+                let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
                 program.set(gpu, &Values { params, camera, tile, morph_weights });
                 let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
                 stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, Some(&mut timer));
@@ -282,7 +282,7 @@ impl<'a> Renderer<'a> {
             plan(&Facts { output, ..self.facts }).map_err(|error| GpuError::Plan(error.to_string()))?;
         let formats = self.key(1, 1, hazy(&plan)).formats();
         let multisamples = self.options.antialias.multisamples();
-        self.programs.push(Program::new(self.gpu, plan, &mut self.uploads, &formats, multisamples)?);
+        self.programs.push(Program::new(&self.gpu, plan, &mut self.uploads, &formats, multisamples)?);
         Ok(self.programs.len() - 1)
     }
 
@@ -308,11 +308,11 @@ impl<'a> Renderer<'a> {
         if let Some(i) = self.stages.iter().position(|stage| stage.targets.key == key) {
             return Ok(i);
         }
-        let targets = Targets::new(self.gpu, key)?;
-        let resolve = targets.samples.as_ref().map(|samples| Resolve::new(self.gpu, &targets, samples));
+        let targets = Targets::new(&self.gpu, key)?;
+        let resolve = targets.samples.as_ref().map(|samples| Resolve::new(&self.gpu, &targets, samples));
         let sigma = self.uploads.content().scene.bloom.sigma;
         let backdrop = self.backdrop.as_ref().map(|(_, backdrop)| backdrop);
-        let finish = Finish::new(self.gpu, &targets, sigma, backdrop);
+        let finish = Finish::new(&self.gpu, &targets, sigma, backdrop);
         self.gpu.check()?;
         self.stages.push(Stage { targets, resolve, finish });
         Ok(self.stages.len() - 1)
@@ -326,9 +326,9 @@ impl<'a> Renderer<'a> {
         gain: f64,
         finished: bool,
     ) -> Result<Drawn, GpuError> {
-        let mut timer = self.options.timed.then(|| Timer::new(self.gpu));
+        let mut timer = self.options.timed.then(|| Timer::new(&self.gpu));
         let (stage, copies) = self.submit(output, camera, gain, finished, timer.as_mut())?;
-        let planes = copies.iter().map(|copy| copy.read(self.gpu)).collect::<Result<Vec<_>, _>>()?;
+        let planes = copies.iter().map(|copy| copy.read(&self.gpu)).collect::<Result<Vec<_>, _>>()?;
         Ok(Drawn { stage, planes, times: timer.map(|timer| timer.times).unwrap_or_default() })
     }
 
@@ -344,11 +344,11 @@ impl<'a> Renderer<'a> {
     ) -> Result<(usize, Vec<Copy>), GpuError> {
         let program = self.program(output)?;
         let place = self.stage(camera, hazy(&self.programs[program].plan))?;
-        let (gpu, program, stage) = (self.gpu, &self.programs[program], &self.stages[place]);
+        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[place]);
         let mut copies = Vec::new();
         let tiles = &stage.targets.tiles;
         for (i, &tile) in tiles.iter().enumerate() {
-            let (params, morph_weights) = (self.uploads.content().params, self.morph_weights.as_slice());
+            let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
             program.set(gpu, &Values { params, camera, tile, morph_weights });
             let mut encoder =
                 gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });

@@ -1,6 +1,7 @@
 //! A scene on the device: what plans read of it, each thing uploaded once and only when a plan names it.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use wgpu::util::{DeviceExt as _, TextureDataOrder};
 use wgpu::{
@@ -17,26 +18,40 @@ use crate::bake::Illumination;
 use crate::bake::VertexOcclusion;
 use crate::model::cube::Cube;
 use crate::model::params::{Param, Params};
+use crate::prepare::Baked;
 use crate::scene::Scene;
 use crate::scene::mesh::Mesh;
 use crate::shader::{Attribute, Resource};
 
-/// What is rendered: a scene, its bakes, and the parameters.
-#[derive(Clone, Copy)]
-pub struct Content<'a> {
+/// What is rendered: a scene, its bakes, and the parameters. Whatever is large is shared: a clone copies none of it.
+#[derive(Clone)]
+pub struct Content {
     /// The scene, its mesh at rest.
-    pub scene: &'a Scene,
+    pub scene: Arc<Scene>,
     /// The cubes that its effects ask for.
-    pub illumination: &'a Illumination,
+    pub illumination: Arc<Illumination>,
     /// Ambient occlusion, when asked for.
-    pub occlusion: Option<&'a VertexOcclusion>,
+    pub occlusion: Option<Arc<VertexOcclusion>>,
     /// The constants of the model.
-    pub params: &'a Params,
+    pub params: Params,
+}
+
+impl Content {
+    /// A scene and its bakes, at its own constants.
+    #[must_use]
+    pub fn of(baked: &Baked) -> Self {
+        Self {
+            scene: Arc::clone(&baked.scene),
+            illumination: Arc::clone(&baked.illumination),
+            occlusion: baked.occlusion.clone(),
+            params: baked.scene.params.clone(),
+        }
+    }
 }
 
 /// The scene's part on the device.
-pub(super) struct Uploads<'a> {
-    content: Content<'a>,
+pub(super) struct Uploads {
+    content: Content,
     /// In the place of the scene's mesh and its occlusion: one whose triangles share no vertices.
     split: Option<(Mesh, Option<VertexOcclusion>)>,
     /// The morph targets that are summed, by their index in the mesh.
@@ -69,22 +84,22 @@ impl Bound {
     }
 }
 
-impl<'a> Uploads<'a> {
+impl Uploads {
     /// The scene's triangles; everything else follows as it is asked for. `targets` are summed.
-    pub(super) fn new(gpu: &Gpu, content: Content<'a>, targets: Vec<usize>) -> Result<Self, GpuError> {
+    pub(super) fn new(gpu: &Gpu, content: Content, targets: Vec<usize>) -> Result<Self, GpuError> {
         Self::of_mesh(gpu, content, targets, None)
     }
 
     /// As [`new`](Self::new), of a mesh whose triangles share no vertices: each knows which corner it is. Its pose is
     /// the scene's for good.
-    pub(super) fn by_corner(gpu: &Gpu, content: Content<'a>, targets: Vec<usize>) -> Result<Self, GpuError> {
-        let split = vertices::by_corner(&content.scene.mesh, content.occlusion);
+    pub(super) fn by_corner(gpu: &Gpu, content: Content, targets: Vec<usize>) -> Result<Self, GpuError> {
+        let split = vertices::by_corner(&content.scene.mesh, content.occlusion.as_deref());
         Self::of_mesh(gpu, content, targets, Some(split))
     }
 
     fn of_mesh(
         gpu: &Gpu,
-        content: Content<'a>,
+        content: Content,
         targets: Vec<usize>,
         split: Option<(Mesh, Option<VertexOcclusion>)>,
     ) -> Result<Self, GpuError> {
@@ -102,11 +117,11 @@ impl<'a> Uploads<'a> {
     fn mesh(&self) -> (&Mesh, Option<&VertexOcclusion>) {
         match &self.split {
             Some((mesh, occlusion)) => (mesh, occlusion.as_ref()),
-            None => (&self.content.scene.mesh, self.content.occlusion),
+            None => (&self.content.scene.mesh, self.content.occlusion.as_deref()),
         }
     }
 
-    pub(super) const fn content(&self) -> &Content<'a> {
+    pub(super) const fn content(&self) -> &Content {
         &self.content
     }
 
@@ -146,7 +161,7 @@ impl<'a> Uploads<'a> {
     }
 
     fn make(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
-        let Content { scene, illumination, .. } = self.content;
+        let (scene, illumination) = (Arc::clone(&self.content.scene), Arc::clone(&self.content.illumination));
         let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
         let texels = match resource {
             Resource::MapSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::Repeat))),
@@ -188,7 +203,7 @@ impl<'a> Uploads<'a> {
     /// device; and `occlusion`, where that pose has one of its own, in place of the scene's.
     pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
         let own = occlusion.is_some();
-        let occlusion = occlusion.or(self.content.occlusion);
+        let occlusion = occlusion.or(self.content.occlusion.as_deref());
         for (&attribute, buffer) in &self.attributes {
             let moves = matches!(attribute, Attribute::Position | Attribute::Normal | Attribute::Tangent);
             if moves || own && attribute == Attribute::Occlusion {

@@ -6,7 +6,7 @@ use super::StudyError;
 use super::subject::Subject;
 use crate::model::effects::Effect;
 use crate::model::params::Params;
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::shader::{Budget, Facts, plan};
 
 /// A cube lookup reads 2 x 2 texels of four 32-bit channels.
@@ -33,14 +33,14 @@ impl Counts {
     /// # Errors
     /// When the renderer has no shader for it.
     pub fn new(subject: &Subject, params: &Params) -> Result<Self, StudyError> {
-        let scene = &subject.prepared.scene;
+        let scene = &subject.observed.scene;
         let planned = plan(&Facts::of_scene(scene, params, Budget::Exact, false))?;
         let attributes =
             subject.engine.views().first().map_or(0, |view| view.samples.surface.rows().stride());
         let needs = scene.needs();
         let lookups = [needs.irradiance, scene.effects.has(Effect::SideSpecular), needs.dapple, needs.hilite];
         let lookups = lookups.into_iter().filter(|&wanted| wanted).count();
-        let (bakes, baked_bytes) = bakes(&subject.prepared);
+        let (bakes, baked_bytes) = bakes(&subject.observed);
         Ok(Self {
             samples: subject.engine.samples(),
             bytes_a_sample: attributes * size_of::<f32>() + lookups * LOOKUP_BYTES,
@@ -58,8 +58,8 @@ impl Counts {
 }
 
 /// What was baked, and how many bytes it is.
-fn bakes(prepared: &Prepared) -> (Vec<String>, usize) {
-    let light = &prepared.illumination;
+fn bakes(baked: &Baked) -> (Vec<String>, usize) {
+    let light = &baked.illumination;
     let (mut names, mut floats) = (Vec::new(), 0);
     let mut cube = |name: &str, texels: usize| {
         names.push(name.to_owned());
@@ -75,7 +75,7 @@ fn bakes(prepared: &Prepared) -> (Vec<String>, usize) {
     if let Some(hilite) = &light.hilite {
         cube("hilite", hilite.padded().len());
     }
-    if let Some(occlusion) = &prepared.occlusion {
+    if let Some(occlusion) = &baked.occlusion {
         names.push("occlusion".to_owned());
         floats += occlusion.base.len() + occlusion.morphs.iter().map(Vec::len).sum::<usize>();
     }

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use super::StudyError;
 use super::reference::Source;
-use crate::engine::Point;
 use crate::engine::cpu::CpuEngine;
+use crate::engine::{Point, Task};
 use crate::fit::outcome::Outcome;
 use crate::fit::{self, FitOptions};
 use crate::model::effects::Effect;
 use crate::model::params::{Column, Param, Params};
-use crate::prepare::{PrepareOptions, Prepared};
+use crate::prepare::{Baked, Loaded, Observed, PrepareOptions, Sampled};
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
@@ -21,16 +21,16 @@ use crate::scene::view::{Target, View};
 /// A scene in one setting.
 #[derive(Debug)]
 pub struct Subject {
-    /// Its stages; the samples are in the engine.
-    pub prepared: Prepared,
-    /// The engine over the views that have something to be compared with.
+    /// Its views that have something to be compared with.
+    pub observed: Observed,
+    /// The engine over them.
     pub engine: CpuEngine,
-    /// What that is.
+    /// What they are compared with.
     pub source: Source,
 }
 
 impl Subject {
-    /// Prepare a scene. `change` is called once it is loaded and sampled: to hold parameters.
+    /// Prepare a scene. `change` is called once it is loaded: to hold parameters.
     ///
     /// Views are compared with `references`, where they are given, and else with their targets; without
     /// either, with what the model itself makes of them.
@@ -41,34 +41,34 @@ impl Subject {
         scene: &Path,
         options: &PrepareOptions,
         references: Option<&[Image]>,
-        change: &dyn Fn(&mut Prepared),
+        change: impl FnOnce(&mut Loaded),
     ) -> Result<Self, StudyError> {
-        let mut prepared = Prepared::new(scene, options)?;
-        change(&mut prepared);
-        Self::of(prepared, references)
+        let mut loaded = Loaded::read(scene, options)?;
+        change(&mut loaded);
+        Self::of(loaded.bake()?.sample()?, references)
     }
 
-    /// As [`Self::new`], of a scene that is prepared.
+    /// As [`Self::new`], of a scene that is sampled.
     ///
     /// # Errors
     /// When a stage refuses its input.
-    pub fn of(mut prepared: Prepared, references: Option<&[Image]>) -> Result<Self, StudyError> {
+    pub fn of(sampled: Sampled, references: Option<&[Image]>) -> Result<Self, StudyError> {
+        let Sampled { baked, samples } = sampled;
         let own: Vec<Image>;
         let made = match references {
             Some(images) => Some(images),
-            None if prepared.scene.views.iter().all(|view| view.target.is_none()) => {
-                own = images(&prepared, &prepared.samples.iter().collect::<Vec<_>>(), &prepared.start())?;
+            None if baked.scene.views.iter().all(|view| view.target.is_none()) => {
+                own = images(&baked, &samples.iter().collect::<Vec<_>>(), &baked.start())?;
                 Some(own.as_slice())
             }
             None => None,
         };
-        for (view, image) in prepared.scene.views.iter_mut().zip(made.into_iter().flatten()) {
-            let (rgb, alpha) = (image.rgb.clone(), Some(image.alpha.clone()));
-            view.target = Some(Target { rgb, alpha, haze: None, mask: None, clipped_at: None });
-        }
-        let source = if made.is_some() { Source::Model } else { Source::Targets };
-        let engine = prepared.engine()?;
-        Ok(Self { prepared, engine, source })
+        let (baked, source) = match made {
+            Some(images) => (compared_with(baked, images), Source::Model),
+            None => (baked, Source::Targets),
+        };
+        let observed = baked.observe(samples)?;
+        Ok(Self { engine: observed.engine()?, observed, source })
     }
 
     /// The image of each view at `point`, bloom and all: the model in f64.
@@ -77,7 +77,7 @@ impl Subject {
     /// When a rule cannot be computed on the processor.
     pub fn images(&self, point: &Point) -> Result<Vec<Image>, StudyError> {
         let samples: Vec<&ViewSamples> = self.engine.views().iter().map(|view| &view.samples).collect();
-        images(&self.prepared, &samples, point)
+        images(&self.observed, &samples, point)
     }
 
     /// Fit what is free, from the scene's start.
@@ -85,7 +85,7 @@ impl Subject {
     /// # Errors
     /// When the fit cannot be done; one that does not converge says so in its outcome.
     pub fn fit(&self, options: &FitOptions) -> Result<Outcome, StudyError> {
-        self.fit_from(&self.prepared.start(), options)
+        self.fit_from(&self.observed.start(), options)
     }
 
     /// Fit what is free, from `start`.
@@ -94,7 +94,7 @@ impl Subject {
     /// When the fit cannot be done; one that does not converge says so in its outcome.
     pub fn fit_from(&self, start: &Point, options: &FitOptions) -> Result<Outcome, StudyError> {
         fit::fit(&self.engine, start, options, &mut |_| {})
-            .map_err(|error| StudyError::Fit { scene: self.prepared.scene.path.display().to_string(), error })
+            .map_err(|error| StudyError::Fit { scene: self.observed.scene.path.display().to_string(), error })
     }
 
     /// An engine over the same samples that keeps nothing from pass to pass: every lookup is done anew, as in
@@ -103,16 +103,24 @@ impl Subject {
     /// # Errors
     /// When a rule cannot be computed on the processor.
     pub fn live_engine(&self) -> Result<CpuEngine, StudyError> {
-        let (illumination, views) = (self.prepared.illumination.clone(), self.engine.views().to_vec());
-        let loss = self.prepared.scene.fit.loss;
-        let setup = self.prepared.setup();
-        Ok(CpuEngine::with_kept_terms(setup, illumination, views, loss, Vec::new(), false)?)
+        let task = Task { unknowns: Vec::new(), ..self.observed.task() };
+        Ok(CpuEngine::with_kept_terms(task, false)?)
     }
 }
 
-fn images(prepared: &Prepared, samples: &[&ViewSamples], point: &Point) -> Result<Vec<Image>, StudyError> {
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &point.params)?;
-    Ok(shaded(&prepared.scene, &shader, samples, &point.gains))
+/// The scene with these images as its views' targets.
+fn compared_with(baked: Baked, images: &[Image]) -> Baked {
+    baked.with_scene(|scene| {
+        for (view, image) in scene.views.iter_mut().zip(images) {
+            let (rgb, alpha) = (image.rgb.clone(), Some(image.alpha.clone()));
+            view.target = Some(Target { rgb, alpha, haze: None, mask: None, clipped_at: None });
+        }
+    })
+}
+
+fn images(baked: &Baked, samples: &[&ViewSamples], point: &Point) -> Result<Vec<Image>, StudyError> {
+    let shader = Shader::new(baked.setup(), &baked.illumination, &point.params)?;
+    Ok(shaded(&baked.scene, &shader, samples, &point.gains))
 }
 
 /// The image of each view of `scene`, bloom and all, times its gain.

@@ -1,7 +1,5 @@
 //! One wgpu device for burn's tensors, the engine and the renderer.
 
-use std::sync::Arc;
-
 use burn::backend::wgpu::WgpuSetup;
 use burn::tensor::Device;
 
@@ -12,7 +10,7 @@ use crate::gpu::{Choice, Gpu};
 /// buffer the other reads there, without a copy.
 #[derive(Clone, Debug)]
 pub struct SharedDevice {
-    gpu: Arc<Gpu>,
+    gpu: Gpu,
     device: Device,
 }
 
@@ -40,12 +38,12 @@ impl SharedDevice {
         })?;
         // Burn has put listeners that panic in place of ours.
         gpu.listen();
-        Ok(Self { gpu: Arc::new(gpu), device })
+        Ok(Self { gpu, device })
     }
 
     /// The device as the renderer and the engine see it.
     #[must_use]
-    pub fn gpu(&self) -> &Arc<Gpu> {
+    pub const fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 

@@ -36,12 +36,12 @@ impl Planes {
     pub(super) fn draw(
         shared: &SharedDevice,
         adjoint: &Adjoint,
-        made: &DeviceSamples<'_>,
+        made: &DeviceSamples,
         views: &[&ViewSamples],
     ) -> Result<Self, TensorError> {
         let gpu = shared.gpu();
         let foreign = |reason: &str| TensorError::Foreign { what: "the samples", reason: reason.to_owned() };
-        if !std::ptr::eq(made.gpu(), &**gpu) {
+        if made.gpu().device != gpu.device {
             return Err(foreign("they were drawn on another device"));
         }
         if !made.came_with(views) {

@@ -73,7 +73,7 @@ impl Shade {
     pub fn over_device_samples(
         shared: &SharedDevice,
         shaded: &Shaded<'_>,
-        samples: &DeviceSamples<'_>,
+        samples: &DeviceSamples,
         views: &[&ViewSamples],
         scatter: Scatter,
     ) -> Result<(Self, Inputs), TensorError> {
@@ -84,7 +84,7 @@ impl Shade {
         shared: &SharedDevice,
         shaded: &Shaded<'_>,
         views: &[&ViewSamples],
-        made: Option<&DeviceSamples<'_>>,
+        made: Option<&DeviceSamples>,
         scatter: Scatter,
     ) -> Result<(Self, Inputs), TensorError> {
         let lobe = shaded.params.scalar(Param::SpecularLobe);

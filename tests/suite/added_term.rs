@@ -1,6 +1,5 @@
 //! A term that only this test knows, through the door by which every term comes in: registered from its text, its
 //! value and derivatives held against a formula written here, fitted, drawn and exported.
-
 use std::sync::OnceLock;
 
 use skinfit::engine::cpu::CpuEngine;
@@ -20,7 +19,7 @@ use skinfit::scene::view::Camera;
 use skinfit::shader::term::{Problem, Term, register};
 use skinfit::shader::{Facts, Resource, Source, plan};
 
-use crate::engine::{EVERYTHING, illumination, params, single, view};
+use crate::engine::{EVERYTHING, illumination, params, single, task, view};
 use crate::evaluators::ByWitness;
 use crate::fixtures::camera;
 
@@ -119,8 +118,9 @@ fn formula(setup: Setup, view: &ObservedView, point: &Point) -> Vec<Vec<f64>> {
     let built_in = Setup { effects: setup.effects.without(term().effect), ..setup };
     let light = illumination();
     let double = |cube: &Cube<f32>| cube.map(|texel| texel.map(f64::from));
-    let specular = double(&light.lobes.unwrap().at(point.params.scalar(Param::SpecularLobe)).0);
-    let (irradiance, hilite) = (double(&light.irradiance.unwrap()), double(&light.hilite.unwrap()));
+    let specular = double(&light.lobes.as_ref().unwrap().at(point.params.scalar(Param::SpecularLobe)).0);
+    let (irradiance, hilite) =
+        (double(light.irradiance.as_ref().unwrap()), double(light.hilite.as_ref().unwrap()));
     let witness = ByWitness::new(built_in, [&irradiance, &specular, &hilite], &point.params);
     let samples = &view.samples;
     let mut planes = vec![vec![0.0; samples.groups() * LANES]; 4];
@@ -235,7 +235,7 @@ fn assert_fit(engine: &dyn Objective, what: &str) {
 }
 
 fn cpu(setup: Setup, views: &[ObservedView], unknowns: &[Unknown]) -> CpuEngine {
-    CpuEngine::new(setup, illumination(), views.to_vec(), Loss::L2, unknowns.to_vec()).unwrap()
+    CpuEngine::new(task(setup, views, Loss::L2, unknowns)).unwrap()
 }
 
 #[test]
@@ -294,16 +294,15 @@ fn the_reference_in_f64_and_the_renderer_on_the_processor_are_the_formula() {
 }
 
 mod on_an_adapter {
-    use skinfit::engine::gpu::{GpuEngine, Memory, Task};
+    use skinfit::engine::gpu::{GpuEngine, Memory};
     use skinfit::gpu::Renderer;
     use skinfit::model::terms::TermName;
 
     use super::*;
-    use crate::graphics::bench::{EXACT, SURFACE, built_in, content, gpu, prepared};
+    use crate::graphics::bench::{Content, EXACT, SURFACE, baked, built_in, gpu};
 
-    fn engine<'g>(setup: Setup, views: &'g [ObservedView], unknowns: &[Unknown]) -> Option<GpuEngine<'g>> {
-        let task =
-            Task { setup, illumination: illumination(), views, loss: Loss::L2, unknowns: unknowns.to_vec() };
+    fn engine(setup: Setup, views: &[ObservedView], unknowns: &[Unknown]) -> Option<GpuEngine> {
+        let task = task(setup, views, Loss::L2, unknowns);
         Some(GpuEngine::new(gpu()?, task, &point(), Memory::default()).unwrap())
     }
 
@@ -360,15 +359,15 @@ mod on_an_adapter {
     #[test]
     fn the_renderer_draws_it_and_its_layer() {
         let Some(gpu) = gpu() else { return };
-        let mut prepared = prepared(&built_in(), SURFACE.with(term().effect), 64);
-        prepared.scene.params.set_rgb(weight(), [0.9, 0.6, 0.4]);
-        let camera = prepared.scene.views[0].camera;
-        let mut renderer = Renderer::new(gpu, content(&prepared), EXACT).unwrap();
+        let baked = baked(&built_in(), SURFACE.with(term().effect), 64)
+            .with_scene(|scene| scene.params.set_rgb(weight(), [0.9, 0.6, 0.4]));
+        let camera = baked.scene.views[0].camera;
+        let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
         let whole = renderer.render(&camera, 1.0).unwrap().image;
         let layer = renderer.render_term(term().layers[0], &camera, 1.0).unwrap();
-        prepared.scene.effects = SURFACE;
+        let baked = baked.with_scene(|scene| scene.effects = SURFACE);
         let without =
-            Renderer::new(gpu, content(&prepared), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
+            Renderer::new(gpu, Content::of(&baked), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
         let most = layer.rgb.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
         assert!(most > 0.01, "the term shows: {most}");
         for (i, added) in layer.rgb.iter().enumerate() {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use skinfit::bake::bake_pose;
 use skinfit::demo;
 use skinfit::model::effects::{Effect, Effects};
-use skinfit::prepare::{ClipOcclusion, PrepareOptions, Prepared, Views};
+use skinfit::prepare::{Baked, ClipOcclusion, PrepareOptions, Views};
 use skinfit::scene::animation::Animation;
 use tempfile::TempDir;
 
@@ -16,7 +16,7 @@ fn cache() -> PathBuf {
 }
 
 /// The built-in scene at the beginning of its nod, its expressions left to the animation.
-fn nodding(clip: Option<ClipOcclusion>) -> (Prepared, TempDir) {
+fn nodding(clip: Option<ClipOcclusion>) -> (Baked, TempDir) {
     let kept = demo::kept_scene(&cache(), Some(&cache())).unwrap();
     let mut text = std::fs::read_to_string(&kept).unwrap();
     for name in ["head.glb", "color.png", "normal.png", "specular.png", "attenuator.png", "environment.exr"] {
@@ -36,35 +36,35 @@ fn nodding(clip: Option<ClipOcclusion>) -> (Prepared, TempDir) {
         ..PrepareOptions::default()
     };
     // The animation is opened from the same file.
-    (Prepared::baked(&scene, &options).unwrap(), folder)
+    (Baked::new(&scene, &options).unwrap(), folder)
 }
 
 #[test]
 fn occlusion_is_baked_for_the_targets_that_a_clip_moves_and_for_no_others() {
-    let baked = |prepared: &Prepared| -> Vec<bool> {
-        prepared.occlusion.as_ref().unwrap().morphs.iter().map(|set| !set.is_empty()).collect()
+    let has_own = |baked: &Baked| -> Vec<bool> {
+        baked.occlusion.as_ref().unwrap().morphs.iter().map(|set| !set.is_empty()).collect()
     };
     // At its beginning the nod gives no target a weight; later all but the fourth.
-    assert_eq!(baked(&nodding(None).0), [false; 5]);
+    assert_eq!(has_own(&nodding(None).0), [false; 5]);
     let (clip, _) = nodding(Some(ClipOcclusion::Targets));
-    assert_eq!(baked(&clip), [true, true, true, false, true]);
+    assert_eq!(has_own(&clip), [true, true, true, false, true]);
     let (again, _) = nodding(Some(ClipOcclusion::Targets));
-    assert!(again.baked.rows.iter().all(|row| row.cached), "{:?}", again.baked.rows);
+    assert!(again.stats.rows.iter().all(|row| row.cached), "{:?}", again.stats.rows);
     assert!(nodding(Some(ClipOcclusion::Frames)).0.occlusion.is_none());
 }
 
 #[test]
 fn an_animated_morph_darkens_what_it_closes_about_as_a_bake_of_the_frame_does() {
-    let (prepared, _folder) = nodding(Some(ClipOcclusion::Targets));
-    let occlusion = prepared.occlusion.as_ref().unwrap();
-    let animation = Animation::open(&prepared.scene).unwrap().unwrap();
+    let (baked, _folder) = nodding(Some(ClipOcclusion::Targets));
+    let occlusion = baked.occlusion.as_ref().unwrap();
+    let animation = Animation::open(&baked.scene).unwrap().unwrap();
     // The frown of the nod's second key, and three expressions of its third, where neck and skull are at rest.
     for (time, turned) in [(0.5, true), (1.0, false)] {
         let mesh = animation.mesh(time).unwrap();
         let weights: Vec<f32> = mesh.morphs.iter().map(|morph| morph.weight).collect();
-        let (frame, stats) = bake_pose(&prepared.scene, &mesh.pose(), Some(&cache()));
+        let (frame, stats) = bake_pose(&baked.scene, &mesh.pose(), Some(&cache()));
         assert_eq!(stats.rows.len(), 1);
-        let (_, stats) = bake_pose(&prepared.scene, &mesh.pose(), Some(&cache()));
+        let (_, stats) = bake_pose(&baked.scene, &mesh.pose(), Some(&cache()));
         assert!(stats.rows[0].cached);
         let targets = occlusion.posed(&weights);
         let apart = |a: &[f32], b: &[f32], at: &[usize]| {

@@ -1,12 +1,14 @@
 //! The CPU engine against its rules evaluated in f64: images, losses, gradients and normal equations.
 
+use std::sync::Arc;
+
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 use skinfit::bake::{Illumination, LobeStack};
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::reference::{Reference, deviation};
 use skinfit::engine::view::ObservedView;
-use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
+use skinfit::engine::{NormalEquations, Objective, Point, Task, Unknown};
 use skinfit::model::cube::{Cube, texel_direction};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
@@ -92,15 +94,15 @@ fn fragment(rng: &mut StdRng) -> Fragment<f32> {
     }
 }
 
-pub(crate) fn illumination() -> Illumination {
-    Illumination {
+pub(crate) fn illumination() -> Arc<Illumination> {
+    Arc::new(Illumination {
         irradiance: Some(wavy(8, 0.3)),
         lobes: Some(LobeStack {
             exponents: vec![16.0, 32.0, 64.0],
             cubes: vec![wavy(16, 0.7), wavy(16, 1.1), wavy(16, 1.3)],
         }),
         hilite: Some(wavy(16, 2.1)),
-    }
+    })
 }
 
 pub(crate) const EVERYTHING: Effects = Effects::SURFACE.with(Effect::Haze).with(Effect::KeyLight);
@@ -173,6 +175,11 @@ pub(crate) fn assert_equal_but_for(
     }
 }
 
+/// A fit under the waves of [`illumination`].
+pub(crate) fn task(setup: Setup, views: &[ObservedView], loss: Loss, unknowns: &[Unknown]) -> Task {
+    Task { setup, illumination: illumination(), views: views.into(), loss, unknowns: unknowns.to_vec() }
+}
+
 pub(crate) fn engine(
     setup: Setup,
     views: &[ObservedView],
@@ -180,7 +187,7 @@ pub(crate) fn engine(
     unknowns: &[Unknown],
     keep: bool,
 ) -> CpuEngine {
-    CpuEngine::with_kept_terms(setup, illumination(), views.to_vec(), loss, unknowns.to_vec(), keep).unwrap()
+    CpuEngine::with_kept_terms(task(setup, views, loss, unknowns), keep).unwrap()
 }
 
 pub(crate) fn names(unknowns: &[Unknown]) -> Vec<String> {

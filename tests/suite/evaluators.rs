@@ -8,6 +8,8 @@
 //! - `OnAdapter`: the engine on a graphics adapter
 //! - `Tensors`: the model on burn's tensors, with reverse-mode derivatives
 
+use std::sync::Arc;
+
 use fearless_simd::Level;
 use skinfit::bake::{Illumination, LobeStack};
 use skinfit::engine::cpu::CpuEngine;
@@ -15,7 +17,7 @@ use skinfit::engine::lanes::Lanes;
 use skinfit::engine::reference::Reference;
 use skinfit::engine::residual::Residuals;
 use skinfit::engine::view::ObservedView;
-use skinfit::engine::{self, Objective, Point};
+use skinfit::engine::{self, Objective, Point, Task};
 use skinfit::fit::{self, FitOptions, Tolerances};
 use skinfit::model::cube::{Channel, Cube};
 use skinfit::model::dapple::Dapple;
@@ -211,16 +213,16 @@ fn cube<T: Channel>(cube: &WitnessCube, to: impl Fn(f64) -> T) -> Cube<T> {
     Cube::from_fn(cube.size, |face, column, row| cube.texel(face, column, row).map(&to))
 }
 
-fn illumination(scene: &Scene) -> Illumination {
+fn illumination(scene: &Scene) -> Arc<Illumination> {
     let single = |of: &WitnessCube| cube(of, |x| x as f32);
-    Illumination {
+    Arc::new(Illumination {
         irradiance: Some(single(&scene.lights.irradiance)),
         lobes: Some(LobeStack {
             exponents: scene.lights.lobes.iter().map(|(exponent, _)| *exponent).collect(),
             cubes: scene.lights.lobes.iter().map(|(_, cube)| single(cube)).collect(),
         }),
         hilite: Some(single(&scene.lights.hilite)),
-    }
+    })
 }
 
 /// The witness' formulas in the library's words: all built-in terms.
@@ -303,7 +305,7 @@ fn stored(f: &Surface) -> (Fragment<f32>, Unmade) {
         attenuator: f.attenuator as f32,
     };
     let [corner_silhouettes, corner_shares] = f.corners.map(three);
-    (fragment, Unmade { dapple_normal: fragment.normal, corner_silhouettes, corner_shares })
+    (fragment, Unmade { dapple_normal: fragment.normal, corner_silhouettes, corner_shares, uv: [0.0; 2] })
 }
 
 /// A view as engines read it: groups of sixteen pixels, with as many records as one of them has samples. Pixels that
@@ -393,10 +395,19 @@ impl Evaluator for Plain {
     }
 }
 
+/// A fit of a scene.
+fn task(scene: &Scene, unknowns: &[Unknown]) -> Task {
+    Task {
+        setup: setup(scene),
+        illumination: illumination(scene),
+        views: all_observed(scene).into(),
+        loss: loss_of(scene.loss),
+        unknowns: unknowns_of(unknowns),
+    }
+}
+
 fn cpu_engine(scene: &Scene, unknowns: &[Unknown], level: Level) -> CpuEngine {
-    let (views, loss) = (all_observed(scene), loss_of(scene.loss));
-    let made = CpuEngine::new(setup(scene), illumination(scene), views, loss, unknowns_of(unknowns));
-    let mut engine = made.unwrap();
+    let mut engine = CpuEngine::new(task(scene, unknowns)).unwrap();
     engine.set_level(level);
     engine
 }
@@ -434,7 +445,8 @@ fn number_cubes<R: Number>(scene: &Scene, at: &At) -> Cubes<R::Texel> {
     let (specular, specular_slope) = match &scene.lights.lobes[..] {
         [(_, only)] => (own(only), own(only).map(|_| [R::texel(0.0); 4])),
         _ => {
-            let (value, slope) = illumination(scene).lobes.unwrap().at(at.constants.specular_lobe[0]);
+            let (value, slope) =
+                illumination(scene).lobes.as_ref().unwrap().at(at.constants.specular_lobe[0]);
             let wide = |cube: &Cube<f32>| cube.map(|texel| texel.map(|x| R::texel(x.into())));
             (wide(&value), wide(&slope))
         }
@@ -607,34 +619,17 @@ impl Evaluator for AtLevel {
 }
 
 mod adapter {
-    use skinfit::engine::gpu::{GpuEngine, Memory, Task};
+    use skinfit::engine::gpu::{GpuEngine, Memory};
     use skinfit::gpu::Gpu;
 
-    use super::{
-        At, Evaluator, Found, Scene, Unknown, View, Width, all_observed, illumination, loss_of, of_objective,
-        pixels, point, setup, unknowns_of,
-    };
+    use super::{At, Evaluator, Found, Scene, Unknown, View, Width, of_objective, pixels, point, task};
 
     /// The engine on a graphics adapter.
     pub(super) struct OnAdapter(pub(super) &'static Gpu);
 
     impl OnAdapter {
-        fn with<T>(
-            &self,
-            scene: &Scene,
-            at: &At,
-            unknowns: &[Unknown],
-            then: impl FnOnce(&GpuEngine<'_>) -> T,
-        ) -> T {
-            let views = all_observed(scene);
-            let task = Task {
-                setup: setup(scene),
-                illumination: illumination(scene),
-                views: &views,
-                loss: loss_of(scene.loss),
-                unknowns: unknowns_of(unknowns),
-            };
-            then(&GpuEngine::new(self.0, task, &point(at), Memory::default()).unwrap())
+        fn engine(&self, scene: &Scene, at: &At, unknowns: &[Unknown]) -> GpuEngine {
+            GpuEngine::new(self.0, task(scene, unknowns), &point(at), Memory::default()).unwrap()
         }
     }
 
@@ -649,13 +644,12 @@ mod adapter {
             Width::Single
         }
         fn image(&self, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
-            self.with(scene, at, &[], |engine| {
-                let image = |(v, view): (usize, &View)| pixels(view, &engine.image(v, &point(at)).unwrap());
-                scene.views.iter().enumerate().map(image).collect()
-            })
+            let engine = self.engine(scene, at, &[]);
+            let image = |(v, view): (usize, &View)| pixels(view, &engine.image(v, &point(at)).unwrap());
+            scene.views.iter().enumerate().map(image).collect()
         }
         fn equations(&self, scene: &Scene, at: &At, unknowns: &[Unknown]) -> Found {
-            self.with(scene, at, unknowns, |engine| of_objective(engine, at))
+            of_objective(&self.engine(scene, at, unknowns), at)
         }
     }
 }
@@ -773,7 +767,7 @@ mod tensors {
             let gradients = weighted.sum().backward();
             let by_column = free.grad(&gradients).map(numbers).unwrap_or_default();
             let by_texel = lobe.grad(&gradients).map(numbers).unwrap();
-            let slope = illumination(scene).lobes.unwrap().at(at.constants.specular_lobe[0]).1;
+            let slope = illumination(scene).lobes.as_ref().unwrap().at(at.constants.specular_lobe[0]).1;
             let moving = slope.padded().as_flattened().iter().map(|&x| f64::from(x));
             let by_lobe: f64 = by_texel.iter().zip(moving).map(|(a, b)| a * b).sum();
             assert_eq!(by_column.len(), columns.len());

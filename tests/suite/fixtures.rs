@@ -14,7 +14,7 @@ use skinfit::model::params::Params;
 use skinfit::scene::maps::{Environment, Map, Maps};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
 use skinfit::scene::view::{Background, Camera, View};
-use skinfit::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene};
+use skinfit::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene};
 
 /// The named planes of an EXR file, and its width and height.
 pub(crate) struct Planes {
@@ -174,6 +174,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         },
         quality: Quality::default(),
         bloom: Bloom::default(),
+        diffusion: Diffusion::default(),
     }
 }
 

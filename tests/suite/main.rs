@@ -24,6 +24,7 @@ mod graphics;
 mod instructions;
 mod meshes;
 mod occlusion;
+mod phases;
 mod readings;
 mod refusals;
 mod reports;

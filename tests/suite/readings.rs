@@ -1,11 +1,13 @@
 //! The paper's other readings over samples of a mesh: cubes looked up along the smooth normal, a dapple that turns, a
 //! rim that is interpolated.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use skinfit::bake::{Illumination, LobeStack};
-use skinfit::engine::Point;
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::view::ObservedView;
+use skinfit::engine::{Point, Task};
 use skinfit::model::cube::Cube;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
@@ -48,7 +50,14 @@ fn shown(scene: &Scene) -> Vec<[f32; 3]> {
     assert!(there.len() > 500);
     let target = skinfit::samples::rows::Rows::new(3, samples.groups());
     let view = ObservedView { samples, target, ..ObservedView::default() };
-    let engine = CpuEngine::new(scene.setup(), white(), vec![view], Loss::L2, Vec::new()).unwrap();
+    let task = Task {
+        setup: scene.setup(),
+        illumination: Arc::new(white()),
+        views: Arc::new([view]),
+        loss: Loss::L2,
+        unknowns: Vec::new(),
+    };
+    let engine = CpuEngine::new(task).unwrap();
     let planes = engine.image(0, &Point { params: scene.params.clone(), gains: vec![1.0] });
     there.into_iter().map(|slot| [0, 1, 2].map(|c| planes[c][slot])).collect()
 }

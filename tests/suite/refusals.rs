@@ -124,6 +124,11 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         ),
         ("[fit]", "background = [0, nan, 0]\n[fit]".into(), &["background holds NaN"]),
         ("[fit]", "[bloom]\nsigma = 0.3\n[fit]".into(), &["line 21", "sigma = 0.3", "[0, 0.25]"]),
+        (
+            "[fit]",
+            "[diffusion]\nlight_map_size = 32\n[fit]".into(),
+            &["line 21", "light_map_size = 32", "[64, 8192]"],
+        ),
         ("[fit]", "[bloom]\nwidth = 0.3\n[fit]".into(), &["line 21", "unknown key `width`", "sigma"]),
         (
             "[fit]",

@@ -263,6 +263,8 @@ fn backgrounds_and_bloom_are_read_and_the_environment_only_for_pictures() {
     let plain = edit("[fit]", "[fit]");
     assert_eq!((plain.views[0].background, plain.bloom.sigma), (Background::None, 0.02));
     assert_eq!(edit("[fit]", "[bloom]\nsigma = 0.1\n[fit]").bloom.sigma, 0.1);
+    let atlas = edit("[fit]", "[diffusion]\nlight_map_size = 1024\n[fit]").diffusion;
+    assert_eq!((plain.diffusion.light_map_size, atlas.light_map_size), (512, 1024));
     assert_eq!(
         edit("[fit]", "background = [1, 0.5, 0]\n[fit]").views[0].background,
         Background::Color([1.0, 0.5, 0.0])

@@ -1,9 +1,11 @@
 //! Loss, gradient and normal equations over samples.
 //!
-//! - [`Objective`]: all that the solvers see of an engine
+//! - [`Objective`]: all that the solvers see of an engine; [`Engine`]: what else is asked of one, whatever it runs on
+//! - [`Task`]: what an engine is to evaluate
 //! - [`cpu`]: the engine on the processor
 //! - `gram`: columns to products; [`residual`]: the losses; [`pulls`]: where residuals stand in the images
 //! - [`lanes`]: sixteen f32 lanes as one number; `corners`: their lookups in cubes
+//! - [`levels`]: what is computed in texels of the UV atlas, and what samples look up of it
 //! - [`rules`]: rules over samples in any kind of number; [`mod@reference`]: passes of them in f64, plainly
 //! - [`view`]: samples beside what was observed
 
@@ -11,12 +13,18 @@ mod corners;
 pub mod cpu;
 mod gram;
 pub mod lanes;
+pub mod levels;
 pub mod pulls;
 pub mod reference;
 pub mod residual;
 pub mod rules;
+mod task;
 pub mod view;
 
+use std::sync::Arc;
+
+pub use self::task::Task;
+use self::view::ObservedView;
 use crate::model::params::{Column, Params};
 
 /// Groups of a block of pixels: a coarse pass reads every so-many-th block.
@@ -85,16 +93,42 @@ pub trait Objective: Sync {
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>);
 }
 
+/// An engine over observed views, whatever it runs on.
+pub trait Engine: Objective {
+    /// `cpu` or `gpu`.
+    fn name(&self) -> &'static str;
+    /// What it runs on, for a report: names and their values.
+    fn provenance(&self) -> Vec<(String, String)>;
+    /// The views.
+    fn views(&self) -> &Arc<[ObservedView]>;
+    /// The views with what their samples show, wherever those were made.
+    ///
+    /// # Errors
+    /// When they cannot be read from where they are: the engine's own error.
+    fn surfaced_views(&self) -> Result<Arc<[ObservedView]>, EngineError>;
+    /// Surface samples of positive weight, over all views.
+    fn samples(&self) -> u64;
+    /// The seconds that making the samples took, where the engine made them itself.
+    fn own_sample_seconds(&self) -> Option<f64> {
+        None
+    }
+    /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
+    fn set_stride(&mut self, stride: usize);
+}
+
+/// What went wrong where an engine runs.
+pub type EngineError = Box<dyn std::error::Error + Send + Sync>;
+
 /// Half a unit in the last place of an f32, as a share of the number.
 const HALF_UNIT: f64 = 1.0 / (1 << 24) as f64;
 
 /// [`Objective::rounding`] of an engine that computes in f32 and reads every `stride`-th block of each view.
-pub fn rounding(views: &[view::ObservedView], loss: crate::scene::Loss, stride: usize) -> f64 {
+pub fn rounding(views: &[ObservedView], loss: crate::scene::Loss, stride: usize) -> f64 {
     use rayon::prelude::*;
     // A fixed number of blocks a sum, so that it does not depend on threads.
     const BLOCKS: usize = 512;
     let residuals = residual::Residuals::new(loss);
-    let power = |view: &view::ObservedView| {
+    let power = |view: &ObservedView| {
         let groups = view.samples.groups();
         let read: Vec<usize> = (0..groups.div_ceil(BLOCK)).step_by(stride).collect();
         let sums = read.par_chunks(BLOCKS).map(|blocks| {

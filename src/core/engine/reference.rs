@@ -70,7 +70,10 @@ impl<'a> Reference<'a> {
         let shading =
             Shading::new(&sample_facts(setup, illumination, true), &seeds, |_| None, Natives::Written)?;
         let outputs = [&[shading.value], &shading.tangents[..]].concat().concat();
-        let steps = SampleSteps::new(&shading.graph, &outputs, |_| Rounding::Plain);
+        let steps = SampleSteps::new(&shading.graph, &outputs, shading.levels, |_| Rounding::Plain);
+        for view in views {
+            steps.check(setup.effects, &view.samples).map_err(ShadingError::Plan)?;
+        }
         let residuals = Residuals::new(loss);
         Ok(Self { illumination, views, residuals, unknowns: unknowns.to_vec(), steps, free })
     }
@@ -79,9 +82,14 @@ impl<'a> Reference<'a> {
         CubesAt::new(self.illumination, params, f64::from)
     }
 
-    fn at<'s>(&'s self, view: usize, setting: &'s Setting<'s, f64>) -> ViewAt<'s> {
+    fn at<'s>(
+        &'s self,
+        view: usize,
+        setting: &'s Setting<'s, f64>,
+        (params, cubes): (&Params, &CubesAt<f64>),
+    ) -> ViewAt<'s> {
         let view = &self.views[view];
-        ViewAt { view, setting, loads: self.steps.loads(view.samples.surface.places()) }
+        ViewAt { view, setting, loads: self.steps.loads(&view.samples, params, cubes) }
     }
 
     /// Value and columns of one pixel slot of a view: the means over its samples.
@@ -89,7 +97,8 @@ impl<'a> Reference<'a> {
     pub fn pixel(&self, view: usize, slot: usize, params: &Params) -> PixelColumns {
         let cubes = self.cubes(params);
         let setting = self.steps.setting(params, &cubes, 0.0);
-        let group = self.group(&self.at(view, &setting), slot / LANES, &mut Registers::default());
+        let group =
+            self.group(&self.at(view, &setting, (params, &cubes)), slot / LANES, &mut Registers::default());
         group[slot % LANES].clone()
     }
 
@@ -142,7 +151,7 @@ impl<'a> Reference<'a> {
         let setting = self.steps.setting(&point.params, &cubes, 0.0);
         let mut total = (empty(self.unknowns.len()), vec![0.0; self.unknowns.len()]);
         for index in 0..self.views.len() {
-            let at = self.at(index, &setting);
+            let at = self.at(index, &setting, (&point.params, &cubes));
             let groups = at.view.samples.groups();
             let chunks: Vec<(NormalEquations, Vec<f64>)> = (0..groups.div_ceil(CHUNK))
                 .into_par_iter()

@@ -1,19 +1,23 @@
 //! The planned rules over stored samples in any kind of number: what engines and renderers are held against, and what
 //! shows how number formats round.
 
+use super::levels::LevelMaker;
 use crate::bake::Illumination;
 use crate::model::batch::Batch;
 use crate::model::cube::Cube;
+use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::model::real::Real;
 use crate::program::graph::{Graph, Id, Input};
+use crate::program::levels::LevelProgram;
 use crate::program::shading::constant;
 use crate::program::steps::{self, Rounding, Steps};
 use crate::samples::rows::Row;
-use crate::samples::surface_records::{Places, neutral};
-use crate::samples::{LANES, SurfaceRecords};
-use crate::shader::facts::{Facts, MapFacts, Source};
+use crate::samples::surface_records::neutral;
+use crate::samples::{LANES, SurfaceRecords, ViewSamples};
+use crate::shader::PlanError;
+use crate::shader::facts::Facts;
 
 /// A number of each of a record's samples.
 pub type Sixteen<R> = Batch<R, LANES>;
@@ -26,7 +30,7 @@ pub fn sample_facts(setup: Setup, illumination: &Illumination, turned: bool) -> 
     for size in [&mut faces.irradiance, &mut faces.specular, &mut faces.hilite] {
         size.get_or_insert(1);
     }
-    Facts { setup, source: Source::Samples, maps: MapFacts::default(), faces, turned, ..Facts::default() }
+    Facts::of_samples(setup, faces, turned)
 }
 
 /// The cubes of a scene at one `specular_lobe`, in texels of a kind.
@@ -51,8 +55,15 @@ impl<T: Copy> CubesAt<T> {
             specular: lobe.as_ref().map(|(cube, _)| converted(cube)),
             specular_slope: lobe.as_ref().map(|(_, slope)| converted(slope)),
             hilite: illumination.hilite.as_ref().map(converted),
-            dark: converted(&Cube::from_fn(1, |_, _, _| [0.0_f32; 4])),
+            ..Self::dark(&texel)
         }
+    }
+
+    /// No light.
+    #[must_use]
+    pub fn dark(texel: impl Fn(f32) -> T) -> Self {
+        let dark = Cube::from_fn(1, |_, _, _| [0.0_f32; 4]).map(|numbers| numbers.map(&texel));
+        Self { irradiance: None, specular: None, specular_slope: None, hilite: None, dark }
     }
 
     /// The same cubes, each number changed.
@@ -85,21 +96,29 @@ impl<T: Copy> CubesAt<T> {
 }
 
 /// Numbers that rules make of stored samples.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct SampleSteps {
     steps: Steps,
+    levels: LevelMaker<f64>,
 }
 
 /// Where a field stands in a record, or what stands in for it.
 #[derive(Clone, Copy, Debug)]
 enum Load {
     Row(usize),
+    /// A row of what was looked up.
+    Level(usize),
     Neutral(f32),
 }
 
-/// Where a view's records hold what is read of them.
+/// Where a view's records hold what is read of them, and what its samples look up.
 #[derive(Clone, Debug)]
-pub struct Loads(Vec<Load>);
+pub struct Loads {
+    loads: Vec<Load>,
+    /// Rows of each record.
+    looked_up: Vec<Sixteen<f64>>,
+    stride: usize,
+}
 
 /// What is the same for all samples of an evaluation.
 pub struct Setting<'a, R: Real> {
@@ -118,23 +137,41 @@ impl<R: Real> Default for Registers<R> {
 }
 
 impl SampleSteps {
-    /// What computes `outputs` of a graph whose fields are those of samples.
+    /// What computes `outputs` of a graph whose fields are those of samples, and what `levels` have them look up.
     #[must_use]
-    pub fn new(graph: &Graph, outputs: &[Id], rounding: impl Fn(Id) -> Rounding) -> Self {
-        Self { steps: Steps::new(graph, outputs, rounding) }
+    pub fn new(
+        graph: &Graph,
+        outputs: &[Id],
+        levels: LevelProgram,
+        rounding: impl Fn(Id) -> Rounding,
+    ) -> Self {
+        Self { steps: Steps::new(graph, outputs, rounding), levels: LevelMaker::new(levels) }
     }
 
-    /// Where records hold the fields.
+    /// Where a view's records hold the fields; what its samples look up at `params`, exactly whatever they are evaluated
+    /// in.
     #[must_use]
-    pub fn loads(&self, places: &Places) -> Loads {
+    pub fn loads(&self, samples: &ViewSamples, params: &Params, cubes: &CubesAt<f64>) -> Loads {
+        let places = samples.surface.places();
         let held = |input: &Input| places.fields().find(|(name, ..)| *name == input.name);
-        let load = |input: &Input| match held(input) {
-            Some((_, place, _)) => Load::Row(place + input.component),
+        let load = |input: &Input| match (held(input), self.levels.row(input)) {
+            (Some((_, place, _)), _) => Load::Row(place + input.component),
+            (None, Some(row)) => Load::Level(row),
             // Where no smooth normal is held, the base stands in.
-            None if input.name == "normal" => Load::Row(places.base.unwrap_or(0) + input.component),
-            None => Load::Neutral(neutral(&input.name).unwrap_or(0.0)),
+            (None, None) if input.name == "normal" => Load::Row(places.base.unwrap_or(0) + input.component),
+            (None, None) => Load::Neutral(neutral(&input.name).unwrap_or(0.0)),
         };
-        Loads(self.steps.fields().iter().map(load).collect())
+        let looked_up = self.levels.look_up(samples, params, || cubes.clone(), Batch);
+        let loads = self.steps.fields().iter().map(load).collect();
+        Loads { loads, looked_up, stride: self.levels.rows() }
+    }
+
+    /// Refuse samples without the texels that `effects` are computed in.
+    ///
+    /// # Errors
+    /// When they lack them.
+    pub fn check(&self, effects: Effects, samples: &ViewSamples) -> Result<(), PlanError> {
+        self.levels.check(effects, samples)
     }
 
     /// The setting of an evaluation at `params` in numbers of `like`'s kind.
@@ -166,8 +203,15 @@ impl SampleSteps {
             all.0.iter_mut().zip(row.iter()).for_each(|(lane, &x)| *lane = lane.lit(x.into()));
             all
         };
-        let field = |at: usize| match loads.0[at] {
+        let looked_up = &loads.looked_up;
+        let field = |at: usize| match loads.loads[at] {
             Load::Row(row) => lit(&rows[row]),
+            Load::Level(row) => {
+                let mut all = setting.like;
+                let numbers = looked_up[record * loads.stride + row].0;
+                all.0.iter_mut().zip(numbers).for_each(|(lane, x)| *lane = lane.lit(x));
+                all
+            }
             Load::Neutral(value) => setting.like.lit(value.into()),
         };
         self.steps.run(&setting.shared, setting.like, &mut registers.0, field);

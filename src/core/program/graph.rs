@@ -226,6 +226,20 @@ impl Graph {
         self.add(Node::Field(at))
     }
 
+    /// How far a number goes from one sample to the next: of a field, the one with `prefix` before its name; what is the
+    /// same for all samples stays. `None` for other numbers.
+    pub fn step(&mut self, id: Id, prefix: &str) -> Option<Id> {
+        match self.node(id) {
+            Node::Constant(_) | Node::Uniform(_) => Some(self.constant(0.0)),
+            Node::Field(at) => {
+                let Input { name, component } = &self.fields[at as usize];
+                let (name, component) = (format!("{prefix}{name}"), *component);
+                Some(self.field(&name, component))
+            }
+            _ => None,
+        }
+    }
+
     /// A number that is the same for all samples.
     pub fn uniform(&mut self, name: &str, component: usize) -> Id {
         let at = place(&mut self.uniforms, Input { name: name.to_owned(), component });

@@ -16,6 +16,11 @@ use naga::{
 
 use super::graph::{Graph, Id, Native, Unary};
 
+/// What the name of a field begins with that holds how far another goes from a texel to its right neighbour (`dpdx`).
+pub const STEP_ALONG_U: &str = "dpdx_";
+/// The same, to the texel below (`dpdy`).
+pub const STEP_ALONG_V: &str = "dpdy_";
+
 /// A text that cannot be lowered.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
 pub enum LowerError {
@@ -99,6 +104,28 @@ impl Source {
         let found = self.module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(function));
         let (handle, _) = found.ok_or_else(|| LowerError::Missing(function.to_owned()))?;
         self.invoke(graph, handle, arguments)
+    }
+
+    /// The members of the structure that a function of one argument takes, and how many numbers each holds.
+    ///
+    /// # Errors
+    /// When there is no such function, or its argument is no structure of numbers.
+    pub fn argument(&self, function: &str) -> Result<Vec<(String, usize)>, LowerError> {
+        let found = self.module.functions.iter().find(|(_, f)| f.name.as_deref() == Some(function));
+        let (_, found) = found.ok_or_else(|| LowerError::Missing(function.to_owned()))?;
+        let inner = found.arguments.first().map(|argument| &self.module.types[argument.ty].inner);
+        let members = match inner {
+            Some(TypeInner::Struct { members, .. }) => &members[..],
+            _ => &[],
+        };
+        let member = |member: &naga::StructMember| {
+            let width = self.width(&self.module.types[member.ty].inner)?;
+            Some((member.name.clone().unwrap_or_default(), width))
+        };
+        members.iter().map(member).collect::<Option<_>>().ok_or_else(|| LowerError::Unsupported {
+            function: function.to_owned(),
+            what: "an array".to_owned(),
+        })
     }
 
     fn invoke(
@@ -488,6 +515,17 @@ impl Frame<'_> {
                     _ => return Err(self.unsupported("isnan or isinf (write is_finite)")),
                 };
                 all.into_iter().reduce(|a, b| both(self.graph, a, b)).into_iter().collect()
+            }
+            E::Derivative { axis, expr, .. } => {
+                let numbers = self.numbers(*expr)?;
+                let prefix = match axis {
+                    naga::DerivativeAxis::X => STEP_ALONG_U,
+                    naga::DerivativeAxis::Y => STEP_ALONG_V,
+                    naga::DerivativeAxis::Width => return Err(self.unsupported("fwidth")),
+                };
+                let step = |id: Id| self.graph.step(id, prefix);
+                let steps: Option<Vec<Id>> = numbers.into_iter().map(step).collect();
+                steps.ok_or_else(|| self.unsupported("dpdx or dpdy of what no vertex holds"))?
             }
             E::Math { fun, arg, arg1, arg2, .. } => {
                 let arguments: Vec<Vec<Id>> = [Some(*arg), *arg1, *arg2]

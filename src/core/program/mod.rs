@@ -10,6 +10,7 @@
 //! - [`native`]: functions that are one instruction
 //! - [`lower`]: WGSL functions called on graphs
 //! - [`shading`]: the value of a plan and how it moves, as a graph
+//! - [`levels`]: passes over stored texels, as graphs
 //! - [`cut`]: what stays from pass to pass
 //! - [`steps`]: a graph evaluated node by node, in any kind of number
 //! - [`tape`]: instructions over registers, which `writer` finds
@@ -18,6 +19,7 @@
 pub mod cut;
 pub mod evaluate;
 pub mod graph;
+pub mod levels;
 pub mod lower;
 pub mod native;
 pub mod print;

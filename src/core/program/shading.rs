@@ -4,11 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
 use super::graph::{Binary, Graph, Id, Input, Node};
+use super::levels::LevelProgram;
 use super::lower::{LowerError, Natives, Source, Value};
 use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 use crate::model::terms::TermName;
 use crate::shader::Domain;
+use crate::shader::atlas::stored;
 use crate::shader::emit::{Plan, hazy, parts, sample_fields};
 use crate::shader::module::{sample_struct, uniform};
 use crate::shader::search::{PlanError, components};
@@ -41,6 +43,8 @@ pub struct Shading {
     pub quantities: Quantities,
     /// How rules' quantities move along each seed; those that stay are not there.
     pub moved: Vec<Quantities>,
+    /// What makes the levels that samples look up.
+    pub levels: LevelProgram,
 }
 
 /// The numbers of quantities, by their names in the rules.
@@ -55,6 +59,8 @@ pub struct TermShading {
     pub terms: Vec<(TermName, [Id; 3])>,
     /// The haze.
     pub haze: Id,
+    /// What makes the levels that samples look up.
+    pub levels: LevelProgram,
 }
 
 /// How the names of directions end that cubes are looked up along.
@@ -82,7 +88,7 @@ impl Shading {
         let listed = Listed::new(&plan, &chain);
         let source = Source::new(&module(&plan, &chain, &listed), natives)?;
         let mut graph = Graph::default();
-        let (sample, fields) = sample(&mut graph, facts, stand_in);
+        let (sample, fields) = sample(&mut graph, &plan, &chain, stand_in);
         let shaded = source.call(&mut graph, ENTRY, vec![Value::Numbers(sample)])?;
         let mut numbers = shaded.into_iter();
         let mut take = |count: usize| -> Vec<Id> { numbers.by_ref().take(count).collect() };
@@ -98,7 +104,8 @@ impl Shading {
         let mut quantities = named(&listed.given);
         let moved = listed.moved.iter().map(|list| named(list)).collect();
         quantities.extend(fields);
-        Ok(Self { graph, value, tangents, quantities, moved })
+        let levels = LevelProgram::new(&plan, &chain)?;
+        Ok(Self { graph, value, tangents, quantities, moved, levels })
     }
 
     /// Numbers on the way from directions to texels: what lookups are addressed with, back to the quantities that are
@@ -149,13 +156,13 @@ impl TermShading {
     /// # Errors
     /// As [`Shading::new`].
     pub fn new(facts: &Facts) -> Result<Self, ShadingError> {
-        let mut graph = Graph::default();
+        let (mut graph, mut levels, still) = (Graph::default(), LevelProgram::default(), Chain::default());
         let mut shaded = |output: Option<TermName>| -> Result<Vec<Id>, ShadingError> {
             let facts = Facts { output, ..*facts };
             let plan = plan(&facts)?;
-            let source =
-                Source::new(&module(&plan, &Chain::default(), &Listed::default()), Natives::Written)?;
-            let (sample, _) = sample(&mut graph, &facts, |_| None);
+            let source = Source::new(&module(&plan, &still, &Listed::default()), Natives::Written)?;
+            let (sample, _) = sample(&mut graph, &plan, &still, |_| None);
+            levels.extend(LevelProgram::new(&plan, &still)?);
             Ok(source.call(&mut graph, ENTRY, vec![Value::Numbers(sample)])?)
         };
         let haze = shaded(None)?[3];
@@ -164,14 +171,19 @@ impl TermShading {
             let value = shaded(Some(term))?;
             terms.push((term, [value[0], value[1], value[2]]));
         }
-        Ok(Self { graph, terms, haze })
+        Ok(Self { graph, terms, haze, levels })
     }
 }
 
 /// The numbers of a stored sample, and the fields that they are.
-fn sample(graph: &mut Graph, facts: &Facts, stand_in: impl Fn(&str) -> Option<f32>) -> (Vec<Id>, Quantities) {
+fn sample(
+    graph: &mut Graph,
+    plan: &Plan,
+    chain: &Chain,
+    stand_in: impl Fn(&str) -> Option<f32>,
+) -> (Vec<Id>, Quantities) {
     let (mut sample, mut fields) = (Vec::new(), Quantities::new());
-    for (name, kind) in sample_fields(facts) {
+    for (name, kind) in sample_fields(&plan.facts) {
         let number = |component| match stand_in(name) {
             Some(value) => graph.constant(value.into()),
             None => graph.field(name, component),
@@ -179,6 +191,9 @@ fn sample(graph: &mut Graph, facts: &Facts, stand_in: impl Fn(&str) -> Option<f3
         let numbers: Vec<Id> = (0..components(kind)).map(number).collect();
         sample.extend(&numbers);
         fields.insert(name, numbers);
+    }
+    for (name, kind) in plan.looked_up(chain) {
+        sample.extend((0..components(kind)).map(|component| graph.field(&name, component)));
     }
     if sample.is_empty() {
         // WGSL knows no empty structures.
@@ -226,7 +241,7 @@ fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
     }
     let mut wgsl = with_slopes.declarations(true);
     wgsl.push_str(&chain.functions);
-    wgsl.push_str(&sample_struct(&sample_fields(&plan.facts)));
+    wgsl.push_str(&sample_struct(&plan.sample_inputs(chain)));
     let parts = parts(&plan.facts);
     let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
     let haze = if hazy(&plan.facts) { "haze" } else { "0.0" };
@@ -249,6 +264,7 @@ fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
         let _ = writeln!(wgsl, "    {name}: {kind},");
     }
     let _ = writeln!(wgsl, "}}\n\nfn {ENTRY}(at: Sample) -> Shaded {{");
+    wgsl.push_str(&stored(&plan.levels));
     wgsl.push_str(&plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
     chain.lines.iter().for_each(|lines| wgsl.push_str(lines));
     let values: Vec<&str> = members.iter().map(|(_, _, value)| value.as_str()).collect();

@@ -73,6 +73,18 @@ impl Steps {
         &self.graph.fields
     }
 
+    /// What all samples share.
+    #[must_use]
+    pub fn inputs(&self) -> &[Input] {
+        &self.graph.uniforms
+    }
+
+    /// Faces that are looked up.
+    #[must_use]
+    pub fn resources(&self) -> &[String] {
+        &self.graph.resources
+    }
+
     /// How many operations a sample takes.
     #[must_use]
     pub const fn count(&self) -> usize {

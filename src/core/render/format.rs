@@ -61,7 +61,7 @@ impl FormatShader {
         Ok(Self {
             params: params.clone(),
             cubes: CubesAt::new(illumination, params, f64::from),
-            steps: SampleSteps::new(&shading.graph, &shading.value, rounding),
+            steps: SampleSteps::new(&shading.graph, &shading.value, shading.levels, rounding),
         })
     }
 
@@ -91,7 +91,7 @@ impl FormatShader {
         R::Wide: Send + Sync,
     {
         let setting = self.steps.setting(&self.params, &self.cubes, like);
-        let loads = self.steps.loads(samples.surface.places());
+        let loads = self.steps.loads(samples, &self.params, &self.cubes);
         let groups: Vec<[[f64; 4]; LANES]> = (0..samples.groups())
             .into_par_iter()
             .map_init(Registers::default, |registers, group| {

@@ -59,7 +59,7 @@ impl Shader {
     /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
     pub fn new(setup: Setup, illumination: &Illumination, params: &Params) -> Result<Self, ShadingError> {
         let turned = params.scalar(Param::EnvironmentRotation) != 0.0;
-        let TermShading { graph, terms, haze } =
+        let TermShading { graph, terms, haze, levels } =
             TermShading::new(&sample_facts(setup, illumination, turned))?;
         let outputs: Vec<_> = terms.iter().flat_map(|(_, numbers)| *numbers).chain([haze]).collect();
         Ok(Self {
@@ -67,12 +67,12 @@ impl Shader {
             params: params.clone(),
             cubes: CubesAt::new(illumination, params, f64::from),
             names: terms.iter().map(|(name, _)| *name).collect(),
-            steps: SampleSteps::new(&graph, &outputs, |_| Rounding::Plain),
+            steps: SampleSteps::new(&graph, &outputs, levels, |_| Rounding::Plain),
             level: Level::new(),
         })
     }
 
-    /// The image of a view, times `gain`. All cores; the same for any number of threads.
+    /// The image of a view, times `gain`; what is computed in texels is black where the samples have none. All cores; the same for any number of threads.
     #[must_use]
     pub fn shade(&self, samples: &ViewSamples, camera: &Camera, gain: f64) -> Shaded {
         let (width, height) = (camera.width as usize, camera.height as usize);
@@ -84,7 +84,7 @@ impl Shader {
             glow: vec![[0.0; 3]; plane(self.effects.has(Effect::Bloom))],
         };
         let setting = self.steps.setting(&self.params, &self.cubes, 0.0);
-        let loads = self.steps.loads(samples.surface.places());
+        let loads = self.steps.loads(samples, &self.params, &self.cubes);
         let groups: Vec<Vec<Pixel>> = (0..samples.groups())
             .into_par_iter()
             .map_init(Registers::default, |registers, group| {
@@ -176,6 +176,7 @@ mod tests {
             pixel: (0..LANES as u32).collect(),
             coverage: vec![1.0; LANES],
             surface: SurfaceRecords::new(Asked::EVERYTHING, 1),
+            atlas: None,
         };
         let facing =
             crate::model::fragment::Fragment { base: [0.0, 0.0, 1.0], view: [0.0, 0.0, -1.0], ..NEUTRAL };

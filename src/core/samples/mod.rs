@@ -13,7 +13,9 @@
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
 //! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
+//! - [`atlas`]: texels of the UV atlas, samples of the mesh as well
 
+pub mod atlas;
 pub mod covered;
 mod group;
 pub mod rows;
@@ -23,6 +25,7 @@ pub mod targets;
 mod trace;
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::Vec2;
 
@@ -32,6 +35,7 @@ use crate::progress;
 use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
+pub use atlas::Atlas;
 pub use group::z_order;
 pub use surface_records::SurfaceRecords;
 pub use targets::TargetRows;
@@ -52,6 +56,8 @@ pub struct ViewSamples {
     /// What the model reads of each sample, and its share of the pixel's covered area; the shares of
     /// a pixel's samples sum to 1.
     pub surface: SurfaceRecords,
+    /// The texels of the mesh that an effect is computed in; views of one pose share them.
+    pub atlas: Option<Arc<Atlas>>,
 }
 
 impl ViewSamples {
@@ -78,6 +84,7 @@ impl ViewSamples {
             pixel: self.pixel[pixels.clone()].to_vec(),
             coverage: self.coverage[pixels].to_vec(),
             surface: self.surface.part(first as usize..starts[starts.len() - 1] as usize),
+            atlas: self.atlas.clone(),
         }
     }
 
@@ -124,6 +131,14 @@ pub enum SampleError {
         /// Vertices of the mesh.
         vertices: usize,
     },
+    /// Texels that cannot be had.
+    #[error("{scene}: {error}")]
+    Atlas {
+        /// The scene file.
+        scene: String,
+        /// Why.
+        error: atlas::AtlasError,
+    },
     /// A target of another size than its view.
     #[error(
         "view \"{view}\": the target has {found} pixels, but the view {pixels}. Give width and \
@@ -162,9 +177,11 @@ pub fn sample_views(
     check_uvs(scene, &posed.uvs)?;
     let open = posed_occlusion(scene, &scene.mesh.morphs, posed.positions.len(), occlusion)?;
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
+    let atlas = atlas_of(scene, posed, open.as_deref())?;
     let bar = progress::bar("samples", scene.views.len() as u64);
     let views = scene.views.iter().map(|view| {
-        let samples = sample_view(scene, posed, &rays, open.as_deref(), &view.camera);
+        let mut samples = sample_view(scene, posed, &rays, open.as_deref(), &view.camera);
+        samples.atlas.clone_from(&atlas);
         bar.inc(1);
         if samples.pixel.is_empty() { Err(nothing_visible(scene, view)) } else { Ok(samples) }
     });
@@ -211,7 +228,25 @@ pub fn posed_occlusion(
     }
 }
 
-/// The visible surface from one camera; empty when it sees nothing. `rays` holds the triangles of
+/// The texels of `posed` that the effects of `scene` are computed in; `None` where none is. `occlusion` holds one value a
+/// vertex.
+///
+/// # Errors
+/// When the mesh has no texture coordinates, or does not lie in the atlas; or an effect's rules cannot be computed.
+pub fn atlas_of(
+    scene: &Scene,
+    posed: &PosedMesh,
+    occlusion: Option<&[f32]>,
+) -> Result<Option<Arc<Atlas>>, SampleError> {
+    if !scene.needs().atlas {
+        return Ok(None);
+    }
+    let made = Atlas::new(&scene.setup(), posed, occlusion, &scene.maps, scene.diffusion.light_map_size);
+    let named = |error| SampleError::Atlas { scene: scene.path.display().to_string(), error };
+    Ok(Some(Arc::new(made.map_err(named)?)))
+}
+
+/// The visible surface from one camera, without an atlas; empty when it sees nothing. `rays` holds the triangles of
 /// `posed`, and `occlusion` one value a vertex. Deterministic for any number of threads.
 #[must_use]
 pub fn sample_view(

@@ -40,6 +40,7 @@ fn asked(setup: &Setup, bumped: bool) -> Asked {
         dapple_normal: needs.dapple && setup.dapple.turns(),
         specular: needs.specular_map,
         attenuator: needs.attenuator_map,
+        uv: needs.atlas,
         weight: true,
     }
 }
@@ -133,7 +134,7 @@ impl<'a> Surface<'a> {
             attenuator: self.maps.attenuator.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]),
         };
         let dapple_normal = interpolated.to_array();
-        (fragment, Unmade { dapple_normal, corner_silhouettes, corner_shares: weights })
+        (fragment, Unmade { dapple_normal, corner_silhouettes, corner_shares: weights, uv: uv.to_array() })
     }
 
     /// S.z at three vertices; 0 where no one asks.

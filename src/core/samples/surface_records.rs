@@ -45,6 +45,8 @@ pub struct Unmade {
     pub corner_silhouettes: [f32; 3],
     /// What each corner counts: barycentric coordinates.
     pub corner_shares: [f32; 3],
+    /// Texture coordinates, by which levels of the UV atlas are looked up.
+    pub uv: [f32; 2],
 }
 
 /// Which numbers are kept of each sample, beside its base and its view vector.
@@ -63,6 +65,8 @@ pub struct Asked {
     pub corners: bool,
     pub specular: bool,
     pub attenuator: bool,
+    /// Texture coordinates.
+    pub uv: bool,
     /// The sample's share of its pixel; without it, each counts 1.
     pub weight: bool,
 }
@@ -80,6 +84,7 @@ impl Asked {
         corners: false,
         specular: true,
         attenuator: true,
+        uv: false,
         weight: true,
     };
 }
@@ -102,6 +107,7 @@ pub struct Places {
     pub corner_shares: Option<usize>,
     pub specular: Option<usize>,
     pub attenuator: Option<usize>,
+    pub uv: Option<usize>,
     /// The sample's share of its pixel.
     pub weight: Option<usize>,
 }
@@ -130,6 +136,7 @@ impl Places {
             corner_shares: place(asked.corners, 3),
             specular: place(asked.specular, 1),
             attenuator: place(asked.attenuator, 1),
+            uv: place(asked.uv, 2),
             weight: place(asked.weight, 1),
         };
         (places, rows)
@@ -151,6 +158,7 @@ impl Places {
             ("albedo", self.albedo, 3),
             ("specular", self.specular, 1),
             ("attenuator", self.attenuator, 1),
+            ("vertex_uv", self.uv, 2),
         ];
         fields.into_iter().filter_map(|(name, place, rows)| Some((name, place?, rows)))
     }
@@ -196,6 +204,9 @@ impl Places {
             for c in 0..3 {
                 record[at + c][lane] = value[c];
             }
+        }
+        if let Some(at) = self.uv {
+            (record[at][lane], record[at + 1][lane]) = (unmade.uv[0], unmade.uv[1]);
         }
         for (place, value) in self.scalars(fragment).into_iter().chain([(self.weight, weight)]) {
             if let Some(at) = place {
@@ -312,6 +323,7 @@ impl SurfaceRecords {
             dapple_normal: vector(self.places.dapple_normal),
             corner_silhouettes: vector(self.places.corner_silhouettes),
             corner_shares: vector(self.places.corner_shares),
+            uv: self.places.uv.map_or([0.0; 2], |at| [0, 1].map(|c| self.rows.number(at + c, slot))),
         }
     }
 }

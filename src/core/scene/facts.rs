@@ -35,16 +35,13 @@ impl Facts {
             square_rim: params.scalar(Param::RimExponent) == 2.0,
             f16,
             tessellation: tessellation_error(scene),
-            atlas: atlas.then_some(ATLAS_SIZE),
+            atlas: atlas.then_some(scene.diffusion.light_map_size),
             work: if atlas { work(scene) } else { Work::default() },
             budget,
             output: None,
         }
     }
 }
-
-/// Texels along a side of the UV atlas.
-const ATLAS_SIZE: u32 = 512;
 
 /// How many vertices, texels of the atlas and fragments an image of the first view takes. Where the charts overlap,
 /// texels are counted again.
@@ -63,7 +60,7 @@ fn work(scene: &Scene) -> Work {
         .views
         .first()
         .map_or(usual, |view| f64::from(view.camera.width) * f64::from(view.camera.height));
-    Work { vertices, texels: covered.min(1.0) * f64::from(ATLAS_SIZE).powi(2), fragments }
+    Work { vertices, texels: covered.min(1.0) * f64::from(scene.diffusion.light_map_size).powi(2), fragments }
 }
 
 /// The 99th percentile over a mesh's triangles of how far an interpolated 1 - |N.V| is off: where the

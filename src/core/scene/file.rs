@@ -28,6 +28,8 @@ pub(super) struct SceneFile {
     pub quality: QualityTable,
     #[serde(default)]
     pub bloom: BloomTable,
+    #[serde(default)]
+    pub diffusion: DiffusionTable,
 }
 
 /// `[mesh]`
@@ -106,6 +108,13 @@ pub(super) enum BackgroundValue {
 #[serde(deny_unknown_fields)]
 pub(super) struct BloomTable {
     pub sigma: Option<Spanned<f64>>,
+}
+
+/// `[diffusion]`
+#[derive(Clone, Debug, Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct DiffusionTable {
+    pub light_map_size: Option<Spanned<i64>>,
 }
 
 /// `[fit]`

@@ -65,6 +65,7 @@ impl Scene {
         let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
+        let diffusion = settings::diffusion(&source, &file.diffusion)?;
         let pose = Pose::check(&source, &file)?.at(options.time);
         let metres_per_unit = metres(&source, &file)?;
         let given = settings::effects(&source, &file.model)?;
@@ -128,6 +129,7 @@ impl Scene {
             fit,
             quality,
             bloom,
+            diffusion,
         };
         Ok((scene, warnings))
     }
@@ -274,6 +276,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;
+    settings::diffusion(&source, &file.diffusion)?;
     Pose::check(&source, &file)?;
     metres(&source, &file)?;
     // What the mesh adds to the effects concerns no value here.

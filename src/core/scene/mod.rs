@@ -86,6 +86,8 @@ pub struct Scene {
     pub quality: Quality,
     /// How far the bloom reaches.
     pub bloom: Bloom,
+    /// How finely texels of the UV atlas are made, where an effect is computed there.
+    pub diffusion: Diffusion,
 }
 
 impl Scene {
@@ -117,6 +119,19 @@ impl Default for Bloom {
     fn default() -> Self {
         // About the softness of the paper's pictures.
         Self { sigma: 0.02 }
+    }
+}
+
+/// The scene's `[diffusion]` table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Diffusion {
+    /// Texels along a side of the UV atlas.
+    pub light_map_size: u32,
+}
+
+impl Default for Diffusion {
+    fn default() -> Self {
+        Self { light_map_size: 512 }
     }
 }
 

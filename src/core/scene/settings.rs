@@ -3,8 +3,8 @@
 use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
-use super::file::{BloomTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
-use super::{Bloom, FitSettings, Loss, Quality, map_fit};
+use super::file::{BloomTable, DiffusionTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
+use super::{Bloom, Diffusion, FitSettings, Loss, Quality, map_fit};
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
 
@@ -236,6 +236,13 @@ pub(super) fn bloom(source: &Source, table: &BloomTable) -> Result<Bloom, SceneE
     let within = |sigma: f64| (0.0..=WIDEST_BLOOM).contains(&sigma);
     let sigma = number(source, table.sigma.as_ref(), Bloom::default().sigma, "sigma", &wanted, within)?;
     Ok(Bloom { sigma })
+}
+
+/// The `[diffusion]` table over the defaults.
+pub(super) fn diffusion(source: &Source, table: &DiffusionTable) -> Result<Diffusion, SceneError> {
+    let default = Diffusion::default().light_map_size;
+    let size = whole(source, table.light_map_size.as_ref(), "light_map_size", [64, 8192], default)?;
+    Ok(Diffusion { light_map_size: size })
 }
 
 /// A whole number within bounds, or `default` when it is not given.

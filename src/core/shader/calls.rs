@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use super::domain::Domain;
 use super::emit::Plan;
+use super::facts::Source;
 use super::quantity::{Constant, Kind, Resource};
 use super::rule::{LIBRARY, Rule};
 
@@ -34,7 +35,8 @@ impl Plan {
             let (space, kind) = resource.kind().wgsl();
             let _ = writeln!(wgsl, "@group(0) @binding({}) {space} {}: {kind};", i + 1, resource.name());
         }
-        for (i, level) in self.levels.iter().enumerate() {
+        let textures = if self.facts.source == Source::Raster { &self.levels[..] } else { &[] };
+        for (i, level) in textures.iter().enumerate() {
             let binding = 1 + self.resources.len() + i;
             let _ = writeln!(wgsl, "@group(0) @binding({binding}) var {}: texture_2d<f32>;", level.bound());
         }

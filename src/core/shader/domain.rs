@@ -100,7 +100,7 @@ pub enum EdgeError {
 }
 
 /// Texture coordinates, by which texels are found.
-pub(super) const UV: &str = "vertex_uv";
+pub(in crate::shader) const UV: &str = "vertex_uv";
 
 /// Every edge from one domain to another. Passes from texels to texels are rules of their own (`pass`): each costs
 /// [`TAP_COST`] a tap and direction beside its kernel.

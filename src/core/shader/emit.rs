@@ -25,9 +25,10 @@ pub struct Plan {
     pub resources: Vec<Resource>,
     /// The members of the uniform block at binding 0, in its order.
     pub constants: Vec<Constant>,
-    /// Textures of the atlas that it reads, bound in group 0 after the resources, in this order.
+    /// Textures of the atlas that it reads, bound in group 0 after the resources, in this order. Of stored samples: what
+    /// was looked up of them, fields of those names.
     pub levels: Vec<Level>,
-    /// Quantities that the rasteriser interpolates, with their WGSL types.
+    /// Quantities that the rasteriser interpolates, or stored texels hold, with their WGSL types.
     pub varyings: Vec<(&'static str, &'static str)>,
     /// The module; `vs_main` and `fs_main` are its entry points, or `shade` its function.
     pub wgsl: String,
@@ -67,6 +68,27 @@ pub const SAMPLE: [(&str, &str); 10] = [
 pub const UNMADE: [(&str, &str); 3] =
     [("dapple_normal", "vec3f"), ("corner_silhouettes", "vec3f"), ("corner_shares", "vec3f")];
 
+/// What the rules of texels read of a stored texel, with WGSL types: what vertices have that no eye moves, and the maps
+/// there.
+pub const TEXEL: [(&str, &str); 10] = [
+    ("vertex_position", "vec3f"),
+    ("vertex_normal", "vec3f"),
+    ("vertex_tangent", "vec3f"),
+    ("vertex_bitangent", "vec3f"),
+    ("vertex_uv", "vec2f"),
+    ("vertex_occlusion", "f32"),
+    ("albedo", "vec3f"),
+    ("specular", "f32"),
+    ("attenuator", "f32"),
+    ("normal_texel", "vec3f"),
+];
+
+/// What stored texels may hold; nothing where there are none.
+pub(super) fn texel_fields(facts: &Facts) -> &'static [(&'static str, &'static str)] {
+    let stored = facts.source == Source::Samples && facts.holds("atlas") == Some(true);
+    if stored { &TEXEL } else { &[] }
+}
+
 /// The cheapest shader that yields what `facts` call for.
 ///
 /// # Errors
@@ -84,7 +106,9 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
             Ok(Plan { wgsl, ..plan })
         }
         Source::Samples | Source::Terms => {
-            let given: Vec<&'static str> = sample_fields(facts).iter().map(|(name, _)| *name).collect();
+            let mut given: Vec<&'static str> = sample_fields(facts).iter().map(|(name, _)| *name).collect();
+            // By these are levels looked up, and what was found is handed to the shader.
+            given.extend(Some(UV).filter(|_| facts.holds("atlas") == Some(true)));
             let plan = Plan::search(facts, &[], &goals, &given)?;
             let wgsl = plan.sample_module(&parts);
             Ok(Plan { wgsl, ..plan })
@@ -188,10 +212,14 @@ impl Plan {
         // Fragments look levels up by their texture coordinates.
         let looks_up = !levels.is_empty() && shading().all(|rule| rule.domain == Domain::Fragment);
         let by = looks_up.then_some((Domain::Fragment, (UV, "vec2f")));
+        let stored = texel_fields(facts);
         for (domain, (quantity, kind)) in needs.chain(by) {
-            if let Some(on) = arrives(domain, quantity)
-                && !varyings.iter().any(|varying| varying.0 == quantity)
-            {
+            if varyings.iter().any(|varying| varying.0 == quantity) {
+                continue;
+            }
+            if domain == Domain::Texel && stored.iter().any(|(name, _)| *name == quantity) {
+                varyings.push((quantity, kind));
+            } else if let Some(on) = arrives(domain, quantity) {
                 varyings.push((quantity, kind));
                 interpolated += on.cost(facts);
             }

@@ -98,7 +98,8 @@ pub struct Facts {
     /// How far 1 - |N.V| is off inside a triangle when it is interpolated: the 99th percentile over
     /// the mesh.
     pub tessellation: f64,
-    /// Texels along a side of the UV atlas; without one nothing is computed in texels.
+    /// Texels along a side of the UV atlas; without one nothing is computed in texels. Of stored samples it only counts
+    /// whether there is one.
     pub atlas: Option<u32>,
     /// How often each domain is evaluated.
     pub work: Work,
@@ -139,6 +140,26 @@ impl Default for Facts {
 }
 
 impl Facts {
+    /// What stored samples call for, whatever maps they were made with; `turned`: whether the environment is, or will be.
+    /// Beside them stand stored texels, where an effect is computed there.
+    #[must_use]
+    pub fn of_samples(setup: Setup, faces: FaceSizes, turned: bool) -> Self {
+        // How many texels there are is told by the texels themselves.
+        let atlas = setup.needs().atlas.then_some(1);
+        let (source, maps) = (Source::Samples, MapFacts::default());
+        Self { setup, source, maps, faces, turned, atlas, ..Self::default() }
+    }
+
+    /// What rules of texels are chosen by: stored texels have been rasterised, and hold what the maps give.
+    pub(super) fn of_texels(&self) -> Self {
+        match self.source {
+            Source::Raster => *self,
+            Source::Samples | Source::Terms => {
+                Self { source: Source::Raster, maps: Self::default().maps, ..*self }
+            }
+        }
+    }
+
     /// What the enabled effects ask for.
     #[must_use]
     pub fn needs(&self) -> Needs {
@@ -207,7 +228,7 @@ impl Facts {
             "turned" => self.turned,
             "square_rim" => self.square_rim,
             "f16" => self.f16,
-            "atlas" => self.source == Source::Raster && self.atlas.is_some_and(|size| size > 0),
+            "atlas" => self.source != Source::Terms && self.atlas.is_some_and(|size| size > 0),
             _ => return None,
         })
     }

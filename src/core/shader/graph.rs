@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::bits::Bits;
 use super::domain::{Domain, EDGES, Edge, EdgeError};
+use super::emit::texel_fields;
 use super::facts::{Budget, Facts};
 use super::quantity::{Attribute, Constant};
 use super::rule::{Rule, rules};
@@ -61,11 +62,21 @@ pub(super) struct Graph<'a> {
     wants: Vec<Want>,
     /// For each want, the means that give it.
     means: Vec<Vec<Means>>,
-    given: &'a [&'static str],
+    given: Given<'a>,
+}
+
+/// What is there without any means.
+#[derive(Clone, Copy)]
+struct Given<'a> {
+    /// Of fragments.
+    fragments: &'a [&'static str],
+    /// Of texels.
+    texels: &'a [(&'static str, &'static str)],
 }
 
 impl<'a> Graph<'a> {
-    pub(super) fn new(facts: &'a Facts, given: &'a [&'static str]) -> Result<Self, PlanError> {
+    pub(super) fn new(facts: &'a Facts, fragments: &'a [&'static str]) -> Result<Self, PlanError> {
+        let given = Given { fragments, texels: texel_fields(facts) };
         let mut means = all_means(facts);
         let ranks = ranks(&means, given)?;
         let mut wants: Vec<Want> = means.keys().copied().collect();
@@ -92,7 +103,7 @@ impl<'a> Graph<'a> {
         means
             .needs()
             .into_iter()
-            .filter(|&want| !is_there(want, self.given))
+            .filter(|&want| !self.given.has(want))
             .try_fold(Bits::default(), |bits, want| Some(bits.or(self.bit(want)?)))
     }
 
@@ -122,16 +133,19 @@ impl<'a> Graph<'a> {
     }
 }
 
-/// Whether a want is met without any means: by an attribute, a constant, the vertex' index, or what is given.
-fn is_there((domain, quantity): Want, given: &[&'static str]) -> bool {
-    let constant = Constant::from_name(quantity);
-    if domain == Domain::Texel {
-        return constant.is_some_and(|constant| !is_of_the_eye(constant.name()));
+impl Given<'_> {
+    /// Whether a want is met without any means: by an attribute, a constant, the vertex' index, or what is given.
+    fn has(self, (domain, quantity): Want) -> bool {
+        let constant = Constant::from_name(quantity);
+        if domain == Domain::Texel {
+            return constant.is_some_and(|constant| !is_of_the_eye(constant.name()))
+                || self.texels.iter().any(|(name, _)| *name == quantity);
+        }
+        constant.is_some()
+            || quantity == "vertex_index"
+            || Attribute::ALL.iter().any(|attribute| attribute.name() == quantity)
+            || (domain == Domain::Fragment && self.fragments.contains(&quantity))
     }
-    constant.is_some()
-        || quantity == "vertex_index"
-        || Attribute::ALL.iter().any(|attribute| attribute.name() == quantity)
-        || (domain == Domain::Fragment && given.contains(&quantity))
 }
 
 /// Whether a constant is the camera's.
@@ -208,17 +222,14 @@ fn seen<I: Iterator<Item = &'static Rule>>(rules: impl Fn() -> I) -> BTreeSet<&'
 
 /// How far each want lies from the inputs: one more than the furthest of its needs, over all means. Wants
 /// that cannot be met have no rank.
-fn ranks(
-    means: &BTreeMap<Want, Vec<Means>>,
-    given: &[&'static str],
-) -> Result<BTreeMap<Want, usize>, PlanError> {
+fn ranks(means: &BTreeMap<Want, Vec<Means>>, given: Given<'_>) -> Result<BTreeMap<Want, usize>, PlanError> {
     let mut ranks: BTreeMap<Want, usize> = BTreeMap::new();
     // Each round settles at least one more; cycles would never end, so rounds are counted.
     for _ in 0..=means.len() {
         let mut changed = false;
         for (want, ways) in means {
             let rank = ways.iter().filter_map(|way| {
-                let open = way.needs().into_iter().filter(|&need| !is_there(need, given));
+                let open = way.needs().into_iter().filter(|&need| !given.has(need));
                 open.into_iter().try_fold(0, |rank: usize, need| Some(rank.max(ranks.get(&need)? + 1)))
             });
             if let Some(rank) = rank.max()

@@ -3,10 +3,12 @@
 
 use std::fmt::Write as _;
 
+use super::atlas::stored;
 use super::atlas::text::{SAMPLE_LEVEL, sampled};
 use super::domain::Domain;
 use super::emit::{Plan, hazy, parts, sample_fields};
 use super::quantity::{Constant, Kind, Resource};
+use super::tangent::chain::Chain;
 use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 
@@ -106,12 +108,28 @@ impl Plan {
 
     pub(super) fn sample_module(&self, parts: &[&str]) -> String {
         let mut wgsl = self.declarations(true);
-        wgsl.push_str(&sample_struct(&sample_fields(&self.facts)));
+        wgsl.push_str(&sample_struct(&self.sample_inputs(&Chain::default())));
         wgsl.push_str("\n// Radiance, and the haze in alpha.\nfn shade(at: Sample) -> vec4f {\n");
+        wgsl.push_str(&stored(&self.levels));
         wgsl.push_str(&self.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         let haze = if hazy(&self.facts) { "haze" } else { "0.0" };
         let _ = write!(wgsl, "    return vec4f({}, {haze});\n}}\n", sum(parts));
         wgsl
+    }
+
+    /// The fields of a stored sample, with their WGSL types: what samples hold, what was looked up of levels, and how that
+    /// moves along each of the chain's seeds.
+    #[must_use]
+    pub fn sample_inputs(&self, chain: &Chain) -> Vec<(String, &'static str)> {
+        let fields = sample_fields(&self.facts).into_iter().map(|(name, kind)| (name.to_owned(), kind));
+        fields.chain(self.looked_up(chain)).collect()
+    }
+
+    /// Those of [`Self::sample_inputs`] that were looked up of levels.
+    #[must_use]
+    pub fn looked_up(&self, chain: &Chain) -> Vec<(String, &'static str)> {
+        let levels = self.levels.iter().map(|level| (level.name.clone(), level.kind));
+        levels.chain(chain.looked_up(self).into_iter().map(|(field, level)| (field, level.kind))).collect()
     }
 
     /// The fragment stage as a function `skinfit_shade` of what the vertex stage hands over (and the eye).
@@ -190,7 +208,7 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
 }
 
 /// The declaration of a stored sample.
-pub fn sample_struct(fields: &[(&str, &str)]) -> String {
+pub fn sample_struct<N: std::fmt::Display>(fields: &[(N, &str)]) -> String {
     let mut wgsl = String::from("\nstruct Sample {\n");
     for (name, kind) in fields {
         let _ = writeln!(wgsl, "    {name}: {kind},");

@@ -139,7 +139,8 @@ impl Rule {
         if self.domain == Domain::Texel && facts.holds("atlas") != Some(true) {
             return Some("only with atlas".to_owned());
         }
-        if let Some(condition) = self.when.iter().find(|c| facts.holds(c) != Some(true)) {
+        let there = if self.domain == Domain::Texel { facts.of_texels() } else { *facts };
+        if let Some(condition) = self.when.iter().find(|c| there.holds(c) != Some(true)) {
             let (only, fact) = condition.strip_prefix('!').map_or(("only", *condition), |fact| ("not", fact));
             return Some(format!(
                 "{only} with {}",

@@ -19,6 +19,7 @@ pub use super::graph::Carried;
 use super::graph::{Graph, Means};
 use super::rule::Rule;
 use super::term;
+use crate::model::effects::{Effect, Effects};
 
 /// Costs and errors in the search are whole numbers: so many to one.
 const COST_STEPS: f64 = 16.0;
@@ -47,7 +48,7 @@ pub enum PlanError {
     },
     /// Quantities of an atlas where there is none.
     #[error(
-        "the effect {effect} is computed in texels of the UV atlas, which is not drawn for stored samples, exports and scenes without one. Leave the effect out there."
+        "the effect {effect} is computed in texels of the UV atlas, which exports, maps' fits, samples made on an adapter and meshes without texture coordinates do not have. Leave the effect out there, or have the CPU make the samples."
     )]
     NoAtlas {
         /// The effect.
@@ -61,6 +62,14 @@ pub enum PlanError {
         /// Among which.
         goals: String,
     },
+}
+
+impl PlanError {
+    /// That there are no texels for the one of `effects` that is computed there.
+    #[must_use]
+    pub fn no_atlas(effects: Effects) -> Self {
+        Self::NoAtlas { effect: term::of_texels(effects).map_or("added", Effect::name) }
+    }
 }
 
 #[derive(Clone, PartialEq, Eq, Hash)]
@@ -97,7 +106,7 @@ pub fn search(
 ) -> Result<Found, PlanError> {
     let graph = Graph::new(facts, given)?;
     let no_plan = || match term::of_texels(facts.setup.effects) {
-        Some(effect) if facts.holds("atlas") != Some(true) => PlanError::NoAtlas { effect: effect.name() },
+        Some(_) if facts.holds("atlas") != Some(true) => PlanError::no_atlas(facts.setup.effects),
         _ => PlanError::NoPlan { goals: [vertex_goals, goals].concat().join(", ") },
     };
     let mut start = State { open: Bits::default(), have: Bits::default(), error: 0 };

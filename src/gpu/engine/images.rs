@@ -1,5 +1,7 @@
 //! The forward pass: images, left on the device.
 
+use std::sync::MutexGuard;
+
 use web_time::Instant;
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeline};
@@ -27,7 +29,7 @@ pub(super) struct Images {
 
 impl Images {
     pub(super) fn new(gpu: &Gpu, fused: &Fused, parts: &Parts) -> Result<Self, GpuError> {
-        let (inputs, layout) = (Inputs::new(gpu, &fused.plan), part_layout(gpu));
+        let (inputs, layout) = (Inputs::new(gpu, &fused.plan), part_layout(gpu, parts.have_levels()));
         let pipeline = pipeline(gpu, "forward pass", &fused.image_module(), &[&inputs.layout, &layout]);
         let channels = fused.channels();
         let images = parts.parts.iter().map(|part| {
@@ -96,14 +98,24 @@ impl Images {
     }
 }
 
-impl GpuEngine<'_> {
+impl OnDevice {
+    /// The images of the last forward pass, and the parts that they are of.
+    fn shaded(&self, gpu: &Gpu) -> Result<(&Images, &Parts), GpuError> {
+        match &self.images {
+            Some((_, images)) => Ok((images, &self.parts)),
+            None => gpu.check().and(Err(gpu.lost("no image"))),
+        }
+    }
+}
+
+impl GpuEngine {
     /// The image of view `index` at `point`, as the CPU engine's: for each pixel slot the mean over its
     /// samples, colour and (where the haze is compared) alpha, times the view's gain.
     ///
     /// # Errors
     /// When the device fails.
     pub fn image(&self, index: usize, point: &Point) -> Result<Vec<Vec<f32>>, GpuError> {
-        self.with_images(point, None, |images, parts| images.read(self.gpu, parts, index))
+        self.read_image(index, point, None)
     }
 
     /// As [`Self::image`], of one term alone, without alpha.
@@ -111,7 +123,7 @@ impl GpuEngine<'_> {
     /// # Errors
     /// When the device fails.
     pub fn term_image(&self, index: usize, point: &Point, term: TermName) -> Result<Vec<Vec<f32>>, GpuError> {
-        self.with_images(point, Some(term), |images, parts| images.read(self.gpu, parts, index))
+        self.read_image(index, point, Some(term))
     }
 
     /// Shade every view and wait for it; the images stay on the device. To be timed.
@@ -119,7 +131,8 @@ impl GpuEngine<'_> {
     /// # Errors
     /// When the device fails.
     pub fn shade(&self, point: &Point) -> Result<(), GpuError> {
-        self.with_images(point, None, |_, _| self.gpu.wait())
+        let _images = self.run_images(point, None)?;
+        self.gpu.wait()
     }
 
     /// Milliseconds of each of so many forward passes over all views with nothing read back. On the GPU's clock, one
@@ -129,30 +142,28 @@ impl GpuEngine<'_> {
     /// # Errors
     /// When the device fails.
     pub fn shade_times(&self, point: &Point, passes: usize) -> Result<Vec<f64>, GpuError> {
-        let (gpu, gains) = (self.gpu, point.gains.as_slice());
+        let (gpu, gains) = (&self.gpu, point.gains.as_slice());
         if !gpu.timestamps() && !gpu.is_software() {
             return Ok(Vec::new());
         }
+        let device = self.run_images(point, None)?;
+        let (images, parts) = device.shaded(gpu)?;
         if gpu.is_software() {
-            return self.with_images(point, None, |images, parts| {
+            gpu.wait()?;
+            let timed = |_| {
+                let start = Instant::now();
+                images.run(gpu, parts, &self.views, gains, None)?;
                 gpu.wait()?;
-                let timed = || {
-                    let start = Instant::now();
-                    images.run(gpu, parts, self.views, gains, None)?;
-                    gpu.wait()?;
-                    Ok(1e3 * start.elapsed().as_secs_f64())
-                };
-                (0..passes).map(|_| timed()).collect()
-            });
-        }
-        let timers = self.with_images(point, None, |images, parts| {
-            let timed = || {
-                let mut timers = Vec::new();
-                images.run(gpu, parts, self.views, gains, Some(&mut timers))?;
-                Ok(timers)
+                Ok(1e3 * start.elapsed().as_secs_f64())
             };
-            (0..passes).map(|_| timed()).collect::<Result<Vec<Vec<Timer>>, GpuError>>()
-        })?;
+            return (0..passes).map(timed).collect();
+        }
+        let timed = |_| {
+            let mut timers = Vec::new();
+            images.run(gpu, parts, &self.views, gains, Some(&mut timers))?;
+            Ok(timers)
+        };
+        let timers = (0..passes).map(timed).collect::<Result<Vec<Vec<Timer>>, GpuError>>()?;
         let milliseconds = |mut timer: Timer| {
             timer.collect(gpu)?;
             Ok(timer.times.iter().map(|time| time.milliseconds).sum::<f64>())
@@ -160,23 +171,36 @@ impl GpuEngine<'_> {
         timers.into_iter().map(|timers| timers.into_iter().map(milliseconds).sum()).collect()
     }
 
-    fn with_images<T>(
+    fn read_image(
+        &self,
+        index: usize,
+        point: &Point,
+        term: Option<TermName>,
+    ) -> Result<Vec<Vec<f32>>, GpuError> {
+        let device = self.run_images(point, term)?;
+        let (images, parts) = device.shaded(&self.gpu)?;
+        images.read(&self.gpu, parts, index)
+    }
+
+    /// Run the forward pass; its images are on the device that comes back, as long as that is held.
+    fn run_images(
         &self,
         point: &Point,
         term: Option<TermName>,
-        then: impl FnOnce(&Images, &Parts) -> Result<T, GpuError>,
-    ) -> Result<T, GpuError> {
+    ) -> Result<MutexGuard<'_, OnDevice>, GpuError> {
         let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
+        self.look_up(point, &mut device)?;
         let OnDevice { parts, lights, images, .. } = &mut *device;
         if images.as_ref().is_none_or(|(of, _)| *of != (written, term)) {
             let fused = self.fused(written, lights.face_sizes(), term)?;
-            *images = Some(((written, term), Images::new(self.gpu, &fused, parts)?));
+            *images = Some(((written, term), Images::new(&self.gpu, &fused, parts)?));
         }
-        let Some((_, images)) = images else { return self.gpu.check().and(Err(self.gpu.lost("no image"))) };
-        lights.set(self.gpu, &point.params, &mut images.inputs)?;
-        images.run(self.gpu, parts, self.views, &point.gains, None)?;
-        then(images, parts)
+        if let Some((_, images)) = images {
+            lights.set(&self.gpu, &point.params, &mut images.inputs)?;
+            images.run(&self.gpu, parts, &self.views, &point.gains, None)?;
+        }
+        Ok(device)
     }
 }

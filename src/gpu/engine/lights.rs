@@ -1,5 +1,7 @@
 //! The cubes and the uniform block of a fit.
 
+use std::sync::Arc;
+
 use wgpu::{
     BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindingResource, BindingType,
     TextureSampleType, TextureView, TextureViewDimension,
@@ -16,7 +18,7 @@ use crate::{Gpu, GpuError, texels, upload};
 
 /// The cubes, each uploaded once, but for the specular one: again when its exponent has changed.
 pub(super) struct DeviceLights {
-    illumination: Illumination,
+    illumination: Arc<Illumination>,
     irradiance: Option<TextureView>,
     hilite: Option<TextureView>,
     /// The exponent, E_s there, and how it moves.
@@ -26,7 +28,7 @@ pub(super) struct DeviceLights {
 }
 
 impl DeviceLights {
-    pub(super) const fn new(illumination: Illumination) -> Self {
+    pub(super) const fn new(illumination: Arc<Illumination>) -> Self {
         Self { illumination, irradiance: None, hilite: None, specular: None, version: 0 }
     }
 

@@ -6,6 +6,7 @@
 //!   memory allowed is uploaded anew in each pass
 //! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
 //! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
+//! - `levels`: what samples look up of the UV atlas
 //! - `lights`: the cubes and the uniform block, as shaders are given them
 //! - `program`: the shaders of a wish, and one run of them
 //! - `images`: the forward pass: images, and how long they take
@@ -13,6 +14,7 @@
 
 pub mod fused;
 mod images;
+mod levels;
 mod lights;
 mod parts;
 mod pipeline;
@@ -21,11 +23,12 @@ mod samples;
 mod terms;
 
 use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use web_time::Instant;
 
 use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish, held_parameters};
 use self::images::Images;
+use self::levels::DeviceLevels;
 use self::lights::DeviceLights;
 use self::parts::{Parts, Traits};
 use self::program::Program;
@@ -41,7 +44,7 @@ use crate::{Gpu, GpuError};
 use skinfit_core::engine::cpu::CpuEngine;
 use skinfit_core::engine::pulls::Pulls;
 use skinfit_core::engine::view::ObservedView;
-use skinfit_core::engine::{BLOCK, NormalEquations, Objective, Point, Unknown};
+use skinfit_core::engine::{BLOCK, Engine, EngineError, NormalEquations, Objective, Point, Task, Unknown};
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,32 +55,17 @@ pub struct Memory {
     pub resident: Option<u64>,
 }
 
-/// What is fitted.
-#[derive(Clone, Debug)]
-pub struct Task<'v> {
-    /// The switches of the model.
-    pub setup: Setup,
-    /// The cubes that its effects ask for.
-    pub illumination: Illumination,
-    /// Samples and targets.
-    pub views: &'v [ObservedView],
-    /// What is minimised.
-    pub loss: Loss,
-    /// What is free.
-    pub unknowns: Vec<Unknown>,
-}
-
 /// Loss, gradient and normal equations on a graphics adapter.
-pub struct GpuEngine<'g> {
-    gpu: &'g Gpu,
+pub struct GpuEngine {
+    gpu: Gpu,
     /// What makes the samples, where they are not uploaded.
-    made: Option<&'g DeviceSamples<'g>>,
+    made: Option<Arc<DeviceSamples>>,
     /// What making them took.
     made_seconds: f64,
     setup: Setup,
-    views: &'g [ObservedView],
+    views: Arc<[ObservedView]>,
     /// For the one pass that the CPU makes: see `pulls`.
-    illumination: Illumination,
+    illumination: Arc<Illumination>,
     loss: Loss,
     unknowns: Vec<Unknown>,
     stride: usize,
@@ -85,6 +73,9 @@ pub struct GpuEngine<'g> {
     weight: (f64, u64),
     alpha: bool,
     traits: Traits,
+    /// What samples look up of the UV atlas, each with how many numbers it has: where the environment is not turned, and
+    /// where it is.
+    looked_up: [Vec<(String, usize)>; 2],
     /// The parameters that terms are made with, where terms stand in the place of samples.
     held: Option<Vec<Param>>,
     /// What changes between passes; a pass at a time.
@@ -96,6 +87,8 @@ pub struct GpuEngine<'g> {
 struct OnDevice {
     parts: Parts,
     lights: DeviceLights,
+    /// Where something is computed in texels.
+    levels: Option<DeviceLevels>,
     /// By wish, and by what is written into the text.
     programs: BTreeMap<(Wish, Written), Program>,
     /// What the terms were made with that stand in the samples' place.
@@ -115,12 +108,12 @@ struct Written {
     gained: bool,
 }
 
-impl<'g> GpuEngine<'g> {
+impl GpuEngine {
     /// An engine for a task; the shaders for passes at `start` are compiled.
     ///
     /// # Errors
     /// When the device does not take it.
-    pub fn new(gpu: &'g Gpu, task: Task<'g>, start: &Point, memory: Memory) -> Result<Self, GpuError> {
+    pub fn new(gpu: &Gpu, task: Task, start: &Point, memory: Memory) -> Result<Self, GpuError> {
         Self::build(gpu, None, task, start, memory)
     }
 
@@ -130,18 +123,19 @@ impl<'g> GpuEngine<'g> {
     /// # Errors
     /// When the device does not take it, or may not keep as much.
     pub fn over_device_samples(
-        samples: &'g DeviceSamples<'g>,
-        task: Task<'g>,
+        samples: Arc<DeviceSamples>,
+        task: Task,
         start: &Point,
         memory: Memory,
     ) -> Result<Self, GpuError> {
-        Self::build(samples.gpu(), Some(samples), task, start, memory)
+        let gpu = samples.gpu().clone();
+        Self::build(&gpu, Some(samples), task, start, memory)
     }
 
     fn build(
-        gpu: &'g Gpu,
-        made: Option<&'g DeviceSamples<'g>>,
-        task: Task<'g>,
+        gpu: &Gpu,
+        made: Option<Arc<DeviceSamples>>,
+        task: Task,
         start: &Point,
         memory: Memory,
     ) -> Result<Self, GpuError> {
@@ -151,23 +145,25 @@ impl<'g> GpuEngine<'g> {
             return Err(GpuError::NothingShown);
         }
         let alpha = views.iter().any(ObservedView::compares_alpha);
-        let traits = Traits::of(gpu, views)?;
+        let traits = Traits::of(gpu, &views)?;
         let mut engine = Self {
-            gpu,
+            gpu: gpu.clone(),
             made,
             made_seconds: 0.0,
             setup,
-            illumination: illumination.clone(),
+            illumination: Arc::clone(&illumination),
             loss,
             unknowns,
             stride: 1,
             weight: (0.0, 0),
             alpha,
             traits,
+            looked_up: [Vec::new(), Vec::new()],
             held: None,
             device: Mutex::new(OnDevice {
                 parts: Parts::default(),
                 lights: DeviceLights::new(illumination),
+                levels: None,
                 programs: BTreeMap::new(),
                 terms: None,
                 replaced: false,
@@ -176,24 +172,40 @@ impl<'g> GpuEngine<'g> {
             fault: Mutex::new(None),
             views,
         };
-        let start_of_parts = Instant::now();
-        let parts = Parts::new(gpu, views, &engine.traits, memory, made)?;
-        engine.made_seconds =
-            made.map_or(0.0, |made| made.seconds() + start_of_parts.elapsed().as_secs_f64());
+        engine.upload(memory)?;
         let samples = Layout::of_samples(&engine.traits.places, engine.traits.rows);
         let terms = Layout::of_terms(setup, &samples);
-        if parts.all_hold(terms.rows, views) {
-            let faces = engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).lights.face_sizes();
+        let device = engine.device.get_mut().unwrap_or_else(PoisonError::into_inner);
+        // What is looked up of the UV atlas stands beside samples, and not beside their terms.
+        if !device.parts.have_levels() && device.parts.all_hold(terms.rows, &engine.views) {
+            let faces = device.lights.face_sizes();
             let held =
                 held_parameters(&engine.fitted(engine.written(start), faces)).map_err(GpuError::Plan)?;
             let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if held.contains(&c.param));
             engine.held = (!engine.unknowns.iter().any(moves)).then_some(held);
         }
-        engine.device.get_mut().unwrap_or_else(PoisonError::into_inner).parts = parts;
         engine.set_stride(1);
         // Whatever the driver refuses shows here, and not in the midst of a fit.
         engine.sums(start, Wish::Normal)?;
         Ok(engine)
+    }
+
+    /// Have samples, targets, and room for what is looked up, on the device.
+    fn upload(&mut self, memory: Memory) -> Result<(), GpuError> {
+        let faces = self.lock().lights.face_sizes();
+        let fitted = |turned| self.fitted(Written { turned, gained: false }, faces);
+        let levels = DeviceLevels::new(fitted, &self.views)?;
+        if let Some(levels) = &levels {
+            self.traits.levels = levels.rows();
+            self.looked_up = [false, true].map(|turned| levels.fields(turned));
+        }
+        let start = Instant::now();
+        let parts = Parts::new(&self.gpu, &self.views, &self.traits, memory, self.made.as_deref())?;
+        let own = |made: &Arc<DeviceSamples>| made.seconds() + start.elapsed().as_secs_f64();
+        self.made_seconds = self.made.as_ref().map_or(0.0, own);
+        let device = self.device.get_mut().unwrap_or_else(PoisonError::into_inner);
+        (device.parts, device.levels) = (parts, levels);
+        Ok(())
     }
 
     /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
@@ -205,8 +217,8 @@ impl<'g> GpuEngine<'g> {
 
     /// The views.
     #[must_use]
-    pub const fn views(&self) -> &'g [ObservedView] {
-        self.views
+    pub const fn views(&self) -> &Arc<[ObservedView]> {
+        &self.views
     }
 
     /// Bytes of the buffers that hold samples, targets and weights on the device, and bytes that each pass for the
@@ -221,8 +233,8 @@ impl<'g> GpuEngine<'g> {
 
     /// What made the samples where they were not uploaded, and the seconds that it took.
     #[must_use]
-    pub fn device_samples(&self) -> Option<(&'g DeviceSamples<'g>, f64)> {
-        Some((self.made?, self.made_seconds))
+    pub fn device_samples(&self) -> Option<(&DeviceSamples, f64)> {
+        Some((self.made.as_deref()?, self.made_seconds))
     }
 
     /// The adapter's name.
@@ -267,7 +279,8 @@ impl<'g> GpuEngine<'g> {
             turned: written.turned,
             gained: written.gained,
             faces,
-            layout: Layout::of_samples(&self.traits.places, self.traits.rows),
+            layout: Layout::of_samples(&self.traits.places, self.traits.rows)
+                .with_levels(self.looked_up[usize::from(written.turned)].clone(), self.traits.levels),
             several: self.traits.several,
             weighted: self.traits.weighted,
             clipped: self.traits.clipped,
@@ -282,6 +295,20 @@ impl<'g> GpuEngine<'g> {
         Fused::new(fitted).map_err(GpuError::Plan)
     }
 
+    /// Have on the device what samples look up of the UV atlas at `point`.
+    fn look_up(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
+        let OnDevice { parts, levels, .. } = device;
+        let Some(levels) = levels else { return Ok(()) };
+        let at = (self.written(point).turned, &point.params);
+        levels.set(&self.gpu, at, &self.illumination, &self.views, parts)
+    }
+
+    /// How often levels of the UV atlas were made: once for as long as nothing changes that moves them.
+    #[must_use]
+    pub fn levels_made(&self) -> u64 {
+        self.lock().levels.as_ref().map_or(0, DeviceLevels::count)
+    }
+
     /// Have the terms at `point` in the place of the samples, where that is how passes are made.
     fn keep(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
         let Some(held) = &self.held else { return Ok(()) };
@@ -289,17 +316,17 @@ impl<'g> GpuEngine<'g> {
         if device.terms.as_ref() == Some(&key) {
             return Ok(());
         }
-        let OnDevice { parts, lights, programs, images, terms, replaced } = device;
+        let OnDevice { parts, lights, programs, images, terms, replaced, .. } = device;
         *terms = None;
         if std::mem::replace(replaced, true) {
-            parts.reload(self.gpu, self.views, self.made)?;
+            parts.reload(&self.gpu, &self.views, self.made.as_deref())?;
         }
         // Their bindings are to the buffers before.
         programs.clear();
         *images = None;
         let fitted = self.fitted(self.written(point), lights.face_sizes());
         let layout = Layout::of_terms(self.setup, &fitted.layout);
-        replace_samples(self.gpu, &fitted, &layout, &point.params, lights, parts, self.views)?;
+        replace_samples(&self.gpu, &fitted, &layout, &point.params, lights, parts, &self.views)?;
         *terms = Some(key);
         Ok(())
     }
@@ -309,16 +336,17 @@ impl<'g> GpuEngine<'g> {
         let written = self.written(point);
         let mut device = self.lock();
         self.keep(point, &mut device)?;
+        self.look_up(point, &mut device)?;
         let OnDevice { parts, lights, programs, .. } = &mut *device;
         let program = match programs.entry((wish, written)) {
             std::collections::btree_map::Entry::Occupied(entry) => entry.into_mut(),
             std::collections::btree_map::Entry::Vacant(entry) => {
                 let fused = self.fused(written, lights.face_sizes(), None)?;
-                entry.insert(Program::new(self.gpu, fused, wish, parts)?)
+                entry.insert(Program::new(&self.gpu, fused, wish, parts)?)
             }
         };
-        lights.set(self.gpu, &point.params, &mut program.inputs)?;
-        let sums = program.run(self.gpu, parts, self.views, &point.gains)?;
+        lights.set(&self.gpu, &point.params, &mut program.inputs)?;
+        let sums = program.run(&self.gpu, parts, &self.views, &point.gains)?;
         Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
     }
 
@@ -387,7 +415,7 @@ impl Passed {
     }
 }
 
-impl Objective for GpuEngine<'_> {
+impl Objective for GpuEngine {
     fn unknowns(&self) -> &[Unknown] {
         &self.unknowns
     }
@@ -397,29 +425,26 @@ impl Objective for GpuEngine<'_> {
     }
 
     fn rounding(&self) -> f64 {
-        skinfit_core::engine::rounding(self.views, self.loss, self.stride)
+        skinfit_core::engine::rounding(&self.views, self.loss, self.stride)
     }
 
-    /// Made by the CPU engine, a view at a time, from the samples that it uploaded; of samples that the adapter made
-    /// there are none.
+    /// Made by the CPU engine, from the samples that this one uploaded; of samples that the adapter made there are
+    /// none.
     fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
-        if self.made.is_some() || widths.len() != self.views.len() {
+        if self.made.is_some() {
             return None;
         }
-        let mut pulls = Pulls::default();
-        for index in 0..self.views.len() {
-            let mut alone = vec![ObservedView::default(); self.views.len()];
-            alone[index] = self.views[index].clone();
-            let (illumination, unknowns) = (self.illumination.clone(), self.unknowns.clone());
-            let engine =
-                CpuEngine::with_kept_terms(self.setup, illumination, alone, self.loss, unknowns, false);
-            let mut engine = engine.ok()?;
-            engine.set_stride(self.stride);
-            let mut of_view = engine.pulls(point, widths)?;
-            pulls.residuals.push(of_view.residuals.swap_remove(index));
-            pulls.tiles.append(&mut of_view.tiles);
-        }
-        Some(pulls)
+        let task = Task {
+            setup: self.setup,
+            illumination: Arc::clone(&self.illumination),
+            views: Arc::clone(&self.views),
+            loss: self.loss,
+            unknowns: self.unknowns.clone(),
+        };
+        // What is kept for later passes would be memory for nothing: this is the only one.
+        let mut engine = CpuEngine::with_kept_terms(task, false).ok()?;
+        engine.set_stride(self.stride);
+        engine.pulls(point, widths)
     }
 
     fn fault(&self) -> Option<String> {
@@ -436,5 +461,52 @@ impl Objective for GpuEngine<'_> {
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
         self.pass(point, Wish::Gradient).loss_and_gradient()
+    }
+}
+
+impl Engine for GpuEngine {
+    fn name(&self) -> &'static str {
+        "gpu"
+    }
+
+    fn provenance(&self) -> Vec<(String, String)> {
+        let (resident, streamed) = self.bytes();
+        let samples =
+            if self.made.is_some() { "made by the adapter" } else { "made by the CPU and uploaded" };
+        vec![
+            ("adapter".to_owned(), self.adapter().to_owned()),
+            ("samples".to_owned(), samples.to_owned()),
+            ("bytes on the device".to_owned(), resident.to_string()),
+            ("bytes uploaded a pass".to_owned(), streamed.to_string()),
+        ]
+    }
+
+    fn views(&self) -> &Arc<[ObservedView]> {
+        self.views()
+    }
+
+    fn surfaced_views(&self) -> Result<Arc<[ObservedView]>, EngineError> {
+        let Some(made) = &self.made else { return Ok(Arc::clone(&self.views)) };
+        let surfaced = self.views.iter().enumerate().map(|(index, view)| {
+            let mut view = view.clone();
+            view.samples.surface = made.read(index, &view.samples)?;
+            Ok(view)
+        });
+        Ok(surfaced.collect::<Result<_, GpuError>>()?)
+    }
+
+    fn samples(&self) -> u64 {
+        match &self.made {
+            Some(made) => made.count() as u64,
+            None => self.views.iter().map(|view| view.samples.count() as u64).sum(),
+        }
+    }
+
+    fn own_sample_seconds(&self) -> Option<f64> {
+        self.device_samples().map(|(_, seconds)| seconds)
+    }
+
+    fn set_stride(&mut self, stride: usize) {
+        self.set_stride(stride);
     }
 }

@@ -9,7 +9,7 @@ use super::fused::WORKGROUP;
 use super::samples::DeviceSamples;
 use crate::records::packed;
 use crate::samples::LANES;
-use crate::samples::rows::{Row, Rows};
+use crate::samples::rows::Row;
 use crate::samples::surface_records::Places;
 use crate::{Gpu, GpuError, MOST_OF_A_DISPATCH};
 use skinfit_core::engine::BLOCK;
@@ -47,6 +47,8 @@ pub(super) struct Traits {
     pub(super) weighted: bool,
     /// Whether targets are clipped.
     pub(super) clipped: bool,
+    /// Rows of what samples look up of the UV atlas.
+    pub(super) levels: usize,
 }
 
 impl Traits {
@@ -60,6 +62,7 @@ impl Traits {
             several: !views.iter().all(single),
             weighted: views.iter().any(|view| !view.weight.is_empty()),
             clipped: views.iter().any(|view| view.clip.is_some()),
+            levels: 0,
         };
         let alike = |view: &ObservedView| {
             *view.samples.surface.places() == traits.places && view.target.stride() == traits.channels
@@ -95,6 +98,8 @@ pub(super) struct PartBuffers {
     pub(super) samples: Buffer,
     pub(super) group_start: Buffer,
     pub(super) targets: Buffer,
+    /// What samples look up of the UV atlas.
+    pub(super) levels: Option<Buffer>,
 }
 
 /// The parts of all views.
@@ -106,6 +111,8 @@ pub(super) struct Parts {
     /// Bytes that a part's samples may take, or their terms.
     limit: u64,
     memory: Memory,
+    /// What the samples of each view look up of the UV atlas, record by record; nothing where there is none.
+    levels: Vec<Vec<Row>>,
 }
 
 impl Parts {
@@ -115,12 +122,13 @@ impl Parts {
         views: &[ObservedView],
         traits: &Traits,
         memory: Memory,
-        made: Option<&DeviceSamples<'_>>,
+        made: Option<&DeviceSamples>,
     ) -> Result<Self, GpuError> {
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let limit = memory.part.map_or(limit, |part| part.min(limit));
-        let mut parts = Self { parts: Vec::new(), traits: *traits, stride: 1, limit, memory };
+        let mut parts =
+            Self { parts: Vec::new(), traits: *traits, stride: 1, limit, memory, levels: Vec::new() };
         if let (Some(_), Some(most)) = (made, memory.resident) {
             let bytes = views.iter().map(|view| parts.size(view, &(0..view.samples.groups())).total()).sum();
             if bytes > most {
@@ -129,7 +137,7 @@ impl Parts {
         }
         let (mut used, mut shared) = (0, None);
         for (index, view) in views.iter().enumerate() {
-            for groups in cut(view, limit) {
+            for groups in cut(view, traits.rows.max(traits.levels), limit) {
                 let size = parts.size(view, &groups);
                 let resident = memory.resident.is_none_or(|most| used + size.total() <= most);
                 let buffers = if resident {
@@ -182,7 +190,9 @@ impl Parts {
     /// Bytes of the buffers on the device, and bytes that are uploaded to visit each part once.
     pub(super) fn bytes(&self) -> (u64, u64) {
         let bytes = |part: &Part| {
-            part.buffers.samples.size() + part.buffers.group_start.size() + part.buffers.targets.size()
+            let PartBuffers { samples, group_start, targets, levels } = &part.buffers;
+            let own = [Some(samples), Some(group_start), Some(targets), levels.as_ref()];
+            own.into_iter().flatten().map(Buffer::size).sum::<u64>()
         };
         let own: u64 = self.parts.iter().filter(|part| part.resident).map(bytes).sum();
         let mut streamed = self.parts.iter().filter(|part| !part.resident);
@@ -222,7 +232,7 @@ impl Parts {
         &mut self,
         gpu: &Gpu,
         views: &[ObservedView],
-        made: Option<&DeviceSamples<'_>>,
+        made: Option<&DeviceSamples>,
     ) -> Result<(), GpuError> {
         for index in 0..self.parts.len() {
             let part = &self.parts[index];
@@ -235,6 +245,30 @@ impl Parts {
             self.upload(gpu, &views[part.view], part, made.is_none())?;
         }
         made.map_or(Ok(()), |made| made.fill(&self.parts))
+    }
+
+    /// Whether samples look something up of the UV atlas.
+    pub(super) const fn have_levels(&self) -> bool {
+        self.traits.levels > 0
+    }
+
+    /// Have what the samples of each view look up beside them.
+    pub(super) fn set_levels(
+        &mut self,
+        gpu: &Gpu,
+        views: &[ObservedView],
+        levels: Vec<Vec<Row>>,
+    ) -> Result<(), GpuError> {
+        self.levels = levels;
+        for part in self.parts.iter().filter(|part| part.resident) {
+            self.upload_levels(gpu, &views[part.view], part);
+        }
+        gpu.check()
+    }
+
+    fn upload_levels(&self, gpu: &Gpu, view: &ObservedView, part: &Part) {
+        let (Some(buffer), Some(rows)) = (&part.buffers.levels, self.levels.get(part.view)) else { return };
+        write(gpu, buffer, (rows, self.traits.levels), &records(view, &part.groups));
     }
 
     /// Samples of a part, padding included.
@@ -301,6 +335,7 @@ impl Parts {
             samples: rows(records(view, groups).len() * self.traits.rows),
             starts: (4 * (groups.len() + 1)) as u64,
             targets: rows(groups.len() * (self.traits.channels + usize::from(self.traits.weighted))),
+            levels: rows(records(view, groups).len() * self.traits.levels),
         }
     }
 
@@ -312,17 +347,19 @@ impl Parts {
         part: &Part,
         with_samples: bool,
     ) -> Result<(), GpuError> {
-        let PartBuffers { samples, group_start, targets } = &part.buffers;
+        let PartBuffers { samples, group_start, targets, .. } = &part.buffers;
         let records = records(view, &part.groups);
         if with_samples {
-            write(gpu, samples, view.samples.surface.rows(), &records);
+            let rows = view.samples.surface.rows();
+            write(gpu, samples, (rows.all(), rows.stride()), &records);
         }
         let starts: Vec<u32> = view.samples.group_start[part.groups.start..=part.groups.end]
             .iter()
             .map(|&start| start - records.start as u32)
             .collect();
         gpu.queue.write_buffer(group_start, 0, bytemuck::cast_slice(&starts));
-        let observed = write(gpu, targets, &view.target, &part.groups);
+        self.upload_levels(gpu, view, part);
+        let observed = write(gpu, targets, (view.target.all(), view.target.stride()), &part.groups);
         if self.traits.weighted {
             let ones;
             let weights = match view.weight.get(part.groups.clone()) {
@@ -344,15 +381,17 @@ struct Size {
     samples: u64,
     starts: u64,
     targets: u64,
+    levels: u64,
 }
 
 impl Size {
     const fn total(self) -> u64 {
-        self.samples + self.starts + self.targets
+        self.samples + self.starts + self.targets + self.levels
     }
 
     const fn within(self, other: Self) -> bool {
-        self.samples <= other.samples && self.starts <= other.starts && self.targets <= other.targets
+        let of_samples = self.samples <= other.samples && self.levels <= other.levels;
+        of_samples && self.starts <= other.starts && self.targets <= other.targets
     }
 
     fn max(self, other: Self) -> Self {
@@ -360,6 +399,7 @@ impl Size {
             samples: self.samples.max(other.samples),
             starts: self.starts.max(other.starts),
             targets: self.targets.max(other.targets),
+            levels: self.levels.max(other.levels),
         }
     }
 }
@@ -378,17 +418,17 @@ impl PartBuffers {
             samples: buffer("samples", size.samples, BufferUsages::STORAGE),
             group_start: buffer("group starts", size.starts, BufferUsages::STORAGE),
             targets: buffer("targets", size.targets, BufferUsages::STORAGE),
+            levels: (size.levels > 0).then(|| buffer("levels", size.levels, BufferUsages::STORAGE)),
         };
         gpu.check()?;
         Ok(made)
     }
 }
 
-/// Ranges of groups, whole blocks each, whose samples stay within the limit. A block that is beyond it on its
+/// Ranges of groups, whole blocks each, whose records of so many rows stay within the limit. A block that is beyond it on its
 /// own is left to the adapter to refuse.
-fn cut(view: &ObservedView, limit: u64) -> Vec<Range<usize>> {
+fn cut(view: &ObservedView, rows: usize, limit: u64) -> Vec<Range<usize>> {
     let groups = view.samples.groups();
-    let rows = view.samples.surface.rows().stride();
     let bytes = |range: &Range<usize>| (size_of::<Row>() * rows * records(view, range).len()) as u64;
     let (mut ranges, mut start, mut end) = (Vec::new(), 0, 0);
     while end < groups {
@@ -417,9 +457,8 @@ fn blocks(view: &ObservedView, groups: &Range<usize>) -> Vec<(f64, u64)> {
 }
 
 /// Write a range of records to a buffer, as they stand on an adapter; returns how many bytes they take.
-fn write(gpu: &Gpu, buffer: &Buffer, rows: &Rows, range: &Range<usize>) -> u64 {
-    let stride = rows.stride();
-    let rows = &rows.all()[range.start * stride..range.end * stride];
+fn write(gpu: &Gpu, buffer: &Buffer, (rows, stride): (&[Row], usize), range: &Range<usize>) -> u64 {
+    let rows = &rows[range.start * stride..range.end * stride];
     // Some at a time: they are packed in the host's memory.
     let mut offset = 0;
     for some in rows.chunks(PACKED_RECORDS * stride.max(1)) {

@@ -100,9 +100,10 @@ pub(super) const READ: BindingType = buffer_kind(BufferBindingType::Storage { re
 pub(super) const WRITE: BindingType = buffer_kind(BufferBindingType::Storage { read_only: false });
 
 /// Group 1 of a shader over a part: counts, samples, group starts, targets, what is written; samples and targets
-/// again, to be read four numbers at a time.
-pub(super) fn part_layout(gpu: &Gpu) -> BindGroupLayout {
-    layout(gpu, "part", &[(0, UNIFORM), (1, READ), (2, READ), (3, READ), (4, WRITE), (5, READ), (6, READ)])
+/// again, to be read four numbers at a time; with `levels`, what samples look up of the UV atlas.
+pub(super) fn part_layout(gpu: &Gpu, levels: bool) -> BindGroupLayout {
+    let kinds = [(0, UNIFORM), (1, READ), (2, READ), (3, READ), (4, WRITE), (5, READ), (6, READ), (7, READ)];
+    layout(gpu, "part", &kinds[..if levels { 8 } else { 7 }])
 }
 
 /// What [`part_layout`] asks for.
@@ -110,8 +111,10 @@ pub(super) fn bind_part(
     gpu: &Gpu,
     layout: &BindGroupLayout,
     counts: &Uniform,
-    PartBuffers { samples, group_start, targets }: &PartBuffers,
+    PartBuffers { samples, group_start, targets, levels }: &PartBuffers,
     written: &Buffer,
 ) -> BindGroup {
-    bind(gpu, layout, &[counts.buffer(), samples, group_start, targets, written, samples, targets])
+    let mut buffers = vec![counts.buffer(), samples, group_start, targets, written, samples, targets];
+    buffers.extend(levels);
+    bind(gpu, layout, &buffers)
 }

@@ -39,8 +39,10 @@ struct Run {
 impl Program {
     pub(super) fn new(gpu: &Gpu, fused: Fused, wish: Wish, parts: &Parts) -> Result<Self, GpuError> {
         let inputs = Inputs::new(gpu, &fused.plan);
-        let (of_part, of_gather) =
-            (part_layout(gpu), layout(gpu, "gather", &[(0, UNIFORM), (1, READ), (2, WRITE)]));
+        let (of_part, of_gather) = (
+            part_layout(gpu, parts.have_levels()),
+            layout(gpu, "gather", &[(0, UNIFORM), (1, READ), (2, WRITE)]),
+        );
         let slabs: Vec<(Slab, ComputePipeline)> = fused
             .slabs(wish)
             .into_iter()

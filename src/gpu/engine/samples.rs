@@ -1,5 +1,7 @@
 //! Samples that the adapter makes itself: the production renderer's geometry pass, in the place of rays and uploads.
 
+use std::sync::Arc;
+
 use web_time::Instant;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoderDescriptor};
@@ -16,6 +18,7 @@ use crate::samples::{
 };
 use crate::scene::Scene;
 use crate::scene::view::Camera;
+use crate::shader::PlanError;
 use crate::upload::Content;
 use crate::{Gpu, GpuError};
 
@@ -35,24 +38,29 @@ pub enum DeviceSampleError {
 /// The positions in the image, the groups and the shares are those of [`sample_views`](crate::samples::sample_views),
 /// but for samples at edges that the rasteriser gives to the other side. What a sample shows is computed in f32 at
 /// what the rasteriser interpolates.
-pub struct DeviceSamples<'a> {
-    gpu: &'a Gpu,
-    geometry: Geometry<'a>,
+pub struct DeviceSamples {
+    gpu: Gpu,
+    geometry: Geometry,
     views: Vec<(Camera, Covered)>,
     seconds: f64,
 }
 
-impl<'a> DeviceSamples<'a> {
+impl DeviceSamples {
     /// Draw which samples of each of the scene's views show its mesh, and group them. With them come the groups, view
     /// by view: [`ViewSamples`] that hold no surface.
     ///
     /// # Errors
     /// When a view sees nothing of the mesh, the mesh lacks what the effects ask for, or the device fails.
-    pub fn new(gpu: &'a Gpu, content: Content<'a>) -> Result<(Self, Vec<ViewSamples>), DeviceSampleError> {
+    pub fn new(gpu: &Gpu, content: Content) -> Result<(Self, Vec<ViewSamples>), DeviceSampleError> {
         let start = Instant::now();
-        let Content { scene, occlusion, .. } = content;
+        let scene = Arc::clone(&content.scene);
+        let scene = &*scene;
+        if scene.needs().atlas {
+            // Texels are the CPU's, as are the samples' places in them.
+            return Err(GpuError::Plan(PlanError::no_atlas(scene.effects).to_string()).into());
+        }
         check_uvs(scene, &scene.mesh.uvs)?;
-        posed_occlusion(scene, &scene.mesh.morphs, scene.mesh.positions.len(), occlusion)?;
+        posed_occlusion(scene, &scene.mesh.morphs, scene.mesh.positions.len(), content.occlusion.as_deref())?;
         let records = asked_records(scene, 0);
         let geometry = Geometry::new(gpu, content, records.places(), records.rows().stride())?;
         let (mut views, mut samples) = (Vec::new(), Vec::new());
@@ -65,13 +73,13 @@ impl<'a> DeviceSamples<'a> {
             views.push((view.camera, covered));
             samples.push(groups);
         }
-        Ok((Self { gpu, geometry, views, seconds: start.elapsed().as_secs_f64() }, samples))
+        Ok((Self { gpu: gpu.clone(), geometry, views, seconds: start.elapsed().as_secs_f64() }, samples))
     }
 
     /// The device that they are on.
     #[must_use]
-    pub const fn gpu(&self) -> &'a Gpu {
-        self.gpu
+    pub const fn gpu(&self) -> &Gpu {
+        &self.gpu
     }
 
     /// Whether these are the groups that came with the samples, all of them and in their order.
@@ -110,9 +118,9 @@ impl<'a> DeviceSamples<'a> {
     /// The surface of view `index`, drawn into a buffer, and records that have places for it.
     pub fn draw(&self, index: usize, groups: &ViewSamples) -> Result<(Buffer, SurfaceRecords), GpuError> {
         let (camera, covered) = &self.views[index];
-        let surface = asked_records(self.geometry.content().scene, groups.records());
+        let surface = asked_records(&self.geometry.content().scene, groups.records());
         let bytes = 4 * LANES * surface.rows().all().len();
-        let records = buffer(self.gpu, "samples", bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+        let records = buffer(&self.gpu, "samples", bytes, BufferUsages::STORAGE | BufferUsages::COPY_SRC);
         self.gpu.check()?;
         let wanted = Wanted { groups: 0..groups.groups(), records: records.clone() };
         self.geometry.fill(camera, covered, &[wanted])?;
@@ -126,7 +134,7 @@ impl<'a> DeviceSamples<'a> {
     pub fn read(&self, index: usize, groups: &ViewSamples) -> Result<SurfaceRecords, GpuError> {
         let (records, mut surface) = self.draw(index, groups)?;
         let encoder = self.gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
-        let numbers = read_floats(self.gpu, encoder, &records)?;
+        let numbers = read_floats(&self.gpu, encoder, &records)?;
         let stride = surface.rows().stride();
         surface.rows_mut().fill(&unpacked(&numbers, stride));
         Ok(surface)

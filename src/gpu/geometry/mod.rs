@@ -38,9 +38,9 @@ use crate::shader::{Budget, Facts};
 const MOST_SAMPLES: u64 = 1 << 23;
 
 /// A scene on a device, ready for its samples to be drawn.
-pub(crate) struct Geometry<'a> {
-    gpu: &'a Gpu,
-    uploads: Uploads<'a>,
+pub(crate) struct Geometry {
+    gpu: Gpu,
+    uploads: Uploads,
     /// Of the morph targets that are on the device.
     morph_weights: Vec<f32>,
     outline: Program,
@@ -56,18 +56,13 @@ pub(crate) struct Wanted {
     pub(crate) records: Buffer,
 }
 
-impl<'a> Geometry<'a> {
+impl Geometry {
     /// The scene's mesh and maps, and the shaders that leave `places` in records of `rows` rows.
-    pub(crate) fn new(
-        gpu: &'a Gpu,
-        content: Content<'a>,
-        places: &Places,
-        rows: usize,
-    ) -> Result<Self, GpuError> {
+    pub(crate) fn new(gpu: &Gpu, content: Content, places: &Places, rows: usize) -> Result<Self, GpuError> {
         let morphs = &content.scene.mesh.morphs;
         let targets: Vec<usize> = (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0).collect();
         let morph_weights = targets.iter().map(|&i| morphs[i].weight).collect();
-        let facts = Facts::of_scene(content.scene, content.params, Budget::Exact, false);
+        let facts = Facts::of_scene(&content.scene, &content.params, Budget::Exact, false);
         let mut uploads = if places.corner_shares.is_some() {
             Uploads::by_corner(gpu, content, targets)?
         } else {
@@ -87,11 +82,11 @@ impl<'a> Geometry<'a> {
         }
         let coverage = Coverage::new(gpu);
         gpu.check()?;
-        Ok(Self { gpu, uploads, morph_weights, outline: alone, coverage, draws })
+        Ok(Self { gpu: gpu.clone(), uploads, morph_weights, outline: alone, coverage, draws })
     }
 
     /// What it is a scene of.
-    pub(crate) const fn content(&self) -> &Content<'a> {
+    pub(crate) const fn content(&self) -> &Content {
         self.uploads.content()
     }
 
@@ -99,12 +94,12 @@ impl<'a> Geometry<'a> {
     pub(crate) fn cover(&self, camera: &Camera, axis: u32) -> Result<SampleMask, GpuError> {
         let mut mask = SampleMask::new(axis * camera.width, axis * camera.height);
         let tiles = self.tiles(camera, axis);
-        let surfaces = Surfaces::new(self.gpu, tiles[0], axis, 0)?;
+        let surfaces = Surfaces::new(&self.gpu, tiles[0], axis, 0)?;
         for tile in tiles {
             let mut encoder = self.encoder();
             self.draw(&mut encoder, &self.outline, &surfaces, camera, tile, axis);
             let size = [axis * tile.width, axis * tile.height];
-            let words = self.coverage.read(self.gpu, encoder, &surfaces, size)?;
+            let words = self.coverage.read(&self.gpu, encoder, &surfaces, size)?;
             mask.set_rectangle(axis * tile.x, axis * tile.y, size[0].div_ceil(u32::BITS) as usize, &words);
         }
         Ok(mask)
@@ -115,7 +110,7 @@ impl<'a> Geometry<'a> {
         let axis = covered.axis();
         let tiles = self.tiles(camera, axis);
         let targets = self.draws.iter().map(|(_, gather)| gather.targets()).max().unwrap_or_default();
-        let surfaces = Surfaces::new(self.gpu, tiles[0], axis, targets)?;
+        let surfaces = Surfaces::new(&self.gpu, tiles[0], axis, targets)?;
         for tile in tiles {
             let parts = wanted.iter().filter_map(|wanted| {
                 let sources = sources(covered, &wanted.groups, tile);
@@ -128,7 +123,7 @@ impl<'a> Geometry<'a> {
                 let mut encoder = self.encoder();
                 self.draw(&mut encoder, program, &surfaces, camera, tile, axis);
                 for (sources, records) in &parts {
-                    gather.encode(self.gpu, &mut encoder, &surfaces, axis * tile.width, sources, records);
+                    gather.encode(&self.gpu, &mut encoder, &surfaces, axis * tile.width, sources, records);
                 }
                 self.gpu.queue.submit([encoder.finish()]);
             }
@@ -156,8 +151,8 @@ impl<'a> Geometry<'a> {
         tile: Tile,
         axis: u32,
     ) {
-        let (params, morph_weights) = (self.uploads.content().params, self.morph_weights.as_slice());
-        program.set(self.gpu, &Values { params, camera, tile, morph_weights });
+        let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
+        program.set(&self.gpu, &Values { params, camera, tile, morph_weights });
         let mut pass = surfaces.begin(encoder, program.targets());
         pass.set_viewport(0.0, 0.0, (axis * tile.width) as f32, (axis * tile.height) as f32, 0.0, 1.0);
         program.draw(&mut pass);

@@ -12,7 +12,7 @@ use crate::model::cube::Cube;
 use crate::model::effects::Effects;
 use crate::model::params::{Param, Params};
 use crate::output;
-use crate::prepare::{PrepareOptions, Prepared};
+use crate::prepare::{Baked, PrepareOptions};
 use crate::render::files::{ImageOptions, write_image};
 use crate::render::image::Image;
 
@@ -45,10 +45,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         cache: arguments.scene.cache(),
         ..PrepareOptions::default()
     };
-    let prepared = Prepared::baked(&path, &options)?;
-    tell_warnings(&prepared.warnings);
-    let cubes = cubes(&prepared.illumination, &prepared.scene.params);
-    let written = cubes.len() + usize::from(prepared.occlusion.is_some());
+    let baked = Baked::new(&path, &options)?;
+    tell_warnings(&baked.warnings);
+    let cubes = cubes(&baked.illumination, &baked.scene.params);
+    let written = cubes.len() + usize::from(baked.occlusion.is_some());
     if written > 0 {
         folder.keep_results();
     }
@@ -56,10 +56,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     for (name, cube) in &cubes {
         write_cube(folder, name, cube)?;
     }
-    if let Some(occlusion) = &prepared.occlusion {
+    if let Some(occlusion) = &baked.occlusion {
         output::write(&folder.join("occlusion.csv"), occlusion_csv(occlusion).as_bytes())?;
     }
-    for row in &prepared.baked.rows {
+    for row in &baked.stats.rows {
         let from = if row.cached { "kept from an earlier run" } else { "baked" };
         say(&format!("{:>14}  {from}, {:.3} s", row.name, row.seconds))?;
     }

@@ -28,6 +28,9 @@ pub(super) fn fingerprint(scene: &Scene) -> Fingerprint {
         .with("environment", environment(scene.environment.as_ref()))
         .with("mesh or its pose", mesh(&scene.mesh, scene.metres_per_unit))
         .with("quality", quality(scene.quality));
+    // Nothing else knows of the atlas' texels.
+    let texels = scene.needs().atlas.then_some(scene.diffusion.light_map_size);
+    let all = texels.into_iter().fold(all, |all, size| all.with("light map", size.to_string()));
     let terms = crate::shader::term::terms().into_iter().filter(|term| scene.effects.has(term.effect));
     let all = terms.fold(all, |all, term| {
         all.with(

@@ -8,7 +8,7 @@ use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::output;
-use crate::prepare::{PrepareOptions, Prepared};
+use crate::prepare::{PrepareOptions, Sampled};
 use crate::progress;
 use crate::scene::{LoadOptions, Scene};
 use crate::study::stability::evaluate::Evaluators;
@@ -69,11 +69,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         cache: arguments.scene.cache(),
         ..PrepareOptions::default()
     };
-    let prepared = Prepared::new(&path, &options)?;
-    tell_warnings(&prepared.warnings);
+    let sampled = Sampled::new(&path, &options)?;
+    tell_warnings(&sampled.warnings);
     let study = Study {
-        swept: batches(&prepared, effects),
-        lights: LightBox::new(Some(prepared.illumination)),
+        swept: batches(&sampled, effects),
+        lights: LightBox::new(Some(sampled.baked.illumination)),
         kept: cases,
         seed: arguments.seed,
         cases: usize::try_from(arguments.cases).unwrap_or(usize::MAX),

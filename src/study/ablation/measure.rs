@@ -8,20 +8,20 @@ use crate::subject::Subject;
 use crate::timing::{Rounds, Timed, interleaved, seconds_of};
 
 /// The whole model, ready to be timed beside a case.
-pub struct Clocks<'a> {
+pub struct Clocks {
     engine: CpuEngine,
     point: Point,
-    gpu: gpu::Clock<'a>,
+    gpu: gpu::Clock,
     /// Why the renderer is not timed, where it should have been.
     pub warning: Option<String>,
 }
 
-impl<'a> Clocks<'a> {
+impl Clocks {
     /// Of the whole model, and of its renderer `when` that is wished for.
     ///
     /// # Errors
     /// When an adapter was wished for and there is none, or it fails, or a rule cannot be computed on the processor.
-    pub fn new(whole: &'a Subject, point: &Point, when: GpuTiming) -> Result<Self, StudyError> {
+    pub fn new(whole: &Subject, point: &Point, when: GpuTiming) -> Result<Self, StudyError> {
         let (gpu, warning) = match when {
             GpuTiming::Never => (gpu::Clock::none(), None),
             GpuTiming::Auto | GpuTiming::Always => gpu::Clock::open(whole, point, when == GpuTiming::Always)?,
@@ -54,7 +54,6 @@ mod gpu {
     use crate::engine::Point;
     use crate::gpu::upload::Content;
     use crate::gpu::{Choice, Gpu, RenderOptions, Renderer};
-    use crate::model::params::Params;
     use crate::render::antialias::Antialias;
     use crate::shader::Budget;
     use crate::subject::Subject;
@@ -64,15 +63,14 @@ mod gpu {
     const FRAMES: usize = 5;
 
     /// The adapter, and the whole model on it.
-    pub(super) struct Clock<'a>(Option<Open<'a>>);
+    pub(super) struct Clock(Option<Open>);
 
-    struct Open<'a> {
+    struct Open {
         gpu: Gpu,
-        whole: &'a Subject,
-        params: Params,
+        whole: Content,
     }
 
-    impl<'a> Clock<'a> {
+    impl Clock {
         pub(super) fn none() -> Self {
             Self(None)
         }
@@ -80,7 +78,7 @@ mod gpu {
         /// Of the whole model, where there is an adapter of hardware, or of any kind if it is `wished` for; and
         /// why it is not timed all the same.
         pub(super) fn open(
-            whole: &'a Subject,
+            whole: &Subject,
             point: &Point,
             wished: bool,
         ) -> Result<(Self, Option<String>), StudyError> {
@@ -93,7 +91,7 @@ mod gpu {
                 let warning = format!("GPU time is not measured: {} has no timestamps.", gpu.name());
                 return Ok((Self(None), Some(warning)));
             }
-            Ok((Self(Some(Open { gpu, whole, params: point.params.clone() })), None))
+            Ok((Self(Some(Open { gpu, whole: content(whole, point) })), None))
         }
 
         pub(super) fn adapter(&self) -> Option<String> {
@@ -104,11 +102,11 @@ mod gpu {
 
         /// A frame of the first view beside the whole model's.
         pub(super) fn time(&self, case: &Subject, point: &Point) -> Result<Option<Timed>, StudyError> {
-            let Some(open) = &self.0 else { return Ok(None) };
-            let mut whole = renderer(&open.gpu, open.whole, &open.params)?;
-            let mut own = renderer(&open.gpu, case, &point.params)?;
-            let camera = open.whole.prepared.scene.views[0].camera;
-            let frames = |renderer: &mut Renderer<'_>| -> Result<f64, StudyError> {
+            let Some(Open { gpu, whole }) = &self.0 else { return Ok(None) };
+            let camera = whole.scene.views[0].camera;
+            let mut whole = renderer(gpu, whole.clone())?;
+            let mut own = renderer(gpu, content(case, point))?;
+            let frames = |renderer: &mut Renderer| -> Result<f64, StudyError> {
                 let times = renderer.frame_times(&camera, FRAMES)?;
                 Ok(1e-3 * Spread::of(&times).map_or(0.0, |spread| spread.median))
             };
@@ -118,19 +116,13 @@ mod gpu {
         }
     }
 
-    fn renderer<'a>(
-        gpu: &'a Gpu,
-        subject: &'a Subject,
-        params: &'a Params,
-    ) -> Result<Renderer<'a>, StudyError> {
-        let prepared = &subject.prepared;
-        let content = Content {
-            scene: &prepared.scene,
-            illumination: &prepared.illumination,
-            occlusion: prepared.occlusion.as_ref(),
-            params,
-        };
-        let antialias = Antialias::Grid(prepared.scene.quality.samples_per_axis);
+    /// A subject at the constants of `point`.
+    fn content(subject: &Subject, point: &Point) -> Content {
+        Content { params: point.params.clone(), ..Content::of(&subject.observed) }
+    }
+
+    fn renderer(gpu: &Gpu, content: Content) -> Result<Renderer, StudyError> {
+        let antialias = Antialias::Grid(content.scene.quality.samples_per_axis);
         let options = RenderOptions { antialias, budget: Budget::Exact, timed: true, animated: false };
         Ok(Renderer::new(gpu, content, options)?)
     }

@@ -166,11 +166,11 @@ pub fn ablate(scene: &Path, options: &AblationOptions) -> Result<Ablation, Study
         cache: options.cache.clone(),
         ..PrepareOptions::default()
     };
-    let whole = Subject::new(scene, &prepare, None, &|_| {})?;
+    let whole = Subject::new(scene, &prepare, None, |_| {})?;
     let source = whole.source;
     // Beside itself, the whole model has nothing to be fitted to.
     let fit = source == Source::Targets && (options.refit || options.params.is_none());
-    let own = whole.prepared.start();
+    let own = whole.observed.start();
     let (outcome, starts) = match (fit, options.refit) {
         (false, _) => (None, None),
         (true, false) => (Some(whole.fit(&errors_of(&whole))?), None),
@@ -184,23 +184,23 @@ pub fn ablate(scene: &Path, options: &AblationOptions) -> Result<Ablation, Study
     let references = references(&whole);
     let study = Study { scene, prepare, options, references, made, point: &point, own: &own };
     let clocks = Clocks::new(&whole, &point, options.gpu)?;
-    let mut warnings = whole.prepared.warnings.clone();
+    let mut warnings = whole.observed.warnings.clone();
     warnings.extend(clocks.warning.clone());
 
-    let loss = whole.prepared.scene.fit.loss;
+    let loss = whole.observed.scene.fit.loss;
     let errors = study.errors(&images, loss);
     let full = Evaluated { case: Case::default(), images, errors, point: point.clone(), outcome, starts };
     let before: Vec<LossMap> = full.errors.iter().map(|errors| errors.map.clone()).collect();
-    let cases = Case::all(whole.prepared.scene.effects, options.pairs);
+    let cases = Case::all(whole.observed.scene.effects, options.pairs);
     let mut held = Vec::new();
     let bar = progress::bar("cases", 1 + cases.len() as u64);
     let mut rows = vec![full.row(&whole, &clocks, &before)?];
     bar.inc(1);
     for case in cases {
         bar.set_message(case.name());
-        let (subject, evaluated) = study.evaluate(case, whole.prepared.scene.effects)?;
+        let (subject, evaluated) = study.evaluate(case, whole.observed.scene.effects)?;
         // A mesh that the scene poses stays posed.
-        if subject.prepared.scene.effects != evaluated.case.effects(whole.prepared.scene.effects) {
+        if subject.observed.scene.effects != evaluated.case.effects(whole.observed.scene.effects) {
             // A pair says nothing new.
             held.extend((evaluated.case.left_out.len() == 1).then(|| evaluated.case.name()));
             continue;
@@ -217,7 +217,7 @@ pub fn ablate(scene: &Path, options: &AblationOptions) -> Result<Ablation, Study
         source,
         constants: words(options, source),
         refitted: options.refit,
-        setup: whole.prepared.setup(),
+        setup: whole.observed.setup(),
         loss,
         adapter: clocks.adapter(),
         references: study.references.clone(),
@@ -236,7 +236,7 @@ fn words(options: &AblationOptions, source: Source) -> String {
 }
 
 fn references(whole: &Subject) -> Vec<ReferenceView> {
-    let views = whole.prepared.scene.views.iter().zip(whole.engine.views());
+    let views = whole.observed.scene.views.iter().zip(whole.engine.views().iter());
     views.map(|(view, observed)| ReferenceView::new(view, observed)).collect()
 }
 
@@ -262,17 +262,17 @@ impl Study<'_> {
     fn evaluate(&self, case: Case, full: Effects) -> Result<(Subject, Evaluated), StudyError> {
         let effects = case.effects(full);
         let prepare = PrepareOptions { effects: Some(effects), ..self.prepare.clone() };
-        let subject = Subject::new(self.scene, &prepare, self.made.as_deref(), &|prepared| {
-            let scene = &mut prepared.scene;
+        let subject = Subject::new(self.scene, &prepare, self.made.as_deref(), |loaded| {
+            let scene = &mut loaded.scene;
             // What is fitted starts where the whole model ended.
             scene.params = self.point.params.clone();
             case.apply(effects, &mut scene.params, &mut scene.fit.free);
             let compared = scene.views.iter().map(|view| self.made.is_some() || view.target.is_some());
-            let gains = prepared.gains.iter_mut().zip(compared).filter(|(_, compared)| *compared);
+            let gains = loaded.gains.iter_mut().zip(compared).filter(|(_, compared)| *compared);
             gains.zip(&self.point.gains).for_each(|((own, _), gain)| *own = *gain);
         })?;
         let from_whole =
-            Point { params: subject.prepared.scene.params.clone(), gains: self.point.gains.clone() };
+            Point { params: subject.observed.scene.params.clone(), gains: self.point.gains.clone() };
         let (outcome, starts) = if self.options.refit {
             let mut own = self.own.clone();
             case.apply(effects, &mut own.params, &mut Vec::new());
@@ -282,7 +282,7 @@ impl Study<'_> {
         };
         let point = outcome.as_ref().map_or(from_whole, |outcome| outcome.end.clone());
         let images = subject.images(&point)?;
-        let errors = self.errors(&images, subject.prepared.scene.fit.loss);
+        let errors = self.errors(&images, subject.observed.scene.fit.loss);
         Ok((subject, Evaluated { case, images, errors, point, outcome, starts }))
     }
 }
@@ -298,11 +298,11 @@ struct Evaluated {
 }
 
 impl Evaluated {
-    fn row(self, subject: &Subject, clocks: &Clocks<'_>, before: &[LossMap]) -> Result<Row, StudyError> {
+    fn row(self, subject: &Subject, clocks: &Clocks, before: &[LossMap]) -> Result<Row, StudyError> {
         let (cpu, gpu) = clocks.time(subject, &self.point)?;
         let maps: Vec<LossMap> = self.errors.iter().map(|errors| errors.map.clone()).collect();
         let keep = self.case.left_out.len() < 2;
-        let names = subject.prepared.scene.views.iter().map(|view| view.name.clone());
+        let names = subject.observed.scene.views.iter().map(|view| view.name.clone());
         let view = |(view, (errors, image)): (String, (&ViewErrors, &Image))| ViewRow {
             view,
             loss: mean_loss([&errors.map]),
@@ -348,7 +348,7 @@ fn constants(subject: &Subject, point: &Point, outcome: Option<&Outcome>) -> Vec
         let known = outcome?.unknowns.iter().find(|unknown| unknown.unknown.name() == name)?;
         known.std_error
     };
-    let unknowns = subject.prepared.unknowns();
+    let unknowns = subject.observed.unknowns();
     let constant = |unknown: &Unknown| {
         let name = unknown.name();
         Constant { value: unknown.get(point), std_error: error(&name), name }

@@ -1,12 +1,14 @@
 //! Hard cases of engines and fits: clipped targets, nothing to compare, what no pixel asks for, ten million
 //! pixels (MODEL 7's last rows).
 
+use std::sync::Arc;
+
 use super::case::FragmentInputs;
 use super::lights::LightBox;
-use super::objectives::{EngineFactory, EngineInputs, ordinary_inputs, targets, view};
+use super::objectives::{EngineFactory, ordinary_task, targets, view};
 use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
-use crate::engine::{NormalEquations, Point, Unknown};
+use crate::engine::{NormalEquations, Point, Task, Unknown};
 use crate::fit::outcome::Outcome;
 use crate::fit::{FitError, FitOptions, fit};
 use crate::model::cube::Cube;
@@ -69,13 +71,9 @@ pub const DEMANDS: [Demand; 7] = [
     },
 ];
 
-fn equations(
-    engine: &dyn EngineFactory,
-    inputs: &EngineInputs,
-    point: &Point,
-) -> Result<NormalEquations, String> {
+fn equations(engine: &dyn EngineFactory, task: &Task, point: &Point) -> Result<NormalEquations, String> {
     let mut equations = None;
-    engine.with(inputs, point, &mut |objective| equations = Some(objective.normal_equations(point)))?;
+    engine.with(task, point, &mut |objective| equations = Some(objective.normal_equations(point)))?;
     equations.ok_or_else(|| "no engine was made".to_owned())
 }
 
@@ -91,11 +89,11 @@ fn finite(equations: &NormalEquations) -> Result<(), String> {
 /// Every fragment is beyond the clip of `target`: loss, gradient and normal equations are 0.
 fn clipped(engine: &dyn EngineFactory, given: &Circumstances<'_>, clip: Clip, target: f32) -> Met {
     for loss in Loss::ALL {
-        let (mut inputs, point) = ordinary_inputs(&[FragmentInputs::ORDINARY; 20], given.lights);
-        inputs.loss = loss;
-        inputs.views[0].clip = Some(clip);
-        inputs.views[0].target = targets(&[target; 4], 2);
-        let equations = equations(engine, &inputs, &point)?;
+        let (task, point) = ordinary_task(&[FragmentInputs::ORDINARY; 20], given.lights);
+        let (clip, target) = (Some(clip), targets(&[target; 4], 2));
+        let view = ObservedView { clip, target, ..task.views[0].clone() };
+        let task = Task { loss, views: Arc::new([view]), ..task };
+        let equations = equations(engine, &task, &point)?;
         finite(&equations)?;
         let largest = [equations.loss, equations.residual].into_iter();
         let largest = largest.chain(equations.jtr).chain(equations.jtj).fold(0.0_f64, |m, x| m.max(x.abs()));
@@ -107,21 +105,21 @@ fn clipped(engine: &dyn EngineFactory, given: &Circumstances<'_>, clip: Clip, ta
 }
 
 /// A flat grey surface under an even light of 1: its value is `base_weight` times its albedo.
-fn grey(fragments: &[FragmentInputs], target: f32, free: &[Param]) -> (EngineInputs, Point) {
+fn grey(fragments: &[FragmentInputs], target: f32, free: &[Param]) -> (Task, Point) {
     let effects = Effects::of(&[Effect::Diffuse, Effect::Rim]);
     let setup = Setup::new(Form::Corrected, Silhouette::Fragment, effects);
     let even = Cube::from_fn(2, |_, _, _| [1.0_f32; 4]);
-    let inputs = EngineInputs {
+    let task = Task {
         setup,
-        illumination: Illumination { irradiance: Some(even), lobes: None, hilite: None },
-        views: vec![ObservedView {
+        illumination: Arc::new(Illumination { irradiance: Some(even), lobes: None, hilite: None }),
+        views: Arc::new([ObservedView {
             target: targets(&[target; 3], fragments.len().div_ceil(LANES)),
             ..view(setup, fragments, [0.0; 4])
-        }],
+        }]),
         loss: Loss::L2,
         unknowns: free.iter().map(|&p| Unknown::Param(Column::tied(p))).collect(),
     };
-    (inputs, Point { params: Params::defaults(Form::Corrected), gains: vec![1.0] })
+    (task, Point { params: Params::defaults(Form::Corrected), gains: vec![1.0] })
 }
 
 /// Facing the eye, where there is no rim.
@@ -133,9 +131,9 @@ const FACING: FragmentInputs = FragmentInputs {
     ..FragmentInputs::ORDINARY
 };
 
-fn solve(engine: &dyn EngineFactory, inputs: &EngineInputs, point: &Point) -> Result<Outcome, FitError> {
+fn solve(engine: &dyn EngineFactory, task: &Task, point: &Point) -> Result<Outcome, FitError> {
     let mut outcome = None;
-    let made = engine.with(inputs, point, &mut |objective| {
+    let made = engine.with(task, point, &mut |objective| {
         outcome = Some(fit(objective, point, &FitOptions::default(), &mut |_| {}));
     });
     let lost = |reason: String| FitError::Solver { solver: "none", reason };
@@ -144,8 +142,8 @@ fn solve(engine: &dyn EngineFactory, inputs: &EngineInputs, point: &Point) -> Re
 }
 
 fn unidentifiable(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
-    let (inputs, point) = grey(&[FACING; 20], 0.25, &[Param::BaseWeight, Param::RimExponent]);
-    let outcome = solve(engine, &inputs, &point).map_err(|error| error.to_string())?;
+    let (task, point) = grey(&[FACING; 20], 0.25, &[Param::BaseWeight, Param::RimExponent]);
+    let outcome = solve(engine, &task, &point).map_err(|error| error.to_string())?;
     let [base, exponent] = &outcome.unknowns[..] else { return Err("unknowns are lost".to_owned()) };
     if exponent.value != exponent.start || exponent.identifiable {
         return Err(format!("rim_exponent went from {} to {}", exponent.start, exponent.value));
@@ -155,10 +153,12 @@ fn unidentifiable(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
 }
 
 fn empty_mask(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
-    let (mut inputs, point) = grey(&[FACING; 20], 0.25, &[Param::BaseWeight]);
-    inputs.views[0].weight.fill(Row::ZERO);
-    finite(&equations(engine, &inputs, &point)?)?;
-    match solve(engine, &inputs, &point) {
+    let (task, point) = grey(&[FACING; 20], 0.25, &[Param::BaseWeight]);
+    let seen = task.views[0].clone();
+    let view = ObservedView { weight: vec![Row::ZERO; seen.weight.len()], ..seen };
+    let task = Task { views: Arc::new([view]), ..task };
+    finite(&equations(engine, &task, &point)?)?;
+    match solve(engine, &task, &point) {
         Err(FitError::Empty) => Ok((0.0, 0.0)),
         Err(other) => Err(format!("another error: {other}")),
         Ok(_) => Err("a fit of nothing was not refused".to_owned()),
@@ -168,9 +168,9 @@ fn empty_mask(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
 fn black_target(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
     let mut worst = 0.0_f64;
     for loss in Loss::ALL {
-        let (mut inputs, point) = grey(&[FACING; 20], 0.0, &[Param::BaseWeight]);
-        inputs.loss = loss;
-        let outcome = solve(engine, &inputs, &point).map_err(|error| error.to_string())?;
+        let (task, point) = grey(&[FACING; 20], 0.0, &[Param::BaseWeight]);
+        let task = Task { loss, ..task };
+        let outcome = solve(engine, &task, &point).map_err(|error| error.to_string())?;
         worst = worst.max(outcome.unknowns[0].value.abs());
         if !outcome.loss_end.is_finite() {
             return Err(format!("{} ends at {}", loss.name(), outcome.loss_end));
@@ -181,8 +181,8 @@ fn black_target(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
 }
 
 fn one_pixel(engine: &dyn EngineFactory, _: &Circumstances<'_>) -> Met {
-    let (inputs, point) = grey(&[FACING], 0.375, &[Param::BaseWeight]);
-    let outcome = solve(engine, &inputs, &point).map_err(|error| error.to_string())?;
+    let (task, point) = grey(&[FACING], 0.375, &[Param::BaseWeight]);
+    let outcome = solve(engine, &task, &point).map_err(|error| error.to_string())?;
     Ok(((outcome.unknowns[0].value - 0.75).abs(), 1e-5))
 }
 
@@ -195,8 +195,8 @@ fn shade_of(i: usize) -> f32 {
 fn many_pixels(engine: &dyn EngineFactory, given: &Circumstances<'_>) -> Met {
     let groups = given.pixels.div_ceil(LANES);
     let count = groups * LANES;
-    let (mut inputs, point) = grey(&[FACING], 0.0, &[Param::BaseWeight]);
-    let facing = FACING.fragment(inputs.setup, 0.0_f32);
+    let (task, point) = grey(&[FACING], 0.0, &[Param::BaseWeight]);
+    let facing = FACING.fragment(task.setup, 0.0_f32);
     let mut surface = SurfaceRecords::new(Asked { albedo: true, ..Asked::default() }, groups);
     for slot in 0..count {
         surface.set(slot, &Fragment { albedo: [shade_of(slot); 3], ..facing }, 1.0);
@@ -208,12 +208,13 @@ fn many_pixels(engine: &dyn EngineFactory, given: &Circumstances<'_>) -> Met {
         ..ViewSamples::default()
     };
     let target = targets(&[0.0; 3], groups);
-    inputs.views = vec![ObservedView { samples, target, weight: Vec::new(), clip: None }];
+    let view = ObservedView { samples, target, weight: Vec::new(), clip: None };
+    let task = Task { views: Arc::new([view]), ..task };
     // The same numbers, summed in pairs in f64.
     let want = pairwise(0, count, &|i| f64::from(shade_of(i)).powi(2)) * 3.0;
     let mut sums: Vec<NormalEquations> = Vec::new();
     let pools = [1, 2, 5].map(|n| rayon::ThreadPoolBuilder::new().num_threads(n).build());
-    engine.with(&inputs, &point, &mut |objective| {
+    engine.with(&task, &point, &mut |objective| {
         let one = |pool: &rayon::ThreadPool| pool.install(|| objective.normal_equations(&point));
         sums = pools.iter().flatten().map(one).collect();
     })?;

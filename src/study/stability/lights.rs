@@ -1,5 +1,7 @@
 //! Lights to look up: an ordinary one, a glaring one, darkness, and a scene's own.
 
+use std::sync::Arc;
+
 use crate::bake::Illumination;
 use crate::bake::LobeStack;
 use crate::model::cube::{Cube, texel_direction};
@@ -38,20 +40,20 @@ impl LightKind {
 /// The cubes of every light.
 #[derive(Debug)]
 pub struct LightBox {
-    own: [Illumination; 3],
-    scene: Option<Illumination>,
+    own: [Arc<Illumination>; 3],
+    scene: Option<Arc<Illumination>>,
 }
 
 impl LightBox {
     /// The lights, with those of a scene where one is swept.
     #[must_use]
-    pub fn new(scene: Option<Illumination>) -> Self {
-        Self { own: [wavy(), glaring(), dark()], scene }
+    pub fn new(scene: Option<Arc<Illumination>>) -> Self {
+        Self { own: [wavy(), glaring(), dark()].map(Arc::new), scene }
     }
 
     /// The cubes of a light; darkness stands in for a scene's where there is no scene.
     #[must_use]
-    pub fn of(&self, kind: LightKind) -> &Illumination {
+    pub fn of(&self, kind: LightKind) -> &Arc<Illumination> {
         let [wavy, glaring, dark] = &self.own;
         match kind {
             LightKind::Wavy => wavy,

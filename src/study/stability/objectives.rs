@@ -1,35 +1,20 @@
 //! Engines as evaluators: the sums over a batch's fragments, each a pixel with one sample.
 
+use std::sync::Arc;
+
 use super::case::{Batch, EVERYTHING, FragmentInputs, Setting};
 use super::evaluate::{Answer, Evaluator, Sums, TARGET};
 use super::lights::LightBox;
-use crate::bake::Illumination;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
-use crate::engine::{Objective, Point, Unknown};
+use crate::engine::{Objective, Point, Task, Unknown};
 use crate::gpu::Gpu;
-use crate::gpu::engine::{GpuEngine, Memory, Task};
+use crate::gpu::engine::{GpuEngine, Memory};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
 use crate::samples::rows::{Row, Rows};
 use crate::samples::surface_records::Asked;
 use crate::samples::{LANES, SurfaceRecords, ViewSamples};
-use crate::scene::Loss;
-
-/// What an engine is made of.
-#[derive(Clone, Debug)]
-pub struct EngineInputs {
-    /// The switches of the model.
-    pub setup: Setup,
-    /// The cubes.
-    pub illumination: Illumination,
-    /// Samples and targets.
-    pub views: Vec<ObservedView>,
-    /// What is minimised.
-    pub loss: Loss,
-    /// What is free.
-    pub unknowns: Vec<Unknown>,
-}
 
 /// Something that makes engines. An engine that has one is studied like every other.
 pub trait EngineFactory {
@@ -43,17 +28,12 @@ pub trait EngineFactory {
     ///
     /// # Errors
     /// When it cannot be made, in words.
-    fn with(
-        &self,
-        inputs: &EngineInputs,
-        point: &Point,
-        then: &mut dyn FnMut(&dyn Objective),
-    ) -> Result<(), String>;
+    fn with(&self, task: &Task, point: &Point, then: &mut dyn FnMut(&dyn Objective)) -> Result<(), String>;
     /// The image of each slot of the first view, where the engine can show it.
     ///
     /// # Errors
     /// As [`Self::with`].
-    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String>;
+    fn image(&self, task: &Task, point: &Point) -> Result<Vec<Vec<f32>>, String>;
 }
 
 /// The CPU engine.
@@ -61,9 +41,8 @@ pub trait EngineFactory {
 pub struct Cpu;
 
 impl Cpu {
-    fn engine(inputs: &EngineInputs) -> Result<CpuEngine, String> {
-        let EngineInputs { setup, illumination, views, loss, unknowns } = inputs.clone();
-        CpuEngine::new(setup, illumination, views, loss, unknowns).map_err(|error| error.to_string())
+    fn engine(task: &Task) -> Result<CpuEngine, String> {
+        CpuEngine::new(task.clone()).map_err(|error| error.to_string())
     }
 }
 
@@ -71,17 +50,12 @@ impl EngineFactory for Cpu {
     fn name(&self) -> String {
         "CPU engine".to_owned()
     }
-    fn with(
-        &self,
-        inputs: &EngineInputs,
-        _: &Point,
-        then: &mut dyn FnMut(&dyn Objective),
-    ) -> Result<(), String> {
-        then(&Self::engine(inputs)?);
+    fn with(&self, task: &Task, _: &Point, then: &mut dyn FnMut(&dyn Objective)) -> Result<(), String> {
+        then(&Self::engine(task)?);
         Ok(())
     }
-    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
-        Ok(Self::engine(inputs)?.image(0, point))
+    fn image(&self, task: &Task, point: &Point) -> Result<Vec<Vec<f32>>, String> {
+        Ok(Self::engine(task)?.image(0, point))
     }
 }
 
@@ -89,16 +63,8 @@ impl EngineFactory for Cpu {
 pub struct OnAdapter(pub std::rc::Rc<super::shader::Adapter>);
 
 impl OnAdapter {
-    fn engine<'a>(gpu: &'a Gpu, inputs: &'a EngineInputs, point: &Point) -> Result<GpuEngine<'a>, String> {
-        let EngineInputs { setup, illumination, views, loss, unknowns } = inputs;
-        let task = Task {
-            setup: *setup,
-            illumination: illumination.clone(),
-            views,
-            loss: *loss,
-            unknowns: unknowns.clone(),
-        };
-        GpuEngine::new(gpu, task, point, Memory::default()).map_err(|error| error.to_string())
+    fn engine(gpu: &Gpu, task: &Task, point: &Point) -> Result<GpuEngine, String> {
+        GpuEngine::new(gpu, task.clone(), point, Memory::default()).map_err(|error| error.to_string())
     }
 }
 
@@ -110,21 +76,16 @@ impl EngineFactory for OnAdapter {
     fn slack(&self) -> f64 {
         4.0
     }
-    fn with(
-        &self,
-        inputs: &EngineInputs,
-        point: &Point,
-        then: &mut dyn FnMut(&dyn Objective),
-    ) -> Result<(), String> {
+    fn with(&self, task: &Task, point: &Point, then: &mut dyn FnMut(&dyn Objective)) -> Result<(), String> {
         self.0.run(|gpu| {
-            let engine = Self::engine(gpu, inputs, point)?;
+            let engine = Self::engine(gpu, task, point)?;
             then(&engine);
             engine.device_fault().map_or(Ok(()), |error| Err(error.to_string()))
         })
     }
-    fn image(&self, inputs: &EngineInputs, point: &Point) -> Result<Vec<Vec<f32>>, String> {
+    fn image(&self, task: &Task, point: &Point) -> Result<Vec<Vec<f32>>, String> {
         self.0.run(|gpu| {
-            let engine = Self::engine(gpu, inputs, point)?;
+            let engine = Self::engine(gpu, task, point)?;
             engine.image(0, point).map_err(|error| error.to_string())
         })
     }
@@ -146,19 +107,19 @@ impl<F: EngineFactory> Evaluator for EngineEvaluator<F> {
 
     fn fragments(&self, lights: &LightBox, batch: &Batch) -> Result<Answer, String> {
         let Setting { setup, params, lights: light, loss } = batch.setting.clone();
-        let inputs = EngineInputs {
+        let task = Task {
             setup,
-            illumination: lights.of(light).clone(),
-            views: vec![view(setup, &batch.fragments, TARGET)],
+            illumination: Arc::clone(lights.of(light)),
+            views: Arc::new([view(setup, &batch.fragments, TARGET)]),
             loss,
             unknowns: unknowns(),
         };
         let point = Point { params, gains: vec![1.0] };
-        let planes = self.0.image(&inputs, &point)?;
+        let planes = self.0.image(&task, &point)?;
         let value = |slot: usize| [0, 1, 2, 3].map(|c: usize| f64::from(planes[c][slot]));
         let values = (0..batch.fragments.len()).map(value).collect();
         let mut sums = None;
-        self.0.with(&inputs, &point, &mut |engine| {
+        self.0.with(&task, &point, &mut |engine| {
             let equations = engine.normal_equations(&point);
             let (_, gradient) = engine.gradient(&point);
             sums = Some(Sums { equations, loss: engine.loss(&point), gradient });
@@ -210,15 +171,15 @@ pub fn targets(target: &[f32], groups: usize) -> Rows {
 
 /// What the checks of [`super::demands`] start from: ordinary fragments seen in every effect.
 #[must_use]
-pub fn ordinary_inputs(fragments: &[FragmentInputs], lights: &LightBox) -> (EngineInputs, Point) {
+pub fn ordinary_task(fragments: &[FragmentInputs], lights: &LightBox) -> (Task, Point) {
     let setting = Setting::ordinary();
     let setup = Setup { effects: EVERYTHING, ..setting.setup };
-    let inputs = EngineInputs {
+    let task = Task {
         setup,
-        illumination: lights.of(setting.lights).clone(),
-        views: vec![view(setup, fragments, TARGET)],
+        illumination: Arc::clone(lights.of(setting.lights)),
+        views: Arc::new([view(setup, fragments, TARGET)]),
         loss: setting.loss,
         unknowns: unknowns(),
     };
-    (inputs, Point { params: setting.params, gains: vec![1.0] })
+    (task, Point { params: setting.params, gains: vec![1.0] })
 }

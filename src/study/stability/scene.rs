@@ -7,7 +7,7 @@ use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
-use crate::prepare::Prepared;
+use crate::prepare::Sampled;
 use crate::samples::{LANES, ViewSamples};
 
 /// Fragments that are taken of a view.
@@ -17,13 +17,13 @@ const FAR: f64 = 1e3;
 
 /// Every setting that a scene is swept through, on a share of its samples.
 #[must_use]
-pub fn batches(prepared: &Prepared, effects: Effects) -> Vec<Batch> {
+pub fn batches(sampled: &Sampled, effects: Effects) -> Vec<Batch> {
     let fragments: Vec<FragmentInputs> =
-        prepared.samples.iter().flat_map(|view| fragments(view, prepared.scene.form)).collect();
+        sampled.samples.iter().flat_map(|view| fragments(view, sampled.scene.form)).collect();
     // Of fragments alone: nothing is interpolated, and S.w is given.
-    let setup = Setup::new(prepared.scene.form, prepared.scene.silhouette, effects);
-    let loss = prepared.scene.fit.loss;
-    let own = Setting { setup, params: prepared.scene.params.clone(), lights: LightKind::Scene, loss };
+    let setup = Setup::new(sampled.scene.form, sampled.scene.silhouette, effects);
+    let loss = sampled.scene.fit.loss;
+    let own = Setting { setup, params: sampled.scene.params.clone(), lights: LightKind::Scene, loss };
     let mut settings = vec![own.clone()];
     for end in [0, 1] {
         // One parameter at its bound, and then all of them.

@@ -2,6 +2,7 @@
 
 use std::cell::RefCell;
 use std::rc::Rc;
+use std::sync::Arc;
 
 use super::case::{Batch, EVERYTHING, FragmentInputs, VertexInputs};
 use super::evaluate::{Answer, Evaluator, Frame, Rgba};
@@ -14,7 +15,7 @@ use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
+use crate::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
 use crate::shader::Domain;
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;
@@ -24,7 +25,7 @@ use crate::shader::probe::Probe;
 /// the case at hand is then not to blame. A case that loses it twice is.
 pub struct Adapter {
     choice: Choice,
-    device: RefCell<Rc<Gpu>>,
+    device: RefCell<Gpu>,
 }
 
 impl Adapter {
@@ -34,7 +35,7 @@ impl Adapter {
     /// When there is no such adapter.
     pub fn open(choice: Choice) -> Result<Self, GpuError> {
         let gpu = Gpu::open(&choice)?;
-        Ok(Self { choice, device: RefCell::new(Rc::new(gpu)) })
+        Ok(Self { choice, device: RefCell::new(gpu) })
     }
 
     /// Do some work on the device.
@@ -42,11 +43,11 @@ impl Adapter {
     /// # Errors
     /// Those of the work, in words.
     pub fn run<T>(&self, mut work: impl FnMut(&Gpu) -> Result<T, String>) -> Result<T, String> {
-        let gpu = Rc::clone(&self.device.borrow());
+        let gpu = self.device.borrow().clone();
         match work(&gpu) {
             Err(_) if matches!(gpu.check(), Err(GpuError::Lost { .. })) => {
-                let gpu = Rc::new(Gpu::open(&self.choice).map_err(|error| error.to_string())?);
-                *self.device.borrow_mut() = Rc::clone(&gpu);
+                let gpu = Gpu::open(&self.choice).map_err(|error| error.to_string())?;
+                *self.device.borrow_mut() = gpu.clone();
                 work(&gpu)
             }
             done => done,
@@ -92,14 +93,20 @@ impl Rules {
     fn run(
         &self,
         probe: &Probe,
-        lights: &Illumination,
+        lights: &Arc<Illumination>,
         params: &Params,
         given: &[f32],
     ) -> Result<Vec<f32>, String> {
-        let scene = scene();
-        let content = Content { scene: &scene, illumination: lights, occlusion: None, params };
+        let content = Content {
+            scene: Arc::new(scene()),
+            illumination: Arc::clone(lights),
+            occlusion: None,
+            params: params.clone(),
+        };
         let block = constants(probe, params);
-        self.0.run(|gpu| evaluate(gpu, probe, content, &block, given).map_err(|error| error.to_string()))
+        self.0.run(|gpu| {
+            evaluate(gpu, probe, content.clone(), &block, given).map_err(|error| error.to_string())
+        })
     }
 }
 
@@ -164,7 +171,7 @@ impl Evaluator for Rules {
         }
         let given: Vec<f32> = given.into_iter().map(|x: f64| x as f32).collect();
         let params = Params::defaults(Form::Corrected);
-        let got = self.run(&probe, &Illumination::default(), &params, &given)?;
+        let got = self.run(&probe, &Arc::default(), &params, &given)?;
         let frame = |numbers: &[f32; 9]| numbers.map(f64::from);
         Ok(Some(got.as_chunks::<9>().0.iter().map(frame).collect()))
     }
@@ -202,5 +209,6 @@ fn scene() -> Scene {
         },
         quality: Quality::default(),
         bloom: Bloom::default(),
+        diffusion: Diffusion::default(),
     }
 }

@@ -10,10 +10,10 @@ use super::result::{Figures, Findings, number};
 use super::studies;
 use crate::StudyError;
 use crate::engine::cpu::CpuEngine;
-use crate::engine::{Objective as _, Unknown};
+use crate::engine::{Objective as _, Task, Unknown};
 use crate::fit::outcome::Outcome;
 use crate::fit::{FitError, FitOptions, SolverKind, fit};
-use crate::prepare::{PrepareError, PrepareOptions, Prepared};
+use crate::prepare::{Observed, PrepareError, PrepareOptions, Sampled};
 use crate::scene::Loss;
 use crate::scene::error::SceneError;
 use crate::stability::lights::LightBox;
@@ -63,23 +63,22 @@ pub fn run(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobError> {
 }
 
 fn run_fit(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
-    let options = PrepareOptions { fit: true, cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(scene, &options)?;
-    let engine = prepared.engine()?;
+    let options = PrepareOptions { cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
+    let observed = Observed::new(scene, &options)?;
+    let engine = observed.engine()?;
     let solver = job.get("solver").and_then(toml::Value::as_str).and_then(SolverKind::from_name);
     let options = FitOptions {
         solver: solver.unwrap_or_default(),
         max_iterations: job.whole("max_iterations"),
         starts: job.whole("starts").and_then(|n| u32::try_from(n).ok()).unwrap_or(1),
         seed: job.whole("seed").unwrap_or(0),
-        widths: prepared.image_widths(),
+        widths: observed.image_widths(),
         ..FitOptions::default()
     };
-    let outcome = fit(&engine, &prepared.start(), &options, &mut |_| {})?;
-    let (setup, light) = (prepared.setup(), prepared.illumination.clone());
-    let squares = CpuEngine::new(setup, light, engine.views().to_vec(), Loss::L2, Vec::new());
-    let squares = squares.map_err(StudyError::from)?;
-    let view = |index: usize| prepared.scene.views.get(index).map_or("?", |view| &view.name);
+    let outcome = fit(&engine, &observed.start(), &options, &mut |_| {})?;
+    let squares = Task { loss: Loss::L2, unknowns: Vec::new(), ..observed.task() };
+    let squares = CpuEngine::new(squares).map_err(StudyError::from)?;
+    let view = |index: usize| observed.scene.views.get(index).map_or("?", |view| &view.name);
     Ok(fit_figures(&outcome, squares.loss(&outcome.end).sqrt(), view))
 }
 
@@ -111,16 +110,16 @@ pub(super) fn add_constant(figures: &mut Figures, name: &str, value: f64, std_er
 
 fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
     let options = PrepareOptions { cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(scene, &options)?;
-    let effects = sweepable(prepared.scene.effects, prepared.scene.environment.is_some());
-    if effects != prepared.scene.effects {
-        prepared = Prepared::new(scene, &PrepareOptions { effects: Some(effects), ..options })?;
+    let mut sampled = Sampled::new(scene, &options)?;
+    let effects = sweepable(sampled.scene.effects, sampled.scene.environment.is_some());
+    if effects != sampled.scene.effects {
+        sampled = Sampled::new(scene, &PrepareOptions { effects: Some(effects), ..options })?;
     }
     let whole =
         |key: &str, default: u64| usize::try_from(job.whole(key).unwrap_or(default)).unwrap_or(usize::MAX);
     let study = Study {
-        swept: batches(&prepared, effects),
-        lights: LightBox::new(Some(prepared.illumination)),
+        swept: batches(&sampled, effects),
+        lights: LightBox::new(Some(sampled.baked.illumination)),
         kept: kept::built_in()?,
         seed: job.whole("seed").unwrap_or(0),
         cases: whole("cases", 10_000),

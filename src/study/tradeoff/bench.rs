@@ -11,11 +11,11 @@ use crate::bake::rays::RayMesh;
 use crate::bake::{self, Illumination, VertexOcclusion};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
-use crate::engine::{Objective, Point};
+use crate::engine::{Objective, Point, Task};
 use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::prepare::{PrepareError, PrepareOptions, Prepared};
+use crate::prepare::{Baked, PrepareError, PrepareOptions, Sampled};
 use crate::reference::Difference;
 use crate::render::format::FormatShader;
 use crate::render::image::Image;
@@ -58,8 +58,8 @@ type Surfaces = Arc<Vec<ViewSamples>>;
 pub struct Bench<'a> {
     /// Its file.
     pub path: &'a Path,
-    /// As it stands, loaded and baked; its samples are `surfaces`.
-    pub prepared: Prepared,
+    /// As it stands; its samples are `surfaces`.
+    pub baked: Baked,
     /// The parameter file, if any.
     pub params: Option<&'a Path>,
     /// Its samples as it stands.
@@ -87,7 +87,7 @@ pub struct Evaluated {
     /// The scene, with the settings.
     pub scene: Scene,
     /// Its cubes.
-    pub illumination: Illumination,
+    pub illumination: Arc<Illumination>,
     /// Its visible surface, a view each.
     pub samples: Surfaces,
 }
@@ -104,19 +104,18 @@ impl<'a> Bench<'a> {
             cache: cache.map(Path::to_owned),
             ..PrepareOptions::default()
         };
-        let mut prepared = Prepared::new(path, &options)?;
-        let surfaces = Arc::new(std::mem::take(&mut prepared.samples));
+        let Sampled { baked, samples } = Sampled::new(path, &options)?;
+        let surfaces = Arc::new(samples);
         let (last, hits) = (RefCell::default(), RefCell::default());
-        Ok(Self { path, prepared, params, surfaces, last, hits, cache: options.cache })
+        Ok(Self { path, baked, params, surfaces, last, hits, cache: options.cache })
     }
 
     /// The same scene at other constants, which move neither its mesh nor its samples.
     #[must_use]
     pub fn at(&self, params: Params) -> Self {
-        let mut prepared = self.prepared.clone();
-        prepared.scene.params = params;
+        let baked = self.baked.clone().with_scene(|scene| scene.params = params);
         let (surfaces, last, hits) = (Arc::clone(&self.surfaces), RefCell::default(), RefCell::default());
-        Self { prepared, surfaces, last, hits, cache: self.cache.clone(), ..*self }
+        Self { baked, surfaces, last, hits, cache: self.cache.clone(), ..*self }
     }
 
     /// What its sweeps are made of, measured.
@@ -131,7 +130,7 @@ impl<'a> Bench<'a> {
         let images = since.elapsed().as_secs_f64();
         let engine = evaluated.live_engine()?;
         let pass = seconds_of(|| engine.loss(&self.point()));
-        Ok(Rates { trace: self.prepared.seconds.samples, images, pass })
+        Ok(Rates { trace: self.baked.seconds.samples, images, pass })
     }
 
     /// Where bakes are kept.
@@ -143,13 +142,13 @@ impl<'a> Bench<'a> {
     /// The scene's own settings.
     #[must_use]
     pub fn settings(&self) -> Settings {
-        Settings { silhouette: self.prepared.scene.silhouette, quality: self.prepared.scene.quality }
+        Settings { silhouette: self.baked.scene.silhouette, quality: self.baked.scene.quality }
     }
 
     /// The scene's constants and gains.
     #[must_use]
     pub fn point(&self) -> Point {
-        self.prepared.start()
+        self.baked.start()
     }
 
     /// The scene as it stands at its own start values, to be fitted: constants of an earlier fit would be the answer
@@ -157,22 +156,22 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// When a stage refuses its input.
-    pub fn to_fit(&self) -> Result<Prepared, StudyError> {
-        let prepared = match self.params {
-            None => self.prepared.clone(),
+    pub fn to_fit(&self) -> Result<Sampled, StudyError> {
+        let baked = match self.params {
+            None => self.baked.clone(),
             Some(_) => {
                 let options =
                     PrepareOptions { fit: true, cache: self.cache.clone(), ..PrepareOptions::default() };
-                Prepared::baked(self.path, &options)?
+                Baked::new(self.path, &options)?
             }
         };
-        Ok(Prepared { samples: self.surfaces.to_vec(), ..prepared })
+        Ok(Sampled { baked, samples: self.surfaces.to_vec() })
     }
 
     /// The scene with these settings.
     #[must_use]
     pub fn scene(&self, settings: Settings) -> Scene {
-        let mut scene = self.prepared.scene.clone();
+        let mut scene = Scene::clone(&self.baked.scene);
         (scene.silhouette, scene.quality) = (settings.silhouette, settings.quality);
         scene
     }
@@ -186,7 +185,7 @@ impl<'a> Bench<'a> {
         let scene = self.scene(settings);
         let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
         let samples = self.surfaces(&scene, settings.into(), bake.occlusion.as_ref())?;
-        Ok(Evaluated { scene, illumination: bake.illumination, samples })
+        Ok(Evaluated { scene, illumination: Arc::new(bake.illumination), samples })
     }
 
     /// As [`Self::evaluate`], with the surface traced anew.
@@ -197,7 +196,7 @@ impl<'a> Bench<'a> {
         let scene = self.scene(settings);
         let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
         let samples = Arc::new(traced(&scene, bake.occlusion.as_ref())?);
-        Ok(Evaluated { scene, illumination: bake.illumination, samples })
+        Ok(Evaluated { scene, illumination: Arc::new(bake.illumination), samples })
     }
 
     /// The samples of `scene`, which is this one at other settings.
@@ -314,7 +313,8 @@ impl Evaluated {
             ..ObservedView::default()
         };
         let views = self.samples.iter().map(observed).collect();
-        let illumination = self.illumination.clone();
-        Ok(CpuEngine::with_kept_terms(self.setup(), illumination, views, Loss::L2, Vec::new(), false)?)
+        let illumination = Arc::clone(&self.illumination);
+        let task = Task { setup: self.setup(), illumination, views, loss: Loss::L2, unknowns: Vec::new() };
+        Ok(CpuEngine::with_kept_terms(task, false)?)
     }
 }

@@ -82,7 +82,7 @@ pub fn tradeoff(
     mut watcher: Option<&mut dyn Watcher>,
 ) -> Result<Tradeoff, StudyError> {
     let bench = Bench::new(scene, options.params.as_deref(), options.cache.as_deref())?;
-    let mut warnings = bench.prepared.warnings.clone();
+    let mut warnings = bench.baked.warnings.clone();
     warnings.extend(foreign(&bench));
     let axes = applying(&bench, options, &mut warnings)?;
     check_goal(options.goal, &axes)?;
@@ -108,10 +108,10 @@ pub fn tradeoff(
 
 /// What is to be said of constants that were fitted with other effects than are measured.
 fn foreign(bench: &Bench<'_>) -> Option<String> {
-    let scene = &bench.prepared.scene;
+    let scene = &bench.baked.scene;
     let foreign = Foreign {
         file: bench.params?,
-        fitted: bench.prepared.fitted,
+        fitted: bench.baked.fitted,
         scene: &scene.path,
         effects: scene.effects,
         params: &scene.params,

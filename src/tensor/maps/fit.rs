@@ -15,7 +15,7 @@ use super::{MapError, adam, cg};
 use crate::bake::Illumination;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
-use crate::engine::{Point, Unknown};
+use crate::engine::{Point, Task, Unknown};
 use crate::fit::{self, FitOptions};
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
@@ -163,8 +163,13 @@ impl<'a> Fixed<'a> {
             let groups = views[view].samples.groups();
             views[view].weight = vec![Row::ZERO; groups];
         }
-        let loss = self.scene.fit.loss;
-        let engine = CpuEngine::new(self.setup, illumination.clone(), views, loss, self.unknowns.clone())?;
+        let engine = CpuEngine::new(Task {
+            setup: self.setup,
+            illumination: Arc::new(illumination.clone()),
+            views: views.into(),
+            loss: self.scene.fit.loss,
+            unknowns: self.unknowns.clone(),
+        })?;
         let options = FitOptions { interrupt: self.interrupt.clone(), ..FitOptions::default() };
         let outcome = fit::fit(&engine, start, &options, &mut |_| {})?;
         Ok((outcome.end, (outcome.loss_start, outcome.loss_end)))

@@ -7,7 +7,7 @@ use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
 use crate::model::params::{Column, Param};
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::{MapKind, Scene};
 
@@ -41,22 +41,22 @@ impl<'a> MapTask<'a> {
     /// Maps of these `kinds` and the scene's constants, from where the stages before leave them; every view counts.
     #[must_use]
     pub fn new(
-        prepared: &'a Prepared,
+        baked: &'a Baked,
         posed: &'a PosedMesh,
         observed: Vec<ObservedView>,
         kinds: Vec<MapKind>,
     ) -> Self {
-        let weights: Vec<f32> = prepared.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
+        let weights: Vec<f32> = baked.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
         Self {
-            scene: &prepared.scene,
+            scene: &baked.scene,
             posed,
-            illumination: prepared.illumination.clone(),
-            open: prepared.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
+            illumination: Illumination::clone(&baked.illumination),
+            open: baked.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights)),
             observed,
             held_out: None,
             kinds,
-            start: prepared.start(),
-            unknowns: prepared.unknowns(),
+            start: baked.start(),
+            unknowns: baked.unknowns(),
             most_samples: None,
             interrupt: None,
         }

@@ -66,7 +66,7 @@ impl Stage {
         shaded: &Shaded<'_>,
         cubes: [Option<&Cube<f32>>; 3],
         views: &[&ViewSamples],
-        made: Option<&DeviceSamples<'_>>,
+        made: Option<&DeviceSamples>,
         scatter: Scatter,
     ) -> Result<(Self, Option<Planes>), TensorError> {
         let gpu = shared.gpu();

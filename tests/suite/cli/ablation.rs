@@ -278,16 +278,16 @@ fn the_sunrise_is_fitted_again_as_well_as_from_its_own_start() {
     std::fs::write(&scene, scene_text(&data.canonicalize().unwrap(), "lps_sunrise")).unwrap();
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
     let options = PrepareOptions { fit: true, cache: Some(cache), ..PrepareOptions::default() };
-    let whole = Subject::new(&scene, &options, None, &|_| {}).unwrap();
+    let whole = Subject::new(&scene, &options, None, |_| {}).unwrap();
     let end = whole.fit(&FitOptions::default()).unwrap().end;
     // Without it, the valley that the whole fit's end lies in was the higher one.
-    let effects = whole.prepared.scene.effects.without(Effect::SideSpecular);
+    let effects = whole.observed.scene.effects.without(Effect::SideSpecular);
     let options = PrepareOptions { effects: Some(effects), ..options };
-    let subject = Subject::new(&scene, &options, None, &|prepared| {
-        prepared.scene.fit.free.retain(|column| column.param.asked_for(effects));
+    let subject = Subject::new(&scene, &options, None, |loaded| {
+        loaded.scene.fit.free.retain(|column| column.param.asked_for(effects));
     })
     .unwrap();
-    let own = subject.prepared.start();
+    let own = subject.observed.start();
     let plain = subject.fit(&FitOptions::default()).unwrap().loss_end;
     let (refitted, starts) = refit(&subject, Some(&end), &own).unwrap();
     println!("by a plain fit {plain:e}, again {:e}: {starts:?}", refitted.loss_end);

@@ -1,11 +1,10 @@
 //! What a looser budget, multisampling and 16-bit targets may change.
 
-use std::collections::BTreeSet;
-
 use skinfit::gpu::{RenderOptions, Renderer};
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
 use skinfit::shader::Budget;
+use std::collections::BTreeSet;
 
 use super::bench::*;
 
@@ -14,10 +13,10 @@ const SIZE: u32 = 128;
 #[test]
 fn the_papers_budget_stays_near_the_cpu_engine() {
     let Some(gpu) = gpu() else { return };
-    let mut prepared = prepared(&built_in(), SURFACE, SIZE);
+    let baked = baked(&built_in(), SURFACE, SIZE);
     let paper = RenderOptions { budget: Budget::Paper, ..EXACT };
-    let test = on_gpu(gpu, &prepared, paper);
-    let reference = on_cpu(&mut prepared, 2);
+    let test = on_gpu(gpu, &baked, paper);
+    let reference = on_cpu(&baked, 2);
     let Difference { interior, .. } = Difference::new(&reference, &test, 4);
     let (median, most) = (quantile(&interior, 0.5), quantile(&interior, 0.99));
     println!("paper: median {median}, 99 % {most}, greatest {:?}", interior.last());
@@ -34,16 +33,16 @@ fn the_papers_budget_stays_near_the_cpu_engine() {
 #[test]
 fn a_budget_in_numbers_is_kept() {
     let Some(gpu) = gpu() else { return };
-    let mut prepared = prepared(&built_in(), SURFACE, SIZE);
-    let reference = on_cpu(&mut prepared, 2);
+    let baked = baked(&built_in(), SURFACE, SIZE);
+    let reference = on_cpu(&baked, 2);
     let mut last_cost = f64::INFINITY;
     for budget in [0.0, 0.01, 0.1] {
         let options = RenderOptions { budget: Budget::Within(budget), ..EXACT };
-        let mut renderer = Renderer::new(gpu, content(&prepared), options).unwrap();
+        let mut renderer = Renderer::new(gpu, Content::of(&baked), options).unwrap();
         let (error, cost) = (renderer.plan().error, renderer.plan().cost);
         assert!(error <= budget && cost <= last_cost, "{budget}: error {error}, cost {cost}");
         last_cost = cost;
-        let test = renderer.render(&prepared.scene.views[0].camera, 1.0).unwrap().image;
+        let test = renderer.render(&baked.scene.views[0].camera, 1.0).unwrap().image;
         let Difference { interior, .. } = Difference::new(&reference, &test, 4);
         // The budget is relative to white, the differences to the image's mean. All but the pixels at creases, of which a
         // sample may fall on another triangle, keep it: f32 and what is drawn into add their own (`parity`'s bounds).
@@ -67,8 +66,8 @@ fn mean(image: &Image) -> f32 {
 #[test]
 fn multisampling_smooths_the_outline_and_leaves_the_inside_as_it_is() {
     let Some(gpu) = gpu() else { return };
-    let prepared = prepared(&built_in(), SURFACE, SIZE);
-    let with = |antialias| on_gpu(gpu, &prepared, RenderOptions { antialias, ..EXACT });
+    let baked = baked(&built_in(), SURFACE, SIZE);
+    let with = |antialias| on_gpu(gpu, &baked, RenderOptions { antialias, ..EXACT });
     let many = with(Antialias::Grid(8));
     let (single, multi) = (with(Antialias::Grid(1)), with(Antialias::Msaa4));
     let shades: BTreeSet<u32> = multi.alpha.iter().map(|a| (4.0 * a) as u32).collect();
@@ -95,12 +94,12 @@ fn multisampling_smooths_the_outline_and_leaves_the_inside_as_it_is() {
 #[test]
 fn radiance_beyond_16_bits_is_cut_and_counted_and_none_is_lost_in_32() {
     let Some(gpu) = gpu() else { return };
-    let mut prepared = prepared(&built_in(), SURFACE, 32);
-    prepared.scene.params.set(skinfit::model::params::Param::BaseWeight, 1e6);
-    let camera = prepared.scene.views[0].camera;
+    let baked = baked(&built_in(), SURFACE, 32)
+        .with_scene(|scene| scene.params.set(skinfit::model::params::Param::BaseWeight, 1e6));
+    let camera = baked.scene.views[0].camera;
     for (antialias, cut) in [(Antialias::Msaa4, true), (Antialias::Grid(2), false)] {
         let options = RenderOptions { antialias, ..EXACT };
-        let frame = Renderer::new(gpu, content(&prepared), options).unwrap().render(&camera, 1.0).unwrap();
+        let frame = Renderer::new(gpu, Content::of(&baked), options).unwrap().render(&camera, 1.0).unwrap();
         let brightest = frame.image.rgb.iter().flatten().fold(0.0_f32, |most, &x| most.max(x));
         assert_eq!(frame.clipped > 0, cut, "{antialias:?}");
         assert_eq!(brightest <= 65504.0, cut, "{antialias:?}: {brightest}");

@@ -4,17 +4,16 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use skinfit::demo;
-use skinfit::gpu::upload::Content;
+pub(crate) use skinfit::gpu::upload::Content;
 use skinfit::gpu::{Choice, Gpu, RenderOptions, Renderer};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
-use skinfit::prepare::{PrepareOptions, Prepared, Views};
+use skinfit::prepare::{Baked, Loaded, PrepareOptions, Sampled, Views};
 use skinfit::render::antialias::Antialias;
 use skinfit::render::backdrop::Backdrop;
 use skinfit::render::bloom::add_bloom;
 use skinfit::render::files::{ImageOptions, write_exr};
 use skinfit::render::image::Image;
 use skinfit::render::shade::Shader;
-use skinfit::samples::sample_views;
 use skinfit::shader::Budget;
 
 use crate::common::not_checked;
@@ -64,57 +63,49 @@ pub(crate) fn built_in() -> PathBuf {
 }
 
 /// The first view of a scene at `size` x `size` pixels.
-pub(crate) fn prepared(scene: &Path, effects: Effects, size: u32) -> Prepared {
+pub(crate) fn baked(scene: &Path, effects: Effects, size: u32) -> Baked {
     let options = PrepareOptions {
         effects: Some(effects),
         views: Views::First,
         cache: Some(cache()),
         ..PrepareOptions::default()
     };
-    let mut prepared = Prepared::baked(scene, &options).unwrap();
-    let camera = &mut prepared.scene.views[0].camera;
+    let mut loaded = Loaded::read(scene, &options).unwrap();
+    let camera = &mut loaded.scene.views[0].camera;
     (camera.width, camera.height) = (size, size);
-    prepared
+    loaded.bake().unwrap()
 }
 
 /// The scene read another way.
-pub(crate) fn read_as(mut prepared: Prepared, form: Form, silhouette: Silhouette) -> Prepared {
-    (prepared.scene.form, prepared.scene.silhouette) = (form, silhouette);
-    prepared
+pub(crate) fn read_as(baked: Baked, form: Form, silhouette: Silhouette) -> Baked {
+    baked.with_scene(|scene| (scene.form, scene.silhouette) = (form, silhouette))
 }
 
-/// What a renderer needs of a scene.
-pub(crate) fn content(prepared: &Prepared) -> Content<'_> {
-    Content {
-        scene: &prepared.scene,
-        illumination: &prepared.illumination,
-        occlusion: prepared.occlusion.as_ref(),
-        params: &prepared.scene.params,
-    }
+/// What the CPU's rays see, with `n` x `n` samples a pixel.
+pub(crate) fn sampled(baked: &Baked, n: u32) -> Sampled {
+    baked.clone().with_scene(|scene| scene.quality.samples_per_axis = n).sample().unwrap()
 }
 
 /// The CPU engine's image, with `n` x `n` samples a pixel.
-pub(crate) fn on_cpu(prepared: &mut Prepared, n: u32) -> Image {
-    prepared.scene.quality.samples_per_axis = n;
-    let posed = prepared.scene.mesh.pose();
-    let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
-    let mut shaded = shader.shade(&samples[0], &prepared.scene.views[0].camera, prepared.gains[0]);
-    let (scene, view) = (&prepared.scene, &prepared.scene.views[0]);
+pub(crate) fn on_cpu(baked: &Baked, n: u32) -> Image {
+    let baked = sampled(baked, n);
+    let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params).unwrap();
+    let mut shaded = shader.shade(&baked.samples[0], &baked.scene.views[0].camera, baked.gains[0]);
+    let (scene, view) = (&baked.scene, &baked.scene.views[0]);
     if let Some(backdrop) = Backdrop::new(scene, &scene.params, view.background, &view.camera, n) {
-        backdrop.put_behind(&mut shaded.image, &mut shaded.glow, prepared.gains[0]);
+        backdrop.put_behind(&mut shaded.image, &mut shaded.glow, baked.gains[0]);
     }
-    if prepared.scene.effects.has(Effect::Bloom) {
-        add_bloom(&mut shaded.image, &shaded.glow, prepared.scene.bloom.sigma);
+    if baked.scene.effects.has(Effect::Bloom) {
+        add_bloom(&mut shaded.image, &shaded.glow, baked.scene.bloom.sigma);
     }
     shaded.image
 }
 
 /// The adapter's image.
-pub(crate) fn on_gpu(gpu: &Gpu, prepared: &Prepared, options: RenderOptions) -> Image {
-    let mut renderer = Renderer::new(gpu, content(prepared), options).unwrap();
-    renderer.set_background(prepared.scene.views[0].background);
-    renderer.render(&prepared.scene.views[0].camera, prepared.gains[0]).unwrap().image
+pub(crate) fn on_gpu(gpu: &Gpu, baked: &Baked, options: RenderOptions) -> Image {
+    let mut renderer = Renderer::new(gpu, Content::of(baked), options).unwrap();
+    renderer.set_background(baked.scene.views[0].background);
+    renderer.render(&baked.scene.views[0].camera, baked.gains[0]).unwrap().image
 }
 
 /// How two images differ, by pixel: interior ones, which both cover wholly, and edge ones, which only part

@@ -78,12 +78,12 @@ fn as_wgsl(glsl: &str) -> String {
 #[test]
 fn exported_glsl_draws_the_pixels_of_the_renderers_own_shader() {
     let Some(gpu) = gpu() else { return };
-    let prepared = prepared(&built_in(), SURFACE, 128);
-    let params = prepared.scene.params.clone();
-    let camera = prepared.scene.views[0].camera;
+    let baked = baked(&built_in(), SURFACE, 128);
+    let params = baked.scene.params.clone();
+    let camera = baked.scene.views[0].camera;
     let options = RenderOptions { antialias: Antialias::Grid(1), budget: Budget::Paper, ..EXACT };
     let draw = |change: &dyn Fn(&Plan) -> Plan| {
-        let mut renderer = Renderer::with_shader(gpu, content(&prepared), options, change).unwrap();
+        let mut renderer = Renderer::with_shader(gpu, Content::of(&baked), options, change).unwrap();
         renderer.render(&camera, 1.0).unwrap().image
     };
     // Exports have no 16-bit arithmetic.

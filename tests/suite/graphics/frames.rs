@@ -1,9 +1,12 @@
 //! Tiles, sequences of frames, layers.
 
+use std::sync::Arc;
+
 use skinfit::bake::bake_pose;
 use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use skinfit::model::effects::Effect;
 use skinfit::model::terms::TermName;
+use skinfit::prepare::Baked;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
 use skinfit::scene::animation::Animation;
@@ -18,10 +21,9 @@ fn an_image_in_tiles_is_the_image_in_one() {
         return;
     };
     for effects in [SURFACE, everything()] {
-        let mut prepared = prepared(&built_in(), effects, 100);
-        prepared.scene.views[0].camera.width = 1100;
+        let baked = baked(&built_in(), effects, 100).with_scene(|scene| scene.views[0].camera.width = 1100);
         let options = RenderOptions { antialias: Antialias::Grid(3), ..EXACT };
-        let (whole, tiled) = (on_gpu(gpu, &prepared, options), on_gpu(&small, &prepared, options));
+        let (whole, tiled) = (on_gpu(gpu, &baked, options), on_gpu(&small, &baked, options));
         assert_eq!(whole.alpha, tiled.alpha, "{effects:?}");
         let Difference { interior, .. } = Difference::new(&whole, &tiled, 9);
         // The tile's clip space is rounded otherwise: a few 1e-7 of a pixel's place; hardware snaps it anew.
@@ -33,12 +35,12 @@ fn an_image_in_tiles_is_the_image_in_one() {
 #[test]
 fn each_term_agrees_with_the_cpu_engines_and_they_add_up_to_the_whole() {
     let Some(gpu) = gpu() else { return };
-    let prepared = prepared(&built_in(), everything().without(Effect::Bloom), 64);
-    let camera = prepared.scene.views[0].camera;
-    let mut renderer = Renderer::new(gpu, content(&prepared), EXACT).unwrap();
+    let baked = baked(&built_in(), everything().without(Effect::Bloom), 64);
+    let camera = baked.scene.views[0].camera;
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
     let whole = renderer.render(&camera, 0.5).unwrap().image;
     let mut sum = Image { alpha: whole.alpha.clone(), ..Image::new(64, 64) };
-    for term in TermName::of(prepared.scene.effects) {
+    for term in TermName::of(baked.scene.effects) {
         let image = renderer.render_term(term, &camera, 0.5).unwrap();
         assert_eq!(image.alpha, whole.alpha, "{term:?}");
         let brightest = image.rgb.iter().flatten().fold(0.0_f32, |most, &x| most.max(x.abs()));
@@ -63,18 +65,17 @@ fn a_renderer_goes_through_an_animation_as_the_cpu_engine_does() {
 }
 
 fn goes_through_an_animation(gpu: &Gpu, of_its_own: bool) {
-    let mut prepared = prepared(&built_in(), everything(), 96);
-    let animation = Animation::open(&prepared.scene).unwrap().unwrap();
-    let camera = prepared.scene.views[0].camera;
+    let baked = baked(&built_in(), everything(), 96);
+    let animation = Animation::open(&baked.scene).unwrap().unwrap();
+    let camera = baked.scene.views[0].camera;
     let (first, last) = animation.seconds;
     assert!(last > first);
     let meshes = [0.0, 0.35, 0.8].map(|share| animation.mesh(first + share * (last - first)).unwrap());
-    let still = prepared.scene.clone();
-    let at_rest = skinfit::gpu::upload::Content { scene: &still, ..content(&prepared) };
-    let mut renderer = Renderer::new(gpu, at_rest, RenderOptions { animated: true, ..EXACT }).unwrap();
+    let mut renderer =
+        Renderer::new(gpu, Content::of(&baked), RenderOptions { animated: true, ..EXACT }).unwrap();
     let (mut frames, mut occlusions) = (Vec::new(), Vec::new());
     for mesh in &meshes {
-        let occlusion = of_its_own.then(|| bake_pose(&prepared.scene, &mesh.pose(), Some(&cache())).0);
+        let occlusion = of_its_own.then(|| bake_pose(&baked.scene, &mesh.pose(), Some(&cache())).0);
         renderer.set_mesh(mesh, occlusion.as_ref());
         occlusions.push(occlusion);
         frames.push(renderer.render(&camera, 1.0).unwrap().image);
@@ -82,11 +83,9 @@ fn goes_through_an_animation(gpu: &Gpu, of_its_own: bool) {
     assert!(frames[0].rgb != frames[1].rgb, "nothing moves");
     drop(renderer);
     for (i, ((mesh, occlusion), frame)) in meshes.into_iter().zip(occlusions).zip(frames).enumerate() {
-        prepared.scene.mesh = mesh;
-        if of_its_own {
-            prepared.occlusion = occlusion;
-        }
-        let reference = on_cpu(&mut prepared, 2);
+        let baked = baked.clone().with_scene(|scene| scene.mesh = mesh);
+        let occlusion = occlusion.map(Arc::new).or(baked.occlusion.clone());
+        let reference = on_cpu(&Baked { occlusion, ..baked }, 2);
         let Difference { interior, .. } = Difference::new(&reference, &frame, 4);
         // As in `parity`.
         let (found, most) = (quantile(&interior, 0.99), if gpu.is_software() { 1e-4 } else { 5e-3 });
@@ -97,9 +96,9 @@ fn goes_through_an_animation(gpu: &Gpu, of_its_own: bool) {
 #[test]
 fn an_image_that_is_not_waited_for_is_the_same_and_so_is_that_of_an_adopted_device() {
     let Some(gpu) = gpu() else { return };
-    let prepared = prepared(&built_in(), everything(), 64);
-    let camera = prepared.scene.views[0].camera;
-    let mut renderer = Renderer::new(gpu, content(&prepared), EXACT).unwrap();
+    let baked = baked(&built_in(), everything(), 64);
+    let camera = baked.scene.views[0].camera;
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
     let waited = renderer.render(&camera, 0.7).unwrap().image;
     assert!(waited.rgb.iter().flatten().any(|x| *x > 0.0));
     let arrived = pollster::block_on(renderer.render_async(&camera, 0.7)).unwrap().image;
@@ -107,7 +106,7 @@ fn an_image_that_is_not_waited_for_is_the_same_and_so_is_that_of_an_adopted_devi
     // As an application does that has opened a device for its window.
     let own = pollster::block_on(Gpu::request(&Choice::default())).unwrap();
     let adopted = Gpu::adopt(own.adapter.clone(), own.device.clone(), own.queue.clone());
-    let mut renderer = Renderer::new(&adopted, content(&prepared), EXACT).unwrap();
+    let mut renderer = Renderer::new(&adopted, Content::of(&baked), EXACT).unwrap();
     assert!(renderer.render(&camera, 0.7).unwrap().image == waited);
     adopted.close();
     let lost = pollster::block_on(renderer.render_async(&camera, 0.7)).map(|_| ());

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use skinfit::engine::gpu::{GpuEngine, Memory, Task};
+use skinfit::engine::gpu::{GpuEngine, Memory};
 use skinfit::engine::reference::{Reference, deviation};
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
@@ -12,7 +12,7 @@ use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Column, Param};
 use skinfit::model::terms::TermName;
-use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::prepare::{Observed, PrepareOptions};
 use skinfit::samples::rows::Rows;
 use skinfit::samples::surface_records::Asked;
 use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
@@ -22,22 +22,21 @@ use skinfit::scene::view::Clip;
 use super::bench::{built_in, cache, gpu, open};
 use crate::engine::{
     EVERYTHING, all_unknowns, assert_equal, assert_passes_equal, engine as cpu, illumination, names, params,
-    single, view,
+    single, task, view,
 };
 
 /// Views of several records a group, and of one: shaders read the latter a pixel ahead.
 const SAMPLINGS: [fn(usize, u64) -> ObservedView; 2] = [view, single];
 
-fn engine<'g>(
-    gpu: &'g Gpu,
+fn engine(
+    gpu: &Gpu,
     setup: Setup,
-    views: &'g [ObservedView],
+    views: &[ObservedView],
     loss: Loss,
     unknowns: &[Unknown],
     at: &Point,
-) -> GpuEngine<'g> {
-    let task = Task { setup, illumination: illumination(), views, loss, unknowns: unknowns.to_vec() };
-    GpuEngine::new(gpu, task, at, Memory::default()).unwrap()
+) -> GpuEngine {
+    GpuEngine::new(gpu, task(setup, views, loss, unknowns), at, Memory::default()).unwrap()
 }
 
 const FULL: Setup = Setup::new(Form::Corrected, Silhouette::Bumped, EVERYTHING);
@@ -60,13 +59,7 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
                 for &effects in if default { single.as_slice() } else { &all } {
                     let setup = Setup::new(form, silhouette, effects);
                     if TermName::of(effects).is_empty() && !effects.needs(silhouette).haze {
-                        let task = Task {
-                            setup,
-                            illumination: illumination(),
-                            views: &views,
-                            loss: Loss::L2,
-                            unknowns: Vec::new(),
-                        };
+                        let task = task(setup, &views, Loss::L2, &[]);
                         let refused = GpuEngine::new(gpu, task, &point, Memory::default()).map(|_| ());
                         assert!(matches!(refused, Err(GpuError::NothingShown)), "{effects:?} shows nothing");
                         continue;
@@ -153,11 +146,8 @@ fn parts_and_streaming_give_the_same_sums() {
         let views = [made(100, 8), made(37, 9)];
         let unknowns = some_unknowns();
         let point = Point { params: params(), gains: vec![1.0, 1.1] };
-        let make = |memory| {
-            let (illumination, unknowns) = (illumination(), unknowns.clone());
-            let task = Task { setup: FULL, illumination, views: &views, loss: Loss::L2, unknowns };
-            GpuEngine::new(gpu, task, &point, memory).unwrap()
-        };
+        let make =
+            |memory| GpuEngine::new(gpu, task(FULL, &views, Loss::L2, &unknowns), &point, memory).unwrap();
         let whole = make(Memory::default());
         let want = whole.normal_equations(&point);
         let (resident, streamed) = whole.bytes();
@@ -190,8 +180,7 @@ fn bytes_are_those_that_stand_on_the_device_and_that_a_pass_uploads() {
     let point = Point { params: params(), gains: vec![1.0, 1.1] };
     let unknowns = some_unknowns();
     let bytes = |resident| {
-        let (illumination, unknowns) = (illumination(), unknowns.clone());
-        let task = Task { setup: FULL, illumination, views: &views, loss: Loss::L2, unknowns };
+        let task = task(FULL, &views, Loss::L2, &unknowns);
         GpuEngine::new(gpu, task, &point, Memory { part: None, resident }).unwrap().bytes()
     };
     let of = |view: &ObservedView| {
@@ -443,19 +432,11 @@ fn to_the_end() -> FitOptions {
 
 /// Fit a scene on both engines from its start.
 fn fit_on_both(gpu: &Gpu, scene: &Path) {
-    let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
-    let mut prepared = Prepared::new(scene, &options).unwrap();
-    let observed = prepared.observed().unwrap();
-    let task = Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views: &observed,
-        loss: prepared.scene.fit.loss,
-        unknowns: prepared.unknowns(),
-    };
-    let start = prepared.start();
-    let ours = GpuEngine::new(gpu, task, &start, Memory::default()).unwrap();
-    let theirs = prepared.engine_over(observed.clone()).unwrap();
+    let options = PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() };
+    let observed = Observed::new(scene, &options).unwrap();
+    let start = observed.start();
+    let ours = GpuEngine::new(gpu, observed.task(), &start, Memory::default()).unwrap();
+    let theirs = observed.engine().unwrap();
     let [ours, theirs] = [&ours as &dyn Objective, &theirs]
         .map(|engine| fit(engine, &start, &to_the_end(), &mut |_| {}).unwrap());
     let what = scene.display();
@@ -503,20 +484,12 @@ fn tiles_of_every_view_pull_as_the_cpu_engines_do() {
     assert_ne!(changed, text);
     std::fs::write(&listing, changed).unwrap();
     for scene in [scene, listing] {
-        let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
-        let mut prepared = Prepared::new(&scene, &options).unwrap();
-        let observed = prepared.observed().unwrap();
-        assert!(observed.len() > 1);
-        let task = Task {
-            setup: prepared.setup(),
-            illumination: prepared.illumination.clone(),
-            views: &observed,
-            loss: prepared.scene.fit.loss,
-            unknowns: prepared.unknowns(),
-        };
-        let (start, widths) = (prepared.start(), prepared.image_widths());
-        let ours = GpuEngine::new(gpu, task, &start, Memory::default()).unwrap();
-        let theirs = prepared.engine_over(observed.clone()).unwrap();
+        let options = PrepareOptions { cache: Some(cache()), ..PrepareOptions::default() };
+        let observed = Observed::new(&scene, &options).unwrap();
+        assert!(observed.views.len() > 1);
+        let (start, widths) = (observed.start(), observed.image_widths());
+        let ours = GpuEngine::new(gpu, observed.task(), &start, Memory::default()).unwrap();
+        let theirs = observed.engine().unwrap();
         let [ours, theirs] =
             [&ours as &dyn Objective, &theirs].map(|engine| engine.pulls(&start, &widths).unwrap());
         assert_eq!(ours.tiles.len(), theirs.tiles.len());

@@ -3,15 +3,14 @@
 //! Both read the same texels and filter them in 32 bits; the CPU evaluates the rest in f64 at rays through
 //! the samples' centres, the adapter in f32 at what its rasteriser interpolates.
 
-use std::path::Path;
-
 use glam::{DMat4, Vec3};
 use skinfit::gpu::Gpu;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::{Column, Param};
-use skinfit::prepare::Prepared;
+use skinfit::prepare::Baked;
 use skinfit::scene::Scene;
+use std::path::Path;
 
 use super::bench::*;
 use crate::common;
@@ -46,9 +45,9 @@ const CREASES: f64 = 0.003;
 const UNCOVERED: f64 = 0.03;
 
 /// Fail with both images and a FLIP map on disk where the engines disagree.
-fn compare(name: &str, gpu: &Gpu, mut prepared: Prepared) {
-    let test = on_gpu(gpu, &prepared, EXACT);
-    let reference = on_cpu(&mut prepared, 2);
+fn compare(name: &str, gpu: &Gpu, baked: &Baked) {
+    let test = on_gpu(gpu, baked, EXACT);
+    let reference = on_cpu(baked, 2);
     let difference = Difference::new(&reference, &test, 4);
     let Difference { interior, edge, uncovered, beyond_a_sample } = &difference;
     assert!(interior.len() > 500, "{name}: only {} pixels to compare", interior.len());
@@ -78,8 +77,8 @@ fn every_form_and_silhouette_shows_the_same_on_both_engines() {
     let Some(gpu) = gpu() else { return };
     for form in Form::ALL {
         for silhouette in Silhouette::ALL {
-            let prepared = read_as(prepared(&built_in(), SURFACE, SIZE), form, silhouette);
-            compare(&format!("{}_{}", form.name(), silhouette.name()), gpu, prepared);
+            let baked = read_as(baked(&built_in(), SURFACE, SIZE), form, silhouette);
+            compare(&format!("{}_{}", form.name(), silhouette.name()), gpu, &baked);
         }
     }
 }
@@ -104,9 +103,8 @@ fn every_single_effect_shows_the_same_on_both_engines() {
         &[E::Diffuse, E::Skin],
     ] {
         let names: Vec<&str> = effects.iter().map(|effect| effect.name()).collect();
-        let mut prepared = prepared(&built_in(), Effects::of(effects), SIZE);
-        pose(&mut prepared);
-        compare(&names.join("_"), gpu, prepared);
+        let baked = baked(&built_in(), Effects::of(effects), SIZE).with_scene(pose);
+        compare(&names.join("_"), gpu, &baked);
     }
 }
 
@@ -115,10 +113,9 @@ fn all_effects_together_show_the_same_on_both_engines() {
     let Some(gpu) = gpu() else { return };
     for form in Form::ALL {
         for silhouette in Silhouette::ALL {
-            let mut prepared = read_as(prepared(&built_in(), everything(), SIZE), form, silhouette);
-            pose(&mut prepared);
-            turn(&mut prepared);
-            compare(&format!("all_{}_{}", form.name(), silhouette.name()), gpu, prepared);
+            let baked = read_as(baked(&built_in(), everything(), SIZE), form, silhouette);
+            let baked = baked.with_scene(pose).with_scene(turn);
+            compare(&format!("all_{}_{}", form.name(), silhouette.name()), gpu, &baked);
         }
     }
 }
@@ -137,11 +134,8 @@ fn the_papers_other_readings_show_the_same_on_both_engines() {
         ("interpolated_rim", |scene| (scene.form, scene.silhouette) = (Form::Listing, Silhouette::Vertex)),
     ];
     for (name, read) in readings {
-        let mut prepared = prepared(&built_in(), everything(), SIZE);
-        pose(&mut prepared);
-        turn(&mut prepared);
-        read(&mut prepared.scene);
-        compare(name, gpu, prepared);
+        let baked = baked(&built_in(), everything(), SIZE);
+        compare(name, gpu, &baked.with_scene(pose).with_scene(turn).with_scene(read));
     }
 }
 
@@ -150,8 +144,8 @@ fn every_shared_scene_shows_the_same_on_both_engines() {
     let (Some(gpu), Some(folder)) = (gpu(), common::data()) else { return };
     for scene in ["lps_forest", "lps_sunrise"] {
         let path = folder.join(scene).join("scene.toml");
-        compare(scene, gpu, prepared(&path, SURFACE, SIZE));
-        compare(&format!("{scene}_all"), gpu, prepared(&path, everything(), SIZE));
+        compare(scene, gpu, &baked(&path, SURFACE, SIZE));
+        compare(&format!("{scene}_all"), gpu, &baked(&path, everything(), SIZE));
     }
 }
 
@@ -176,38 +170,37 @@ fn shared_meshes_that_move_show_the_same_on_both_engines() {
         );
         std::fs::write(&path, text).unwrap();
         // Without bloom, which would spread a sample at a crease over its neighbours.
-        let mut prepared = prepared(&path, everything().without(Effect::Bloom), SIZE);
-        stand_back(&mut prepared);
-        compare(&Path::new(mesh).with_extension("").display().to_string(), gpu, prepared);
+        let baked = baked(&path, everything().without(Effect::Bloom), SIZE).with_scene(stand_back);
+        compare(&Path::new(mesh).with_extension("").display().to_string(), gpu, &baked);
     }
 }
 
 /// Put the camera where it shows the mesh whole.
-pub(super) fn stand_back(prepared: &mut Prepared) {
-    let positions = prepared.scene.mesh.pose().positions;
+pub(super) fn stand_back(scene: &mut Scene) {
+    let positions = scene.mesh.pose().positions;
     let low = positions.iter().copied().reduce(Vec3::min).unwrap();
     let high = positions.iter().copied().reduce(Vec3::max).unwrap();
     let eye = 0.5 * (low + high) + 2.0 * Vec3::new(0.3, 0.2, 1.0) * (high - low).max_element();
     let look = DMat4::from_rotation_x(0.19) * DMat4::from_rotation_y(-0.29);
-    prepared.scene.views[0].camera.world_to_camera = look * DMat4::from_translation(-eye.as_dvec3());
+    scene.views[0].camera.world_to_camera = look * DMat4::from_translation(-eye.as_dvec3());
 }
 
 /// Morph weights of all signs, and the bones of the middle of the animation.
-pub(super) fn pose(prepared: &mut Prepared) {
+pub(super) fn pose(scene: &mut Scene) {
     let weights = [0.8, 0.0, -0.3, 0.5, 1.1];
-    for (morph, weight) in prepared.scene.mesh.morphs.iter_mut().zip(weights) {
+    for (morph, weight) in scene.mesh.morphs.iter_mut().zip(weights) {
         morph.weight = weight;
     }
-    if prepared.scene.effects.has(Effect::Skin) {
-        let animation = skinfit::scene::animation::Animation::open(&prepared.scene).unwrap().unwrap();
+    if scene.effects.has(Effect::Skin) {
+        let animation = skinfit::scene::animation::Animation::open(scene).unwrap().unwrap();
         let (first, last) = animation.seconds;
-        prepared.scene.mesh.bones = animation.mesh(0.4 * first + 0.6 * last).unwrap().bones;
+        scene.mesh.bones = animation.mesh(0.4 * first + 0.6 * last).unwrap().bones;
     }
 }
 
 /// Parameters away from their defaults, channels apart.
-pub(super) fn turn(prepared: &mut Prepared) {
-    let params = &mut prepared.scene.params;
+pub(super) fn turn(scene: &mut Scene) {
+    let params = &mut scene.params;
     params.set_rgb(Param::BaseWeight, [0.9, 1.0, 1.1]);
     params.set_rgb(Param::RimWeight, [0.4, -0.1, 0.3]);
     params.set_rgb(Param::KeyColor, [0.3, 0.2, 0.1]);

@@ -2,10 +2,10 @@
 
 use skinfit::gpu::{RenderOptions, Renderer};
 use skinfit::model::effects::Effect;
+use skinfit::prepare::Baked;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
 use skinfit::render::shade::Shader;
-use skinfit::samples::sample_views;
 use skinfit::scene::view::Background;
 use skinfit::shader::Budget;
 
@@ -19,12 +19,13 @@ fn backdrop_and_bloom_are_the_same_from_both_engines() {
     let Some(gpu) = gpu() else { return };
     for background in BACKGROUNDS {
         for (effects, n) in [(everything(), 1), (everything(), 3), (SURFACE, 2)] {
-            let mut prepared = prepared(&built_in(), effects, 64);
-            prepared.scene.views[0].background = background;
-            prepared.scene.bloom.sigma = 0.05;
-            prepared.gains[0] = 0.5;
+            let baked = baked(&built_in(), effects, 64).with_scene(|scene| {
+                scene.views[0].background = background;
+                scene.bloom.sigma = 0.05;
+            });
+            let baked = Baked { gains: vec![0.5], ..baked };
             let options = RenderOptions { antialias: Antialias::Grid(n), ..EXACT };
-            let (cpu, drawn) = (on_cpu(&mut prepared, n), on_gpu(gpu, &prepared, options));
+            let (cpu, drawn) = (on_cpu(&baked, n), on_gpu(gpu, &baked, options));
             let shown = background != Background::None;
             assert_eq!(cpu.alpha.iter().all(|&alpha| alpha == 1.0), shown, "{background:?}");
             assert_eq!(drawn.alpha.iter().all(|&alpha| alpha == 1.0), shown, "{background:?}");
@@ -43,10 +44,9 @@ fn backdrop_and_bloom_are_the_same_from_both_engines() {
 #[test]
 fn in_sixteen_bits_backdrop_and_bloom_differ_by_rounding_alone() {
     let Some(gpu) = gpu() else { return };
-    let mut prepared = prepared(&built_in(), everything(), 64);
-    prepared.scene.views[0].background = Background::None;
-    let bare = on_gpu(gpu, &prepared, RenderOptions { antialias: Antialias::Grid(2), ..EXACT });
-    prepared.scene.views[0].background = Background::Environment;
+    let baked = before(baked(&built_in(), everything(), 64), Background::None);
+    let bare = on_gpu(gpu, &baked, RenderOptions { antialias: Antialias::Grid(2), ..EXACT });
+    let baked = before(baked, Background::Environment);
     // Multisampling shades the pixel's centre, as one sample does, but covers outlines otherwise: there and as far as
     // they bleed, some four pixels, pictures differ
     // (folds of the ear and the lips are outlines as well: there the median is asked for).
@@ -55,12 +55,17 @@ fn in_sixteen_bits_backdrop_and_bloom_differ_by_rounding_alone() {
     {
         let exact = RenderOptions { antialias: alike, ..EXACT };
         let half = RenderOptions { antialias, budget: Budget::Within(2e-3), ..EXACT };
-        let (exact, half) = (on_gpu(gpu, &prepared, exact), on_gpu(gpu, &prepared, half));
+        let (exact, half) = (on_gpu(gpu, &baked, exact), on_gpu(gpu, &baked, half));
         let found = difference_off_the_outline(&exact, &half, &bare, margin, share);
         // 16-bit floats round to 2^-11 of up to 20 times the mean; the budget adds 2e-3 of white.
         println!("{antialias:?}: {found:.1e} of the mean");
         assert!(found < 1e-2, "{antialias:?}: {found}; {}", keep("backdrop_half", &exact, &half));
     }
+}
+
+/// The scene with another background.
+fn before(baked: Baked, background: Background) -> Baked {
+    baked.with_scene(|scene| scene.views[0].background = background)
 }
 
 /// The error that a share of the pixels stays below, in shares of the mean, over those that see no outline of `bare`
@@ -86,32 +91,26 @@ fn difference_off_the_outline(a: &Image, b: &Image, bare: &Image, margin: usize,
 
 #[test]
 fn the_glow_grows_with_the_gain_and_not_with_its_square() {
-    let mut prepared = prepared(&built_in(), everything(), 64);
-    prepared.scene.views[0].background = Background::Color([2.0, 1.0, 0.5]);
-    let mut at = |gain: f64, on: &mut dyn FnMut(&mut skinfit::prepare::Prepared) -> Image| {
-        prepared.gains[0] = gain;
-        on(&mut prepared)
-    };
-    let mut check = |on: &mut dyn FnMut(&mut skinfit::prepare::Prepared) -> Image| {
+    let baked = before(baked(&built_in(), everything(), 64), Background::Color([2.0, 1.0, 0.5]));
+    let at = |gain: f64, on: &dyn Fn(&Baked) -> Image| on(&Baked { gains: vec![gain], ..baked.clone() });
+    let check = |on: &dyn Fn(&Baked) -> Image| {
         let (once, thrice) = (at(1.0, on), at(3.0, on));
         for (one, three) in once.rgb.iter().flatten().zip(thrice.rgb.iter().flatten()) {
             // Sums of some 40 f32, twice.
             assert!((3.0 * one - three).abs() <= 1e-5 * (1.0 + three.abs()), "{one} {three}");
         }
     };
-    check(&mut |prepared| on_cpu(prepared, 2));
+    check(&|baked| on_cpu(baked, 2));
     if let Some(gpu) = gpu() {
-        check(&mut |prepared| on_gpu(gpu, prepared, EXACT));
+        check(&|baked| on_gpu(gpu, baked, EXACT));
     }
 }
 
 #[test]
 fn a_bright_backdrop_bleeds_over_the_silhouette_as_far_as_the_bloom_reaches() {
-    let mut prepared = prepared(&built_in(), everything(), 96);
-    prepared.scene.bloom.sigma = 0.02;
-    let bare = on_cpu(&mut prepared, 2);
-    prepared.scene.views[0].background = Background::Color([4.0; 3]);
-    let lit = on_cpu(&mut prepared, 2);
+    let baked = baked(&built_in(), everything(), 96).with_scene(|scene| scene.bloom.sigma = 0.02);
+    let bare = on_cpu(&baked, 2);
+    let lit = on_cpu(&before(baked, Background::Color([4.0; 3])), 2);
     // The kernel ends at three standard deviations, rounded up.
     let reach = (3.0_f64 * 0.02 * 96.0).ceil() as usize;
     let covered = |x: usize, y: usize| bare.alpha[y * 96 + x] == 1.0;
@@ -140,12 +139,9 @@ fn a_bright_backdrop_bleeds_over_the_silhouette_as_far_as_the_bloom_reaches() {
 fn a_pixels_glow_is_the_mean_over_its_samples_of_radiance_times_haze() {
     // The samples of 3 x 3 pixels, one each, are those of one pixel of 3 x 3.
     let of = |size: u32, n: u32| {
-        let mut prepared = prepared(&built_in(), everything(), size);
-        prepared.scene.quality.samples_per_axis = n;
-        let posed = prepared.scene.mesh.pose();
-        let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
-        let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
-        shader.shade(&samples[0], &prepared.scene.views[0].camera, 1.0)
+        let baked = sampled(&baked(&built_in(), everything(), size), n);
+        let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params).unwrap();
+        shader.shade(&baked.samples[0], &baked.scene.views[0].camera, 1.0)
     };
     let (coarse, fine) = (of(32, 3), of(96, 1));
     let mut products = 0;
@@ -167,21 +163,18 @@ fn a_pixels_glow_is_the_mean_over_its_samples_of_radiance_times_haze() {
 fn the_haze_is_the_same_from_both_engines() {
     let Some(gpu) = gpu() else { return };
     let effects = SURFACE.with(Effect::Haze);
-    let mut prepared = prepared(&built_in(), effects, 64);
-    prepared.scene.quality.samples_per_axis = 2;
-    let posed = prepared.scene.mesh.pose();
-    let samples = sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap();
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params).unwrap();
-    let camera = prepared.scene.views[0].camera;
-    let want = shader.shade(&samples[0], &camera, 0.5).haze;
-    let mut renderer = Renderer::new(gpu, content(&prepared), EXACT).unwrap();
+    let baked = sampled(&baked(&built_in(), effects, 64), 2);
+    let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params).unwrap();
+    let camera = baked.scene.views[0].camera;
+    let want = shader.shade(&baked.samples[0], &camera, 0.5).haze;
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
     let got = renderer.render_haze(&camera, 0.5).unwrap();
     assert!(want.iter().any(|&haze| haze > 0.01));
     let mut errors: Vec<f32> = want.iter().zip(&got).map(|(a, b)| (a - b).abs()).collect();
     errors.sort_by(f32::total_cmp);
     // As the terms: pixels of the outline may differ by a sample.
     assert!(quantile(&errors, 0.97) < if gpu.is_software() { 1e-4 } else { 5e-3 });
-    let plain = self::prepared(&built_in(), SURFACE, 64);
-    let mut renderer = Renderer::new(gpu, content(&plain), EXACT).unwrap();
+    let plain = self::baked(&built_in(), SURFACE, 64);
+    let mut renderer = Renderer::new(gpu, Content::of(&plain), EXACT).unwrap();
     assert!(renderer.render_haze(&camera, 1.0).unwrap().is_empty());
 }

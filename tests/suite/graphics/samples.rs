@@ -5,20 +5,21 @@
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::sync::Arc;
 
-use skinfit::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory, Task};
+use skinfit::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory};
 use skinfit::engine::reference::Reference;
 use skinfit::engine::view::ObservedView;
-use skinfit::engine::{Objective, Point, Unknown};
+use skinfit::engine::{Objective, Point, Task, Unknown};
 use skinfit::fit::{FitOptions, fit};
 use skinfit::gpu::{Choice, Gpu, GpuError};
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::{Column, Param};
-use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::prepare::{Baked, PrepareOptions};
 use skinfit::samples::rows::Rows;
 use skinfit::samples::surface_records::Unmade;
-use skinfit::samples::{LANES, SampleError, ViewSamples, sample_views};
+use skinfit::samples::{LANES, SampleError, ViewSamples};
 
 use super::bench::*;
 use super::parity::{pose, turn};
@@ -83,14 +84,13 @@ fn by_pixel(samples: &ViewSamples) -> BTreeMap<u32, Vec<usize>> {
 }
 
 /// The first view's samples as the CPU makes them.
-fn traced(prepared: &Prepared) -> ViewSamples {
-    let posed = prepared.scene.mesh.pose();
-    sample_views(&prepared.scene, &posed, prepared.occlusion.as_ref()).unwrap().remove(0)
+fn traced(baked: &Baked) -> ViewSamples {
+    baked.clone().sample().unwrap().samples.remove(0)
 }
 
 /// And as the adapter does.
-fn drawn(gpu: &Gpu, prepared: &Prepared) -> ViewSamples {
-    let (made, groups) = DeviceSamples::new(gpu, content(prepared)).unwrap();
+fn drawn(gpu: &Gpu, baked: &Baked) -> ViewSamples {
+    let (made, groups) = DeviceSamples::new(gpu, Content::of(baked)).unwrap();
     let mut samples = groups.into_iter().next().unwrap();
     samples.surface = made.read(0, &samples).unwrap();
     assert_eq!(made.count(), samples.count());
@@ -104,12 +104,12 @@ fn squared_rim(samples: &ViewSamples, slot: usize) -> f32 {
     corner_silhouettes.iter().zip(corner_shares).map(|(z, share)| share * z * z).sum()
 }
 
-fn compare(name: &str, gpu: &Gpu, prepared: &Prepared) {
-    let (want, got) = (traced(prepared), drawn(gpu, prepared));
+fn compare(name: &str, gpu: &Gpu, baked: &Baked) {
+    let (want, got) = (traced(baked), drawn(gpu, baked));
     assert_eq!(got.surface.places(), want.surface.places(), "{name}");
     let (ours, want_pixels) = (by_pixel(&got), by_pixel(&want));
-    let full = prepared.scene.quality.samples_per_axis.pow(2) as usize;
-    let width = prepared.scene.views[0].camera.width;
+    let full = baked.scene.quality.samples_per_axis.pow(2) as usize;
+    let width = baked.scene.views[0].camera.width;
     // Pixels are on the outline where a sample of theirs or a neighbour shows no mesh.
     let beside = |pixel: u32| [pixel + 1, pixel.wrapping_sub(1), pixel + width, pixel.wrapping_sub(width)];
     let (mut outline, mut uncovered) =
@@ -158,11 +158,8 @@ fn compare(name: &str, gpu: &Gpu, prepared: &Prepared) {
 }
 
 /// The built-in head, moved by its morph targets and bones.
-fn moved(form: Form, silhouette: Silhouette) -> Prepared {
-    let mut prepared = read_as(prepared(&built_in(), everything(), SIZE), form, silhouette);
-    pose(&mut prepared);
-    turn(&mut prepared);
-    prepared
+fn moved(form: Form, silhouette: Silhouette) -> Baked {
+    read_as(baked(&built_in(), everything(), SIZE), form, silhouette).with_scene(pose).with_scene(turn)
 }
 
 #[test]
@@ -176,19 +173,20 @@ fn every_field_holds_what_the_rays_hit() {
         compare(&format!("{} {}", form.name(), silhouette.name()), gpu, &moved(form, silhouette));
     }
     // Two normals, and a normal for the dapple in its place.
-    let mut other = moved(Form::Corrected, Silhouette::Fragment);
-    other.scene.lookups = Lookups::Smooth;
-    other.scene.dapple = Dapple::new([0.48, -0.36, 0.8], 30.0, false);
-    other.scene.fit.free.push(Column::tied(Param::EnvironmentRotation));
+    let other = moved(Form::Corrected, Silhouette::Fragment).with_scene(|scene| {
+        scene.lookups = Lookups::Smooth;
+        scene.dapple = Dapple::new([0.48, -0.36, 0.8], 30.0, false);
+        scene.fit.free.push(Column::tied(Param::EnvironmentRotation));
+    });
     compare("smooth lookups, a dapple that turns", gpu, &other);
-    let mut still = prepared(&built_in(), SURFACE, SIZE);
+    let still = baked(&built_in(), SURFACE, SIZE);
     compare("still", gpu, &still);
-    still.scene.quality.samples_per_axis = 1;
-    compare("one sample a pixel", gpu, &still);
+    let single = still.with_scene(|scene| scene.quality.samples_per_axis = 1);
+    compare("one sample a pixel", gpu, &single);
     // Without a normal map, the base is the whole normal: unit, or as interpolated.
     for form in Form::ALL {
         let plain =
-            read_as(prepared(&built_in(), Effects::of(&[Effect::Diffuse]), SIZE), form, Silhouette::Fragment);
+            read_as(baked(&built_in(), Effects::of(&[Effect::Diffuse]), SIZE), form, Silhouette::Fragment);
         compare(&format!("diffuse alone, {}", form.name()), gpu, &plain);
     }
 }
@@ -196,22 +194,22 @@ fn every_field_holds_what_the_rays_hit() {
 #[test]
 fn shared_scenes_hold_what_the_rays_hit() {
     let (Some(gpu), Some(folder)) = (gpu(), crate::common::data()) else { return };
-    compare("lps_forest", gpu, &prepared(&folder.join("lps_forest/scene.toml"), everything(), SIZE));
+    compare("lps_forest", gpu, &baked(&folder.join("lps_forest/scene.toml"), everything(), SIZE));
 }
 
 #[test]
 fn what_is_beyond_a_texture_is_drawn_in_tiles() {
     // 192 samples a side in tiles of 74: neither words nor groups end where tiles do.
     let Some(gpu) = open(&Choice { max_side: Some(75), ..Choice::default() }) else { return };
-    let mut prepared = prepared(&built_in(), SURFACE, SIZE);
+    let baked = baked(&built_in(), SURFACE, SIZE);
     // Maps that such a device takes.
-    prepared.scene.maps = Default::default();
-    prepared.illumination = Default::default();
-    compare("tiles", &gpu, &prepared);
+    let baked = baked.with_scene(|scene| scene.maps = Default::default());
+    let baked = Baked { illumination: Arc::default(), ..baked };
+    compare("tiles", &gpu, &baked);
 }
 
 /// The views of a scene with the targets of the CPU's samples at other parameters.
-fn observed(prepared: &Prepared, groups: Vec<ViewSamples>) -> Vec<ObservedView> {
+fn observed(baked: &Baked, groups: Vec<ViewSamples>) -> Vec<ObservedView> {
     let view = |samples: ViewSamples| {
         let mut target = Rows::new(3, samples.groups());
         for (row, slot) in (0..3).flat_map(|row| (0..LANES * samples.groups()).map(move |slot| (row, slot))) {
@@ -220,16 +218,17 @@ fn observed(prepared: &Prepared, groups: Vec<ViewSamples>) -> Vec<ObservedView> 
         }
         ObservedView { samples, target, ..ObservedView::default() }
     };
-    assert_eq!(groups.len(), prepared.scene.views.len());
+    assert_eq!(groups.len(), baked.scene.views.len());
     groups.into_iter().map(view).collect()
 }
 
 #[test]
 fn passes_over_them_equal_the_plain_model_in_parts_and_when_terms_are_kept() {
     let Some(gpu) = gpu() else { return };
-    let prepared = moved(Form::Corrected, Silhouette::Fragment);
-    let (made, groups) = DeviceSamples::new(gpu, content(&prepared)).unwrap();
-    let views = observed(&prepared, groups);
+    let baked = moved(Form::Corrected, Silhouette::Fragment);
+    let (made, groups) = DeviceSamples::new(gpu, Content::of(&baked)).unwrap();
+    let made = Arc::new(made);
+    let views = observed(&baked, groups);
     let mut read = views.clone();
     read[0].samples.surface = made.read(0, &views[0].samples).unwrap();
     let loss = skinfit::scene::Loss::L2;
@@ -241,17 +240,11 @@ fn passes_over_them_equal_the_plain_model_in_parts_and_when_terms_are_kept() {
     let live = columns(&[Param::BaseWeight, Param::NormalStrength]);
     let bytes = 4 * LANES as u64 * read[0].samples.surface.rows().all().len() as u64;
     for (unknowns, part) in [(&kept, None), (&kept, Some(bytes / 3)), (&live, Some(bytes / 3))] {
-        let mut point = prepared.start();
-        let task = Task {
-            setup: prepared.setup(),
-            illumination: prepared.illumination.clone(),
-            views: &views,
-            loss,
-            unknowns: unknowns.clone(),
-        };
+        let mut point = baked.start();
+        let task = Task { loss, unknowns: unknowns.clone(), ..baked.task_over(&*views) };
         let memory = Memory { part, resident: None };
-        let engine = GpuEngine::over_device_samples(&made, task, &point, memory).unwrap();
-        let plain = Reference::new(prepared.setup(), &prepared.illumination, &read, loss, unknowns).unwrap();
+        let engine = GpuEngine::over_device_samples(Arc::clone(&made), task, &point, memory).unwrap();
+        let plain = Reference::new(baked.setup(), &baked.illumination, &read, loss, unknowns).unwrap();
         for strength in [1.4, 0.6] {
             point.params.set(Param::NormalStrength, strength);
             let what = format!("{part:?} {strength}");
@@ -267,21 +260,13 @@ fn passes_over_them_equal_the_plain_model_in_parts_and_when_terms_are_kept() {
 /// Fit a scene over both kinds of samples; parameters may differ by that share of their value.
 fn fit_both_ways(gpu: &Gpu, scene: &Path, share: f64) {
     let options = PrepareOptions { fit: true, cache: Some(cache()), ..PrepareOptions::default() };
-    let mut prepared = Prepared::baked(scene, &options).unwrap();
-    prepared.keep_targets().unwrap();
-    let (made, groups) = DeviceSamples::new(gpu, content(&prepared)).unwrap();
-    let views = prepared.observed_with(groups).unwrap();
-    let traced = prepared.observed_with(prepared.traced().unwrap()).unwrap();
-    let task = |views| Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views,
-        loss: prepared.scene.fit.loss,
-        unknowns: prepared.unknowns(),
-    };
-    let start: Point = prepared.start();
-    let ours = GpuEngine::over_device_samples(&made, task(&views), &start, Memory::default()).unwrap();
-    let theirs = GpuEngine::new(gpu, task(&traced), &start, Memory::default()).unwrap();
+    let baked = Baked::new(scene, &options).unwrap().keep_targets().unwrap();
+    let (made, groups) = DeviceSamples::new(gpu, Content::of(&baked)).unwrap();
+    let (made, drawn) = (Arc::new(made), baked.clone().observe(groups).unwrap());
+    let traced = baked.sample().unwrap().observe().unwrap();
+    let start: Point = traced.start();
+    let ours = GpuEngine::over_device_samples(made, drawn.task(), &start, Memory::default()).unwrap();
+    let theirs = GpuEngine::new(gpu, traced.task(), &start, Memory::default()).unwrap();
     let [ours, theirs] =
         [&ours, &theirs].map(|engine| fit(engine, &start, &FitOptions::default(), &mut |_| {}).unwrap());
     let what = scene.display();
@@ -318,27 +303,22 @@ fn fits_over_them_end_where_those_over_the_cpus_do() {
 #[test]
 fn what_cannot_be_made_is_refused() {
     let Some(gpu) = gpu() else { return };
-    let mut prepared = prepared(&built_in(), SURFACE, SIZE);
-    let (made, groups) = DeviceSamples::new(gpu, content(&prepared)).unwrap();
-    let views = observed(&prepared, groups);
-    let task = Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views: &views,
-        loss: prepared.scene.fit.loss,
-        unknowns: Vec::new(),
-    };
+    let baked = baked(&built_in(), SURFACE, SIZE);
+    let (made, groups) = DeviceSamples::new(gpu, Content::of(&baked)).unwrap();
+    let views = observed(&baked, groups);
+    let task = Task { unknowns: Vec::new(), ..baked.task_over(views) };
     let memory = Memory { part: None, resident: Some(1000) };
-    let refused = GpuEngine::over_device_samples(&made, task, &prepared.start(), memory).map(|_| ());
+    let refused = GpuEngine::over_device_samples(Arc::new(made), task, &baked.start(), memory).map(|_| ());
     assert!(matches!(refused, Err(GpuError::SamplesStay { most: 1000, .. })), "{refused:?}");
     let words = refused.unwrap_err().to_string();
     assert!(words.contains("1000 may stay there"), "{words}");
-    let refusal = |prepared: &Prepared| DeviceSamples::new(gpu, content(prepared)).map(|_| ()).unwrap_err();
-    let camera = &mut prepared.scene.views[0].camera;
-    camera.world_to_camera = glam::DMat4::from_rotation_y(3.1) * camera.world_to_camera;
-    let error = refusal(&prepared);
+    let refusal = |baked: &Baked| DeviceSamples::new(gpu, Content::of(baked)).map(|_| ()).unwrap_err();
+    let baked = baked.with_scene(|scene| {
+        let camera = &mut scene.views[0].camera;
+        camera.world_to_camera = glam::DMat4::from_rotation_y(3.1) * camera.world_to_camera;
+    });
+    let error = refusal(&baked);
     assert!(matches!(error, DeviceSampleError::Samples(SampleError::NothingVisible { .. })), "{error}");
-    prepared.scene.mesh.uvs.clear();
-    let error = refusal(&prepared);
+    let error = refusal(&baked.with_scene(|scene| scene.mesh.uvs.clear()));
     assert!(matches!(error, DeviceSampleError::Samples(SampleError::NoUvs { .. })), "{error}");
 }

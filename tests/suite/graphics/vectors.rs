@@ -1,5 +1,7 @@
 //! The conformance vectors through the shader rules' WGSL, on a graphics adapter.
 
+use std::sync::Arc;
+
 use glam::{Mat4, Vec2, Vec3, Vec4};
 use skinfit::bake::Illumination;
 use skinfit::bake::{LobeStack, VertexOcclusion};
@@ -53,18 +55,18 @@ fn check(what: &str, got: &[f32], want: &Node<'_>) {
     want.vector.tolerances().single.times(4.0).check(what, &got, want);
 }
 
-fn illumination(vectors: &Vectors, file: &Node<'_>) -> Illumination {
+fn illumination(vectors: &Vectors, file: &Node<'_>) -> Arc<Illumination> {
     let cube = |which: &str| cube::<f32>(vectors, file, which);
-    Illumination {
+    Arc::new(Illumination {
         irradiance: Some(cube("diffuse")),
         lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![cube("spec")] }),
         hilite: Some(cube("hilite")),
-    }
+    })
 }
 
-fn run(gpu: &Gpu, probe: &Probe, light: &Illumination, params: &Params, given: &[f64]) -> Vec<f32> {
-    let scene = bare_scene(EFFECTS);
-    let content = Content { scene: &scene, illumination: light, occlusion: None, params };
+fn run(gpu: &Gpu, probe: &Probe, light: Arc<Illumination>, params: &Params, given: &[f64]) -> Vec<f32> {
+    let scene = Arc::new(bare_scene(EFFECTS));
+    let content = Content { scene, illumination: light, occlusion: None, params: params.clone() };
     let given: Vec<f32> = given.iter().map(|&x| x as f32).collect();
     evaluate(gpu, probe, content, &block(probe, params, [0.0; 3], &[]), &given).unwrap()
 }
@@ -120,7 +122,7 @@ fn fragment(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>, form: Form) {
     item.extend([s[0], s[2], if form == Form::Corrected { s[3].max(0.0) } else { s[3] }]);
     item.extend(inputs.at("skinColor").three());
     item.extend([texel[3], inputs.at("hiLightAttenuator").number()]);
-    let got = run(gpu, &probe, &illumination(vectors, file), &params, &item);
+    let got = run(gpu, &probe, illumination(vectors, file), &params, &item);
     check("n", &got[..3], &want.at("n"));
     check("reflection", &got[3..6], &want.at("reflVect"));
     if form == Form::Corrected {
@@ -140,7 +142,7 @@ fn rim(gpu: &Gpu, file: &Node<'_>) {
     for exponent in file.at("inputs").at("exponent").numbers() {
         let mut params = Params::defaults(Form::Corrected);
         params.set(Param::RimExponent, exponent);
-        let column = run(gpu, &probe, &Illumination::default(), &params, &z);
+        let column = run(gpu, &probe, Arc::default(), &params, &z);
         got.iter_mut().zip(column).for_each(|(row, x)| row.push(x));
     }
     check("rim", &got.concat(), &file.at("expected").at("rim"));
@@ -152,7 +154,7 @@ fn cube_sample(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>) {
     let facts = facts(Form::Corrected, Silhouette::Fragment);
     let probe = Probe::new(&facts, Domain::Fragment, &given, &wanted).unwrap();
     let directions = file.at("inputs").at("directions").numbers();
-    let got = run(gpu, &probe, &illumination(vectors, file), &Params::defaults(Form::Corrected), &directions);
+    let got = run(gpu, &probe, illumination(vectors, file), &Params::defaults(Form::Corrected), &directions);
     check("seamless lookups", &got, &file.at("expected").at("seamless"));
 }
 
@@ -183,7 +185,7 @@ fn bench(gpu: &Gpu, vectors: &Vectors, file: &Node<'_>) {
         items.extend(g.at("c").item(i).three());
         items.extend([one("p"), one("a")]);
     }
-    let got = run(gpu, &probe, &illumination(vectors, file), &params, &items);
+    let got = run(gpu, &probe, illumination(vectors, file), &params, &items);
     let rgba =
         got.chunks(PARTS.iter().map(|(_, kind)| if *kind == "f32" { 1 } else { 3 }).sum()).flat_map(|p| {
             let channel = |c: usize| p[7 + c] + p[10 + c] + p[13 + c] + p[16 + c];
@@ -239,9 +241,12 @@ fn vertex(gpu: &Gpu, file: &Node<'_>) {
     let probe = Probe::new(&facts, Domain::Vertex, &[], &wanted).unwrap();
     let scene = skinfit::scene::Scene { mesh, ..bare_scene(EFFECTS) };
     let params = Params::defaults(Form::Corrected);
-    let light = Illumination::default();
-    let content =
-        Content { scene: &scene, illumination: &light, occlusion: Some(&occlusion), params: &params };
+    let content = Content {
+        scene: Arc::new(scene),
+        illumination: Arc::default(),
+        occlusion: Some(Arc::new(occlusion)),
+        params: params.clone(),
+    };
     let mut given = Vec::new();
     for (name, _) in &probe.given {
         match *name {

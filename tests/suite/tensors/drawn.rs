@@ -8,28 +8,23 @@ use skinfit::gpu::upload::Content;
 use skinfit::gpu::{Choice, Gpu};
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::model::params::{Column, Param};
-use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::prepare::{Baked, Loaded, PrepareOptions};
 use skinfit::samples::ViewSamples;
 use skinfit::tensor::{Input, Inputs, Scatter, Shade, Shaded, TensorError};
 
 use super::bench::{numbers, shared};
 
 /// Two views of the built-in scene, small, with the scene's own effects or others.
-fn small(effects: Option<Effects>) -> Prepared {
+fn small(effects: Option<Effects>) -> Baked {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
     let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
     let options = PrepareOptions { effects, cache: Some(cache), ..PrepareOptions::default() };
-    let mut prepared = Prepared::baked(&scene, &options).unwrap();
-    prepared.scene.views.truncate(2);
-    for view in &mut prepared.scene.views {
+    let mut loaded = Loaded::read(&scene, &options).unwrap();
+    loaded.scene.views.truncate(2);
+    for view in &mut loaded.scene.views {
         (view.camera.width, view.camera.height) = (64, 48);
     }
-    prepared
-}
-
-fn content(prepared: &Prepared) -> Content<'_> {
-    let Prepared { scene, illumination, occlusion, .. } = prepared;
-    Content { scene, illumination, occlusion: occlusion.as_ref(), params: &scene.params }
+    loaded.bake().unwrap()
 }
 
 #[test]
@@ -37,11 +32,11 @@ fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded()
     let Some(shared) = shared() else { return };
     // With all that the scene shows, and with little: records and tensors hold what is asked for alone.
     for effects in [None, Some(Effects::of(&[Effect::Diffuse, Effect::Rim]))] {
-        let prepared = small(effects);
-        let asked = |param: &Param| param.asked_for(prepared.setup().effects);
+        let baked = small(effects);
+        let asked = |param: &Param| param.asked_for(baked.setup().effects);
         let free = [Param::BaseWeight, Param::RimExponent, Param::Occlusion].into_iter().filter(asked);
         let columns: Vec<Column> = free.map(Column::tied).collect();
-        let (made, groups) = DeviceSamples::new(shared.gpu(), content(&prepared)).unwrap();
+        let (made, groups) = DeviceSamples::new(shared.gpu(), Content::of(&baked)).unwrap();
         let read: Vec<ViewSamples> = groups
             .iter()
             .enumerate()
@@ -49,10 +44,10 @@ fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded()
             .collect();
         let (groups, read): (Vec<_>, Vec<_>) = (groups.iter().collect(), read.iter().collect());
         let shaded = Shaded {
-            setup: prepared.setup(),
-            params: &prepared.scene.params,
+            setup: baked.setup(),
+            params: &baked.scene.params,
             columns: &columns,
-            illumination: &prepared.illumination,
+            illumination: &baked.illumination,
         };
         let image_and_gradients = |(shade, mut inputs): (Shade, Inputs)| {
             let track = |tensor: burn::tensor::Tensor<2>| tensor.autodiff().require_grad();
@@ -90,14 +85,14 @@ fn drawn_samples_give_the_image_and_the_gradients_of_the_same_samples_uploaded()
 #[test]
 fn samples_of_another_device_and_other_views_are_refused_in_words() {
     let Some(shared) = shared() else { return };
-    let prepared = small(Some(Effects::SURFACE));
+    let baked = small(Some(Effects::SURFACE));
     let other = Gpu::open(&Choice::default()).unwrap();
-    let (made, groups) = DeviceSamples::new(&other, content(&prepared)).unwrap();
+    let (made, groups) = DeviceSamples::new(&other, Content::of(&baked)).unwrap();
     let shaded = Shaded {
-        setup: prepared.setup(),
-        params: &prepared.scene.params,
+        setup: baked.setup(),
+        params: &baked.scene.params,
         columns: &[],
-        illumination: &prepared.illumination,
+        illumination: &baked.illumination,
     };
     let groups: Vec<_> = groups.iter().collect();
     let refused = |refused: Result<(), TensorError>, words: &str| {
@@ -105,11 +100,11 @@ fn samples_of_another_device_and_other_views_are_refused_in_words() {
         assert!(matches!(error, TensorError::Foreign { what: "the samples", .. }), "{error:?}");
         assert!(error.to_string().contains(words), "{error}");
     };
-    let over = |made: &DeviceSamples<'_>, groups: &[&ViewSamples]| {
+    let over = |made: &DeviceSamples, groups: &[&ViewSamples]| {
         Shade::over_device_samples(shared, &shaded, made, groups, Scatter::Exact).map(|_| ())
     };
     refused(over(&made, &groups), "another device");
-    let (made, _) = DeviceSamples::new(shared.gpu(), content(&prepared)).unwrap();
+    let (made, _) = DeviceSamples::new(shared.gpu(), Content::of(&baked)).unwrap();
     refused(over(&made, &groups[..1]), "came with them");
     refused(Shade::new(shared, &shaded, &groups, Scatter::Exact).map(|_| ()), "without a surface");
 }

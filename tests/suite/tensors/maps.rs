@@ -4,6 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
+use skinfit::bake::{Illumination, VertexOcclusion};
 use skinfit::demo;
 use skinfit::engine::Unknown;
 use skinfit::engine::view::ObservedView;
@@ -11,15 +12,16 @@ use skinfit::maps::layer::{Layer, LayerParts};
 use skinfit::maps::parts::Cut;
 use skinfit::maps::problem::read;
 use skinfit::maps::{FittedMaps, Grid, MapError, MapTask, fit_maps};
+use skinfit::model::cube::Cube;
 use skinfit::model::effects::Effect;
 use skinfit::model::params::{Column, Param};
-use skinfit::prepare::{PrepareOptions, Prepared};
+use skinfit::prepare::{Baked, Loaded, PrepareOptions};
 use skinfit::render::shade::Shader;
-use skinfit::samples::{LANES, TargetRows, ViewSamples, sample_views};
+use skinfit::samples::{LANES, TargetRows, ViewSamples};
 use skinfit::scene::maps::Map;
 use skinfit::scene::mesh::PosedMesh;
 use skinfit::scene::view::{Target, View};
-use skinfit::scene::{Loss, MapKind, MapPrior, MapSolver};
+use skinfit::scene::{Loss, MapKind, MapPrior, MapSolver, Scene};
 use skinfit::tensor::Input;
 use skinfit::tensor::footprint::{texel_pairs, texels};
 
@@ -30,34 +32,44 @@ const PIXELS: u32 = 96;
 const TEXELS: usize = 48;
 
 /// The built-in scene, small: its first view, and maps of a few texels.
-fn small() -> Prepared {
+fn small() -> Baked {
     small_of(1)
 }
 
 /// Of so many views.
-fn small_of(views: usize) -> Prepared {
+fn small_of(views: usize) -> Baked {
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
     let scene = demo::kept_scene(&cache, Some(&cache)).unwrap();
     let options = PrepareOptions { cache: Some(cache), ..PrepareOptions::default() };
-    let mut prepared = Prepared::baked(&scene, &options).unwrap();
-    prepared.scene.views.truncate(views);
-    prepared.gains.truncate(views);
-    for View { camera, .. } in &mut prepared.scene.views {
+    let mut loaded = Loaded::read(&scene, &options).unwrap();
+    loaded.gains.truncate(views);
+    let scene = &mut loaded.scene;
+    scene.views.truncate(views);
+    for View { camera, .. } in &mut scene.views {
         (camera.width, camera.height) = (PIXELS, PIXELS);
     }
-    let maps = &mut prepared.scene.maps;
+    let maps = &mut scene.maps;
     maps.color = maps.color.as_ref().map(shrunk);
     maps.specular = maps.specular.as_ref().map(shrunk);
     maps.attenuator = maps.attenuator.as_ref().map(shrunk);
-    prepared.scene.fit.loss = Loss::L2;
-    prepared.scene.fit.maps.rounds = 1;
-    prepared.scene.fit.maps.steps = 30;
+    scene.fit.loss = Loss::L2;
+    scene.fit.maps.rounds = 1;
+    scene.fit.maps.steps = 30;
     for kind in MapKind::ALL {
         // Next to nothing is held: what the images say is to be found.
-        let prior = prepared.scene.fit.maps.prior(kind);
-        prepared.scene.fit.maps.set_prior(kind, MapPrior { smoothness: 0.0, closeness: 1e-9, ..prior });
+        let prior = scene.fit.maps.prior(kind);
+        scene.fit.maps.set_prior(kind, MapPrior { smoothness: 0.0, closeness: 1e-9, ..prior });
     }
-    prepared
+    loaded.bake().unwrap()
+}
+
+/// The scene with a colour map of so many times its radiance.
+fn darkened(baked: Baked, factor: f32) -> Baked {
+    baked.with_scene(|scene| darken(&mut scene.maps.color, factor))
+}
+
+fn darken<const C: usize>(map: &mut Option<Map<C>>, factor: f32) {
+    map.as_mut().unwrap().texels.iter_mut().for_each(|texel| *texel = texel.map(|x| factor * x));
 }
 
 /// Means of squares of texels.
@@ -71,12 +83,12 @@ fn shrunk<const C: usize>(map: &Map<C>) -> Map<C> {
     Map { width: TEXELS, height: TEXELS, texels: (0..TEXELS * TEXELS).map(mean).collect() }
 }
 
-fn sampled(prepared: &Prepared) -> Vec<ViewSamples> {
-    sample_views(&prepared.scene, &prepared.scene.mesh.pose(), prepared.occlusion.as_ref()).unwrap()
+fn sampled(baked: &Baked) -> Vec<ViewSamples> {
+    baked.clone().sample().unwrap().samples
 }
 
 /// What the scene looks like as it is, to be met by the samples of another.
-fn targets(truth: &Prepared) -> Vec<(View, Target)> {
+fn targets(truth: &Baked) -> Vec<(View, Target)> {
     let shader = Shader::new(truth.setup(), &truth.illumination, &truth.scene.params).unwrap();
     let samples = sampled(truth);
     (truth.scene.views.iter().zip(&samples))
@@ -89,7 +101,7 @@ fn targets(truth: &Prepared) -> Vec<(View, Target)> {
         .collect()
 }
 
-fn observed(changed: &Prepared, targets: &[(View, Target)]) -> Vec<ObservedView> {
+fn observed(changed: &Baked, targets: &[(View, Target)]) -> Vec<ObservedView> {
     (sampled(changed).into_iter().zip(targets))
         .map(|(samples, (view, target))| {
             let view = View { target: Some(target.clone()), ..view.clone() };
@@ -101,8 +113,8 @@ fn observed(changed: &Prepared, targets: &[(View, Target)]) -> Vec<ObservedView>
 
 /// The constants held, and the changed scene's maps fitted to images of the true one.
 fn fit(
-    truth: &Prepared,
-    changed: &Prepared,
+    truth: &Baked,
+    changed: &Baked,
     kind: MapKind,
     open: Option<Vec<f32>>,
 ) -> Result<FittedMaps, MapError> {
@@ -114,7 +126,7 @@ fn fit(
 
 /// The maps of `changed` to be fitted to what was observed, its constants held.
 fn task<'a>(
-    changed: &'a Prepared,
+    changed: &'a Baked,
     posed: &'a PosedMesh,
     observed: Vec<ObservedView>,
     kind: MapKind,
@@ -148,11 +160,12 @@ fn a_changed_colour_map_is_found_again() {
     if shared().is_none() {
         return;
     }
-    let (truth, mut changed) = (small(), small());
-    let map = changed.scene.maps.color.as_mut().unwrap();
-    for (i, texel) in map.texels.iter_mut().enumerate() {
-        *texel = texel.map(|x| (0.9 * x * wavy(i)).min(1.0));
-    }
+    let truth = small();
+    let changed = small().with_scene(|scene| {
+        for (i, texel) in scene.maps.color.as_mut().unwrap().texels.iter_mut().enumerate() {
+            *texel = texel.map(|x| (0.9 * x * wavy(i)).min(1.0));
+        }
+    });
     let (seen, start) = (sampled(&truth).remove(0), sampled(&changed).remove(0));
     let fitted = fit(&truth, &changed, MapKind::Color, None).unwrap();
     let before = difference(&seen, &start, albedo);
@@ -176,37 +189,28 @@ fn every_kind_of_map_explains_what_was_changed_in_it() {
     }
     let truth = small();
     for kind in MapKind::ALL {
-        let mut changed = small();
-        let mut open = None;
-        match kind {
-            MapKind::Color => changed
-                .scene
-                .maps
-                .color
-                .as_mut()
-                .unwrap()
-                .texels
-                .iter_mut()
-                .for_each(|t| *t = t.map(|x| 0.8 * x)),
-            MapKind::Specular => {
-                changed.scene.maps.specular.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6);
-            }
-            MapKind::Attenuator => {
-                changed.scene.maps.attenuator.as_mut().unwrap().texels.iter_mut().for_each(|t| t[0] *= 0.6);
-            }
+        let (baked, mut open) = (small(), None);
+        let changed = match kind {
+            MapKind::Color => darkened(baked, 0.8),
+            MapKind::Specular => baked.with_scene(|scene| darken(&mut scene.maps.specular, 0.6)),
+            MapKind::Attenuator => baked.with_scene(|scene| darken(&mut scene.maps.attenuator, 0.6)),
             MapKind::Occlusion => {
-                let base = &mut changed.occlusion.as_mut().unwrap().base;
-                base.iter_mut().for_each(|o| *o *= 0.8);
-                let weights: Vec<f32> = changed.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
-                open = changed.occlusion.as_ref().map(|occlusion| occlusion.posed(&weights));
+                let mut occlusion = VertexOcclusion::clone(baked.occlusion.as_ref().unwrap());
+                occlusion.base.iter_mut().for_each(|o| *o *= 0.8);
+                let weights: Vec<f32> = baked.scene.mesh.morphs.iter().map(|morph| morph.weight).collect();
+                open = Some(occlusion.posed(&weights));
+                Baked { occlusion: Some(Arc::new(occlusion)), ..baked }
             }
             MapKind::Environment => {
-                let dim = |cube: &skinfit::model::cube::Cube<f32>| cube.map(|texel| texel.map(|x| 0.8 * x));
-                let light = &mut changed.illumination;
-                light.irradiance = light.irradiance.as_ref().map(dim);
-                light.hilite = light.hilite.as_ref().map(dim);
+                let dim = |cube: &Cube<f32>| cube.map(|texel| texel.map(|x| 0.8 * x));
+                let light = Illumination {
+                    irradiance: baked.illumination.irradiance.as_ref().map(dim),
+                    hilite: baked.illumination.hilite.as_ref().map(dim),
+                    lobes: baked.illumination.lobes.clone(),
+                };
+                Baked { illumination: Arc::new(light), ..baked }
             }
-        }
+        };
         let fitted = fit(&truth, &changed, kind, open).unwrap();
         let (first, last) =
             (fitted.history[0].before, fitted.history.iter().rfind(|s| s.what != "constants").unwrap().after);
@@ -224,11 +228,12 @@ fn conjugate_gradients_and_adam_go_to_the_same_place() {
     if shared().is_none() {
         return;
     }
-    let (truth, mut changed) = (small(), small());
-    changed.scene.maps.color.as_mut().unwrap().texels.iter_mut().for_each(|t| *t = t.map(|x| 0.9 * x));
+    let (truth, changed) = (small(), darkened(small(), 0.9));
     let by_cg = fit(&truth, &changed, MapKind::Color, None).unwrap();
-    changed.scene.fit.maps.solver = MapSolver::Adam;
-    changed.scene.fit.maps.steps = 200;
+    let changed = changed.with_scene(|scene| {
+        scene.fit.maps.solver = MapSolver::Adam;
+        scene.fit.maps.steps = 200;
+    });
     let by_adam = fit(&truth, &changed, MapKind::Color, None).unwrap();
     let apart = difference(&by_cg.observed[0].samples, &by_adam.observed[0].samples, albedo);
     let moved = difference(&by_cg.observed[0].samples, &sampled(&changed)[0], albedo);
@@ -241,15 +246,16 @@ fn bounds_and_priors_hold() {
     if shared().is_none() {
         return;
     }
-    let (truth, mut changed) = (small(), small());
-    changed.scene.maps.color.as_mut().unwrap().texels.iter_mut().for_each(|t| *t = t.map(|x| 0.5 * x));
+    let (truth, changed) = (small(), darkened(small(), 0.5));
     let prior = changed.scene.fit.maps.prior(MapKind::Color);
-    changed.scene.fit.maps.set_prior(MapKind::Color, MapPrior { upper: 0.25, ..prior });
+    let with_prior =
+        |baked: Baked, prior| baked.with_scene(|scene| scene.fit.maps.set_prior(MapKind::Color, prior));
+    let changed = with_prior(changed, MapPrior { upper: 0.25, ..prior });
     let fitted = fit(&truth, &changed, MapKind::Color, None).unwrap();
     let now = read(fitted.layers[0].value.clone()).unwrap();
     assert!(now.iter().all(|x| (0.0..=0.25).contains(x)));
     assert!(now.iter().filter(|&&x| x == 0.25).count() > 100, "the bound is not met");
-    changed.scene.fit.maps.set_prior(MapKind::Color, MapPrior { closeness: 1e6, ..prior });
+    let changed = with_prior(changed, MapPrior { closeness: 1e6, ..prior });
     let held = fit(&truth, &changed, MapKind::Color, None).unwrap();
     let (then, now) =
         (read(held.layers[0].start.clone()).unwrap(), read(held.layers[0].value.clone()).unwrap());
@@ -258,11 +264,12 @@ fn bounds_and_priors_hold() {
 }
 
 /// Two views of a scene whose colour map is darker than in the targets.
-fn darker() -> (Prepared, Vec<(View, Target)>) {
-    let (truth, mut changed) = (small_of(2), small_of(2));
-    changed.scene.maps.color.as_mut().unwrap().texels.iter_mut().for_each(|t| *t = t.map(|x| 0.9 * x));
-    changed.scene.fit.maps.rounds = 2;
-    changed.scene.fit.maps.steps = 3;
+fn darker() -> (Baked, Vec<(View, Target)>) {
+    let truth = small_of(2);
+    let changed = darkened(small_of(2), 0.9).with_scene(|scene| {
+        scene.fit.maps.rounds = 2;
+        scene.fit.maps.steps = 3;
+    });
     let targets = targets(&truth);
     (changed, targets)
 }
@@ -394,10 +401,8 @@ fn a_map_that_nothing_reads_is_refused() {
     if shared().is_none() {
         return;
     }
-    let (truth, mut changed) = (small(), small());
-    changed.scene.effects = changed.scene.effects.without(Effect::SideSpecular);
-    let truth =
-        Prepared { scene: skinfit::scene::Scene { effects: changed.scene.effects, ..truth.scene }, ..truth };
+    let without = |scene: &mut Scene| scene.effects = scene.effects.without(Effect::SideSpecular);
+    let (truth, changed) = (small().with_scene(without), small().with_scene(without));
     let Err(error) = fit(&truth, &changed, MapKind::Specular, None) else { panic!("it was fitted") };
     assert!(error.to_string().contains("side_specular"), "{error}");
 }

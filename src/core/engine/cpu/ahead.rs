@@ -15,7 +15,7 @@ use std::marker::PhantomData;
 use fearless_simd::SimdBase;
 
 use super::block::Block;
-use super::pass::{Fitted, facts};
+use super::pass::Fitted;
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
@@ -133,7 +133,7 @@ impl Plan {
     pub(super) fn facts(&self) -> Facts {
         // Lookups take the size from the cube; the rules' text wants some number.
         let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1) };
-        facts(self.setup(), any, self.turned())
+        Facts::of_samples(self.setup(), any, self.turned())
     }
 }
 

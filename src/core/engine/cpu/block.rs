@@ -59,8 +59,8 @@ impl<'a> Block<'a> {
                     let rows = self.stream(stream).rows;
                     &rows[first_neutral(rows, place)..]
                 }
-                // They are read by [`Self::kept`], and by no tape.
-                StreamOf::Kept | StreamOf::Targets => &[],
+                // They are read by [`Self::kept`], and by no tape; no effect that is compiled ahead has texels.
+                StreamOf::Kept | StreamOf::Targets | StreamOf::Levels => &[],
             }
         })
     }

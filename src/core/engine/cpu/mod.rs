@@ -10,7 +10,7 @@
 //! - `ahead`: plans whose tapes are compiled ahead; `block`: what their functions read
 //! - `code`: other tapes as the code of a machine that has an accumulator; `machine`: that machine, on SIMD
 //! - `view_pass`: a view's blocks of records, from tapes' outputs to sums
-//! - `lobe`: the specular cube of the last exponent
+//! - `lobe`: the specular cube of the last exponent; what is computed in texels is [`super::levels`]'
 //! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
 
 mod ahead;
@@ -30,17 +30,17 @@ use rayon::prelude::*;
 
 use self::block::neutral_rows;
 use self::lobe::Lobe;
-use self::machine::{BATCH, Bound, File};
+use self::machine::{BATCH, Bound, File, Stream};
 use self::pass::{Fitted, Pass, Reading};
 use self::sums::{CHUNK, Sums, Wish, by_chunk, pairwise};
-use self::view_pass::{ViewPass, streams, with_scratch};
+use self::view_pass::{Beside, ViewPass, streams, with_scratch};
 use super::gram::pair;
 use super::pulls::{Gathered, Pulls};
+use super::rules::CubesAt;
 use super::view::ObservedView;
-use super::{BLOCK, NormalEquations, Objective, Point, Unknown};
+use super::{BLOCK, Engine, EngineError, NormalEquations, Objective, Point, Task, Unknown};
 use crate::bake::Illumination;
 use crate::model::cube::Cube;
-use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::program::shading::ShadingError;
 use crate::samples::LANES;
@@ -51,8 +51,8 @@ use crate::with_simd;
 /// Loss, gradient and normal equations on the CPU, of whatever rules the planner chose.
 #[derive(Debug)]
 pub struct CpuEngine {
-    illumination: Illumination,
-    views: Vec<ObservedView>,
+    illumination: Arc<Illumination>,
+    views: Arc<[ObservedView]>,
     fitted: Fitted,
     loss: Loss,
     level: Level,
@@ -66,6 +66,7 @@ pub struct CpuEngine {
     dark: Cube<f32>,
     lobe: Mutex<Option<Arc<Lobe>>>,
     kept: Mutex<Option<Arc<Kept>>>,
+    looked_up: Mutex<Option<Arc<LookedUp>>>,
     /// Why a pass could not be made.
     fault: OnceLock<String>,
 }
@@ -80,33 +81,48 @@ struct Kept {
     views: Vec<Vec<Row>>,
 }
 
+/// What samples look up of the UV atlas, and what that was made with.
+#[derive(Debug)]
+struct LookedUp {
+    turned: bool,
+    made_with: Vec<f64>,
+    /// For each view, rows of each record.
+    views: Vec<Vec<Row>>,
+}
+
+/// What a pass at a point reads beside samples.
+struct Ready {
+    pass: Arc<Pass>,
+    lobe: Option<Arc<Lobe>>,
+    looked_up: Option<Arc<LookedUp>>,
+    kept: Arc<Kept>,
+}
+
+impl Ready {
+    fn beside(&self, view: usize) -> Beside<'_> {
+        let looked_up = self.looked_up.as_ref().map_or(&[][..], |found| &found.views[view]);
+        Beside {
+            kept: Stream { rows: &self.kept.views[view], stride: self.pass.kept },
+            levels: Stream { rows: looked_up, stride: self.pass.levels.rows() },
+        }
+    }
+}
+
 impl CpuEngine {
-    /// An engine over `views` for the `unknowns`.
+    /// An engine for a task.
     ///
     /// # Errors
     /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
-    pub fn new(
-        setup: Setup,
-        illumination: Illumination,
-        views: Vec<ObservedView>,
-        loss: Loss,
-        unknowns: Vec<Unknown>,
-    ) -> Result<Self, ShadingError> {
-        Self::with_kept_terms(setup, illumination, views, loss, unknowns, true)
+    pub fn new(task: Task) -> Result<Self, ShadingError> {
+        Self::with_kept_terms(task, true)
     }
 
     /// As [`Self::new`]; with `keep` false every number is computed anew in each pass.
     ///
     /// # Errors
     /// As of [`Self::new`].
-    pub fn with_kept_terms(
-        setup: Setup,
-        illumination: Illumination,
-        views: Vec<ObservedView>,
-        loss: Loss,
-        unknowns: Vec<Unknown>,
-        keep: bool,
-    ) -> Result<Self, ShadingError> {
+    pub fn with_kept_terms(task: Task, keep: bool) -> Result<Self, ShadingError> {
+        let Task { setup, illumination, views, loss, unknowns } = task;
         let mut fitted = Fitted::new(setup, unknowns, &views);
         fitted.keep = keep;
         fitted.faces = super::face_sizes(&illumination);
@@ -124,6 +140,7 @@ impl CpuEngine {
             dark: Cube::from_fn(1, |_, _, _| [0.0; 4]),
             lobe: Mutex::default(),
             kept: Mutex::default(),
+            looked_up: Mutex::default(),
             fault: OnceLock::new(),
         };
         engine.set_stride(1);
@@ -131,7 +148,10 @@ impl CpuEngine {
         if !engine.turns() {
             engine.pass_for(false)?;
         }
-        engine.pass_for(true)?;
+        let pass = engine.pass_for(true)?;
+        for view in engine.views.iter() {
+            pass.levels.check(setup.effects, &view.samples)?;
+        }
         Ok(engine)
     }
 
@@ -139,7 +159,7 @@ impl CpuEngine {
     pub fn set_stride(&mut self, stride: usize) {
         self.stride = stride.max(1);
         self.weight = (0.0, 0);
-        for view in &self.views {
+        for view in self.views.iter() {
             let groups = view.samples.groups();
             let read = self.read_blocks(view).flat_map(|b| b * BLOCK..groups.min((b + 1) * BLOCK));
             let (weight, count) = view.weight_and_count(read);
@@ -158,7 +178,7 @@ impl CpuEngine {
 
     /// The views.
     #[must_use]
-    pub fn views(&self) -> &[ObservedView] {
+    pub const fn views(&self) -> &Arc<[ObservedView]> {
         &self.views
     }
 
@@ -208,6 +228,43 @@ impl CpuEngine {
         let pass = Arc::new(pass.inspect_err(|error| drop(self.fault.set(error.to_string())))?);
         passes.insert(turned, Arc::clone(&pass));
         Ok(pass)
+    }
+
+    /// All that a pass at `point` reads beside samples.
+    fn ready(&self, point: &Point) -> Result<Ready, ShadingError> {
+        let turned = self.turned(point);
+        let pass = self.pass_for(turned)?;
+        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let looked_up = self.looked_up(&pass, turned, point);
+        let kept = self.kept(&pass, turned, point, lobe.as_deref());
+        Ok(Ready { pass, lobe, looked_up, kept })
+    }
+
+    /// What samples look up of the UV atlas, made again where a number differs that it is made with; `None` where nothing
+    /// is computed there.
+    fn looked_up(&self, pass: &Pass, turned: bool, point: &Point) -> Option<Arc<LookedUp>> {
+        if pass.levels.rows() == 0 {
+            return None;
+        }
+        let made_with = pass.levels.made_with(&point.params);
+        let mut slot = self.looked_up.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |found: &&Arc<LookedUp>| found.turned == turned && found.made_with == made_with;
+        if let Some(found) = slot.as_ref().filter(same) {
+            return Some(Arc::clone(found));
+        }
+        let params = &point.params;
+        let cubes = || CubesAt::new(&self.illumination, params, |x| x);
+        let views = self.views.iter().map(|view| pass.levels.look_up(&view.samples, params, cubes, Row::of));
+        let found = Arc::new(LookedUp { turned, views: views.collect(), made_with });
+        *slot = Some(Arc::clone(&found));
+        Some(found)
+    }
+
+    /// How often levels of the UV atlas were made: once for as long as nothing changes that moves them.
+    #[must_use]
+    pub fn levels_made(&self) -> u64 {
+        let passes = self.passes.lock().unwrap_or_else(PoisonError::into_inner);
+        passes.values().map(|pass| pass.levels.count()).sum()
     }
 
     fn lobe(&self, exponent: f64) -> Option<Arc<Lobe>> {
@@ -262,7 +319,8 @@ impl CpuEngine {
             return kept;
         }
         let bound = self.bound(&pass.keep, point, lobe);
-        let streams = streams(observed, &[], 0, &self.neutral);
+        let none = Stream { rows: &[], stride: 0 };
+        let streams = streams(observed, Beside { kept: none, levels: none }, &self.neutral);
         let size = BLOCK * CHUNK;
         kept.par_chunks_mut(stride * size).enumerate().for_each_init(File::default, |file, (chunk, rows)| {
             file.prepare(&bound);
@@ -285,15 +343,14 @@ impl CpuEngine {
     fn view_pass<'a>(
         &'a self,
         (reading, read): (&'a Reading, &'a [usize]),
-        (kept, stride): (&'a [Row], usize),
+        ready: &'a Ready,
         point: &Point,
         view: usize,
-        lobe: Option<&'a Lobe>,
     ) -> ViewPass<'a> {
         ViewPass {
             view: &self.views[view],
-            streams: streams(&self.views[view], kept, stride, &self.neutral),
-            bound: self.bound(reading, point, lobe),
+            streams: streams(&self.views[view], ready.beside(view), &self.neutral),
+            bound: self.bound(reading, point, ready.lobe.as_deref()),
             read,
             loss: self.loss,
             gain: point.gains.get(view).copied().unwrap_or(1.0) as f32,
@@ -311,13 +368,9 @@ impl CpuEngine {
 
     /// As [`Self::image`], into the planes of an earlier image: memory that is new costs more than the pass.
     pub fn image_into(&self, index: usize, point: &Point, planes: &mut Vec<Vec<f32>>) {
-        let turned = self.turned(point);
-        let Ok(pass) = self.pass_for(turned) else { return };
-        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
-        let kept = self.kept(&pass, turned, point, lobe.as_deref());
-        let kept = (&kept.views[index][..], pass.kept);
+        let Ok(ready) = self.ready(point) else { return };
         let channels: Vec<usize> = (0..self.fitted.channels).collect();
-        let of_view = self.view_pass((&pass.value, &channels), kept, point, index, lobe.as_deref());
+        let of_view = self.view_pass((&ready.pass.value, &channels), &ready, point, index);
         let groups = of_view.view.samples.groups();
         planes.resize_with(channels.len(), Vec::new);
         planes.iter_mut().for_each(|plane| plane.resize(groups * LANES, 0.0));
@@ -341,18 +394,15 @@ impl CpuEngine {
             jtr: vec![0.0; k],
             jtj: vec![0.0; k * k],
         };
-        let turned = self.turned(point);
-        let Ok(pass) = self.pass_for(turned) else {
+        let Ok(ready) = self.ready(point) else {
             total.loss = f64::NAN;
             return total;
         };
-        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
-        let kept = self.kept(&pass, turned, point, lobe.as_deref());
+        let pass = &*ready.pass;
         let every: Vec<usize> = (0..channels).collect();
         let of = if wish == Wish::Loss { (&pass.value, &every[..]) } else { (&pass.moved, &pass.read[..]) };
         for view in 0..self.views.len() {
-            let kept = (&kept.views[view][..], pass.kept);
-            let of_view = self.view_pass(of, kept, point, view, lobe.as_deref());
+            let of_view = self.view_pass(of, &ready, point, view);
             let blocks: Vec<usize> = self.read_blocks(&self.views[view]).collect();
             let sums: Vec<Sums> = blocks
                 .par_chunks(CHUNK)
@@ -364,7 +414,7 @@ impl CpuEngine {
                     })
                 })
                 .collect();
-            self.add(view, &pass, &pairwise(sums), wish, &mut total);
+            self.add(view, pass, &pairwise(sums), wish, &mut total);
         }
         if total.weight > 0.0 {
             total.loss /= total.weight;
@@ -374,14 +424,11 @@ impl CpuEngine {
 
     /// A pass that keeps the tiles of the images apart.
     fn tiled_pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
-        let turned = self.turned(point);
-        let pass = self.pass_for(turned).ok()?;
-        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
-        let kept = self.kept(&pass, turned, point, lobe.as_deref());
+        let ready = self.ready(point).ok()?;
+        let pass = &*ready.pass;
         let mut pulls = Pulls::default();
         for (index, (view, &width)) in self.views.iter().zip(widths).enumerate() {
-            let kept = (&kept.views[index][..], pass.kept);
-            let of_view = self.view_pass((&pass.moved, &pass.read), kept, point, index, lobe.as_deref());
+            let of_view = self.view_pass((&pass.moved, &pass.read), &ready, point, index);
             let own = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(index));
             let columns: Vec<Vec<Option<usize>>> =
                 pass.channels.iter().map(|c| c.unknowns.iter().map(|u| u.or(own)).collect()).collect();
@@ -469,5 +516,34 @@ impl Objective for CpuEngine {
 
     fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
         self.pass(point, Wish::Gradient).loss_and_gradient()
+    }
+}
+
+impl Engine for CpuEngine {
+    fn name(&self) -> &'static str {
+        "cpu"
+    }
+
+    fn provenance(&self) -> Vec<(String, String)> {
+        vec![
+            ("threads".to_owned(), rayon::current_num_threads().to_string()),
+            ("instructions".to_owned(), crate::simd::instructions()),
+        ]
+    }
+
+    fn views(&self) -> &Arc<[ObservedView]> {
+        self.views()
+    }
+
+    fn surfaced_views(&self) -> Result<Arc<[ObservedView]>, EngineError> {
+        Ok(Arc::clone(&self.views))
+    }
+
+    fn samples(&self) -> u64 {
+        self.samples()
+    }
+
+    fn set_stride(&mut self, stride: usize) {
+        self.set_stride(stride);
     }
 }

@@ -5,17 +5,19 @@ use std::collections::BTreeMap;
 use super::ahead;
 use super::machine::Program;
 use crate::engine::Unknown;
+use crate::engine::levels::LevelMaker;
 use crate::engine::view::ObservedView;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param, Params};
 use crate::program::cut::{KEPT, cut};
 use crate::program::graph::{Graph, Id, Input, Node};
+use crate::program::levels::LevelProgram;
 use crate::program::lower::Natives;
 use crate::program::shading::{Shading, ShadingError, component};
 use crate::program::tape::Tape;
 use crate::samples::surface_records::{Places, neutral};
 use crate::shader::Constant;
-use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source as FactsSource};
+use crate::shader::facts::{FaceSizes, Facts};
 use crate::shader::tangent::chain::Seed;
 
 /// The streams that tapes read.
@@ -27,6 +29,8 @@ pub(super) enum StreamOf {
     Neutral,
     /// What pixels are compared with, a record a pixel; no tape reads it, but it is asked for meanwhile.
     Targets,
+    /// What samples look up of the UV atlas.
+    Levels,
 }
 
 /// The numbers that stand in for fields.
@@ -109,6 +113,8 @@ pub(super) struct Pass {
     pub(super) channels: Vec<ChannelColumns>,
     /// The outputs of `moved` that are read.
     pub(super) read: Vec<usize>,
+    /// Makes what samples look up of the UV atlas.
+    pub(super) levels: LevelMaker<f32>,
 }
 
 /// The tapes of a plan, before it is known who reads what of them.
@@ -118,6 +124,7 @@ pub(super) struct Tapes {
     pub(super) moved: Tape,
     /// For each seed and channel the output of `moved`; `None` where the channel never moves.
     columns: Vec<Vec<Option<usize>>>,
+    levels: LevelProgram,
 }
 
 impl Tapes {
@@ -138,10 +145,13 @@ impl Tapes {
             .flat_map(|numbers| numbers[..channels].to_vec())
             .collect();
         let names = live_names(&seeds);
+        // They are kept where they stand.
+        let looked_up = |name: &str| shading.levels.looked_up.iter().any(|(found, _)| found == name);
         let moves = |graph: &Graph, id: Id| {
             !keep
                 || match graph.node(id) {
                     Node::Uniform(at) => names.contains(&graph.uniforms[at as usize].name),
+                    Node::Field(at) => looked_up(&graph.fields[at as usize].name),
                     _ => graph.looked_up(id).is_some_and(|name| names.iter().any(|known| known == name)),
                 }
         };
@@ -163,6 +173,7 @@ impl Tapes {
             value: Tape::new(&cut.graph, &moved[..channels]),
             moved: Tape::new(&cut.graph, &moved),
             columns,
+            levels: shading.levels,
         })
     }
 }
@@ -178,7 +189,7 @@ impl Pass {
             // It reads every field; what samples lack stands in a stream of its own.
             Some(plan) => Tapes::new(&plan.facts(), &plan.free(), plan.channels(), |_| true, plan.keeps())?,
             None => Tapes::new(
-                &facts(fitted.setup, fitted.faces, turned),
+                &Facts::of_samples(fitted.setup, fitted.faces, turned),
                 &free,
                 fitted.channels,
                 held,
@@ -192,7 +203,8 @@ impl Pass {
         read.extend(channels.iter().flat_map(|channel| &channel.tangents));
         read.sort_unstable();
         read.dedup();
-        let reading = |tape| Reading::new(&fitted.places, tape, ahead.is_some());
+        let levels = LevelMaker::new(tapes.levels);
+        let reading = |tape| Reading::new(&fitted.places, &levels, tape, ahead.is_some());
         Ok(Self {
             kept: tapes.keep.outputs.len(),
             keep: reading(tapes.keep),
@@ -200,6 +212,7 @@ impl Pass {
             moved: reading(tapes.moved),
             channels,
             read,
+            levels,
         })
     }
 }
@@ -225,12 +238,15 @@ impl ChannelColumns {
 }
 
 impl Reading {
-    fn new(places: &Places, tape: Tape, ahead: bool) -> Self {
+    fn new(places: &Places, levels: &LevelMaker<f32>, tape: Tape, ahead: bool) -> Self {
         let held: BTreeMap<&str, usize> = places.fields().map(|(name, place, _)| (name, place)).collect();
         let load = |input: &Input| match (input.name.as_str(), held.get(input.name.as_str())) {
             (KEPT, _) => (StreamOf::Kept, input.component),
             (_, Some(place)) => (StreamOf::Samples, place + input.component),
             (field, None) => {
+                if let Some(row) = levels.row(input) {
+                    return (StreamOf::Levels, row);
+                }
                 let value = neutral(field).unwrap_or(0.0);
                 (StreamOf::Neutral, NEUTRALS.iter().position(|&x| x == value).unwrap_or(0))
             }
@@ -268,18 +284,4 @@ fn live_names(seeds: &[Seed]) -> Vec<String> {
         }
     }
     names
-}
-
-/// What stored samples call for.
-pub(super) fn facts(setup: Setup, faces: FaceSizes, turned: bool) -> Facts {
-    Facts {
-        setup,
-        source: FactsSource::Samples,
-        maps: MapFacts::default(),
-        faces,
-        turned,
-        square_rim: false,
-        budget: Budget::Exact,
-        ..Facts::default()
-    }
 }

@@ -20,7 +20,7 @@ use crate::simd::Simd;
 /// What the blocks of a view read in one pass.
 pub(super) struct ViewPass<'a> {
     pub(super) view: &'a ObservedView,
-    pub(super) streams: [Stream<'a>; 4],
+    pub(super) streams: Streams<'a>,
     pub(super) bound: Bound<'a>,
     /// The tape's outputs that are wanted.
     pub(super) read: &'a [usize],
@@ -51,20 +51,30 @@ struct Compared {
 }
 
 /// The streams of a view, in the order of `pass::StreamOf`.
+pub(super) type Streams<'a> = [Stream<'a>; 5];
+
+/// What stands beside a view's samples.
+#[derive(Clone, Copy)]
+pub(super) struct Beside<'a> {
+    pub(super) kept: Stream<'a>,
+    pub(super) levels: Stream<'a>,
+}
+
+/// The streams of a view.
 pub(super) fn streams<'a>(
     view: &'a ObservedView,
-    kept: &'a [Row],
-    kept_stride: usize,
+    Beside { kept, levels }: Beside<'a>,
     neutral: &'a [Row],
-) -> [Stream<'a>; 4] {
+) -> Streams<'a> {
     let samples = view.samples.surface.rows();
     // Of several samples a pixel, records are not groups.
     let targets = if several(view) { &[] } else { view.target.all() };
     [
         Stream { rows: samples.all(), stride: samples.stride() },
-        Stream { rows: kept, stride: kept_stride },
+        kept,
         Stream { rows: neutral, stride: 0 },
         Stream { rows: targets, stride: view.target.stride() },
+        levels,
     ]
 }
 

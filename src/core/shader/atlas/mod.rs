@@ -6,6 +6,9 @@
 //! or along v. Draws and blurs take turns where texels' rules need what was blurred; texels that need nothing of that are
 //! computed anew in each draw.
 //!
+//! Beside stored samples stand stored texels: the same passes are functions of them ([`TEXEL`], [`TAPS`]), which the
+//! processor evaluates.
+//!
 //! - this module: from the rules that a search has found to passes; `text`: their WGSL
 //! - [`tangent`]: passes that leave how levels move
 
@@ -16,9 +19,10 @@ pub(super) mod text;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+pub use self::text::stored;
 use super::domain::{DIRECTIONS, Domain, UV};
 use super::emit::Plan;
-use super::facts::Facts;
+use super::facts::{Facts, Source};
 use super::rule::Rule;
 use super::search::{Carried, Found, PlanError};
 
@@ -90,9 +94,25 @@ pub struct Pass {
     pub kind: PassKind,
     /// What it leaves: a target each, cleared to 0.
     pub leaves: Vec<Level>,
-    /// Its rules, and what they read. The module's entry points are `vs_main` and `fs_main`.
+    /// Its rules, and what they read; of a blur the first level is what is blurred. The module's entry points are
+    /// `vs_main` and `fs_main`, over stored texels [`TEXEL`] or [`TAPS`].
     pub plan: Plan,
+    /// Of a blur that leaves how another moves, and whose kernel moves itself.
+    pub moving: Option<MovingKernel>,
 }
+
+/// A kernel that moves along a seed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MovingKernel {
+    /// The level that holds how what is blurred moves; `None` where it stays.
+    pub blurred: Option<Level>,
+}
+
+/// Over stored texels: the function of a `Sample` that yields what a draw leaves, one value after another.
+pub const TEXEL: &str = "skinfit_texel";
+/// Over stored texels: the function of a `Sample` that yields, for each tap of a blur, where it lies and what it weighs;
+/// where the kernel moves, after each how that does.
+pub const TAPS: &str = "skinfit_taps";
 
 /// The passes that yield the texels' quantities which fragments look up; none where nothing is computed in texels.
 ///
@@ -104,12 +124,13 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
     if texels.is_empty() {
         return Ok(Vec::new());
     }
-    if !found.rules.iter().any(|rule| rule.domain == Domain::Vertex && rule.gives_quantity(UV)) {
+    let drawn = facts.source == Source::Raster;
+    if drawn && !found.rules.iter().any(|rule| rule.domain == Domain::Vertex && rule.gives_quantity(UV)) {
         return Err(PlanError::NoPlan { goals: UV.to_owned() });
     }
     let depths = depths(&texels);
     let depth = |rule: &Rule| rule.gives.iter().filter_map(|(q, _)| depths.get(q)).max().copied();
-    let stored = stored(&texels, &found.carried);
+    let stored = in_levels(&texels, &found.carried);
     let mut passes = Vec::new();
     for layer in 0..=depths.values().copied().max().unwrap_or(0) {
         let drawn = texels.iter().filter(|rule| rule.blur.is_none() && depth(rule) == Some(layer));
@@ -139,7 +160,7 @@ fn depths(texels: &[&'static Rule]) -> BTreeMap<&'static str, usize> {
 }
 
 /// The texels' quantities that stand in the atlas: what fragments look up, and what blurs and their kernels read.
-fn stored(texels: &[&'static Rule], carried: &[Carried]) -> BTreeSet<&'static str> {
+fn in_levels(texels: &[&'static Rule], carried: &[Carried]) -> BTreeSet<&'static str> {
     let sampled = carried.iter().filter(|on| on.edge.from == Domain::Texel).map(|on| on.quantity);
     let blurs = texels.iter().filter(|rule| rule.blur.is_some());
     let read = blurs.flat_map(|rule| rule.needs.iter().map(|(need, _)| *need));
@@ -199,7 +220,7 @@ fn draw(facts: &Facts, found: &Found, texels: &[&'static Rule], leaves: &[Level]
     let rules = with_vertices(found, Domain::Texel, &[UV], shading);
     let mut plan = Plan::of_rules(facts, &rules, &found.carried, levels);
     plan.wgsl = text::draw(&plan, leaves);
-    Pass { kind: PassKind::Draw, leaves: leaves.to_vec(), plan }
+    Pass { kind: PassKind::Draw, leaves: leaves.to_vec(), plan, moving: None }
 }
 
 /// The name of what a blur leaves along u.
@@ -218,7 +239,7 @@ fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
     let pass = |(axis, source, leaves): (Axis, Level, Level)| {
         let mut plan = blur_plan(facts, rule, &source);
         plan.wgsl = text::blur(&plan, rule, axis, &source);
-        Pass { kind: PassKind::Blur(axis), leaves: vec![leaves], plan }
+        Pass { kind: PassKind::Blur(axis), leaves: vec![leaves], plan, moving: None }
     };
     directions.into_iter().map(pass).collect()
 }

@@ -6,8 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use super::text::{self, draw_of, filled, texel};
-use super::{Level, Pass, PassKind};
+use super::text::{self, Slope};
+use super::{Level, MovingKernel, Pass, PassKind};
 use crate::shader::emit::Plan;
 use crate::shader::quantity::Constant;
 use crate::shader::rule::Rule;
@@ -64,76 +64,57 @@ impl Along {
         }
         let moves = |level: &&Level| chain.moved[0].contains_key(level.name.as_str());
         let leaving: Vec<Level> = pass.leaves.iter().filter(moves).cloned().collect();
-        let target = |level: &Level| {
-            let value = &chain.moved[0][level.name.as_str()];
-            (format!("d_{}", level.name), texel(level, value))
-        };
-        let targets: Vec<(String, String)> = leaving.iter().map(target).collect();
-        if targets.is_empty() {
+        if leaving.is_empty() {
             return Ok(None);
         }
-        plan.wgsl = draw_of(&plan, &chain.functions, &chain.lines[0], &targets);
-        let leaves = leaving.iter().map(|level| self.leave(level)).collect();
-        Ok(Some(Pass { kind: pass.kind, leaves, plan }))
+        let value = |level: &Level| chain.moved[0][level.name.as_str()].clone();
+        let targets: Vec<(Level, String)> =
+            leaving.iter().map(|level| (self.leave(level), value(level))).collect();
+        plan.wgsl = text::draw_of(&plan, &chain.functions, &chain.lines[0], &targets);
+        let leaves = targets.into_iter().map(|(level, _)| level).collect();
+        Ok(Some(Pass { kind: pass.kind, leaves, plan, moving: None }))
     }
 
     fn blur(&mut self, pass: &Pass, seed: &Seed) -> Result<Option<Pass>, TangentError> {
         let PassKind::Blur(axis) = pass.kind else { return Ok(None) };
         let (rule, source) = (pass.plan.steps[0].rule, pass.plan.levels[0].clone());
         let moved = self.moved.get(&source.name).cloned();
-        let kernel = self.kernel_slope(pass, rule, seed, axis)?;
+        let slope = self.kernel_slope(pass, rule, seed)?;
         let mut plan = pass.plan.clone();
-        plan.wgsl = match (moved, kernel) {
+        let mut moving = None;
+        match (moved, slope) {
             (None, None) => return Ok(None),
             (Some(moved), None) => {
                 plan.levels[0] = moved.clone();
-                text::blur(&plan, rule, axis, &moved)
+                plan.wgsl = text::blur(&plan, rule, axis, &moved);
             }
-            (moved, Some((slope, functions, levels))) => {
-                let of =
-                    |level: &Level, place: &str| format!("textureLoad({}, {place}, 0).xyz", level.bound());
-                let at =
-                    |place: &str| moved.as_ref().map_or("vec3f(0.0)".to_owned(), |level| of(level, place));
-                plan.levels.extend(moved.iter().cloned().chain(levels));
-                let template = include_str!("blur_tangent.wgsl")
-                    .replace("{slope}", &slope)
-                    .replace("{moved}", &at("near"))
-                    .replace("{moved_here}", &at("here"));
-                filled(&format!("{functions}{template}"), &plan, rule, axis, &source)
+            (moved, Some(slope)) => {
+                plan.levels.extend(moved.iter().chain(&slope.levels).cloned());
+                plan.wgsl = text::blur_tangent(&plan, rule, axis, (&source, moved.as_ref()), &slope);
+                moving = Some(MovingKernel { blurred: moved });
             }
-        };
+        }
         let leaves = pass.leaves.iter().map(|level| self.leave(level)).collect();
-        Ok(Some(Pass { kind: pass.kind, leaves, plan }))
+        Ok(Some(Pass { kind: pass.kind, leaves, plan, moving }))
     }
 
-    /// How a kernel's value moves: the call, the functions that it takes, and the levels that it reads; `None` where it
-    /// stays.
-    fn kernel_slope(
-        &self,
-        pass: &Pass,
-        rule: &Rule,
-        seed: &Seed,
-        axis: super::Axis,
-    ) -> Result<Option<(String, String, Vec<Level>)>, TangentError> {
+    /// How a kernel's value moves; `None` where it stays.
+    fn kernel_slope(&self, pass: &Pass, rule: &Rule, seed: &Seed) -> Result<Option<Slope>, TangentError> {
         let mut levels = Vec::new();
-        let mut along = |name: &str, kind: &str| match seed {
+        let mut along = |name: &str| match seed {
             Seed::Named { name: seeded, tangent } if *seeded == name => Some(tangent.clone()),
             _ => self.moved.get(name).map(|level| {
                 levels.push(level.clone());
-                format!("{kind}(textureLoad({}, here, 0).{})", level.bound(), level.swizzle())
+                level.name.clone()
             }),
         };
-        let slopes: Vec<Option<String>> =
-            rule.parameters().iter().map(|(name, kind)| along(name, kind)).collect();
+        let slopes: Vec<Option<String>> = rule.parameters().iter().map(|(name, _)| along(name)).collect();
         let moving: Vec<bool> = slopes.iter().map(Option::is_some).collect();
         let mut tangents = Tangents::new(&pass.plan.declarations(true))?;
         let Some(tangent) = tangents.of(rule.function, &moving)? else { return Ok(None) };
-        let mut given = text::arguments(rule, axis.step());
-        for (slope, (_, kind)) in slopes.into_iter().zip(rule.parameters()) {
-            let still = tangent.of_all.then(|| format!("{kind}()"));
-            given.extend(slope.or(still));
-        }
-        let call = format!("{}({})", tangent.name, given.join(", "));
-        Ok(Some((call, tangents.text().to_owned(), levels)))
+        let still = |kind: &str| tangent.of_all.then(|| format!("{kind}()"));
+        let given = slopes.into_iter().zip(rule.parameters());
+        let along = given.filter_map(|(slope, (_, kind))| slope.or_else(|| still(kind))).collect();
+        Ok(Some(Slope { name: tangent.name, along, functions: tangents.text().to_owned(), levels }))
     }
 }

@@ -148,6 +148,8 @@ fn every_pass_is_valid_in_every_kind_of_scene() {
         Facts { budget: Budget::Paper, f16: true, ..facts(Effects::of(&[Effect::Occlusion])) },
         Facts { setup: listing, ..exact },
         Facts { maps: bare, setup: listing, ..exact },
+        Facts { source: Source::Samples, ..exact },
+        Facts { source: Source::Samples, setup: listing, turned: true, ..exact },
     ] {
         let plan = plan(&facts).unwrap();
         validate(&plan);
@@ -196,8 +198,8 @@ fn without_an_atlas_the_effect_is_refused_and_others_have_no_passes() {
     let without = facts(Effects::default());
     for facts in [
         Facts { atlas: None, ..without },
-        Facts { source: Source::Samples, ..without },
-        Facts { source: Source::Terms, ..without },
+        Facts { atlas: None, source: Source::Samples, ..without },
+        Facts { atlas: None, source: Source::Terms, ..without },
     ] {
         assert_eq!(plan(&facts).unwrap_err(), PlanError::NoAtlas { effect });
     }

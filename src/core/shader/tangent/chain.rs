@@ -4,6 +4,8 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::{TangentError, Tangents};
+use crate::shader::atlas::Level;
+use crate::shader::atlas::tangent::Along;
 use crate::shader::domain::Domain;
 use crate::shader::emit::{Plan, hazy, parts};
 use crate::shader::module::uniform;
@@ -44,6 +46,8 @@ pub struct Chain {
     pub haze: Vec<Option<String>>,
     /// For each seed, the quantities that move with it, and how (WGSL of their types).
     pub moved: Vec<BTreeMap<&'static str, String>>,
+    /// For each seed, how levels of the atlas move; empty where the plan looks none up.
+    pub along: Vec<Along>,
 }
 
 impl Chain {
@@ -56,7 +60,11 @@ impl Chain {
         let mut chain = Self::default();
         for (k, seed) in seeds.iter().enumerate() {
             chain.lines.push(String::new());
-            let moved = chain.follow(plan, Domain::Fragment, k, seed, BTreeMap::new(), &mut tangents)?;
+            if !plan.passes.is_empty() {
+                chain.along.push(Along::new(plan, seed)?);
+            }
+            let read = chain.read(plan, k);
+            let moved = chain.follow(plan, Domain::Fragment, k, seed, read, &mut tangents)?;
             let along: Vec<&str> = parts(&plan.facts)
                 .into_iter()
                 .filter_map(|part| moved.get(part).map(String::as_str))
@@ -67,6 +75,25 @@ impl Chain {
         }
         chain.functions.push_str(tangents.text());
         Ok(chain)
+    }
+
+    /// What was looked up of levels that move with the `k`-th seed, and the field of a sample that holds how.
+    fn read(&self, plan: &Plan, k: usize) -> BTreeMap<&'static str, String> {
+        let Some(along) = self.along.get(k) else { return BTreeMap::new() };
+        let moves =
+            |name: &str| along.moved.contains_key(name) && plan.levels.iter().any(|level| level.name == name);
+        let needs = plan.rules(Domain::Fragment).flat_map(|rule| &rule.needs);
+        needs.filter(|(name, _)| moves(name)).map(|(name, _)| (*name, format!("at.d{k}_{name}"))).collect()
+    }
+
+    /// The fields of a sample that hold how what was looked up moves, seed by seed, each with the level that holds it.
+    pub(in crate::shader) fn looked_up(&self, plan: &Plan) -> Vec<(String, Level)> {
+        let of_seed = |(k, along): (usize, &Along)| -> Vec<(String, Level)> {
+            let field =
+                |level: &Level| Some((format!("d{k}_{}", level.name), along.moved.get(&level.name)?.clone()));
+            plan.levels.iter().filter_map(field).collect()
+        };
+        self.along.iter().enumerate().flat_map(of_seed).collect()
     }
 
     /// Of the texels of a draw into the atlas along one seed; `moved` are quantities whose tangents stand there. The

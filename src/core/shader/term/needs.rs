@@ -5,7 +5,7 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
-use crate::shader::domain::Domain;
+use crate::shader::domain::{Domain, UV};
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
@@ -41,32 +41,33 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     let held = |name: &str| held(name) && !(name == "silhouette" && setup.rim_of_corners());
     let given: Vec<&'static str> =
         SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name).filter(|name| held(name)).collect();
-    // What is computed in texels is of no stored sample: it is asked for as the renderer asks. What cannot be planned is
-    // told when it is.
-    let drawn = Facts { source: Source::Raster, atlas: Some(1), ..facts };
-    let found = search(&facts, &[], goals, &given).map(|found| (found, true));
-    let found = found.or_else(|_| search(&drawn, &[], goals, &[]).map(|found| (found, false)));
-    let (found, stored) = found.unwrap_or_default();
-    let chosen = found.rules;
-    let needed = |name: &str| {
+    // Texels are asked for where nothing can be planned without them. What cannot be planned at all is told when it is.
+    let looking_up = [&given[..], &[UV]].concat();
+    let textured = Facts { atlas: Some(1), ..facts };
+    let found = search(&facts, &[], goals, &given).or_else(|_| search(&textured, &[], goals, &looking_up));
+    let chosen = found.unwrap_or_default().rules;
+    let needed_in = |domains: &[Domain], name: &str| {
         let mut rules = chosen.iter().filter(|rule| !rule.fallback.contains(&name));
-        rules.any(|rule| rule.needs.iter().any(|(need, _)| *need == name))
+        rules.any(|rule| domains.contains(&rule.domain) && rule.needs.iter().any(|(need, _)| *need == name))
     };
+    let needed = |name: &str| needed_in(&Domain::ALL, name);
+    let bumped = needed("bump") || needed("normal_texel");
+    let framed = needed("bump") || needed("vertex_tangent") || needed("vertex_bitangent");
     let read = |resource: Resource| chosen.iter().any(|rule| rule.reads.contains(&resource.name()));
     Needs {
         color_map: needed("albedo"),
-        normal_map: needed("bump"),
+        normal_map: bumped,
         specular_map: needed("specular"),
         attenuator_map: needed("attenuator"),
-        tangents: needed("bump"),
+        tangents: framed,
         irradiance: read(Resource::IrradianceFaces),
         lobes: read(Resource::SpecularFaces),
         hilite: read(Resource::HiliteFaces),
-        occlusion: needed("open"),
+        occlusion: needed("open") || needed("vertex_occlusion"),
         rim: needed("silhouette") || needed("corner_silhouettes"),
         dapple: needed("dapple"),
         haze: false,
-        smooth_normal: stored && needed("normal"),
+        smooth_normal: needed_in(&[Domain::Fragment], "normal"),
         key_light: false,
         atlas: chosen.iter().any(|rule| rule.domain == Domain::Texel),
     }

@@ -6,7 +6,7 @@ use super::declaration::Declaration;
 use super::error::{Problem, TermError};
 use crate::model::params::Param;
 use crate::shader::domain::Domain;
-use crate::shader::emit::SAMPLE;
+use crate::shader::emit::{SAMPLE, TEXEL};
 use crate::shader::graph::is_of_the_eye;
 use crate::shader::quantity::{Attribute, Constant};
 use crate::shader::rule::{RULES, Rule};
@@ -35,6 +35,8 @@ fn of_samples<'a>(rules: &(impl Iterator<Item = &'a Rule> + Clone)) -> BTreeSet<
 /// What rules give of texels: all that no eye moves.
 fn of_texels() -> BTreeSet<&'static str> {
     let of_vertices = || RULES.iter().filter(|rule| rule.domain == Domain::Vertex);
+    // What a mesh has before it is posed, stored texels do not hold.
+    let stored = |name: &&'static str| TEXEL.iter().any(|(held, _)| held == name);
     let unmet = |name: &str| is_of_the_eye(name);
     let mut seen: BTreeSet<&'static str> = BTreeSet::new();
     let mut there: BTreeSet<&'static str> = BTreeSet::new();
@@ -42,7 +44,12 @@ fn of_texels() -> BTreeSet<&'static str> {
         let before = seen.len() + there.len();
         for rule in of_vertices() {
             let moved = rule.needs.iter().any(|(name, _)| unmet(name) || seen.contains(name));
-            if moved { &mut seen } else { &mut there }.extend(rule.gives.iter().map(|(name, _)| *name));
+            let given = rule.gives.iter().map(|(name, _)| *name);
+            if moved {
+                seen.extend(given);
+            } else {
+                there.extend(given.filter(stored));
+            }
         }
         there.retain(|name| !seen.contains(name));
         for rule in RULES.iter().filter(|rule| rule.domain == Domain::Texel) {

@@ -28,11 +28,13 @@ use crate::model::params::{Channels, Param};
 use crate::model::terms::TermName;
 use crate::samples::LANES;
 use crate::scene::Loss;
-use crate::shader::emit::{Plan, plan, sample_fields};
-use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts};
+use crate::shader::emit::{Plan, plan};
+use crate::shader::facts::{FaceSizes, Facts};
 use crate::shader::quantity::Constant;
 use crate::shader::tangent::chain::{Chain, Seed};
 use skinfit_core::engine::{BLOCK, Unknown};
+use skinfit_core::program::levels::LevelProgram;
+use skinfit_core::program::lower::LowerError;
 
 /// Threads of a workgroup.
 pub const WORKGROUP: u32 = 128;
@@ -186,8 +188,16 @@ impl Fused {
 
     /// The fields of a stored sample, with their WGSL types.
     #[must_use]
-    pub fn fields(&self) -> Vec<(&'static str, &'static str)> {
-        sample_fields(&self.plan.facts)
+    pub fn fields(&self) -> Vec<(String, &'static str)> {
+        self.plan.sample_inputs(&self.chain)
+    }
+
+    /// What makes that of a sample which it looks up of the UV atlas.
+    ///
+    /// # Errors
+    /// When the processor cannot compute it.
+    pub fn levels(&self) -> Result<LevelProgram, LowerError> {
+        LevelProgram::new(&self.plan, &self.chain)
     }
 
     /// The sums of a wish; products of two columns that share no colour channel are 0 and left out.
@@ -225,15 +235,9 @@ const fn compared(fitted: &Fitted) -> Moved {
 /// What the planner is told of stored samples.
 fn facts(fitted: &Fitted) -> Facts {
     Facts {
-        setup: fitted.setup,
         output: fitted.output,
         source: fitted.layout.source,
-        maps: MapFacts::default(),
-        faces: fitted.faces,
-        turned: fitted.turned,
-        square_rim: false,
-        budget: Budget::Exact,
-        ..Facts::default()
+        ..Facts::of_samples(fitted.setup, fitted.faces, fitted.turned)
     }
 }
 

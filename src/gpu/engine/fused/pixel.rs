@@ -114,7 +114,7 @@ impl Fused {
     fn read_sample(&self, record: &str) -> String {
         let (layout, fields) = (&self.fitted.layout, self.fields());
         let read = |place| layout.stored().read(record, place);
-        quads_read(layout, &fields, record) + &fields_read(layout, &fields, read)
+        quads_read(layout, &fields, record) + &fields_read(layout, &fields, record, read)
     }
 }
 

@@ -32,7 +32,10 @@ pub fn held_parameters(fitted: &Fitted) -> Result<Vec<Param>, String> {
 pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), String> {
     let facts = facts(fitted);
     let (plan, wanted) = plan_terms(&facts).map_err(|error| error.to_string())?;
-    let fields = sample_fields(&Facts { source: Source::Samples, ..facts });
+    let fields: Vec<_> = sample_fields(&Facts { source: Source::Samples, ..facts })
+        .into_iter()
+        .map(|(name, kind)| (name.to_owned(), kind))
+        .collect();
     let (into, buffers) = if terms.in_place_of(&fitted.layout) {
         ("samples", "@group(1) @binding(1) var<storage, read_write> samples: array<f32>;")
     } else {
@@ -54,7 +57,7 @@ pub fn terms_module(fitted: &Fitted, terms: &Layout) -> Result<(Plan, String), S
     );
     let samples = fitted.layout.stored();
     let stored = StoredRecords { name: into, rows: terms.rows };
-    wgsl.push_str(&fields_read(&fitted.layout, &fields, |place| samples.number("record", place)));
+    wgsl.push_str(&fields_read(&fitted.layout, &fields, "record", |place| samples.number("record", place)));
     // Everything is read before anything is written.
     if let Some(share) = fitted.layout.share {
         let _ = writeln!(wgsl, "    let share = {};", samples.number("record", share));

@@ -5,6 +5,7 @@ use std::fmt::Write as _;
 use super::reduce::{functions, reduction};
 use super::{ColumnOf, Fused, Moved, Sum, WORKGROUP};
 use crate::shader::Domain;
+use crate::shader::atlas::stored;
 use crate::shader::emit::{hazy, parts};
 use crate::shader::module::{sample_struct, uniform};
 use skinfit_core::engine::residual::loss_text;
@@ -71,6 +72,9 @@ impl Fused {
              @group(1) @binding(5) var<storage, read> samples_quads: array<vec4f>;\n\
              @group(1) @binding(6) var<storage, read> targets_quads: array<vec4f>;\n\n"
         );
+        if self.fitted.layout.has_levels() {
+            wgsl.push_str("@group(1) @binding(7) var<storage, read> levels: array<f32>;\n\n");
+        }
         wgsl.push_str(&loss_text(self.fitted.loss));
         wgsl.push('\n');
         wgsl.push_str(&functions());
@@ -93,6 +97,7 @@ impl Fused {
     fn samples(&self, seeds: &[usize], compares: bool) -> String {
         let mut wgsl = String::new();
         wgsl.push_str(&self.each_sample(compares));
+        wgsl.push_str(&stored(&self.plan.levels));
         wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
         seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
         let parts = parts(&self.plan.facts);

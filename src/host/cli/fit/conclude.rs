@@ -7,15 +7,16 @@ use super::Arguments;
 use super::evidence::evidence;
 use super::solve::Solving;
 use super::words::{Times, advice, advice_on_maps, tell_run};
-use crate::cli::fit_engine::{FitEngine, SelectedEngine};
+use crate::cli::fit_engine::SelectedEngine;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::machine::made;
 use crate::cli::maps::MapsLeft;
 use crate::cli::run_folder::RunFolder;
 use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
+use crate::engine::Engine;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::params_file::{Origin, ParamsFile};
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::report::{self, RunInfo, ViewEvidence};
 use crate::scene::Scene;
 
@@ -33,23 +34,23 @@ pub(super) fn conclude(
     solving: Solving,
     folder: &RunFolder,
     Fitted { path, maps, begun }: Fitted<'_>,
-    prepared: &Prepared,
-    chosen: &SelectedEngine<'_>,
+    baked: &Baked,
+    chosen: &SelectedEngine,
     outcome: &Outcome,
 ) -> Result<Exit, Refusal> {
-    let engine = &chosen.engine;
+    let engine = &*chosen.engine;
     let clock = Instant::now();
-    let views = evidence(prepared, engine, outcome)?;
-    let mut seconds = prepared.seconds;
-    seconds.samples = chosen.sample_seconds().unwrap_or(seconds.samples);
+    let views = evidence(baked, engine, outcome)?;
+    let mut seconds = baked.seconds;
+    seconds.samples = engine.own_sample_seconds().unwrap_or(seconds.samples);
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
     let maps_named = maps.map_or(&[][..], |left| &left.named);
-    let named = folder.write_scene(path, Changes { maps: maps_named, ..changes(arguments, prepared) })?;
+    let named = folder.write_scene(path, Changes { maps: maps_named, ..changes(arguments, baked) })?;
     let origin = Origin { scene: path, outcome: Some(outcome), set: arguments.set.checked() };
-    params_file(prepared, outcome).write(&folder.path().join("params.toml"), origin)?;
-    let mut run = RunInfo { seconds, named, ..run_info(arguments, solving, path, prepared, engine, views) };
+    params_file(baked, outcome).write(&folder.path().join("params.toml"), origin)?;
+    let mut run = RunInfo { seconds, named, ..run_info(arguments, solving, path, baked, engine, views) };
     if let Some(left) = maps {
         tell_warnings(&left.warnings);
         run.warnings.extend(left.warnings.iter().cloned());
@@ -66,7 +67,7 @@ pub(super) fn conclude(
     } else {
         // All that there was to do is done: reading, bakes, samples, the fit, its pictures and the report.
         let times = Times { whole: begun.elapsed().as_secs_f64(), samples: seconds.samples };
-        tell_run(folder.path(), &prepared.scene.views, chosen, outcome, &report.summary.misfit, times)?;
+        tell_run(folder.path(), &baked.scene.views, chosen, outcome, &report.summary.misfit, times)?;
     }
     let advice = match maps {
         Some(left) => advice_on_maps(arguments, folder.path(), left, outcome),
@@ -80,8 +81,8 @@ pub(super) fn conclude(
 }
 
 /// Where the fit differed from its scene file.
-fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> {
-    let Scene { form, params, fit, .. } = &prepared.scene;
+fn changes<'a>(arguments: &'a Arguments, baked: &'a Baked) -> Changes<'a> {
+    let Scene { form, params, fit, .. } = &*baked.scene;
     let start = Start { form: *form, params, free: &fit.free };
     Changes {
         loss: arguments.loss.as_deref(),
@@ -93,12 +94,12 @@ fn changes<'a>(arguments: &'a Arguments, prepared: &'a Prepared) -> Changes<'a> 
 }
 
 /// The fitted parameters, to be used again.
-fn params_file(prepared: &Prepared, outcome: &Outcome) -> ParamsFile {
-    let names = prepared.scene.views.iter().map(|view| view.name.clone());
+fn params_file(baked: &Baked, outcome: &Outcome) -> ParamsFile {
+    let names = baked.scene.views.iter().map(|view| view.name.clone());
     ParamsFile {
-        form: prepared.scene.form,
-        effects: Some(prepared.scene.effects),
-        loss: Some(prepared.scene.fit.loss),
+        form: baked.scene.form,
+        effects: Some(baked.scene.effects),
+        loss: Some(baked.scene.fit.loss),
         params: outcome.end.params.clone(),
         gains: names.zip(outcome.end.gains.iter().copied()).collect(),
     }
@@ -108,8 +109,8 @@ fn run_info(
     arguments: &Arguments,
     solving: Solving,
     path: &Path,
-    prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    baked: &Baked,
+    engine: &dyn Engine,
     views: Vec<ViewEvidence>,
 ) -> RunInfo {
     let scene = match &arguments.scene.scene {
@@ -117,19 +118,19 @@ fn run_info(
         None => "the built-in scene".to_owned(),
     };
     let set = arguments.set.words();
-    let effects: Vec<&str> = prepared.scene.effects.iter().map(crate::model::effects::Effect::name).collect();
+    let effects: Vec<&str> = baked.scene.effects.iter().map(crate::model::effects::Effect::name).collect();
     RunInfo {
         scene,
-        loss: prepared.scene.fit.loss,
+        loss: baked.scene.fit.loss,
         engine: engine.name().to_owned(),
-        samples: engine.samples() as u64,
-        seconds: prepared.seconds,
+        samples: engine.samples(),
+        seconds: baked.seconds,
         views,
-        warnings: prepared.warnings.clone(),
+        warnings: baked.warnings.clone(),
         provenance: vec![
-            ("form".to_owned(), prepared.scene.form.name().to_owned()),
-            ("silhouette".to_owned(), prepared.scene.silhouette.name().to_owned()),
-            ("lookups".to_owned(), prepared.scene.lookups.name().to_owned()),
+            ("form".to_owned(), baked.scene.form.name().to_owned()),
+            ("silhouette".to_owned(), baked.scene.silhouette.name().to_owned()),
+            ("lookups".to_owned(), baked.scene.lookups.name().to_owned()),
             ("effects".to_owned(), effects.join(", ")),
             ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
         ]

@@ -1,10 +1,11 @@
 //! The evidence: each view's target, fit and terms.
 
 use crate::cli::Refusal;
-use crate::cli::fit_engine::FitEngine;
+use crate::cli::fit_engine::surfaced_views;
+use crate::engine::Engine;
 use crate::engine::view::ObservedView;
 use crate::fit::outcome::Outcome;
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::progress;
 use crate::render::image::Image;
 use crate::render::places::places;
@@ -14,14 +15,14 @@ use crate::scene::view::View;
 
 /// For each view the target, the fit and its terms.
 pub(super) fn evidence(
-    prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    baked: &Baked,
+    engine: &dyn Engine,
     outcome: &Outcome,
 ) -> Result<Vec<ViewEvidence>, Refusal> {
-    let observed = engine.surfaced_views()?;
-    let shader = Shader::new(prepared.setup(), &prepared.illumination, &outcome.end.params)?;
-    let bar = progress::bar("pictures", prepared.scene.views.len() as u64);
-    let views = prepared.scene.views.iter().zip(observed.iter()).enumerate();
+    let observed = surfaced_views(engine)?;
+    let shader = Shader::new(baked.setup(), &baked.illumination, &outcome.end.params)?;
+    let bar = progress::bar("pictures", baked.scene.views.len() as u64);
+    let views = baked.scene.views.iter().zip(observed.iter()).enumerate();
     let evidence = views
         .map(|(index, (view, observed))| {
             let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
@@ -40,8 +41,8 @@ pub(super) fn evidence(
                 haze: shaded.haze,
                 places: places(
                     &observed.samples,
-                    prepared.setup(),
-                    &prepared.illumination,
+                    baked.setup(),
+                    &baked.illumination,
                     &outcome.end.params,
                     [view.camera.width, view.camera.height].map(|side| side as usize),
                 ),

@@ -12,14 +12,14 @@ mod words;
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::fit_engine::FitEngineArguments;
+use super::fit_engine::{FitEngineArguments, SelectedEngine};
 use super::interrupt::Interrupt;
-use super::maps::{MapArguments, MapRun};
+use super::maps::{MapArguments, MapRun, MapsFound};
 use super::run_folder::RunFolder;
 use super::scene::SceneArguments;
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, tell_warnings, unfinished};
-use crate::prepare::{PrepareOptions, Prepared};
+use crate::prepare::{Baked, Loaded, Observed, PrepareOptions};
 use crate::scene::Loss;
 use conclude::{Fitted, conclude};
 #[cfg(feature = "burn")]
@@ -92,30 +92,50 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         cache: arguments.scene.cache(),
         ..PrepareOptions::default()
     };
-    let own = arguments.engine.makes_samples();
-    let mut prepared = if own { Prepared::baked(&path, &options) } else { Prepared::new(&path, &options) }?;
+    let mut loaded = Loaded::read(&path, &options)?;
     if let Some(loss) = &arguments.loss {
-        prepared.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
+        loaded.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
     }
     let solving = Solving::of(arguments, folder.path())?;
-    let observed = if own { prepared.keep_targets().map(|()| None) } else { prepared.observed().map(Some) }?;
-    tell_warnings(&prepared.warnings);
-    arguments.set.tell_idle(prepared.scene.effects);
     let interrupt = Interrupt::default();
-    let (observed, maps) = match observed {
-        Some(observed) if arguments.maps.any() => {
-            let (adapter, quiet) = (arguments.engine.adapter(), arguments.json);
-            let run = MapRun { adapter, interrupt: interrupt.watch(), quiet };
-            let (observed, maps) = arguments.maps.fit(&mut prepared, observed, &run)?;
-            (Some(observed), maps)
-        }
-        observed => (observed, None),
+    let Ready { observed, chosen, maps } = ready(arguments, loaded.bake()?, &interrupt)?;
+    let outcome = solve(arguments, solving, &folder, &observed, &*chosen.engine, &interrupt)?;
+    folder.keep();
+    let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
+    let fitted = Fitted { path: &path, maps: maps.as_ref(), begun };
+    conclude(arguments, solving, &folder, fitted, &observed, &chosen, &outcome)
+}
+
+/// All that a search needs.
+struct Ready {
+    observed: Observed,
+    chosen: SelectedEngine,
+    maps: Option<MapsFound>,
+}
+
+/// The views beside their targets, by the maps that are to be fitted, and the engine over them.
+fn ready(arguments: &Arguments, baked: Baked, interrupt: &Interrupt) -> Result<Ready, Refusal> {
+    if arguments.engine.makes_samples() {
+        let baked = baked.keep_targets()?;
+        tell_of(arguments, &baked);
+        let (observed, chosen) = arguments.engine.over_own_samples(baked)?;
+        return Ok(Ready { observed, chosen, maps: None });
+    }
+    let observed = baked.sample()?.observe()?;
+    tell_of(arguments, &observed);
+    let (observed, maps) = if arguments.maps.any() {
+        let (adapter, quiet) = (arguments.engine.adapter(), arguments.json);
+        let run = MapRun { adapter, interrupt: interrupt.watch(), quiet };
+        arguments.maps.fit(observed, &run)?
+    } else {
+        (observed, None)
     };
-    arguments.engine.with_engine(&prepared, observed, |chosen| {
-        let outcome = solve(arguments, solving, &folder, &prepared, &chosen.engine, &interrupt)?;
-        folder.keep();
-        let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
-        let fitted = Fitted { path: &path, maps: maps.as_ref(), begun };
-        conclude(arguments, solving, &folder, fitted, &prepared, chosen, &outcome)
-    })
+    let chosen = arguments.engine.select(&observed)?;
+    Ok(Ready { observed, chosen, maps })
+}
+
+/// What the user should know before the search.
+fn tell_of(arguments: &Arguments, baked: &Baked) {
+    tell_warnings(&baked.warnings);
+    arguments.set.tell_idle(baked.scene.effects);
 }

@@ -6,15 +6,15 @@ use std::path::Path;
 use super::Arguments;
 use crate::cli::Refusal;
 use crate::cli::fingerprint::fingerprint;
-use crate::cli::fit_engine::FitEngine;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::run_folder::RunFolder;
+use crate::engine::Engine;
 use crate::fit::outcome::Outcome;
 use crate::fit::state::Saved;
 use crate::fit::state::StateError;
 use crate::fit::{self, FitError, FitOptions, SolverKind};
 use crate::output::OutputError;
-use crate::prepare::Prepared;
+use crate::prepare::Observed;
 use crate::progress;
 
 /// How the unknowns are searched for: as the command line says, else as the fit that is resumed was
@@ -48,8 +48,8 @@ pub(super) fn solve(
     arguments: &Arguments,
     solving: Solving,
     folder: &RunFolder,
-    prepared: &Prepared,
-    engine: &FitEngine<'_>,
+    observed: &Observed,
+    engine: &dyn Engine,
     interrupt: &Interrupt,
 ) -> Result<Outcome, Refusal> {
     let state = folder.path().join(STATE);
@@ -68,16 +68,16 @@ pub(super) fn solve(
         max_iterations: arguments.max_iterations,
         starts: solving.starts,
         seed: solving.seed,
-        fingerprint: fingerprint(&prepared.scene),
+        fingerprint: fingerprint(&observed.scene),
         resume: arguments.resume.then(|| state.clone()),
         state: (!maps).then_some(state),
         interrupt: Some(interrupt.watch()),
-        widths: prepared.image_widths(),
+        widths: observed.image_widths(),
         profile: true,
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");
-    let outcome = fit::fit(engine.objective(), &prepared.start(), &options, &mut |iteration| {
+    let outcome = fit::fit(engine, &observed.start(), &options, &mut |iteration| {
         bar.set_position(iteration.iteration);
         bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
     });
@@ -88,12 +88,12 @@ pub(super) fn solve(
         FitError::State(error) => with_option(&error, "without --resume"),
         FitError::Engine(fault) => Refusal::failure(format!(
             "{}: {fault} What was found up to then is kept: go on with --resume.",
-            prepared.scene.path.display()
+            observed.scene.path.display()
         )),
         FitError::Solver { .. } => {
-            with_option(&format!("{}: {error}", prepared.scene.path.display()), "(--solver varpro)")
+            with_option(&format!("{}: {error}", observed.scene.path.display()), "(--solver varpro)")
         }
-        error => Refusal::new(format!("{}: {error}", prepared.scene.path.display())),
+        error => Refusal::new(format!("{}: {error}", observed.scene.path.display())),
     })
 }
 

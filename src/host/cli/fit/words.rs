@@ -25,7 +25,7 @@ pub(super) struct Times {
 pub(super) fn tell_run(
     folder: &Path,
     views: &[View],
-    chosen: &SelectedEngine<'_>,
+    chosen: &SelectedEngine,
     outcome: &Outcome,
     misfit: &Misfit,
     times: Times,
@@ -37,7 +37,7 @@ pub(super) fn tell_run(
         let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
         say(&format!("{} samples made by the {by} in {sample_seconds:.3} s", engine.samples()))?;
     }
-    if let Some(why) = &chosen.selection.why {
+    if let Some(why) = &chosen.why {
         say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
     }
     say(&format!("{}: final loss {:.6e}", folder.display(), outcome.loss_end))

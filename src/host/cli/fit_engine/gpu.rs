@@ -1,14 +1,13 @@
 //! The GPU engine: when it is taken, and over whose samples.
 
-use std::time::Instant;
+use std::sync::Arc;
 
 use super::super::graphics::Task as Doing;
-use super::{
-    FitEngine, FitEngineArguments, ObservedView, Prepared, Refusal, SelectedEngine, Selection, tell,
-};
-use crate::gpu::engine::{DeviceSampleError, DeviceSamples, GpuEngine, Memory, Task};
+use super::{FitEngineArguments, Observed, ObservedView, Refusal, SelectedEngine, on_cpu, tell};
+use crate::gpu::engine::{DeviceSampleError, DeviceSamples, GpuEngine, Memory};
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError};
+use crate::prepare::Baked;
 
 /// Samples from which `auto` takes a graphics card, for each thread of the CPU. A rule of thumb: 0.6 s for
 /// opening a device and compiling, ten passes at 30 ns a sample and thread.
@@ -35,37 +34,29 @@ impl FitEngineArguments {
         }
     }
 
-    pub(super) fn with_gpu<T>(
-        &self,
-        prepared: &Prepared,
-        observed: Vec<ObservedView>,
-        selection: Selection,
-        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
-    ) -> Result<T, Refusal> {
-        let must = selection.why.is_none();
+    /// The engine on an adapter; on the CPU where `auto` wanted one that does not make it faster.
+    pub(super) fn on_gpu(&self, observed: &Observed, why: Option<String>) -> Result<SelectedEngine, Refusal> {
+        let must = why.is_none();
+        let but = |words: &str| why.as_ref().map(|why| format!("{why}, but {words}"));
         let mut gpu = match self.open() {
             Ok(gpu) if must || !gpu.is_software() => gpu,
             Ok(gpu) => {
-                let selection = selection.but(&format!("{} is a program on the CPU", gpu.name()));
-                return self.on_cpu(prepared, observed, selection, then);
+                return on_cpu(observed, but(&format!("{} is a program on the CPU", gpu.name())));
             }
             Err(error) if must => return Err(refused(&error)),
             Err(error) => {
                 tell(&format!("{error} The CPU engine makes the passes."));
-                return self.on_cpu(prepared, observed, selection.but("none could be opened"), then);
+                return on_cpu(observed, but("none could be opened"));
             }
         };
         let mut resident = self.resident();
         loop {
-            match self.engine_on(&gpu, prepared, &observed, resident) {
-                Ok(engine) => {
-                    let engine = FitEngine::Gpu(engine);
-                    self.verify(prepared, &engine)?;
-                    return then(&SelectedEngine { engine, selection });
-                }
+            let memory = Memory { part: None, resident };
+            match GpuEngine::new(&gpu, observed.task(), &observed.start(), memory) {
+                Ok(engine) => return Ok(SelectedEngine { engine: Box::new(engine), why }),
                 // A device that ran out of memory is not to be trusted any more; half as much may fit.
                 Err(GpuError::OutOfMemory { .. }) if resident != Some(0) => {
-                    let all: u64 = observed.iter().map(bytes).sum();
+                    let all: u64 = observed.views.iter().map(bytes).sum();
                     let most = resident.map_or(all, |most| most.min(all)) / 2;
                     resident = Some(if most < 16_000_000 { 0 } else { most });
                     tell(&format!(
@@ -80,48 +71,39 @@ impl FitEngineArguments {
         }
     }
 
-    /// Call `then` with an engine over samples that the adapter makes; where they have no room on it, over the
-    /// CPU's, as many of which stay as may.
-    pub(super) fn with_own_samples<T>(
+    /// The engine over samples that the adapter makes; where they have no room on it, over the CPU's, as many of
+    /// which stay as may. With it come the views, all of which have a target.
+    pub(in crate::cli) fn over_own_samples(
         &self,
-        prepared: &Prepared,
-        then: impl FnOnce(&SelectedEngine<'_>) -> Result<T, Refusal>,
-    ) -> Result<T, Refusal> {
-        let gpu = self.open().map_err(|error| refused(&error))?;
-        let content = Content {
-            scene: &prepared.scene,
-            illumination: &prepared.illumination,
-            occlusion: prepared.occlusion.as_ref(),
-            params: &prepared.scene.params,
-        };
-        let resident = self.resident();
-        let error = match DeviceSamples::new(&gpu, content) {
-            Ok((made, groups)) => {
-                let observed = prepared.observed_with(groups)?;
-                let (task, memory) = (task(prepared, &observed), Memory { part: None, resident });
-                match GpuEngine::over_device_samples(&made, task, &prepared.start(), memory) {
-                    Ok(engine) => {
-                        let engine = FitEngine::Gpu(engine);
-                        self.verify(prepared, &engine)?;
-                        return then(&SelectedEngine { engine, selection: Selection::default() });
-                    }
-                    Err(error) => error,
-                }
+        baked: Baked,
+    ) -> Result<(Observed, SelectedEngine), Refusal> {
+        let (observed, chosen) = match self.with_own_samples(baked.clone())? {
+            Ok((observed, engine)) => (observed, SelectedEngine { engine: Box::new(engine), why: None }),
+            Err(error @ (GpuError::OutOfMemory { .. } | GpuError::SamplesStay { .. })) => {
+                tell(&format!("{error} The CPU makes the samples."));
+                let observed = baked.sample()?.observe()?;
+                let chosen = self.on_gpu(&observed, None)?;
+                (observed, chosen)
             }
-            Err(DeviceSampleError::Gpu(error)) => error,
+            Err(error) => return Err(refused(&error)),
+        };
+        let chosen = self.verified(&observed, chosen)?;
+        Ok((observed, chosen))
+    }
+
+    /// The views and the engine over the adapter's samples, or what the adapter refused.
+    fn with_own_samples(&self, baked: Baked) -> Result<Result<(Observed, GpuEngine), GpuError>, Refusal> {
+        let gpu = self.open().map_err(|error| refused(&error))?;
+        let (made, groups) = match DeviceSamples::new(&gpu, Content::of(&baked)) {
+            Ok(made) => made,
+            Err(DeviceSampleError::Gpu(error)) => return Ok(Err(error)),
             Err(error) => return Err(error.into()),
         };
-        if !matches!(error, GpuError::OutOfMemory { .. } | GpuError::SamplesStay { .. }) {
-            return Err(refused(&error));
-        }
-        drop(gpu);
-        tell(&format!("{error} The CPU makes the samples."));
-        let start = Instant::now();
-        let samples = prepared.traced()?;
-        let selection =
-            Selection { traced_seconds: Some(start.elapsed().as_secs_f64()), ..Selection::default() };
-        let observed = prepared.observed_with(samples)?;
-        self.with_gpu(prepared, observed, selection, then)
+        let observed = baked.observe(groups)?;
+        let memory = Memory { part: None, resident: self.resident() };
+        let engine =
+            GpuEngine::over_device_samples(Arc::new(made), observed.task(), &observed.start(), memory);
+        Ok(engine.map(|engine| (observed, engine)))
     }
 
     /// Most bytes that stay on the adapter, where that is limited.
@@ -132,31 +114,10 @@ impl FitEngineArguments {
     fn open(&self) -> Result<Gpu, GpuError> {
         Gpu::open(&Choice { name: self.adapter.clone(), ..Choice::default() })
     }
-
-    fn engine_on<'g>(
-        &self,
-        gpu: &'g Gpu,
-        prepared: &Prepared,
-        observed: &'g [ObservedView],
-        resident: Option<u64>,
-    ) -> Result<GpuEngine<'g>, GpuError> {
-        let memory = Memory { part: None, resident };
-        GpuEngine::new(gpu, task(prepared, observed), &prepared.start(), memory)
-    }
 }
 
 fn refused(error: &GpuError) -> Refusal {
     Doing::Fit.refusal(error)
-}
-
-fn task<'v>(prepared: &Prepared, observed: &'v [ObservedView]) -> Task<'v> {
-    Task {
-        setup: prepared.setup(),
-        illumination: prepared.illumination.clone(),
-        views: observed,
-        loss: prepared.scene.fit.loss,
-        unknowns: prepared.unknowns(),
-    }
 }
 
 fn bytes(view: &ObservedView) -> u64 {

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use super::{MapArguments, MapRun, MapsLeft, Refusal};
-use crate::engine::view::ObservedView;
-use crate::prepare::Prepared;
+use crate::prepare::Observed;
 
 /// Nothing finds any.
 pub(in crate::cli) enum MapsFound {}
@@ -14,10 +13,9 @@ impl MapArguments {
     #[allow(clippy::unused_self, clippy::unnecessary_wraps, reason = "as where maps are fitted")]
     pub(in crate::cli) fn fit(
         &self,
-        _: &mut Prepared,
-        observed: Vec<ObservedView>,
+        observed: Observed,
         _: &MapRun<'_>,
-    ) -> Result<(Vec<ObservedView>, Option<MapsFound>), Refusal> {
+    ) -> Result<(Observed, Option<MapsFound>), Refusal> {
         Ok((observed, None))
     }
 }

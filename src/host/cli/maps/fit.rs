@@ -10,12 +10,13 @@ use super::{MapArguments, MapRun};
 use crate::cli::fit::compared;
 use crate::cli::graphics::tensor_words;
 use crate::cli::{Refusal, say};
+use crate::engine::Point;
 use crate::engine::view::ObservedView;
 use crate::gpu::Choice;
 use crate::maps::fit::MapStep;
 use crate::maps::task::columns_beside;
 use crate::maps::{FittedMaps, MapError, MapTask, fit_maps};
-use crate::prepare::Prepared;
+use crate::prepare::{Baked, Observed, StageSeconds};
 use crate::progress;
 use crate::render::shade::Shader;
 use crate::report::maps::MapView;
@@ -30,41 +31,45 @@ impl MapArguments {
     /// and a view that was held out is gone.
     pub(in crate::cli) fn fit(
         &self,
-        prepared: &mut Prepared,
-        observed: Vec<ObservedView>,
+        observed: Observed,
         run: &MapRun<'_>,
-    ) -> Result<(Vec<ObservedView>, Option<MapsFound>), Refusal> {
+    ) -> Result<(Observed, Option<MapsFound>), Refusal> {
         if self.maps.is_empty() {
             return Ok((observed, None));
         }
         let clock = Instant::now();
+        let Observed { baked, views } = observed;
         let named = |kind: &MapKind| self.maps.iter().any(|name| name == kind.name());
         let kinds: Vec<MapKind> = MapKind::ALL.into_iter().filter(named).collect();
-        let held_out = self.held_out(&prepared.scene.views, &prepared.scene.path)?;
+        let held_out = self.held_out(&baked.scene.views, &baked.scene.path)?;
         let choice = Choice { name: run.adapter.map(str::to_owned), ..Choice::default() };
         let shared = SharedDevice::open(&choice).map_err(|error| Refusal::new(tensor_words(&error)))?;
-        prepared.scene.fit.free = columns_beside(&kinds, &prepared.scene.fit.free);
-        let posed = prepared.scene.mesh.pose();
+        let baked = baked.with_scene(|scene| scene.fit.free = columns_beside(&kinds, &scene.fit.free));
+        let posed = baked.scene.mesh.pose();
         let interrupt = Some(Arc::clone(&run.interrupt));
-        let task = MapTask::new(prepared, &posed, observed.clone(), kinds);
+        let task = MapTask::new(&baked, &posed, views.to_vec(), kinds);
         let task = MapTask { held_out, interrupt, ..task };
-        let found = told(&shared, task, prepared.scene.fit.maps.rounds, run.quiet)
-            .map_err(|error| refusal(&error, &prepared.scene.path))?;
-        let views = gained(prepared, &observed, &found, held_out)?;
+        let settings = baked.scene.fit.maps.clone();
+        let found = told(&shared, task, settings.rounds, run.quiet)
+            .map_err(|error| refusal(&error, &baked.scene.path))?;
+        let gained = gained(&baked, &views, &found, held_out)?;
         let maps = found.layers.iter().map(|layer| MapPictures::new(layer, &posed));
         let maps = maps.collect::<Result<Vec<_>, _>>()?;
-        let FittedMaps { illumination, mut observed, constants, history, interrupted, .. } = found;
-        prepared.illumination = illumination;
-        (prepared.scene.params, prepared.gains) = (constants.params, constants.gains);
+        let FittedMaps { illumination, observed: mut views, constants, history, interrupted, .. } = found;
+        let Point { params, mut gains } = constants;
         if let Some(view) = held_out {
-            observed.remove(view);
-            prepared.scene.views.remove(view);
-            prepared.gains.remove(view);
+            views.remove(view);
+            gains.remove(view);
         }
-        prepared.seconds.maps = clock.elapsed().as_secs_f64();
+        let baked = baked.with_scene(|scene| {
+            scene.params = params;
+            held_out.map(|view| scene.views.remove(view));
+        });
+        let seconds = StageSeconds { maps: clock.elapsed().as_secs_f64(), ..baked.seconds };
+        let baked = Baked { illumination: Arc::new(illumination), gains, seconds, ..baked };
         let adapter = shared.gpu().name().to_owned();
-        let settings = prepared.scene.fit.maps.clone();
-        Ok((observed, Some(MapsFound { views, maps, history, adapter, settings, interrupted })))
+        let found = MapsFound { views: gained, maps, history, adapter, settings, interrupted };
+        Ok((Observed { baked, views: views.into() }, Some(found)))
     }
 
     fn held_out(&self, views: &[View], scene: &Path) -> Result<Option<usize>, Refusal> {
@@ -132,14 +137,14 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
 
 /// How well each view is met by the maps of the start and by the fitted ones, each with their best constants.
 fn gained(
-    prepared: &Prepared,
+    baked: &Baked,
     before: &[ObservedView],
     found: &FittedMaps,
     held_out: Option<usize>,
 ) -> Result<Vec<MapView>, ShadingError> {
-    let initial = Shader::new(prepared.setup(), &prepared.illumination, &found.initial.params)?;
-    let fitted = Shader::new(prepared.setup(), &found.illumination, &found.constants.params)?;
-    let views = prepared.scene.views.iter().enumerate();
+    let initial = Shader::new(baked.setup(), &baked.illumination, &found.initial.params)?;
+    let fitted = Shader::new(baked.setup(), &found.illumination, &found.constants.params)?;
+    let views = baked.scene.views.iter().enumerate();
     let scored = views
         .map(|(i, view)| {
             let scores = |shader: &Shader, observed: &ObservedView, gain: f64| {

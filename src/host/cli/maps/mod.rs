@@ -18,6 +18,10 @@ use std::sync::atomic::AtomicBool;
 
 use super::Refusal;
 use crate::report::maps::MapEvidence;
+#[cfg(not(feature = "burn"))]
+pub(super) use absent::MapsFound;
+#[cfg(feature = "burn")]
+pub(super) use found::MapsFound;
 
 /// How to build the program so that it fits maps.
 const BUILD: &str = "cargo build --release --features burn";

@@ -1,9 +1,13 @@
 //! Which engine draws, and its options.
 
 use super::Refusal;
-use super::painter::{CpuPainter, Painter};
+use super::painter::{CpuPainter, GpuPainter, Painter};
+use crate::cli::graphics::Task;
 use crate::cli::shader::parse_budget;
-use crate::prepare::Prepared;
+use crate::cli::tell;
+use crate::gpu::error::SOFTWARE_DRIVER;
+use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
+use crate::prepare::Baked;
 use crate::render::antialias::Antialias;
 use crate::shader::Budget;
 
@@ -46,72 +50,48 @@ impl EngineArguments {
         self.engine != "cpu"
     }
 
-    /// Call `draw` with the requested engine, the scene in it.
-    pub(super) fn with_painter(
-        &self,
-        prepared: &mut Prepared,
-        painting: Painting,
-        draw: impl FnOnce(&Prepared, &mut dyn Painter) -> Result<(), Refusal>,
-    ) -> Result<(), Refusal> {
-        let antialias = self.antialias.unwrap_or(Antialias::Grid(prepared.scene.quality.samples_per_axis));
+    /// Samples along a pixel's side, where they are not the scene's.
+    pub(super) const fn samples_per_axis(&self) -> Option<u32> {
+        match self.antialias {
+            Some(Antialias::Grid(n)) => Some(n),
+            _ => None,
+        }
+    }
+
+    /// The requested engine with the scene in it.
+    pub(super) fn painter(&self, baked: &Baked, painting: Painting) -> Result<Box<dyn Painter>, Refusal> {
+        let antialias = self.antialias.unwrap_or(Antialias::Grid(baked.scene.quality.samples_per_axis));
         if self.may_be_gpu()
             && let Some(gpu) = self.open()?
         {
-            let mut painter = self.painter(&gpu, prepared, antialias, painting)?;
-            return draw(prepared, &mut painter);
+            let Painting { animated, timed } = painting;
+            let options = RenderOptions { antialias, budget: self.accuracy, timed, animated };
+            let painter = GpuPainter::new(gpu, baked, options);
+            return Ok(Box::new(painter.map_err(|error| Task::Render.refusal(&error))?));
         }
-        let Antialias::Grid(n) = antialias else {
+        let Antialias::Grid(_) = antialias else {
             return Err(Refusal::new(
                 "--antialias msaa4 is a graphics adapter's; the CPU engine shades every sample. Give 2x2, or \
                  render on an adapter.",
             ));
         };
-        prepared.scene.quality.samples_per_axis = n;
-        let mut painter = CpuPainter::new(prepared)?;
-        draw(prepared, &mut painter)
+        Ok(Box::new(CpuPainter::new(baked)?))
     }
-}
 
-mod gpu {
-    use super::super::painter::GpuPainter;
-    use super::{Antialias, EngineArguments, Painting, Prepared, Refusal};
-    use crate::cli::graphics::Task;
-    use crate::cli::tell;
-    use crate::gpu::error::SOFTWARE_DRIVER;
-    use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
-
-    impl EngineArguments {
-        /// The adapter's device; none where `auto` finds no adapter that works, which it says.
-        pub(super) fn open(&self) -> Result<Option<Gpu>, Refusal> {
-            let choice = Choice { name: self.adapter.clone(), ..Choice::default() };
-            match Gpu::open(&choice) {
-                Ok(gpu) => Ok(Some(gpu)),
-                Err(error) if self.engine == "gpu" || self.adapter.is_some() => {
-                    Err(Task::Render.refusal(&error))
-                }
-                Err(GpuError::NoAdapter) => {
-                    tell(&format!(
-                        "no graphics adapter was found: the CPU engine renders. {SOFTWARE_DRIVER}."
-                    ));
-                    Ok(None)
-                }
-                Err(error) => {
-                    tell(&format!("{error} The CPU engine renders."));
-                    Ok(None)
-                }
+    /// The adapter's device; none where `auto` finds no adapter that works, which it says.
+    fn open(&self) -> Result<Option<Gpu>, Refusal> {
+        let choice = Choice { name: self.adapter.clone(), ..Choice::default() };
+        match Gpu::open(&choice) {
+            Ok(gpu) => Ok(Some(gpu)),
+            Err(error) if self.engine == "gpu" || self.adapter.is_some() => Err(Task::Render.refusal(&error)),
+            Err(GpuError::NoAdapter) => {
+                tell(&format!("no graphics adapter was found: the CPU engine renders. {SOFTWARE_DRIVER}."));
+                Ok(None)
             }
-        }
-
-        pub(super) fn painter<'a>(
-            &self,
-            gpu: &'a Gpu,
-            prepared: &'a Prepared,
-            antialias: Antialias,
-            painting: Painting,
-        ) -> Result<GpuPainter<'a>, Refusal> {
-            let Painting { animated, timed } = painting;
-            let options = RenderOptions { antialias, budget: self.accuracy, timed, animated };
-            GpuPainter::new(gpu, prepared, options).map_err(|error| Task::Render.refusal(&error))
+            Err(error) => {
+                tell(&format!("{error} The CPU engine renders."));
+                Ok(None)
+            }
         }
     }
 }

@@ -17,7 +17,7 @@ use crate::bake::{self, VertexOcclusion};
 use crate::fit::params_file::Foreign;
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{LARGEST, Param, Params};
-use crate::prepare::{ClipOcclusion, PrepareOptions, Prepared, Views};
+use crate::prepare::{Baked, ClipOcclusion, Loaded, PrepareOptions, Views};
 use crate::progress;
 use crate::render::files::{ImageOptions, write_exr_layers, write_image};
 use crate::render::image::{MAX_PIXELS, MAX_SIDE};
@@ -103,75 +103,78 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         clip: arguments.animate.then_some(arguments.follows()),
         background: arguments.background,
     };
-    let mut prepared = Prepared::baked(&path, &options)?;
-    samples::check_uvs(&prepared.scene, &prepared.scene.mesh.uvs)?;
+    let mut loaded = Loaded::read(&path, &options)?;
     if let Some((width, height)) = arguments.size {
-        let camera = &mut prepared.scene.views[0].camera;
+        let camera = &mut loaded.scene.views[0].camera;
         (camera.width, camera.height) = (width, height);
     }
-    let animation = if arguments.animate { Some(animation(&prepared)?) } else { None };
-    tell_warnings(&prepared.warnings);
-    tell_warnings(&foreign(arguments, &path, &prepared).into_iter().collect::<Vec<_>>());
-    arguments.set.tell_idle(prepared.scene.effects);
-    let frames = frames(arguments, &prepared, animation.as_ref());
+    if let Some(n) = arguments.engine.samples_per_axis() {
+        loaded.scene.quality.samples_per_axis = n;
+    }
+    let baked = loaded.bake()?;
+    samples::check_uvs(&baked.scene, &baked.scene.mesh.uvs)?;
+    let animation = if arguments.animate { Some(animation(&baked)?) } else { None };
+    tell_warnings(&baked.warnings);
+    tell_warnings(&foreign(arguments, &path, &baked).into_iter().collect::<Vec<_>>());
+    arguments.set.tell_idle(baked.scene.effects);
+    let frames = frames(arguments, &baked, animation.as_ref());
     let sequence = arguments.frames.is_some();
     // The effect `haze` is asked for by name, and has no other place to go.
     let layers = is_exr && arguments.layers;
-    let beside = Beside { layers, haze: layers || is_exr && prepared.scene.effects.has(Effect::Haze) };
+    let beside = Beside { layers, haze: layers || is_exr && baked.scene.effects.has(Effect::Haze) };
     let painting = engine::Painting { animated: animation.is_some(), timed: arguments.stats };
-    arguments.engine.with_painter(&mut prepared, painting, |prepared, painter| {
-        let bar = progress::bar("frames", frames.len() as u64);
-        for frame in &frames {
-            if let (Some(animation), Some(time)) = (&animation, frame.time) {
-                let mesh = animation.mesh(time)?;
-                let occlusion = frame_occlusion(arguments, prepared, &mesh);
-                painter.set_mesh(&mesh, occlusion.as_ref())?;
-            }
-            let picture = painter.paint(&frame.camera, prepared.gains[0], beside)?;
-            if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
-                return Err(samples::nothing_visible(&prepared.scene, &prepared.scene.views[0]).into());
-            }
-            bar.suspend(|| tell_warnings(&picture.warnings));
-            write(arguments, &path, frame, &picture, &prepared.scene.params)?;
-            bar.inc(1);
+    let mut painter = arguments.engine.painter(&baked, painting)?;
+    let bar = progress::bar("frames", frames.len() as u64);
+    for frame in &frames {
+        if let (Some(animation), Some(time)) = (&animation, frame.time) {
+            let mesh = animation.mesh(time)?;
+            let occlusion = frame_occlusion(arguments, &baked, &mesh);
+            painter.set_mesh(&mesh, occlusion.as_ref())?;
         }
-        bar.finish_and_clear();
-        tell_done(arguments, prepared, &frames, painter)
-    })?;
+        let picture = painter.paint(&frame.camera, baked.gains[0], beside)?;
+        if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
+            return Err(samples::nothing_visible(&baked.scene, &baked.scene.views[0]).into());
+        }
+        bar.suspend(|| tell_warnings(&picture.warnings));
+        write(arguments, &path, frame, &picture, &baked.scene.params)?;
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    tell_done(arguments, &baked, &frames, &*painter)?;
     Ok(Exit::Done)
 }
 
 /// What is drawn with constants that were fitted with other effects, in words.
-fn foreign(arguments: &Arguments, path: &Path, prepared: &Prepared) -> Option<String> {
+fn foreign(arguments: &Arguments, path: &Path, baked: &Baked) -> Option<String> {
     let foreign = Foreign {
         file: arguments.params.as_deref()?,
-        fitted: prepared.fitted,
+        fitted: baked.fitted,
         scene: if arguments.effects.is_some() { Path::new("--effects") } else { path },
-        effects: prepared.scene.effects,
-        params: &prepared.scene.params,
+        effects: baked.scene.effects,
+        params: &baked.scene.params,
         chosen: &arguments.set.params(),
     };
-    let names = prepared.fitted?.iter().map(Effect::name).collect::<Vec<_>>().join(",");
+    let names = baked.fitted?.iter().map(Effect::name).collect::<Vec<_>>().join(",");
     let remedy = format!("To draw what was fitted, name the scene that was fitted, or --effects {names}.");
     // Whoever names effects has left out what is left out.
     foreign.words("drawn", &remedy, arguments.effects.is_none())
 }
 
 /// The requested frames.
-fn frames(arguments: &Arguments, prepared: &Prepared, animation: Option<&Animation>) -> Vec<Frame> {
-    let (camera, output) = (&prepared.scene.views[0].camera, &arguments.output);
+fn frames(arguments: &Arguments, baked: &Baked, animation: Option<&Animation>) -> Vec<Frame> {
+    let (camera, output) = (&baked.scene.views[0].camera, &arguments.output);
     match (arguments.frames, animation) {
         (None, _) => frames::still(*camera, output),
-        (Some(count), None) => frames::turntable(camera, &prepared.scene.mesh, count, output),
+        (Some(count), None) => frames::turntable(camera, &baked.scene.mesh, count, output),
         (Some(count), Some(animation)) => frames::animation(camera, animation.seconds, count, output),
     }
 }
 
-fn animation(prepared: &Prepared) -> Result<Animation, Refusal> {
-    Animation::open(&prepared.scene)?.ok_or_else(|| {
+fn animation(baked: &Baked) -> Result<Animation, Refusal> {
+    Animation::open(&baked.scene)?.ok_or_else(|| {
         Refusal::new(format!(
             "{}: its mesh file has no animation with keys. Leave out --animate, or name a mesh that moves.",
-            prepared.scene.path.display()
+            baked.scene.path.display()
         ))
     })
 }
@@ -213,8 +216,8 @@ impl Arguments {
 }
 
 /// The occlusion of a frame's pose alone, where each frame is to be baked and an effect asks for it.
-fn frame_occlusion(arguments: &Arguments, prepared: &Prepared, mesh: &Mesh) -> Option<VertexOcclusion> {
-    let scene = &prepared.scene;
+fn frame_occlusion(arguments: &Arguments, baked: &Baked, mesh: &Mesh) -> Option<VertexOcclusion> {
+    let scene = &baked.scene;
     let wanted = arguments.follows() == ClipOcclusion::Frames && scene.needs().occlusion;
     let cache = arguments.scene.cache();
     let (occlusion, stats) = wanted.then(|| bake::bake_pose(scene, &mesh.pose(), cache.as_deref()))?;
@@ -224,11 +227,11 @@ fn frame_occlusion(arguments: &Arguments, prepared: &Prepared, mesh: &Mesh) -> O
 
 fn tell_done(
     arguments: &Arguments,
-    prepared: &Prepared,
+    baked: &Baked,
     frames: &[Frame],
     painter: &dyn Painter,
 ) -> Result<(), Refusal> {
-    let (view, engine) = (&prepared.scene.views[0].name, painter.name());
+    let (view, engine) = (&baked.scene.views[0].name, painter.name());
     if let [first, .., last] = frames {
         let (first, last) = (first.path.display(), last.path.display());
         say(&format!("wrote {} frames, {first} to {last} (view {view}; {engine})", frames.len()))?;

@@ -1,15 +1,18 @@
 //! What draws frames: the CPU engine, or the GPU's renderer.
 
+use std::sync::Arc;
+
 use super::Refusal;
 use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
 use crate::model::effects::Effect;
-use crate::prepare::Prepared;
+use crate::prepare::Baked;
 use crate::render::backdrop::Backdrop;
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
-use crate::samples::{self, sample_view};
+use crate::samples::{self, Atlas, atlas_of, sample_view};
+use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, PosedMesh};
 use crate::scene::view::Camera;
 
@@ -49,52 +52,58 @@ pub(super) trait Painter {
 const BACKGROUND: &str = "background";
 
 /// The CPU engine: rays through the samples' positions, the model in f64.
-pub(super) struct CpuPainter<'a> {
-    prepared: &'a Prepared,
+pub(super) struct CpuPainter {
+    scene: Arc<Scene>,
+    occlusion: Option<Arc<VertexOcclusion>>,
     shader: Shader,
     posed: PosedMesh,
     rays: RayMesh,
     /// Open share of each vertex' hemisphere.
     open: Option<Vec<f32>>,
+    atlas: Option<Arc<Atlas>>,
     seconds: f64,
 }
 
-impl<'a> CpuPainter<'a> {
+impl CpuPainter {
     /// Of a scene at its own pose.
-    pub(super) fn new(prepared: &'a Prepared) -> Result<Self, Refusal> {
-        let shader = Shader::new(prepared.setup(), &prepared.illumination, &prepared.scene.params)?;
-        let (posed, rays, open) = pose(prepared, &prepared.scene.mesh, prepared.occlusion.as_ref())?;
-        Ok(Self { prepared, shader, posed, rays, open, seconds: 0.0 })
+    pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
+        let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
+        let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
+        let (posed, rays, open) = pose(&scene, &scene.mesh, occlusion.as_deref())?;
+        let atlas = atlas_of(&scene, &posed, open.as_deref())?;
+        Ok(Self { scene, occlusion, shader, posed, rays, open, atlas, seconds: 0.0 })
     }
 }
 
 /// The mesh in the world, as rays see it, and its occlusion.
 fn pose(
-    prepared: &Prepared,
+    scene: &Scene,
     mesh: &Mesh,
     occlusion: Option<&VertexOcclusion>,
 ) -> Result<(PosedMesh, RayMesh, Option<Vec<f32>>), Refusal> {
     let posed = mesh.pose();
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
-    let open = samples::posed_occlusion(&prepared.scene, &mesh.morphs, mesh.positions.len(), occlusion)?;
+    let open = samples::posed_occlusion(scene, &mesh.morphs, mesh.positions.len(), occlusion)?;
     Ok((posed, rays, open))
 }
 
-impl Painter for CpuPainter<'_> {
+impl Painter for CpuPainter {
     fn name(&self) -> String {
         "cpu".to_owned()
     }
 
     fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal> {
-        let occlusion = occlusion.or(self.prepared.occlusion.as_ref());
-        (self.posed, self.rays, self.open) = pose(self.prepared, mesh, occlusion)?;
+        let occlusion = occlusion.or(self.occlusion.as_deref());
+        (self.posed, self.rays, self.open) = pose(&self.scene, mesh, occlusion)?;
+        self.atlas = atlas_of(&self.scene, &self.posed, self.open.as_deref())?;
         Ok(())
     }
 
     fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal> {
         let start = std::time::Instant::now();
-        let scene = &self.prepared.scene;
-        let samples = sample_view(scene, &self.posed, &self.rays, self.open.as_deref(), camera);
+        let scene = &*self.scene;
+        let mut samples = sample_view(scene, &self.posed, &self.rays, self.open.as_deref(), camera);
+        samples.atlas.clone_from(&self.atlas);
         let mut shaded = self.shader.shade(&samples, camera, gain);
         let mut layers: Vec<(String, Image)> =
             shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image)).collect();
@@ -122,7 +131,7 @@ pub(super) use gpu::GpuPainter;
 
 mod gpu {
     use super::{
-        BACKGROUND, Backdrop, Beside, Camera, Image, Mesh, Painter, Picture, Prepared, Refusal,
+        Arc, BACKGROUND, Backdrop, Baked, Beside, Camera, Image, Mesh, Painter, Picture, Refusal, Scene,
         VertexOcclusion,
     };
     use crate::cli::graphics::Task;
@@ -132,37 +141,30 @@ mod gpu {
     use crate::model::terms::TermName;
 
     /// The production renderer.
-    pub(in crate::cli::render) struct GpuPainter<'a> {
-        gpu: &'a Gpu,
-        renderer: Renderer<'a>,
-        prepared: &'a Prepared,
+    pub(in crate::cli::render) struct GpuPainter {
+        gpu: Gpu,
+        renderer: Renderer,
+        scene: Arc<Scene>,
         terms: Vec<TermName>,
         times: Vec<PassTime>,
         /// Whether what the user should know of the uploads was told.
         told: bool,
     }
 
-    impl<'a> GpuPainter<'a> {
+    impl GpuPainter {
         /// Of a scene, on an adapter's device.
         pub(in crate::cli::render) fn new(
-            gpu: &'a Gpu,
-            prepared: &'a Prepared,
+            gpu: Gpu,
+            baked: &Baked,
             options: RenderOptions,
         ) -> Result<Self, GpuError> {
-            let content = Content {
-                scene: &prepared.scene,
-                illumination: &prepared.illumination,
-                occlusion: prepared.occlusion.as_ref(),
-                params: &prepared.scene.params,
-            };
-            let mut renderer = Renderer::new(gpu, content, options)?;
-            renderer.set_background(prepared.scene.views[0].background);
-            let terms = TermName::of(prepared.scene.effects);
-            Ok(Self { gpu, renderer, prepared, terms, times: Vec::new(), told: false })
+            let mut renderer = Renderer::new(&gpu, Content::of(baked), options)?;
+            renderer.set_background(baked.scene.views[0].background);
+            let terms = TermName::of(baked.scene.effects);
+            let scene = Arc::clone(&baked.scene);
+            Ok(Self { gpu, renderer, scene, terms, times: Vec::new(), told: false })
         }
-    }
 
-    impl GpuPainter<'_> {
         /// The layers of a frame: terms, and what stands behind the mesh.
         fn layers(&mut self, camera: &Camera, gain: f64) -> Result<Vec<(String, Image)>, GpuError> {
             let mut layers = Vec::new();
@@ -172,7 +174,7 @@ mod gpu {
                 last = Some(Image { rgb: Vec::new(), ..image.clone() });
                 layers.push((name.name().to_owned(), image));
             }
-            let (scene, n) = (&self.prepared.scene, self.renderer.backdrop_samples());
+            let (scene, n) = (&*self.scene, self.renderer.backdrop_samples());
             let background = scene.views[0].background;
             if let Some(coverage) = last
                 && let Some(backdrop) = Backdrop::new(scene, &scene.params, background, camera, n)
@@ -202,7 +204,7 @@ mod gpu {
         }
     }
 
-    impl Painter for GpuPainter<'_> {
+    impl Painter for GpuPainter {
         fn name(&self) -> String {
             let kind = if self.gpu.is_software() { " (software)" } else { "" };
             format!("gpu: {}{kind}", self.gpu.name())

@@ -55,7 +55,7 @@ impl Axis for CubeSize {
     }
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let scene = &bench.prepared.scene;
+        let scene = &bench.baked.scene;
         let asked = (self.asked)(scene.needs());
         asked.then_some(()).ok_or("no effect looks this cube up")
     }

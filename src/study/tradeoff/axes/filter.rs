@@ -16,7 +16,7 @@ impl Axis for Filters {
     }
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let scene = &bench.prepared.scene;
+        let scene = &bench.baked.scene;
         let asked = scene.needs().environment();
         asked.then_some(()).ok_or("no effect looks a cube up")
     }

@@ -91,6 +91,6 @@ pub(super) fn images_in(
     bench: &Bench<'_>,
     shade: impl Fn(&crate::samples::ViewSamples, &crate::scene::view::Camera, f64) -> Image,
 ) -> Vec<Image> {
-    let views = evaluated.samples.iter().zip(&evaluated.scene.views).zip(&bench.prepared.gains);
+    let views = evaluated.samples.iter().zip(&evaluated.scene.views).zip(&bench.baked.gains);
     views.map(|((samples, view), &gain)| shade(samples, &view.camera, gain)).collect()
 }

@@ -18,7 +18,7 @@ impl Axis for Density {
     }
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let scene = &bench.prepared.scene;
+        let scene = &bench.baked.scene;
         let asked = scene.needs().lobes;
         asked.then_some(()).ok_or("no effect looks the specular cube up")
     }

@@ -18,7 +18,7 @@ impl Axis for Pixels {
     }
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let targets = bench.prepared.scene.views.iter().any(|view| view.target.is_some());
+        let targets = bench.baked.scene.views.iter().any(|view| view.target.is_some());
         targets.then_some(()).ok_or("no view names a target to fit to")
     }
 

@@ -115,6 +115,6 @@ impl Swept<'_> {
 
 /// The seconds of those bakes of a scene whose name begins with `name`; nothing comes from a cache.
 pub(super) fn bake_seconds(bench: &Bench<'_>, scene: &Scene, name: &str) -> Result<f64, StudyError> {
-    let (_, stats) = baked(scene, &bench.prepared.scene, None)?;
+    let (_, stats) = baked(scene, &bench.baked.scene, None)?;
     Ok(stats.rows.iter().filter(|row| row.name.starts_with(name)).map(|row| row.seconds).sum())
 }

@@ -15,7 +15,7 @@ impl Axis for Rays {
     }
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let scene = &bench.prepared.scene;
+        let scene = &bench.baked.scene;
         let asked = scene.needs().occlusion;
         asked.then_some(()).ok_or("no effect asks for occlusion")
     }
@@ -26,14 +26,14 @@ impl Axis for Rays {
 
     fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
         // The surface is traced once more, for the points that the samples show.
-        let vertices = bench.prepared.scene.mesh.positions.len() as f64;
+        let vertices = bench.baked.scene.mesh.positions.len() as f64;
         let count = |rays| counted(vertices, rays);
         let sweep = swept(&count);
         Ok(rates.trace + sweep.seconds(bench, rates, &|_| 0.0, &|settings| trace(bench, settings))?)
     }
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
-        let vertices = bench.prepared.scene.mesh.positions.len() as f64;
+        let vertices = bench.baked.scene.mesh.positions.len() as f64;
         swept(&|rays| counted(vertices, rays))
             .sweep(bench, &bench.point(), &|settings| trace(bench, settings))
     }

@@ -21,9 +21,9 @@ pub(super) struct Remeshed {
 impl Remeshed {
     /// The scene's own mesh.
     pub(super) fn of(bench: &Bench<'_>) -> Result<Self, StudyError> {
-        let scene = &bench.prepared.scene;
+        let scene = &bench.baked.scene;
         let mesh = scene.mesh.pose();
-        let occlusion = bench.prepared.occlusion.as_ref();
+        let occlusion = bench.baked.occlusion.as_deref();
         let open = samples::posed_occlusion(scene, &scene.mesh.morphs, mesh.positions.len(), occlusion);
         Ok(Self { mesh, open: open.map_err(PrepareError::from)? })
     }
@@ -83,7 +83,7 @@ impl Remeshed {
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
         let samples =
             samples::sample_views(&scene, &self.mesh, occlusion.as_ref()).map_err(PrepareError::from)?;
-        Ok(Evaluated { scene, illumination: bench.prepared.illumination.clone(), samples: Arc::new(samples) })
+        Ok(Evaluated { scene, illumination: bench.baked.illumination.clone(), samples: Arc::new(samples) })
     }
 
     /// The median length of an edge.

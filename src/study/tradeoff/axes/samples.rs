@@ -38,7 +38,7 @@ impl Axis for Samples {
 }
 
 fn pixels(bench: &Bench<'_>) -> u32 {
-    bench.prepared.scene.views.iter().map(|view| view.camera.width * view.camera.height).sum()
+    bench.baked.scene.views.iter().map(|view| view.camera.width * view.camera.height).sum()
 }
 
 /// Million rays.

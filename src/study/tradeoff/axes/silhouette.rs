@@ -24,7 +24,7 @@ impl Axis for Silhouettes {
     }
 
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let scene = &bench.prepared.scene;
+        let scene = &bench.baked.scene;
         let asked = scene.effects.needs(Silhouette::Fragment).rim;
         asked.then_some(()).ok_or("no effect asks for the silhouette")
     }
@@ -108,7 +108,7 @@ fn setting(
             ("sag", tessellation_error(scene)),
         ],
         reference: silhouette == Silhouette::Fragment,
-        present: own && silhouette == bench.prepared.scene.silhouette,
+        present: own && silhouette == bench.baked.scene.silhouette,
         pareto: false,
     })
 }

@@ -135,17 +135,11 @@ impl Fits {
 
     /// One run: its last outcome, the seconds and passes of all its fits.
     fn fit(&self, (_, strides, solver): &Run) -> Result<(Outcome, f64, u64), StudyError> {
-        let scene = &self.subject.prepared.scene;
-        let mut start = self.subject.prepared.start();
+        let scene = &self.subject.observed.scene;
+        let mut start = self.subject.observed.start();
         let (mut seconds, mut passes, mut last) = (0.0, 0, None);
         // Terms that earlier fits kept would be a present.
-        let mut engine = CpuEngine::new(
-            self.subject.prepared.setup(),
-            self.subject.prepared.illumination.clone(),
-            self.subject.engine.views().to_vec(),
-            scene.fit.loss,
-            self.subject.prepared.unknowns(),
-        )?;
+        let mut engine = CpuEngine::new(self.subject.observed.task())?;
         for &stride in strides {
             engine.set_stride(stride);
             let options = FitOptions {

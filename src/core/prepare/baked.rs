@@ -1,0 +1,163 @@
+//! A scene with all that is baked of it.
+
+use std::path::Path;
+use std::sync::Arc;
+use web_time::Instant;
+
+use super::{Loaded, Observed, PrepareError, PrepareOptions, Sampled, StageSeconds};
+use crate::bake::{self, BakeStats, Illumination, VertexOcclusion};
+use crate::engine::view::ObservedView;
+use crate::engine::{Point, Task, Unknown};
+use crate::model::effects::Effects;
+use crate::model::evaluate::Setup;
+use crate::model::params::Param;
+use crate::samples::{self, ViewSamples};
+use crate::scene::Scene;
+use crate::scene::view::View;
+
+/// A scene with its light and occlusion, which are shared with what is made of them: a clone copies neither.
+#[derive(Clone, Debug)]
+pub struct Baked {
+    /// The scene; its params are those to start from.
+    pub scene: Arc<Scene>,
+    /// The effects that the parameter file's values were fitted with, where it says.
+    pub fitted: Option<Effects>,
+    /// A factor on each view's image.
+    pub gains: Vec<f64>,
+    /// The cubes that its effects ask for.
+    pub illumination: Arc<Illumination>,
+    /// Ambient occlusion, when asked for.
+    pub occlusion: Option<Arc<VertexOcclusion>>,
+    /// What was baked, and what came from the cache.
+    pub stats: BakeStats,
+    /// Seconds by stage so far.
+    pub seconds: StageSeconds,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl Baked {
+    /// Read and bake the scene at `path`; no surface is sampled.
+    ///
+    /// # Errors
+    /// The first stage's that refuses its input.
+    pub fn new(path: &Path, options: &PrepareOptions) -> Result<Self, PrepareError> {
+        Loaded::read(path, options)?.bake()
+    }
+
+    pub(super) fn of(loaded: Loaded) -> Result<Self, PrepareError> {
+        let start = Instant::now();
+        let Loaded { scene, fitted, gains, seconds, mut warnings, asked } = loaded;
+        let (lobe, own) = (Param::SpecularLobe.info(), scene.params.scalar(Param::SpecularLobe));
+        let free = scene.fit.free.iter().any(|column| column.param == lobe.param);
+        let exponents = if asked.fit && free { lobe.lower..=lobe.upper } else { own..=own };
+        let cache = asked.cache.as_deref();
+        let (illumination, occlusion, stats) = if asked.light_alone {
+            let (illumination, stats) = bake::bake_light(&scene, exponents, cache)?;
+            (illumination, None, stats)
+        } else {
+            let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
+            let (baked, stats) = bake::bake(&scene, &pose, exponents, cache)?;
+            (baked.illumination, baked.occlusion.map(Arc::new), stats)
+        };
+        warnings.extend(stats.warnings.iter().cloned());
+        let seconds = StageSeconds { bake: start.elapsed().as_secs_f64(), ..seconds };
+        let (scene, illumination) = (Arc::new(scene), Arc::new(illumination));
+        Ok(Self { scene, fitted, gains, illumination, occlusion, stats, seconds, warnings })
+    }
+
+    /// The same bakes of a scene that differs in what they do not depend on, such as constants that turn no lobe,
+    /// targets, or what is free.
+    #[must_use]
+    pub fn with_scene(mut self, change: impl FnOnce(&mut Scene)) -> Self {
+        change(Arc::make_mut(&mut self.scene));
+        self
+    }
+
+    /// Trace the visible surface of each view.
+    ///
+    /// # Errors
+    /// When a view sees nothing of the mesh, or the mesh lacks what the effects ask for.
+    pub fn sample(self) -> Result<Sampled, PrepareError> {
+        let start = Instant::now();
+        let posed = self.scene.mesh.pose();
+        let samples = samples::sample_views(&self.scene, &posed, self.occlusion.as_deref())?;
+        let seconds = StageSeconds { samples: start.elapsed().as_secs_f64(), ..self.seconds };
+        Ok(Sampled { baked: Self { seconds, ..self }, samples })
+    }
+
+    /// Without the views that have no target: a warning names each.
+    ///
+    /// # Errors
+    /// When no view has one.
+    pub fn keep_targets(mut self) -> Result<Self, PrepareError> {
+        let has_target: Vec<bool> = self.scene.views.iter().map(|view| view.target.is_some()).collect();
+        if !has_target.contains(&true) {
+            return Err(PrepareError::NoTarget { scene: self.scene.path.display().to_string() });
+        }
+        let without = self.scene.views.iter().filter(|view| view.target.is_none());
+        let path = self.scene.path.display();
+        let warning = |view: &View| {
+            format!("{path}: view \"{}\" has no target and takes no part in the fit.", view.name)
+        };
+        self.warnings.extend(without.map(warning));
+        self.gains = kept(self.gains, &has_target);
+        // A scene that is shared is not copied for nothing.
+        if has_target.contains(&false) {
+            return Ok(self.with_scene(|scene| scene.views.retain(|view| view.target.is_some())));
+        }
+        Ok(self)
+    }
+
+    /// The views that have a target beside what was observed there, with `samples` of all views.
+    ///
+    /// # Errors
+    /// When no view has a target, or a target asks nothing.
+    pub fn observe(self, samples: Vec<ViewSamples>) -> Result<Observed, PrepareError> {
+        let has_target: Vec<bool> = self.scene.views.iter().map(|view| view.target.is_some()).collect();
+        Observed::of(self.keep_targets()?, kept(samples, &has_target))
+    }
+
+    /// Where a fit starts.
+    #[must_use]
+    pub fn start(&self) -> Point {
+        Point { params: self.scene.params.clone(), gains: self.gains.clone() }
+    }
+
+    /// Pixels in a row of each view's image.
+    #[must_use]
+    pub fn image_widths(&self) -> Vec<usize> {
+        self.scene.views.iter().map(|view| view.camera.width as usize).collect()
+    }
+
+    /// The switches of the model.
+    #[must_use]
+    pub fn setup(&self) -> Setup {
+        self.scene.setup()
+    }
+
+    /// The unknowns of the scene's fit: free columns, then free gains.
+    #[must_use]
+    pub fn unknowns(&self) -> Vec<Unknown> {
+        let gains = if self.scene.fit.free_gains { self.scene.views.len() } else { 0 };
+        let columns = self.scene.fit.free.iter().copied().map(Unknown::Param);
+        columns.chain((1..gains).map(Unknown::Gain)).collect()
+    }
+
+    /// The scene's fit over other views than its own.
+    #[must_use]
+    pub fn task_over(&self, views: impl Into<Arc<[ObservedView]>>) -> Task {
+        Task {
+            setup: self.setup(),
+            illumination: Arc::clone(&self.illumination),
+            views: views.into(),
+            loss: self.scene.fit.loss,
+            unknowns: self.unknowns(),
+        }
+    }
+}
+
+/// Those of a list that are marked.
+fn kept<T>(list: Vec<T>, marked: &[bool]) -> Vec<T> {
+    list.into_iter().zip(marked).filter_map(|(item, marked)| marked.then_some(item)).collect()
+}

@@ -1,0 +1,41 @@
+//! What a stage refuses.
+
+use crate::bake::BakeError;
+use crate::fit::params_file::ParamsFileError;
+use crate::program::shading::ShadingError;
+use crate::samples::SampleError;
+use crate::scene::error::SceneError;
+
+/// A stage refused its input.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each variant is the stage's own error")]
+pub enum PrepareError {
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    #[error(transparent)]
+    Bake(#[from] BakeError),
+    #[error(transparent)]
+    Samples(#[from] SampleError),
+    #[error(transparent)]
+    Params(#[from] ParamsFileError),
+    /// A view that cannot be compared with its target.
+    #[error("{scene}: {error}")]
+    Target { scene: String, error: SampleError },
+    /// What posing leaves of the mesh.
+    #[error(
+        "{scene}: no triangle of the mesh has an area once it is posed: node scales, bones or morph weights draw it \
+         together. Correct them in the mesh file, or the scene's morph_weights and time."
+    )]
+    Collapsed { scene: String },
+    /// Rules that the processor cannot compute.
+    #[error("{scene}: {error}.")]
+    Shading { scene: String, error: ShadingError },
+    /// No view of that name.
+    #[error("{scene}: there is no view `{view}`. {suggestion}.")]
+    NoView { scene: String, view: String, suggestion: String },
+    /// A fit without anything to match.
+    #[error(
+        "{scene}: no view names a target, so there is nothing to fit. Add target = \"image.exr\" to a [[view]]."
+    )]
+    NoTarget { scene: String },
+}

@@ -1,0 +1,43 @@
+//! The stages before a fit or a render, each made from the one before by value: what a stage was made of does not
+//! change under it.
+//!
+//! - [`Loaded`]: the scene as it was read; here it may still be changed
+//! - [`Baked`]: it and its light and occlusion
+//! - [`Sampled`]: these and the visible surface of each view
+//! - [`Observed`]: of the views that have a target, samples beside what was observed there
+//!
+//! A stage reads as the ones before it: `observed.scene`, `sampled.illumination`. Renderers start from a [`Baked`],
+//! engines from an [`Observed`].
+
+mod baked;
+mod error;
+mod loaded;
+mod observed;
+mod options;
+mod sampled;
+
+pub use self::baked::Baked;
+pub use self::error::PrepareError;
+pub use self::loaded::Loaded;
+pub use self::observed::Observed;
+pub use self::options::{ClipOcclusion, PrepareOptions, Views};
+pub use self::sampled::Sampled;
+
+/// Seconds spent in each stage of a run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct StageSeconds {
+    /// Reading the scene.
+    pub load: f64,
+    /// Cube maps and ambient occlusion (or reading them from the cache).
+    pub bake: f64,
+    /// Tracing the visible surface.
+    pub samples: f64,
+    /// Fitting whole maps, where they are.
+    pub maps: f64,
+    /// Fitting the constants.
+    pub fit: f64,
+    /// Rendering what the report shows.
+    pub render: f64,
+    /// Scores, pictures and files of the report, up to its page.
+    pub report: f64,
+}

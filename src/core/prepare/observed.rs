@@ -1,0 +1,68 @@
+//! A scene's views beside what was observed there.
+
+use std::ops::Deref;
+use std::path::Path;
+use std::sync::Arc;
+
+use super::{Baked, PrepareError, PrepareOptions, Sampled};
+use crate::engine::Task;
+use crate::engine::cpu::CpuEngine;
+use crate::engine::view::ObservedView;
+use crate::samples::{TargetRows, ViewSamples};
+
+/// A scene of views that have a target, ready to be fitted.
+#[derive(Clone, Debug)]
+pub struct Observed {
+    /// The scene and its bakes; each of its views has a target.
+    pub baked: Baked,
+    /// Those views: their samples and targets.
+    pub views: Arc<[ObservedView]>,
+}
+
+impl Observed {
+    /// Read, bake and sample the scene at `path` for a fit of its views that have a target, whether or not the options
+    /// speak of a fit.
+    ///
+    /// # Errors
+    /// The first stage's that refuses its input.
+    pub fn new(path: &Path, options: &PrepareOptions) -> Result<Self, PrepareError> {
+        let options = PrepareOptions { fit: true, ..options.clone() };
+        Sampled::new(path, &options)?.observe()
+    }
+
+    /// Of views all of which have a target, with their samples.
+    pub(super) fn of(baked: Baked, samples: Vec<ViewSamples>) -> Result<Self, PrepareError> {
+        let scene = || baked.scene.path.display().to_string();
+        let mut views = Vec::with_capacity(samples.len());
+        for (view, samples) in baked.scene.views.iter().zip(samples) {
+            let TargetRows { channels, weight, clip } = TargetRows::new(view, &samples)
+                .map_err(|error| PrepareError::Target { scene: scene(), error })?
+                .ok_or_else(|| PrepareError::NoTarget { scene: scene() })?;
+            views.push(ObservedView { samples, target: channels, weight, clip });
+        }
+        Ok(Self { baked, views: views.into() })
+    }
+
+    /// The scene's fit.
+    #[must_use]
+    pub fn task(&self) -> Task {
+        self.task_over(Arc::clone(&self.views))
+    }
+
+    /// The CPU engine for it.
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for, or one of them cannot be computed on the processor.
+    pub fn engine(&self) -> Result<CpuEngine, PrepareError> {
+        let scene = || self.scene.path.display().to_string();
+        CpuEngine::new(self.task()).map_err(|error| PrepareError::Shading { scene: scene(), error })
+    }
+}
+
+impl Deref for Observed {
+    type Target = Baked;
+
+    fn deref(&self) -> &Baked {
+        &self.baked
+    }
+}

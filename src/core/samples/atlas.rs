@@ -1,0 +1,402 @@
+//! Texels of the UV atlas as samples: the mesh rasterised with its texture coordinates as positions.
+//!
+//! As a graphics adapter draws it: a texel is covered where its centre lies in a triangle, edges by the top-left rule
+//! (Direct3D and Vulkan alike), both sides, without depth; where triangles overlap, the later one stays. Covered texels
+//! stand row by row, sixteen a record, each with what the effects' rules read of it and nothing else.
+
+use std::sync::atomic::{AtomicU32, Ordering};
+
+use glam::{DVec2, Vec2, Vec3, Vec4};
+use rayon::prelude::*;
+
+use super::LANES;
+use super::rows::Rows;
+use crate::model::evaluate::Setup;
+use crate::program::graph::Input;
+use crate::program::levels::texel_inputs;
+use crate::program::lower::{STEP_ALONG_U, STEP_ALONG_V};
+use crate::program::shading::ShadingError;
+use crate::scene::maps::Maps;
+use crate::scene::mesh::PosedMesh;
+use crate::shader::Facts;
+use crate::shader::facts::FaceSizes;
+
+/// How far texture coordinates may lie outside the atlas: a rounding of what was meant to be its border.
+pub const BORDER: f32 = 1e-5;
+/// A texel that the mesh does not cover.
+const EMPTY: u32 = u32::MAX;
+
+/// Texels that cannot be had.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum AtlasError {
+    /// Nothing tells where the mesh lies.
+    #[error(
+        "the mesh has no texture coordinates, but the enabled effects are computed in texels of its UV atlas. Give a \
+         mesh with TEXCOORD_0, or leave the effects out."
+    )]
+    NoUvs,
+    /// A tiled mesh: several places would share a texel.
+    #[error(
+        "texture coordinates lie in the tile ({u}, {v}), but effects that are computed in the UV atlas need all of \
+         them in the unit square. Lay the mesh out there, or leave those effects out."
+    )]
+    Outside {
+        /// The tile's column.
+        u: f32,
+        /// The tile's row.
+        v: f32,
+    },
+    /// A quantity that texels do not hold, or whose step to the next texel is not known.
+    #[error("`{quantity}` is not stored with texels: dpdx and dpdy are there for what vertices hold.")]
+    NotStored {
+        /// The quantity.
+        quantity: String,
+    },
+    /// The effects cannot be computed.
+    #[error(transparent)]
+    Shading(#[from] ShadingError),
+}
+
+/// The texels that a mesh covers, and what rules read of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Atlas {
+    size: u32,
+    /// For each texel, row by row, its place among those that are covered.
+    places: Vec<u32>,
+    /// Which texel each covered one is.
+    texels: Vec<u32>,
+    /// What records hold, row by row.
+    inputs: Vec<Input>,
+    rows: Rows,
+}
+
+impl Atlas {
+    /// The texels of a mesh as it is posed, `size` a side, with what the effects of `setup` read. `occlusion` holds one
+    /// value a vertex. All cores; the same for any number of threads.
+    ///
+    /// # Errors
+    /// When the mesh has no texture coordinates, or does not lie in the unit square; or the effects cannot be computed.
+    pub fn new(
+        setup: &Setup,
+        posed: &PosedMesh,
+        occlusion: Option<&[f32]>,
+        maps: &Maps,
+        size: u32,
+    ) -> Result<Self, AtlasError> {
+        check(posed)?;
+        let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1) };
+        // Turned or not, the same is read.
+        let inputs = texel_inputs(&Facts::of_samples(*setup, any, true))?;
+        let mesh = Textured { posed, occlusion, maps, size: f64::from(size) };
+        let fields = inputs.iter().map(Field::of).collect::<Result<Vec<_>, _>>()?;
+        let triangles = cover(&mesh, size);
+        let texels: Vec<u32> = (0..size * size).filter(|&texel| triangles[texel as usize] != EMPTY).collect();
+        let mut places = vec![EMPTY; triangles.len()];
+        texels.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
+        let mut rows = Rows::new(fields.len(), texels.len().div_ceil(LANES));
+        if !fields.is_empty() {
+            let records = rows.all_mut().par_chunks_mut(fields.len()).zip(texels.par_chunks(LANES));
+            records.for_each(|(record, texels)| {
+                for lane in 0..LANES {
+                    // Lanes beyond the last texel repeat it.
+                    let texel = texels[lane.min(texels.len() - 1)];
+                    let triangle = mesh.triangle(triangles[texel as usize]);
+                    let weights = triangle.weights(centre(texel, size));
+                    for (row, field) in record.iter_mut().zip(&fields) {
+                        row[lane] = field.value(&mesh, &triangle, weights);
+                    }
+                }
+            });
+        }
+        Ok(Self { size, places, texels, inputs, rows })
+    }
+
+    /// Texels along a side.
+    #[must_use]
+    pub const fn size(&self) -> u32 {
+        self.size
+    }
+
+    /// How many texels are covered.
+    #[must_use]
+    pub const fn covered(&self) -> usize {
+        self.texels.len()
+    }
+
+    /// Column and row of a covered texel.
+    #[inline(always)]
+    #[must_use]
+    pub fn texel(&self, place: usize) -> [u32; 2] {
+        [self.texels[place] % self.size, self.texels[place] / self.size]
+    }
+
+    /// The place of a texel among those that are covered; `None` for one that is not, or lies outside.
+    #[inline(always)]
+    #[must_use]
+    pub fn place(&self, column: i64, row: i64) -> Option<usize> {
+        let inside = |at: i64| (0..i64::from(self.size)).contains(&at);
+        if !inside(column) || !inside(row) {
+            return None;
+        }
+        let place = self.places[row as usize * self.size as usize + column as usize];
+        (place != EMPTY).then_some(place as usize)
+    }
+
+    /// The row of a record that holds a number; `None` where it was not asked for.
+    #[must_use]
+    pub fn row(&self, input: &Input) -> Option<usize> {
+        self.inputs.iter().position(|held| held == input)
+    }
+
+    /// The records: sixteen covered texels each, in their order.
+    #[must_use]
+    pub const fn rows(&self) -> &Rows {
+        &self.rows
+    }
+}
+
+fn check(posed: &PosedMesh) -> Result<(), AtlasError> {
+    if posed.uvs.is_empty() {
+        return Err(AtlasError::NoUvs);
+    }
+    let inside = |x: f32| (-BORDER..=1.0 + BORDER).contains(&x);
+    match posed.uvs.iter().find(|uv| !inside(uv.x) || !inside(uv.y)) {
+        Some(uv) => Err(AtlasError::Outside { u: uv.x.floor(), v: uv.y.floor() }),
+        None => Ok(()),
+    }
+}
+
+/// Where a texel is sampled, in texels.
+fn centre(texel: u32, size: u32) -> DVec2 {
+    DVec2::new(f64::from(texel % size), f64::from(texel / size)) + 0.5
+}
+
+/// A mesh as it lies in an atlas of `size` texels a side.
+struct Textured<'a> {
+    posed: &'a PosedMesh,
+    occlusion: Option<&'a [f32]>,
+    maps: &'a Maps,
+    size: f64,
+}
+
+/// A triangle in the atlas, counter-clockwise as v runs downwards: its vertices, and their places in texels.
+struct Triangle {
+    vertices: [usize; 3],
+    corners: [DVec2; 3],
+}
+
+impl Textured<'_> {
+    fn triangle(&self, index: u32) -> Triangle {
+        let mut vertices = self.posed.triangles[index as usize].map(|i| i as usize);
+        let corner = |i: usize| self.size * self.posed.uvs[i].as_dvec2();
+        let [a, b, c] = vertices.map(corner);
+        if (b - a).perp_dot(c - a) < 0.0 {
+            vertices.swap(1, 2);
+        }
+        Triangle { corners: vertices.map(corner), vertices }
+    }
+}
+
+impl Triangle {
+    /// Twice the area of the triangle between each edge and a place; the edge lies opposite to the vertex.
+    fn areas(&self, at: DVec2) -> [f64; 3] {
+        let [a, b, c] = self.corners;
+        [[b, c], [c, a], [a, b]].map(|[from, to]| (to - from).perp_dot(at - from))
+    }
+
+    /// Whether a place is drawn: inside, or on an edge that is the triangle's top or on its left.
+    fn covers(&self, at: DVec2) -> bool {
+        let [a, b, c] = self.corners;
+        let edges = [c - b, a - c, b - a];
+        // The inside lies to the right of an edge that goes up, below one that goes right.
+        let drawn = |edge: DVec2| edge.y < 0.0 || (edge.y == 0.0 && edge.x > 0.0);
+        let areas = self.areas(at);
+        edges.into_iter().zip(areas).all(|(edge, area)| area > 0.0 || (area == 0.0 && drawn(edge)))
+    }
+
+    /// What each vertex counts at a place.
+    fn weights(&self, at: DVec2) -> [f64; 3] {
+        let areas = self.areas(at);
+        let sum: f64 = areas.iter().sum();
+        areas.map(|area| area / sum)
+    }
+
+    /// How the weights change from a texel to its right neighbour, and to the one below.
+    fn steps(&self) -> [[f64; 3]; 2] {
+        let [a, b, c] = self.corners;
+        let area = (b - a).perp_dot(c - a);
+        let edges = [c - b, a - c, b - a];
+        [edges.map(|edge| -edge.y / area), edges.map(|edge| edge.x / area)]
+    }
+}
+
+/// For each texel the triangle that it shows.
+fn cover(mesh: &Textured<'_>, size: u32) -> Vec<u32> {
+    let texels = size as usize * size as usize;
+    // The last triangle stays whatever thread comes last; 0 is none.
+    let shown: Vec<AtomicU32> = (0..texels).map(|_| AtomicU32::new(0)).collect();
+    (0..mesh.posed.triangles.len() as u32).into_par_iter().for_each(|index| {
+        let triangle = mesh.triangle(index);
+        let [a, b, c] = triangle.corners;
+        if (b - a).perp_dot(c - a) == 0.0 {
+            return;
+        }
+        let most = f64::from(size);
+        let low = (a.min(b).min(c) - 0.5).ceil().clamp(DVec2::ZERO, DVec2::splat(most));
+        let high = (a.max(b).max(c) + 0.5).floor().clamp(DVec2::ZERO, DVec2::splat(most));
+        for row in low.y as u32..high.y as u32 {
+            for column in low.x as u32..high.x as u32 {
+                let texel = row * size + column;
+                if triangle.covers(centre(texel, size)) {
+                    shown[texel as usize].fetch_max(index + 1, Ordering::Relaxed);
+                }
+            }
+        }
+    });
+    shown.into_iter().map(|shown| shown.into_inner().checked_sub(1).unwrap_or(EMPTY)).collect()
+}
+
+/// One number of a texel.
+struct Field {
+    of: Quantity,
+    component: usize,
+    step: Option<usize>,
+}
+
+/// What texels hold ([`crate::shader::emit::TEXEL`]).
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Quantity {
+    Position,
+    Normal,
+    Tangent,
+    Bitangent,
+    Uv,
+    Occlusion,
+    Color,
+    Specular,
+    Attenuator,
+    NormalMap,
+}
+
+impl Field {
+    fn of(input: &Input) -> Result<Self, AtlasError> {
+        let steps = [STEP_ALONG_U, STEP_ALONG_V];
+        let step = steps.iter().position(|prefix| input.name.starts_with(prefix));
+        let name = step.map_or(&*input.name, |axis| &input.name[steps[axis].len()..]);
+        let of = match name {
+            "vertex_position" => Quantity::Position,
+            "vertex_normal" => Quantity::Normal,
+            "vertex_tangent" => Quantity::Tangent,
+            "vertex_bitangent" => Quantity::Bitangent,
+            "vertex_uv" => Quantity::Uv,
+            "vertex_occlusion" => Quantity::Occlusion,
+            "albedo" if step.is_none() => Quantity::Color,
+            "specular" if step.is_none() => Quantity::Specular,
+            "attenuator" if step.is_none() => Quantity::Attenuator,
+            "normal_texel" if step.is_none() => Quantity::NormalMap,
+            _ => return Err(AtlasError::NotStored { quantity: name.to_owned() }),
+        };
+        Ok(Self { of, component: input.component, step })
+    }
+
+    fn value(&self, mesh: &Textured<'_>, triangle: &Triangle, weights: [f64; 3]) -> f32 {
+        let map = |sampled: &dyn Fn(Vec2) -> f32| {
+            let uv: DVec2 =
+                (0..3).map(|i| weights[i] * mesh.posed.uvs[triangle.vertices[i]].as_dvec2()).sum();
+            sampled(uv.as_vec2())
+        };
+        let Maps { color, normal, specular, attenuator } = mesh.maps;
+        let c = self.component;
+        match self.of {
+            Quantity::Color => map(&|uv| color.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[c])),
+            Quantity::Specular => map(&|uv| specular.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0])),
+            Quantity::Attenuator => {
+                map(&|uv| attenuator.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]))
+            }
+            Quantity::NormalMap => {
+                map(&|uv| normal.as_ref().map_or([0.5, 0.5, 1.0], |map| map.sample(uv.x, uv.y))[c])
+            }
+            _ => {
+                let weights = self.step.map_or(weights, |axis| triangle.steps()[axis]);
+                (0..3).map(|i| weights[i] * self.of_vertex(mesh, triangle.vertices[i])).sum::<f64>() as f32
+            }
+        }
+    }
+
+    /// Of a vertex; 0 where the mesh lacks it, but for the open share of the hemisphere.
+    fn of_vertex(&self, mesh: &Textured<'_>, i: usize) -> f64 {
+        let PosedMesh { positions, normals, tangents, uvs, .. } = mesh.posed;
+        let vector = |of: &[Vec3]| of.get(i).map_or(0.0, |v| v[self.component]);
+        let tangent = || tangents.get(i).copied().unwrap_or(Vec4::ZERO);
+        f64::from(match self.of {
+            Quantity::Position => vector(positions),
+            Quantity::Normal => vector(normals),
+            Quantity::Tangent => tangent()[self.component],
+            Quantity::Bitangent => {
+                let (n, t) = (normals.get(i).copied().unwrap_or_default(), tangent());
+                (t.w * n.cross(t.truncate()).normalize_or_zero())[self.component]
+            }
+            Quantity::Uv => uvs[i][self.component],
+            _ => mesh.occlusion.and_then(|open| open.get(i).copied()).unwrap_or(1.0),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(uvs: &[[f32; 2]], triangles: &[[u32; 3]]) -> Textured<'static> {
+        let posed = PosedMesh {
+            positions: uvs.iter().map(|&[u, v]| Vec3::new(3.0 * u, v, 1.0)).collect(),
+            uvs: uvs.iter().copied().map(Vec2::from).collect(),
+            triangles: triangles.to_vec(),
+            ..PosedMesh::default()
+        };
+        let maps = Box::leak(Box::<Maps>::default());
+        Textured { posed: Box::leak(Box::new(posed)), occlusion: None, maps, size: 8.0 }
+    }
+
+    #[test]
+    fn centres_on_shared_edges_belong_to_one_triangle_and_on_outer_ones_to_the_top_and_left() {
+        // From centre to centre: a square whose edges and diagonal go through centres.
+        let [low, high] = [1.5 / 8.0, 4.5 / 8.0];
+        let corners = [[low, low], [high, low], [high, high], [low, high]];
+        for triangles in [[[0, 1, 2], [0, 2, 3]], [[2, 1, 0], [3, 2, 0]]] {
+            let shown = cover(&mesh(&corners, &triangles), 8);
+            for (i, shown) in shown.iter().enumerate() {
+                let inside = (1..4).contains(&(i % 8)) && (1..4).contains(&(i / 8));
+                assert_eq!(*shown != EMPTY, inside, "{} {}", i % 8, i / 8);
+            }
+        }
+    }
+
+    #[test]
+    fn of_triangles_that_overlap_the_later_one_stays_and_steps_are_exact() {
+        let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
+        let mesh = mesh(&corners, &[[0, 1, 2], [2, 1, 0], [0, 0, 1]]);
+        let shown = cover(&mesh, 8);
+        assert!(shown.iter().all(|&triangle| triangle == 1 || triangle == EMPTY));
+        assert!((27..=36).contains(&shown.iter().filter(|&&triangle| triangle == 1).count()));
+        let triangle = mesh.triangle(1);
+        let input = |name: &str, component| Input { name: name.to_owned(), component };
+        let value = |name, component| {
+            let field = Field::of(&input(name, component)).unwrap();
+            field.value(&mesh, &triangle, triangle.weights(DVec2::new(2.5, 1.5)))
+        };
+        // All of these are sums of few halves.
+        assert_eq!([value("vertex_position", 0), value("vertex_uv", 1)], [3.0 * 2.5 / 8.0, 1.5 / 8.0]);
+        assert_eq!([value("dpdx_vertex_position", 0), value("dpdy_vertex_position", 0)], [3.0 / 8.0, 0.0]);
+        assert_eq!(value("vertex_occlusion", 0), 1.0);
+        let error = Field::of(&input("dpdx_albedo", 0)).err().unwrap();
+        assert_eq!(error, AtlasError::NotStored { quantity: "albedo".to_owned() });
+    }
+
+    #[test]
+    fn a_mesh_must_lie_in_the_atlas() {
+        let uvs = vec![Vec2::new(0.5, 0.5), Vec2::new(1.5, -0.5)];
+        let tiled = PosedMesh { uvs, ..PosedMesh::default() };
+        assert_eq!(check(&tiled).unwrap_err(), AtlasError::Outside { u: 1.0, v: -1.0 });
+        assert_eq!(check(&PosedMesh::default()).unwrap_err(), AtlasError::NoUvs);
+    }
+}
