@@ -74,6 +74,12 @@ impl Gpu {
         gpu
     }
 
+    /// Whether two handles are of one device. (wgpu compares numbers that devices of two instances may share.)
+    #[must_use]
+    pub fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.fault, &other.fault)
+    }
+
     /// Keep the first error, instead of wgpu's panic. A library that shares the device may have put its own
     /// listeners in their place.
     pub fn listen(&self) {

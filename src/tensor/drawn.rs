@@ -41,7 +41,7 @@ impl Planes {
     ) -> Result<Self, TensorError> {
         let gpu = shared.gpu();
         let foreign = |reason: &str| TensorError::Foreign { what: "the samples", reason: reason.to_owned() };
-        if made.gpu().device != gpu.device {
+        if !made.gpu().is(gpu) {
             return Err(foreign("they were drawn on another device"));
         }
         if !made.came_with(views) {

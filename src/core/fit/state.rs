@@ -220,7 +220,7 @@ impl Saved {
         if let Ok(Versioned { format }) = serde_json::from_slice(&bytes)
             && format != FORMAT
         {
-            return Err(different(path, "format", format.to_string(), FORMAT.to_string()));
+            return Err(different(path, "format", &format.to_string(), FORMAT.to_string()));
         }
         // Keys of the file stand in what is said of it: what they hold must not break the paragraph.
         let said = |e: serde_json::Error| e.to_string().replace(char::is_control, " ");
@@ -229,12 +229,12 @@ impl Saved {
 
     fn belongs_to(&self, now: &Self, path: &Path) -> Result<(), StateError> {
         let same = |what, found: String, expected: String| {
-            if found == expected { Ok(()) } else { Err(different(path, what, found, expected)) }
+            if found == expected { Ok(()) } else { Err(different(path, what, &found, expected)) }
         };
         same("solver", self.solver.name().to_owned(), now.solver.name().to_owned())?;
         same("list of unknowns", self.unknowns.join(" "), now.unknowns.join(" "))?;
         if let Some(Difference { what, was, is }) = self.fingerprint.difference(&now.fingerprint) {
-            return Err(different(path, &what, was, is));
+            return Err(different(path, &what, &was, is));
         }
         if self.start != now.start {
             let (was, is) = first_difference(&self.start, &now.start);
@@ -260,7 +260,9 @@ struct Versioned {
     format: u32,
 }
 
-fn different(path: &Path, what: &str, found: String, expected: String) -> StateError {
+fn different(path: &Path, what: &str, found: &str, expected: String) -> StateError {
+    // What a file holds must not break the paragraph.
+    let found = found.replace(char::is_control, " ");
     StateError::Different { path: path.to_owned(), what: what.to_owned(), found, expected }
 }
 

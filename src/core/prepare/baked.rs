@@ -66,8 +66,8 @@ impl Baked {
         Ok(Self { scene, fitted, gains, illumination, occlusion, stats, seconds, warnings })
     }
 
-    /// The same bakes of a scene that differs in what they do not depend on, such as constants that turn no lobe,
-    /// targets, or what is free.
+    /// The same bakes of a scene that differs in what they do not depend on, such as constants (a lobe's exponent within
+    /// those that are baked), targets, or what is free.
     #[must_use]
     pub fn with_scene(mut self, change: impl FnOnce(&mut Scene)) -> Self {
         change(Arc::make_mut(&mut self.scene));

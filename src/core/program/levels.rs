@@ -75,9 +75,9 @@ impl LevelProgram {
 
     /// Take over the passes and lookups of another program of the same rules that this one lacks.
     pub fn extend(&mut self, other: Self) {
+        // A pass of which something is lacking is taken whole: to leave a level twice does no harm.
         let left = |passes: &[LevelPass], pass: &LevelPass| {
-            let mut left = passes.iter().flat_map(|known| &known.leaves);
-            left.any(|leaf| pass.leaves.contains(leaf))
+            pass.leaves.iter().all(|leaf| passes.iter().any(|known| known.leaves.contains(leaf)))
         };
         for pass in other.passes {
             if !left(&self.passes, &pass) {

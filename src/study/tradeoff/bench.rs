@@ -232,8 +232,11 @@ impl<'a> Bench<'a> {
         let open = samples::posed_occlusion(scene, &mesh.morphs, mesh.positions.len(), occlusion);
         let mut surfaces = self.surfaces.to_vec();
         let Some(open) = open.map_err(PrepareError::from)? else { return Ok(surfaces) };
+        // Texels of the atlas see the same occlusion.
+        let atlas = samples::atlas_of(scene, &mesh.pose(), Some(&open)).map_err(PrepareError::from)?;
         let hits = self.hits(scene);
         for (samples, hits) in surfaces.iter_mut().zip(hits.iter()) {
+            samples.atlas.clone_from(&atlas);
             let Some(place) = samples.surface.places().occlusion else { continue };
             let corners = |hit: &Hit| mesh.triangles[hit.triangle as usize].map(|i| open[i as usize]);
             // As `samples` interpolates a number of the vertices.

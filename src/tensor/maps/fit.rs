@@ -20,9 +20,11 @@ use crate::fit::{self, FitOptions};
 use crate::model::cube::Cube;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
+use crate::program::shading::ShadingError;
 use crate::samples::ViewSamples;
 use crate::samples::rows::Row;
 use crate::scene::{MapSolver, Scene};
+use crate::shader::PlanError;
 use crate::{Input, Inputs, Scatter, Shade, Shaded, SharedDevice, TensorError};
 
 /// What was found.
@@ -70,6 +72,10 @@ pub fn fit_maps(
     told: &mut dyn FnMut(&MapStep),
 ) -> Result<FittedMaps, MapError> {
     let clock = Instant::now();
+    // Told before the constants are fitted, which takes a while.
+    if task.scene.needs().atlas {
+        return Err(ShadingError::from(PlanError::no_atlas(task.scene.effects)).into());
+    }
     let fixed = Fixed::of(&task);
     let (initial, _) = fixed.solve_constants(&task.illumination, &task.observed, &task.start)?;
     let problem = problem(shared, &task, fixed.setup, &initial)?;

@@ -62,3 +62,19 @@ fn no_damage_to_a_state_makes_a_fit_panic_or_end_beyond_its_bounds() {
     // Were every state refused, nothing would have been tried.
     assert!(gone_on > 30, "only {gone_on} states were gone on from");
 }
+
+#[test]
+fn a_name_that_a_state_holds_does_not_break_the_paragraph() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("state.json");
+    let image = Image::new(10, &truth());
+    let short = FitOptions { max_iterations: Some(1), state: Some(path.clone()), ..FitOptions::default() };
+    fit(&image, &point(&[]), &short, &mut |_| {}).unwrap();
+    let mut state: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    state["unknowns"][0] = "a\nb\u{1b}[2J".into();
+    std::fs::write(&path, state.to_string()).unwrap();
+    let resumed = FitOptions { resume: Some(path), ..short };
+    let words = fit(&image, &point(&[]), &resumed, &mut |_| {}).unwrap_err().to_string();
+    assert!(words.contains("another fit") && words.contains("a b"), "{words:?}");
+    assert!(!words.contains(char::is_control), "{words:?}");
+}

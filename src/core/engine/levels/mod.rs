@@ -126,15 +126,16 @@ impl<R: Number> LevelMaker<R> {
     /// When they lack them; texels that were made for other effects may.
     pub fn check(&self, effects: Effects, samples: &ViewSamples) -> Result<(), PlanError> {
         let holds = |atlas: &Atlas| self.program.fields().iter().all(|input| atlas.row(input).is_some());
-        let placed = samples.surface.places().uv.is_some() || samples.records() == 0;
-        if self.program.is_empty() || (placed && samples.atlas.as_deref().is_some_and(holds)) {
+        let placed = samples.surface.places().uv.is_some() && samples.atlas.as_deref().is_some_and(holds);
+        // A view that holds nothing looks nothing up.
+        if self.program.is_empty() || samples.records() == 0 || placed {
             return Ok(());
         }
         Err(PlanError::no_atlas(effects))
     }
 
-    /// The levels of an atlas that samples look up, at `params`: the last ones, where nothing has changed that they are made with. `cubes` gives
-    /// the cubes at `params`.
+    /// The levels of an atlas that samples look up, at `params`: the last ones, where nothing has changed that they are
+    /// made with. `cubes` gives the cubes at `params`.
     pub fn levels(
         &self,
         atlas: &Arc<Atlas>,
@@ -142,19 +143,28 @@ impl<R: Number> LevelMaker<R> {
         cubes: impl FnOnce() -> CubesAt<R>,
     ) -> Arc<Levels<R>> {
         let with = self.made_with(params);
-        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        last.retain(|made| made.with == with);
-        if let Some(made) = last.iter().find(|made| Arc::ptr_eq(&made.atlas, atlas)) {
-            return Arc::clone(&made.levels);
+        if let Some(levels) = self.known(atlas, &with) {
+            return levels;
         }
+        // Nothing is locked meanwhile: a thread that waits for others may come here again.
         self.count.fetch_add(1, Ordering::Relaxed);
         let reads = self.program.passes.iter().any(|pass| !pass.steps.resources().is_empty());
         let cubes = if reads { cubes() } else { CubesAt::dark(|x| R::from(x)) };
         let mut levels = self.make(atlas, params, &cubes);
         levels.retain(|name, _| self.program.looked_up.iter().any(|(found, _)| found == name));
         let levels = Arc::new(levels);
-        last.push(Made { atlas: Arc::clone(atlas), with, levels: Arc::clone(&levels) });
+        let made = Made { atlas: Arc::clone(atlas), with, levels: Arc::clone(&levels) };
+        self.last.lock().unwrap_or_else(PoisonError::into_inner).push(made);
         levels
+    }
+
+    /// Levels that were made with the same numbers. Others go, and those of an atlas that nobody else has any more, such
+    /// as an earlier frame's.
+    fn known(&self, atlas: &Arc<Atlas>, with: &[f64]) -> Option<Arc<Levels<R>>> {
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        last.retain(|made| made.with == with && Arc::strong_count(&made.atlas) > 1);
+        let made = last.iter().find(|made| Arc::ptr_eq(&made.atlas, atlas))?;
+        Some(Arc::clone(&made.levels))
     }
 
     /// Every level, those between with them.

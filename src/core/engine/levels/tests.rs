@@ -506,3 +506,16 @@ fn what_has_no_texels_makes_none_and_samples_without_them_are_refused() {
     let error = CpuEngine::new(task(setup(&[hills()]))).unwrap_err().to_string();
     assert!(error.contains("hills") && error.contains("Leave the effect out"), "{error}");
 }
+
+#[test]
+fn the_levels_of_an_earlier_frame_go() {
+    let setup = setup(&[hills()]);
+    let maker = maker::<f64>(&setup, &[]);
+    let params = start(&[(hills().params[1], 1.7)]).params;
+    let made = |atlas: &Arc<Atlas>| maker.levels(atlas, &params, || CubesAt::dark(f64::from));
+    for frame in 1..4 {
+        let atlas = atlas(&setup);
+        assert!(Arc::ptr_eq(&made(&atlas), &made(&atlas)));
+        assert_eq!((maker.count(), maker.last.lock().unwrap().len()), (frame, 1));
+    }
+}
