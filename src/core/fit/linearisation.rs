@@ -50,6 +50,16 @@ impl Linearisation {
             && self.gradient.iter().chain(&self.hessian).all(|x| x.is_finite())
     }
 
+    /// Whether H may be a J^T J: by the Cauchy-Schwarz inequality `|H_ij| <= sqrt(H_ii H_jj)`. Sums of f32 products keep
+    /// it to some 1e-6, and but for products that are too small for an f32.
+    #[must_use]
+    pub fn is_of_products(&self) -> bool {
+        let k = self.len();
+        let least = 1e-15 * (0..k).map(|i| self.curvature(i)).fold(0.0, f64::max);
+        let most = |i: usize, j: usize| 1.001 * self.curvature(i).sqrt() * self.curvature(j).sqrt() + least;
+        (0..k * k).all(|ij| self.hessian[ij].abs() <= most(ij / k, ij % k))
+    }
+
     /// H's diagonal element `i`.
     #[must_use]
     pub fn curvature(&self, i: usize) -> f64 {

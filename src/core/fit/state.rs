@@ -124,6 +124,9 @@ impl Run {
         if self.at.len() != k || !self.model().is_none_or(complete) {
             return Err(format!("its vectors are not of length {k}"));
         }
+        if !self.model().is_none_or(Linearisation::is_of_products) {
+            return Err("its normal equations are those of no Jacobian".to_owned());
+        }
         if self.memory.as_ref().is_some_and(|memory| !memory.is_sound()) {
             return Err("the solver's memory is not sound".to_owned());
         }
