@@ -171,8 +171,8 @@ pub(super) fn find(tape: &Tape) -> Option<usize> {
     tapes::KEYS.iter().position(|known| *known == key)
 }
 
-/// Whether functions are compiled for `S`: not for SSE2, as processors of the last ten years have AVX2, and a third of all
-/// that is compiled would be for the others, whose tapes run on the machine.
+/// Whether functions are compiled for `S`: not for SSE2, as that would be half as many again for processors without AVX2,
+/// whose tapes run on the machine.
 struct Functions<S>(PhantomData<S>);
 
 impl<S: Simd> Functions<S> {
