@@ -10,7 +10,7 @@
 //! - `ahead`: plans whose tapes are compiled ahead; `block`: what their functions read
 //! - `code`: other tapes as the code of a machine that has an accumulator; `machine`: that machine, on SIMD
 //! - `view_pass`: a view's blocks of records, from tapes' outputs to sums
-//! - `lobe`: the specular cube of the last exponent; what is computed in texels is [`super::levels`]'
+//! - `lobe`: the specular cube of the last exponent
 //! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
 
 mod ahead;
