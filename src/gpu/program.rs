@@ -186,13 +186,18 @@ fn bind(gpu: &Gpu, layout: &BindGroupLayout, constants: Option<&Buffer>, resourc
     gpu.device.create_bind_group(&BindGroupDescriptor { label: Some("plan"), layout, entries: &entries })
 }
 
-const fn vertex_format(attribute: Attribute) -> VertexFormat {
+fn vertex_format(attribute: Attribute) -> VertexFormat {
     match attribute {
         Attribute::Position | Attribute::Normal | Attribute::Corner => VertexFormat::Float32x3,
         Attribute::Tangent | Attribute::Weights => VertexFormat::Float32x4,
         Attribute::Uv => VertexFormat::Float32x2,
         Attribute::Occlusion => VertexFormat::Float32,
         Attribute::Joints => VertexFormat::Uint32x4,
+        Attribute::Field(field) => match field.info().numbers {
+            1 => VertexFormat::Float32,
+            2 => VertexFormat::Float32x2,
+            _ => VertexFormat::Float32x3,
+        },
     }
 }
 

@@ -205,7 +205,10 @@ impl Uploads {
         let own = occlusion.is_some();
         let occlusion = occlusion.or(self.content.occlusion.as_deref());
         for (&attribute, buffer) in &self.attributes {
-            let moves = matches!(attribute, Attribute::Position | Attribute::Normal | Attribute::Tangent);
+            let moves = matches!(
+                attribute,
+                Attribute::Position | Attribute::Normal | Attribute::Tangent | Attribute::Field(_)
+            );
             if moves || own && attribute == Attribute::Occlusion {
                 let bytes = vertices::attribute(attribute, mesh, occlusion);
                 gpu.queue.write_buffer(buffer, 0, &bytes);

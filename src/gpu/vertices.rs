@@ -4,11 +4,11 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use crate::bake::VertexOcclusion;
 use crate::model::vertex::Bone;
-use crate::scene::mesh::{Mesh, Morph};
+use crate::scene::mesh::{Mesh, Morph, VertexField};
 use crate::shader::Attribute;
 
 /// One attribute of every vertex, as bytes; what the mesh lacks is zero, which the vertex stage takes for
-/// "no direction", and occlusion 1.
+/// "no direction", occlusion 1, and what a file of rules declares what it says.
 pub(super) fn attribute(attribute: Attribute, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Vec<u8> {
     let count = mesh.positions.len();
     let floats = |floats: Vec<f32>| bytemuck::cast_slice(&floats).to_vec();
@@ -23,6 +23,10 @@ pub(super) fn attribute(attribute: Attribute, mesh: &Mesh, occlusion: Option<&Ve
             bytemuck::cast_slice(&joints).to_vec()
         }
         Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
+        Attribute::Field(field) => floats(match mesh.fields.iter().find(|held| held.field == field) {
+            Some(held) => held.numbers.clone(),
+            None => vec![field.info().neutral; count * field.info().numbers],
+        }),
         Attribute::Corner => floats((0..count).flat_map(|i| Vec3::AXES[i % 3].to_array()).collect()),
     };
     bytes.resize(count * attribute.bytes() as usize, 0);
@@ -42,6 +46,10 @@ pub(super) fn by_corner(mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> (Me
         normals: each(&morph.normals, triangles),
         ..morph.clone()
     };
+    let by_corner = |of: &VertexField| {
+        let numbers = triangles.as_flattened().iter().flat_map(|&i| of.of(i as usize)).copied().collect();
+        VertexField { field: of.field, numbers }
+    };
     let split = Mesh {
         positions: each(&mesh.positions, triangles),
         normals: each(&mesh.normals, triangles),
@@ -52,6 +60,7 @@ pub(super) fn by_corner(mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> (Me
         joints: each(&mesh.joints, triangles),
         weights: each(&mesh.weights, triangles),
         bones: mesh.bones.clone(),
+        fields: mesh.fields.iter().map(by_corner).collect(),
     };
     let occlusion = occlusion.map(|occlusion| VertexOcclusion {
         base: each(&occlusion.base, triangles),

@@ -82,6 +82,7 @@ pub(crate) fn head(folder: &Path) -> PosedMesh {
         normals: reader.read_normals().unwrap().map(Vec3::from).collect(),
         uvs: reader.read_tex_coords(0).unwrap().into_f32().map(Vec2::from).collect(),
         triangles: indices.as_chunks::<3>().0.to_vec(),
+        fields: Vec::new(),
     };
     generate_tangents(&mut Corners(&mut mesh)).unwrap();
     for i in 0..mesh.normals.len() {

@@ -3,6 +3,7 @@
 use std::fmt;
 
 use super::evaluate::Setup;
+use super::fields::Fields;
 use super::registry::{Added, RegistryError};
 
 /// Which of the two readings of the paper's listings is evaluated.
@@ -379,6 +380,7 @@ impl Setup {
             smooth_normal: effects.has(E::KeyLight) || (looked_up && self.smooth_lookups()),
             key_light: effects.has(E::KeyLight),
             atlas: false,
+            fields: Fields::default(),
         };
         let added = effects.added().filter_map(|effect| Some(effect.info().needs?(effect, self)));
         added.fold(built_in, Needs::or)
@@ -430,12 +432,14 @@ pub struct Needs {
     pub key_light: bool,
     /// The texture coordinates of an atlas in whose texels something is computed.
     pub atlas: bool,
+    /// Numbers of each vertex beside position and frame.
+    pub fields: Fields,
 }
 
 impl Needs {
     /// What either asks for.
     #[must_use]
-    pub const fn or(self, other: Self) -> Self {
+    pub fn or(self, other: Self) -> Self {
         Self {
             color_map: self.color_map || other.color_map,
             normal_map: self.normal_map || other.normal_map,
@@ -452,6 +456,7 @@ impl Needs {
             smooth_normal: self.smooth_normal || other.smooth_normal,
             key_light: self.key_light || other.key_light,
             atlas: self.atlas || other.atlas,
+            fields: self.fields.or(other.fields),
         }
     }
 

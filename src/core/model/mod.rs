@@ -3,7 +3,8 @@
 //!
 //! - [`params`]: the one table of parameters
 //! - [`effects`]: what can be switched on, and what each effect asks for; [`terms`]: parts of the sum
-//! - [`registry`]: how tables of parameters, effects and terms grow
+//! - [`fields`]: numbers of vertices that rules read by name
+//! - [`registry`]: how tables of parameters, effects, terms and fields grow
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands
 //! - [`fragment`]: a fragment as samples hold it
 //! - [`vertex`]: morphing, skinning and the frame of a vertex, of which meshes are posed
@@ -16,6 +17,7 @@ pub mod cube;
 pub mod dapple;
 pub mod effects;
 pub mod evaluate;
+pub mod fields;
 pub mod formats;
 pub mod fragment;
 pub mod key_light;

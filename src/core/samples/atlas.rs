@@ -12,6 +12,7 @@ use rayon::prelude::*;
 use super::LANES;
 use super::rows::Rows;
 use crate::model::evaluate::Setup;
+use crate::model::fields;
 use crate::program::graph::Input;
 use crate::program::levels::texel_inputs;
 use crate::program::lower::{STEP_ALONG_U, STEP_ALONG_V};
@@ -276,6 +277,8 @@ enum Quantity {
     Specular,
     Attenuator,
     NormalMap,
+    /// What files of rules declare.
+    Declared(fields::Field),
 }
 
 impl Field {
@@ -294,7 +297,10 @@ impl Field {
             "specular" if step.is_none() => Quantity::Specular,
             "attenuator" if step.is_none() => Quantity::Attenuator,
             "normal_texel" if step.is_none() => Quantity::NormalMap,
-            _ => return Err(AtlasError::NotStored { quantity: name.to_owned() }),
+            other => match fields::Field::from_name(other) {
+                Some(field) => Quantity::Declared(field),
+                None => return Err(AtlasError::NotStored { quantity: name.to_owned() }),
+            },
         };
         Ok(Self { of, component: input.component, step })
     }
@@ -337,6 +343,10 @@ impl Field {
                 (t.w * n.cross(t.truncate()).normalize_or_zero())[self.component]
             }
             Quantity::Uv => uvs[i][self.component],
+            Quantity::Declared(field) => {
+                let held = mesh.posed.fields.iter().find(|held| held.field == field);
+                held.map_or(field.info().neutral, |held| held.of(i)[self.component])
+            }
             _ => mesh.occlusion.and_then(|open| open.get(i).copied()).unwrap_or(1.0),
         })
     }

@@ -95,6 +95,7 @@ fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], 
             for (record, rows) in rows.chunks_exact_mut(stride).enumerate() {
                 let Slot { hit, share, .. } = hit(&hits.pixels, group, lane, record);
                 places.put(rows, lane, &surface.at(hits.hits[hit]), share);
+                places.put_fields(rows, lane, |field, numbers| surface.field(field, hits.hits[hit], numbers));
             }
         }
     });

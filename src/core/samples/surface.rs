@@ -7,6 +7,7 @@ use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
 use crate::model::effects::{Form, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::fields::Field;
 use crate::model::fragment::{Fragment, decode_normal, guarded};
 use crate::model::params::Param;
 use crate::model::vector::normalize_or;
@@ -41,6 +42,7 @@ fn asked(setup: &Setup, bumped: bool) -> Asked {
         specular: needs.specular_map,
         attenuator: needs.attenuator_map,
         uv: needs.atlas,
+        fields: needs.fields,
         weight: true,
     }
 }
@@ -91,7 +93,7 @@ impl<'a> Surface<'a> {
 
     /// The surface at `hit`.
     pub(super) fn at(&self, hit: Hit) -> (Fragment<f32>, Unmade) {
-        let corners = self.mesh.triangles[hit.triangle as usize].map(|i| i as usize);
+        let corners = self.corners(hit);
         let weights = hit.weights();
         let vector = |of: &[Vec3]| -> Vec3 { (0..3).map(|i| weights[i] * of[corners[i]]).sum() };
         let scalar = |of: &[f32]| -> f32 { (0..3).map(|i| weights[i] * of[corners[i]]).sum() };
@@ -135,6 +137,22 @@ impl<'a> Surface<'a> {
         };
         let dapple_normal = interpolated.to_array();
         (fragment, Unmade { dapple_normal, corner_silhouettes, corner_shares: weights, uv: uv.to_array() })
+    }
+
+    fn corners(&self, hit: Hit) -> [usize; 3] {
+        self.mesh.triangles[hit.triangle as usize].map(|i| i as usize)
+    }
+
+    /// What the mesh has of a field at `hit`, interpolated; what stands in for it where it lacks the field.
+    pub(super) fn field(&self, field: Field, hit: Hit, numbers: &mut [f32]) {
+        let Some(of) = self.mesh.fields.iter().find(|of| of.field == field) else {
+            return numbers.fill(field.info().neutral);
+        };
+        let corners = self.corners(hit).map(|corner| of.of(corner));
+        let weights = hit.weights();
+        for (k, number) in numbers.iter_mut().enumerate() {
+            *number = (0..3).map(|i| weights[i] * corners[i][k]).sum();
+        }
     }
 
     /// S.z at three vertices; 0 where no one asks.

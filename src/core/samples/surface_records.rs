@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use super::LANES;
 use super::rows::{Row, Rows};
+use crate::model::fields::{Field, Fields, MOST_NUMBERS};
 use crate::model::fragment::Fragment;
 
 /// What stands in for a number that no enabled effect asks for. The smooth normal's stand-in is the
@@ -32,7 +33,7 @@ pub fn neutral(field: &str) -> Option<f32> {
         "albedo" => NEUTRAL.albedo[0],
         "specular" => NEUTRAL.specular,
         "attenuator" => NEUTRAL.attenuator,
-        _ => return None,
+        other => return Field::from_name(other).map(|field| field.info().neutral),
     })
 }
 
@@ -67,6 +68,8 @@ pub struct Asked {
     pub attenuator: bool,
     /// Texture coordinates.
     pub uv: bool,
+    /// Numbers of vertices that files of rules declare.
+    pub fields: Fields,
     /// The sample's share of its pixel; without it, each counts 1.
     pub weight: bool,
 }
@@ -85,6 +88,7 @@ impl Asked {
         specular: true,
         attenuator: true,
         uv: false,
+        fields: Fields::NONE,
         weight: true,
     };
 }
@@ -108,6 +112,10 @@ pub struct Places {
     pub specular: Option<usize>,
     pub attenuator: Option<usize>,
     pub uv: Option<usize>,
+    /// What files of rules declare, one after the other.
+    pub fields: Fields,
+    /// The first row of those.
+    pub fields_at: usize,
     /// The sample's share of its pixel.
     pub weight: Option<usize>,
 }
@@ -137,6 +145,8 @@ impl Places {
             specular: place(asked.specular, 1),
             attenuator: place(asked.attenuator, 1),
             uv: place(asked.uv, 2),
+            fields: asked.fields,
+            fields_at: place(true, asked.fields.numbers()).unwrap_or(0),
             weight: place(asked.weight, 1),
         };
         (places, rows)
@@ -160,7 +170,13 @@ impl Places {
             ("attenuator", self.attenuator, 1),
             ("vertex_uv", self.uv, 2),
         ];
-        fields.into_iter().filter_map(|(name, place, rows)| Some((name, place?, rows)))
+        let mut next = self.fields_at;
+        let declared = self.fields.iter().map(move |field| {
+            let numbers = field.info().numbers;
+            next += numbers;
+            (field.name(), next - numbers, numbers)
+        });
+        fields.into_iter().filter_map(|(name, place, rows)| Some((name, place?, rows))).chain(declared)
     }
 
     fn vectors(&self, f: &Fragment<f32>) -> [(Option<usize>, [f32; 3]); 5] {
@@ -189,6 +205,20 @@ impl Places {
             (self.specular, f.specular),
             (self.attenuator, f.attenuator),
         ]
+    }
+
+    /// Write what files of rules declare into one lane of a record; `find` fills in a field's numbers.
+    pub(super) fn put_fields(&self, record: &mut [Row], lane: usize, find: impl Fn(Field, &mut [f32])) {
+        let mut at = self.fields_at;
+        for field in self.fields.iter() {
+            let mut numbers = [0.0; MOST_NUMBERS];
+            let numbers = &mut numbers[..field.info().numbers];
+            find(field, numbers);
+            for number in numbers {
+                record[at][lane] = *number;
+                at += 1;
+            }
+        }
     }
 
     /// Write one lane of a record.

@@ -128,6 +128,7 @@ pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose:
         morphs: effects.has(Effect::Morph),
         morph_weights: pose.morph_weights.clone(),
         bones: effects.has(Effect::Skin),
+        fields: needs.fields,
         time: pose.time.filter(|_| effects.has_any(&[Effect::Morph, Effect::Skin])),
         clip: false,
     }

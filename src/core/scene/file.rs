@@ -72,9 +72,25 @@ pub(super) struct ModelTable {
     pub lookups: Option<Spanned<String>>,
     pub effects: Option<Vec<Spanned<String>>>,
     #[serde(default)]
-    pub terms: Vec<PathBuf>,
+    pub terms: Vec<Spanned<TermValue>>,
     #[serde(default)]
     pub params: ParamsTable,
+}
+
+/// A file of shader rules; of a family's, the names of those that there are.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(untagged, expecting = "invalid type: expected a path or { file = \"...\", names = [\"...\"] }")]
+pub(super) enum TermValue {
+    Alone(PathBuf),
+    Family(FamilyTable),
+}
+
+/// `{ file = "...", names = ["...", ...] }`
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FamilyTable {
+    pub file: PathBuf,
+    pub names: Vec<String>,
 }
 
 /// `[model.params]`

@@ -57,7 +57,7 @@ impl Scene {
         let file: SceneFile = source.parse()?;
         let mut warnings = Warnings::new();
         let folder = path.parent().unwrap_or(Path::new(""));
-        let terms = terms(&file.model, folder)?;
+        let terms = terms(&source, &file.model, folder)?;
         let (form, silhouette) = settings::form(&source, &file.model)?;
         let lookups = settings::lookups(&source, &file.model)?;
         let dapple = read_dapple(&source, &file)?;
@@ -269,7 +269,7 @@ fn read_dapple(source: &Source, file: &SceneFile) -> Result<Dapple, SceneError> 
 pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let source = Source::of(path, text.to_owned());
     let file: SceneFile = source.parse()?;
-    let terms = terms(&file.model, path.parent().unwrap_or(Path::new("")))?;
+    let terms = terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))?;
     let (form, _) = settings::form(&source, &file.model)?;
     settings::lookups(&source, &file.model)?;
     settings::params(&source, &file.model.params, form)?;

@@ -2,6 +2,8 @@
 
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
+use crate::model::fields::Field;
+
 /// A mesh in world units, node transforms applied; not yet morphed or skinned.
 ///
 /// All vertex arrays are as long as `positions`, or empty when no enabled effect asks for them.
@@ -25,6 +27,8 @@ pub struct Mesh {
     pub weights: Vec<[f32; 4]>,
     /// Bone matrices (joint to world times inverse bind) at the scene's time.
     pub bones: Vec<Mat4>,
+    /// Numbers that rules read by name, those alone that enabled effects ask for.
+    pub fields: Vec<VertexField>,
 }
 
 /// One morph target: what is added at weight 1.
@@ -55,6 +59,32 @@ pub struct PosedMesh {
     pub uvs: Vec<Vec2>,
     /// Vertex indices.
     pub triangles: Vec<[u32; 3]>,
+    /// Numbers that rules read by name.
+    pub fields: Vec<VertexField>,
+}
+
+/// A field of every vertex, its numbers one after the other; no pose moves it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct VertexField {
+    /// Which.
+    pub field: Field,
+    /// As many a vertex as the field has.
+    pub numbers: Vec<f32>,
+}
+
+impl VertexField {
+    /// Of no vertices yet.
+    #[must_use]
+    pub const fn new(field: Field) -> Self {
+        Self { field, numbers: Vec::new() }
+    }
+
+    /// The field's numbers of a vertex.
+    #[must_use]
+    pub fn of(&self, vertex: usize) -> &[f32] {
+        let count = self.field.info().numbers;
+        &self.numbers[vertex * count..][..count]
+    }
 }
 
 impl PosedMesh {

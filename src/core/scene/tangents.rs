@@ -69,6 +69,10 @@ impl Mesh {
         again(&mut self.positions, i);
         again(&mut self.normals, i);
         again(&mut self.uvs, i);
+        for field in &mut self.fields {
+            let again = field.of(i).to_vec();
+            field.numbers.extend(again);
+        }
         again(&mut self.joints, i);
         again(&mut self.weights, i);
         for morph in &mut self.morphs {

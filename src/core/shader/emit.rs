@@ -7,6 +7,7 @@ use super::kept::kept_fields;
 use super::quantity::{Attribute, Constant, Resource};
 use super::rule::{Rule, rules};
 use super::search::{Carried, PlanError, search};
+use super::term;
 use crate::model::terms::TermName;
 
 /// The shader that a scene gets.
@@ -84,9 +85,14 @@ pub const TEXEL: [(&str, &str); 10] = [
 ];
 
 /// What stored texels may hold; nothing where there are none.
-pub(super) fn texel_fields(facts: &Facts) -> &'static [(&'static str, &'static str)] {
+pub(super) fn texel_fields(facts: &Facts) -> Fields {
     let stored = facts.source == Source::Samples && facts.holds("atlas") == Some(true);
-    if stored { &TEXEL } else { &[] }
+    if stored { TEXEL.into_iter().chain(of_vertices(facts)).collect() } else { Fields::new() }
+}
+
+/// Numbers of vertices that files of rules have declared, of the effects that `facts` call for.
+pub(super) fn of_vertices(facts: &Facts) -> impl Iterator<Item = (&'static str, &'static str)> {
+    term::fields(facts.setup.effects).iter().map(|field| (field.name(), field.wgsl()))
 }
 
 /// The cheapest shader that yields what `facts` call for.
@@ -141,7 +147,8 @@ pub fn sample_fields(facts: &Facts) -> Fields {
         "attenuator" => needs.attenuator_map,
         _ => true,
     };
-    SAMPLE.into_iter().chain(UNMADE).filter(|(name, _)| wanted(name)).collect()
+    let built_in = SAMPLE.into_iter().chain(UNMADE).filter(|(name, _)| wanted(name));
+    built_in.chain(needs.fields.iter().map(|field| (field.name(), field.wgsl()))).collect()
 }
 
 /// Whether the haze goes to alpha.
@@ -240,7 +247,7 @@ impl Plan {
         let share = |step: &Step| facts.work.share(step.rule.domain) * step.cost;
         Self {
             facts: *facts,
-            attributes: Attribute::ALL.into_iter().filter(|a| needed(a.name())).collect(),
+            attributes: Attribute::all(facts.setup.effects).filter(|a| needed(a.name())).collect(),
             resources: Resource::ALL.into_iter().filter(|r| read(r.name())).collect(),
             constants,
             varyings,

@@ -4,11 +4,12 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::bits::Bits;
 use super::domain::{Domain, EDGES, Edge, EdgeError};
-use super::emit::texel_fields;
+use super::emit::{Fields, texel_fields};
 use super::facts::{Budget, Facts};
 use super::quantity::{Attribute, Constant};
 use super::rule::{Rule, rules};
 use super::search::{PlanError, components};
+use crate::model::effects::Effects;
 
 /// A wanted quantity, and the domain where it is wanted.
 pub(super) type Want = (Domain, &'static str);
@@ -66,19 +67,20 @@ pub(super) struct Graph<'a> {
 }
 
 /// What is there without any means.
-#[derive(Clone, Copy)]
 struct Given<'a> {
+    /// Whose attributes vertices have.
+    effects: Effects,
     /// Of fragments.
     fragments: &'a [&'static str],
     /// Of texels.
-    texels: &'a [(&'static str, &'static str)],
+    texels: Fields,
 }
 
 impl<'a> Graph<'a> {
     pub(super) fn new(facts: &'a Facts, fragments: &'a [&'static str]) -> Result<Self, PlanError> {
-        let given = Given { fragments, texels: texel_fields(facts) };
+        let given = Given { effects: facts.setup.effects, fragments, texels: texel_fields(facts) };
         let mut means = all_means(facts);
-        let ranks = ranks(&means, given)?;
+        let ranks = ranks(&means, &given)?;
         let mut wants: Vec<Want> = means.keys().copied().collect();
         wants.retain(|want| ranks.contains_key(want));
         wants.sort_by_key(|want| (ranks[want], *want));
@@ -135,7 +137,7 @@ impl<'a> Graph<'a> {
 
 impl Given<'_> {
     /// Whether a want is met without any means: by an attribute, a constant, the vertex' index, or what is given.
-    fn has(self, (domain, quantity): Want) -> bool {
+    fn has(&self, (domain, quantity): Want) -> bool {
         let constant = Constant::from_name(quantity);
         if domain == Domain::Texel {
             return constant.is_some_and(|constant| !is_of_the_eye(constant.name()))
@@ -143,7 +145,7 @@ impl Given<'_> {
         }
         constant.is_some()
             || quantity == "vertex_index"
-            || Attribute::ALL.iter().any(|attribute| attribute.name() == quantity)
+            || Attribute::all(self.effects).any(|attribute| attribute.name() == quantity)
             || (domain == Domain::Fragment && self.fragments.contains(&quantity))
     }
 }
@@ -222,7 +224,7 @@ fn seen<I: Iterator<Item = &'static Rule>>(rules: impl Fn() -> I) -> BTreeSet<&'
 
 /// How far each want lies from the inputs: one more than the furthest of its needs, over all means. Wants
 /// that cannot be met have no rank.
-fn ranks(means: &BTreeMap<Want, Vec<Means>>, given: Given<'_>) -> Result<BTreeMap<Want, usize>, PlanError> {
+fn ranks(means: &BTreeMap<Want, Vec<Means>>, given: &Given<'_>) -> Result<BTreeMap<Want, usize>, PlanError> {
     let mut ranks: BTreeMap<Want, usize> = BTreeMap::new();
     // Each round settles at least one more; cycles would never end, so rounds are counted.
     for _ in 0..=means.len() {

@@ -1,6 +1,9 @@
 //! What shaders read: vertex attributes, bound resources and uniform constants. Everything else is a
 //! quantity that rules give.
 
+use super::term;
+use crate::model::effects::Effects;
+use crate::model::fields::Field;
 use crate::model::params::Param;
 
 /// A vertex attribute; in WGSL `rest_position` and so on.
@@ -23,11 +26,13 @@ pub enum Attribute {
     /// Which corner of its triangle it is, a unit vector for each of the three: `vec3f`. A mesh has it where triangles
     /// share no vertices.
     Corner,
+    /// Numbers that a file of rules has declared, by the name that it gives them.
+    Field(Field),
 }
 
 impl Attribute {
-    /// Every attribute.
-    pub const ALL: [Self; 8] = [
+    /// The built-in attributes.
+    pub const BUILT_IN: [Self; 8] = [
         Self::Position,
         Self::Normal,
         Self::Tangent,
@@ -38,9 +43,14 @@ impl Attribute {
         Self::Corner,
     ];
 
+    /// The attributes that a vertex may have with these effects.
+    pub fn all(effects: Effects) -> impl Iterator<Item = Self> {
+        Self::BUILT_IN.into_iter().chain(term::fields(effects).iter().map(Self::Field))
+    }
+
     /// The quantity's name in rules.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Position => "rest_position",
             Self::Normal => "rest_normal",
@@ -50,29 +60,32 @@ impl Attribute {
             Self::Joints => "joints",
             Self::Weights => "joint_weights",
             Self::Corner => "corner",
+            Self::Field(field) => field.info().attribute,
         }
     }
 
     /// Its WGSL type.
     #[must_use]
-    pub const fn wgsl(self) -> &'static str {
+    pub fn wgsl(self) -> &'static str {
         match self {
             Self::Position | Self::Normal | Self::Corner => "vec3f",
             Self::Tangent | Self::Weights => "vec4f",
             Self::Uv => "vec2f",
             Self::Occlusion => "f32",
             Self::Joints => "vec4u",
+            Self::Field(field) => field.wgsl(),
         }
     }
 
     /// Bytes a vertex, as they are uploaded (32-bit components).
     #[must_use]
-    pub const fn bytes(self) -> u64 {
+    pub fn bytes(self) -> u64 {
         match self {
             Self::Position | Self::Normal | Self::Corner => 12,
             Self::Tangent | Self::Weights | Self::Joints => 16,
             Self::Uv => 8,
             Self::Occlusion => 4,
+            Self::Field(field) => 4 * field.info().numbers as u64,
         }
     }
 }

@@ -11,7 +11,6 @@ use crate::records::StoredRecords;
 use crate::samples::LANES;
 use crate::samples::surface_records::Places;
 use crate::shader::Domain;
-use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::module::uniform;
 use crate::shader::{Facts, Plan, PlanError, Source};
 
@@ -157,6 +156,8 @@ fn quantity(field: &'static str, facts: &Facts) -> &'static str {
 
 /// The numbers of a quantity, one by one.
 fn parts(field: &Field, goal: &str) -> Vec<String> {
-    let vector = SAMPLE.iter().chain(&UNMADE).any(|(name, kind)| *name == field.name && *kind == "vec3f");
-    if vector { ["x", "y", "z"].map(|c| format!("{goal}.{c}")).to_vec() } else { vec![goal.to_owned()] }
+    match field.size {
+        1 => vec![goal.to_owned()],
+        size => ["x", "y", "z"][..size].iter().map(|c| format!("{goal}.{c}")).collect(),
+    }
 }

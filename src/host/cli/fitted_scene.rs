@@ -51,6 +51,8 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
         for term in terms.iter_mut() {
             if let Some(path) = term.as_str() {
                 *term = folder.join(path).display().to_string().into();
+            } else if let Some(family) = term.as_inline_table_mut() {
+                make_absolute(family, &["file"], folder);
             }
         }
     }

@@ -8,7 +8,7 @@ use super::nodes::Nodes;
 use super::primitive::{Mended, Part, Target};
 use super::{Ask, Tangents, Uvs};
 use crate::scene::error::{SceneError, Warnings, warn};
-use crate::scene::mesh::{Mesh, Morph};
+use crate::scene::mesh::{Mesh, Morph, VertexField};
 use crate::scene::{normals, tangents};
 
 /// The most vertices, triangles, and vertices times morph targets of a mesh: files can name the same
@@ -52,7 +52,7 @@ impl Document {
             document: self,
             ask,
             nodes: self.nodes(ask.time)?,
-            mesh: Mesh::default(),
+            mesh: Mesh { fields: ask.fields.iter().map(VertexField::new).collect(), ..Mesh::default() },
             identity: None,
             skins: vec![None; self.root.skins.len()],
             mended: Mended::default(),
@@ -223,6 +223,9 @@ impl Builder<'_> {
         }));
         if self.ask.uvs != Uvs::None {
             mesh.uvs.extend(part.uvs.unwrap_or_else(|| vec![glam::Vec2::ZERO; count]));
+        }
+        for (field, numbers) in mesh.fields.iter_mut().zip(part.fields) {
+            field.numbers.extend(numbers);
         }
         if self.ask.tangents == Tangents::Exact {
             let given = part.tangents.is_some();

@@ -20,6 +20,8 @@ mod skins;
 
 pub(super) use document::Document;
 
+use crate::model::fields::Fields;
+
 /// What is to be read of a mesh file; the rest is left alone.
 #[derive(Clone, Debug)]
 pub(super) struct Ask {
@@ -33,6 +35,8 @@ pub(super) struct Ask {
     pub morph_weights: Option<Vec<f32>>,
     /// Bones.
     pub bones: bool,
+    /// Numbers of vertices, of the attributes `_NAME`.
+    pub fields: Fields,
     /// Seconds into animation 0; without: the nodes as they stand.
     pub time: Option<f64>,
     /// Whether morph targets are to be marked that animation 0 moves.

@@ -11,6 +11,7 @@ use json::validation::Checked;
 
 use super::document::Document;
 use super::{Ask, Tangents, Uvs};
+use crate::model::fields::{Field, FieldInfo};
 use crate::scene::error::{SceneError, Warnings, warn};
 
 /// A primitive in its node's space.
@@ -19,6 +20,8 @@ pub(super) struct Part {
     pub normals: Option<Vec<Vec3>>,
     pub tangents: Option<Vec<Vec4>>,
     pub uvs: Option<Vec<Vec2>>,
+    /// Of each field that is asked for, its numbers.
+    pub fields: Vec<Vec<f32>>,
     /// Bone indices (into the skin) and weights.
     pub influences: Option<Vec<Influence>>,
     pub triangles: Vec<[u32; 3]>,
@@ -113,6 +116,7 @@ impl Document {
         same(tangents.as_ref().map_or(count, Vec::len), "tangents")?;
         let uvs = self.uvs(attribute(Semantic::TexCoords(0)), place, ask)?;
         same(uvs.as_ref().map_or(count, Vec::len), "texture coordinates")?;
+        let fields = self.fields(primitive, place, ask, count)?;
         let influences = match bones {
             Some(bones) => self.influences(primitive, bones, count, place, mended)?,
             None => None,
@@ -131,7 +135,7 @@ impl Document {
             targets.push(target);
         }
         let triangles = self.triangles(primitive, mode, count, place)?;
-        Ok(Some(Part { positions, normals, tangents, uvs, influences, triangles, targets }))
+        Ok(Some(Part { positions, normals, tangents, uvs, fields, influences, triangles, targets }))
     }
 
     fn vectors(&self, index: Index<Accessor>) -> Result<Vec<Vec3>, SceneError> {
@@ -162,6 +166,44 @@ impl Document {
                 .error("has a texture coordinate that is not finite", "Repair the mesh")
                 .at(format!("{place}, vertex {i}"))),
         }
+    }
+
+    /// What fields are asked for, from the attributes of their names: `_CURVATURE` of the field `curvature`. A part that
+    /// lacks one has what stands in for it.
+    fn fields(
+        &self,
+        primitive: &Primitive,
+        place: &str,
+        ask: &Ask,
+        count: usize,
+    ) -> Result<Vec<Vec<f32>>, SceneError> {
+        let read = |field: Field| {
+            let FieldInfo { name, numbers, neutral, .. } = *field.info();
+            let semantic = Semantic::Extras(name.to_uppercase());
+            let Some(&index) = primitive.attributes.get(&Checked::Valid(semantic)) else {
+                return Ok(vec![neutral; numbers * count]);
+            };
+            let read: Vec<f32> = match numbers {
+                1 => self.floats::<1>(index)?.into_flattened(),
+                2 => self.floats::<2>(index)?.into_flattened(),
+                _ => self.floats::<3>(index)?.into_flattened(),
+            };
+            let attribute = format!("_{}", name.to_uppercase());
+            if read.len() != numbers * count {
+                let vertices = read.len() / numbers;
+                let wrong = format!("has {count} positions but {vertices} of the attribute {attribute}");
+                return Err(self.error(wrong, "Export it anew").at(place));
+            }
+            match read.iter().position(|x| !x.is_finite()) {
+                None => Ok(read),
+                Some(i) => {
+                    let place = format!("{place}, vertex {}", i / numbers);
+                    let wrong = format!("has a number in {attribute} that is not finite");
+                    Err(self.error(wrong, "Repair the mesh").at(place))
+                }
+            }
+        };
+        ask.fields.iter().map(read).collect()
     }
 
     /// The triangles of a list, strip or fan, indexed or not.

@@ -121,17 +121,25 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
         .chain(terms().into_iter().flat_map(|term| &term.rules))
         .flat_map(|rule| rule.gives.iter().map(|(quantity, _)| *quantity))
         .chain(SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name))
-        .chain(Attribute::ALL.iter().map(|attribute| attribute.name()))
+        .chain(Attribute::BUILT_IN.iter().map(|attribute| attribute.name()))
         .chain(Resource::ALL.iter().map(|resource| resource.name()))
         .chain(Constant::OWN.iter().map(|constant| constant.name()))
         .chain(["vertex_index"])
         .collect();
     let mut own = BTreeSet::new();
     for &(line, parameter) in &declaration.parameters {
-        quantity_name(parameter.name, line)?;
-        let there = known.contains(parameter.name) || Param::from_identifier(parameter.name).is_some();
-        if there || !own.insert(parameter.name) {
+        quantity_name(parameter.identifier, line)?;
+        let there =
+            known.contains(parameter.identifier) || Param::from_identifier(parameter.identifier).is_some();
+        if there || !own.insert(parameter.identifier) {
             return taken("parameter or quantity", parameter.name, line);
+        }
+    }
+    for &(line, field) in &declaration.fields {
+        quantity_name(field.name, line)?;
+        let there = known.contains(field.name) || Param::from_identifier(field.name).is_some();
+        if there || !own.insert(field.name) {
+            return taken("field or quantity", field.name, line);
         }
     }
     let params = own.clone();
@@ -226,7 +234,8 @@ fn known_types() -> BTreeMap<&'static str, &'static str> {
 fn types(declaration: &Declaration) -> Result<(), TermError> {
     let mut types = known_types();
     types.extend(Param::all().map(|param| (param.identifier(), param_type(param.info().rgb))));
-    types.extend(declaration.parameters.iter().map(|(_, p)| (p.name, param_type(p.rgb))));
+    types.extend(declaration.parameters.iter().map(|(_, p)| (p.identifier, param_type(p.rgb))));
+    types.extend(declaration.fields.iter().map(|(_, field)| (field.name, field.wgsl)));
     for rule in &declaration.rules {
         let given = rule.gives.iter().map(|(quantity, components)| (*quantity, rule.given_type(components)));
         for (quantity, kind) in given.clone().chain(rule.needs.iter().copied()) {

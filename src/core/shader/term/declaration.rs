@@ -1,18 +1,21 @@
 //! A file of rules: what its comments declare, and its functions.
 
 use super::error::{Problem, TermError};
-use super::texels::{blur, domains_of, kernel};
+use super::texels::{LEVEL_TYPES, blur, domains_of, kernel};
 use crate::model::params::{LARGEST, Scale};
+use crate::model::registry::leaked;
 use crate::shader::domain::Domain;
 use crate::shader::rule::{Error, Rule};
 
 /// What a file of rules holds.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Declaration {
     /// The effect, and its line.
     pub(super) effect: Option<(usize, DeclaredEffect)>,
     /// Its parameters, and their lines.
     pub(super) parameters: Vec<(usize, DeclaredParameter)>,
+    /// Numbers of vertices that it reads, and their lines.
+    pub(super) fields: Vec<(usize, DeclaredField)>,
     /// Its rules, in their order.
     pub(crate) rules: Vec<Rule>,
 }
@@ -27,7 +30,10 @@ pub(super) struct DeclaredEffect {
 /// `parameter: NAME = 0.5 in [0, inf), rgb, linear; what it does; where it comes from`
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredParameter {
+    /// As users write it: `sheen_weight`, of a family's member `light.key.color`.
     pub(super) name: &'static str,
+    /// As rules write it: each `.` a `_`.
+    pub(super) identifier: &'static str,
     pub(super) default: f64,
     pub(super) lower: f64,
     pub(super) upper: f64,
@@ -39,10 +45,20 @@ pub(super) struct DeclaredParameter {
     pub(super) source: &'static str,
 }
 
+/// `field: NAME: TYPE = NEUTRAL; what it is`
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct DeclaredField {
+    pub(super) name: &'static str,
+    pub(super) wgsl: &'static str,
+    pub(super) neutral: f32,
+    pub(super) meaning: &'static str,
+}
+
 /// The keys that a header may have.
-const KEYS: [&str; 15] = [
+const KEYS: [&str; 16] = [
     "effect",
     "parameter",
+    "field",
     "gives",
     "adds",
     "shows",
@@ -67,7 +83,7 @@ pub(crate) fn parse(
     name: &'static str,
     text: &'static str,
 ) -> Result<Declaration, TermError> {
-    let mut declaration = Declaration { effect: None, parameters: Vec::new(), rules: Vec::new() };
+    let mut declaration = Declaration::default();
     let mut header: Vec<(usize, &'static str)> = Vec::new();
     let mut lines = text.lines().enumerate();
     while let Some((at, line)) = lines.next() {
@@ -113,7 +129,7 @@ impl Declaration {
         for &(at, words) in header {
             let (key, value) = words.split_once(": ").map_or(("", words), |(key, value)| (key, value.trim()));
             match KEYS.iter().find(|known| **known == key) {
-                Some(&"effect" | &"parameter") => {
+                Some(&"effect" | &"parameter" | &"field") => {
                     self.declare(at, key, value)?;
                     // What stood before belongs to the file.
                     rule.about.clear();
@@ -155,8 +171,20 @@ impl Declaration {
             self.effect = Some((line, DeclaredEffect { name: name.trim(), meaning: meaning.trim() }));
             return Ok(());
         }
+        let misplaced = |key| Problem::Misplaced { key }.at(line);
+        if key == "field" {
+            if !self.rules.is_empty() {
+                return Err(misplaced("field"));
+            }
+            let wanted = "NAME: TYPE = NEUTRAL; what it is. The type is f32, vec2f or vec3f, and the number what stands \
+                          in for each of a mesh that lacks it";
+            let field = field(value)
+                .ok_or_else(|| Problem::Value { key: "field", given: value.to_owned(), wanted }.at(line))?;
+            self.fields.push((line, field));
+            return Ok(());
+        }
         if !self.rules.is_empty() {
-            return Err(Problem::Misplaced { key: "parameter" }.at(line));
+            return Err(misplaced("parameter"));
         }
         let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log` or `, unit UNIT` where they \
                       hold, then `; what it does; where it comes from`. The default lies within the bounds";
@@ -219,6 +247,16 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
     Ok(())
 }
 
+fn field(value: &'static str) -> Option<DeclaredField> {
+    let (typed, meaning) = value.split_once(';')?;
+    let (name, rest) = typed.split_once(':')?;
+    let (wgsl, neutral) = rest.split_once('=')?;
+    let (name, wgsl, meaning) = (name.trim(), wgsl.trim(), meaning.trim());
+    let neutral = number(neutral)? as f32;
+    let known = LEVEL_TYPES.contains(&wgsl) && neutral.is_finite() && !meaning.is_empty();
+    known.then_some(DeclaredField { name, wgsl, neutral, meaning })
+}
+
 fn parameter(value: &'static str) -> Option<DeclaredParameter> {
     let mut parts = value.splitn(3, ';').map(str::trim);
     let (numbers, meaning) = (parts.next()?, parts.next()?);
@@ -232,8 +270,10 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         "-inf" => Some(f64::NEG_INFINITY),
         other => number(other),
     };
+    let name = name.trim();
     let mut parameter = DeclaredParameter {
-        name: name.trim(),
+        name,
+        identifier: if name.contains('.') { leaked(&name.replace('.', "_")) } else { name },
         default: number(default)?,
         lower: bound(lower)?,
         upper: bound(upper)?,
@@ -271,7 +311,7 @@ mod tests {
         // gives: sheen_a.x, sheen_b.y\n// cost: 3\nfn both() -> vec2f {\n    return vec2f(1.0);\n}\n";
 
     fn read(text: &str) -> Result<Declaration, TermError> {
-        parse(Domain::Fragment, "file", crate::model::registry::leaked(text))
+        parse(Domain::Fragment, "file", leaked(text))
     }
 
     #[test]

@@ -62,7 +62,7 @@ pub enum Problem {
     Circle(String),
     #[error("`{key}: {name}` names what is not there")]
     NotThere { key: &'static str, name: String, known: Vec<String> },
-    #[error("the parameter {0} is used by no rule")]
+    #[error("{0} is declared, but used by no rule")]
     Idle(String),
     #[error("it is no valid WGSL: {0}")]
     Wgsl(String),

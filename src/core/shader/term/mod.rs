@@ -41,11 +41,13 @@ mod wgsl;
 
 use std::sync::{Mutex, PoisonError};
 
-use self::declaration::Declaration;
+use self::declaration::{Declaration, DeclaredField};
 pub use self::error::{Problem, TermError};
 use super::domain::Domain;
 use super::rule::Rule;
+use super::search::components;
 use crate::model::effects::{Effect, EffectInfo, Effects};
+use crate::model::fields::{Field, FieldInfo, Fields};
 use crate::model::params::{Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
 use crate::model::terms::{TermInfo, TermName};
@@ -57,6 +59,8 @@ pub struct Term {
     pub effect: Effect,
     /// Its parameters.
     pub params: Vec<Param>,
+    /// Numbers of vertices that it reads.
+    pub fields: Fields,
     /// Its image layers.
     pub layers: Vec<TermName>,
     /// Its rules.
@@ -64,6 +68,10 @@ pub struct Term {
     /// The text that declares it.
     pub text: &'static str,
 }
+
+/// What stands for a member's name in the file of a family: terms alike but for their names, such as the lamps of a
+/// scene.
+pub const MEMBER: &str = "NAME";
 
 static TERMS: Added<Term> = Added::new();
 
@@ -80,6 +88,12 @@ pub fn of_texels(effects: Effects) -> Option<Effect> {
         .filter(enabled)
         .find(|term| term.rules.iter().any(|rule| rule.domain == Domain::Texel));
     term.map(|term| term.effect)
+}
+
+/// The fields that the rules of added effects read of vertices.
+pub fn fields(effects: Effects) -> Fields {
+    let enabled = terms().into_iter().filter(|term| effects.has(term.effect));
+    enabled.fold(Fields::default(), |all, term| all.or(term.fields))
 }
 
 /// Make a term known to this process for as long as it runs, from the text of the file that declares it; `name` is
@@ -103,7 +117,7 @@ pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
 
 /// Enter a checked declaration into the tables.
 fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, TermError> {
-    let Declaration { effect, parameters, mut rules } = declaration;
+    let Declaration { effect, parameters, fields, mut rules } = declaration;
     let (line, declared) = effect.ok_or(Problem::NoEffect.at(1))?;
     let row = EffectInfo { name: declared.name, meaning: declared.meaning, needs: Some(needs::of_effect) };
     let effect = Effect::register(row).map_err(|error| problem(error).at(line))?;
@@ -113,7 +127,7 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
         let row = ParamInfo {
             param: Param::BaseWeight,
             name: declared.name,
-            identifier: declared.name,
+            identifier: declared.identifier,
             listing: declared.default,
             corrected: declared.default,
             lower: declared.lower,
@@ -128,6 +142,14 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
         };
         params.push(Param::register(row).map_err(|error| problem(error).at(line))?);
     }
+    let mut read = Vec::new();
+    for (line, declared) in fields {
+        let DeclaredField { name, wgsl, neutral, meaning } = declared;
+        let attribute = leaked(&format!("rest_{name}"));
+        let row = FieldInfo { name, attribute, numbers: components(wgsl), neutral, meaning };
+        read.push(Field::register(row).map_err(|error| problem(error).at(line))?);
+        rules.extend(of_vertex(&declared, attribute, line));
+    }
     let mut layers = Vec::new();
     for rule in &mut rules {
         for &name in rule.adds.iter().chain(&rule.shows) {
@@ -141,9 +163,20 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
             rule.when.push(declared.name);
         }
     }
-    let term = Term { effect, params, layers, rules, text };
+    let term = Term { effect, params, fields: Fields::of(read), layers, rules, text };
     let never = || Problem::Full { kind: "term", most: 0 }.at(line);
     TERMS.add(|_| false, |_| false, |_| Ok(term), never)
+}
+
+/// The rule by which a field comes from its attribute, interpolated from there to fragments and texels.
+fn of_vertex(field: &DeclaredField, attribute: &'static str, line: usize) -> Option<Rule> {
+    let &DeclaredField { name, wgsl, meaning, .. } = field;
+    let text =
+        format!("fn {name}_of_vertex({attribute}: {wgsl}) -> {wgsl} {{\n    return {attribute};\n}}\n");
+    let mut rule = Rule::bare(Domain::Vertex, line, leaked(&text))?;
+    rule.set_cost((0.0, 0.0));
+    (rule.about, rule.gives, rule.when) = (format!("{meaning}."), vec![(name, "")], vec!["raster"]);
+    Some(rule)
 }
 
 fn problem(error: RegistryError) -> Problem {

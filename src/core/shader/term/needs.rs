@@ -5,12 +5,15 @@ use std::sync::{LazyLock, Mutex, PoisonError};
 
 use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::fields::{Field, Fields};
 use crate::shader::domain::{Domain, UV};
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
 use crate::shader::rule::rules;
 use crate::shader::search::search;
+
+use super::fields;
 
 /// What `effect` asks for beside the others of `setup`.
 pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
@@ -39,8 +42,9 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     let bumped = setup.silhouette == Silhouette::Bumped;
     let held = |name: &str| !(name == "normal" && stand_in || name == "silhouette" && bumped);
     let held = |name: &str| held(name) && !(name == "silhouette" && setup.rim_of_corners());
-    let given: Vec<&'static str> =
-        SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name).filter(|name| held(name)).collect();
+    let fields = fields(setup.effects);
+    let built_in = SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name).filter(|name| held(name));
+    let given: Vec<&'static str> = built_in.chain(fields.iter().map(Field::name)).collect();
     // Texels are asked for where nothing can be planned without them. What cannot be planned at all is told when it is.
     let looking_up = [&given[..], &[UV]].concat();
     let textured = Facts { atlas: Some(1), ..facts };
@@ -70,6 +74,7 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
         smooth_normal: needed_in(&[Domain::Fragment], "normal"),
         key_light: false,
         atlas: chosen.iter().any(|rule| rule.domain == Domain::Texel),
+        fields: Fields::of(fields.iter().filter(|field| needed(field.name()))),
     }
 }
 

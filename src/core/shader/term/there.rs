@@ -70,7 +70,11 @@ fn is_constant(name: &str) -> bool {
 
 /// Everything that the rules need is there, for fragments and for samples, or for texels; every parameter is needed.
 pub(super) fn there(declaration: &Declaration) -> Result<(), TermError> {
-    let own: BTreeSet<&str> = declaration.parameters.iter().map(|(_, parameter)| parameter.name).collect();
+    let parameters =
+        declaration.parameters.iter().map(|(line, parameter)| (*line, parameter.identifier, parameter.name));
+    let fields = declaration.fields.iter().map(|(line, field)| (*line, field.name, field.name));
+    let declared: Vec<(usize, &str, &str)> = parameters.chain(fields).collect();
+    let own: BTreeSet<&str> = declared.iter().map(|(_, identifier, _)| *identifier).collect();
     let (samples, texels) = (of_samples(&RULES.iter()), of_texels());
     for rule in &declaration.rules {
         let there = if rule.domain == Domain::Texel { &texels } else { &samples };
@@ -96,7 +100,7 @@ pub(super) fn there(declaration: &Declaration) -> Result<(), TermError> {
             }
             let somewhere = RULES.iter().any(|rule| rule.gives_quantity(need))
                 || Constant::from_name(need).is_some()
-                || Attribute::ALL.iter().any(|attribute| attribute.name() == need);
+                || Attribute::BUILT_IN.iter().any(|attribute| attribute.name() == need);
             if somewhere && rule.domain == Domain::Texel {
                 return Err(Problem::NotOfTexels { quantity }.at(rule.line));
             }
@@ -109,10 +113,10 @@ pub(super) fn there(declaration: &Declaration) -> Result<(), TermError> {
             return Err(Problem::Unknown { quantity, near }.at(rule.line));
         }
     }
-    let idle = declaration.parameters.iter().find(|(_, parameter)| {
-        !declaration.rules.iter().any(|rule| rule.needs.iter().any(|(need, _)| *need == parameter.name))
+    let idle = declared.iter().find(|(_, identifier, _)| {
+        !declaration.rules.iter().any(|rule| rule.needs.iter().any(|(need, _)| need == identifier))
     });
-    idle.map_or(Ok(()), |&(line, parameter)| Err(Problem::Idle(parameter.name.to_owned()).at(line)))
+    idle.map_or(Ok(()), |&(line, _, name)| Err(Problem::Idle(name.to_owned()).at(line)))
 }
 
 /// The nearest of the known names, where any is near.

@@ -45,6 +45,11 @@ impl Remeshed {
                 if !mesh.uvs.is_empty() {
                     mesh.uvs.push(0.5 * (mesh.uvs[i] + mesh.uvs[j]));
                 }
+                for of in &mut mesh.fields {
+                    let between: Vec<f32> =
+                        of.of(i).iter().zip(of.of(j)).map(|(x, y)| 0.5 * (x + y)).collect();
+                    of.numbers.extend(between);
+                }
                 if let Some(open) = &mut open {
                     open.push(0.5 * (open[i] + open[j]));
                 }
@@ -78,8 +83,8 @@ impl Remeshed {
     /// The scene with this mesh and these settings, sampled.
     pub(super) fn evaluated(&self, bench: &Bench<'_>, settings: Settings) -> Result<Evaluated, StudyError> {
         let mut scene = bench.scene(settings);
-        let PosedMesh { positions, normals, tangents, uvs, triangles } = self.mesh.clone();
-        scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, ..Mesh::default() };
+        let PosedMesh { positions, normals, tangents, uvs, triangles, fields } = self.mesh.clone();
+        scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, fields, ..Mesh::default() };
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
         let samples =
             samples::sample_views(&scene, &self.mesh, occlusion.as_ref()).map_err(PrepareError::from)?;
