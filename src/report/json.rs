@@ -10,9 +10,9 @@ use super::metrics::Scores;
 use super::misfit::Misfit;
 use super::{RunInfo, StageSeconds};
 use crate::engine::{Point, Unknown};
+use crate::fit::error_basis::ErrorBasis;
 use crate::fit::outcome::{Ending, Iteration, Outcome, UnknownOutcome};
 use crate::fit::profile::Profile;
-use crate::fit::statistics::ErrorBasis;
 use crate::model::params::{Channels, Param};
 
 /// The whole of `report.json`.

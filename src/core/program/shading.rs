@@ -3,9 +3,10 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+pub use super::error::ShadingError;
 use super::graph::{Binary, Graph, Id, Input, Node};
 use super::levels::LevelProgram;
-use super::lower::{LowerError, Natives, Source, Value};
+use super::lower::{Natives, Source, Value};
 use crate::model::key_light::KeyLight;
 use crate::model::params::{Param, Params};
 use crate::model::terms::TermName;
@@ -13,22 +14,9 @@ use crate::shader::Domain;
 use crate::shader::atlas::stored;
 use crate::shader::emit::{Plan, hazy, parts, sample_fields};
 use crate::shader::module::{sample_struct, uniform};
-use crate::shader::search::{PlanError, components};
-use crate::shader::tangent::TangentError;
+use crate::shader::search::components;
 use crate::shader::tangent::chain::{Chain, Seed};
 use crate::shader::{Constant, Facts, plan};
-
-/// A scene whose shading cannot be put as a graph.
-#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
-#[error(transparent)]
-pub enum ShadingError {
-    /// No rules yield it.
-    Plan(#[from] PlanError),
-    /// A rule has no derivative.
-    Tangent(#[from] TangentError),
-    /// A rule cannot be computed on the processor.
-    Lower(#[from] LowerError),
-}
 
 /// Radiance and haze of a sample, and how they move.
 #[derive(Debug)]

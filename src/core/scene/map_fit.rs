@@ -4,7 +4,7 @@ use toml::Spanned;
 
 use super::error::SceneError;
 use super::file::{MapFitTable, MapPriorTable, Source};
-use super::settings::{number, short, whole};
+use super::numbers::{number, short, whole};
 
 /// A map that can be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
