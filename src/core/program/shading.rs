@@ -8,8 +8,9 @@ use super::graph::{Binary, Graph, Id, Input, Node};
 use super::levels::LevelProgram;
 use super::lower::{Natives, Source, Value};
 use crate::model::key_light::KeyLight;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::model::terms::TermName;
+use crate::model::turn::turn;
 use crate::shader::Domain;
 use crate::shader::atlas::stored;
 use crate::shader::emit::{Plan, hazy, parts, sample_fields};
@@ -221,12 +222,7 @@ const VECTORS: [&str; 4] = ["f32", "vec2f", "vec3f", "vec4f"];
 fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
     let mut with_slopes = plan.clone();
     with_slopes.resources.extend(&chain.resources);
-    for constant in [Constant::KeyByAzimuth, Constant::KeyByElevation] {
-        let named = chain.lines.iter().any(|lines| lines.contains(&format!("constants.{}", constant.name())));
-        if named && !with_slopes.constants.contains(&constant) {
-            with_slopes.constants.push(constant);
-        }
-    }
+    with_slopes.constants.extend(&chain.constants);
     let mut wgsl = with_slopes.declarations(true);
     wgsl.push_str(&chain.functions);
     wgsl.push_str(&sample_struct(&plan.sample_inputs(chain)));
@@ -269,17 +265,23 @@ pub fn constant(input: &Input, params: &Params) -> Option<f64> {
 /// A component of a constant of the rules at `params`; `None` for one that no parameter gives.
 #[must_use]
 pub fn component(constant: Constant, component: usize, params: &Params) -> Option<f64> {
+    Some(numbers(constant, params)?.get(component).copied().unwrap_or(0.0))
+}
+
+/// The numbers of a constant of the rules at `params`, 0 beyond those that it has; `None` for one that no parameter
+/// gives, but a camera or a mesh.
+#[must_use]
+pub fn numbers(constant: Constant, params: &Params) -> Option<[f64; 3]> {
     let key = || KeyLight::new(params);
-    let value = match constant {
+    Some(match constant {
         Constant::Param(param) => params.rgb(param),
         Constant::Turn => {
-            let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
+            let [cos, sin] = turn(params);
             [cos, sin, 0.0]
         }
         Constant::KeyDirection => key().direction,
         Constant::KeyByAzimuth => key().by_azimuth,
         Constant::KeyByElevation => key().by_elevation,
         Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => return None,
-    };
-    Some(value.get(component).copied().unwrap_or(0.0))
+    })
 }

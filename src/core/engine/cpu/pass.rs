@@ -212,11 +212,10 @@ fn live_names(seeds: &[Seed]) -> Vec<String> {
     let mut names = Vec::new();
     for seed in seeds {
         match seed {
-            Seed::Named { name, tangent } => {
+            Seed::Named { name, .. } => {
                 names.push((*name).to_owned());
                 // Constants that tell how it moves, move as well.
-                let told = tangent.split("constants.").skip(1);
-                names.extend(told.filter_map(|rest| rest.split('.').next()).map(str::to_owned));
+                names.extend(seed.constants().map(|constant| constant.name().to_owned()));
             }
             Seed::Resource { resource, slope } => {
                 names.extend([resource.name().to_owned(), slope.name().to_owned()]);

@@ -96,6 +96,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if let Some(loss) = &arguments.loss {
         loaded.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
     }
+    arguments.maps.hold_constants(&mut loaded.scene.fit);
     let solving = Solving::of(arguments, folder.path())?;
     let interrupt = Interrupt::default();
     let Ready { observed, chosen, maps } = ready(arguments, loaded.bake()?, &interrupt)?;

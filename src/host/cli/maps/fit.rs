@@ -14,14 +14,12 @@ use crate::engine::Point;
 use crate::engine::view::ObservedView;
 use crate::gpu::Choice;
 use crate::maps::fit::MapStep;
-use crate::maps::task::columns_beside;
 use crate::maps::{FittedMaps, MapError, MapTask, fit_maps};
 use crate::prepare::{Baked, Observed, StageSeconds};
 use crate::progress;
 use crate::render::shade::Shader;
 use crate::report::maps::MapView;
 use crate::report::metrics::Comparison;
-use crate::scene::MapKind;
 use crate::scene::view::View;
 use crate::tensor::SharedDevice;
 use skinfit_core::program::shading::ShadingError;
@@ -39,15 +37,12 @@ impl MapArguments {
         }
         let clock = Instant::now();
         let Observed { baked, views } = observed;
-        let named = |kind: &MapKind| self.maps.iter().any(|name| name == kind.name());
-        let kinds: Vec<MapKind> = MapKind::ALL.into_iter().filter(named).collect();
         let held_out = self.held_out(&baked.scene.views, &baked.scene.path)?;
         let choice = Choice { name: run.adapter.map(str::to_owned), ..Choice::default() };
         let shared = SharedDevice::open(&choice).map_err(|error| Refusal::new(tensor_words(&error)))?;
-        let baked = baked.with_scene(|scene| scene.fit.free = columns_beside(&kinds, &scene.fit.free));
         let posed = baked.scene.mesh.pose();
         let interrupt = Some(Arc::clone(&run.interrupt));
-        let task = MapTask::new(&baked, &posed, views.to_vec(), kinds);
+        let task = MapTask::new(&baked, &posed, views.to_vec(), self.kinds());
         let task = MapTask { held_out, interrupt, ..task };
         let settings = baked.scene.fit.maps.clone();
         let found = told(&shared, task, settings.rounds, run.quiet)
