@@ -3,6 +3,8 @@
 //! Nodes are made through [`Graph`]'s constructors, which find an equal node where there is one, compute what is
 //! constant, and leave out what changes nothing (`x + 0`, `1 x`). So two rules, or a rule and its tangent, that
 //! compute the same number share it without a word in either.
+//!
+//! `node`: what a graph consists of; `simplify`: its operations; `rebuilt`: parts of it as a graph of their own.
 
 mod node;
 mod rebuilt;

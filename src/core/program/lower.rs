@@ -4,6 +4,9 @@
 //!   addressed by whole numbers, which graphs have not; `is_finite` likewise
 //! - so are unit vectors and places on cubes ([`super::native`]), which every fragment needs again and again
 //! - both sides of an `if` are computed, and a value chosen where they meet: the rules' branches are short
+//!
+//! Here stand the text and its functions; one call of one is a `frame`, its parts are `expression`, `math`, `call` (of
+//! other functions) and `memory` (where pointers lead).
 
 mod call;
 mod expression;

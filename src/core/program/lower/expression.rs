@@ -2,8 +2,7 @@
 
 use naga::{Expression as E, Handle, Literal, ScalarKind, UnaryOperator as U};
 
-use super::frame::Frame;
-use super::memory::Place;
+use super::frame::{Frame, Place};
 use super::{LowerError, STEP_ALONG_U, STEP_ALONG_V, Value};
 use crate::program::graph::{Graph, Id, Unary};
 

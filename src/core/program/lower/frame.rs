@@ -3,7 +3,6 @@
 use naga::proc::TypeResolution;
 use naga::{Block, Expression as E, Function, Handle, Statement, TypeInner};
 
-use super::memory::Place;
 use super::{LowerError, Source, Value};
 use crate::program::graph::{Graph, Id};
 
@@ -23,6 +22,14 @@ pub(super) struct Frame<'a> {
     /// What it returned, and where.
     pub(super) returned: Vec<(Option<Id>, Vec<Id>)>,
     pub(super) finished: bool,
+}
+
+/// Where a pointer leads.
+pub(super) enum Place {
+    /// Numbers of a local variable: its index, the first, and how many.
+    Local(usize, usize, usize),
+    /// Numbers of a member of the uniform block: its name, the first, and how many.
+    Uniform(String, usize, usize),
 }
 
 impl Frame<'_> {

@@ -3,15 +3,7 @@
 use naga::{Expression as E, Handle, TypeInner};
 
 use super::LowerError;
-use super::frame::Frame;
-
-/// Where a pointer leads.
-pub(super) enum Place {
-    /// Numbers of a local variable: its index, the first, and how many.
-    Local(usize, usize, usize),
-    /// Numbers of a member of the uniform block: its name, the first, and how many.
-    Uniform(String, usize, usize),
-}
+use super::frame::{Frame, Place};
 
 impl Frame<'_> {
     pub(super) fn place(&mut self, pointer: Handle<E>) -> Result<Place, LowerError> {

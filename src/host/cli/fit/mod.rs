@@ -22,8 +22,6 @@ use super::{Exit, Refusal, quieten_graphics, tell_warnings, unfinished};
 use crate::prepare::{Baked, Loaded, Observed, PrepareOptions};
 use crate::scene::Loss;
 use conclude::{Fitted, conclude};
-#[cfg(feature = "burn")]
-pub(super) use evidence::compared;
 use solve::{Solving, solve};
 
 /// Fit a scene's free parameters to its target images

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::found::MapsFound;
 use super::pictures::MapPictures;
 use super::{MapArguments, MapRun};
-use crate::cli::fit::compared;
+use crate::cli::compared::compared;
 use crate::cli::graphics::tensor_words;
 use crate::cli::{Refusal, say};
 use crate::engine::Point;
