@@ -10,6 +10,7 @@ mod bakes;
 mod borders;
 mod builtin;
 mod by_rules;
+mod chain_rule;
 mod cli;
 mod common;
 mod damage;
