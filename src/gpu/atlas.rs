@@ -10,25 +10,24 @@ use wgpu::{
 use super::constants::Values;
 use super::device::Gpu;
 use super::error::{GpuError, Oversized};
-use super::program::{Outputs, Program};
+use super::pipeline::{Outputs, Pipeline};
 use super::readback::Copy;
 use super::targets::{Tile, texture};
 use super::timing::Timer;
 use super::upload::{Bound, Content, Uploads};
+use crate::scene::mesh::tile_outside_atlas;
 use crate::scene::view::Camera;
 use crate::shader::Plan;
 use crate::shader::atlas::{Level, Pass};
 
 /// A quantity in x, y and z, the chart in w.
 const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
-/// How far texture coordinates may lie outside the atlas: a rounding of what was meant to be its border.
-const BORDER: f32 = 1e-5;
 
 /// Passes on the device.
 pub(super) struct Atlas {
     levels: HashMap<String, TextureView>,
     /// Each with the levels that it leaves.
-    passes: Vec<(Program, Vec<TextureView>)>,
+    passes: Vec<(Pipeline, Vec<TextureView>)>,
 }
 
 impl Atlas {
@@ -55,17 +54,21 @@ impl Atlas {
         }
         let formats = vec![FORMAT; left.len()];
         let outputs = Outputs { formats: &formats, multisamples: 1, depth: false };
-        let read = self.bound(&pass.plan.levels);
-        self.passes.push((Program::over(gpu, pass.plan.clone(), uploads, read, outputs)?, left));
+        let read = self.bound(&pass.plan.levels)?;
+        self.passes.push((Pipeline::new(gpu, pass.plan.clone(), uploads, read, outputs)?, left));
         Ok(())
     }
 
     /// Levels, ready to be bound.
-    pub(super) fn bound(&self, levels: &[Level]) -> Vec<Bound> {
-        levels
-            .iter()
-            .filter_map(|level| Some(Bound::Texture(self.levels.get(&level.name)?.clone())))
-            .collect()
+    ///
+    /// # Errors
+    /// When no pass before has left one of them.
+    pub(super) fn bound(&self, levels: &[Level]) -> Result<Vec<Bound>, GpuError> {
+        let bound = |level: &Level| match self.levels.get(&level.name) {
+            Some(view) => Ok(Bound::Texture(view.clone())),
+            None => Err(GpuError::MissingLevel { level: level.name.clone() }),
+        };
+        levels.iter().map(bound).collect()
     }
 
     /// Set the constants of what is drawn next.
@@ -124,11 +127,24 @@ fn check(gpu: &Gpu, size: u32, uploads: &Uploads) -> Result<(), GpuError> {
         let of = Oversized::Map;
         return Err(GpuError::TextureSize { adapter, what, width: side, height: side, limit, of });
     }
-    let inside = |x: f32| (-BORDER..=1.0 + BORDER).contains(&x);
-    let uvs = &uploads.content().scene.mesh.uvs;
-    if let Some(uv) = uvs.iter().find(|uv| !inside(uv.x) || !inside(uv.y)) {
-        let (u, v) = (uv.x.floor(), uv.y.floor());
-        return Err(GpuError::OutsideAtlas { u, v });
+    match tile_outside_atlas(&uploads.content().scene.mesh.uvs) {
+        Some([u, v]) => Err(GpuError::OutsideAtlas { u, v }),
+        None => Ok(()),
     }
-    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_that_no_pass_leaves_is_refused_by_its_name() {
+        let atlas = Atlas { levels: HashMap::new(), passes: Vec::new() };
+        let error = atlas
+            .bound(&[Level { name: "mist".to_owned(), kind: "vec3f" }])
+            .err()
+            .map(|error| error.to_string());
+        assert!(error.is_some_and(|error| error.contains("the level mist of the UV atlas")));
+        assert!(atlas.bound(&[]).is_ok_and(|bound| bound.is_empty()));
+    }
 }

@@ -3,10 +3,10 @@
 use glam::{DMat4, DVec4};
 
 use super::targets::Tile;
-use crate::model::key_light::KeyLight;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::scene::view::Camera;
 use crate::shader::Constant;
+use skinfit_core::program::shading::numbers;
 
 /// Where the near plane lies. Depth is near / distance in floating point, which resolves it equally well at
 /// any distance: the plane may be as near as this whatever a scene's unit.
@@ -49,18 +49,7 @@ pub(crate) fn model_block(constants: &[Constant], params: &Params) -> Vec<f32> {
 
 /// A constant that the parameters give; a camera's or a mesh's is 0.
 fn of_params(constant: Constant, params: &Params) -> [f64; 3] {
-    let key = || KeyLight::new(params);
-    match constant {
-        Constant::Param(param) => params.rgb(param),
-        Constant::Turn => {
-            let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
-            [cos, sin, 0.0]
-        }
-        Constant::KeyDirection => key().direction,
-        Constant::KeyByAzimuth => key().by_azimuth,
-        Constant::KeyByElevation => key().by_elevation,
-        Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => [0.0; 3],
-    }
+    numbers(constant, params).unwrap_or_default()
 }
 
 /// The block's bytes, with that many morph weights.

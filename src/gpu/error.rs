@@ -123,6 +123,12 @@ pub enum GpuError {
         /// The tile's number along v.
         v: f32,
     },
+    /// A plan reads a level of the atlas that none of the passes before leaves.
+    #[error("the plan reads the level {level} of the UV atlas, but no pass before leaves it.")]
+    MissingLevel {
+        /// Its name.
+        level: String,
+    },
     /// There is nothing to compute.
     #[error("none of the enabled effects shows anything.")]
     NothingShown,

@@ -6,14 +6,15 @@
 //!   `vertices`: the mesh at rest, its morph targets and bones)
 //! - `constants`: the uniform block
 //! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
-//! - `program`: a plan as a pipeline; [`atlas`]: its passes over the UV atlas
+//! - `program`: a plan on the device: its `pipeline`, and before it its passes over the UV atlas ([`atlas`])
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
 //! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
 //! - `records`: where the numbers of a stored sample stand on the device
 //! - `readback`: images from the device
 //! - [`probe`]: rules evaluated for given numbers
 //! - [`timing`]: GPU time by pass
-//! - [`renderer`]: all of it: from a scene and a camera to an image
+//! - [`renderer`]: all of it: from a scene and a camera to an image; `stage`: the targets of one size, and what is drawn
+//!   into them
 //! - [`engine`]: loss, gradient and normal equations over samples
 //! - [`error`]: what is refused
 //!
@@ -31,12 +32,14 @@ pub mod engine;
 pub mod error;
 mod filter;
 pub(crate) mod geometry;
+mod pipeline;
 pub mod probe;
 mod program;
 pub(crate) mod readback;
 pub mod records;
 pub mod renderer;
 mod resolve;
+mod stage;
 mod targets;
 pub(crate) mod texels;
 pub mod timing;

@@ -1,19 +1,15 @@
 //! From a scene and a camera to an image.
 
-use wgpu::{
-    Color, CommandEncoder, CommandEncoderDescriptor, LoadOp, Operations, RenderPassColorAttachment,
-    RenderPassDepthStencilAttachment, RenderPassDescriptor, RenderPassTimestampWrites, StoreOp, TextureView,
-};
+mod frames;
 
 use super::bloom::Finish;
-use super::constants::Values;
 use super::device::Gpu;
 use super::error::GpuError;
 use super::program::Program;
-use super::readback::Copy;
 use super::resolve::Resolve;
-use super::targets::{Key, Planes, Precision, Targets, Tile};
-use super::timing::{PassTime, Timer};
+use super::stage::Stage;
+use super::targets::{Key, Precision, Targets};
+use super::timing::PassTime;
 use super::upload::{Content, Uploads};
 use crate::bake::VertexOcclusion;
 use crate::model::effects::Effect;
@@ -69,13 +65,6 @@ pub struct Renderer {
     backdrop: Option<(Camera, Backdrop)>,
 }
 
-/// Targets, and the passes after the mesh's.
-struct Stage {
-    targets: Targets,
-    resolve: Option<Resolve>,
-    finish: Option<Finish>,
-}
-
 impl Renderer {
     /// Plan the scene's shader, upload what it reads, and compile it.
     ///
@@ -128,7 +117,7 @@ impl Renderer {
     /// The plan of the whole image.
     #[must_use]
     pub fn plan(&self) -> &Plan {
-        &self.programs[0].plan
+        self.programs[0].plan()
     }
 
     /// Bytes of mesh, maps and cubes on the device.
@@ -238,44 +227,9 @@ impl Renderer {
         }
     }
 
-    /// GPU milliseconds of each of so many frames, drawn one right after another with nothing read back: an
-    /// adapter that waits for the CPU between frames lowers its clock. Empty where there are no timestamps.
-    /// Without the bloom.
-    ///
-    /// # Errors
-    /// As of [`Self::render`].
-    pub fn frame_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
-        let program = self.program(None)?;
-        let stage = self.stage(camera, hazy(&self.programs[program].plan))?;
-        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[stage]);
-        let mut timers = Vec::with_capacity(frames);
-        for _ in 0..frames {
-            for (i, &tile) in stage.targets.tiles.iter().enumerate() {
-                let mut timer = Timer::new(gpu);
-                let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
-                program.set(gpu, &Values { params, camera, tile, morph_weights });
-                let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
-                stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, Some(&mut timer));
-                timer.finish(&mut encoder);
-                gpu.queue.submit([encoder.finish()]);
-                timers.push((i, timer));
-            }
-        }
-        let mut times = Vec::with_capacity(frames);
-        for (tile, mut timer) in timers {
-            timer.collect(gpu)?;
-            let milliseconds: f64 = timer.times.iter().map(|time| time.milliseconds).sum();
-            match times.last_mut() {
-                Some(last) if tile > 0 => *last += milliseconds,
-                _ => times.push(milliseconds),
-            }
-        }
-        Ok(if gpu.timestamps() { times } else { Vec::new() })
-    }
-
     /// The place of the program that draws the whole, or a term; made if it is not there yet.
     fn program(&mut self, output: Option<TermName>) -> Result<usize, GpuError> {
-        if let Some(i) = self.programs.iter().position(|program| program.plan.facts.output == output) {
+        if let Some(i) = self.programs.iter().position(|program| program.plan().facts.output == output) {
             return Ok(i);
         }
         let plan =
@@ -317,210 +271,9 @@ impl Renderer {
         self.stages.push(Stage { targets, resolve, finish });
         Ok(self.stages.len() - 1)
     }
-
-    /// Draw the whole or a term; what follows the mesh's passes where it is to be `finished`.
-    fn draw(
-        &mut self,
-        output: Option<TermName>,
-        camera: &Camera,
-        gain: f64,
-        finished: bool,
-    ) -> Result<Drawn, GpuError> {
-        let mut timer = self.options.timed.then(|| Timer::new(&self.gpu));
-        let (stage, copies) = self.submit(output, camera, gain, finished, timer.as_mut())?;
-        let planes = copies.iter().map(|copy| copy.read(&self.gpu)).collect::<Result<Vec<_>, _>>()?;
-        Ok(Drawn { stage, planes, times: timer.map(|timer| timer.times).unwrap_or_default() })
-    }
-
-    /// Have an image drawn: the place of the targets that it is drawn into, and copies of what it is made of. Waits
-    /// only where it is timed.
-    fn submit(
-        &mut self,
-        output: Option<TermName>,
-        camera: &Camera,
-        gain: f64,
-        finished: bool,
-        mut timer: Option<&mut Timer>,
-    ) -> Result<(usize, Vec<Copy>), GpuError> {
-        let program = self.program(output)?;
-        let place = self.stage(camera, hazy(&self.programs[program].plan))?;
-        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[place]);
-        let mut copies = Vec::new();
-        let tiles = &stage.targets.tiles;
-        for (i, &tile) in tiles.iter().enumerate() {
-            let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
-            program.set(gpu, &Values { params, camera, tile, morph_weights });
-            let mut encoder =
-                gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
-            stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, timer.as_deref_mut());
-            if i + 1 == tiles.len() {
-                copies = stage.encode_end(gpu, &mut encoder, gain, finished, timer.as_deref_mut());
-            }
-            if let Some(timer) = &timer {
-                timer.finish(&mut encoder);
-            }
-            gpu.queue.submit([encoder.finish()]);
-            if let Some(timer) = &mut timer {
-                timer.collect(gpu)?;
-            }
-            gpu.check()?;
-        }
-        Ok((place, copies))
-    }
-}
-
-/// What was drawn and read back.
-struct Drawn {
-    /// The place of its targets.
-    stage: usize,
-    planes: Vec<Vec<f32>>,
-    times: Vec<PassTime>,
 }
 
 /// Whether a plan's alpha is the haze.
 fn hazy(plan: &Plan) -> bool {
     plan.facts.needs().haze && plan.facts.output.is_none()
-}
-
-impl Stage {
-    /// The image of a frame that is finished: the last passes have the gain in them already.
-    fn finished_image(&self, planes: &[Vec<f32>], gain: f64) -> (Image, usize) {
-        self.image(planes, if self.finish.is_some() { 1.0 } else { gain as f32 })
-    }
-
-    /// Draw the mesh into a tile, and its samples into the image.
-    fn encode_tile(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut CommandEncoder,
-        program: &Program,
-        tile: Tile,
-        first: bool,
-        mut timer: Option<&mut Timer>,
-    ) {
-        if first {
-            program.prepare(encoder, timer.as_deref_mut());
-        }
-        let targets = &self.targets;
-        let drawn = targets.samples.as_ref().unwrap_or(&targets.pixels);
-        let attachments = match &targets.multisampled {
-            Some(multisampled) => attached(multisampled, Some(drawn), true),
-            None => attached(drawn, None, true),
-        };
-        let depth = RenderPassDepthStencilAttachment {
-            view: &targets.depth,
-            depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
-            stencil_ops: None,
-        };
-        {
-            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-                label: Some("raster"),
-                color_attachments: &attachments,
-                depth_stencil_attachment: Some(depth),
-                timestamp_writes: timer.as_mut().and_then(|timer| timer.around("raster")),
-                ..RenderPassDescriptor::default()
-            });
-            let n = targets.key.antialias.grid();
-            let (width, height) = ((n * tile.width) as f32, (n * tile.height) as f32);
-            pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
-            program.draw(&mut pass);
-        }
-        if let Some(resolve) = &self.resolve {
-            resolve.set(gpu, tile);
-            let attachments = attached(&targets.pixels, None, first);
-            let times = timer.as_mut().and_then(|timer| timer.around("resolve"));
-            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-                label: Some("resolve"),
-                color_attachments: &attachments,
-                timestamp_writes: times,
-                ..RenderPassDescriptor::default()
-            });
-            resolve.draw(&mut pass, tile);
-        }
-        if let (Some(resolve), Some(glow)) = (&self.resolve, &targets.glow) {
-            let times = timer.as_mut().and_then(|timer| timer.around("resolve, glow"));
-            let load = if first { LoadOp::Clear(Color::TRANSPARENT) } else { LoadOp::Load };
-            over(encoder, glow, load, times, |pass| resolve.draw_glow(pass, tile));
-        }
-    }
-
-    /// After the last tile: what stands behind the mesh and the bloom, where it is to be `finished`, and copies of what
-    /// the image is made of.
-    fn encode_end(
-        &self,
-        gpu: &Gpu,
-        encoder: &mut CommandEncoder,
-        gain: f64,
-        finished: bool,
-        mut timer: Option<&mut Timer>,
-    ) -> Vec<Copy> {
-        let Some(finish) = self.finish.as_ref().filter(|_| finished) else {
-            return self.targets.pixels.views().map(|view| Copy::new(gpu, encoder, view)).collect();
-        };
-        finish.set(gpu, gain);
-        let clear = LoadOp::Clear(Color::TRANSPARENT);
-        if let Some(blurred) = finish.blurred() {
-            let times = timer.as_mut().and_then(|timer| timer.around("bloom, rows"));
-            over(encoder, blurred, clear, times, |pass| finish.draw_across(pass));
-        }
-        let last = if finish.blurred().is_some() { "bloom, columns" } else { "backdrop" };
-        let times = timer.as_mut().and_then(|timer| timer.around(last));
-        over(encoder, &finish.whole, clear, times, |pass| finish.draw_last(pass));
-        vec![Copy::new(gpu, encoder, &finish.whole)]
-    }
-
-    /// The image of those planes, and how many of its pixels reached the end of the targets' range.
-    fn image(&self, planes: &[Vec<f32>], gain: f32) -> (Image, usize) {
-        let key = &self.targets.key;
-        let largest = key.precision.largest();
-        let mut image = Image::new(key.width as usize, key.height as usize);
-        let mut clipped = 0;
-        let texels = planes[0].chunks_exact(4);
-        for (i, texel) in texels.enumerate() {
-            let rgb = [texel[0], texel[1], texel[2]].map(|x| x.clamp(-largest, largest));
-            clipped += usize::from(rgb.iter().any(|x| x.abs() >= largest));
-            image.rgb[i] = rgb.map(|x| gain * x);
-            image.alpha[i] = planes.get(1).map_or(texel[3], |coverage| coverage[i]);
-        }
-        (image, clipped)
-    }
-}
-
-/// Planes as a pass's attachments, resolved into others where those are given.
-fn attached<'a>(
-    planes: &'a Planes,
-    resolved: Option<&'a Planes>,
-    clear: bool,
-) -> Vec<Option<RenderPassColorAttachment<'a>>> {
-    let mut resolved = resolved.map(Planes::views);
-    let attachment = |view: &'a TextureView| {
-        let resolve_target = resolved.as_mut().and_then(Iterator::next);
-        let load = if clear { LoadOp::Clear(Color::TRANSPARENT) } else { LoadOp::Load };
-        let store = if resolve_target.is_some() { StoreOp::Discard } else { StoreOp::Store };
-        Some(RenderPassColorAttachment {
-            view,
-            depth_slice: None,
-            resolve_target,
-            ops: Operations { load, store },
-        })
-    };
-    planes.views().map(attachment).collect()
-}
-
-/// A pass over the whole of `view`.
-fn over(
-    encoder: &mut CommandEncoder,
-    view: &TextureView,
-    load: LoadOp<Color>,
-    timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
-    draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
-) {
-    let ops = Operations { load, store: StoreOp::Store };
-    let attachment = RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops };
-    let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-        color_attachments: &[Some(attachment)],
-        timestamp_writes,
-        ..RenderPassDescriptor::default()
-    });
-    draw(&mut pass);
 }

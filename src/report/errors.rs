@@ -2,9 +2,9 @@
 
 use super::json::{Ordered, Summary};
 use super::words::number;
+use crate::fit::error_basis::ErrorBasis;
 use crate::fit::profile::Profile;
 use crate::fit::sandwich::Blocks;
-use crate::fit::statistics::ErrorBasis;
 
 /// Errors that differ from those of independent residuals by less than this factor do so by chance.
 const NOTABLE: f64 = 1.5;

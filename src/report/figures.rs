@@ -3,10 +3,10 @@
 use std::fmt::Write as _;
 
 use super::ViewEvidence;
-use super::json::ViewSummary;
 use super::page::escape;
 use super::pictures::Picture;
 use super::signed;
+use super::view_summary::ViewSummary;
 use crate::render::files::{Image, encode_png};
 
 /// The longest side of a picture in the page; larger ones are shrunk by a whole factor.

@@ -3,16 +3,15 @@
 //! Keys stand in the order of the format's description; `null` stands for a number that does not
 //! exist (a standard error at a bound, a score of a view without covered pixels, an infinite bound).
 
-use serde::ser::{Serialize, Serializer};
-
 use super::maps::{MapEvidence, MapSummary};
-use super::metrics::Scores;
 use super::misfit::Misfit;
+pub use super::ordered::Ordered;
+pub use super::view_summary::ViewSummary;
 use super::{RunInfo, StageSeconds};
 use crate::engine::{Point, Unknown};
+use crate::fit::error_basis::ErrorBasis;
 use crate::fit::outcome::{Ending, Iteration, Outcome, UnknownOutcome};
 use crate::fit::profile::Profile;
-use crate::fit::statistics::ErrorBasis;
 use crate::model::params::{Channels, Param};
 
 /// The whole of `report.json`.
@@ -113,28 +112,6 @@ pub enum Value<T> {
     Rgb([T; 3]),
 }
 
-/// How well one view is matched; `null` when no pixel of it is covered.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub struct ViewSummary {
-    /// dB; 200 stands for equal images.
-    pub psnr: Option<f64>,
-    /// 1 for equal images.
-    pub ssim: Option<f64>,
-    /// 0 for equal images.
-    pub flip: Option<f64>,
-    /// How many pixels were compared.
-    pub pixels: usize,
-}
-
-impl ViewSummary {
-    /// The scores over `pixels` compared pixels.
-    #[must_use]
-    pub fn new(scores: Option<Scores>, pixels: usize) -> Self {
-        let of = |score: fn(&Scores) -> f64| scores.as_ref().map(score);
-        Self { psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), flip: of(|s| s.flip), pixels }
-    }
-}
-
 /// What is known of one unknown.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct UnknownSummary {
@@ -165,16 +142,6 @@ pub struct Correlations {
     pub names: Vec<String>,
     /// Rows; `null` beside an unknown without a standard error.
     pub matrix: Vec<Vec<Option<f64>>>,
-}
-
-/// A JSON object whose keys keep their order.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Ordered<T>(pub Vec<(String, T)>);
-
-impl<T: Serialize> Serialize for Ordered<T> {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_map(self.0.iter().map(|(key, value)| (key, value)))
-    }
 }
 
 impl Summary {

@@ -6,7 +6,7 @@
 //! - [`pictures`]: target | fit | error side by side
 //! - [`page`], [`plot`]: what all pages share: sortable tables, scatter plots, pictures that wipe
 //! - [`maps`]: what whole maps gained, where they were fitted
-//! - [`html`]: the page `report.html`, with its `figures`, `charts`, `tables` and `words`
+//! - [`html`]: the page `report.html`, with its `figures`, `charts`, `tables`, `verdict` and `words`
 //!
 //! [`write_run`] leaves all of it in a run's folder, with an EXR of the terms for each view.
 
@@ -21,11 +21,14 @@ mod lettering;
 pub mod maps;
 pub mod metrics;
 pub mod misfit;
+mod ordered;
 pub mod page;
 pub mod pictures;
 pub mod plot;
 pub mod signed;
 mod tables;
+mod verdict;
+mod view_summary;
 mod words;
 
 pub use words::{count, number, seconds};

@@ -1,8 +1,8 @@
 //! Fitted maps in the report: what they gained in each view, and how they look.
 
 use super::figures::triple_of;
-use super::json::Ordered;
 use super::metrics::Scores;
+use super::ordered::Ordered;
 use super::page::{Cell, Table, escape, section};
 use super::pictures::Picture;
 use super::words::number;

@@ -2,8 +2,8 @@
 //!
 //! - [`device`]: one wgpu device for burn and for us
 //! - [`buffer`]: tensors as ranges of wgpu buffers, both ways without a copy
-//! - [`shade`]: the model as an operation; [`inputs`]: what it takes; `stage`: its passes; `scatter`: what lookups of
-//!   a cube gained, added to its texels
+//! - [`shade`]: the model as an operation, of what is [`Shaded`]; [`inputs`]: what it takes; `stage`: its passes;
+//!   `scatter`: what lookups of a cube gained, added to its texels
 //! - `drawn`: samples that the adapter drew, as tensors
 //! - [`adjoint`]: the text of those passes: the image of stored samples, and its vector-Jacobian product
 //! - [`footprint`]: the linear maps of a scene: texels, vertices, cube borders
@@ -24,12 +24,14 @@ pub mod maps;
 mod pass;
 mod scatter;
 pub mod shade;
+mod shaded;
 pub mod sparse;
 mod stage;
 
 pub use device::SharedDevice;
 pub use inputs::{Input, Inputs};
-pub use shade::{Scatter, Shade, Shaded};
+pub use shade::Shade;
+pub use shaded::{Scatter, Shaded};
 pub use sparse::Sparse;
 
 use burn::backend::ops::FloatTensorOps as _;

@@ -4,7 +4,7 @@ use wgpu::{Buffer, BufferUsages, CommandEncoder, ComputePipeline};
 
 use super::buffer::TensorBuffer;
 use super::pass;
-use super::shade::Scatter;
+use super::shaded::Scatter;
 use crate::gpu::{Gpu, GpuError};
 
 /// The passes of either way of adding.

@@ -462,6 +462,12 @@ fn what_does_not_fit_is_refused_with_its_line_and_a_remedy() {
             "derivative",
         ),
         ("fn sheen_light(", "fn normalize_or(", 22, "`normalize_or` is there already"),
+        ("fn sheen_light(", "fn sample_level(", 22, "`sample_level` is a name that the shaders give"),
+        ("fn sheen_light(", "fn vs_main(", 22, "`vs_main` is a name that the shaders give"),
+        ("fn sheen_curve(", "fn fs_main(", 11, "`fs_main` is a name that the shaders give"),
+        ("parameter: sheen_f0", "parameter: sheen_level", 5, "Give it another name: those that begin with"),
+        ("gives: sheen_share", "gives: sheen_along_u", 11, "`sheen_along_u` is a name that the shaders give"),
+        ("gives: sheen_share", "gives: d_sheen", 11, "`d_sheen` is a name that the shaders give"),
     ];
     for &(old, new, line, words) in cases {
         assert!(text.contains(old), "{old}");

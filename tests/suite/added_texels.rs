@@ -25,35 +25,8 @@ use skinfit::shader::{Budget, Domain, Facts, Plan, Work, plan};
 use crate::fixtures::bare_scene;
 use crate::graphics::bench::{EXACT, gpu};
 
-/// A light map, a blur of it, and what is added: the blurred map, and a detail that may be computed in either domain.
-const GLOW: &str = "\
-// Light that wanders under the surface.
-//
-// effect: glow, light that wanders under the surface
-// parameter: glow_weight = 0.5 in [0, inf), rgb, linear; weight of what wandered; a test
-// parameter: glow_radius = 1.3 in [0.1, 30], unit texels; how far it wandered; a test
-//
-// The light map: hills over the atlas.
-//
-// gives: glow_light
-// domain: texel
-// cost: 12
-fn glow_light_map(vertex_uv: vec2f) -> vec3f {
-    let within: vec2f = fract(12.0 * vertex_uv);
-    return vec3f(4.0 * within * (1.0 - within), vertex_uv.x * vertex_uv.y);
-}
-
-// A Gaussian of seven taps, a standard deviation apart.
-//
-// gives: glow_soft
-// domain: texel
-// pass: glow_light: vec3f, 7 taps
-// sampled: 0
-// cost: 8
-fn glow_kernel(tap: f32, glow_radius: f32) -> vec2f {
-    return vec2f(glow_radius * tap, exp(-0.5 * tap * tap));
-}
-
+/// Beside a light map and a blur of it, what is added: the blurred map, and a detail that may be computed in either domain.
+const GLOW: &str = "
 // Slow, and smooth enough to be looked up.
 //
 // gives: glow_detail
@@ -72,39 +45,8 @@ fn glow_light(glow_soft: vec3f, glow_detail: vec3f, glow_weight: vec3f) -> vec3f
 }
 ";
 
-/// A blur as wide on the surface as its radius says, of what a parameter moves.
-const VEINED: &str = "\
-// effect: veins, light under a stretched skin
-// parameter: veins_radius = 0.05 in [0.001, 30]; standard deviation, in the scene's unit; a test
-// parameter: veins_depth = 1.5 in [0.1, 10]; exponent of the light map; a test
-//
-// gives: veins_light
-// domain: texel
-// cost: 12
-fn veins_map(vertex_uv: vec2f, veins_depth: f32) -> vec3f {
-    let power: f32 = exp(veins_depth * log(0.1 + vertex_uv.x));
-    return vec3f(power, power * vertex_uv.y, vertex_uv.y * vertex_uv.y);
-}
-
-// gives: veins_stretch
-// domain: texel
-// cost: 20
-fn veins_stretch_map(vertex_position: vec3f) -> vec2f {
-    let along: vec3f = dpdx(vertex_position);
-    let down: vec3f = dpdy(vertex_position);
-    return sqrt(vec2f(dot(along, along), dot(down, down)));
-}
-
-// gives: veins_soft
-// domain: texel
-// pass: veins_light: vec3f, 5 taps
-// sampled: 0
-// cost: 8
-fn veins_kernel(tap: f32, axis: vec2f, veins_radius: f32, veins_stretch: vec2f) -> vec2f {
-    let step: f32 = dot(veins_stretch, axis);
-    return vec2f(tap * veins_radius / max(step, 1e-6), exp(-0.5 * tap * tap));
-}
-
+/// What is added of a blur that is as wide on the surface as its radius says, of what a parameter moves.
+const VEINED: &str = "
 // gives: veins_part
 // adds: veins
 // cost: 1
@@ -149,12 +91,16 @@ fn lit() -> &'static Term {
 
 fn veined() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
-    TERM.get_or_init(|| register("veins", VEINED).unwrap_or_else(|error| panic!("{error}")))
+    let text =
+        include_str!("../../src/core/shader/atlas/tests/stretched.wgsl").replace("NAME", "veins") + VEINED;
+    TERM.get_or_init(|| register("veins", &text).unwrap_or_else(|error| panic!("{error}")))
 }
 
 fn term() -> &'static Term {
     static TERM: OnceLock<&'static Term> = OnceLock::new();
-    TERM.get_or_init(|| register("glow", GLOW).unwrap_or_else(|error| panic!("{error}")))
+    let text = include_str!("../../src/core/shader/atlas/tests/hills.wgsl");
+    let text = text.replace("NAME", "glow").replace("HILLS", "12.0") + GLOW;
+    TERM.get_or_init(|| register("glow", &text).unwrap_or_else(|error| panic!("{error}")))
 }
 
 fn setup() -> Setup {

@@ -11,6 +11,7 @@ mod bakes;
 mod borders;
 mod builtin;
 mod by_rules;
+mod chain_rule;
 mod cli;
 mod common;
 mod damage;

@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use skinfit::engine::{Point, Unknown};
+use skinfit::fit::error_basis::ErrorBasis;
 use skinfit::fit::outcome::{Direction, Ending, Iteration, Outcome, UnknownOutcome};
 use skinfit::fit::profile::{Profile, ProfilePoint};
 use skinfit::fit::sandwich::Blocks;
-use skinfit::fit::statistics::ErrorBasis;
 use skinfit::model::effects::Form;
 use skinfit::model::params::{Column, Param, Params};
 use skinfit::render::files::Image;

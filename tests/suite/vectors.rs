@@ -147,19 +147,7 @@ fn fragments<'a, R: Number>(
 
 /// A number of a fragment by the rules' name.
 fn field<R: Real>(f: &Fragment<R>, Input { name, component }: &Input) -> R {
-    match name.as_str() {
-        "base" => f.base[*component],
-        "bump" => f.bump[*component],
-        "normal" => f.normal[*component],
-        "view" => f.view[*component],
-        "albedo" => f.albedo[*component],
-        "open" => f.occlusion,
-        "silhouette" => f.silhouette,
-        "dapple" => f.dapple,
-        "specular" => f.specular,
-        "attenuator" => f.attenuator,
-        other => panic!("a fragment has no {other}"),
-    }
+    f.number(name, *component).unwrap_or_else(|| panic!("a fragment has no {name}"))
 }
 
 /// `[rgba][column]`, row after row.

@@ -4,7 +4,7 @@
 //! - [`Task`]: what an engine is to evaluate
 //! - [`cpu`]: the engine on the processor
 //! - `gram`: columns to products; [`residual`]: the losses; [`pulls`]: where residuals stand in the images
-//! - [`lanes`]: sixteen f32 lanes as one number; `corners`: their lookups in cubes
+//! - [`lanes`]: sixteen f32 lanes as one number; `real_lanes`: its functions; `corners`: its lookups in cubes
 //! - [`levels`]: what is computed in texels of the UV atlas, and what samples look up of it
 //! - [`rules`]: rules over samples in any kind of number; [`mod@reference`]: passes of them in f64, plainly
 //! - [`view`]: samples beside what was observed
@@ -15,6 +15,7 @@ mod gram;
 pub mod lanes;
 pub mod levels;
 pub mod pulls;
+mod real_lanes;
 pub mod reference;
 pub mod residual;
 pub mod rules;

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use serde_json::{Map, Value, json};
 
-use super::dialect::PREFIX;
+use super::names::PREFIX;
 use super::target::Target;
 use super::{Constants, Provenance, names};
 use crate::fit::params_file::quoted;

@@ -1,10 +1,7 @@
 //! How each shading language spells what the shader rules say in WGSL.
 
-use super::names::function;
+use super::names::{PREFIX, function};
 use crate::shader::quantity::{Kind, Resource};
-
-/// What the names of all that an export defines begin with, in whatever capitals its language wants.
-pub const PREFIX: &str = "skinfit_";
 
 /// Families that share most of their grammar.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

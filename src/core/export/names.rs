@@ -3,7 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use super::dialect::PREFIX;
+/// What the names of all that an export defines begin with, in whatever capitals its language wants.
+pub(super) const PREFIX: &str = "skinfit_";
 
 /// `wgsl` with the prefix before the name of every function and struct that it defines, and before the `constants` and
 /// `resources` that it reads. `fields` of structs keep their names.

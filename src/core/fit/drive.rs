@@ -18,10 +18,11 @@ use web_time::Instant;
 
 use super::adam::{Adam, AdamState};
 use super::bounded;
+use super::error::FitError;
 use super::linearisation::{EngineFault, Linearisation, Passes};
 use super::lm::{LevenbergMarquardt, LmState};
 use super::memory::Memory;
-use super::options::{FitError, FitOptions, SolverKind};
+use super::options::{FitOptions, SolverKind};
 use super::outcome::{Ending, Iteration};
 use super::state::{Run, Saved, StateError};
 use super::transform::Transform;

@@ -1,6 +1,6 @@
 //! The solvers, and what is known of the answer afterwards.
 //!
-//! - [`options`]: how a fit is to be done, and how it may fail
+//! - [`options`]: how a fit is to be done; `error`: why it cannot be
 //! - [`coordinates`], [`linearisation`]: what solvers step in, and what one pass tells them
 //! - [`bounded`]: the bounded least-squares step
 //! - [`lm`], [`memory`]: Levenberg-Marquardt; [`varpro`]: what makes it variable projection
@@ -9,8 +9,8 @@
 //! - `drive`: the executor, watched
 //! - [`state`]: interrupted fits, resumed; [`fingerprint`]: by fits of the same alone
 //! - [`starts`]: where the other starts of a multi-start fit begin
-//! - [`statistics`]: standard errors and correlations; [`sandwich`]: where neighbouring residuals are alike;
-//!   `null_space`: what is undetermined; [`profile`]: how far the loss lets an unknown go
+//! - [`statistics`]: standard errors and correlations; [`error_basis`]: what they rest on; [`sandwich`]: where
+//!   neighbouring residuals are alike; `null_space`: what is undetermined; [`profile`]: how far the loss lets an unknown go
 //! - [`outcome`]: what a fit yields
 //! - [`params_file`]: what was fitted, as `params.toml`
 
@@ -22,6 +22,8 @@ mod adam;
 pub mod bounded;
 pub mod coordinates;
 mod drive;
+mod error;
+pub mod error_basis;
 pub mod fingerprint;
 pub mod linearisation;
 pub mod lm;
@@ -39,15 +41,17 @@ pub mod transform;
 pub mod unbounded;
 pub mod varpro;
 
-pub use options::{FitError, FitOptions, SolverKind, Tolerances};
+pub use error::FitError;
+pub use options::{FitOptions, SolverKind, Tolerances};
 
 use coordinates::Coordinates;
 use drive::Log;
+use error_basis::ErrorBasis;
 use linearisation::{Linearisation, Passes};
 use outcome::{Ending, Iteration, Outcome, StartOutcome, UnknownOutcome};
 use profile::{Answer, Profile};
 use state::{Run, Saved};
-use statistics::{ErrorBasis, Statistics};
+use statistics::Statistics;
 
 use crate::engine::{Objective, Point};
 

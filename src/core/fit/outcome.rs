@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::error_basis::ErrorBasis;
 use super::profile::Profile;
-use super::statistics::ErrorBasis;
 use crate::engine::{Point, Unknown};
 
 /// A finished (or interrupted) fit.

@@ -29,10 +29,11 @@ use nalgebra::{DMatrix, SymmetricEigen};
 
 use super::bounded::NULL_EIGENVALUE;
 use super::coordinates::Coordinates;
+use super::error_basis::ErrorBasis;
 use super::linearisation::Linearisation;
 use super::null_space::{NullSpace, unit_diagonal};
 use super::outcome::Direction;
-use super::sandwich::{Blocks, sandwich};
+use super::sandwich::sandwich;
 use crate::engine::pulls::Pulls;
 
 /// What is known of an answer, in the order of the unknowns.
@@ -53,18 +54,6 @@ pub struct Statistics {
     pub undetermined: Vec<Direction>,
     /// The diagonal of (J'WJ)^+ in coordinates: variances of unknowns where residuals have the variance 1.
     pub(super) unit: Vec<f64>,
-}
-
-/// What standard errors rest on.
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-#[serde(rename_all = "kebab-case", tag = "basis")]
-pub enum ErrorBasis {
-    /// Residuals are taken to be independent: nobody knows which of them are neighbours.
-    Independent,
-    /// Roundings are all that is left of the residuals.
-    Rounding,
-    /// Squares of pixels are.
-    Blocks(Blocks),
 }
 
 impl Statistics {

@@ -32,6 +32,27 @@ pub struct Fragment<R> {
     pub attenuator: R,
 }
 
+impl<R: Real> Fragment<R> {
+    /// A component of what the rules call `name`; `None` for what a fragment does not hold.
+    #[inline]
+    pub fn number(&self, name: &str, component: usize) -> Option<R> {
+        let vector = |of: &V3<R>| of.get(component).copied();
+        match name {
+            "base" => vector(&self.base),
+            "bump" => vector(&self.bump),
+            "normal" => vector(&self.normal),
+            "view" => vector(&self.view),
+            "albedo" => vector(&self.albedo),
+            "open" => Some(self.occlusion),
+            "silhouette" => Some(self.silhouette),
+            "dapple" => Some(self.dapple),
+            "specular" => Some(self.specular),
+            "attenuator" => Some(self.attenuator),
+            _ => None,
+        }
+    }
+}
+
 /// The two parts of the shading normal from a normal map's texel in [0, 1] and the rows of the
 /// tangent-to-world matrix: n is the direction of `base + normal_strength bump`.
 ///

@@ -1,8 +1,8 @@
 //! Passes over stored texels, as operations on numbers: what draws leave, and the taps of blurs.
 
+use super::error::ShadingError;
 use super::graph::{Graph, Id, Input};
 use super::lower::{LowerError, Natives, STEP_ALONG_U, STEP_ALONG_V, Source, Value};
-use super::shading::ShadingError;
 use super::steps::{Rounding, Steps};
 use crate::model::terms::TermName;
 use crate::shader::atlas::{Axis, Level, Pass, PassKind, TAPS, TEXEL};

@@ -9,7 +9,7 @@
 //! - [`graph`]: numbers and what they are made of; equal ones are one
 //! - [`native`]: functions that are one instruction
 //! - [`lower`]: WGSL functions called on graphs
-//! - [`shading`]: the value of a plan and how it moves, as a graph
+//! - [`shading`]: the value of a plan and how it moves, as a graph; `error`: why it cannot be
 //! - [`levels`]: passes over stored texels, as graphs
 //! - [`cut`]: what stays from pass to pass
 //! - [`steps`]: a graph evaluated node by node, in any kind of number
@@ -17,6 +17,7 @@
 //! - [`evaluate`]: a tape run for one sample; [`mod@print`]: a tape as Rust
 
 pub mod cut;
+mod error;
 pub mod evaluate;
 pub mod graph;
 pub mod levels;

@@ -3,32 +3,21 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 
+pub use super::error::ShadingError;
 use super::graph::{Binary, Graph, Id, Input, Node};
 use super::levels::LevelProgram;
-use super::lower::{LowerError, Natives, Source, Value};
+use super::lower::{Natives, Source, Value};
 use crate::model::key_light::KeyLight;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::model::terms::TermName;
+use crate::model::turn::turn;
 use crate::shader::Domain;
 use crate::shader::atlas::stored;
 use crate::shader::emit::{Plan, hazy, parts, sample_fields};
 use crate::shader::module::{sample_struct, uniform};
-use crate::shader::search::{PlanError, components};
-use crate::shader::tangent::TangentError;
+use crate::shader::search::components;
 use crate::shader::tangent::chain::{Chain, Seed};
 use crate::shader::{Constant, Facts, plan};
-
-/// A scene whose shading cannot be put as a graph.
-#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
-#[error(transparent)]
-pub enum ShadingError {
-    /// No rules yield it.
-    Plan(#[from] PlanError),
-    /// A rule has no derivative.
-    Tangent(#[from] TangentError),
-    /// A rule cannot be computed on the processor.
-    Lower(#[from] LowerError),
-}
 
 /// Radiance and haze of a sample, and how they move.
 #[derive(Debug)]
@@ -233,12 +222,7 @@ const VECTORS: [&str; 4] = ["f32", "vec2f", "vec3f", "vec4f"];
 fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
     let mut with_slopes = plan.clone();
     with_slopes.resources.extend(&chain.resources);
-    for constant in [Constant::KeyByAzimuth, Constant::KeyByElevation] {
-        let named = chain.lines.iter().any(|lines| lines.contains(&format!("constants.{}", constant.name())));
-        if named && !with_slopes.constants.contains(&constant) {
-            with_slopes.constants.push(constant);
-        }
-    }
+    with_slopes.constants.extend(&chain.constants);
     let mut wgsl = with_slopes.declarations(true);
     wgsl.push_str(&chain.functions);
     wgsl.push_str(&sample_struct(&plan.sample_inputs(chain)));
@@ -281,17 +265,23 @@ pub fn constant(input: &Input, params: &Params) -> Option<f64> {
 /// A component of a constant of the rules at `params`; `None` for one that no parameter gives.
 #[must_use]
 pub fn component(constant: Constant, component: usize, params: &Params) -> Option<f64> {
+    Some(numbers(constant, params)?.get(component).copied().unwrap_or(0.0))
+}
+
+/// The numbers of a constant of the rules at `params`, 0 beyond those that it has; `None` for one that no parameter
+/// gives, but a camera or a mesh.
+#[must_use]
+pub fn numbers(constant: Constant, params: &Params) -> Option<[f64; 3]> {
     let key = || KeyLight::new(params);
-    let value = match constant {
+    Some(match constant {
         Constant::Param(param) => params.rgb(param),
         Constant::Turn => {
-            let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
+            let [cos, sin] = turn(params);
             [cos, sin, 0.0]
         }
         Constant::KeyDirection => key().direction,
         Constant::KeyByAzimuth => key().by_azimuth,
         Constant::KeyByElevation => key().by_elevation,
         Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => return None,
-    };
-    Some(value.get(component).copied().unwrap_or(0.0))
+    })
 }

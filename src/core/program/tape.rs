@@ -6,7 +6,6 @@
 
 use super::graph::{Binary, Graph, Id, Input, Native, Node, Unary, apply_binary, apply_unary};
 use super::native;
-use super::writer::Writer;
 
 /// Where an operand stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -107,12 +106,6 @@ pub(super) enum Operand {
 }
 
 impl Tape {
-    /// The instructions that compute `outputs`.
-    #[must_use]
-    pub fn new(graph: &Graph, outputs: &[Id]) -> Self {
-        Writer::new(graph, outputs).tape(outputs)
-    }
-
     /// The numbers that are the same for all samples, in the order of their slots.
     #[must_use]
     pub fn uniform_values(&self, value: impl Fn(&Input) -> f64) -> Vec<f64> {

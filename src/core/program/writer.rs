@@ -9,7 +9,7 @@ use super::graph::{Binary, Call, Graph, Id, Native, Node, Unary};
 use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
 
 /// Instructions over nodes, whose registers are not yet known.
-pub(super) struct Writer<'a> {
+struct Writer<'a> {
     graph: &'a Graph,
     /// Whether a node differs between samples.
     varies: Vec<bool>,
@@ -55,8 +55,16 @@ enum Kind {
     Mend(Vec<usize>),
 }
 
+impl Tape {
+    /// The instructions that compute `outputs`.
+    #[must_use]
+    pub fn new(graph: &Graph, outputs: &[Id]) -> Self {
+        Writer::new(graph, outputs).tape(outputs)
+    }
+}
+
 impl<'a> Writer<'a> {
-    pub(super) fn new(graph: &'a Graph, outputs: &[Id]) -> Self {
+    fn new(graph: &'a Graph, outputs: &[Id]) -> Self {
         let varies = graph
             .made_of(|graph, id| matches!(graph.node(id), Node::Field(_)) || graph.looked_up(id).is_some());
         let reached = graph.reached(outputs);
@@ -89,7 +97,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    pub(super) fn tape(mut self, outputs: &[Id]) -> Tape {
+    fn tape(mut self, outputs: &[Id]) -> Tape {
         // Where lookups fall comes first, and powers: what they wait for hides behind the texels.
         let hot: Vec<Id> = (0..self.graph.len()).filter(|&at| self.hot[at]).map(|at| Id(at as u32)).collect();
         for &id in &hot {

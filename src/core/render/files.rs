@@ -1,64 +1,16 @@
 //! Images as files: OpenEXR (whole, or with a layer a term) and PNG.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatSamples, Layer, LayerAttributes, SmallVec, Text, WritableImage,
     f16,
 };
 
+pub use super::error::ImageFileError;
 pub use super::image::Image;
-use super::image::{MAX_PIXELS, MAX_SIDE};
 use super::tonemap::ToneMap;
 use crate::output::{self, OutputError};
-
-/// An image could not be written; nothing new stands at its path.
-#[derive(Debug, thiserror::Error)]
-pub enum ImageFileError {
-    /// The name's ending is none that can be written.
-    #[error("{}: the name ends in {ending}, which is no image format that can be written. Use .exr (linear, floating point) or .png (8 bits, tone-mapped).", path.display())]
-    Extension {
-        /// The file.
-        path: PathBuf,
-        /// What it ends in, in words.
-        ending: String,
-    },
-    /// Too large, or nothing.
-    #[error("{}: an image of {width} x {height} pixels cannot be written. Each side must be 1 to {MAX_SIDE} pixels, with at most {MAX_PIXELS} pixels in all: change width and height of the view.", path.display())]
-    Size {
-        /// The file.
-        path: PathBuf,
-        /// Pixels across.
-        width: usize,
-        /// Pixels down.
-        height: usize,
-    },
-    /// The arrays do not hold width x height pixels, or a layer is of another size.
-    #[error("{}: an image of {width} x {height} pixels cannot be made of {found}. Give every plane width x height values.", path.display())]
-    Shape {
-        /// The file.
-        path: PathBuf,
-        /// Pixels across.
-        width: usize,
-        /// Pixels down.
-        height: usize,
-        /// What there was instead.
-        found: String,
-    },
-    /// A pixel is NaN or infinite.
-    #[error("{}: pixel ({x}, {y}) is not a finite number. Look for infinite parameters or radiance in the scene; no such image is written.", path.display())]
-    NotFinite {
-        /// The file.
-        path: PathBuf,
-        /// Column, from the left.
-        x: usize,
-        /// Row, from the top.
-        y: usize,
-    },
-    /// The file system, or an encoder.
-    #[error(transparent)]
-    Output(#[from] OutputError),
-}
 
 /// How an image file is written.
 #[derive(Clone, Debug, PartialEq)]
@@ -227,6 +179,7 @@ pub fn encode_png(width: usize, height: usize, bytes: &[u8]) -> Result<Vec<u8>, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::image::MAX_SIDE;
 
     fn ramp() -> Image {
         let mut image = Image::new(5, 3);

@@ -2,12 +2,8 @@
 
 use std::path::Path;
 
-use super::files::ImageFileError;
-
-/// The longest side of an image file, in pixels.
-pub const MAX_SIDE: usize = 32_768;
-/// The most pixels in an image file.
-pub const MAX_PIXELS: usize = 1 << 28;
+use super::error::ImageFileError;
+pub use super::error::{MAX_PIXELS, MAX_SIDE};
 
 /// An image in linear Rec.709, row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]

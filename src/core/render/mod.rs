@@ -5,13 +5,14 @@
 //! - [`shade`]: samples to images, with an image for each term; [`mod@format`]: in other number formats
 //! - [`bloom`]: the glow that the haze drives
 //! - [`mod@image`]: images in memory
-//! - [`files`]: images as EXR and PNG files
+//! - [`files`]: images as EXR and PNG files; `error`: why one cannot be written
 //! - [`places`]: where the surface behind each pixel lies
 //! - [`tonemap`]: from linear radiance to sRGB
 
 pub mod antialias;
 pub mod backdrop;
 pub mod bloom;
+mod error;
 pub mod files;
 pub mod format;
 pub mod image;

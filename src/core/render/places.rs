@@ -8,6 +8,7 @@ use crate::model::cube::Cube;
 use crate::model::effects::Effect;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
+use crate::model::turn::{in_environment, turn};
 use crate::model::vector::{V3, dot, normalize_or, scale_add};
 use crate::samples::{LANES, ViewSamples};
 
@@ -36,11 +37,10 @@ pub fn places(
 ) -> Places {
     let lobe = illumination.lobes.as_ref().map(|stack| stack.at(params.scalar(Param::SpecularLobe)).0);
     let (needs, side) = (setup.needs(), setup.effects.has(Effect::SideSpecular));
-    let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
     let lights = Lights {
         irradiance: illumination.irradiance.as_ref().filter(|_| needs.irradiance),
         specular: lobe.as_ref().filter(|_| side || needs.dapple),
-        turn: [cos as f32, sin as f32],
+        turn: turn(params).map(|x| x as f32),
     };
     let plane = |there: bool| vec![0.0; if there { width * height } else { 0 }];
     let mut places = Places {
@@ -72,9 +72,8 @@ struct Lights<'a> {
 
 impl Lights<'_> {
     /// Luminance along a direction of the world; 0 without the cube.
-    fn luminance(&self, cube: Option<&Cube<f32>>, [x, y, z]: V3<f32>) -> f32 {
-        let [cos, sin] = self.turn;
-        let along = [cos * x - sin * z, y, sin * x + cos * z];
+    fn luminance(&self, cube: Option<&Cube<f32>>, direction: V3<f32>) -> f32 {
+        let along = in_environment(self.turn, direction);
         let [r, g, b, _] = cube.map_or([0.0; 4], |cube| cube.sample(along));
         0.2126 * r + 0.7152 * g + 0.0722 * b
     }

@@ -18,12 +18,10 @@ use crate::program::levels::texel_inputs;
 use crate::program::lower::{STEP_ALONG_U, STEP_ALONG_V};
 use crate::program::shading::ShadingError;
 use crate::scene::maps::Maps;
-use crate::scene::mesh::PosedMesh;
+use crate::scene::mesh::{PosedMesh, tile_outside_atlas};
 use crate::shader::Facts;
 use crate::shader::facts::FaceSizes;
 
-/// How far texture coordinates may lie outside the atlas: a rounding of what was meant to be its border.
-pub const BORDER: f32 = 1e-5;
 /// A texel that the mesh does not cover.
 const EMPTY: u32 = u32::MAX;
 
@@ -160,9 +158,8 @@ fn check(posed: &PosedMesh) -> Result<(), AtlasError> {
     if posed.uvs.is_empty() {
         return Err(AtlasError::NoUvs);
     }
-    let inside = |x: f32| (-BORDER..=1.0 + BORDER).contains(&x);
-    match posed.uvs.iter().find(|uv| !inside(uv.x) || !inside(uv.y)) {
-        Some(uv) => Err(AtlasError::Outside { u: uv.x.floor(), v: uv.y.floor() }),
+    match tile_outside_atlas(&posed.uvs) {
+        Some([u, v]) => Err(AtlasError::Outside { u, v }),
         None => Ok(()),
     }
 }

@@ -10,7 +10,7 @@ use super::file::{SceneFile, Source};
 use super::gltf::{Ask, Document, Tangents, Uvs};
 use super::maps::Maps;
 use super::mesh::Mesh;
-use super::settings::{interval, number, short};
+use super::numbers::{interval, number, short};
 use crate::model::effects::{Effect, Effects, Form, Needs};
 
 /// The mesh of a scene through its animation 0.

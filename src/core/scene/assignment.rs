@@ -3,7 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
-use super::settings::{check_value, short};
+use super::numbers::short;
+use super::settings::check_value;
 use super::suggestion;
 use crate::model::params::{Param, Params};
 

@@ -7,7 +7,7 @@ use toml::Spanned;
 
 use super::error::SceneError;
 use super::file::{BackgroundValue, Source, ViewTable};
-use super::settings::{interval, number, short};
+use super::numbers::{interval, number, short};
 use super::view::{Background, Camera};
 use crate::model::params::LARGEST;
 

@@ -2,9 +2,11 @@
 
 use toml::Spanned;
 
+use super::FitSettings;
 use super::error::SceneError;
 use super::file::{MapFitTable, MapPriorTable, Source};
-use super::settings::{number, short, whole};
+use super::numbers::{number, short, whole};
+use crate::model::params::Param;
 
 /// A map that can be fitted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -48,6 +50,17 @@ impl MapKind {
             Self::Occlusion => "occlusion",
             Self::Environment => "diffuse, side_specular, hilite or reflection",
         }
+    }
+}
+
+impl FitSettings {
+    /// Hold what a fit of these maps leaves to the maps: a fitted environment has in its texels what turns and blurs it.
+    ///
+    /// To be done before bakes and samples are made, as what they hold depends on what is free.
+    pub fn hold_beside(&mut self, kinds: &[MapKind]) {
+        let environment = kinds.contains(&MapKind::Environment);
+        let of_light = |param| matches!(param, Param::SpecularLobe | Param::EnvironmentRotation);
+        self.free.retain(|column| !(environment && of_light(column.param)));
     }
 }
 
@@ -162,4 +175,26 @@ fn read(source: &Source, table: &MapPriorTable, default: MapPrior) -> Result<Map
         lower,
         upper: number(source, table.upper.as_ref(), default.upper, "upper", "a number above lower", above)?,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::params::Column;
+    use crate::scene::Loss;
+
+    #[test]
+    fn a_fitted_environment_holds_what_turns_and_blurs_it_and_other_maps_hold_nothing() {
+        let free =
+            [Param::Hilite, Param::SpecularLobe, Param::EnvironmentRotation].map(Column::tied).to_vec();
+        let maps = MapSettings::default();
+        let fit = FitSettings { free: free.clone(), loss: Loss::default(), free_gains: false, maps };
+        let held = |kinds: &[MapKind]| {
+            let mut fit = fit.clone();
+            fit.hold_beside(kinds);
+            fit.free
+        };
+        assert_eq!(held(&[MapKind::Color, MapKind::Environment]), [Column::tied(Param::Hilite)]);
+        assert_eq!(held(&[MapKind::Color, MapKind::Occlusion]), free);
+    }
 }

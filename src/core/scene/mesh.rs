@@ -94,3 +94,15 @@ impl PosedMesh {
         self.uvs.iter().any(|uv| *uv != self.uvs[0])
     }
 }
+
+/// How far texture coordinates may lie outside the atlas: a rounding of what was meant to be its border.
+const BORDER: f32 = 1e-5;
+
+/// The tile, along u and v, of the first texture coordinates that lie outside the unit square; `None` where all of a
+/// mesh lie in its UV atlas.
+#[must_use]
+pub fn tile_outside_atlas(uvs: &[Vec2]) -> Option<[f32; 2]> {
+    let inside = |x: f32| (-BORDER..=1.0 + BORDER).contains(&x);
+    let outside = uvs.iter().find(|uv| !inside(uv.x) || !inside(uv.y))?;
+    Some([outside.x.floor(), outside.y.floor()])
+}

@@ -4,7 +4,7 @@
 //! - [`view`]: cameras and targets
 //! - [`maps`]: texture maps and the panorama
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
-//!   `settings`, `cameras` and `dapple`
+//!   `settings`, `cameras` and `dapple`, within the bounds of `numbers`
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
@@ -29,6 +29,7 @@ pub mod map_fit;
 pub mod maps;
 pub mod mesh;
 mod normals;
+mod numbers;
 pub mod pose;
 mod settings;
 mod tangents;
@@ -42,8 +43,7 @@ pub use file::{Source, check_text};
 pub use load::LoadOptions;
 pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
-pub use settings::interval;
-pub use settings::short;
+pub use numbers::{interval, short};
 pub use terms::register_terms;
 
 use std::path::PathBuf;

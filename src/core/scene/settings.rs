@@ -4,6 +4,7 @@ use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
 use super::file::{BloomTable, DiffusionTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
+use super::numbers::{interval, number, short, whole};
 use super::{Bloom, Diffusion, FitSettings, Loss, Quality, map_fit};
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
@@ -78,20 +79,6 @@ pub(super) fn check_value(param: Param, values: [f64; 3]) -> Result<(), (String,
 fn param(source: &Source, name: &Spanned<String>) -> Result<Param, SceneError> {
     let all: Vec<_> = Param::all().map(|param| (param.name(), param)).collect();
     source.choose("parameter", name, &all)
-}
-
-/// A number as one would write it: 180, 1e300.
-pub fn short(number: f64) -> String {
-    let text = format!("{number:?}");
-    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
-}
-
-/// "[0, inf)" and the like.
-#[must_use]
-pub fn interval(lower: f64, upper: f64) -> String {
-    let left = if lower.is_finite() { '[' } else { '(' };
-    let right = if upper.is_finite() { ']' } else { ')' };
-    format!("{left}{lower}, {upper}{right}")
 }
 
 /// What is free when a scene does not say: the constants of the paper's fragment program.
@@ -243,42 +230,4 @@ pub(super) fn diffusion(source: &Source, table: &DiffusionTable) -> Result<Diffu
     let default = Diffusion::default().light_map_size;
     let size = whole(source, table.light_map_size.as_ref(), "light_map_size", [64, 8192], default)?;
     Ok(Diffusion { light_map_size: size })
-}
-
-/// A whole number within bounds, or `default` when it is not given.
-pub(super) fn whole(
-    source: &Source,
-    value: Option<&Spanned<i64>>,
-    name: &str,
-    [least, most]: [i64; 2],
-    default: u32,
-) -> Result<u32, SceneError> {
-    let Some(number) = value else { return Ok(default) };
-    u32::try_from(*number.get_ref()).ok().filter(|&n| (least..=most).contains(&i64::from(n))).ok_or_else(
-        || {
-            let what = format!("{name} = {} is out of bounds", number.get_ref());
-            source.error(number, what, format!("Give a whole number in [{least}, {most}]"))
-        },
-    )
-}
-
-/// A number that must be finite and satisfy `test`, or `default` when it is not given.
-pub(super) fn number(
-    source: &Source,
-    value: Option<&Spanned<f64>>,
-    default: f64,
-    name: &str,
-    wanted: &str,
-    test: impl Fn(f64) -> bool,
-) -> Result<f64, SceneError> {
-    let Some(spanned) = value else { return Ok(default) };
-    let number = *spanned.get_ref();
-    if number.is_finite() && test(number) {
-        return Ok(number);
-    }
-    Err(source.error(
-        spanned,
-        format!("{name} = {} is out of bounds", short(number)),
-        format!("Give {wanted}"),
-    ))
 }

@@ -10,7 +10,8 @@ use super::emit::{Plan, hazy, parts, sample_fields};
 use super::quantity::{Constant, Kind, Resource};
 use super::tangent::chain::Chain;
 use crate::model::key_light::KeyLight;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
+use crate::model::turn::turn;
 
 impl Plan {
     /// Declarations, and the vertex stage; its position has these attributes.
@@ -194,10 +195,7 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
     match constant {
         Constant::Param(param) if param.info().rgb => Some(("vec3f", params.rgb(param).to_vec())),
         Constant::Param(param) => Some(("f32", vec![params.scalar(param)])),
-        Constant::Turn => {
-            let (sin, cos) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
-            Some(("vec2f", vec![cos, sin]))
-        }
+        Constant::Turn => Some(("vec2f", turn(params).to_vec())),
         Constant::KeyDirection => Some(("vec3f", KeyLight::new(params).direction.to_vec())),
         Constant::Eye
         | Constant::ViewProjection

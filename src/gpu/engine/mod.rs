@@ -1,8 +1,9 @@
 //! The GPU engine: the fused pass ([`fused`]) over samples on a graphics adapter.
 //!
-//! - [`GpuEngine`]: the objective; what it is made of and how sums become normal equations
+//! - [`GpuEngine`]: the objective, and what it is made of; `build`: how it is made
+//! - `equations`: how sums become normal equations; `objective`: what solvers see
 //! - [`fused`]: the text of that pass
-//! - `parts`: samples and targets on the device, in parts that fit a binding; what does not fit the
+//! - `parts`: samples and targets on the device, each `part` of them within a binding; what does not fit the
 //!   memory allowed is uploaded anew in each pass
 //! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
 //! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
@@ -12,10 +13,14 @@
 //! - `images`: the forward pass: images, and how long they take
 //! - `pipeline`: what both make pipelines and bindings with
 
+mod build;
+mod equations;
 pub mod fused;
 mod images;
 mod levels;
 mod lights;
+mod objective;
+mod part;
 mod parts;
 mod pipeline;
 mod program;
@@ -24,9 +29,9 @@ mod terms;
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use web_time::Instant;
 
-use self::fused::{ColumnOf, Fitted, Fused, Layout, Sum, Wish, held_parameters};
+use self::equations::Passed;
+use self::fused::{Fitted, Fused, Layout, Wish};
 use self::images::Images;
 use self::levels::DeviceLevels;
 use self::lights::DeviceLights;
@@ -41,10 +46,8 @@ use crate::model::terms::TermName;
 use crate::scene::Loss;
 use crate::shader::facts::FaceSizes;
 use crate::{Gpu, GpuError};
-use skinfit_core::engine::cpu::CpuEngine;
-use skinfit_core::engine::pulls::Pulls;
 use skinfit_core::engine::view::ObservedView;
-use skinfit_core::engine::{BLOCK, Engine, EngineError, NormalEquations, Objective, Point, Task, Unknown};
+use skinfit_core::engine::{BLOCK, Point, Unknown};
 
 /// How much of the device is used.
 #[derive(Clone, Copy, Debug, Default)]
@@ -109,105 +112,6 @@ struct Written {
 }
 
 impl GpuEngine {
-    /// An engine for a task; the shaders for passes at `start` are compiled.
-    ///
-    /// # Errors
-    /// When the device does not take it.
-    pub fn new(gpu: &Gpu, task: Task, start: &Point, memory: Memory) -> Result<Self, GpuError> {
-        Self::build(gpu, None, task, start, memory)
-    }
-
-    /// As [`Self::new`], over samples that the adapter makes: the task's views hold the groups that came with them,
-    /// in their order, and no surface. All of them stay on the device.
-    ///
-    /// # Errors
-    /// When the device does not take it, or may not keep as much.
-    pub fn over_device_samples(
-        samples: Arc<DeviceSamples>,
-        task: Task,
-        start: &Point,
-        memory: Memory,
-    ) -> Result<Self, GpuError> {
-        let gpu = samples.gpu().clone();
-        Self::build(&gpu, Some(samples), task, start, memory)
-    }
-
-    fn build(
-        gpu: &Gpu,
-        made: Option<Arc<DeviceSamples>>,
-        task: Task,
-        start: &Point,
-        memory: Memory,
-    ) -> Result<Self, GpuError> {
-        let Task { setup, illumination, views, loss, unknowns } = task;
-        // Mesa's software driver loses its device over a pass that looks nothing up and weighs nothing.
-        if TermName::of(setup.effects).is_empty() && !setup.needs().haze {
-            return Err(GpuError::NothingShown);
-        }
-        let alpha = views.iter().any(ObservedView::compares_alpha);
-        let traits = Traits::of(gpu, &views)?;
-        let mut engine = Self {
-            gpu: gpu.clone(),
-            made,
-            made_seconds: 0.0,
-            setup,
-            illumination: Arc::clone(&illumination),
-            loss,
-            unknowns,
-            stride: 1,
-            weight: (0.0, 0),
-            alpha,
-            traits,
-            looked_up: [Vec::new(), Vec::new()],
-            held: None,
-            device: Mutex::new(OnDevice {
-                parts: Parts::default(),
-                lights: DeviceLights::new(illumination),
-                levels: None,
-                programs: BTreeMap::new(),
-                terms: None,
-                replaced: false,
-                images: None,
-            }),
-            fault: Mutex::new(None),
-            views,
-        };
-        engine.upload(memory)?;
-        let samples = Layout::of_samples(&engine.traits.places, engine.traits.rows);
-        let terms = Layout::of_terms(setup, &samples);
-        let device = engine.device.get_mut().unwrap_or_else(PoisonError::into_inner);
-        // What is looked up of the UV atlas stands beside samples, and not beside their terms.
-        if !device.parts.have_levels() && device.parts.all_hold(terms.rows, &engine.views) {
-            let faces = device.lights.face_sizes();
-            let held =
-                held_parameters(&engine.fitted(engine.written(start), faces)).map_err(GpuError::Plan)?;
-            let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if held.contains(&c.param));
-            engine.held = (!engine.unknowns.iter().any(moves)).then_some(held);
-        }
-        engine.set_stride(1);
-        // Whatever the driver refuses shows here, and not in the midst of a fit.
-        engine.sums(start, Wish::Normal)?;
-        Ok(engine)
-    }
-
-    /// Have samples, targets, and room for what is looked up, on the device.
-    fn upload(&mut self, memory: Memory) -> Result<(), GpuError> {
-        let faces = self.lock().lights.face_sizes();
-        let fitted = |turned| self.fitted(Written { turned, gained: false }, faces);
-        let levels = DeviceLevels::new(fitted, &self.views)?;
-        if let Some(levels) = &levels {
-            self.traits.levels = levels.rows();
-            self.looked_up = [false, true].map(|turned| levels.fields(turned));
-        }
-        let start = Instant::now();
-        let parts = Parts::new(&self.gpu, &self.views, &self.traits, memory, self.made.as_deref())?;
-        let own = |made: &Arc<DeviceSamples>| made.seconds() + start.elapsed().as_secs_f64();
-        self.made_seconds = self.made.as_ref().map_or(0.0, own);
-        let device = self.device.get_mut().unwrap_or_else(PoisonError::into_inner);
-        (device.parts, device.levels) = (parts, levels);
-        Ok(())
-    }
-
     /// Let each pass read only every `stride`-th block of pixels: a coarse fit on a fraction of them.
     pub fn set_stride(&mut self, stride: usize) {
         self.stride = stride.max(1);
@@ -348,165 +252,5 @@ impl GpuEngine {
         lights.set(&self.gpu, &point.params, &mut program.inputs)?;
         let sums = program.run(&self.gpu, parts, &self.views, &point.gains)?;
         Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
-    }
-
-    /// A pass as normal equations; after a fault, numbers that no solver takes.
-    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
-        let channels: u32 = if self.alpha { 4 } else { 3 };
-        let k = self.unknowns.len();
-        let mut total = NormalEquations {
-            loss: 0.0,
-            residual: 0.0,
-            weight: self.weight.0 * f64::from(channels),
-            count: self.weight.1 * u64::from(channels),
-            jtr: vec![0.0; k],
-            jtj: vec![0.0; k * k],
-        };
-        match self.sums(point, wish) {
-            Ok(passed) => passed.add_to(&mut total, &self.unknowns),
-            Err(error) => {
-                self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-                total.loss = f64::NAN;
-            }
-        }
-        if total.weight > 0.0 {
-            total.loss /= total.weight;
-        }
-        total
-    }
-}
-
-/// What a pass yielded.
-struct Passed {
-    /// For each part, its sums.
-    sums: Vec<Vec<(Sum, f64)>>,
-    columns: Vec<ColumnOf>,
-    /// For each part, its view.
-    view_of: Vec<usize>,
-}
-
-impl Passed {
-    /// Add the parts' sums, in their order.
-    fn add_to(&self, total: &mut NormalEquations, unknowns: &[Unknown]) {
-        let k = unknowns.len();
-        for (sums, &view) in self.sums.iter().zip(&self.view_of) {
-            let gain = unknowns.iter().position(|u| *u == Unknown::Gain(view));
-            let unknown = |i: usize| self.columns[i].unknown.or(gain);
-            let last = self.columns.len();
-            for &(sum, value) in sums {
-                match sum {
-                    Sum::Loss => total.loss += value,
-                    Sum::Product(i, j) if i == last && j == last => total.residual += value,
-                    Sum::Product(i, j) if j == last => {
-                        if let Some(a) = unknown(i) {
-                            total.jtr[a] += value;
-                        }
-                    }
-                    Sum::Product(i, j) => {
-                        let (Some(a), Some(b)) = (unknown(i), unknown(j)) else { continue };
-                        total.jtj[a * k + b] += value;
-                        if a != b {
-                            total.jtj[b * k + a] += value;
-                        }
-                    }
-                }
-            }
-        }
-    }
-}
-
-impl Objective for GpuEngine {
-    fn unknowns(&self) -> &[Unknown] {
-        &self.unknowns
-    }
-
-    fn is_quadratic(&self) -> bool {
-        self.loss == Loss::L2 && !self.traits.clipped
-    }
-
-    fn rounding(&self) -> f64 {
-        skinfit_core::engine::rounding(&self.views, self.loss, self.stride)
-    }
-
-    /// Made by the CPU engine, from the samples that this one uploaded; of samples that the adapter made there are
-    /// none.
-    fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
-        if self.made.is_some() {
-            return None;
-        }
-        let task = Task {
-            setup: self.setup,
-            illumination: Arc::clone(&self.illumination),
-            views: Arc::clone(&self.views),
-            loss: self.loss,
-            unknowns: self.unknowns.clone(),
-        };
-        // What is kept for later passes would be memory for nothing: this is the only one.
-        let mut engine = CpuEngine::with_kept_terms(task, false).ok()?;
-        engine.set_stride(self.stride);
-        engine.pulls(point, widths)
-    }
-
-    fn fault(&self) -> Option<String> {
-        self.device_fault().map(|error| error.to_string())
-    }
-
-    fn normal_equations(&self, point: &Point) -> NormalEquations {
-        self.pass(point, Wish::Normal)
-    }
-
-    fn loss(&self, point: &Point) -> f64 {
-        self.pass(point, Wish::Loss).loss
-    }
-
-    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        self.pass(point, Wish::Gradient).loss_and_gradient()
-    }
-}
-
-impl Engine for GpuEngine {
-    fn name(&self) -> &'static str {
-        "gpu"
-    }
-
-    fn provenance(&self) -> Vec<(String, String)> {
-        let (resident, streamed) = self.bytes();
-        let samples =
-            if self.made.is_some() { "made by the adapter" } else { "made by the CPU and uploaded" };
-        vec![
-            ("adapter".to_owned(), self.adapter().to_owned()),
-            ("samples".to_owned(), samples.to_owned()),
-            ("bytes on the device".to_owned(), resident.to_string()),
-            ("bytes uploaded a pass".to_owned(), streamed.to_string()),
-        ]
-    }
-
-    fn views(&self) -> &Arc<[ObservedView]> {
-        self.views()
-    }
-
-    fn surfaced_views(&self) -> Result<Arc<[ObservedView]>, EngineError> {
-        let Some(made) = &self.made else { return Ok(Arc::clone(&self.views)) };
-        let surfaced = self.views.iter().enumerate().map(|(index, view)| {
-            let mut view = view.clone();
-            view.samples.surface = made.read(index, &view.samples)?;
-            Ok(view)
-        });
-        Ok(surfaced.collect::<Result<_, GpuError>>()?)
-    }
-
-    fn samples(&self) -> u64 {
-        match &self.made {
-            Some(made) => made.count() as u64,
-            None => self.views.iter().map(|view| view.samples.count() as u64).sum(),
-        }
-    }
-
-    fn own_sample_seconds(&self) -> Option<f64> {
-        self.device_samples().map(|(_, seconds)| seconds)
-    }
-
-    fn set_stride(&mut self, stride: usize) {
-        self.set_stride(stride);
     }
 }

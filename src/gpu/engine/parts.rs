@@ -2,10 +2,11 @@
 
 use std::ops::Range;
 
-use wgpu::{Buffer, BufferDescriptor, BufferUsages};
+use wgpu::Buffer;
 
 use super::Memory;
 use super::fused::WORKGROUP;
+use super::part::{Part, PartBuffers, Size};
 use super::samples::DeviceSamples;
 use crate::records::packed;
 use crate::samples::LANES;
@@ -75,31 +76,6 @@ impl Traits {
             reason: "the views' samples or targets hold different numbers".to_owned(),
         })
     }
-}
-
-/// One part of a view.
-pub(super) struct Part {
-    pub(super) view: usize,
-    pub(super) groups: Range<usize>,
-    /// Whether its buffers are its own.
-    resident: bool,
-    /// Bytes that an upload writes.
-    uploaded: u64,
-    pub(super) buffers: PartBuffers,
-    /// Weight and count of each block of pixels.
-    blocks: Vec<(f64, u64)>,
-    /// Pixels that a pass reads.
-    pub(super) read: u32,
-}
-
-/// The buffers of group 1, the sums apart.
-#[derive(Clone)]
-pub(super) struct PartBuffers {
-    pub(super) samples: Buffer,
-    pub(super) group_start: Buffer,
-    pub(super) targets: Buffer,
-    /// What samples look up of the UV atlas.
-    pub(super) levels: Option<Buffer>,
 }
 
 /// The parts of all views.
@@ -372,56 +348,6 @@ impl Parts {
             gpu.queue.write_buffer(targets, observed, bytemuck::cast_slice(weights));
         }
         gpu.check()
-    }
-}
-
-/// Bytes of a part's buffers.
-#[derive(Clone, Copy, Debug)]
-struct Size {
-    samples: u64,
-    starts: u64,
-    targets: u64,
-    levels: u64,
-}
-
-impl Size {
-    const fn total(self) -> u64 {
-        self.samples + self.starts + self.targets + self.levels
-    }
-
-    const fn within(self, other: Self) -> bool {
-        let of_samples = self.samples <= other.samples && self.levels <= other.levels;
-        of_samples && self.starts <= other.starts && self.targets <= other.targets
-    }
-
-    fn max(self, other: Self) -> Self {
-        Self {
-            samples: self.samples.max(other.samples),
-            starts: self.starts.max(other.starts),
-            targets: self.targets.max(other.targets),
-            levels: self.levels.max(other.levels),
-        }
-    }
-}
-
-impl PartBuffers {
-    fn new(gpu: &Gpu, size: Size) -> Result<Self, GpuError> {
-        let buffer = |label, bytes: u64, usage| {
-            gpu.device.create_buffer(&BufferDescriptor {
-                label: Some(label),
-                size: bytes.max(16),
-                usage: usage | BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
-        };
-        let made = Self {
-            samples: buffer("samples", size.samples, BufferUsages::STORAGE),
-            group_start: buffer("group starts", size.starts, BufferUsages::STORAGE),
-            targets: buffer("targets", size.targets, BufferUsages::STORAGE),
-            levels: (size.levels > 0).then(|| buffer("levels", size.levels, BufferUsages::STORAGE)),
-        };
-        gpu.check()?;
-        Ok(made)
     }
 }
 

@@ -9,7 +9,7 @@ use wgpu::{
     PipelineCompilationOptions, PipelineLayoutDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
 };
 
-use super::parts::PartBuffers;
+use super::part::PartBuffers;
 use crate::Gpu;
 
 /// A uniform block, which is only written when it changes: each write is a copy and a wait on the device.

@@ -4,7 +4,8 @@ use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescripto
 
 use super::fused::{ColumnOf, Fused, PARTS, Slab, Sum, Wish, gather_module};
 use super::lights::Inputs;
-use super::parts::{PART_BYTES, Part, Parts};
+use super::part::Part;
+use super::parts::{PART_BYTES, Parts};
 use super::pipeline::{
     READ, UNIFORM, Uniform, WRITE, bind, bind_part, buffer, encoder, layout, part_layout, pipeline,
 };

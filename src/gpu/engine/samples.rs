@@ -6,7 +6,7 @@ use web_time::Instant;
 
 use wgpu::{Buffer, BufferUsages, CommandEncoderDescriptor};
 
-use super::parts::Part;
+use super::part::Part;
 use super::pipeline::buffer;
 use crate::geometry::{Geometry, Wanted};
 use crate::readback::read_floats;

@@ -54,7 +54,7 @@ impl Task {
                 "Allow more (--device-memory), or have them made by the CPU (--samples cpu)".to_owned()
             }
             GpuError::Lost { .. } => self.or_another("Its driver was reset or taken away: try again"),
-            GpuError::Refused { .. } => {
+            GpuError::Refused { .. } | GpuError::MissingLevel { .. } => {
                 let without =
                     self.without().map_or(String::new(), |without| format!(", and {without} meanwhile"));
                 format!("This is a fault of skinfit or of the driver: please report it{without}")
@@ -139,6 +139,7 @@ mod tests {
             GpuError::Lost { adapter: adapter(), reason: reason() },
             GpuError::Refused { adapter: adapter(), reason: reason() },
             GpuError::NothingShown,
+            GpuError::MissingLevel { level: "a".to_owned() },
             GpuError::OutsideAtlas { u: 1.0, v: -2.0 },
             GpuError::Plan("no rule.".to_owned()),
         ];

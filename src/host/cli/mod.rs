@@ -4,6 +4,7 @@
 //!   `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit; `fingerprint`: what its state belongs to
 //! - `graphics`: what to do about an adapter that cannot; `machine`: what a report says of its making
+//! - `compared`: what of a view is compared
 //! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
@@ -11,6 +12,7 @@
 
 mod ablate;
 mod bake;
+mod compared;
 mod demo;
 mod export;
 mod fingerprint;

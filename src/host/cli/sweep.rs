@@ -13,10 +13,11 @@ use super::{Exit, Refusal, say, tell, unfinished};
 use crate::output;
 use crate::progress;
 use crate::study::sweep::collect::Collection;
+use crate::study::sweep::inputs::Inputs;
 use crate::study::sweep::job::Job;
 use crate::study::sweep::plan::Plan;
 use crate::study::sweep::result::{Findings, JobResult, Status, settings};
-use crate::study::sweep::run::{self, Inputs};
+use crate::study::sweep::run;
 
 /// Run the jobs of a plan: many scenes and settings, here or on many machines
 #[derive(clap::Args)]

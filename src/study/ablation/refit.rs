@@ -65,15 +65,41 @@ pub fn refit(subject: &Subject, whole: Option<&Point>, own: &Point) -> Result<(O
         None => None,
     };
     let drawn = subject.fit_from(own, &FitOptions { starts: 1 + DRAWN, ..errors_of(subject) })?;
-    let lowest =
-        |best: usize, i: usize| if drawn.starts[i].loss_end < drawn.starts[best].loss_end { i } else { best };
-    let best = (0..drawn.starts.len()).fold(0, lowest);
+    let best = least(drawn.starts.iter().map(|start| start.loss_end));
     let name = |i: usize| if i == 0 { "scene".to_owned() } else { format!("drawn {i}") };
     let ends = drawn.starts.iter().enumerate();
     tried.extend(ends.map(|(i, start)| Tried { from: name(i), loss: start.loss_end, ending: start.ending }));
     let (outcome, best) = match from_whole {
-        Some(whole) if whole.loss_end <= drawn.loss_end * (1.0 + SAME) => (whole, "whole".to_owned()),
+        Some(whole) if is_no_worse(whole.loss_end, drawn.loss_end) => (whole, "whole".to_owned()),
         _ => (drawn, name(best)),
     };
     Ok((outcome, Starts { tried, best }))
+}
+
+/// The place of the least loss, the first of equal ones; one that is no number is greater than every other.
+fn least(losses: impl Iterator<Item = f64>) -> usize {
+    let rank = |loss: f64| if loss.is_nan() { f64::INFINITY } else { loss };
+    let least = losses.enumerate().min_by(|(_, a), (_, b)| rank(*a).total_cmp(&rank(*b)));
+    least.map_or(0, |(place, _)| place)
+}
+
+/// Whether an end is as good as the other, or of its valley.
+fn is_no_worse(loss: f64, other: f64) -> bool {
+    other.is_nan() || loss <= other * (1.0 + SAME)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_end_that_is_no_number_is_never_the_best_where_another_is_one() {
+        let of = |losses: &[f64]| least(losses.iter().copied());
+        assert_eq!(of(&[f64::NAN, 0.2, 0.1]), 2);
+        assert_eq!(of(&[-f64::NAN, 0.2, f64::NAN]), 1);
+        assert_eq!(of(&[0.1, 0.1, 0.2]), 0);
+        assert_eq!([of(&[f64::NAN]), of(&[])], [0, 0]);
+        assert!(is_no_worse(0.5, f64::NAN) && !is_no_worse(f64::NAN, 0.5));
+        assert!(is_no_worse(0.5, 0.5) && !is_no_worse(0.5, 0.4));
+    }
 }

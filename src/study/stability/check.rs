@@ -1,9 +1,10 @@
 //! An evaluator's answer held against the reference.
 
 use super::case::{Batch, VertexInputs};
-use super::evaluate::{Answer, Evaluator, Frame, Plain, Sums};
+use super::evaluate::{Answer, Evaluator, Frame, Sums};
 use super::hard::Holds;
 use super::lights::LightBox;
+use super::plain::Plain;
 use super::reference::{FEW, MANY, Reference, SumReference, pair};
 use crate::model::params::Param;
 use crate::program::shading::ShadingError;

@@ -4,8 +4,9 @@
 use std::sync::Arc;
 
 use super::case::FragmentInputs;
+use super::engine_factory::EngineFactory;
 use super::lights::LightBox;
-use super::objectives::{EngineFactory, ordinary_task, targets, view};
+use super::objectives::{ordinary_task, targets, view};
 use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
 use crate::engine::{NormalEquations, Point, Task, Unknown};

@@ -3,22 +3,24 @@
 //! - [`case`]: the numbers that evaluators are given; [`lights`]: what they look up
 //! - [`hard`]: the hard cases of MODEL 7, a declaration each; [`demands`]: those of engines and fits
 //! - [`random`]: random cases; [`scene`]: a scene's own samples; [`kept`]: cases kept in files
-//! - [`evaluate`]: what an evaluator is, and the model as one, by the [`rules`]; [`objectives`]: engines; `shader`:
-//!   the renderer's rules on an adapter
+//! - [`evaluate`]: what an evaluator is; [`plain`]: the model as one, by the [`rules`]; [`objectives`]: engines;
+//!   `shader`: the renderer's rules on an adapter
 //! - [`mod@reference`]: the model in f64, and how far rounding may move it
 //! - [`check`]: an answer held against the reference; [`search`]: the search, and failures made simple
 //! - [`report`]: what came of it
 //!
-//! Another engine is studied once it is a [`objectives::EngineFactory`] in the list of evaluators.
+//! Another engine is studied once it is a [`engine_factory::EngineFactory`] in the list of evaluators.
 
 pub mod case;
 pub mod check;
 pub mod demands;
+pub mod engine_factory;
 pub mod evaluate;
 pub mod hard;
 pub mod kept;
 pub mod lights;
 pub mod objectives;
+pub mod plain;
 pub mod random;
 pub mod reference;
 pub mod report;
@@ -30,10 +32,11 @@ pub mod shader;
 use case::Batch;
 use check::{Verdict, check_against, check_frame};
 use demands::{Circumstances, DEMANDS};
-use evaluate::{Evaluator, Evaluators, Plain};
+use evaluate::{Evaluator, Evaluators};
 use kept::KeptCase;
 use lights::LightBox;
 use objectives::{Cpu, EngineEvaluator};
+use plain::Plain;
 use reference::{FEW, Reference};
 use report::Report;
 use search::Hunt;

@@ -209,20 +209,7 @@ impl Rules {
     }
 }
 
-/// A number of a fragment by the rules' name.
-fn field<R: Scalar>(f: &Fragment<R>, input: &Input) -> R {
-    let Input { name, component } = input;
-    match name.as_str() {
-        "base" => f.base[*component],
-        "bump" => f.bump[*component],
-        "normal" => f.normal[*component],
-        "view" => f.view[*component],
-        "albedo" => f.albedo[*component],
-        "open" => f.occlusion,
-        "silhouette" => f.silhouette,
-        "dapple" => f.dapple,
-        "specular" => f.specular,
-        "attenuator" => f.attenuator,
-        _ => R::ZERO,
-    }
+/// A number of a fragment by the rules' name; 0 of what it does not hold.
+fn field<R: Scalar>(f: &Fragment<R>, Input { name, component }: &Input) -> R {
+    f.number(name, *component).unwrap_or(R::ZERO)
 }

@@ -105,3 +105,9 @@ pub fn settings(job: &Job) -> BTreeMap<String, Value> {
     let value = |value: &toml::Value| serde_json::to_value(value).unwrap_or(Value::Null);
     job.settings.iter().map(|(key, setting)| (key.clone(), value(setting))).collect()
 }
+
+/// A constant's value and its standard error.
+pub(super) fn add_constant(figures: &mut Figures, name: &str, value: f64, std_error: Option<f64>) {
+    figures.insert(format!("value.{name}"), number(value));
+    figures.insert(format!("error.{name}"), std_error.map_or(Value::Null, number));
+}

@@ -2,50 +2,21 @@
 
 use std::path::Path;
 
-use serde_json::Value;
-
 use super::command::Command;
+use super::inputs::{Inputs, JobError};
 use super::job::Job;
-use super::result::{Figures, Findings, number};
+use super::result::{Figures, Findings, add_constant, number};
 use super::studies;
 use crate::StudyError;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::{Objective as _, Task, Unknown};
 use crate::fit::outcome::Outcome;
-use crate::fit::{FitError, FitOptions, SolverKind, fit};
-use crate::prepare::{Observed, PrepareError, PrepareOptions, Sampled};
+use crate::fit::{FitOptions, SolverKind, fit};
+use crate::prepare::{Observed, PrepareOptions, Sampled};
 use crate::scene::Loss;
-use crate::scene::error::SceneError;
 use crate::stability::lights::LightBox;
 use crate::stability::scene::{batches, sweepable};
 use crate::stability::{Study, evaluators, kept};
-
-/// A job could not be done.
-#[derive(Debug, thiserror::Error)]
-#[allow(missing_docs, reason = "each variant is the stage's own error")]
-pub enum JobError {
-    #[error(transparent)]
-    Prepare(#[from] PrepareError),
-    #[error(transparent)]
-    Fit(#[from] FitError),
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    #[error(transparent)]
-    Study(#[from] StudyError),
-}
-
-/// What a job reads.
-#[derive(Clone, Copy, Debug)]
-pub struct Inputs<'a> {
-    /// Its scene file.
-    pub scene: &'a Path,
-    /// A fit's constants, where it is given some.
-    pub constants: Option<&'a Path>,
-    /// Where bakes are kept.
-    pub cache: Option<&'a Path>,
-    /// Where, without that, they may be kept as long as the job runs: studies ask for them again and again.
-    pub scratch: Option<&'a Path>,
-}
 
 /// Run a job. The figures, but for those that are times, are the same for any number of threads.
 ///
@@ -100,12 +71,6 @@ fn fit_figures<'a>(outcome: &Outcome, rmse: f64, view: impl Fn(usize) -> &'a str
         add_constant(&mut figures, &name, unknown.value, unknown.std_error);
     }
     figures
-}
-
-/// A constant's value and its standard error.
-pub(super) fn add_constant(figures: &mut Figures, name: &str, value: f64, std_error: Option<f64>) {
-    figures.insert(format!("value.{name}"), number(value));
-    figures.insert(format!("error.{name}"), std_error.map_or(Value::Null, number));
 }
 
 fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {

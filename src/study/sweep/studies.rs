@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use serde_json::Value;
 
+use super::inputs::{Inputs, JobError};
 use super::job::Job;
-use super::result::{Figures, Findings, number};
-use super::run::{Inputs, JobError, add_constant};
+use super::result::{Figures, Findings, add_constant, number};
 use crate::ablation::{self, AblationOptions, GpuTiming, ablate};
 use crate::timing::Timed;
 use crate::tradeoff::axis::{Setting, Sweep};

@@ -6,7 +6,6 @@ use std::sync::atomic::AtomicBool;
 use crate::bake::Illumination;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Unknown};
-use crate::model::params::{Column, Param};
 use crate::prepare::Baked;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::{MapKind, Scene};
@@ -38,7 +37,9 @@ pub struct MapTask<'a> {
 }
 
 impl<'a> MapTask<'a> {
-    /// Maps of these `kinds` and the scene's constants, from where the stages before leave them; every view counts.
+    /// Maps of these `kinds` and the scene's constants, from where the stages before leave them; every view counts. What
+    /// the maps hold of the constants is not free there
+    /// ([`FitSettings::hold_beside`](crate::scene::FitSettings::hold_beside)).
     #[must_use]
     pub fn new(
         baked: &'a Baked,
@@ -61,12 +62,4 @@ impl<'a> MapTask<'a> {
             interrupt: None,
         }
     }
-}
-
-/// The free columns that a fit of maps leaves: a fitted environment holds what turns and blurs it.
-#[must_use]
-pub fn columns_beside(kinds: &[MapKind], free: &[Column]) -> Vec<Column> {
-    let environment = kinds.contains(&MapKind::Environment);
-    let of_light = |column: &Column| matches!(column.param, Param::SpecularLobe | Param::EnvironmentRotation);
-    free.iter().copied().filter(|column| !(environment && of_light(column))).collect()
 }

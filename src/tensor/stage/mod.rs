@@ -17,7 +17,7 @@ use super::buffer::{TensorBuffer, check_shape, lend};
 use super::drawn::Planes;
 use super::inputs::Input;
 use super::scatter::Scattering;
-use super::shade::{Scatter, Shaded};
+use super::shaded::{Scatter, Shaded};
 use super::{SharedDevice, TensorError, pass};
 use crate::adjoint::{Adjoint, Binding, Module};
 use crate::gpu::engine::DeviceSamples;

@@ -11,7 +11,7 @@ use crate::gpu::{Gpu, GpuError};
 use crate::model::params::Param;
 use crate::pass;
 use crate::samples::{SurfaceRecords, ViewSamples};
-use crate::shade::Shaded;
+use crate::shaded::Shaded;
 
 /// The block of constants, and the pass that fills it.
 #[derive(Debug)]

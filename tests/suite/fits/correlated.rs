@@ -1,8 +1,8 @@
 //! Standard errors where neighbouring residuals are alike, where noise grows with the light, and along valleys.
 
 use skinfit::engine::Unknown;
+use skinfit::fit::error_basis::ErrorBasis;
 use skinfit::fit::outcome::Outcome;
-use skinfit::fit::statistics::ErrorBasis;
 use skinfit::fit::{FitOptions, fit};
 use skinfit::model::params::Param;
 use skinfit::scene::Loss;

@@ -15,7 +15,7 @@ use std::marker::PhantomData;
 use fearless_simd::SimdBase;
 
 use super::block::Block;
-use super::pass::Fitted;
+use super::fitted::Fitted;
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
@@ -204,8 +204,11 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
-    use crate::engine::cpu::machine::{self, BATCH, Bound, File, Program, Stream};
-    use crate::engine::cpu::pass::{StreamOf, Tapes};
+    use crate::engine::cpu::file::File;
+    use crate::engine::cpu::machine;
+    use crate::engine::cpu::pass::Tapes;
+    use crate::engine::cpu::program::{Bound, Program};
+    use crate::engine::cpu::streams::{BATCH, Stream, StreamOf};
     use crate::model::cube::Cube;
     use crate::program::cut::KEPT;
     use crate::program::evaluate::Shared;

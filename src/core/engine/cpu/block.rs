@@ -2,19 +2,20 @@
 
 use prefetch_index::prefetch_index;
 
-use super::machine::{AHEAD, BATCH, Bound, Column, Stream, store};
-use super::pass::{NEUTRALS, StreamOf};
+use super::streams::{AHEAD, Column, Stream, StreamOf, first_neutral, store};
 use crate::engine::lanes::Lanes;
 use crate::model::cube::Cube;
 use crate::model::real::Real;
-use crate::samples::LANES;
 use crate::samples::rows::{Row, prefetch_rows};
 use crate::simd::Simd;
 
-/// `count` records from `first` on, at most [`BATCH`], and where their outputs go.
+/// `count` records from `first` on, at most [`BATCH`](super::streams::BATCH), and where their outputs go.
 #[derive(Clone, Copy)]
 pub(super) struct Block<'a> {
-    pub(super) bound: &'a Bound<'a>,
+    /// For each field, the stream that holds it and its row there.
+    pub(super) loads: &'a [(StreamOf, usize)],
+    /// The numbers that all samples share.
+    pub(super) uniforms: &'a [f32],
     pub(super) streams: &'a [Stream<'a>],
     pub(super) first: usize,
     pub(super) count: usize,
@@ -30,7 +31,7 @@ impl<'a> Block<'a> {
     /// The numbers that all samples share.
     #[inline(always)]
     pub(super) fn uniforms<const N: usize>(&self) -> &'a [f32; N] {
-        self.bound.uniforms.first_chunk().unwrap_or(&[0.0; N])
+        self.uniforms.first_chunk().unwrap_or(&[0.0; N])
     }
 
     /// The row of record `i` of the block among a field's. Asks for what its pixel is compared with.
@@ -52,7 +53,7 @@ impl<'a> Block<'a> {
     pub(super) fn fields<const N: usize>(&self) -> [&'a [Row]; N] {
         let stride = self.stride();
         std::array::from_fn(|k| {
-            let (stream, place) = self.bound.loads[k];
+            let (stream, place) = self.loads[k];
             match stream {
                 StreamOf::Samples => &self.stream(stream).rows[self.first * stride + place..],
                 StreamOf::Neutral => {
@@ -91,15 +92,4 @@ impl<'a> Block<'a> {
 #[inline(always)]
 pub(super) fn along<R: Real>([ds, dt]: [R; 2], across: [R; 4], down: [R; 4]) -> [R; 4] {
     std::array::from_fn(|c| ds.mul_add(across[c], dt * down[c]))
-}
-
-/// Rows of what stands in for fields that samples of at most `stride` rows lack.
-pub(super) fn neutral_rows(stride: usize) -> Vec<Row> {
-    let rows = |&value: &f32| std::iter::repeat_n(Row::of([value; LANES]), BATCH * stride.max(1));
-    NEUTRALS.iter().flat_map(rows).collect()
-}
-
-/// The first of the rows of one of [`NEUTRALS`].
-pub(super) const fn first_neutral(rows: &[Row], which: usize) -> usize {
-    which * (rows.len() / NEUTRALS.len())
 }

@@ -6,19 +6,32 @@
 //! pairwise in their order. So the order of additions never depends on threads, and the rounding error stays that of
 //! short sums however many samples there are.
 //!
-//! - `pass`: what a pass computes, as tapes
+//! - `fitted`: what is the same for every view of a fit; `pass`: what a pass computes, as tapes
+//! - `program`: tapes and what runs them; `streams`: what they read and write
 //! - `ahead`: plans whose tapes are compiled ahead; `block`: what their functions read
-//! - `code`: other tapes as the code of a machine that has an accumulator; `machine`: that machine, on SIMD
+//! - `code`: other tapes as the code of a machine that has an accumulator; `machine`: that machine, on SIMD; `heavy`: its
+//!   operations from memory to memory; `file`: its registers
+//! - `kept`: rows that no free parameter changes; `looked_up`: rows of what samples find of the UV atlas
 //! - `view_pass`: a view's blocks of records, from tapes' outputs to sums
 //! - `lobe`: the specular cube of the last exponent
-//! - `sums`: the sums of a chunk, and the fixed tree that adds chunks
+//! - `sums`: the sums of a chunk, and the fixed tree that adds chunks; `equations`: those of all views
+//! - `objective`: what solvers see
 
 mod ahead;
 mod block;
 mod code;
+mod equations;
+mod file;
+mod fitted;
+mod heavy;
+mod kept;
 mod lobe;
+mod looked_up;
 mod machine;
+mod objective;
 mod pass;
+mod program;
+mod streams;
 mod sums;
 mod view_pass;
 
@@ -28,17 +41,17 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use self::block::neutral_rows;
+use self::fitted::Fitted;
+use self::kept::Kept;
 use self::lobe::Lobe;
-use self::machine::{BATCH, Bound, File, Stream};
-use self::pass::{Fitted, Pass, Reading};
-use self::sums::{CHUNK, Sums, Wish, by_chunk, pairwise};
+use self::looked_up::LookedUp;
+use self::pass::{Pass, Reading};
+use self::program::Bound;
+use self::streams::{Stream, neutral_rows};
+use self::sums::{CHUNK, by_chunk};
 use self::view_pass::{Beside, ViewPass, streams, with_scratch};
-use super::gram::pair;
-use super::pulls::{Gathered, Pulls};
-use super::rules::CubesAt;
 use super::view::ObservedView;
-use super::{BLOCK, Engine, EngineError, NormalEquations, Objective, Point, Task, Unknown};
+use super::{BLOCK, Point, Task, Unknown};
 use crate::bake::Illumination;
 use crate::model::cube::Cube;
 use crate::model::params::Param;
@@ -69,25 +82,6 @@ pub struct CpuEngine {
     looked_up: Mutex<Option<Arc<LookedUp>>>,
     /// Why a pass could not be made.
     fault: OnceLock<String>,
-}
-
-/// Kept numbers, and what they were made with.
-#[derive(Debug)]
-struct Kept {
-    turned: bool,
-    /// The numbers that all samples shared, and the specular cube's exponent.
-    made_with: (Vec<f64>, f64),
-    /// For each view, rows of each record.
-    views: Vec<Vec<Row>>,
-}
-
-/// What samples look up of the UV atlas, and what that was made with.
-#[derive(Debug)]
-struct LookedUp {
-    turned: bool,
-    made_with: Vec<f64>,
-    /// For each view, rows of each record.
-    views: Vec<Vec<Row>>,
 }
 
 /// What a pass at a point reads beside samples.
@@ -240,33 +234,6 @@ impl CpuEngine {
         Ok(Ready { pass, lobe, looked_up, kept })
     }
 
-    /// What samples look up of the UV atlas, made again where a number differs that it is made with; `None` where nothing
-    /// is computed there.
-    fn looked_up(&self, pass: &Pass, turned: bool, point: &Point) -> Option<Arc<LookedUp>> {
-        if pass.levels.rows() == 0 {
-            return None;
-        }
-        let made_with = pass.levels.made_with(&point.params);
-        let mut slot = self.looked_up.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |found: &&Arc<LookedUp>| found.turned == turned && found.made_with == made_with;
-        if let Some(found) = slot.as_ref().filter(same) {
-            return Some(Arc::clone(found));
-        }
-        let params = &point.params;
-        let cubes = || CubesAt::new(&self.illumination, params, |x| x);
-        let views = self.views.iter().map(|view| pass.levels.look_up(&view.samples, params, cubes, Row::of));
-        let found = Arc::new(LookedUp { turned, views: views.collect(), made_with });
-        *slot = Some(Arc::clone(&found));
-        Some(found)
-    }
-
-    /// How often levels of the UV atlas were made: once for as long as nothing changes that moves them.
-    #[must_use]
-    pub fn levels_made(&self) -> u64 {
-        let passes = self.passes.lock().unwrap_or_else(PoisonError::into_inner);
-        passes.values().map(|pass| pass.levels.count()).sum()
-    }
-
     fn lobe(&self, exponent: f64) -> Option<Arc<Lobe>> {
         let mut slot = self.lobe.lock().unwrap_or_else(PoisonError::into_inner);
         Lobe::at(self.illumination.lobes.as_ref()?, exponent, &mut slot)
@@ -293,50 +260,6 @@ impl CpuEngine {
             "specular_slope_faces" => lobe.map(|lobe| &lobe.slope),
             _ => None,
         }
-    }
-
-    /// What no free parameter changes, made on the first pass, and again should a held parameter differ.
-    fn kept(&self, pass: &Pass, turned: bool, point: &Point, lobe: Option<&Lobe>) -> Arc<Kept> {
-        let exponent = pass.keep.program.tape.resources.iter().any(|name| name.starts_with("specular"));
-        let exponent = if exponent { point.params.scalar(Param::SpecularLobe) } else { 0.0 };
-        let made_with = (pass.keep.uniforms(&point.params), exponent);
-        let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = slot.as_ref().filter(|kept| kept.turned == turned && kept.made_with == made_with)
-        {
-            return Arc::clone(kept);
-        }
-        let views = (0..self.views.len()).map(|view| self.make_kept(pass, point, view, lobe)).collect();
-        let kept = Arc::new(Kept { turned, made_with, views });
-        *slot = Some(Arc::clone(&kept));
-        kept
-    }
-
-    fn make_kept(&self, pass: &Pass, point: &Point, view: usize, lobe: Option<&Lobe>) -> Vec<Row> {
-        let (stride, observed) = (pass.kept, &self.views[view]);
-        let records = observed.samples.records();
-        let mut kept = vec![Row::ZERO; records * stride];
-        if stride == 0 {
-            return kept;
-        }
-        let bound = self.bound(&pass.keep, point, lobe);
-        let none = Stream { rows: &[], stride: 0 };
-        let streams = streams(observed, Beside { kept: none, levels: none }, &self.neutral);
-        let size = BLOCK * CHUNK;
-        kept.par_chunks_mut(stride * size).enumerate().for_each_init(File::default, |file, (chunk, rows)| {
-            file.prepare(&bound);
-            with_simd!(self.level, simd => {
-                for (k, rows) in rows.chunks_mut(stride * BATCH).enumerate() {
-                    let count = rows.len() / stride;
-                    machine::run(simd, &bound, file, &streams, chunk * size + k * BATCH, count);
-                    for (output, column) in file.columns().iter().enumerate() {
-                        for i in 0..count {
-                            rows[i * stride + output] = column[i].get();
-                        }
-                    }
-                }
-            });
-        });
-        kept
     }
 
     /// What the blocks of a view read in a pass over one of the tapes, of whose outputs `read` are wanted.
@@ -381,169 +304,5 @@ impl CpuEngine {
                 with_simd!(self.level, simd => of_view.shade(simd, scratch, groups, parts));
             });
         });
-    }
-
-    fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
-        let channels = self.fitted.channels;
-        let k = self.fitted.unknowns.len();
-        let mut total = NormalEquations {
-            loss: 0.0,
-            residual: 0.0,
-            weight: self.weight.0 * channels as f64,
-            count: self.weight.1 * channels as u64,
-            jtr: vec![0.0; k],
-            jtj: vec![0.0; k * k],
-        };
-        let Ok(ready) = self.ready(point) else {
-            total.loss = f64::NAN;
-            return total;
-        };
-        let pass = &*ready.pass;
-        let every: Vec<usize> = (0..channels).collect();
-        let of = if wish == Wish::Loss { (&pass.value, &every[..]) } else { (&pass.moved, &pass.read[..]) };
-        for view in 0..self.views.len() {
-            let of_view = self.view_pass(of, &ready, point, view);
-            let blocks: Vec<usize> = self.read_blocks(&self.views[view]).collect();
-            let sums: Vec<Sums> = blocks
-                .par_chunks(CHUNK)
-                .map(|blocks| {
-                    with_scratch(&of_view, |scratch| {
-                        with_simd!(self.level, simd => {
-                            of_view.chunk(simd, &pass.channels, blocks, wish, scratch)
-                        })
-                    })
-                })
-                .collect();
-            self.add(view, pass, &pairwise(sums), wish, &mut total);
-        }
-        if total.weight > 0.0 {
-            total.loss /= total.weight;
-        }
-        total
-    }
-
-    /// A pass that keeps the tiles of the images apart.
-    fn tiled_pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
-        let ready = self.ready(point).ok()?;
-        let pass = &*ready.pass;
-        let mut pulls = Pulls::default();
-        for (index, (view, &width)) in self.views.iter().zip(widths).enumerate() {
-            let of_view = self.view_pass((&pass.moved, &pass.read), &ready, point, index);
-            let own = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(index));
-            let columns: Vec<Vec<Option<usize>>> =
-                pass.channels.iter().map(|c| c.unknowns.iter().map(|u| u.or(own)).collect()).collect();
-            let groups = view.samples.groups();
-            let blocks: Vec<usize> = self.read_blocks(view).collect();
-            let parts = blocks.par_iter().map(|&block| {
-                let mut gathered = Gathered::new(view, width, &columns, self.fitted.unknowns.len());
-                let end = groups.min((block + 1) * BLOCK);
-                with_scratch(&of_view, |scratch| {
-                    for first in (block * BLOCK..end).step_by(BATCH) {
-                        let count = BATCH.min(end - first);
-                        let channels = &pass.channels;
-                        with_simd!(self.level, simd => of_view.residuals(simd, channels, scratch, first, count));
-                        for i in 0..count {
-                            gathered.add(first + i, |c, column| of_view.row(scratch, &channels[c], (c, column), i));
-                        }
-                    }
-                });
-                gathered
-            });
-            let parts: Vec<Gathered<'_>> = parts.collect();
-            pulls.add_view(index, width, parts);
-        }
-        Some(pulls)
-    }
-
-    /// One view's packed sums into the full matrices.
-    fn add(&self, view: usize, pass: &Pass, sums: &Sums, wish: Wish, total: &mut NormalEquations) {
-        let Some(loss) = sums.0.last() else { return };
-        total.loss += loss;
-        let k = self.fitted.unknowns.len();
-        let gain = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(view));
-        let mut base = 0;
-        for channel in pass.channels.iter().filter(|_| wish != Wish::Loss) {
-            let (columns, count) = (channel.unknowns.len(), channel.unknowns.len() + 1);
-            let unknown: Vec<Option<usize>> = channel.unknowns.iter().map(|u| u.or(gain)).collect();
-            // Of a gradient there is the last column alone.
-            let entry = |i: usize, j: usize| if wish == Wish::Gradient { i } else { pair(i, j, count) };
-            for i in 0..columns {
-                let Some(a) = unknown[i] else { continue };
-                total.jtr[a] += sums.0[base + entry(i, columns)];
-                for j in (i..columns).filter(|_| wish == Wish::Normal) {
-                    let Some(b) = unknown[j] else { continue };
-                    let value = sums.0[base + entry(i, j)];
-                    total.jtj[a * k + b] += value;
-                    if a != b {
-                        total.jtj[b * k + a] += value;
-                    }
-                }
-            }
-            total.residual += sums.0[base + entry(columns, columns)];
-            base += if wish == Wish::Gradient { count } else { count * (count + 1) / 2 };
-        }
-    }
-}
-
-impl Objective for CpuEngine {
-    fn unknowns(&self) -> &[Unknown] {
-        &self.fitted.unknowns
-    }
-
-    fn is_quadratic(&self) -> bool {
-        self.loss == Loss::L2 && self.views.iter().all(|view| view.clip.is_none())
-    }
-
-    fn rounding(&self) -> f64 {
-        super::rounding(&self.views, self.loss, self.stride)
-    }
-
-    fn fault(&self) -> Option<String> {
-        self.fault.get().cloned()
-    }
-
-    fn pulls(&self, point: &Point, widths: &[usize]) -> Option<Pulls> {
-        if widths.len() == self.views.len() { self.tiled_pulls(point, widths) } else { None }
-    }
-
-    fn normal_equations(&self, point: &Point) -> NormalEquations {
-        self.pass(point, Wish::Normal)
-    }
-
-    fn loss(&self, point: &Point) -> f64 {
-        self.pass(point, Wish::Loss).loss
-    }
-
-    fn gradient(&self, point: &Point) -> (f64, Vec<f64>) {
-        self.pass(point, Wish::Gradient).loss_and_gradient()
-    }
-}
-
-impl Engine for CpuEngine {
-    fn name(&self) -> &'static str {
-        "cpu"
-    }
-
-    fn provenance(&self) -> Vec<(String, String)> {
-        vec![
-            ("threads".to_owned(), rayon::current_num_threads().to_string()),
-            ("instructions".to_owned(), crate::simd::instructions()),
-        ]
-    }
-
-    fn views(&self) -> &Arc<[ObservedView]> {
-        self.views()
-    }
-
-    fn surfaced_views(&self) -> Result<Arc<[ObservedView]>, EngineError> {
-        Ok(Arc::clone(&self.views))
-    }
-
-    fn samples(&self) -> u64 {
-        self.samples()
-    }
-
-    fn set_stride(&mut self, stride: usize) {
-        self.set_stride(stride);
     }
 }

@@ -3,11 +3,11 @@
 use std::collections::BTreeMap;
 
 use super::ahead;
-use super::machine::Program;
+use super::fitted::Fitted;
+use super::program::Program;
+use super::streams::{NEUTRALS, StreamOf};
 use crate::engine::Unknown;
 use crate::engine::levels::LevelMaker;
-use crate::engine::view::ObservedView;
-use crate::model::evaluate::Setup;
 use crate::model::params::{Channels, Param, Params};
 use crate::program::cut::{KEPT, cut};
 use crate::program::graph::{Graph, Id, Input, Node};
@@ -17,68 +17,8 @@ use crate::program::shading::{Shading, ShadingError, component};
 use crate::program::tape::Tape;
 use crate::samples::surface_records::{Places, neutral};
 use crate::shader::Constant;
-use crate::shader::facts::{FaceSizes, Facts};
+use crate::shader::facts::Facts;
 use crate::shader::tangent::chain::Seed;
-
-/// The streams that tapes read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum StreamOf {
-    Samples = 0,
-    Kept,
-    /// What stands in for fields that samples lack: [`NEUTRALS`], each for as many rows as a block has.
-    Neutral,
-    /// What pixels are compared with, a record a pixel; no tape reads it, but it is asked for meanwhile.
-    Targets,
-    /// What samples look up of the UV atlas.
-    Levels,
-}
-
-/// The numbers that stand in for fields.
-pub(super) const NEUTRALS: [f32; 2] = [0.0, 1.0];
-
-/// What is the same for every view of a fit.
-#[derive(Clone, Debug)]
-pub(super) struct Fitted {
-    pub(super) setup: Setup,
-    pub(super) unknowns: Vec<Unknown>,
-    /// Colours, and the haze where it is compared.
-    pub(super) channels: usize,
-    pub(super) faces: FaceSizes,
-    /// Where a sample's numbers stand.
-    pub(super) places: Places,
-    /// Whether what no free parameter moves is kept.
-    pub(super) keep: bool,
-}
-
-impl Fitted {
-    /// Of views of one kind.
-    pub(super) fn new(setup: Setup, unknowns: Vec<Unknown>, views: &[ObservedView]) -> Self {
-        let channels = if views.iter().any(ObservedView::compares_alpha) { 4 } else { 3 };
-        let places = views
-            .iter()
-            // One that holds nothing says nothing of where numbers stand.
-            .find(|view| view.samples.groups() > 0)
-            .map(|view| *view.samples.surface.places())
-            .unwrap_or_default();
-        Self { setup, unknowns, channels, faces: FaceSizes::default(), places, keep: true }
-    }
-
-    /// The parameters that are free and that an effect asks for, each once.
-    fn free(&self) -> Vec<Param> {
-        let mut free = Vec::new();
-        for unknown in &self.unknowns {
-            let Unknown::Param(column) = unknown else { continue };
-            if column.param.asked_for(self.setup.effects) && !free.contains(&column.param) {
-                free.push(column.param);
-            }
-        }
-        free
-    }
-
-    fn gains(&self) -> bool {
-        self.unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(_)))
-    }
-}
 
 /// A tape, and where it reads each of its fields.
 #[derive(Debug)]
@@ -272,11 +212,10 @@ fn live_names(seeds: &[Seed]) -> Vec<String> {
     let mut names = Vec::new();
     for seed in seeds {
         match seed {
-            Seed::Named { name, tangent } => {
+            Seed::Named { name, .. } => {
                 names.push((*name).to_owned());
                 // Constants that tell how it moves, move as well.
-                let told = tangent.split("constants.").skip(1);
-                names.extend(told.filter_map(|rest| rest.split('.').next()).map(str::to_owned));
+                names.extend(seed.constants().map(|constant| constant.name().to_owned()));
             }
             Seed::Resource { resource, slope } => {
                 names.extend([resource.name().to_owned(), slope.name().to_owned()]);

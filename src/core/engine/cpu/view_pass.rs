@@ -3,8 +3,11 @@
 use std::cell::RefCell;
 use std::ops::Range;
 
-use super::machine::{self, BATCH, Bound, Column, File, FileColumns, Stream};
+use super::file::File;
+use super::machine;
 use super::pass::ChannelColumns;
+use super::program::Bound;
+use super::streams::{BATCH, Column, FileColumns, Stream, load, store};
 use super::sums::{Sums, Wish, fold};
 use crate::engine::BLOCK;
 use crate::engine::gram::add_gram;
@@ -50,7 +53,7 @@ struct Compared {
     residual: Column,
 }
 
-/// The streams of a view, in the order of `pass::StreamOf`.
+/// The streams of a view, in the order of [`StreamOf`](super::streams::StreamOf).
 pub(super) type Streams<'a> = [Stream<'a>; 5];
 
 /// What stands beside a view's samples.
@@ -149,7 +152,7 @@ impl ViewPass<'_> {
             for (column, plane) in shown.iter().zip(planes.iter_mut()) {
                 let rows = plane[(start - groups.start) * LANES..].chunks_exact_mut(LANES);
                 for (i, row) in rows.enumerate().take(count) {
-                    row.copy_from_slice(&(gain * machine::load(simd, &column[i])).to_array());
+                    row.copy_from_slice(&(gain * load(simd, &column[i])).to_array());
                 }
             }
         }
@@ -177,8 +180,8 @@ impl ViewPass<'_> {
                 };
                 for &output in self.read {
                     let sum = &pixels[output][group - first];
-                    let value = machine::load(simd, &file.columns()[output][i]);
-                    machine::store(sum, share.mul_add(value, machine::load(simd, sum)));
+                    let value = load(simd, &file.columns()[output][i]);
+                    store(sum, share.mul_add(value, load(simd, sum)));
                 }
             }
             record += block;
@@ -200,21 +203,21 @@ impl ViewPass<'_> {
         if self.is_plain() {
             // The root of a weight takes as long as all else.
             for i in 0..count {
-                let value = machine::load(simd, &shown[channel][i]);
+                let value = load(simd, &shown[channel][i]);
                 let residual = value - Lanes::of_row(simd, &self.view.target.record(first + i)[channel]);
                 loss = residual.mul_add(residual, loss);
-                machine::store(&compared.residual[i], residual);
+                store(&compared.residual[i], residual);
             }
             return loss;
         }
         for i in 0..count {
-            let value = gain * machine::load(simd, &shown[channel][i]);
+            let value = gain * load(simd, &shown[channel][i]);
             let wanted = Lanes::of_row(simd, &self.view.target.record(first + i)[channel]);
             let weight = self.view.weight.get(first + i).map_or(one, |row| Lanes::of_row(simd, row));
             let row = Residuals::new(self.loss).weigh(self.view.clip, value, wanted, weight);
             loss = loss + row.loss;
-            machine::store(&compared.scale[i], row.scale);
-            machine::store(&compared.residual[i], row.residual);
+            store(&compared.scale[i], row.scale);
+            store(&compared.residual[i], row.residual);
         }
         loss
     }
@@ -327,8 +330,8 @@ impl ViewPass<'_> {
         {
             let gain = Lanes::splat(simd, self.gain_of(*unknown));
             for i in 0..count {
-                let scale = gain * machine::load(simd, &scale[i]);
-                machine::store(&weighed[i], scale * machine::load(simd, &shown[tangent][i]));
+                let scale = gain * load(simd, &scale[i]);
+                store(&weighed[i], scale * load(simd, &shown[tangent][i]));
             }
         }
     }
@@ -353,8 +356,8 @@ impl ViewPass<'_> {
         let last = channel.tangents.len();
         let mut squares = Lanes::of_row(simd, &sums[last]);
         for i in 0..count {
-            let residual = machine::load(simd, &compared.residual[i]);
-            let scaled = residual * machine::load(simd, &compared.scale[i]);
+            let residual = load(simd, &compared.residual[i]);
+            let scaled = residual * load(simd, &compared.scale[i]);
             factors[i] = if self.is_plain() { residual } else { scaled };
             squares = residual.mul_add(residual, squares);
         }
@@ -362,7 +365,7 @@ impl ViewPass<'_> {
         for ((&tangent, unknown), sum) in channel.tangents.iter().zip(&channel.unknowns).zip(sums) {
             let mut slope = Lanes::splat(simd, 0.0);
             for i in 0..count {
-                slope = machine::load(simd, &shown[tangent][i]).mul_add(factors[i], slope);
+                slope = load(simd, &shown[tangent][i]).mul_add(factors[i], slope);
             }
             let gain = Lanes::splat(simd, self.gain_of(*unknown));
             gain.mul_add(slope, Lanes::of_row(simd, sum)).store(sum);

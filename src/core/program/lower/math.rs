@@ -2,7 +2,8 @@
 
 use naga::{BinaryOperator as B, MathFunction as M};
 
-use super::{Frame, LowerError};
+use super::LowerError;
+use super::frame::Frame;
 use crate::program::graph::{Binary, Graph, Id, Unary};
 
 impl Frame<'_> {

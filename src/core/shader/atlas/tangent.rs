@@ -9,7 +9,6 @@ use std::collections::BTreeMap;
 use super::text::{self, Slope};
 use super::{Level, MovingKernel, Pass, PassKind};
 use crate::shader::emit::Plan;
-use crate::shader::quantity::Constant;
 use crate::shader::rule::Rule;
 use crate::shader::tangent::chain::{Chain, Seed};
 use crate::shader::tangent::{TangentError, Tangents};
@@ -57,11 +56,7 @@ impl Along {
         let read = needs().filter_map(|(name, _)| tangent(name)).collect();
         let chain = Chain::of_texels(&plan, seed, read)?;
         plan.resources.extend(&chain.resources);
-        for constant in [Constant::KeyByAzimuth, Constant::KeyByElevation] {
-            if chain.lines[0].contains(constant.name()) && !plan.constants.contains(&constant) {
-                plan.constants.push(constant);
-            }
-        }
+        plan.constants.extend(&chain.constants);
         let moves = |level: &&Level| chain.moved[0].contains_key(level.name.as_str());
         let leaving: Vec<Level> = pass.leaves.iter().filter(moves).cloned().collect();
         if leaving.is_empty() {

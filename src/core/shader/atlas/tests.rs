@@ -297,6 +297,20 @@ fn what_texels_cannot_have_is_told_with_its_line_and_a_remedy() {
         let error = register("haar", &changed).map(|term| term.effect).unwrap_err();
         assert!(error.line == line && error.to_string().contains(problem), "{new}: {error}");
     }
+    for (old, new, at) in [
+        ("gives: haar_light", "gives: haar_level", "fn haar_light_map"),
+        ("gives: haar_lit", "gives: haar_near_along_u", "fn haar_lit_again"),
+        ("gives: haar_lit", "gives: d_haar_near", "fn haar_lit_again"),
+        ("parameter: haar_weight", "parameter: d_haar_weight", "parameter: d_haar_weight"),
+        ("fn haar_light_map", "fn sample_level", "fn sample_level"),
+        ("fn haar_light_map", "fn vs_main", "fn vs_main"),
+        ("fn haar_lit_again", "fn fs_main", "fn fs_main"),
+    ] {
+        let changed = text.replacen(old, new, 1);
+        let line = changed.lines().position(|line| line.contains(at)).unwrap() + 1;
+        let error = register("haar", &changed).map(|term| term.effect).unwrap_err();
+        assert!(error.line == line && matches!(error.problem, Problem::Reserved(_)), "{new}: {error}");
+    }
     let held = text
         .replacen("(vertex_position: vec3f) -> vec2f", "(vertex_position: vec3f) -> vec4f", 1)
         .replacen("sqrt(vec2f(dot(along, along), dot(down, down)))", "sqrt(vec4f(dot(along, along)))", 1)

@@ -13,6 +13,10 @@ use crate::shader::rule::Rule;
 /// The function by which fragments look levels up.
 pub(crate) const SAMPLE_LEVEL: &str = include_str!("level.wgsl");
 
+/// One direction of a blur, and how it moves: one head, and what differs.
+const BLUR: &str = concat!(include_str!("blur_head.wgsl"), include_str!("blur.wgsl"));
+const BLUR_TANGENT: &str = concat!(include_str!("blur_head.wgsl"), include_str!("blur_tangent.wgsl"));
+
 /// Where the mesh lies in the atlas: v runs downwards.
 const IN_ATLAS: &str = "vec4f(2.0 * vertex_uv.x - 1.0, 1.0 - 2.0 * vertex_uv.y, 0.0, 1.0)";
 
@@ -98,7 +102,7 @@ pub fn stored(levels: &[Level]) -> String {
 /// One direction of a blur.
 pub(super) fn blur(plan: &Plan, rule: &Rule, axis: Axis, source: &Level) -> String {
     match plan.facts.source {
-        Source::Raster => filled(include_str!("blur.wgsl"), plan, rule, axis, source, &[]),
+        Source::Raster => filled(BLUR, plan, rule, axis, source, &[]),
         Source::Samples | Source::Terms => taps_of(plan, rule, axis, &[], None),
     }
 }
@@ -136,7 +140,7 @@ pub(super) fn blur_tangent(
     }
     let of = |level: &Level, place: &str| format!("textureLoad({}, {place}, 0).xyz", level.bound());
     let at = |place: &str| moved.map_or("vec3f(0.0)".to_owned(), |level| of(level, place));
-    let template = include_str!("blur_tangent.wgsl")
+    let template = BLUR_TANGENT
         .replace("{slope}", &slope.call(rule, axis, TAP))
         .replace("{moved}", &at("near"))
         .replace("{moved_here}", &at("here"));

@@ -38,6 +38,8 @@ pub struct Chain {
     pub functions: String,
     /// Resources that they read beside the plan's.
     pub resources: Vec<Resource>,
+    /// Constants that they read beside the plan's.
+    pub constants: Vec<Constant>,
     /// For each seed its lines, to stand after the plan's calls; they name what those do.
     pub lines: Vec<String>,
     /// For each seed, how the radiance moves (WGSL of a `vec3f`); `None` where it stays.
@@ -126,6 +128,11 @@ impl Chain {
             if let Some((_, kind)) = typed {
                 let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
                 moved.insert(name, format!("d{k}_{name}"));
+                for constant in seed.constants() {
+                    if !plan.constants.contains(&constant) && !self.constants.contains(&constant) {
+                        self.constants.push(constant);
+                    }
+                }
             }
         }
         for rule in plan.rules(domain) {
@@ -234,5 +241,15 @@ impl Seed {
             colour if colour.info().rgb => named(colour.identifier(), "vec3f(1.0)"),
             scalar => named(scalar.identifier(), "1.0"),
         }
+    }
+
+    /// The constants that its tangent is made of.
+    pub fn constants(&self) -> impl Iterator<Item = Constant> {
+        let tangent = match self {
+            Self::Named { tangent, .. } => tangent.as_str(),
+            Self::Resource { .. } => "",
+        };
+        let names = tangent.split("constants.").skip(1);
+        names.filter_map(|rest| Constant::from_name(rest.split('.').next()?))
     }
 }

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use naga::{Block, Expression, Function, Handle, LocalVariable, Statement, TypeInner};
 
-use super::expression::{is_float, type_name};
+use super::types::{is_float, type_name};
 use super::{TangentError, Tangents, name};
 
 /// What is known while a function is written.

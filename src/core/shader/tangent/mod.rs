@@ -9,12 +9,13 @@
 //! point (`rim_power` at 0, `cube_place_of_unit` of a tiny direction, which `cube_place` may hand it).
 //!
 //! - [`Tangents`]: the functions that were asked for
-//! - `function`: one function's statements; `expression`: the chain rule
+//! - `function`: one function's statements; `expression`: the chain rule; `types`: what moves
 //! - [`chain`]: the chain rule over a plan's steps
 
 pub mod chain;
 mod expression;
 mod function;
+mod types;
 
 use std::collections::BTreeMap;
 

@@ -68,6 +68,15 @@ const TAKEN: [&str; 48] = [
     "clip",
 ];
 
+/// Functions of those modules.
+const FUNCTIONS: [&str; 4] = ["sample_level", "vs_main", "fs_main", "cs_main"];
+
+/// Whether a name is one of those that the passes over the atlas make of others': `NAME_level` is a level as it is bound,
+/// `NAME_along_u` what the first direction of a blur leaves, `d_NAME` how a level moves.
+fn is_made(name: &str) -> bool {
+    name.starts_with("d_") || name.ends_with("_level") || name.ends_with("_along_u")
+}
+
 /// The declaration, where it fits.
 pub(super) fn checked(declaration: Declaration) -> Result<Declaration, TermError> {
     names(&declaration)?;
@@ -98,6 +107,9 @@ fn counts_up(name: &str) -> bool {
 fn quantity_name(name: &str, line: usize) -> Result<(), TermError> {
     if !is_word(name) || counts_up(name) || TAKEN.contains(&name) || name.ends_with("_and_more") {
         return Err(Problem::Name(name.to_owned()).at(line));
+    }
+    if is_made(name) || FUNCTIONS.contains(&name) {
+        return Err(Problem::Reserved(name.to_owned()).at(line));
     }
     Ok(())
 }
@@ -167,6 +179,9 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
             > 0;
         if library || twice || functions.any(|function| function == rule.function) {
             return taken("function", rule.function, rule.line);
+        }
+        if FUNCTIONS.contains(&rule.function) {
+            return Err(Problem::Reserved(rule.function.to_owned()).at(rule.line));
         }
     }
     Ok(())

@@ -30,6 +30,8 @@ pub enum Problem {
     Misplaced { key: &'static str },
     #[error("`{0}` is no name")]
     Name(String),
+    #[error("`{0}` is a name that the shaders give themselves")]
+    Reserved(String),
     #[error("the {kind} `{name}` is there already")]
     Taken { kind: &'static str, name: String },
     #[error("there may be {most} {kind}s, no more")]
@@ -86,6 +88,11 @@ impl Problem {
             Self::Name(_) => {
                 "Use lower-case letters, digits and single `_`, a letter first; it must mean nothing else in the \
                  shaders"
+                    .to_owned()
+            }
+            Self::Reserved(_) => {
+                "Give it another name: those that begin with `d_` or end in `_level` or `_along_u` are of levels of the \
+                 atlas, and sample_level, vs_main, fs_main and cs_main are functions"
                     .to_owned()
             }
             Self::Taken { .. } => "Give it another name".to_owned(),

@@ -30,7 +30,6 @@ use crate::samples::LANES;
 use crate::scene::Loss;
 use crate::shader::emit::{Plan, plan};
 use crate::shader::facts::{FaceSizes, Facts};
-use crate::shader::quantity::Constant;
 use crate::shader::tangent::chain::{Chain, Seed};
 use skinfit_core::engine::{BLOCK, Unknown};
 use skinfit_core::program::levels::LevelProgram;
@@ -158,14 +157,6 @@ impl Fused {
         let facts = facts(&fitted);
         let mut plan = plan(&facts).map_err(|error| error.to_string())?;
         let (seeds, mut columns) = columns(&fitted.unknowns);
-        for seed in &seeds {
-            let Seed::Named { tangent, .. } = seed else { continue };
-            for constant in [Constant::KeyByAzimuth, Constant::KeyByElevation] {
-                if tangent.contains(constant.name()) && !plan.constants.contains(&constant) {
-                    plan.constants.push(constant);
-                }
-            }
-        }
         let chain = Chain::new(&plan, &seeds).map_err(|error| error.to_string())?;
         for column in &mut columns {
             let moved = column.seed.map_or(Moved::ALL, |seed| {
@@ -176,6 +167,7 @@ impl Fused {
         }
         columns.retain(|column| column.channels != Moved::NONE);
         plan.resources.extend(&chain.resources);
+        plan.constants.extend(&chain.constants);
         Ok(Self { columns, fitted, chain, plan })
     }
 

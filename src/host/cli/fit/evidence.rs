@@ -1,17 +1,15 @@
 //! The evidence: each view's target, fit and terms.
 
 use crate::cli::Refusal;
+use crate::cli::compared::compared;
 use crate::cli::fit_engine::surfaced_views;
 use crate::engine::Engine;
-use crate::engine::view::ObservedView;
 use crate::fit::outcome::Outcome;
 use crate::prepare::Baked;
 use crate::progress;
-use crate::render::image::Image;
 use crate::render::places::places;
 use crate::render::shade::Shader;
 use crate::report::ViewEvidence;
-use crate::scene::view::View;
 
 /// For each view the target, the fit and its terms.
 pub(super) fn evidence(
@@ -52,21 +50,4 @@ pub(super) fn evidence(
         .collect();
     bar.finish_and_clear();
     evidence
-}
-
-/// The target as an image, and how much of each pixel is compared.
-pub(in crate::cli) fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
-    let mut target = Image::new(fit.width, fit.height);
-    let Some(source) = &view.target else { return (target, fit.alpha.clone()) };
-    target.rgb.clone_from(&source.rgb);
-    // Without an alpha of its own, the target is opaque.
-    target.alpha = source.alpha.clone().unwrap_or_else(|| vec![1.0; source.rgb.len()]);
-    let mut coverage = vec![0.0; fit.alpha.len()];
-    for (slot, &pixel) in observed.samples.pixel.iter().enumerate() {
-        if pixel != u32::MAX && observed.pixel_weight(slot) > 0.0 {
-            let at = pixel as usize;
-            coverage[at] = observed.samples.coverage[slot].min(target.alpha[at]);
-        }
-    }
-    (target, coverage)
 }

@@ -22,8 +22,6 @@ use super::{Exit, Refusal, quieten_graphics, tell_warnings, unfinished};
 use crate::prepare::{Baked, Loaded, Observed, PrepareOptions};
 use crate::scene::Loss;
 use conclude::{Fitted, conclude};
-#[cfg(feature = "burn")]
-pub(super) use evidence::compared;
 use solve::{Solving, solve};
 
 /// Fit a scene's free parameters to its target images
@@ -96,6 +94,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if let Some(loss) = &arguments.loss {
         loaded.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
     }
+    arguments.maps.hold_constants(&mut loaded.scene.fit);
     let solving = Solving::of(arguments, folder.path())?;
     let interrupt = Interrupt::default();
     let Ready { observed, chosen, maps } = ready(arguments, loaded.bake()?, &interrupt)?;

@@ -18,6 +18,7 @@ use std::sync::atomic::AtomicBool;
 
 use super::Refusal;
 use crate::report::maps::MapEvidence;
+use crate::scene::{FitSettings, MapKind};
 #[cfg(not(feature = "burn"))]
 pub(super) use absent::MapsFound;
 #[cfg(feature = "burn")]
@@ -68,6 +69,17 @@ impl MapArguments {
         !self.maps.is_empty()
     }
 
+    /// The maps to be fitted.
+    fn kinds(&self) -> Vec<MapKind> {
+        let named = |kind: &MapKind| self.maps.iter().any(|name| name == kind.name());
+        MapKind::ALL.into_iter().filter(named).collect()
+    }
+
+    /// Hold the constants that the maps leave nothing to, before anything is made that depends on what is free.
+    pub(super) fn hold_constants(&self, fit: &mut FitSettings) {
+        fit.hold_beside(&self.kinds());
+    }
+
     /// Refuse maps in a program that was built without them.
     pub(super) fn check(&self) -> Result<(), Refusal> {
         if cfg!(feature = "burn") || (self.maps.is_empty() && self.hold_out.is_none()) {
@@ -87,5 +99,25 @@ impl MapArguments {
              with `skinfit fit {folder}/scene.toml --maps {maps}{held_out}`; what is held of the maps \
              beforehand is then held of these."
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::params::{Column, Param};
+    use crate::scene::{Loss, MapSettings};
+
+    #[test]
+    fn the_named_maps_hold_what_acts_through_them_alone() {
+        let held = |maps: &[&str]| {
+            let maps = maps.iter().map(|&name| name.to_owned()).collect();
+            let free = [Param::EnvironmentRotation, Param::Hilite].map(Column::tied).to_vec();
+            let (loss, settings) = (Loss::default(), MapSettings::default());
+            let mut fit = FitSettings { free, loss, free_gains: false, maps: settings };
+            MapArguments { maps, hold_out: None }.hold_constants(&mut fit);
+            fit.free.len()
+        };
+        assert_eq!([held(&[]), held(&["color"]), held(&["color", "environment"])], [2, 2, 1]);
     }
 }

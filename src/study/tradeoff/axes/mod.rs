@@ -2,6 +2,7 @@
 
 mod cubes;
 mod filter;
+mod fits;
 mod format;
 mod lobes;
 mod pixels;

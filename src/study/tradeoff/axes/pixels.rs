@@ -1,6 +1,6 @@
 //! How many pixels a fit needs.
 
-use super::solver::{Fits, expected_passes};
+use super::fits::{Fits, expected_passes};
 use crate::StudyError;
 use crate::fit::SolverKind;
 use crate::tradeoff::axis::{Axis, Rates, Sweep};

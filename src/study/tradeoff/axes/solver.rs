@@ -1,24 +1,14 @@
 //! How fast the solvers find the answer.
 
-use std::cell::RefCell;
-
-use super::quality::ROUNDS;
+use super::fits::{Fits, MOST_ITERATIONS, expected_passes};
 use crate::StudyError;
-use crate::engine::Point;
-use crate::engine::cpu::CpuEngine;
+use crate::fit::SolverKind;
 use crate::fit::outcome::Outcome;
-use crate::fit::{self, FitOptions, SolverKind};
-use crate::reference::Difference;
-use crate::subject::Subject;
-use crate::timing::{Job, interleaved};
-use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, Trace, mark_pareto};
+use crate::tradeoff::axis::{Axis, Rates, Sweep, Trace};
 use crate::tradeoff::bench::Bench;
 
 /// The solvers.
 pub(super) struct Solvers;
-
-/// A solver that has not ended by then is stopped; the best of them take some ten iterations.
-const MOST_ITERATIONS: u64 = 300;
 
 impl Axis for Solvers {
     fn name(&self) -> &'static str {
@@ -54,107 +44,5 @@ impl Axis for Solvers {
             settings,
             traces: runs.iter().zip(&outcomes).map(trace).collect(),
         })
-    }
-}
-
-/// About how many passes over the samples a solver takes; those that converge late are stopped.
-pub(super) fn expected_passes(solver: SolverKind) -> f64 {
-    match solver {
-        SolverKind::Varpro | SolverKind::Lm => 12.0,
-        // One an iteration, and now and then one more.
-        SolverKind::Lbfgs | SolverKind::Adam => 1.1 * MOST_ITERATIONS as f64,
-        // The simplex tries two places in most of its iterations.
-        SolverKind::NelderMead => 1.7 * MOST_ITERATIONS as f64,
-    }
-}
-
-/// Fits of a scene's constants, from the same start in different ways.
-pub(super) struct Fits {
-    subject: Subject,
-}
-
-/// What a fit is called, on every how many-th block of pixels it reads (one fit after another), and its solver.
-type Run = (String, Vec<usize>, SolverKind);
-
-impl Fits {
-    pub(super) fn new(bench: &Bench<'_>) -> Result<Self, StudyError> {
-        Ok(Self { subject: Subject::of(bench.to_fit()?, None)? })
-    }
-
-    /// The seconds that [`Self::measure`] takes for runs of these seconds.
-    pub(super) fn seconds(runs: &[f64], rates: Rates) -> f64 {
-        ROUNDS.expected(runs) + (1 + runs.len()) as f64 * rates.images
-    }
-
-    pub(super) fn blocks(&self) -> usize {
-        self.subject.engine.blocks()
-    }
-
-    /// Each run's setting, beside that of run `reference`, and how it ended.
-    pub(super) fn measure(
-        &self,
-        runs: &[Run],
-        reference: usize,
-    ) -> Result<(Vec<Setting>, Vec<Outcome>), StudyError> {
-        let outcomes: Vec<RefCell<Option<(Outcome, u64)>>> =
-            runs.iter().map(|_| RefCell::new(None)).collect();
-        let mut works: Vec<Box<dyn FnMut() -> Result<f64, StudyError> + '_>> = Vec::new();
-        for (run, slot) in runs.iter().zip(&outcomes) {
-            works.push(Box::new(move || {
-                let (outcome, seconds, passes) = self.fit(run)?;
-                *slot.borrow_mut() = Some((outcome, passes));
-                Ok(seconds)
-            }));
-        }
-        let mut jobs: Vec<Job<'_, StudyError>> =
-            works.iter_mut().map(|job| &mut **job as Job<'_, StudyError>).collect();
-        let timed = interleaved(ROUNDS, &mut jobs)?;
-        drop(jobs);
-        drop(works);
-        let outcomes: Vec<(Outcome, u64)> = outcomes.into_iter().filter_map(RefCell::into_inner).collect();
-        let images = |point: &Point| self.subject.images(point);
-        let best = images(&outcomes[reference].0.end)?;
-        let setting = |(i, (outcome, passes)): (usize, &(Outcome, u64))| -> Result<Setting, StudyError> {
-            Ok(Setting {
-                name: runs[i].0.clone(),
-                choose: None,
-                error: Difference::of_all(&best, &images(&outcome.end)?),
-                cost: timed[i].seconds.median,
-                time: Some(timed[i]),
-                counts: vec![("passes", *passes as f64), ("loss", outcome.loss_end)],
-                reference: i == reference,
-                present: false,
-                pareto: false,
-            })
-        };
-        let mut settings: Vec<Setting> =
-            outcomes.iter().enumerate().map(setting).collect::<Result<_, StudyError>>()?;
-        mark_pareto(&mut settings);
-        Ok((settings, outcomes.into_iter().map(|(outcome, _)| outcome).collect()))
-    }
-
-    /// One run: its last outcome, the seconds and passes of all its fits.
-    fn fit(&self, (_, strides, solver): &Run) -> Result<(Outcome, f64, u64), StudyError> {
-        let scene = &self.subject.observed.scene;
-        let mut start = self.subject.observed.start();
-        let (mut seconds, mut passes, mut last) = (0.0, 0, None);
-        // Terms that earlier fits kept would be a present.
-        let mut engine = CpuEngine::new(self.subject.observed.task())?;
-        for &stride in strides {
-            engine.set_stride(stride);
-            let options = FitOptions {
-                solver: *solver,
-                max_iterations: Some(MOST_ITERATIONS),
-                ..FitOptions::default()
-            };
-            let outcome = fit::fit(&engine, &start, &options, &mut |_| {})
-                .map_err(|error| StudyError::Fit { scene: scene.path.display().to_string(), error })?;
-            seconds += outcome.seconds;
-            passes += outcome.evaluations;
-            start = outcome.end.clone();
-            last = Some(outcome);
-        }
-        let outcome = last.map_or_else(|| self.subject.fit(&FitOptions::default()), Ok)?;
-        Ok((outcome, seconds, passes))
     }
 }

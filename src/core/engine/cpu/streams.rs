@@ -1,0 +1,86 @@
+//! What tapes read and write: streams of records, and columns of outputs.
+
+use std::cell::Cell;
+
+use fearless_simd::f32x16;
+use fearless_simd::prelude::*;
+
+use crate::engine::gram::Source as GramSource;
+use crate::engine::lanes::Lanes;
+use crate::samples::LANES;
+use crate::samples::rows::Row;
+use crate::simd::Simd;
+
+/// Records whose outputs stand side by side: a Gram matrix adds up so many at once.
+pub(super) const BATCH: usize = 16;
+/// Records ahead of which fields are asked for.
+pub(super) const AHEAD: usize = 8;
+
+/// The rows of an output.
+pub(super) type Column = [Cell<Row>; BATCH];
+
+/// The streams that tapes read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum StreamOf {
+    Samples = 0,
+    Kept,
+    /// What stands in for fields that samples lack: [`NEUTRALS`], each for as many rows as a block has.
+    Neutral,
+    /// What pixels are compared with, a record a pixel; no tape reads it, but it is asked for meanwhile.
+    Targets,
+    /// What samples look up of the UV atlas.
+    Levels,
+}
+
+/// The numbers that stand in for fields.
+pub(super) const NEUTRALS: [f32; 2] = [0.0, 1.0];
+
+/// Records of `stride` rows each, one for each record or group.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stream<'a> {
+    pub(super) rows: &'a [Row],
+    pub(super) stride: usize,
+}
+
+/// Rows of what stands in for fields that samples of at most `stride` rows lack.
+pub(super) fn neutral_rows(stride: usize) -> Vec<Row> {
+    let rows = |&value: &f32| std::iter::repeat_n(Row::of([value; LANES]), BATCH * stride.max(1));
+    NEUTRALS.iter().flat_map(rows).collect()
+}
+
+/// The first of the rows of one of [`NEUTRALS`].
+pub(super) const fn first_neutral(rows: &[Row], which: usize) -> usize {
+    which * (rows.len() / NEUTRALS.len())
+}
+
+#[inline(always)]
+pub(super) fn load<S: Simd>(simd: S, cell: &Cell<Row>) -> Lanes<S> {
+    Lanes::of_row(simd, &cell.get())
+}
+
+#[inline(always)]
+pub(super) fn store<S: Simd>(cell: &Cell<Row>, value: Lanes<S>) {
+    let mut row = Row::ZERO;
+    value.store(&mut row);
+    cell.set(row);
+}
+
+/// Columns as the Gram matrix reads them.
+#[derive(Clone, Copy)]
+pub(super) struct FileColumns<'a> {
+    pub(super) columns: &'a [&'a Column],
+    pub(super) groups: usize,
+}
+
+impl GramSource for FileColumns<'_> {
+    fn columns(&self) -> usize {
+        self.columns.len()
+    }
+    fn groups(&self) -> usize {
+        self.groups
+    }
+    #[inline(always)]
+    fn load<S: Simd>(&self, simd: S, group: usize, column: usize) -> f32x16<S> {
+        f32x16::load_array_ref(simd, &self.columns[column][group].get())
+    }
+}

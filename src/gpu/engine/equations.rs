@@ -1,0 +1,73 @@
+//! A pass' sums as normal equations.
+
+use std::sync::PoisonError;
+
+use super::GpuEngine;
+use super::fused::{ColumnOf, Sum, Wish};
+use skinfit_core::engine::{NormalEquations, Point, Unknown};
+
+impl GpuEngine {
+    /// A pass as normal equations; after a fault, numbers that no solver takes.
+    pub(super) fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
+        let channels: u32 = if self.alpha { 4 } else { 3 };
+        let k = self.unknowns.len();
+        let mut total = NormalEquations {
+            loss: 0.0,
+            residual: 0.0,
+            weight: self.weight.0 * f64::from(channels),
+            count: self.weight.1 * u64::from(channels),
+            jtr: vec![0.0; k],
+            jtj: vec![0.0; k * k],
+        };
+        match self.sums(point, wish) {
+            Ok(passed) => passed.add_to(&mut total, &self.unknowns),
+            Err(error) => {
+                self.fault.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+                total.loss = f64::NAN;
+            }
+        }
+        if total.weight > 0.0 {
+            total.loss /= total.weight;
+        }
+        total
+    }
+}
+
+/// What a pass yielded.
+pub(super) struct Passed {
+    /// For each part, its sums.
+    pub(super) sums: Vec<Vec<(Sum, f64)>>,
+    pub(super) columns: Vec<ColumnOf>,
+    /// For each part, its view.
+    pub(super) view_of: Vec<usize>,
+}
+
+impl Passed {
+    /// Add the parts' sums, in their order.
+    fn add_to(&self, total: &mut NormalEquations, unknowns: &[Unknown]) {
+        let k = unknowns.len();
+        for (sums, &view) in self.sums.iter().zip(&self.view_of) {
+            let gain = unknowns.iter().position(|u| *u == Unknown::Gain(view));
+            let unknown = |i: usize| self.columns[i].unknown.or(gain);
+            let last = self.columns.len();
+            for &(sum, value) in sums {
+                match sum {
+                    Sum::Loss => total.loss += value,
+                    Sum::Product(i, j) if i == last && j == last => total.residual += value,
+                    Sum::Product(i, j) if j == last => {
+                        if let Some(a) = unknown(i) {
+                            total.jtr[a] += value;
+                        }
+                    }
+                    Sum::Product(i, j) => {
+                        let (Some(a), Some(b)) = (unknown(i), unknown(j)) else { continue };
+                        total.jtj[a * k + b] += value;
+                        if a != b {
+                            total.jtj[b * k + a] += value;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

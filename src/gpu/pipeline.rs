@@ -1,0 +1,237 @@
+//! A plan as a pipeline, with what it reads bound to it.
+
+use wgpu::{
+    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
+    BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferUsages, ColorTargetState,
+    ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, FragmentState, IndexFormat,
+    MultisampleState, PipelineCompilationOptions, PipelineLayoutDescriptor, PrimitiveState, RenderPass,
+    RenderPipeline, RenderPipelineDescriptor, SamplerBindingType, ShaderModuleDescriptor, ShaderSource,
+    ShaderStages, StencilState, TextureFormat, TextureSampleType, TextureViewDimension, VertexAttribute,
+    VertexBufferLayout, VertexFormat, VertexState, VertexStepMode,
+};
+
+use super::constants::{self, Values};
+use super::device::Gpu;
+use super::error::GpuError;
+use super::targets::DEPTH;
+use super::upload::{Bound, Uploads};
+use crate::shader::quantity::Kind;
+use crate::shader::{Attribute, Plan};
+
+/// A plan's pipeline, and what is bound to it.
+pub(super) struct Pipeline {
+    pub(super) plan: Plan,
+    pipeline: RenderPipeline,
+    bound: BindGroup,
+    /// The uniform block, where the plan has constants.
+    constants: Option<Buffer>,
+    attributes: Vec<Buffer>,
+    /// The mesh's triangles and how many indices they have; without them three vertices cover the target.
+    mesh: Option<(Buffer, u32)>,
+    /// Targets that it draws into.
+    targets: usize,
+}
+
+/// What a pipeline draws into.
+#[derive(Clone, Copy)]
+pub(super) struct Outputs<'a> {
+    pub(super) formats: &'a [TextureFormat],
+    pub(super) multisamples: u32,
+    /// Whether what is nearer hides what is behind.
+    pub(super) depth: bool,
+}
+
+impl Pipeline {
+    /// The plan's pipeline; `levels` are those that it reads.
+    pub(super) fn new(
+        gpu: &Gpu,
+        plan: Plan,
+        uploads: &mut Uploads,
+        levels: Vec<Bound>,
+        outputs: Outputs<'_>,
+    ) -> Result<Self, GpuError> {
+        let attributes =
+            plan.attributes.iter().map(|&a| uploads.attribute(gpu, a)).collect::<Result<Vec<_>, _>>()?;
+        let mut resources =
+            plan.resources.iter().map(|&r| uploads.resource(gpu, r)).collect::<Result<Vec<_>, _>>()?;
+        resources.extend(levels);
+        let constants = constant_buffer(gpu, &plan);
+        let layout = layout(gpu, &plan);
+        let pipeline = pipeline(gpu, &plan, &layout, outputs);
+        let bound = bind(gpu, &layout, constants.as_ref(), &resources);
+        gpu.check()?;
+        let index_count = 3 * uploads.content().scene.mesh.triangles.len() as u32;
+        let mesh = (!attributes.is_empty()).then(|| (uploads.indices().clone(), index_count));
+        let targets = outputs.formats.len();
+        Ok(Self { plan, pipeline, bound, constants, attributes, mesh, targets })
+    }
+
+    /// Targets that it draws into, depth aside.
+    pub(super) const fn targets(&self) -> usize {
+        self.targets
+    }
+
+    /// Set the constants of what is drawn next; they hold for all that is submitted at once.
+    pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>) {
+        if let Some(buffer) = &self.constants {
+            let block = constants::block(&self.plan.constants, values);
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&block));
+        }
+    }
+
+    /// Draw the mesh, or over the whole target.
+    pub(super) fn draw(&self, pass: &mut RenderPass<'_>) {
+        pass.set_pipeline(&self.pipeline);
+        pass.set_bind_group(0, &self.bound, &[]);
+        for (slot, buffer) in self.attributes.iter().enumerate() {
+            pass.set_vertex_buffer(slot as u32, buffer.slice(..));
+        }
+        match &self.mesh {
+            Some((indices, count)) => {
+                pass.set_index_buffer(indices.slice(..), IndexFormat::Uint32);
+                pass.draw_indexed(0..*count, 0, 0..1);
+            }
+            None => pass.draw(0..3, 0..1),
+        }
+    }
+}
+
+/// A buffer for the plan's constants; what it holds is set before each draw.
+fn constant_buffer(gpu: &Gpu, plan: &Plan) -> Option<Buffer> {
+    let size = constants::block_bytes(&plan.constants, plan.facts.morphs);
+    (size > 0).then(|| gpu.buffer("constants", &vec![0; size], BufferUsages::UNIFORM))
+}
+
+fn layout(gpu: &Gpu, plan: &Plan) -> BindGroupLayout {
+    let entry = |binding, visibility, ty| BindGroupLayoutEntry { binding, visibility, ty, count: None };
+    let constants = (!plan.constants.is_empty()).then(|| {
+        let ty = BindingType::Buffer {
+            ty: BufferBindingType::Uniform,
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        };
+        entry(0, ShaderStages::VERTEX_FRAGMENT, ty)
+    });
+    let resources = plan.resources.iter().enumerate().map(|(i, resource)| {
+        let kind = resource.kind();
+        // Storage is what the vertex stage reads; textures are the fragment stage's.
+        let stage = if kind == Kind::Storage { ShaderStages::VERTEX } else { ShaderStages::FRAGMENT };
+        entry(1 + i as u32, stage, binding_type(kind))
+    });
+    let first = 1 + plan.resources.len() as u32;
+    let levels = (first..).zip(&plan.levels);
+    let levels =
+        levels.map(|(binding, _)| entry(binding, ShaderStages::FRAGMENT, binding_type(Kind::Texels)));
+    let entries: Vec<_> = constants.into_iter().chain(resources).chain(levels).collect();
+    gpu.device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some("plan"), entries: &entries })
+}
+
+fn binding_type(kind: Kind) -> BindingType {
+    let texture = |filterable, view_dimension| BindingType::Texture {
+        sample_type: TextureSampleType::Float { filterable },
+        view_dimension,
+        multisampled: false,
+    };
+    match kind {
+        Kind::Faces => texture(false, TextureViewDimension::D2Array),
+        Kind::Cube => texture(true, TextureViewDimension::Cube),
+        Kind::Texels => texture(false, TextureViewDimension::D2),
+        Kind::Map => texture(true, TextureViewDimension::D2),
+        Kind::Sampler => BindingType::Sampler(SamplerBindingType::Filtering),
+        Kind::Storage => BindingType::Buffer {
+            ty: BufferBindingType::Storage { read_only: true },
+            has_dynamic_offset: false,
+            min_binding_size: None,
+        },
+    }
+}
+
+fn bind(gpu: &Gpu, layout: &BindGroupLayout, constants: Option<&Buffer>, resources: &[Bound]) -> BindGroup {
+    let constants =
+        constants.map(|buffer| BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() });
+    let resources = resources
+        .iter()
+        .enumerate()
+        .map(|(i, bound)| BindGroupEntry { binding: 1 + i as u32, resource: bound.binding() });
+    let entries: Vec<_> = constants.into_iter().chain(resources).collect();
+    gpu.device.create_bind_group(&BindGroupDescriptor { label: Some("plan"), layout, entries: &entries })
+}
+
+fn vertex_format(attribute: Attribute) -> VertexFormat {
+    match attribute {
+        Attribute::Position | Attribute::Normal | Attribute::Corner => VertexFormat::Float32x3,
+        Attribute::Tangent | Attribute::Weights => VertexFormat::Float32x4,
+        Attribute::Uv => VertexFormat::Float32x2,
+        Attribute::Occlusion => VertexFormat::Float32,
+        Attribute::Joints => VertexFormat::Uint32x4,
+        Attribute::Field(field) => match field.info().numbers {
+            1 => VertexFormat::Float32,
+            2 => VertexFormat::Float32x2,
+            _ => VertexFormat::Float32x3,
+        },
+    }
+}
+
+fn pipeline(
+    gpu: &Gpu,
+    plan: &Plan,
+    layout: &BindGroupLayout,
+    Outputs { formats, multisamples, depth }: Outputs<'_>,
+) -> RenderPipeline {
+    let device = &gpu.device;
+    let module = device.create_shader_module(ShaderModuleDescriptor {
+        label: Some("plan"),
+        source: ShaderSource::Wgsl(plan.wgsl.as_str().into()),
+    });
+    let pipeline_layout = device.create_pipeline_layout(&PipelineLayoutDescriptor {
+        label: Some("plan"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: 0,
+    });
+    let attributes: Vec<[VertexAttribute; 1]> = (0_u32..)
+        .zip(&plan.attributes)
+        .map(|(shader_location, &a)| {
+            [VertexAttribute { format: vertex_format(a), offset: 0, shader_location }]
+        })
+        .collect();
+    let buffers: Vec<_> = attributes
+        .iter()
+        .zip(&plan.attributes)
+        .map(|(attributes, a)| {
+            let step_mode = VertexStepMode::Vertex;
+            Some(VertexBufferLayout { array_stride: a.bytes(), step_mode, attributes })
+        })
+        .collect();
+    let targets: Vec<_> = formats
+        .iter()
+        .map(|&format| Some(ColorTargetState { format, blend: None, write_mask: ColorWrites::ALL }))
+        .collect();
+    device.create_render_pipeline(&RenderPipelineDescriptor {
+        label: Some("plan"),
+        layout: Some(&pipeline_layout),
+        vertex: VertexState {
+            module: &module,
+            entry_point: Some("vs_main"),
+            compilation_options: PipelineCompilationOptions::default(),
+            buffers: &buffers,
+        },
+        // Both sides of a triangle are seen, as on the CPU.
+        primitive: PrimitiveState { cull_mode: None, ..PrimitiveState::default() },
+        depth_stencil: depth.then(|| DepthStencilState {
+            format: DEPTH,
+            depth_write_enabled: Some(true),
+            depth_compare: Some(CompareFunction::Greater),
+            stencil: StencilState::default(),
+            bias: DepthBiasState::default(),
+        }),
+        multisample: MultisampleState { count: multisamples, ..MultisampleState::default() },
+        fragment: (!targets.is_empty()).then(|| FragmentState {
+            module: &module,
+            entry_point: Some("fs_main"),
+            compilation_options: PipelineCompilationOptions::default(),
+            targets: &targets,
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}

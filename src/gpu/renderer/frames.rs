@@ -1,0 +1,106 @@
+//! Frames: drawn, read back, and timed.
+
+use wgpu::CommandEncoderDescriptor;
+
+use super::{Renderer, hazy};
+use crate::GpuError;
+use crate::constants::Values;
+use crate::model::terms::TermName;
+use crate::readback::Copy;
+use crate::scene::view::Camera;
+use crate::timing::{PassTime, Timer};
+
+/// What was drawn and read back.
+pub(super) struct Drawn {
+    /// The place of its targets.
+    pub(super) stage: usize,
+    pub(super) planes: Vec<Vec<f32>>,
+    pub(super) times: Vec<PassTime>,
+}
+
+impl Renderer {
+    /// GPU milliseconds of each of so many frames, drawn one right after another with nothing read back: an
+    /// adapter that waits for the CPU between frames lowers its clock. Empty where there are no timestamps.
+    /// Without the bloom.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub fn frame_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
+        let program = self.program(None)?;
+        let stage = self.stage(camera, hazy(self.programs[program].plan()))?;
+        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[stage]);
+        let mut timers = Vec::with_capacity(frames);
+        for _ in 0..frames {
+            for (i, &tile) in stage.targets.tiles.iter().enumerate() {
+                let mut timer = Timer::new(gpu);
+                let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
+                program.set(gpu, &Values { params, camera, tile, morph_weights });
+                let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
+                stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, Some(&mut timer));
+                timer.finish(&mut encoder);
+                gpu.queue.submit([encoder.finish()]);
+                timers.push((i, timer));
+            }
+        }
+        let mut times = Vec::with_capacity(frames);
+        for (tile, mut timer) in timers {
+            timer.collect(gpu)?;
+            let milliseconds: f64 = timer.times.iter().map(|time| time.milliseconds).sum();
+            match times.last_mut() {
+                Some(last) if tile > 0 => *last += milliseconds,
+                _ => times.push(milliseconds),
+            }
+        }
+        Ok(if gpu.timestamps() { times } else { Vec::new() })
+    }
+
+    /// Draw the whole or a term; what follows the mesh's passes where it is to be `finished`.
+    pub(super) fn draw(
+        &mut self,
+        output: Option<TermName>,
+        camera: &Camera,
+        gain: f64,
+        finished: bool,
+    ) -> Result<Drawn, GpuError> {
+        let mut timer = self.options.timed.then(|| Timer::new(&self.gpu));
+        let (stage, copies) = self.submit(output, camera, gain, finished, timer.as_mut())?;
+        let planes = copies.iter().map(|copy| copy.read(&self.gpu)).collect::<Result<Vec<_>, _>>()?;
+        Ok(Drawn { stage, planes, times: timer.map(|timer| timer.times).unwrap_or_default() })
+    }
+
+    /// Have an image drawn: the place of the targets that it is drawn into, and copies of what it is made of. Waits
+    /// only where it is timed.
+    pub(super) fn submit(
+        &mut self,
+        output: Option<TermName>,
+        camera: &Camera,
+        gain: f64,
+        finished: bool,
+        mut timer: Option<&mut Timer>,
+    ) -> Result<(usize, Vec<Copy>), GpuError> {
+        let program = self.program(output)?;
+        let place = self.stage(camera, hazy(self.programs[program].plan()))?;
+        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[place]);
+        let mut copies = Vec::new();
+        let tiles = &stage.targets.tiles;
+        for (i, &tile) in tiles.iter().enumerate() {
+            let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
+            program.set(gpu, &Values { params, camera, tile, morph_weights });
+            let mut encoder =
+                gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
+            stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, timer.as_deref_mut());
+            if i + 1 == tiles.len() {
+                copies = stage.encode_end(gpu, &mut encoder, gain, finished, timer.as_deref_mut());
+            }
+            if let Some(timer) = &timer {
+                timer.finish(&mut encoder);
+            }
+            gpu.queue.submit([encoder.finish()]);
+            if let Some(timer) = &mut timer {
+                timer.collect(gpu)?;
+            }
+            gpu.check()?;
+        }
+        Ok((place, copies))
+    }
+}

@@ -1,0 +1,165 @@
+//! A stage of images: the targets of one size, and what is drawn into them.
+
+use wgpu::{
+    Color, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment, RenderPassDepthStencilAttachment,
+    RenderPassDescriptor, RenderPassTimestampWrites, StoreOp, TextureView,
+};
+
+use super::bloom::Finish;
+use super::device::Gpu;
+use super::program::Program;
+use super::readback::Copy;
+use super::resolve::Resolve;
+use super::targets::{Planes, Targets, Tile};
+use super::timing::Timer;
+use crate::render::image::Image;
+
+/// Targets, and the passes after the mesh's.
+pub(super) struct Stage {
+    pub(super) targets: Targets,
+    pub(super) resolve: Option<Resolve>,
+    pub(super) finish: Option<Finish>,
+}
+
+impl Stage {
+    /// The image of a frame that is finished: the last passes have the gain in them already.
+    pub(super) fn finished_image(&self, planes: &[Vec<f32>], gain: f64) -> (Image, usize) {
+        self.image(planes, if self.finish.is_some() { 1.0 } else { gain as f32 })
+    }
+
+    /// Draw the mesh into a tile, and its samples into the image.
+    pub(super) fn encode_tile(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut CommandEncoder,
+        program: &Program,
+        tile: Tile,
+        first: bool,
+        mut timer: Option<&mut Timer>,
+    ) {
+        if first {
+            program.prepare(encoder, timer.as_deref_mut());
+        }
+        let targets = &self.targets;
+        let drawn = targets.samples.as_ref().unwrap_or(&targets.pixels);
+        let attachments = match &targets.multisampled {
+            Some(multisampled) => attached(multisampled, Some(drawn), true),
+            None => attached(drawn, None, true),
+        };
+        let depth = RenderPassDepthStencilAttachment {
+            view: &targets.depth,
+            depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
+            stencil_ops: None,
+        };
+        {
+            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+                label: Some("raster"),
+                color_attachments: &attachments,
+                depth_stencil_attachment: Some(depth),
+                timestamp_writes: timer.as_mut().and_then(|timer| timer.around("raster")),
+                ..RenderPassDescriptor::default()
+            });
+            let n = targets.key.antialias.grid();
+            let (width, height) = ((n * tile.width) as f32, (n * tile.height) as f32);
+            pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
+            program.draw(&mut pass);
+        }
+        if let Some(resolve) = &self.resolve {
+            resolve.set(gpu, tile);
+            let attachments = attached(&targets.pixels, None, first);
+            let times = timer.as_mut().and_then(|timer| timer.around("resolve"));
+            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+                label: Some("resolve"),
+                color_attachments: &attachments,
+                timestamp_writes: times,
+                ..RenderPassDescriptor::default()
+            });
+            resolve.draw(&mut pass, tile);
+        }
+        if let (Some(resolve), Some(glow)) = (&self.resolve, &targets.glow) {
+            let times = timer.as_mut().and_then(|timer| timer.around("resolve, glow"));
+            let load = if first { LoadOp::Clear(Color::TRANSPARENT) } else { LoadOp::Load };
+            over(encoder, glow, load, times, |pass| resolve.draw_glow(pass, tile));
+        }
+    }
+
+    /// After the last tile: what stands behind the mesh and the bloom, where it is to be `finished`, and copies of what
+    /// the image is made of.
+    pub(super) fn encode_end(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut CommandEncoder,
+        gain: f64,
+        finished: bool,
+        mut timer: Option<&mut Timer>,
+    ) -> Vec<Copy> {
+        let Some(finish) = self.finish.as_ref().filter(|_| finished) else {
+            return self.targets.pixels.views().map(|view| Copy::new(gpu, encoder, view)).collect();
+        };
+        finish.set(gpu, gain);
+        let clear = LoadOp::Clear(Color::TRANSPARENT);
+        if let Some(blurred) = finish.blurred() {
+            let times = timer.as_mut().and_then(|timer| timer.around("bloom, rows"));
+            over(encoder, blurred, clear, times, |pass| finish.draw_across(pass));
+        }
+        let last = if finish.blurred().is_some() { "bloom, columns" } else { "backdrop" };
+        let times = timer.as_mut().and_then(|timer| timer.around(last));
+        over(encoder, &finish.whole, clear, times, |pass| finish.draw_last(pass));
+        vec![Copy::new(gpu, encoder, &finish.whole)]
+    }
+
+    /// The image of those planes, and how many of its pixels reached the end of the targets' range.
+    pub(super) fn image(&self, planes: &[Vec<f32>], gain: f32) -> (Image, usize) {
+        let key = &self.targets.key;
+        let largest = key.precision.largest();
+        let mut image = Image::new(key.width as usize, key.height as usize);
+        let mut clipped = 0;
+        let texels = planes[0].chunks_exact(4);
+        for (i, texel) in texels.enumerate() {
+            let rgb = [texel[0], texel[1], texel[2]].map(|x| x.clamp(-largest, largest));
+            clipped += usize::from(rgb.iter().any(|x| x.abs() >= largest));
+            image.rgb[i] = rgb.map(|x| gain * x);
+            image.alpha[i] = planes.get(1).map_or(texel[3], |coverage| coverage[i]);
+        }
+        (image, clipped)
+    }
+}
+
+/// Planes as a pass's attachments, resolved into others where those are given.
+fn attached<'a>(
+    planes: &'a Planes,
+    resolved: Option<&'a Planes>,
+    clear: bool,
+) -> Vec<Option<RenderPassColorAttachment<'a>>> {
+    let mut resolved = resolved.map(Planes::views);
+    let attachment = |view: &'a TextureView| {
+        let resolve_target = resolved.as_mut().and_then(Iterator::next);
+        let load = if clear { LoadOp::Clear(Color::TRANSPARENT) } else { LoadOp::Load };
+        let store = if resolve_target.is_some() { StoreOp::Discard } else { StoreOp::Store };
+        Some(RenderPassColorAttachment {
+            view,
+            depth_slice: None,
+            resolve_target,
+            ops: Operations { load, store },
+        })
+    };
+    planes.views().map(attachment).collect()
+}
+
+/// A pass over the whole of `view`.
+fn over(
+    encoder: &mut CommandEncoder,
+    view: &TextureView,
+    load: LoadOp<Color>,
+    timestamp_writes: Option<RenderPassTimestampWrites<'_>>,
+    draw: impl FnOnce(&mut wgpu::RenderPass<'_>),
+) {
+    let ops = Operations { load, store: StoreOp::Store };
+    let attachment = RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops };
+    let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+        color_attachments: &[Some(attachment)],
+        timestamp_writes,
+        ..RenderPassDescriptor::default()
+    });
+    draw(&mut pass);
+}
