@@ -12,6 +12,7 @@ use super::maps::Maps;
 use super::mesh::Mesh;
 use super::settings::{interval, number, short};
 use crate::model::effects::{Effect, Effects, Form, Needs};
+use crate::model::fields::Fields;
 
 /// The mesh of a scene through its animation 0.
 pub struct Animation {
@@ -128,7 +129,7 @@ pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose:
         morphs: effects.has(Effect::Morph),
         morph_weights: pose.morph_weights.clone(),
         bones: effects.has(Effect::Skin),
-        fields: needs.fields,
+        fields: Fields::of(needs.fields.iter().filter(|field| field.is_of_vertices())),
         time: pose.time.filter(|_| effects.has_any(&[Effect::Morph, Effect::Skin])),
         clip: false,
     }

@@ -3,6 +3,7 @@ use std::sync::OnceLock;
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 use super::*;
+use crate::bake::rays::RayMesh;
 use crate::bake::{Illumination, LobeStack};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::reference::{Reference, deviation};
@@ -15,9 +16,9 @@ use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Params};
 use crate::program::lower::Natives;
 use crate::program::shading::Shading;
-use crate::samples::SurfaceRecords;
 use crate::samples::rows::Rows;
 use crate::samples::surface_records::{Asked, NEUTRAL, Unmade};
+use crate::samples::{PosedSurface, SurfaceRecords};
 use crate::scene::Loss;
 use crate::scene::maps::Maps;
 use crate::scene::mesh::PosedMesh;
@@ -178,7 +179,9 @@ fn square() -> PosedMesh {
 
 fn atlas(setup: &Setup) -> Arc<Atlas> {
     let open = [0.2, 0.9, 0.6, 0.4];
-    Arc::new(Atlas::new(setup, &square(), Some(&open), &Maps::default(), SIZE).unwrap())
+    let (mesh, rays) = (square(), RayMesh::new(&[], &[]));
+    let surface = PosedSurface::bare(&mesh, &rays, Some(open.to_vec()));
+    Arc::new(Atlas::new(setup, &surface, &Maps::default(), SIZE).unwrap())
 }
 
 /// Sixteen times sixteen pixels over the square, one sample each, the first of them beyond the chart.

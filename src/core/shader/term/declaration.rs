@@ -2,6 +2,7 @@
 
 use super::error::{Problem, TermError};
 use super::texels::{LEVEL_TYPES, blur, domains_of, kernel};
+use crate::model::fields::Found;
 use crate::model::params::{LARGEST, Scale};
 use crate::model::registry::leaked;
 use crate::shader::domain::Domain;
@@ -49,16 +50,18 @@ pub(super) struct DeclaredParameter {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredField {
     pub(super) name: &'static str,
+    pub(super) of: Found,
     pub(super) wgsl: &'static str,
     pub(super) neutral: f32,
     pub(super) meaning: &'static str,
 }
 
 /// The keys that a header may have.
-const KEYS: [&str; 16] = [
+const KEYS: [&str; 17] = [
     "effect",
     "parameter",
     "field",
+    "sample_field",
     "gives",
     "adds",
     "shows",
@@ -129,7 +132,7 @@ impl Declaration {
         for &(at, words) in header {
             let (key, value) = words.split_once(": ").map_or(("", words), |(key, value)| (key, value.trim()));
             match KEYS.iter().find(|known| **known == key) {
-                Some(&"effect" | &"parameter" | &"field") => {
+                Some(&"effect" | &"parameter" | &"field" | &"sample_field") => {
                     self.declare(at, key, value)?;
                     // What stood before belongs to the file.
                     rule.about.clear();
@@ -172,13 +175,17 @@ impl Declaration {
             return Ok(());
         }
         let misplaced = |key| Problem::Misplaced { key }.at(line);
-        if key == "field" {
+        if let Some(of) = [("field", Found::Vertices), ("sample_field", Found::Samples)]
+            .into_iter()
+            .find(|(known, _)| *known == key)
+            .map(|(_, of)| of)
+        {
             if !self.rules.is_empty() {
                 return Err(misplaced("field"));
             }
             let wanted = "NAME: TYPE = NEUTRAL; what it is. The type is f32, vec2f or vec3f, and the number what stands \
                           in for each of a mesh that lacks it";
-            let field = field(value)
+            let field = field(of, value)
                 .ok_or_else(|| Problem::Value { key: "field", given: value.to_owned(), wanted }.at(line))?;
             self.fields.push((line, field));
             return Ok(());
@@ -247,14 +254,14 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
     Ok(())
 }
 
-fn field(value: &'static str) -> Option<DeclaredField> {
+fn field(of: Found, value: &'static str) -> Option<DeclaredField> {
     let (typed, meaning) = value.split_once(';')?;
     let (name, rest) = typed.split_once(':')?;
     let (wgsl, neutral) = rest.split_once('=')?;
     let (name, wgsl, meaning) = (name.trim(), wgsl.trim(), meaning.trim());
     let neutral = number(neutral)? as f32;
     let known = LEVEL_TYPES.contains(&wgsl) && neutral.is_finite() && !meaning.is_empty();
-    known.then_some(DeclaredField { name, wgsl, neutral, meaning })
+    known.then_some(DeclaredField { name, of, wgsl, neutral, meaning })
 }
 
 fn parameter(value: &'static str) -> Option<DeclaredParameter> {
