@@ -23,6 +23,8 @@ mod fits;
 mod fixtures;
 mod graphics;
 mod instructions;
+mod light_files;
+mod lights;
 mod meshes;
 mod occlusion;
 mod phases;

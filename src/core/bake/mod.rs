@@ -7,18 +7,20 @@
 //! - [`lobes`]: the stack of specular cubes over the exponent
 //! - [`occlusion`]: per-vertex ambient occlusion (`low_discrepancy`: its rays)
 //! - [`rays`]: the mesh as rays see it
+//! - [`sky_lights`]: the panorama's brightest spots as lights
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
 mod baker;
 pub mod cache;
 mod lobe_kernel;
 pub mod lobes;
-mod low_discrepancy;
+pub(crate) mod low_discrepancy;
 pub mod occlusion;
 pub mod panorama;
 pub mod prefilter;
 mod pyramid;
 pub mod rays;
+pub mod sky_lights;
 
 use std::ops::RangeInclusive;
 use std::path::Path;

@@ -91,6 +91,14 @@ impl RayMesh {
         !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
     }
 
+    /// Whether a triangle stands between two points, seen from either side.
+    #[must_use]
+    pub fn between(&self, from: Vec3A, to: Vec3A) -> bool {
+        let Some(bvh) = &self.bvh else { return false };
+        let ray = Ray { tmax: 1.0, ..ray(from, to - from, 0.0) };
+        !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
+    }
+
     /// The nearest triangle along the ray, by `intersect`: the distance at which the ray meets a
     /// triangle (by its index in the mesh), or infinity.
     pub fn nearest(
@@ -168,6 +176,14 @@ mod tests {
                     },
                 );
             assert_eq!(found, Some(MANY as u32), "{hidden:?}");
+        }
+    }
+
+    #[test]
+    fn what_stands_behind_the_further_point_is_not_between() {
+        let mesh = RayMesh::new(&across(2.0), &[[0, 1, 2]]);
+        for (to, want) in [(1.9, false), (2.1, true), (1e9, true), (-1e9, false), (0.0, false)] {
+            assert_eq!(mesh.between(Vec3A::ZERO, to * Vec3A::Z), want, "{to}");
         }
     }
 

@@ -13,6 +13,7 @@
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
 //! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
+//! - [`visibility`]: how much of a light reaches a place of the mesh
 //! - [`atlas`]: texels of the UV atlas, samples of the mesh as well
 
 pub mod atlas;
@@ -24,6 +25,7 @@ mod surface;
 pub mod surface_records;
 pub mod targets;
 mod trace;
+pub mod visibility;
 
 use std::ops::Range;
 use std::sync::Arc;

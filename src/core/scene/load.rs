@@ -10,11 +10,11 @@ use super::dapple::dapple;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, SceneFile, Source};
 use super::gltf::{Ask, Document};
-use super::maps::{Environment, Map, Maps};
+use super::maps::{Environment, Map, Maps, Spots};
 use super::settings::{self, interval, number};
 use super::terms::terms;
 use super::view::{Background, View};
-use super::{FitSettings, Scene, images};
+use super::{FitSettings, Scene, images, lights};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Needs};
 use crate::model::evaluate::Setup;
@@ -62,6 +62,8 @@ impl Scene {
         let lookups = settings::lookups(&source, &file.model)?;
         let dapple = read_dapple(&source, &file)?;
         let params = settings::params(&source, &file.model.params, form)?;
+        let mut lights = lights::plan(&source, &file.light)?;
+        file.environment.as_ref().map(|table| spots(&source, table)).transpose()?;
         let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
@@ -100,6 +102,9 @@ impl Scene {
         let ask = Ask { clip: options.clip, ..ask(&maps, form, effects, needs, &pose) };
         let mesh = document.mesh(&ask, &mut warnings)?;
         idle_effects(&document, effects, &mesh, &mut warnings)?;
+        if file.mesh.lights {
+            document.lights(ask.time, &mut lights, &mut warnings)?;
+        }
         drop(document);
         bar.inc(1);
         // Targets have a background of their own; it is a picture that shows the environment.
@@ -119,6 +124,7 @@ impl Scene {
             metres_per_unit,
             maps,
             environment,
+            lights,
             form,
             silhouette,
             lookups,
@@ -231,10 +237,11 @@ fn read_environment(
             format!("Add [environment] with a lat-long EXR or HDR file, or {otherwise}"),
         ));
     };
-    let (rotation_degrees, intensity) = light(source, table)?;
+    let (rotation_degrees, intensity) = turn_and_intensity(source, table)?;
     Ok(Environment {
         rotation_degrees,
         intensity,
+        spots: spots(source, table)?,
         panorama: images::panorama(&folder.join(&table.file), warnings)?,
     })
 }
@@ -243,7 +250,7 @@ fn read_environment(
 const MOST_DEGREES: f64 = 36_000.0;
 
 /// The numbers of `[environment]`: its turn in degrees, and its intensity.
-fn light(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneError> {
+fn turn_and_intensity(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneError> {
     let turn = number(
         source,
         table.rotation_degrees.as_ref(),
@@ -257,10 +264,28 @@ fn light(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneE
     Ok((turn, intensity))
 }
 
+/// Each light costs shadows of its own.
+const MOST_SPOTS: i64 = 64;
+/// Below it a spot is about a texel of a panorama of 8192 columns, above it no light from one direction.
+const SPOT_DEGREES: [f64; 2] = [0.05, 45.0];
+
+/// Which spots of the panorama become lights.
+fn spots(source: &Source, table: &EnvironmentTable) -> Result<Spots, SceneError> {
+    let default = Spots::default();
+    let [least, most] = SPOT_DEGREES;
+    let wanted = format!("degrees in {}", interval(least, most));
+    let given = table.light_spot_degrees.as_ref();
+    let degrees = number(source, given, default.degrees, "light_spot_degrees", &wanted, |degrees| {
+        (least..=most).contains(&degrees)
+    })?;
+    let count = settings::whole(source, table.lights.as_ref(), "lights", [0, MOST_SPOTS], default.count)?;
+    Ok(Spots { count, degrees })
+}
+
 /// Where light falls through leaves from, in the environment as it is turned.
 fn read_dapple(source: &Source, file: &SceneFile) -> Result<Dapple, SceneError> {
     let Some(table) = &file.environment else { return Ok(Dapple::default()) };
-    let (degrees, _) = light(source, table)?;
+    let (degrees, _) = turn_and_intensity(source, table)?;
     dapple(source, table.dapple.as_ref(), degrees)
 }
 
@@ -273,6 +298,8 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let (form, _) = settings::form(&source, &file.model)?;
     settings::lookups(&source, &file.model)?;
     settings::params(&source, &file.model.params, form)?;
+    lights::plan(&source, &file.light)?;
+    file.environment.as_ref().map(|table| spots(&source, table)).transpose()?;
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;

@@ -64,4 +64,22 @@ pub struct Environment {
     pub rotation_degrees: f64,
     /// Factor on the radiance.
     pub intensity: f64,
+    /// What of it becomes lights of their own.
+    pub spots: Spots,
+}
+
+/// The brightest spots of a panorama, to be taken out as directional lights
+/// ([`sky_lights`](crate::bake::sky_lights)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spots {
+    /// How many, at most.
+    pub count: u32,
+    /// The angle around its middle, degrees, within which all light is a spot's.
+    pub degrees: f64,
+}
+
+impl Default for Spots {
+    fn default() -> Self {
+        Self { count: 0, degrees: 4.0 }
+    }
 }

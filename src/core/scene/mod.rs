@@ -3,8 +3,9 @@
 //! - [`mesh`]: the mesh as loaded, and posed
 //! - [`view`]: cameras and targets
 //! - [`maps`]: texture maps and the panorama
+//! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
-//!   `settings`, `cameras` and `dapple`
+//!   `settings`, `cameras`, `lights` and `dapple`
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
@@ -24,6 +25,8 @@ pub mod facts;
 mod file;
 mod gltf;
 pub mod images;
+pub mod light;
+mod lights;
 pub mod load;
 pub mod map_fit;
 pub mod maps;
@@ -39,6 +42,7 @@ pub use assignment::Assignment;
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub use file::{Source, check_text};
+pub use light::{Light, LightKind};
 pub use load::LoadOptions;
 pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
@@ -66,6 +70,9 @@ pub struct Scene {
     pub maps: maps::Maps,
     /// The environment; absent when no effect asks for it.
     pub environment: Option<maps::Environment>,
+    /// The lights that the scene file and, where it says so, the mesh file name, in the world; those of the panorama
+    /// are not among them.
+    pub lights: Vec<Light>,
     /// Which reading of the listings.
     pub form: Form,
     /// Where S.z is evaluated.

@@ -76,7 +76,8 @@ fn map<const C: usize>(map: Option<&Map<C>>) -> String {
 }
 
 fn environment(environment: Option<&Environment>) -> String {
-    let Some(Environment { panorama, rotation_degrees, intensity }) = environment else {
+    // No effect looks at its lights.
+    let Some(Environment { panorama, rotation_degrees, intensity, spots: _ }) = environment else {
         return NONE.to_owned();
     };
     let of = Hash::default().words(&[panorama.width, panorama.height]).words(&[rotation_degrees, intensity]);

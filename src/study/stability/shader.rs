@@ -209,6 +209,7 @@ fn scene() -> Scene {
         },
         quality: Quality::default(),
         bloom: Bloom::default(),
+        lights: Vec::new(),
         diffusion: Diffusion::default(),
     }
 }
