@@ -28,7 +28,7 @@ pub mod signed;
 mod tables;
 mod words;
 
-pub use words::{count, number, seconds};
+pub use words::{count, held_out, number, seconds};
 
 // What other members of the workspace hold stands under the names that it has there.
 use skinfit_core::{engine, fit, model, output, prepare, progress, render, scene};
@@ -68,7 +68,7 @@ pub struct RunInfo {
     pub samples: u64,
     /// Seconds spent in each stage.
     pub seconds: StageSeconds,
-    /// The images, in the order of the scene's views.
+    /// The images, in the order of the scene's views; those of views that were held out come last.
     pub views: Vec<ViewEvidence>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -103,6 +103,8 @@ pub struct ViewEvidence {
     pub places: Places,
     /// Where an 8-bit target is clipped.
     pub clip: Option<Clip>,
+    /// Whether it took no part in the fit, which is only scored on it.
+    pub held_out: bool,
 }
 
 /// What [`write_run`] wrote.
@@ -153,7 +155,8 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
     for view in &run.views {
         view.check()?;
     }
-    let misfit = Misfit::of(&run.views);
+    // What the fit gets wrong of what it was to match; on the rest it is only scored.
+    let misfit = Misfit::of(run.fitted());
     let mut warnings = run.warnings.clone();
     let mut written = Vec::new();
     let (mut views, mut shown) = (Vec::new(), Vec::new());
@@ -164,14 +167,14 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
         let scores = comparison.scores();
         warnings.extend(view.warnings(scores.is_some()));
         let png = folder.join(format!("{stem}.png"));
-        let sheet = pictures::side_by_side(&view.name, &view.target, &view.fit, &comparison, scores);
+        let sheet = pictures::side_by_side(&view.title(), &view.target, &view.fit, &comparison, scores);
         files::write_png_bytes(&png, sheet.width, sheet.height, &sheet.bytes)?;
         let exr = folder.join(format!("{stem}_terms.exr"));
         let haze = ("haze".to_owned(), view.haze.as_slice());
         let planes = if view.haze.is_empty() { &[][..] } else { std::slice::from_ref(&haze) };
         files::write_exr_layers(&exr, &view.fit, &view.terms, planes, &options)?;
         written.extend([png, exr]);
-        views.push(ViewSummary::new(scores, comparison.pixels()));
+        views.push(ViewSummary::new(scores, comparison.pixels(), view.held_out));
         shown.push(Picture::of_error(&comparison, view.fit.width));
         bar.inc(1);
     }
@@ -255,6 +258,12 @@ fn is_ours(name: &str) -> bool {
 }
 
 impl RunInfo {
+    /// The views that took part in the fit.
+    fn fitted(&self) -> &[ViewEvidence] {
+        let end = self.views.iter().position(|view| view.held_out).unwrap_or(self.views.len());
+        &self.views[..end]
+    }
+
     /// Where the numbers come from, as (name, text).
     fn provenance(&self) -> Vec<(String, String)> {
         let own = [("software", software()), ("scene", self.scene.clone())];
@@ -284,6 +293,12 @@ fn software() -> String {
 }
 
 impl ViewEvidence {
+    /// Its name, and whether it was held out.
+    fn title(&self) -> String {
+        let name = &self.name;
+        if self.held_out { format!("{name} (held out)") } else { name.clone() }
+    }
+
     fn check(&self) -> Result<(), ReportError> {
         let (width, height) = (self.fit.width, self.fit.height);
         let fits = |image: &Image| {
@@ -379,6 +394,7 @@ mod tests {
             haze: Vec::new(),
             places: Places::default(),
             clip: None,
+            held_out: false,
         };
         let views = ["front", "Front", "../up", "", "a/b", "a:b", "größe"].map(view);
         let stems = file_stems(&views);

@@ -8,6 +8,7 @@ mod constants;
 mod damaged;
 mod exported;
 mod graphics;
+mod held_out;
 mod interrupted;
 mod maps;
 mod outputs;

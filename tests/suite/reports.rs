@@ -66,7 +66,7 @@ fn ball(name: &str, side: usize, light: [f32; 3]) -> ViewEvidence {
     });
     let places = Places { facing: facing.collect(), ..Places::default() };
     let (name, terms) = (name.to_owned(), terms.to_vec());
-    ViewEvidence { name, target, fit, coverage, terms, haze: Vec::new(), places, clip: None }
+    ViewEvidence { name, target, fit, coverage, terms, haze: Vec::new(), places, clip: None, held_out: false }
 }
 
 fn run() -> RunInfo {

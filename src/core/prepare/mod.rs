@@ -5,12 +5,14 @@
 //! - [`Baked`]: it and its light and occlusion
 //! - [`Sampled`]: these and the visible surface of each view
 //! - [`Observed`]: of the views that have a target, samples beside what was observed there
+//! - [`HeldOut`]: views that are taken out of a scene before its fit, to score it on
 //!
 //! A stage reads as the ones before it: `observed.scene`, `sampled.illumination`. Renderers start from a [`Baked`],
 //! engines from an [`Observed`].
 
 mod baked;
 mod error;
+mod held_out;
 mod loaded;
 mod observed;
 mod options;
@@ -18,6 +20,7 @@ mod sampled;
 
 pub use self::baked::Baked;
 pub use self::error::PrepareError;
+pub use self::held_out::HeldOut;
 pub use self::loaded::Loaded;
 pub use self::observed::Observed;
 pub use self::options::{ClipOcclusion, PrepareOptions, Views};

@@ -174,12 +174,25 @@ pub fn sample_views(
     posed: &PosedMesh,
     occlusion: Option<&VertexOcclusion>,
 ) -> Result<Vec<ViewSamples>, SampleError> {
+    sample_these(scene, &scene.views, posed, occlusion)
+}
+
+/// As [`sample_views`], of other views than the scene's own.
+///
+/// # Errors
+/// As of [`sample_views`].
+pub fn sample_these(
+    scene: &Scene,
+    views: &[View],
+    posed: &PosedMesh,
+    occlusion: Option<&VertexOcclusion>,
+) -> Result<Vec<ViewSamples>, SampleError> {
     check_uvs(scene, &posed.uvs)?;
     let open = posed_occlusion(scene, &scene.mesh.morphs, posed.positions.len(), occlusion)?;
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
     let atlas = atlas_of(scene, posed, open.as_deref())?;
-    let bar = progress::bar("samples", scene.views.len() as u64);
-    let views = scene.views.iter().map(|view| {
+    let bar = progress::bar("samples", views.len() as u64);
+    let views = views.iter().map(|view| {
         let mut samples = sample_view(scene, posed, &rays, open.as_deref(), &view.camera);
         samples.atlas.clone_from(&atlas);
         bar.inc(1);

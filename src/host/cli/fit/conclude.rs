@@ -16,7 +16,7 @@ use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
 use crate::engine::Engine;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::params_file::{Origin, ParamsFile};
-use crate::prepare::Baked;
+use crate::prepare::{Baked, HeldOut};
 use crate::report::{self, RunInfo, ViewEvidence};
 use crate::scene::Scene;
 
@@ -34,13 +34,13 @@ pub(super) fn conclude(
     solving: Solving,
     folder: &RunFolder,
     Fitted { path, maps, begun }: Fitted<'_>,
-    baked: &Baked,
+    (baked, held): (&Baked, &HeldOut),
     chosen: &SelectedEngine,
     outcome: &Outcome,
 ) -> Result<Exit, Refusal> {
     let engine = &*chosen.engine;
     let clock = Instant::now();
-    let views = evidence(baked, engine, outcome)?;
+    let views = evidence((baked, held), engine, &outcome.end)?;
     let mut seconds = baked.seconds;
     seconds.samples = engine.own_sample_seconds().unwrap_or(seconds.samples);
     // Of every process that had a part in it, where the fit was resumed.
@@ -49,7 +49,7 @@ pub(super) fn conclude(
     let maps_named = maps.map_or(&[][..], |left| &left.named);
     let named = folder.write_scene(path, Changes { maps: maps_named, ..changes(arguments, baked) })?;
     let origin = Origin { scene: path, outcome: Some(outcome), set: arguments.set.checked() };
-    params_file(baked, outcome).write(&folder.path().join("params.toml"), origin)?;
+    params_file((baked, held), outcome).write(&folder.path().join("params.toml"), origin)?;
     let mut run = RunInfo { seconds, named, ..run_info(arguments, solving, path, baked, engine, views) };
     if let Some(left) = maps {
         tell_warnings(&left.warnings);
@@ -67,7 +67,7 @@ pub(super) fn conclude(
     } else {
         // All that there was to do is done: reading, bakes, samples, the fit, its pictures and the report.
         let times = Times { whole: begun.elapsed().as_secs_f64(), samples: seconds.samples };
-        tell_run(folder.path(), &baked.scene.views, chosen, outcome, &report.summary.misfit, times)?;
+        tell_run(folder.path(), &baked.scene.views, chosen, outcome, &report.summary, times)?;
     }
     let advice = match maps {
         Some(left) => advice_on_maps(arguments, folder.path(), left, outcome),
@@ -94,14 +94,17 @@ fn changes<'a>(arguments: &'a Arguments, baked: &'a Baked) -> Changes<'a> {
 }
 
 /// The fitted parameters, to be used again.
-fn params_file(baked: &Baked, outcome: &Outcome) -> ParamsFile {
+fn params_file((baked, held): (&Baked, &HeldOut), outcome: &Outcome) -> ParamsFile {
     let names = baked.scene.views.iter().map(|view| view.name.clone());
+    let gains = names.zip(outcome.end.gains.iter().copied());
+    // They stand after those that were fitted, whose numbers the unknowns know.
+    let others = held.views.iter().map(|view| view.name.clone()).zip(held.gains.iter().copied());
     ParamsFile {
         form: baked.scene.form,
         effects: Some(baked.scene.effects),
         loss: Some(baked.scene.fit.loss),
         params: outcome.end.params.clone(),
-        gains: names.zip(outcome.end.gains.iter().copied()).collect(),
+        gains: gains.chain(others).collect(),
     }
 }
 
@@ -118,6 +121,7 @@ fn run_info(
         None => "the built-in scene".to_owned(),
     };
     let set = arguments.set.words();
+    let held: Vec<String> = views.iter().filter(|view| view.held_out).map(|view| view.name.clone()).collect();
     let effects: Vec<&str> = baked.scene.effects.iter().map(crate::model::effects::Effect::name).collect();
     RunInfo {
         scene,
@@ -136,6 +140,7 @@ fn run_info(
         ]
         .into_iter()
         .chain((!set.is_empty()).then(|| ("set".to_owned(), set.join(", "))))
+        .chain((!held.is_empty()).then(|| ("held out".to_owned(), held.join(", "))))
         .chain(engine.provenance())
         .collect(),
         made: made(),

@@ -2,10 +2,9 @@
 
 use crate::cli::Refusal;
 use crate::cli::fit_engine::surfaced_views;
-use crate::engine::Engine;
 use crate::engine::view::ObservedView;
-use crate::fit::outcome::Outcome;
-use crate::prepare::Baked;
+use crate::engine::{Engine, Point};
+use crate::prepare::{Baked, HeldOut};
 use crate::progress;
 use crate::render::image::Image;
 use crate::render::places::places;
@@ -13,22 +12,24 @@ use crate::render::shade::Shader;
 use crate::report::ViewEvidence;
 use crate::scene::view::View;
 
-/// For each view the target, the fit and its terms.
+/// For each view the target, the fit and its terms; those of views that were held out come last.
 pub(super) fn evidence(
-    baked: &Baked,
+    (baked, held): (&Baked, &HeldOut),
     engine: &dyn Engine,
-    outcome: &Outcome,
+    end: &Point,
 ) -> Result<Vec<ViewEvidence>, Refusal> {
     let observed = surfaced_views(engine)?;
-    let shader = Shader::new(baked.setup(), &baked.illumination, &outcome.end.params)?;
-    let bar = progress::bar("pictures", baked.scene.views.len() as u64);
-    let views = baked.scene.views.iter().zip(observed.iter()).enumerate();
-    let evidence = views
-        .map(|(index, (view, observed))| {
-            let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
+    let shader = Shader::new(baked.setup(), &baked.illumination, &end.params)?;
+    let fitted = baked.scene.views.iter().zip(observed.iter()).zip(&end.gains).map(|view| (view, false));
+    let others = held.views.iter().zip(&held.observed).zip(&held.gains).map(|view| (view, true));
+    let bar = progress::bar("pictures", (baked.scene.views.len() + held.views.len()) as u64);
+    let evidence = fitted
+        .chain(others)
+        .map(|(((view, observed), &gain), held_out)| {
+            let shaded = shader.shade(&observed.samples, &view.camera, gain);
             let (target, coverage) = compared(view, observed, &shaded.image);
             bar.inc(1);
-            Ok(ViewEvidence {
+            ViewEvidence {
                 name: view.name.clone(),
                 target,
                 fit: shaded.image,
@@ -43,15 +44,16 @@ pub(super) fn evidence(
                     &observed.samples,
                     baked.setup(),
                     &baked.illumination,
-                    &outcome.end.params,
+                    &end.params,
                     [view.camera.width, view.camera.height].map(|side| side as usize),
                 ),
                 clip: observed.clip,
-            })
+                held_out,
+            }
         })
         .collect();
     bar.finish_and_clear();
-    evidence
+    Ok(evidence)
 }
 
 /// The target as an image, and how much of each pixel is compared.

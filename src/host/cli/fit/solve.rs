@@ -14,7 +14,7 @@ use crate::fit::state::Saved;
 use crate::fit::state::StateError;
 use crate::fit::{self, FitError, FitOptions, SolverKind};
 use crate::output::OutputError;
-use crate::prepare::Observed;
+use crate::prepare::{HeldOut, Observed};
 use crate::progress;
 
 /// How the unknowns are searched for: as the command line says, else as the fit that is resumed was
@@ -48,7 +48,7 @@ pub(super) fn solve(
     arguments: &Arguments,
     solving: Solving,
     folder: &RunFolder,
-    observed: &Observed,
+    (observed, held): (&Observed, &HeldOut),
     engine: &dyn Engine,
     interrupt: &Interrupt,
 ) -> Result<Outcome, Refusal> {
@@ -68,7 +68,7 @@ pub(super) fn solve(
         max_iterations: arguments.max_iterations,
         starts: solving.starts,
         seed: solving.seed,
-        fingerprint: fingerprint(&observed.scene),
+        fingerprint: fingerprint(&observed.scene, held),
         resume: arguments.resume.then(|| state.clone()),
         state: (!maps).then_some(state),
         interrupt: Some(interrupt.watch()),

@@ -9,6 +9,8 @@ use crate::cli::{Refusal, say};
 use crate::engine::Unknown;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::report::errors::{basis_in_words, profile_in_words};
+use crate::report::held_out;
+use crate::report::json::Summary;
 use crate::report::misfit::Misfit;
 use crate::scene::view::View;
 
@@ -27,12 +29,15 @@ pub(super) fn tell_run(
     views: &[View],
     chosen: &SelectedEngine,
     outcome: &Outcome,
-    misfit: &Misfit,
+    summary: &Summary,
     times: Times,
 ) -> Result<(), Refusal> {
     let (engine, sample_seconds) = (&chosen.engine, times.samples);
     tell_outcome(outcome, views, times.whole)?;
-    tell_misfit(misfit)?;
+    tell_misfit(&summary.misfit)?;
+    if let Some(words) = held_out(summary) {
+        say(&words)?;
+    }
     if engine.name() == "gpu" {
         let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
         say(&format!("{} samples made by the {by} in {sample_seconds:.3} s", engine.samples()))?;
@@ -118,13 +123,16 @@ pub(super) fn advice_on_maps(
     outcome: &Outcome,
 ) -> Option<String> {
     if left.evidence.interrupted {
-        return Some(format!("the fit of the maps was interrupted. {}", arguments.maps.advice(folder)));
+        return Some(format!(
+            "the fit of the maps was interrupted. {}",
+            arguments.maps.advice(folder, &arguments.hold_out)
+        ));
     }
     let iterations = outcome.iterations;
     match outcome.ending {
         Ending::Interrupted => Some(format!(
             "the last solve of the constants was interrupted after {iterations} iterations; the maps are fitted. {}",
-            arguments.maps.advice(folder)
+            arguments.maps.advice(folder, &arguments.hold_out)
         )),
         Ending::RanOut => Some(format!(
             "the last solve of the constants ran out after {iterations} iterations and has not converged. Fit again \
