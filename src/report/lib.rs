@@ -33,6 +33,7 @@ pub use words::{count, held_out, number, seconds};
 // What other members of the workspace hold stands under the names that it has there.
 use skinfit_core::{engine, fit, model, output, prepare, progress, render, scene};
 
+use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -50,6 +51,8 @@ use metrics::Comparison;
 use misfit::Misfit;
 use pictures::Picture;
 
+/// The folder of the scenes' files in the run folder of a fit of several.
+pub const SCENES: &str = "scenes";
 /// The folder of fitted maps in a run folder.
 pub const MAPS: &str = "maps";
 /// What was found of fitted maps, in numbers.
@@ -60,6 +63,8 @@ pub const MAPS_JSON: &str = "maps.json";
 pub struct RunInfo {
     /// The scene's file, or what the built-in scene is called.
     pub scene: String,
+    /// Of several scenes that were fitted as one skin their names, in the order of the unknowns' numbers; empty of one.
+    pub scenes: Vec<String>,
     /// What was minimised.
     pub loss: Loss,
     /// Which engine evaluated the model: `cpu` or `gpu`.
@@ -81,6 +86,8 @@ pub struct RunInfo {
     pub maps: Option<MapEvidence>,
     /// Files that the run's scene names: where one is what an earlier run left, it stays.
     pub named: Vec<PathBuf>,
+    /// Other files that the run has left in its folder, by their paths from there.
+    pub files: Vec<String>,
 }
 
 /// The images of one view; all of one size.
@@ -182,7 +189,7 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
 
     let path = folder.join("report.json");
     let mut left = file_names(&written);
-    left.extend(run.maps.iter().flat_map(|maps| maps.files.iter().cloned()));
+    left.extend(run.maps.iter().flat_map(|maps| maps.files.iter().cloned()).chain(run.files.iter().cloned()));
     let kept = remove_stale(folder, &path, &left, &run.named)?;
     left.extend(kept);
     let scale = signed::scale(&run.views, misfit.threshold);
@@ -224,7 +231,7 @@ fn remove_stale(
     // Without a report, or with one that is not ours, nothing in the folder is known to be ours.
     let earlier = std::fs::read(report).ok().and_then(|bytes| serde_json::from_slice::<Earlier>(&bytes).ok());
     let named: Vec<PathBuf> = named.iter().filter_map(|path| path.canonicalize().ok()).collect();
-    let (mut kept, mut maps) = (Vec::new(), false);
+    let (mut kept, mut folders) = (Vec::new(), BTreeSet::new());
     for name in earlier.map(|earlier| earlier.files).unwrap_or_default() {
         if !is_ours(&name) || written.contains(&name) {
             continue;
@@ -236,12 +243,12 @@ fn remove_stale(
         }
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(OutputError::new(&path, &error)),
-            _ => maps |= name != MAPS_JSON && name.starts_with(MAPS),
+            _ => folders.extend(name.split_once('/').map(|(own, _)| folder.join(own))),
         }
     }
-    if maps {
+    for own in folders {
         // A folder that still holds something stays.
-        let _ = std::fs::remove_dir(folder.join(MAPS));
+        let _ = std::fs::remove_dir(own);
     }
     Ok(kept)
 }
@@ -249,6 +256,9 @@ fn remove_stale(
 /// Whether a run could have left a file of that name, by its path from the run folder: one that leads elsewhere is
 /// never removed.
 fn is_ours(name: &str) -> bool {
+    if let Some(scene) = name.strip_prefix(SCENES).and_then(|name| name.strip_prefix('/')) {
+        return scene.ends_with(".toml") && !scene.contains(['/', '\\']);
+    }
     let stem = match name.strip_prefix(MAPS).and_then(|name| name.strip_prefix('/')) {
         Some(map) => [".png", ".exr", ".csv"].iter().find_map(|ending| map.strip_suffix(ending)),
         None if name == MAPS_JSON => return true,
@@ -258,6 +268,18 @@ fn is_ours(name: &str) -> bool {
 }
 
 impl RunInfo {
+    /// An unknown's name for people: a gain is named by its view and not by the view's number, and what a scene has of its
+    /// own by the scene.
+    #[must_use]
+    pub fn label(&self, name: &str) -> String {
+        let number = |text: &str| text.parse::<usize>().ok();
+        if let Some(view) = name.strip_prefix("gain.").and_then(number).and_then(|n| self.views.get(n)) {
+            return format!("gain.{}", view.name);
+        }
+        let own = name.split_once('/').and_then(|(scene, own)| Some((self.scenes.get(number(scene)?)?, own)));
+        own.map_or_else(|| name.to_owned(), |(scene, own)| format!("{scene}/{own}"))
+    }
+
     /// The views that took part in the fit.
     fn fitted(&self) -> &[ViewEvidence] {
         let end = self.views.iter().position(|view| view.held_out).unwrap_or(self.views.len());
@@ -279,8 +301,11 @@ impl RunInfo {
 
     /// The provenance that image files carry: as the report's, and the fitted parameters.
     fn attributes(&self, outcome: &Outcome) -> Vec<(String, String)> {
-        let values: Vec<String> =
-            outcome.unknowns.iter().map(|u| format!("{} = {}", u.unknown.name(), u.value)).collect();
+        let values: Vec<String> = outcome
+            .unknowns
+            .iter()
+            .map(|u| format!("{} = {}", self.label(&u.unknown.name()), u.value))
+            .collect();
         let mut attributes = self.provenance();
         attributes.push(("parameters".to_owned(), values.join("; ")));
         attributes

@@ -10,6 +10,7 @@ mod exported;
 mod graphics;
 mod held_out;
 mod interrupted;
+mod joint;
 mod maps;
 mod outputs;
 mod pinned;

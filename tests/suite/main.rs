@@ -22,6 +22,7 @@ mod fits;
 mod fixtures;
 mod graphics;
 mod instructions;
+mod joint;
 mod meshes;
 mod occlusion;
 mod phases;

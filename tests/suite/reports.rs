@@ -77,6 +77,7 @@ fn run() -> RunInfo {
 fn run_of(side: usize) -> RunInfo {
     RunInfo {
         scene: "scenes/<script>alert('forest')</script>/scene.toml".to_owned(),
+        scenes: Vec::new(),
         loss: Loss::RelativeL2,
         engine: "cpu".to_owned(),
         samples: 1_234_567,
@@ -99,6 +100,7 @@ fn run_of(side: usize) -> RunInfo {
         ],
         maps: None,
         named: Vec::new(),
+        files: Vec::new(),
     }
 }
 

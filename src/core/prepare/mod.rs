@@ -7,6 +7,8 @@
 //! - [`Observed`]: of the views that have a target, samples beside what was observed there
 //! - [`HeldOut`]: views that are taken out of a scene before its fit, to score it on
 //!
+//! [`share_skin`] has several scenes agree on what a fit of them as one skin shares.
+//!
 //! A stage reads as the ones before it: `observed.scene`, `sampled.illumination`. Renderers start from a [`Baked`],
 //! engines from an [`Observed`].
 
@@ -15,6 +17,7 @@ mod error;
 mod held_out;
 mod loaded;
 mod observed;
+mod one_skin;
 mod options;
 mod sampled;
 
@@ -23,6 +26,7 @@ pub use self::error::PrepareError;
 pub use self::held_out::HeldOut;
 pub use self::loaded::Loaded;
 pub use self::observed::Observed;
+pub use self::one_skin::share_skin;
 pub use self::options::{ClipOcclusion, PrepareOptions, Views};
 pub use self::sampled::Sampled;
 

@@ -46,7 +46,7 @@ pub use self::error::{Problem, TermError};
 use super::domain::Domain;
 use super::rule::Rule;
 use crate::model::effects::{Effect, EffectInfo, Effects};
-use crate::model::params::{Param, ParamInfo};
+use crate::model::params::{Owner, Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
 use crate::model::terms::{TermInfo, TermName};
 
@@ -122,6 +122,7 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
             rgb: declared.rgb,
             linear: declared.linear,
             scale: declared.scale,
+            owner: Owner::Skin,
             effects,
             source: declared.source,
             meaning: declared.meaning,

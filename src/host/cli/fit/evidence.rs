@@ -1,10 +1,12 @@
 //! The evidence: each view's target, fit and terms.
 
+use super::scenes::{Part, Scenes};
 use crate::cli::Refusal;
 use crate::cli::fit_engine::surfaced_views;
+use crate::engine::Point;
 use crate::engine::view::ObservedView;
-use crate::engine::{Engine, Point};
-use crate::prepare::{Baked, HeldOut};
+use crate::model::params::Params;
+use crate::prepare::Baked;
 use crate::progress;
 use crate::render::image::Image;
 use crate::render::places::places;
@@ -12,48 +14,55 @@ use crate::render::shade::Shader;
 use crate::report::ViewEvidence;
 use crate::scene::view::View;
 
-/// For each view the target, the fit and its terms; those of views that were held out come last.
-pub(super) fn evidence(
-    (baked, held): (&Baked, &HeldOut),
-    engine: &dyn Engine,
-    end: &Point,
-) -> Result<Vec<ViewEvidence>, Refusal> {
-    let observed = surfaced_views(engine)?;
-    let shader = Shader::new(baked.setup(), &baked.illumination, &end.params)?;
-    let fitted = baked.scene.views.iter().zip(observed.iter()).zip(&end.gains).map(|view| (view, false));
-    let others = held.views.iter().zip(&held.observed).zip(&held.gains).map(|view| (view, true));
-    let bar = progress::bar("pictures", (baked.scene.views.len() + held.views.len()) as u64);
-    let evidence = fitted
-        .chain(others)
-        .map(|(((view, observed), &gain), held_out)| {
-            let shaded = shader.shade(&observed.samples, &view.camera, gain);
-            let (target, coverage) = compared(view, observed, &shaded.image);
+/// For each view the target, the fit and its terms: those that were fitted, scene by scene, then those that were held
+/// out.
+pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>, Refusal> {
+    let count = |part: &Part| part.baked.scene.views.len() + part.held.views.len();
+    let bar = progress::bar("pictures", scenes.parts.iter().map(count).sum::<usize>() as u64);
+    let (mut fitted, mut others) = (Vec::new(), Vec::new());
+    for part in &scenes.parts {
+        let own = scenes.point_of(part, end);
+        let shader = Shader::new(part.baked.setup(), &part.baked.illumination, &own.params)?;
+        let shown = |(view, observed, gain, held_out): (&View, &ObservedView, f64, bool)| {
             bar.inc(1);
-            ViewEvidence {
-                name: view.name.clone(),
-                target,
-                fit: shaded.image,
-                coverage,
-                terms: shaded
-                    .terms
-                    .into_iter()
-                    .map(|(name, image)| (name.name().to_owned(), image))
-                    .collect(),
-                haze: shaded.haze,
-                places: places(
-                    &observed.samples,
-                    baked.setup(),
-                    &baked.illumination,
-                    &end.params,
-                    [view.camera.width, view.camera.height].map(|side| side as usize),
-                ),
-                clip: observed.clip,
-                held_out,
-            }
-        })
-        .collect();
+            let name = scenes.view_name(part, &view.name);
+            ViewEvidence { name, held_out, ..shown(part, (&shader, &own.params), (view, observed, gain)) }
+        };
+        if let Some(engine) = part.number.and_then(|number| scenes.engine(number)) {
+            let observed = surfaced_views(engine)?;
+            let views = part.baked.scene.views.iter().zip(observed.iter()).zip(&own.gains);
+            fitted.extend(views.map(|((view, observed), &gain)| shown((view, observed, gain, false))));
+        }
+        let held = part.held.views.iter().zip(&part.held.observed).zip(&part.held.gains);
+        others.extend(held.map(|((view, observed), &gain)| shown((view, observed, gain, true))));
+    }
     bar.finish_and_clear();
-    Ok(evidence)
+    fitted.extend(others);
+    Ok(fitted)
+}
+
+/// The images of a view of a scene, at the scene's constants.
+fn shown(
+    part: &Part,
+    (shader, params): (&Shader, &Params),
+    (view, observed, gain): (&View, &ObservedView, f64),
+) -> ViewEvidence {
+    let Baked { scene, illumination, .. } = &part.baked;
+    let shaded = shader.shade(&observed.samples, &view.camera, gain);
+    let (target, coverage) = compared(view, observed, &shaded.image);
+    let size = [view.camera.width, view.camera.height].map(|side| side as usize);
+    let terms = shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image));
+    ViewEvidence {
+        name: view.name.clone(),
+        target,
+        fit: shaded.image,
+        coverage,
+        terms: terms.collect(),
+        haze: shaded.haze,
+        places: places(&observed.samples, scene.setup(), illumination, params, size),
+        clip: observed.clip,
+        held_out: false,
+    }
 }
 
 /// The target as an image, and how much of each pixel is compared.
