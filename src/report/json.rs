@@ -13,7 +13,7 @@ use crate::engine::{Point, Unknown};
 use crate::fit::outcome::{Ending, Iteration, Outcome, UnknownOutcome};
 use crate::fit::profile::Profile;
 use crate::fit::statistics::ErrorBasis;
-use crate::model::params::{Channels, Param};
+use crate::model::params::{Channels, Column, Param};
 
 /// The whole of `report.json`.
 ///
@@ -26,6 +26,8 @@ pub struct Summary {
     pub params: Ordered<ParamSummary>,
     /// Each view's scores, by its name.
     pub views: Ordered<ViewSummary>,
+    /// The means of these, of the views that were fitted and of those that were held out.
+    pub scores: MeanScores,
     /// Which solver ran.
     pub solver: &'static str,
     /// Which engine evaluated the model: `cpu` or `gpu`.
@@ -124,14 +126,62 @@ pub struct ViewSummary {
     pub flip: Option<f64>,
     /// How many pixels were compared.
     pub pixels: usize,
+    /// Whether it took no part in the fit.
+    pub held_out: bool,
 }
 
 impl ViewSummary {
-    /// The scores over `pixels` compared pixels.
+    /// The scores over `pixels` compared pixels of a view that took part in the fit, or was held out of it.
     #[must_use]
-    pub fn new(scores: Option<Scores>, pixels: usize) -> Self {
+    pub fn new(scores: Option<Scores>, pixels: usize, held_out: bool) -> Self {
         let of = |score: fn(&Scores) -> f64| scores.as_ref().map(score);
-        Self { psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), flip: of(|s| s.flip), pixels }
+        Self { psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), flip: of(|s| s.flip), pixels, held_out }
+    }
+}
+
+/// How well the fit matches what it has seen, and what it has not.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct MeanScores {
+    /// The views that were fitted; `null` without any.
+    pub fitted: Option<ViewMeans>,
+    /// The views that were held out; `null` without any.
+    pub held_out: Option<ViewMeans>,
+}
+
+/// The mean scores of some views; `null` when no pixel of them is covered.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct ViewMeans {
+    /// How many views.
+    pub views: usize,
+    /// dB.
+    pub psnr: Option<f64>,
+    /// 1 for equal images.
+    pub ssim: Option<f64>,
+    /// 0 for equal images.
+    pub flip: Option<f64>,
+}
+
+impl MeanScores {
+    fn of(views: &[ViewSummary]) -> Self {
+        let part = |held_out: bool| ViewMeans::of(views.iter().filter(|view| view.held_out == held_out));
+        Self { fitted: part(false), held_out: part(true) }
+    }
+}
+
+impl ViewMeans {
+    /// A view without covered pixels has no part in a mean.
+    fn of<'a>(views: impl Iterator<Item = &'a ViewSummary>) -> Option<Self> {
+        let views: Vec<&ViewSummary> = views.collect();
+        let mean = |score: fn(&ViewSummary) -> Option<f64>| {
+            let scores: Vec<f64> = views.iter().filter_map(|view| score(view)).collect();
+            (!scores.is_empty()).then(|| scores.iter().sum::<f64>() / scores.len() as f64)
+        };
+        (!views.is_empty()).then(|| Self {
+            views: views.len(),
+            psnr: mean(|view| view.psnr),
+            ssim: mean(|view| view.ssim),
+            flip: mean(|view| view.flip),
+        })
     }
 }
 
@@ -188,12 +238,13 @@ impl Summary {
         warnings: Vec<String>,
         misfit: Misfit,
     ) -> Self {
-        let names: Vec<String> = outcome.unknowns.iter().map(|u| label(&u.unknown.name(), run)).collect();
+        let names: Vec<String> = outcome.unknowns.iter().map(|u| run.label(&u.unknown.name())).collect();
         let order = names.len().max(1);
         Self {
             loss: StartEnd { start: outcome.loss_start, end: outcome.loss_end },
-            params: Ordered(params(outcome)),
+            params: Ordered(params(run, outcome)),
             views: Ordered(run.views.iter().map(|v| v.name.clone()).zip(views.iter().copied()).collect()),
+            scores: MeanScores::of(views),
             solver: outcome.solver,
             engine: run.engine.clone(),
             iterations: outcome.iterations,
@@ -207,7 +258,10 @@ impl Summary {
                 basis: outcome.errors,
                 most_over_noise: outcome.most_over_noise().filter(|x| x.is_finite()),
             },
-            profile: outcome.profile.clone(),
+            profile: outcome
+                .profile
+                .clone()
+                .map(|profile| Profile { name: run.label(&profile.name), ..profile }),
             correlations: Correlations {
                 names,
                 matrix: outcome
@@ -221,7 +275,7 @@ impl Summary {
             undetermined: outcome
                 .undetermined
                 .iter()
-                .map(|d| Ordered(d.components.iter().map(|(name, x)| (label(name, run), *x)).collect()))
+                .map(|d| Ordered(d.components.iter().map(|(name, x)| (run.label(name), *x)).collect()))
                 .collect(),
             history: outcome.history.clone(),
             misfit,
@@ -238,15 +292,6 @@ impl Summary {
     /// None that these types can cause.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string_pretty(self).map(|text| text + "\n")
-    }
-}
-
-/// An unknown's name for people: a gain is named by its view, not by the view's number.
-fn label(name: &str, run: &RunInfo) -> String {
-    let number = name.strip_prefix("gain.").and_then(|n| n.parse::<usize>().ok());
-    match number.and_then(|n| run.views.get(n)) {
-        Some(view) => format!("gain.{}", view.name),
-        None => name.to_owned(),
     }
 }
 
@@ -271,25 +316,39 @@ fn unknown(outcome: &UnknownOutcome, name: &str) -> UnknownSummary {
     }
 }
 
-/// The unknowns gathered by parameter, in the order of the unknowns.
-fn params(outcome: &Outcome) -> Vec<(String, ParamSummary)> {
-    let mut free: Vec<Param> = Vec::new();
+/// The unknowns gathered by parameter (and by scene, of what each has of its own), in the order of the unknowns.
+fn params(run: &RunInfo, outcome: &Outcome) -> Vec<(String, ParamSummary)> {
+    let mut free: Vec<(Option<usize>, Param)> = Vec::new();
     for unknown in &outcome.unknowns {
-        if let Unknown::Param(column) = unknown.unknown
-            && !free.contains(&column.param)
-        {
-            free.push(column.param);
+        if let Some(whose) = whose(&unknown.unknown).filter(|whose| !free.contains(whose)) {
+            free.push(whose);
         }
     }
-    free.into_iter().map(|param| (param.name().to_owned(), summarise(param, outcome))).collect()
+    let named = |(scene, param): (Option<usize>, Param)| {
+        let unknown = match scene {
+            Some(scene) => Unknown::Own(scene, Column::tied(param)),
+            None => Unknown::Param(Column::tied(param)),
+        };
+        (run.label(&unknown.name()), summarise((scene, param), outcome))
+    };
+    free.into_iter().map(named).collect()
 }
 
-fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
+/// The parameter of an unknown, and the scene that it is free in alone.
+fn whose(unknown: &Unknown) -> Option<(Option<usize>, Param)> {
+    match unknown {
+        Unknown::Param(column) => Some((None, column.param)),
+        Unknown::Own(scene, column) => Some((Some(*scene), column.param)),
+        Unknown::Gain(_) => None,
+    }
+}
+
+fn summarise((scene, param): (Option<usize>, Param), outcome: &Outcome) -> ParamSummary {
     let (mut errors, mut noise) = ([None; 3], [None; 3]);
     let (mut tied, mut identifiable, mut at_bound) = (true, true, false);
     for known in &outcome.unknowns {
-        let Unknown::Param(column) = known.unknown else { continue };
-        if column.param == param {
+        let Some(column) = known.unknown.column() else { continue };
+        if whose(&known.unknown) == Some((scene, param)) {
             tied &= column.channels == Channels::Tied;
             identifiable &= known.identifiable;
             at_bound |= known.at_bound;
@@ -299,9 +358,13 @@ fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
             }
         }
     }
+    let rgb = |point: &Point| match scene {
+        Some(scene) => point.params.rgb_in(scene, param),
+        None => point.params.rgb(param),
+    };
     let value = |point: &Point| match tied {
-        true => Value::Tied(point.params.scalar(param)),
-        false => Value::Rgb(point.params.rgb(param)),
+        true => Value::Tied(rgb(point)[0]),
+        false => Value::Rgb(rgb(point)),
     };
     let gathered = |errors: [Option<f64>; 3]| {
         errors.iter().any(Option::is_some).then_some(match tied {

@@ -507,6 +507,7 @@ pub(crate) mod tests {
             haze: Vec::new(),
             places,
             clip: None,
+            held_out: false,
         }
     }
 

@@ -23,6 +23,7 @@ mod fits;
 mod fixtures;
 mod graphics;
 mod instructions;
+mod joint;
 mod light_files;
 mod lights;
 mod meshes;

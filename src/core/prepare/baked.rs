@@ -88,7 +88,9 @@ impl Baked {
         let start = Instant::now();
         let posed = self.scene.mesh.pose();
         let samples = samples::sample_views(&self.scene, &posed, self.surface_bakes())?;
-        let seconds = StageSeconds { samples: start.elapsed().as_secs_f64(), ..self.seconds };
+        // Of views that were held out, some were spent before.
+        let samples_so_far = self.seconds.samples + start.elapsed().as_secs_f64();
+        let seconds = StageSeconds { samples: samples_so_far, ..self.seconds };
         Ok(Sampled { baked: Self { seconds, ..self }, samples })
     }
 

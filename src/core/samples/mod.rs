@@ -178,12 +178,25 @@ pub fn sample_views(
     posed: &PosedMesh,
     bakes: SurfaceBakes<'_>,
 ) -> Result<Vec<ViewSamples>, SampleError> {
+    sample_these(scene, &scene.views, posed, bakes)
+}
+
+/// As [`sample_views`], of other views than the scene's own.
+///
+/// # Errors
+/// As of [`sample_views`].
+pub fn sample_these(
+    scene: &Scene,
+    views: &[View],
+    posed: &PosedMesh,
+    bakes: SurfaceBakes<'_>,
+) -> Result<Vec<ViewSamples>, SampleError> {
     check_uvs(scene, &posed.uvs)?;
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
     let posed = PosedSurface::new(scene, posed, &rays, &scene.mesh.morphs, bakes)?;
     let atlas = atlas_of(scene, &posed)?;
-    let bar = progress::bar("samples", scene.views.len() as u64);
-    let views = scene.views.iter().map(|view| {
+    let bar = progress::bar("samples", views.len() as u64);
+    let views = views.iter().map(|view| {
         let mut samples = sample_view(scene, &posed, &view.camera);
         samples.atlas.clone_from(&atlas);
         bar.inc(1);

@@ -8,6 +8,7 @@
 //!   `settings`, `cameras`, `lights` and `dapple`
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
+//! - [`names`]: what a scene is called among several
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
 //! - [`facts`]: what a scene calls for of the shader planner
 //! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
@@ -31,6 +32,7 @@ pub mod load;
 pub mod map_fit;
 pub mod maps;
 pub mod mesh;
+pub mod names;
 mod normals;
 pub mod pose;
 mod settings;

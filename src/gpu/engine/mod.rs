@@ -350,14 +350,19 @@ impl GpuEngine {
         Ok(Passed { sums, columns: program.columns().to_vec(), view_of: parts.views() })
     }
 
+    /// How many numbers of a pixel are compared.
+    const fn channels(&self) -> u32 {
+        if self.alpha { 4 } else { 3 }
+    }
+
     /// A pass as normal equations; after a fault, numbers that no solver takes.
     fn pass(&self, point: &Point, wish: Wish) -> NormalEquations {
-        let channels: u32 = if self.alpha { 4 } else { 3 };
+        let channels = self.channels();
         let k = self.unknowns.len();
         let mut total = NormalEquations {
             loss: 0.0,
             residual: 0.0,
-            weight: self.weight.0 * f64::from(channels),
+            weight: self.weight(),
             count: self.weight.1 * u64::from(channels),
             jtr: vec![0.0; k],
             jtj: vec![0.0; k * k],
@@ -500,6 +505,10 @@ impl Engine for GpuEngine {
             Some(made) => made.count() as u64,
             None => self.views.iter().map(|view| view.samples.count() as u64).sum(),
         }
+    }
+
+    fn weight(&self) -> f64 {
+        self.weight.0 * f64::from(self.channels())
     }
 
     fn own_sample_seconds(&self) -> Option<f64> {

@@ -389,7 +389,7 @@ impl CpuEngine {
         let mut total = NormalEquations {
             loss: 0.0,
             residual: 0.0,
-            weight: self.weight.0 * channels as f64,
+            weight: self.weight(),
             count: self.weight.1 * channels as u64,
             jtr: vec![0.0; k],
             jtj: vec![0.0; k * k],
@@ -541,6 +541,10 @@ impl Engine for CpuEngine {
 
     fn samples(&self) -> u64 {
         self.samples()
+    }
+
+    fn weight(&self) -> f64 {
+        self.weight.0 * self.fitted.channels as f64
     }
 
     fn set_stride(&mut self, stride: usize) {

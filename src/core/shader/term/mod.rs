@@ -48,7 +48,7 @@ use super::rule::Rule;
 use super::search::components;
 use crate::model::effects::{Effect, EffectInfo, Effects};
 use crate::model::fields::{Field, FieldInfo, Fields, Found};
-use crate::model::params::{Param, ParamInfo};
+use crate::model::params::{Owner, Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
 use crate::model::terms::{TermInfo, TermName};
 
@@ -154,6 +154,7 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
             rgb: declared.rgb,
             linear: declared.linear,
             scale: declared.scale,
+            owner: Owner::Skin,
             effects,
             source: declared.source,
             meaning: declared.meaning,
