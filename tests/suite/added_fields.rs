@@ -145,7 +145,8 @@ fn the_renderer_draws_them_and_an_export_names_them() {
     let facts = Facts { setup: baked.setup(), ..Facts::default() };
     let planned = plan(&facts).unwrap();
     assert!(planned.wgsl.contains("rest_key_share: f32"), "{}", planned.wgsl);
-    let text = crate::exports::compiled_glsl("lamps", &facts);
+    let of_engine = Facts { setup: baked.setup(), ..crate::exports::engine_facts() };
+    let text = crate::exports::compiled_glsl("lamps", &of_engine);
     assert!(text.contains("KEY_COLOR") && text.contains("key_share"), "{text}");
     let Some(gpu) = gpu() else { return };
     let camera = baked.scene.views[0].camera;

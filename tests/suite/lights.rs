@@ -6,7 +6,7 @@ use std::path::Path;
 
 use glam::DVec3;
 use skinfit::bake::rays::RayMesh;
-use skinfit::bake::sky_lights::sky_lights;
+use skinfit::scene::sky_lights::sky_lights;
 use skinfit::model::bearing::Bearing;
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::samples::visibility::Shadows;

@@ -22,7 +22,7 @@ const SOURCES: [&str; 13] = [
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),
     include_str!("rays.rs"),
-    include_str!("sky_lights.rs"),
+    include_str!("../scene/sky_lights.rs"),
     crate::model::cube::SOURCE,
 ];
 const MAGIC: &[u8; 8] = b"SKINBAKE";

@@ -7,7 +7,6 @@
 //! - [`lobes`]: the stack of specular cubes over the exponent
 //! - [`occlusion`]: per-vertex ambient occlusion (`low_discrepancy`: its rays)
 //! - [`rays`]: the mesh as rays see it
-//! - [`sky_lights`]: the panorama's brightest spots as lights
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
 mod baker;
@@ -20,7 +19,6 @@ pub mod panorama;
 pub mod prefilter;
 mod pyramid;
 pub mod rays;
-pub mod sky_lights;
 
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -28,6 +26,7 @@ use std::path::Path;
 use crate::model::cube::Cube;
 use crate::scene::Scene;
 use crate::scene::maps::Environment;
+use crate::scene::sky_lights::sky_lights;
 use crate::scene::mesh::PosedMesh;
 use baker::{Baker, EnvironmentBaker};
 pub use lobes::LobeStack;
@@ -199,8 +198,10 @@ pub fn bake_light(
     let mut baker = Baker { cache, stats: BakeStats::default() };
     let mut light = Illumination::default();
     if needs.environment() {
-        let environment = checked_environment(scene)?;
-        let mut cubes = EnvironmentBaker::new(environment);
+        let whole = checked_environment(scene)?;
+        // What became lights shines as such, with shadows.
+        let rest = (!scene.sky_lights.is_empty()).then(|| sky_lights(whole).rest);
+        let mut cubes = EnvironmentBaker::new(rest.as_ref().unwrap_or(whole));
         let quality = &scene.quality;
         if needs.irradiance {
             let size = quality.irradiance_size as usize;

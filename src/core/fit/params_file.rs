@@ -150,7 +150,8 @@ impl ParamsFile {
         writeln!(text, "\n[params]")?;
         let known = outcome.map_or(&[][..], |outcome| &outcome.unknowns);
         let shared = |param: &Param| self.scenes.is_empty() || !param.is_of_scene();
-        for param in Param::of(self.effects.unwrap_or_default()).filter(shared) {
+        let written = |param: &Param| shared(param) && !param.info().held;
+        for param in Param::of(self.effects.unwrap_or_default()).filter(written) {
             let line = format!("{} = {}", key(param), value(self.params.rgb(param)));
             line_with_comment(text, &line, &comment(known, |unknown| param_channel(unknown, param)))?;
         }

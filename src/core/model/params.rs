@@ -94,6 +94,8 @@ pub struct ParamInfo {
     pub scale: Scale,
     /// Whose it is, where several scenes are fitted as one skin.
     pub owner: Owner,
+    /// Whether it is a number that its scene gives elsewhere, which no fit moves and no file of constants holds.
+    pub held: bool,
     /// It is asked for when one of these effects is enabled.
     pub effects: &'static [Effect],
     /// Where it comes from.
@@ -130,7 +132,7 @@ macro_rules! row {
      $rgb:literal, $linear:literal, $scale:ident, [$($effect:ident),*], $source:literal, $meaning:literal) => {
         ParamInfo {
             param: Param::$param, name: $name, identifier: $name, listing: $listing, corrected: $corrected, lower: $lower, upper: $upper,
-            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, effects: &[$(Effect::$effect),*],
+            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, held: false, effects: &[$(Effect::$effect),*],
             source: $source, meaning: $meaning,
         }
     };
@@ -140,11 +142,11 @@ macro_rules! row {
 #[rustfmt::skip]
 pub static TABLE: [ParamInfo; Param::COUNT] = [
     //  param               name                   listing corrected  bounds        unit  rgb   linear scale  asked for by
-    row!(BaseWeight          "base_weight",          0.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [Diffuse],
+    row!(BaseWeight          "base_weight",          0.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [Diffuse, Lights],
          "MODEL 3 (corrected form)", "share of the diffuse light seen from any angle"),
-    row!(RimWeight           "rim_weight",           1.0,  0.5,  [-INF, INF],      "",        true,  true,  Linear, [Diffuse],
+    row!(RimWeight           "rim_weight",           1.0,  0.5,  [-INF, INF],      "",        true,  true,  Linear, [Diffuse, Lights],
          "listing 3-4, SkinSilhouetteVec.y", "diffuse light added towards the silhouette"),
-    row!(RimExponent         "rim_exponent",         2.0,  2.0,  [0.25, 16.0],     "",        false, false, Linear, [Diffuse, Hilite],
+    row!(RimExponent         "rim_exponent",         2.0,  2.0,  [0.25, 16.0],     "",        false, false, Linear, [Lights, Diffuse, Hilite],
          "listing 3-3, (1-|N.V|)^2", "power of the silhouette term 1-|N.V|"),
     row!(Hilite              "hilite",               0.7,  0.7,  [0.0, INF],       "",        true,  true,  Linear, [Hilite],
          "listing 3-4, 0.7", "weight of the back light that shines past the rim"),

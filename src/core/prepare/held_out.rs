@@ -46,7 +46,7 @@ impl Baked {
         });
         baked.gains = gains;
         let posed = baked.scene.mesh.pose();
-        let samples = samples::sample_these(&baked.scene, &held.views, &posed, baked.occlusion.as_deref())?;
+        let samples = samples::sample_these(&baked.scene, &held.views, &posed, baked.surface_bakes())?;
         held.observed = beside(&baked.scene.path, &held.views, samples)?;
         baked.seconds = StageSeconds { samples: start.elapsed().as_secs_f64(), ..baked.seconds };
         Ok((baked, held))

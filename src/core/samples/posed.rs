@@ -1,7 +1,7 @@
 //! A scene's mesh in one pose with all that its samples and texels are made of.
 
 use super::trace::Hit;
-use super::{SampleError, posed_occlusion};
+use super::{SampleError, lit, posed_occlusion};
 use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
 use crate::model::fields::Field;
@@ -43,7 +43,7 @@ impl<'a> PosedSurface<'a> {
         bakes: SurfaceBakes<'a>,
     ) -> Result<Self, SampleError> {
         let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
-        Ok(Self::bare(mesh, rays, open))
+        Ok(Self { supplies: lit::supplies(scene, mesh, rays), ..Self::bare(mesh, rays, open) })
     }
 
     /// A mesh with the open share of each vertex' hemisphere, and nothing else.

@@ -87,6 +87,11 @@ impl Pose {
         })
     }
 
+    /// Seconds into the animation.
+    pub(super) const fn time(&self) -> Option<f64> {
+        self.time
+    }
+
     pub(super) fn at(self, time: Option<f64>) -> Self {
         Self { time: time.or(self.time), ..self }
     }

@@ -211,6 +211,7 @@ pub(super) struct QualityTable {
     pub hilite_size: Option<Spanned<i64>>,
     pub lobes_per_octave: Option<Spanned<i64>>,
     pub occlusion_rays: Option<Spanned<i64>>,
+    pub shadow_rays: Option<Spanned<i64>>,
 }
 
 /// A number, or one for each channel.

@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 
 use super::settings::{interval, short};
 use crate::model::bearing::Bearing;
-use crate::model::params::LARGEST;
+use crate::model::params::{LARGEST, Param, Params};
 
 /// A light nearer than this, in scene units, is no brighter than there.
 pub const NEAREST: f64 = 1e-4;
@@ -100,6 +100,34 @@ impl Light {
             }
         }
         Ok(Self { name: name.to_owned(), kind })
+    }
+
+    /// The light of the panorama with that number, before it is known where it stands.
+    pub(super) fn of_sky(number: u32) -> Self {
+        let beam = Beam { direction: DVec3::NEG_Y, irradiance: [0.0; 3], angular_diameter_degrees: 0.0 };
+        Self { name: format!("sky_{number}"), kind: LightKind::Directional(beam) }
+    }
+
+    /// Its name as part of parameters' names, effects and quantities.
+    #[must_use]
+    pub fn member(&self) -> String {
+        self.name.to_ascii_lowercase()
+    }
+
+    /// The light where its parameters have it come from.
+    #[must_use]
+    pub fn moved(&self, params: &Params) -> Self {
+        let angle = |key: &str| {
+            let param = Param::from_name(&format!("light.{}.{key}", self.member()));
+            param.map(|param| params.scalar(param))
+        };
+        let mut light = self.clone();
+        if let LightKind::Directional(beam) = &mut light.kind
+            && let (Some(azimuth), Some(elevation)) = (angle("azimuth"), angle("elevation"))
+        {
+            beam.direction = -DVec3::from_array(Bearing { azimuth, elevation }.direction());
+        }
+        light
     }
 
     /// What it is called in scene files.
@@ -227,6 +255,7 @@ pub(super) fn is_name(name: &str) -> bool {
     name.len() <= LONGEST_NAME
         && name.starts_with(|c: char| c.is_ascii_alphabetic())
         && name.chars().all(letter)
+        && name.split('_').all(|part| !part.is_empty())
 }
 
 fn check_name(name: &str) -> Result<(), LightError> {
@@ -239,7 +268,7 @@ fn check_name(name: &str) -> Result<(), LightError> {
             "the light's name {name:?} cannot be part of a parameter's name, as in light.key.color"
         ),
         remedy: format!(
-            "Use up to {LONGEST_NAME} letters (a to z, A to Z), digits and `_`, beginning with a letter"
+            "Use up to {LONGEST_NAME} letters (a to z, A to Z), digits and single `_` between them, beginning with a letter"
         ),
     })
 }

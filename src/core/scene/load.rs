@@ -10,11 +10,13 @@ use super::dapple::dapple;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, SceneFile, Source};
 use super::gltf::{Ask, Document};
-use super::maps::{Environment, Map, Maps, Spots};
-use super::settings::{self, interval, number};
+use super::maps::{Environment, Map, Maps};
+use super::settings::{self, interval, number, spots};
 use super::terms::terms;
 use super::view::{Background, View};
-use super::{FitSettings, Scene, images, lights};
+use super::lit::{self, Lights};
+use super::sky_lights::sky_lights;
+use super::{FitSettings, Scene, images};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Needs};
 use crate::model::evaluate::Setup;
@@ -61,16 +63,12 @@ impl Scene {
         let (form, silhouette) = settings::form(&source, &file.model)?;
         let lookups = settings::lookups(&source, &file.model)?;
         let dapple = read_dapple(&source, &file)?;
-        let params = settings::params(&source, &file.model.params, form)?;
-        let mut lights = lights::plan(&source, &file.light)?;
-        file.environment.as_ref().map(|table| spots(&source, table)).transpose()?;
         let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
         let diffusion = settings::diffusion(&source, &file.diffusion)?;
         let pose = Pose::check(&source, &file)?.at(options.time);
         let metres_per_unit = metres(&source, &file)?;
-        let given = settings::effects(&source, &file.model)?;
 
         if let Some(background) = options.background {
             plans.iter_mut().for_each(|plan| plan.background = background);
@@ -78,11 +76,15 @@ impl Scene {
 
         let bar = progress::bar("loading", 3 + plans.len() as u64);
         let document = Document::open(&folder.join(&file.mesh.file))?;
+        let lights = Lights::read(&source, &file, Some((&document, pose.time())), &mut warnings)?;
+        let mut params = settings::params(&source, &file.model.params, form)?;
+        let given = settings::effects(&source, &file.model)?;
         let listed = options.effects.or(given);
         let mut effects = pose.effects(listed, &document)?;
         if listed.is_none() {
             effects = terms.iter().fold(effects, |effects, term| effects.with(term.effect));
         }
+        let effects = lights.switched(effects);
         let setup = Setup { lookups, dapple, ..Setup::new(form, silhouette, effects) };
         let needs = setup.needs();
         let mut idle = Warnings::new();
@@ -102,18 +104,23 @@ impl Scene {
         let ask = Ask { clip: options.clip, ..ask(&maps, form, effects, needs, &pose) };
         let mesh = document.mesh(&ask, &mut warnings)?;
         idle_effects(&document, effects, &mesh, &mut warnings)?;
-        if file.mesh.lights {
-            document.lights(ask.time, &mut lights, &mut warnings)?;
-        }
         drop(document);
         bar.inc(1);
         // Targets have a background of their own; it is a picture that shows the environment.
         let shown = !options.targets && plans.iter().any(|plan| plan.background == Background::Environment);
-        let environment = if needs.environment() || shown {
+        let of_sky = effects.has(Effect::Lights) && lights.are_of_sky();
+        let environment = if needs.environment() || shown || of_sky {
             Some(read_environment(&source, &file, folder, shown, &mut warnings)?)
         } else {
             None
         };
+        let sky_lights = match &environment {
+            Some(environment) if of_sky => sky_lights(environment).lights_in_world(environment),
+            _ => Vec::new(),
+        };
+        for light in lights.own.iter().chain(&sky_lights) {
+            lit::set(light, &mut params, |name| file.model.params.keys().any(|key| key.get_ref() == name));
+        }
         bar.inc(1);
         let views = read_views(plans, folder, options.targets, &bar, &mut warnings)?;
         bar.finish_and_clear();
@@ -124,7 +131,8 @@ impl Scene {
             metres_per_unit,
             maps,
             environment,
-            lights,
+            lights: lights.own,
+            sky_lights,
             form,
             silhouette,
             lookups,
@@ -264,29 +272,19 @@ fn turn_and_intensity(source: &Source, table: &EnvironmentTable) -> Result<(f64,
     Ok((turn, intensity))
 }
 
-/// Each light costs shadows of its own.
-const MOST_SPOTS: i64 = 64;
-/// Below it a spot is about a texel of a panorama of 8192 columns, above it no light from one direction.
-const SPOT_DEGREES: [f64; 2] = [0.05, 45.0];
-
-/// Which spots of the panorama become lights.
-fn spots(source: &Source, table: &EnvironmentTable) -> Result<Spots, SceneError> {
-    let default = Spots::default();
-    let [least, most] = SPOT_DEGREES;
-    let wanted = format!("degrees in {}", interval(least, most));
-    let given = table.light_spot_degrees.as_ref();
-    let degrees = number(source, given, default.degrees, "light_spot_degrees", &wanted, |degrees| {
-        (least..=most).contains(&degrees)
-    })?;
-    let count = settings::whole(source, table.lights.as_ref(), "lights", [0, MOST_SPOTS], default.count)?;
-    Ok(Spots { count, degrees })
-}
-
 /// Where light falls through leaves from, in the environment as it is turned.
 fn read_dapple(source: &Source, file: &SceneFile) -> Result<Dapple, SceneError> {
     let Some(table) = &file.environment else { return Ok(Dapple::default()) };
     let (degrees, _) = turn_and_intensity(source, table)?;
     dapple(source, table.dapple.as_ref(), degrees)
+}
+
+/// The lights of a scene file, for what reads nothing else of its files: of the mesh file, where it names some.
+pub(super) fn read_lights(source: &Source, file: &SceneFile) -> Result<Lights, SceneError> {
+    let folder = source.path.parent().unwrap_or(Path::new(""));
+    let document = file.mesh.lights.then(|| Document::open(&folder.join(&file.mesh.file))).transpose()?;
+    let time = Pose::check(source, file)?.time();
+    Lights::read(source, file, document.as_ref().map(|document| (document, time)), &mut Warnings::new())
 }
 
 /// Refuse the text of a scene file for whatever [`Scene::load`] would refuse before it reads another file than those of
@@ -296,10 +294,9 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let file: SceneFile = source.parse()?;
     let terms = terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))?;
     let (form, _) = settings::form(&source, &file.model)?;
-    settings::lookups(&source, &file.model)?;
+    let lights = read_lights(&source, &file)?;
     settings::params(&source, &file.model.params, form)?;
-    lights::plan(&source, &file.light)?;
-    file.environment.as_ref().map(|table| spots(&source, table)).transpose()?;
+    settings::lookups(&source, &file.model)?;
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;
@@ -308,7 +305,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     metres(&source, &file)?;
     // What the mesh adds to the effects concerns no value here.
     let every = || terms.iter().fold(Effects::SURFACE, |effects, term| effects.with(term.effect));
-    let effects = settings::effects(&source, &file.model)?.unwrap_or_else(every);
+    let effects = lights.switched(settings::effects(&source, &file.model)?.unwrap_or_else(every));
     settings::fit(&source, &file.fit, &file.model.params, effects, &mut Warnings::new())?;
     normal_flip(&source, &file)?;
     read_dapple(&source, &file).map(drop)

@@ -69,7 +69,7 @@ pub struct Environment {
 }
 
 /// The brightest spots of a panorama, to be taken out as directional lights
-/// ([`sky_lights`](crate::bake::sky_lights)).
+/// ([`sky_lights`](super::sky_lights)).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spots {
     /// How many, at most.
@@ -82,4 +82,12 @@ impl Default for Spots {
     fn default() -> Self {
         Self { count: 0, degrees: 4.0 }
     }
+}
+
+/// Rec.709 luminance.
+#[must_use]
+pub fn luminance(rgb: [f32; 3]) -> f32 {
+    let [r, g, b] = rgb.map(f64::from);
+    // In f64 and with weights that sum to exactly 1, so that grey 1 has luminance 1.
+    (0.2126 * r + 0.7152 * g + 0.0722 * b) as f32
 }

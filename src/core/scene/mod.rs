@@ -6,6 +6,7 @@
 //! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings`, `cameras`, `lights` and `dapple`
+//! - [`sky_lights`]: the panorama's brightest spots as lights; `lit`: the effect that each light is
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`names`]: what a scene is called among several
@@ -28,6 +29,7 @@ mod gltf;
 pub mod images;
 pub mod light;
 mod lights;
+mod lit;
 pub mod load;
 pub mod map_fit;
 pub mod maps;
@@ -35,6 +37,7 @@ pub mod mesh;
 pub mod names;
 mod normals;
 pub mod pose;
+pub mod sky_lights;
 mod settings;
 mod tangents;
 mod terms;
@@ -75,6 +78,9 @@ pub struct Scene {
     /// The lights that the scene file and, where it says so, the mesh file name, in the world; those of the panorama
     /// are not among them.
     pub lights: Vec<Light>,
+    /// Those that were taken out of the panorama, where the scene's own turn has them; `environment_rotation` turns them
+    /// with it.
+    pub sky_lights: Vec<Light>,
     /// Which reading of the listings.
     pub form: Form,
     /// Where S.z is evaluated.
@@ -203,6 +209,8 @@ pub struct Quality {
     pub lobes_per_octave: u32,
     /// Rays a vertex for ambient occlusion.
     pub occlusion_rays: u32,
+    /// Rays a sample towards each light that has a size; those of a pixel's samples differ.
+    pub shadow_rays: u32,
 }
 
 impl Default for Quality {
@@ -214,6 +222,7 @@ impl Default for Quality {
             hilite_size: 128,
             lobes_per_octave: 1,
             occlusion_rays: 256,
+            shadow_rays: 1,
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::error::{Problem, TermError};
 use super::texels::{LEVEL_TYPES, blur, domains_of, kernel};
 use crate::model::fields::Found;
-use crate::model::params::{LARGEST, Scale};
+use crate::model::params::{LARGEST, Owner, Scale};
 use crate::model::registry::leaked;
 use crate::shader::domain::Domain;
 use crate::shader::rule::{Error, Rule};
@@ -25,6 +25,8 @@ pub(crate) struct Declaration {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredEffect {
     pub(super) name: &'static str,
+    /// The effect that switches it.
+    pub(super) within: Option<&'static str>,
     pub(super) meaning: &'static str,
 }
 
@@ -42,6 +44,8 @@ pub(super) struct DeclaredParameter {
     pub(super) rgb: bool,
     pub(super) linear: bool,
     pub(super) scale: Scale,
+    pub(super) owner: Owner,
+    pub(super) held: bool,
     pub(super) meaning: &'static str,
     pub(super) source: &'static str,
 }
@@ -171,7 +175,9 @@ impl Declaration {
                 return Err(Problem::Misplaced { key: "effect" }.at(line));
             }
             let (name, meaning) = value.split_once(',').unwrap_or((value, ""));
-            self.effect = Some((line, DeclaredEffect { name: name.trim(), meaning: meaning.trim() }));
+            let (name, within) = name.split_once(" within ").unwrap_or((name, ""));
+            let within = Some(within.trim()).filter(|within| !within.is_empty());
+            self.effect = Some((line, DeclaredEffect { name: name.trim(), within, meaning: meaning.trim() }));
             return Ok(());
         }
         let misplaced = |key| Problem::Misplaced { key }.at(line);
@@ -193,8 +199,8 @@ impl Declaration {
         if !self.rules.is_empty() {
             return Err(misplaced("parameter"));
         }
-        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log` or `, unit UNIT` where they \
-                      hold, then `; what it does; where it comes from`. The default lies within the bounds";
+        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene` or `, unit UNIT` where \
+                      they hold, then `; what it does; where it comes from`. The default lies within the bounds";
         let parameter = parameter(value)
             .ok_or_else(|| Problem::Value { key: "parameter", given: value.to_owned(), wanted }.at(line))?;
         self.parameters.push((line, parameter));
@@ -288,6 +294,8 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         rgb: false,
         linear: false,
         scale: Scale::Linear,
+        owner: Owner::Skin,
+        held: false,
         meaning,
         source: parts.next().unwrap_or_default(),
     };
@@ -296,6 +304,8 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
             "rgb" => parameter.rgb = true,
             "linear" => parameter.linear = true,
             "log" => parameter.scale = Scale::Log,
+            "scene" => parameter.owner = Owner::Scene,
+            "held" => (parameter.held, parameter.owner) = (true, Owner::Scene),
             other => parameter.unit = other.strip_prefix("unit ")?.trim(),
         }
     }
@@ -324,7 +334,7 @@ mod tests {
     #[test]
     fn effects_parameters_and_several_rules_are_read() {
         let read = read(TEXT).unwrap();
-        assert_eq!(read.effect, Some((3, DeclaredEffect { name: "sheen", meaning: "light of fine hair" })));
+        assert_eq!(read.effect, Some((3, DeclaredEffect { name: "sheen", within: None, meaning: "light of fine hair" })));
         let [(4, weight), (5, width)] = read.parameters.as_slice() else { panic!("{:?}", read.parameters) };
         assert!(weight.rgb && weight.linear && weight.upper == f64::INFINITY && weight.source == "a paper");
         assert!(width.scale == Scale::Log && width.unit == "degrees" && width.default == 20.0);

@@ -48,7 +48,7 @@ use super::rule::Rule;
 use super::search::components;
 use crate::model::effects::{Effect, EffectInfo, Effects};
 use crate::model::fields::{Field, FieldInfo, Fields, Found};
-use crate::model::params::{Owner, Param, ParamInfo};
+use crate::model::params::{Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
 use crate::model::terms::{TermInfo, TermName};
 
@@ -137,7 +137,9 @@ pub(crate) fn register_from(origin: Origin, name: &str, text: &str) -> Result<&'
 fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, TermError> {
     let Declaration { effect, parameters, fields, mut rules } = declaration;
     let (line, declared) = effect.ok_or(Problem::NoEffect.at(1))?;
-    let row = EffectInfo { name: declared.name, meaning: declared.meaning, needs: Some(needs::of_effect) };
+    let within = declared.within.and_then(Effect::from_name);
+    let (name, meaning) = (declared.name, declared.meaning);
+    let row = EffectInfo { name, meaning, needs: Some(needs::of_effect), within };
     let effect = Effect::register(row).map_err(|error| problem(error).at(line))?;
     let effects: &'static [Effect] = Box::leak(Box::new([effect]));
     let mut params = Vec::new();
@@ -154,7 +156,8 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
             rgb: declared.rgb,
             linear: declared.linear,
             scale: declared.scale,
-            owner: Owner::Skin,
+            owner: declared.owner,
+            held: declared.held,
             effects,
             source: declared.source,
             meaning: declared.meaning,
@@ -173,7 +176,11 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
     }
     let mut layers = Vec::new();
     for rule in &mut rules {
+        // It is there where the effects are on that its rule asks for.
+        let others = rule.when.iter().filter_map(|condition| Effect::from_name(condition));
+        let effects: Vec<Effect> = effects.iter().copied().chain(others).collect();
         for &name in rule.adds.iter().chain(&rule.shows) {
+            let effects = effects.clone().leak();
             let layer = TermName::register(TermInfo { name, effects })
                 .map_err(|error| problem(error).at(rule.line))?;
             if !layers.contains(&layer) {

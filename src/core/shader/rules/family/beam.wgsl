@@ -1,6 +1,6 @@
 // Light from one direction, beside the environment (MODEL 8; glTF's KHR_lights_punctual).
 //
-// effect: light_NAME, the light NAME
+// effect: light_NAME within lights, the light NAME
 // parameter: light.NAME.color = 1 in [0, inf), rgb, linear, scene; factor on the light's irradiance; KHR_lights_punctual
 // parameter: light.NAME.irradiance = 0 in [0, inf), rgb, held; irradiance of a surface that faces it; KHR_lights_punctual
 // parameter: light.NAME.azimuth = 0 in [-inf, inf], unit degrees, scene; where it comes from, from +Z towards +X; KHR_lights_punctual
@@ -9,7 +9,7 @@
 
 // Unit vector towards the light.
 //
-// gives: light_NAME_toward
+// gives: light_NAME_bearing
 // domain: texel, fragment
 // cost: 20
 fn light_NAME_direction(light_NAME_azimuth: f32, light_NAME_elevation: f32) -> vec3f {

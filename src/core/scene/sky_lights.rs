@@ -10,9 +10,8 @@ use std::f64::consts::{PI, TAU};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::prefilter::luminance;
-use crate::scene::light::{Beam, Light, LightKind};
-use crate::scene::maps::{Environment, Map};
+use super::light::{Beam, Light, LightKind};
+use super::maps::{Environment, Map, luminance};
 
 /// The brightest place is looked for among means over cells of this share of a spot's angle, so that one hot texel of
 /// a fine panorama does not hide a lamp.
@@ -29,6 +28,14 @@ pub struct SkyLights {
     pub lights: Vec<Light>,
     /// The environment without their light, from which nothing more is to be taken.
     pub rest: Environment,
+}
+
+impl SkyLights {
+    /// The lights as the environment's own turn has them.
+    #[must_use]
+    pub fn lights_in_world(&self, environment: &Environment) -> Vec<Light> {
+        self.lights.iter().map(|light| light.turned(environment.rotation_degrees)).collect()
+    }
 }
 
 /// Take the brightest spots out of an environment, as many as it says. Fewer, where the brightest one that is left is not
