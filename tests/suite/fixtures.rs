@@ -176,6 +176,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         quality: Quality::default(),
         bloom: Bloom::default(),
         lights: Vec::new(),
+        sky_lights: Vec::new(),
         diffusion: Diffusion::default(),
     }
 }

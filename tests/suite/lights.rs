@@ -6,13 +6,13 @@ use std::path::Path;
 
 use glam::DVec3;
 use skinfit::bake::rays::RayMesh;
-use skinfit::scene::sky_lights::sky_lights;
 use skinfit::model::bearing::Bearing;
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::samples::visibility::Shadows;
 use skinfit::samples::{sample_hits, sample_view};
 use skinfit::scene::light::{Beam, Cone, Lamp, NEAREST, THINNEST_EDGE};
 use skinfit::scene::maps::Spots;
+use skinfit::scene::sky_lights::sky_lights;
 use skinfit::scene::{Light, LightKind, LoadOptions, Scene};
 
 use crate::common;

@@ -26,8 +26,8 @@ use std::path::Path;
 use crate::model::cube::Cube;
 use crate::scene::Scene;
 use crate::scene::maps::Environment;
-use crate::scene::sky_lights::sky_lights;
 use crate::scene::mesh::PosedMesh;
+use crate::scene::sky_lights::sky_lights;
 use baker::{Baker, EnvironmentBaker};
 pub use lobes::LobeStack;
 

@@ -179,7 +179,12 @@ const TABLE: [EffectInfo; Effect::BUILT_IN.len()] = [
         needs: None,
         within: None,
     },
-    EffectInfo { name: "haze", meaning: "The reflection's alpha to the output alpha", needs: None, within: None },
+    EffectInfo {
+        name: "haze",
+        meaning: "The reflection's alpha to the output alpha",
+        needs: None,
+        within: None,
+    },
     EffectInfo {
         name: "bloom",
         meaning: "A blur pass over alpha-weighted colour, driven by the haze",

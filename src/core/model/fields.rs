@@ -34,7 +34,7 @@ pub struct FieldInfo {
 pub enum Found {
     /// At vertices.
     Vertices,
-    /// At each stored sample or texel. Fragments of a rasteriser have rules in their place.
+    /// At each stored sample or texel by itself. A rasteriser interpolates what is found so at the vertices.
     Samples,
 }
 

@@ -1,10 +1,12 @@
 //! A scene's mesh in one pose with all that its samples and texels are made of.
 
+use rayon::prelude::*;
+
 use super::trace::Hit;
 use super::{SampleError, lit, posed_occlusion};
 use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
-use crate::model::fields::Field;
+use crate::model::fields::{Field, FieldInfo};
 use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
 
@@ -36,20 +38,47 @@ impl<'a> PosedSurface<'a> {
     /// # Errors
     /// When something was baked for another mesh.
     pub fn new(
-        scene: &'a Scene,
+        scene: &Scene,
         mesh: &'a PosedMesh,
         rays: &'a RayMesh,
         morphs: &[Morph],
-        bakes: SurfaceBakes<'a>,
+        bakes: SurfaceBakes<'_>,
     ) -> Result<Self, SampleError> {
         let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
-        Ok(Self { supplies: lit::supplies(scene, mesh, rays), ..Self::bare(mesh, rays, open) })
+        Ok(Self { open, ..Self::with_fields(scene, mesh, rays) })
+    }
+
+    /// The mesh of `scene` as it is posed with all that is found at its points, and nothing that is baked.
+    #[must_use]
+    pub fn with_fields(scene: &Scene, mesh: &'a PosedMesh, rays: &'a RayMesh) -> Self {
+        Self { supplies: lit::supplies(scene, mesh, rays), ..Self::bare(mesh, rays, None) }
     }
 
     /// A mesh with the open share of each vertex' hemisphere, and nothing else.
     #[must_use]
     pub const fn bare(mesh: &'a PosedMesh, rays: &'a RayMesh, open: Option<Vec<f32>>) -> Self {
         Self { mesh, rays, open, supplies: Vec::new() }
+    }
+
+    /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what
+    /// stands in for them. All cores.
+    #[must_use]
+    pub fn field_of_vertices(&self, field: Field) -> Vec<f32> {
+        let FieldInfo { numbers: count, neutral, .. } = *field.info();
+        let mut hits: Vec<Option<Hit>> = vec![None; self.mesh.positions.len()];
+        for (triangle, corners) in (0..).zip(&self.mesh.triangles) {
+            for (corner, barycentric) in corners.iter().zip([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) {
+                hits[*corner as usize] = Some(Hit { triangle, barycentric });
+            }
+        }
+        let mut numbers = vec![neutral; count * hits.len()];
+        let found = numbers.par_chunks_mut(count).zip(&hits);
+        found.for_each(|(numbers, hit)| {
+            if let Some(hit) = hit {
+                self.field(field, *hit, numbers);
+            }
+        });
+        numbers
     }
 
     /// What there is of a field at a point; what stands in for it where nothing has it.

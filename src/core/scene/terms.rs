@@ -5,8 +5,8 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::error::{SceneError, read_bytes};
-use super::load::read_lights;
 use super::file::{FamilyTable, ModelTable, SceneFile, Source, TermValue};
+use super::load::read_lights;
 use crate::model::registry::leaked;
 use crate::shader::term::{MEMBER, Term, register};
 

@@ -45,9 +45,7 @@ impl Attribute {
 
     /// The attributes that a vertex may have with these effects.
     pub fn all(effects: Effects) -> impl Iterator<Item = Self> {
-        Self::BUILT_IN
-            .into_iter()
-            .chain(term::fields(effects).iter().filter(|field| field.is_of_vertices()).map(Self::Field))
+        Self::BUILT_IN.into_iter().chain(term::fields(effects).iter().map(Self::Field))
     }
 
     /// The quantity's name in rules.

@@ -210,6 +210,7 @@ fn scene() -> Scene {
         quality: Quality::default(),
         bloom: Bloom::default(),
         lights: Vec::new(),
+        sky_lights: Vec::new(),
         diffusion: Diffusion::default(),
     }
 }

@@ -334,7 +334,10 @@ mod tests {
     #[test]
     fn effects_parameters_and_several_rules_are_read() {
         let read = read(TEXT).unwrap();
-        assert_eq!(read.effect, Some((3, DeclaredEffect { name: "sheen", within: None, meaning: "light of fine hair" })));
+        assert_eq!(
+            read.effect,
+            Some((3, DeclaredEffect { name: "sheen", within: None, meaning: "light of fine hair" }))
+        );
         let [(4, weight), (5, width)] = read.parameters.as_slice() else { panic!("{:?}", read.parameters) };
         assert!(weight.rgb && weight.linear && weight.upper == f64::INFINITY && weight.source == "a paper");
         assert!(width.scale == Scale::Log && width.unit == "degrees" && width.default == 20.0);

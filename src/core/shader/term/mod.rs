@@ -170,9 +170,7 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
         let attribute = leaked(&format!("rest_{name}"));
         let row = FieldInfo { name, attribute, of, numbers: components(wgsl), neutral, meaning };
         read.push(Field::register(row).map_err(|error| problem(error).at(line))?);
-        if of == Found::Vertices {
-            rules.extend(of_vertex(&declared, attribute, line));
-        }
+        rules.extend(of_vertex(&declared, attribute, line));
     }
     let mut layers = Vec::new();
     for rule in &mut rules {
@@ -196,7 +194,8 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
     TERMS.add(|_| false, |_| false, |_| Ok(term), never)
 }
 
-/// The rule by which a field comes from its attribute, interpolated from there to fragments and texels.
+/// The rule by which a field comes from its attribute, interpolated from there to fragments and texels of a rasteriser. A
+/// field of samples is found at the vertices then.
 fn of_vertex(field: &DeclaredField, attribute: &'static str, line: usize) -> Option<Rule> {
     let &DeclaredField { name, wgsl, meaning, .. } = field;
     let text =
