@@ -70,6 +70,8 @@ pub struct ParamsFile {
 pub struct SceneValues {
     /// What it is called ([`names_of`]).
     pub name: String,
+    /// Its effects, where they differ from the file's: by those of its light and its pose.
+    pub effects: Option<Effects>,
     /// Its parameters' values.
     pub params: Vec<(Param, [f64; 3])>,
     /// A gain for each of its views.
@@ -108,6 +110,7 @@ impl ParamsFile {
         if let Some(own) = own {
             own.params.iter().for_each(|(param, rgb)| self.params.set_rgb(*param, *rgb));
             self.gains.clone_from(&own.gains);
+            self.effects = own.effects.or(self.effects);
         }
         self
     }
@@ -140,10 +143,7 @@ impl ParamsFile {
             writeln!(text, "# Set on the command line before the fit: {}.", set.join(", "))?;
         }
         writeln!(text, "form = \"{}\"", self.form.name())?;
-        if let Some(effects) = self.effects {
-            let names: Vec<&str> = effects.iter().map(Effect::name).collect();
-            writeln!(text, "effects = {names:?}")?;
-        }
+        write_effects(text, self.effects)?;
         if let Some(loss) = self.loss {
             writeln!(text, "loss = \"{}\"", loss.name())?;
         }
@@ -213,6 +213,12 @@ impl ParamsFile {
     }
 }
 
+fn write_effects(text: &mut String, effects: Option<Effects>) -> std::fmt::Result {
+    let Some(effects) = effects else { return Ok(()) };
+    let names: Vec<&str> = effects.iter().map(Effect::name).collect();
+    writeln!(text, "effects = {names:?}")
+}
+
 impl SceneValues {
     /// The scene's tables; `numbers` are its own and its first view's among the unknowns.
     fn write_text(
@@ -222,6 +228,10 @@ impl SceneValues {
         numbers: Option<(usize, usize)>,
     ) -> std::fmt::Result {
         let name = quoted(&self.name);
+        if self.effects.is_some() {
+            writeln!(text, "\n[scenes.{name}]")?;
+            write_effects(text, self.effects)?;
+        }
         writeln!(text, "\n[scenes.{name}.params]")?;
         for (param, rgb) in &self.params {
             let own = |unknown: &Unknown| match unknown {
@@ -336,6 +346,7 @@ mod tests {
         let form = Form::Corrected;
         let own = |name: &str, turn: f64, gain: f64| SceneValues {
             name: name.to_owned(),
+            effects: (gain < 1.0).then_some(Effects::SURFACE.with(Effect::KeyLight)),
             params: vec![(Param::EnvironmentRotation, [turn; 3]), (Param::KeyColor, [0.1, 0.2, 0.3])],
             gains: vec![("front".to_owned(), gain)],
         };
@@ -358,6 +369,12 @@ mod tests {
         assert_eq!(turn("/noon/scene.toml"), (-1.0 / 3.0, Some(0.7)));
         assert_eq!(turn("/run/scenes/a b.toml"), (12.5, Some(1.0)));
         assert_eq!(turn("/d/dusk.toml"), (0.0, None));
+        let effects = |path: &str| read(&text, form).unwrap().of_scene(Path::new(path)).effects;
+        assert_eq!(effects("/d/noon.toml"), Some(Effects::SURFACE.with(Effect::KeyLight)));
+        assert_eq!(
+            (effects("/d/a b.toml"), effects("/d/dusk.toml")),
+            (Some(Effects::SURFACE), Some(Effects::SURFACE))
+        );
     }
 
     #[test]

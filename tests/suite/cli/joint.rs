@@ -2,6 +2,7 @@
 
 use serde_json::Value;
 
+use super::graphics::adapter;
 use super::runs::SHARE;
 use super::sandbox::{SCENE, Sandbox};
 use crate::fixtures::read_exr;
@@ -141,6 +142,30 @@ fn constants_of_a_joint_fit_are_used_with_one_scene() {
 }
 
 #[test]
+fn passes_on_an_adapter_are_of_all_scenes_too() {
+    let sandbox = lit();
+    if !adapter(&sandbox) {
+        return;
+    }
+    let fit = ["fit", "noon.toml", "night.toml", "-o"];
+    sandbox.run(&[&fit[..], &["gpu", "--engine", "gpu"]].concat()).done();
+    let report = sandbox.json("gpu/report.json");
+    assert_eq!(report["engine"], "gpu");
+    for (name, truth) in numbers(SKIN) {
+        let found = report["params"][&name]["value"].as_f64().unwrap();
+        // Passes in f32 on another processor: as far off as roundings may be on this one, several times over.
+        assert!((found - truth).abs() <= 10.0 * SHARE * truth, "{name}: {found} is not {truth}");
+    }
+    // The adapter's own samples are where a rasteriser finds them; nobody knows which are neighbours.
+    let ran = sandbox.run(&[&fit[..], &["own", "--engine", "gpu", "--samples", "gpu"]].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    let report = sandbox.json("own/report.json");
+    let basis = report["errors"]["basis"].as_str().unwrap();
+    assert!(["independent", "rounding"].contains(&basis), "{basis}");
+    assert!(ran.out.contains("samples made by the GPU in "), "{}", ran.out);
+}
+
+#[test]
 fn a_joint_fit_goes_on_to_the_same_end_on_any_number_of_threads() {
     let sandbox = lit();
     let fit = |run: &str, more: &[&str]| {
@@ -197,6 +222,11 @@ fn scenes_that_are_no_one_skin_are_refused_and_leave_nothing() {
     refused(&held, &["no scene and no view `nihgt`", "Did you mean `night`?"]);
     refused(&["noon.toml", "night.toml", "--hold-out", "front", "--hold-out", "side"], &["nothing is left"]);
     refused(&["noon.toml", "--free", "hilite,hilite"], &["--free lists hilite twice"]);
+    assert!(sandbox.files() == before, "files were left");
+    for command in ["ablate", "tradeoff"] {
+        let ran = sandbox.run(&[command, "noon.toml", "night.toml", "-o", "deep/run"]);
+        ran.refused(&["night.toml: this command takes one scene", "`skinfit fit` alone takes several"]);
+    }
     assert!(sandbox.files() == before, "files were left");
     // What the command line says of all scenes makes them one.
     let fit = ["fit", "noon.toml", "other_loss.toml", "other_free.toml", "-o", "run", "--loss", "l2"];

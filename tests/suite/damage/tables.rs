@@ -80,6 +80,7 @@ fn no_file_of_constants_makes_its_reader_panic_or_pass_what_is_out_of_bounds() {
         gains: gains.clone(),
         scenes: vec![SceneValues {
             name: "noon".to_owned(),
+            effects: Some(Effects::SURFACE),
             params: vec![(Param::KeyColor, [0.1, 0.2, 0.3])],
             gains,
         }],

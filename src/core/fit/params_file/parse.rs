@@ -132,16 +132,22 @@ fn read_scenes(table: &DeTable<'_>) -> Result<Vec<SceneValues>, Problem> {
         };
         for (key, value) in parts {
             match (key.get_ref().as_ref(), value.get_ref()) {
+                ("effects", DeValue::Array(names)) => own.effects = Some(read_effects(names)?),
                 ("params", DeValue::Table(params)) => own.params = read_own(params)?,
                 ("gains", DeValue::Table(gains)) => own.gains = read_gains(gains)?,
-                ("params" | "gains", _) => {
+                ("effects" | "params" | "gains", _) => {
                     let key = key.get_ref();
-                    return problem(value.span(), format!("`{key}` is of the wrong kind: it is a table."));
+                    return problem(
+                        value.span(),
+                        format!(
+                            "`{key}` is of the wrong kind: effects are a list of names, params and gains tables."
+                        ),
+                    );
                 }
                 (name, _) => {
                     return problem(
                         key.span(),
-                        format!("unknown key `{name}`. A scene has params and gains."),
+                        format!("unknown key `{name}`. A scene has effects, params and gains."),
                     );
                 }
             }

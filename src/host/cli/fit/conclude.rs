@@ -125,7 +125,8 @@ fn write_params(
         let at = scenes.point_of(part, &outcome.end);
         let params = Param::of(part.baked.scene.effects).filter(|param| param.is_of_scene());
         let params = params.map(|param| (param, at.params.rgb(param))).collect();
-        SceneValues { name: part.name.clone(), params, gains: gains(part) }
+        let effects = Some(part.baked.scene.effects).filter(|own| *own != first.baked.scene.effects);
+        SceneValues { name: part.name.clone(), effects, params, gains: gains(part) }
     };
     let several = scenes.several();
     let file = ParamsFile {

@@ -16,11 +16,22 @@ pub(super) type Place<'a> = (&'a str, &'a Path, &'a [View]);
 /// When a name is that of no view with a target, or nothing is left to fit.
 pub(super) fn marked(names: &[String], scenes: &[Place<'_>]) -> Result<Vec<Vec<bool>>, Refusal> {
     let mut marks: Vec<Vec<bool>> = scenes.iter().map(|(_, _, views)| vec![false; views.len()]).collect();
+    // Of a single scene its own name says nothing.
+    let of_scene = |name: &String, scene: &str| scenes.len() > 1 && name == scene;
     for name in names {
         let mut found = false;
+        let both = scenes.iter().any(|(scene, ..)| of_scene(name, scene))
+            && scenes.iter().any(|(_, _, views)| views.iter().any(|view| view.name == *name));
+        if both {
+            return Err(Refusal::new(format!(
+                "{}: --hold-out {name}: a scene is called so, and a view. Name each view with its scene: SCENE/VIEW.",
+                files(scenes)
+            )));
+        }
         for ((scene, _, views), marks) in scenes.iter().zip(&mut marks) {
             for (view, mark) in views.iter().zip(marks).filter(|(view, _)| view.target.is_some()) {
-                let named = *name == view.name || name == scene || *name == format!("{scene}/{}", view.name);
+                let whole = format!("{scene}/{}", view.name);
+                let named = *name == view.name || of_scene(name, scene) || *name == whole;
                 (*mark, found) = (*mark || named, found || named);
             }
         }
@@ -95,5 +106,9 @@ mod tests {
         assert!(words(&["bare"]).contains("no scene and no view `bare` with a target"));
         assert!(words(&["nite"]).contains("Did you mean `night`?"));
         assert!(words(&["noon", "night"]).contains("nothing is left to fit"));
+        let scenes = [("front", Path::new("front"), &views[..]), scenes[0]];
+        let names = ["front".to_owned()];
+        assert!(marked(&names, &scenes).unwrap_err().words.contains("a scene is called so, and a view"));
+        assert_eq!(marked(&names, &scenes[..1]).unwrap().concat(), [true, false, false]);
     }
 }
