@@ -5,11 +5,12 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::DVec3;
+use rayon::prelude::*;
 use skinfit::bake::rays::RayMesh;
 use skinfit::model::bearing::Bearing;
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::samples::visibility::Shadows;
-use skinfit::samples::{sample_hits, sample_view};
+use skinfit::samples::{Hit, sample_hits, sample_view};
 use skinfit::scene::light::{Beam, Cone, Lamp, NEAREST, THINNEST_EDGE};
 use skinfit::scene::maps::Spots;
 use skinfit::scene::sky_lights::sky_lights;
@@ -126,7 +127,7 @@ const ALBEDO: f64 = 0.5;
 /// Samples along a pixel's side.
 const PER_AXIS: u32 = 4;
 /// Rays towards lights that have a size.
-const SOFT_RAYS: u32 = 64;
+const SOFT_RAYS: u32 = 16;
 
 fn predict(scene: &Scene) -> Predicted {
     let posed = scene.mesh.pose();
@@ -146,7 +147,7 @@ fn predict(scene: &Scene) -> Predicted {
     // Strata are even, so that their filter weights sum to the filter's integral.
     let stratum = 1.0 / f64::from(PER_AXIS).powi(2);
     let whole = (3.0 * 0.35875_f64).powi(2);
-    for (_, hit) in hits.iter().enumerate().filter(|(slot, _)| samples.surface.weight(*slot) > 0.0) {
+    let lit = |hit: &Hit| {
         let weights = hit.weights().map(f64::from);
         let place = shadows.place(hit.triangle, weights);
         let corners = posed.triangles[hit.triangle as usize].map(|i| posed.normals[i as usize].as_dvec3());
@@ -159,7 +160,13 @@ fn predict(scene: &Scene) -> Predicted {
             let all = light.attenuation(place.position) * cosine;
             lit += if all > 0.0 { arriving / all } else { 0.0 };
         }
-        let (x, y, _) = camera.project(place.position);
+        (place.position, radiance, lit)
+    };
+    let shown: Vec<&Hit> =
+        (0..hits.len()).filter(|&i| samples.surface.weight(i) > 0.0).map(|i| &hits[i]).collect();
+    let lit: Vec<(DVec3, [f64; 3], f64)> = shown.into_par_iter().map(lit).collect();
+    for (position, radiance, lit) in lit {
+        let (x, y, _) = camera.project(position);
         for row in (y - 2.0).floor() as i64..=(y + 1.0).ceil() as i64 {
             for column in (x - 2.0).floor() as i64..=(x + 1.0).ceil() as i64 {
                 let [dx, dy] = [x - column as f64 - 0.5, y - row as f64 - 0.5];
@@ -170,7 +177,7 @@ fn predict(scene: &Scene) -> Predicted {
                 let weight = stratum * filter(dx) * filter(dy) / whole;
                 let pixel = (row * width + column) as usize;
                 (0..3).for_each(|c| sums.radiance[pixel][c] += weight * radiance[c]);
-                sums.height[pixel] += weight * place.position.y;
+                sums.height[pixel] += weight * position.y;
                 sums.lit[pixel] += weight * lit;
                 sums.coverage[pixel] += weight;
             }
