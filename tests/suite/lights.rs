@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use skinfit::bake::rays::RayMesh;
 use skinfit::model::bearing::Bearing;
 use skinfit::model::effects::{Effect, Effects};
+use skinfit::samples::PosedSurface;
 use skinfit::samples::visibility::Shadows;
 use skinfit::samples::{Hit, sample_hits, sample_view};
 use skinfit::scene::light::{Beam, Cone, Lamp, NEAREST, THINNEST_EDGE};
@@ -134,7 +135,7 @@ fn predict(scene: &Scene) -> Predicted {
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
     let shadows = Shadows::new(&posed, &rays, SOFT_RAYS);
     let camera = &scene.views[0].camera;
-    let samples = sample_view(scene, &posed, &rays, None, camera);
+    let samples = sample_view(scene, &PosedSurface::bare(&posed, &rays, None), camera);
     let hits = sample_hits(scene, &posed, &rays, camera);
     let (width, height) = (i64::from(camera.width), i64::from(camera.height));
     let pixels = (width * height) as usize;

@@ -26,6 +26,7 @@ mod instructions;
 mod joint;
 mod light_files;
 mod lights;
+mod lit;
 mod meshes;
 mod occlusion;
 mod phases;
