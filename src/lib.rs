@@ -36,6 +36,7 @@
 //! | --- | --- |
 //! | read, bake and sample a scene | [`Loaded`], [`Baked`], [`Sampled`], [`Observed`], each made from the one before or, by [`PrepareOptions`], from a file; [`built_in_scene`] writes one |
 //! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`]: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] |
+//! | fit several scenes as one skin | the same over a [`Joint`] of their engines; [`HeldOut`] views score a fit |
 //! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name |
 //! | render | [`Shader`] on the CPU, [`Renderer`] on a graphics adapter; [`write_exr`] |
 //! | take it to another engine | [`export_constants`] of [`Constants`], [`export_function`] |
@@ -55,6 +56,7 @@
 
 pub use skinfit_core::demo::built_in_scene;
 pub use skinfit_core::engine::cpu::CpuEngine;
+pub use skinfit_core::engine::joint::Joint;
 pub use skinfit_core::engine::{Objective, Point, Unknown};
 pub use skinfit_core::export::{
     Constants, Target as ExportTarget, constants as export_constants, function as export_function,
@@ -62,7 +64,7 @@ pub use skinfit_core::export::{
 pub use skinfit_core::fit::outcome::Outcome;
 pub use skinfit_core::fit::{FitOptions, fit};
 pub use skinfit_core::model::params::{Param, Params};
-pub use skinfit_core::prepare::{Baked, Loaded, Observed, PrepareOptions, Sampled};
+pub use skinfit_core::prepare::{Baked, HeldOut, Loaded, Observed, PrepareOptions, Sampled};
 pub use skinfit_core::progress;
 pub use skinfit_core::render::files::write_exr;
 pub use skinfit_core::render::shade::Shader;

@@ -13,7 +13,7 @@ use skinfit::bake::rays::RayMesh;
 use skinfit::engine::{Objective, Point};
 use skinfit::prepare::{PrepareOptions, Sampled};
 use skinfit::render::shade::Shader;
-use skinfit::samples::sample_view;
+use skinfit::samples::{PosedSurface, sample_view};
 
 /// The built-in scene, written once below target/.
 fn sampled() -> Sampled {
@@ -75,12 +75,13 @@ fn surface(c: &mut Criterion) {
     let posed = sampled.scene.mesh.pose();
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
     let camera = &sampled.scene.views[0].camera;
+    let surface = PosedSurface::bare(&posed, &rays, None);
     let mut group = c.benchmark_group("samples");
     group.sample_size(20);
     let count = sampled.samples[0].count();
     group.throughput(Throughput::Elements(count as u64));
     group.bench_function("one view", |b| {
-        b.iter(|| black_box(sample_view(&sampled.scene, &posed, &rays, None, camera)));
+        b.iter(|| black_box(sample_view(&sampled.scene, &surface, camera)));
     });
     group.finish();
 }

@@ -143,7 +143,7 @@ impl Uploads {
             return Ok(buffer.clone());
         }
         let (mesh, occlusion) = self.mesh();
-        let bytes = vertices::attribute(attribute, mesh, occlusion);
+        let bytes = vertices::attribute(attribute, &self.content.scene, mesh, occlusion);
         let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
         self.bytes += bytes.len() as u64;
         self.attributes.insert(attribute, made.clone());
@@ -210,7 +210,7 @@ impl Uploads {
                 Attribute::Position | Attribute::Normal | Attribute::Tangent | Attribute::Field(_)
             );
             if moves || own && attribute == Attribute::Occlusion {
-                let bytes = vertices::attribute(attribute, mesh, occlusion);
+                let bytes = vertices::attribute(attribute, &self.content.scene, mesh, occlusion);
                 gpu.queue.write_buffer(buffer, 0, &bytes);
             }
         }

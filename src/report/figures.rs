@@ -36,8 +36,11 @@ pub(super) fn view(
         ["target", "fit", "wipe in the target"],
         &[("FLIP error", FLIP_LEGEND, error), ("signed error", &signed::legend(scale), &signed)],
     )?;
+    let held = if view.held_out { " <span class=\"pill\">held out</span>" } else { "" };
     let (scores, terms) = (score_list(scores), terms(view)?);
-    Ok(format!("<article class=\"view\"><header><h3>{name}</h3>{scores}</header>{triple}{terms}</article>"))
+    Ok(format!(
+        "<article class=\"view\"><header><h3>{name}{held}</h3>{scores}</header>{triple}{terms}</article>"
+    ))
 }
 
 /// Two pictures of one thing and the error between them, side by side; `words` name the first and the

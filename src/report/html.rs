@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use rayon::prelude::*;
 
-use super::json::{Summary, ViewSummary};
+use super::json::{Summary, ViewMeans};
 use super::misfit::{LEAST, Match, Misfit, SIGMAS};
 use super::page::{Page, escape, filled, tile};
 use super::pictures::Picture;
@@ -13,6 +13,10 @@ use super::words::{capital, count, counted, ending, list, number, seconds};
 use super::{RunInfo, charts, errors, figures, maps, tables};
 use crate::fit::outcome::Ending;
 use crate::fit::profile::Profile;
+
+/// What the scores of views that were held out tell.
+const HELD_OUT: &str = "Views that are held out took no part in the fit, and come last: their scores tell whether the \
+    constants hold for what it has not seen.";
 
 /// The page of the run called `title`; `errors` are the views' FLIP errors, in their order, and `scale` is the greatest
 /// signed error that is told apart.
@@ -34,6 +38,7 @@ pub fn page(
         "warnings" => warnings(&summary.warnings),
         "misfit" => misfit(&summary.misfit),
         "views" => views.clone(),
+        "held_out" if run.views.iter().any(|view| view.held_out) => format!("<p>{HELD_OUT}</p>\n"),
         "maps" => shown.clone(),
         "held" if run.maps.is_some() => format!("<p>{}</p>\n", maps::HELD),
         "parameters" => tables::parameters(summary),
@@ -98,24 +103,24 @@ fn misfit(misfit: &Misfit) -> String {
 
 /// The run in a handful of numbers.
 fn tiles(summary: &Summary) -> String {
-    let views: Vec<&ViewSummary> = summary.views.0.iter().map(|(_, view)| view).collect();
-    let mean = |score: fn(&ViewSummary) -> Option<f64>| {
-        let scores: Vec<f64> = views.iter().filter_map(|v| score(v)).collect();
-        (!scores.is_empty()).then(|| scores.iter().sum::<f64>() / scores.len() as f64)
+    let score = |name, of: fn(&ViewMeans) -> Option<f64>, text: fn(f64) -> String| {
+        let text = |means: ViewMeans| of(&means).map_or_else(|| "–".to_owned(), text);
+        let whole = match summary.scores.fitted {
+            Some(means) if means.views > 1 => Some(format!("mean of {} views", means.views)),
+            _ => None,
+        };
+        let held = summary.scores.held_out.map(|means| format!("held out {}", text(means)));
+        let note = whole.into_iter().chain(held).collect::<Vec<_>>().join(" · ");
+        (name, summary.scores.fitted.map_or_else(|| "–".to_owned(), text), note)
     };
-    let of_views = match views.len() {
-        0 | 1 => String::new(),
-        n => format!("mean of {n} views"),
-    };
-    let score = |x: Option<f64>, text: fn(f64) -> String| x.map_or_else(|| "–".to_owned(), text);
     let total = summary.seconds;
     let total =
         total.load + total.bake + total.samples + total.maps + total.fit + total.render + total.report;
     let tiles = [
         ("loss", number(summary.loss.end, 3), format!("from {}", number(summary.loss.start, 3))),
-        ("PSNR", score(mean(|v| v.psnr), |x| format!("{x:.1} <small>dB</small>")), of_views.clone()),
-        ("SSIM", score(mean(|v| v.ssim), |x| format!("{x:.3}")), of_views.clone()),
-        ("FLIP", score(mean(|v| v.flip), |x| format!("{x:.3}")), of_views),
+        score("PSNR", |means| means.psnr, |x| format!("{x:.1} <small>dB</small>")),
+        score("SSIM", |means| means.ssim, |x| format!("{x:.3}")),
+        score("FLIP", |means| means.flip, |x| format!("{x:.3}")),
         ("samples", count(summary.samples), format!("{} · {}", escape(&summary.engine), summary.solver)),
         ("time", seconds(total), format!("fit {}", seconds(summary.seconds.fit))),
     ];

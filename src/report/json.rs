@@ -6,13 +6,13 @@
 use super::maps::{MapEvidence, MapSummary};
 use super::misfit::Misfit;
 pub use super::ordered::Ordered;
-pub use super::view_summary::ViewSummary;
+pub use super::view_summary::{MeanScores, ViewMeans, ViewSummary};
 use super::{RunInfo, StageSeconds};
 use crate::engine::{Point, Unknown};
 use crate::fit::error_basis::ErrorBasis;
 use crate::fit::outcome::{Ending, Iteration, Outcome, UnknownOutcome};
 use crate::fit::profile::Profile;
-use crate::model::params::{Channels, Param};
+use crate::model::params::{Channels, Column, Param};
 
 /// The whole of `report.json`.
 ///
@@ -25,6 +25,8 @@ pub struct Summary {
     pub params: Ordered<ParamSummary>,
     /// Each view's scores, by its name.
     pub views: Ordered<ViewSummary>,
+    /// The means of these, of the views that were fitted and of those that were held out.
+    pub scores: MeanScores,
     /// Which solver ran.
     pub solver: &'static str,
     /// Which engine evaluated the model: `cpu` or `gpu`.
@@ -155,12 +157,13 @@ impl Summary {
         warnings: Vec<String>,
         misfit: Misfit,
     ) -> Self {
-        let names: Vec<String> = outcome.unknowns.iter().map(|u| label(&u.unknown.name(), run)).collect();
+        let names: Vec<String> = outcome.unknowns.iter().map(|u| run.label(&u.unknown.name())).collect();
         let order = names.len().max(1);
         Self {
             loss: StartEnd { start: outcome.loss_start, end: outcome.loss_end },
-            params: Ordered(params(outcome)),
+            params: Ordered(params(run, outcome)),
             views: Ordered(run.views.iter().map(|v| v.name.clone()).zip(views.iter().copied()).collect()),
+            scores: MeanScores::of(views),
             solver: outcome.solver,
             engine: run.engine.clone(),
             iterations: outcome.iterations,
@@ -174,7 +177,10 @@ impl Summary {
                 basis: outcome.errors,
                 most_over_noise: outcome.most_over_noise().filter(|x| x.is_finite()),
             },
-            profile: outcome.profile.clone(),
+            profile: outcome
+                .profile
+                .clone()
+                .map(|profile| Profile { name: run.label(&profile.name), ..profile }),
             correlations: Correlations {
                 names,
                 matrix: outcome
@@ -188,7 +194,7 @@ impl Summary {
             undetermined: outcome
                 .undetermined
                 .iter()
-                .map(|d| Ordered(d.components.iter().map(|(name, x)| (label(name, run), *x)).collect()))
+                .map(|d| Ordered(d.components.iter().map(|(name, x)| (run.label(name), *x)).collect()))
                 .collect(),
             history: outcome.history.clone(),
             misfit,
@@ -205,15 +211,6 @@ impl Summary {
     /// None that these types can cause.
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         serde_json::to_string_pretty(self).map(|text| text + "\n")
-    }
-}
-
-/// An unknown's name for people: a gain is named by its view, not by the view's number.
-fn label(name: &str, run: &RunInfo) -> String {
-    let number = name.strip_prefix("gain.").and_then(|n| n.parse::<usize>().ok());
-    match number.and_then(|n| run.views.get(n)) {
-        Some(view) => format!("gain.{}", view.name),
-        None => name.to_owned(),
     }
 }
 
@@ -238,25 +235,39 @@ fn unknown(outcome: &UnknownOutcome, name: &str) -> UnknownSummary {
     }
 }
 
-/// The unknowns gathered by parameter, in the order of the unknowns.
-fn params(outcome: &Outcome) -> Vec<(String, ParamSummary)> {
-    let mut free: Vec<Param> = Vec::new();
+/// The unknowns gathered by parameter (and by scene, of what each has of its own), in the order of the unknowns.
+fn params(run: &RunInfo, outcome: &Outcome) -> Vec<(String, ParamSummary)> {
+    let mut free: Vec<(Option<usize>, Param)> = Vec::new();
     for unknown in &outcome.unknowns {
-        if let Unknown::Param(column) = unknown.unknown
-            && !free.contains(&column.param)
-        {
-            free.push(column.param);
+        if let Some(whose) = whose(&unknown.unknown).filter(|whose| !free.contains(whose)) {
+            free.push(whose);
         }
     }
-    free.into_iter().map(|param| (param.name().to_owned(), summarise(param, outcome))).collect()
+    let named = |(scene, param): (Option<usize>, Param)| {
+        let unknown = match scene {
+            Some(scene) => Unknown::Own(scene, Column::tied(param)),
+            None => Unknown::Param(Column::tied(param)),
+        };
+        (run.label(&unknown.name()), summarise((scene, param), outcome))
+    };
+    free.into_iter().map(named).collect()
 }
 
-fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
+/// The parameter of an unknown, and the scene that it is free in alone.
+fn whose(unknown: &Unknown) -> Option<(Option<usize>, Param)> {
+    match unknown {
+        Unknown::Param(column) => Some((None, column.param)),
+        Unknown::Own(scene, column) => Some((Some(*scene), column.param)),
+        Unknown::Gain(_) => None,
+    }
+}
+
+fn summarise((scene, param): (Option<usize>, Param), outcome: &Outcome) -> ParamSummary {
     let (mut errors, mut noise) = ([None; 3], [None; 3]);
     let (mut tied, mut identifiable, mut at_bound) = (true, true, false);
     for known in &outcome.unknowns {
-        let Unknown::Param(column) = known.unknown else { continue };
-        if column.param == param {
+        let Some(column) = known.unknown.column() else { continue };
+        if whose(&known.unknown) == Some((scene, param)) {
             tied &= column.channels == Channels::Tied;
             identifiable &= known.identifiable;
             at_bound |= known.at_bound;
@@ -266,9 +277,13 @@ fn summarise(param: Param, outcome: &Outcome) -> ParamSummary {
             }
         }
     }
+    let rgb = |point: &Point| match scene {
+        Some(scene) => point.params.rgb_in(scene, param),
+        None => point.params.rgb(param),
+    };
     let value = |point: &Point| match tied {
-        true => Value::Tied(point.params.scalar(param)),
-        false => Value::Rgb(point.params.rgb(param)),
+        true => Value::Tied(rgb(point)[0]),
+        false => Value::Rgb(rgb(point)),
     };
     let gathered = |errors: [Option<f64>; 3]| {
         errors.iter().any(Option::is_some).then_some(match tied {

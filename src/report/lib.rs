@@ -31,11 +31,13 @@ mod verdict;
 mod view_summary;
 mod words;
 
+pub use verdict::held_out;
 pub use words::{count, number, seconds};
 
 // What other members of the workspace hold stands under the names that it has there.
 use skinfit_core::{engine, fit, model, output, prepare, progress, render, scene};
 
+use std::collections::BTreeSet;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -53,6 +55,8 @@ use metrics::Comparison;
 use misfit::Misfit;
 use pictures::Picture;
 
+/// The folder of the scenes' files in the run folder of a fit of several.
+pub const SCENES: &str = "scenes";
 /// The folder of fitted maps in a run folder.
 pub const MAPS: &str = "maps";
 /// What was found of fitted maps, in numbers.
@@ -63,6 +67,8 @@ pub const MAPS_JSON: &str = "maps.json";
 pub struct RunInfo {
     /// The scene's file, or what the built-in scene is called.
     pub scene: String,
+    /// Of several scenes that were fitted as one skin their names, in the order of the unknowns' numbers; empty of one.
+    pub scenes: Vec<String>,
     /// What was minimised.
     pub loss: Loss,
     /// Which engine evaluated the model: `cpu` or `gpu`.
@@ -71,7 +77,7 @@ pub struct RunInfo {
     pub samples: u64,
     /// Seconds spent in each stage.
     pub seconds: StageSeconds,
-    /// The images, in the order of the scene's views.
+    /// The images, in the order of the scene's views; those of views that were held out come last.
     pub views: Vec<ViewEvidence>,
     /// What the user should know.
     pub warnings: Vec<String>,
@@ -84,6 +90,8 @@ pub struct RunInfo {
     pub maps: Option<MapEvidence>,
     /// Files that the run's scene names: where one is what an earlier run left, it stays.
     pub named: Vec<PathBuf>,
+    /// Other files that the run has left in its folder, by their paths from there.
+    pub files: Vec<String>,
 }
 
 /// The images of one view; all of one size.
@@ -106,6 +114,8 @@ pub struct ViewEvidence {
     pub places: Places,
     /// Where an 8-bit target is clipped.
     pub clip: Option<Clip>,
+    /// Whether it took no part in the fit, which is only scored on it.
+    pub held_out: bool,
 }
 
 /// What [`write_run`] wrote.
@@ -156,7 +166,8 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
     for view in &run.views {
         view.check()?;
     }
-    let misfit = Misfit::of(&run.views);
+    // What the fit gets wrong of what it was to match; on the rest it is only scored.
+    let misfit = Misfit::of(run.fitted());
     let mut warnings = run.warnings.clone();
     let mut written = Vec::new();
     let (mut views, mut shown) = (Vec::new(), Vec::new());
@@ -167,14 +178,14 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
         let scores = comparison.scores();
         warnings.extend(view.warnings(scores.is_some()));
         let png = folder.join(format!("{stem}.png"));
-        let sheet = pictures::side_by_side(&view.name, &view.target, &view.fit, &comparison, scores);
+        let sheet = pictures::side_by_side(&view.title(), &view.target, &view.fit, &comparison, scores);
         files::write_png_bytes(&png, sheet.width, sheet.height, &sheet.bytes)?;
         let exr = folder.join(format!("{stem}_terms.exr"));
         let haze = ("haze".to_owned(), view.haze.as_slice());
         let planes = if view.haze.is_empty() { &[][..] } else { std::slice::from_ref(&haze) };
         files::write_exr_layers(&exr, &view.fit, &view.terms, planes, &options)?;
         written.extend([png, exr]);
-        views.push(ViewSummary::new(scores, comparison.pixels()));
+        views.push(ViewSummary::new(scores, comparison.pixels(), view.held_out));
         shown.push(Picture::of_error(&comparison, view.fit.width));
         bar.inc(1);
     }
@@ -182,7 +193,7 @@ pub fn write_run(folder: &Path, run: &RunInfo, outcome: &Outcome) -> Result<Repo
 
     let path = folder.join("report.json");
     let mut left = file_names(&written);
-    left.extend(run.maps.iter().flat_map(|maps| maps.files.iter().cloned()));
+    left.extend(run.maps.iter().flat_map(|maps| maps.files.iter().cloned()).chain(run.files.iter().cloned()));
     let kept = remove_stale(folder, &path, &left, &run.named)?;
     left.extend(kept);
     let scale = signed::scale(&run.views, misfit.threshold);
@@ -224,7 +235,7 @@ fn remove_stale(
     // Without a report, or with one that is not ours, nothing in the folder is known to be ours.
     let earlier = std::fs::read(report).ok().and_then(|bytes| serde_json::from_slice::<Earlier>(&bytes).ok());
     let named: Vec<PathBuf> = named.iter().filter_map(|path| path.canonicalize().ok()).collect();
-    let (mut kept, mut maps) = (Vec::new(), false);
+    let (mut kept, mut folders) = (Vec::new(), BTreeSet::new());
     for name in earlier.map(|earlier| earlier.files).unwrap_or_default() {
         if !is_ours(&name) || written.contains(&name) {
             continue;
@@ -236,12 +247,12 @@ fn remove_stale(
         }
         match std::fs::remove_file(&path) {
             Err(error) if error.kind() != ErrorKind::NotFound => return Err(OutputError::new(&path, &error)),
-            _ => maps |= name != MAPS_JSON && name.starts_with(MAPS),
+            _ => folders.extend(name.split_once('/').map(|(own, _)| folder.join(own))),
         }
     }
-    if maps {
+    for own in folders {
         // A folder that still holds something stays.
-        let _ = std::fs::remove_dir(folder.join(MAPS));
+        let _ = std::fs::remove_dir(own);
     }
     Ok(kept)
 }
@@ -249,6 +260,9 @@ fn remove_stale(
 /// Whether a run could have left a file of that name, by its path from the run folder: one that leads elsewhere is
 /// never removed.
 fn is_ours(name: &str) -> bool {
+    if let Some(scene) = name.strip_prefix(SCENES).and_then(|name| name.strip_prefix('/')) {
+        return scene.ends_with(".toml") && !scene.contains(['/', '\\']);
+    }
     let stem = match name.strip_prefix(MAPS).and_then(|name| name.strip_prefix('/')) {
         Some(map) => [".png", ".exr", ".csv"].iter().find_map(|ending| map.strip_suffix(ending)),
         None if name == MAPS_JSON => return true,
@@ -258,6 +272,24 @@ fn is_ours(name: &str) -> bool {
 }
 
 impl RunInfo {
+    /// An unknown's name for people: a gain is named by its view and not by the view's number, and what a scene has of its
+    /// own by the scene.
+    #[must_use]
+    pub fn label(&self, name: &str) -> String {
+        let number = |text: &str| text.parse::<usize>().ok();
+        if let Some(view) = name.strip_prefix("gain.").and_then(number).and_then(|n| self.views.get(n)) {
+            return format!("gain.{}", view.name);
+        }
+        let own = name.split_once('/').and_then(|(scene, own)| Some((self.scenes.get(number(scene)?)?, own)));
+        own.map_or_else(|| name.to_owned(), |(scene, own)| format!("{scene}/{own}"))
+    }
+
+    /// The views that took part in the fit.
+    fn fitted(&self) -> &[ViewEvidence] {
+        let end = self.views.iter().position(|view| view.held_out).unwrap_or(self.views.len());
+        &self.views[..end]
+    }
+
     /// Where the numbers come from, as (name, text).
     fn provenance(&self) -> Vec<(String, String)> {
         let own = [("software", software()), ("scene", self.scene.clone())];
@@ -273,8 +305,11 @@ impl RunInfo {
 
     /// The provenance that image files carry: as the report's, and the fitted parameters.
     fn attributes(&self, outcome: &Outcome) -> Vec<(String, String)> {
-        let values: Vec<String> =
-            outcome.unknowns.iter().map(|u| format!("{} = {}", u.unknown.name(), u.value)).collect();
+        let values: Vec<String> = outcome
+            .unknowns
+            .iter()
+            .map(|u| format!("{} = {}", self.label(&u.unknown.name()), u.value))
+            .collect();
         let mut attributes = self.provenance();
         attributes.push(("parameters".to_owned(), values.join("; ")));
         attributes
@@ -287,6 +322,12 @@ fn software() -> String {
 }
 
 impl ViewEvidence {
+    /// Its name, and whether it was held out.
+    fn title(&self) -> String {
+        let name = &self.name;
+        if self.held_out { format!("{name} (held out)") } else { name.clone() }
+    }
+
     fn check(&self) -> Result<(), ReportError> {
         let (width, height) = (self.fit.width, self.fit.height);
         let fits = |image: &Image| {
@@ -382,6 +423,7 @@ mod tests {
             haze: Vec::new(),
             places: Places::default(),
             clip: None,
+            held_out: false,
         };
         let views = ["front", "Front", "../up", "", "a/b", "a:b", "größe"].map(view);
         let stems = file_stems(&views);

@@ -15,10 +15,10 @@ pub(super) fn parameters(summary: &Summary) -> String {
     let mut last = "";
     for unknown in &summary.unknowns {
         let (base, channel) = match unknown.name.rsplit_once('.') {
-            Some((base, channel @ ("r" | "g" | "b"))) if Param::from_name(base).is_some() => (base, channel),
+            Some((base, channel @ ("r" | "g" | "b"))) if parameter(base).is_some() => (base, channel),
             _ => (unknown.name.as_str(), ""),
         };
-        let info = Param::from_name(base).map(Param::info);
+        let info = parameter(base).map(Param::info);
         rows.push_str(&row(summary, unknown, info, (base, channel), base == last));
         last = base;
     }
@@ -27,6 +27,12 @@ pub(super) fn parameters(summary: &Summary) -> String {
          <th class=\"n\">value ± standard error</th><th>between its bounds</th><th class=\"n\">sensitivity</th>\
          <th>notes</th></tr></thead><tbody>{rows}</tbody></table></div>"
     )
+}
+
+/// The parameter of that name, which may stand after its scene's.
+fn parameter(name: &str) -> Option<Param> {
+    let own = || name.rsplit_once('/').filter(|_| !name.starts_with("gain."));
+    Param::from_name(name).or_else(|| Param::from_name(own()?.1))
 }
 
 fn row(

@@ -8,6 +8,7 @@ use crate::fit::outcome::Ending;
 /// The verdict: how the fit ended, what it reached, and what to be wary of; a sentence an entry.
 pub(super) fn verdict(summary: &Summary) -> Vec<String> {
     let mut sentences = vec![how_it_ended(summary), what_it_reached(summary)];
+    sentences.extend(held_out(summary).map(|words| sentence(&words)));
     let misfit = [summary.misfit.explained_in_words(), summary.misfit.largest_in_words()];
     sentences.extend(misfit.into_iter().flatten().map(|words| sentence(&words)));
     let named = |wanted: &dyn Fn(&UnknownSummary) -> bool| -> Vec<String> {
@@ -71,7 +72,8 @@ fn what_it_reached(summary: &Summary) -> String {
         _ => ("went", String::new()),
     };
     let mut text = format!("The loss {went} from {} to {}{fall}", number(start, 4), number(end, 4));
-    let psnr: Vec<f64> = summary.views.0.iter().filter_map(|(_, view)| view.psnr).collect();
+    let fitted = summary.views.0.iter().filter(|(_, view)| !view.held_out);
+    let psnr: Vec<f64> = fitted.filter_map(|(_, view)| view.psnr).collect();
     let (least, most) = psnr.iter().fold((f64::MAX, f64::MIN), |(a, b), &x| (a.min(x), b.max(x)));
     match psnr.len() {
         0 => {}
@@ -79,6 +81,32 @@ fn what_it_reached(summary: &Summary) -> String {
         n => text += &format!("; the {n} views are matched with a PSNR of {least:.1} to {most:.1} dB"),
     }
     text + "."
+}
+
+/// How well what was held out is matched, beside what was fitted, in a sentence without its end; `None` where nothing
+/// was held out, or no pixel of it is covered.
+#[must_use]
+pub fn held_out(summary: &Summary) -> Option<String> {
+    let held: Vec<(&String, f64, f64, f64)> = summary
+        .views
+        .0
+        .iter()
+        .filter(|(_, view)| view.held_out)
+        .filter_map(|(name, view)| Some((name, view.psnr?, view.ssim?, view.flip?)))
+        .collect();
+    let each: Vec<String> = held
+        .iter()
+        .map(|(name, psnr, ssim, flip)| {
+            format!("{name} with a PSNR of {psnr:.1} dB, SSIM {ssim:.3}, FLIP {flip:.3}")
+        })
+        .collect();
+    let fitted = summary.scores.fitted.and_then(|means| Some((means.views, means.psnr?)));
+    let beside = match fitted {
+        Some((1, psnr)) => format!(", where the view that was fitted has {psnr:.1} dB"),
+        Some((n, psnr)) => format!(", where the {n} views that were fitted have {psnr:.1} dB on average"),
+        None => String::new(),
+    };
+    (!each.is_empty()).then(|| format!("held out: {}{beside}", each.join("; ")))
 }
 
 /// An undetermined direction in words.

@@ -355,6 +355,8 @@ fn the_renderer_draws_its_passes() {
 }
 
 mod over_stored_texels {
+    use skinfit::bake::VertexOcclusion;
+    use skinfit::bake::rays::RayMesh;
     use skinfit::engine::cpu::CpuEngine;
     use skinfit::engine::gpu::{GpuEngine, Memory};
     use skinfit::engine::levels::LevelMaker;
@@ -367,7 +369,9 @@ mod over_stored_texels {
     use skinfit::program::lower::Natives;
     use skinfit::program::shading::Shading;
     use skinfit::render::shade::Shader;
-    use skinfit::samples::{TargetRows, ViewSamples, atlas_of, sample_views};
+    use skinfit::samples::{
+        Atlas, PosedSurface, SurfaceBakes, TargetRows, ViewSamples, atlas_of, sample_views,
+    };
     use skinfit::scene::Loss;
     use skinfit::scene::view::Target;
     use skinfit::shader::facts::FaceSizes;
@@ -389,7 +393,7 @@ mod over_stored_texels {
     }
 
     fn samples(scene: &Scene) -> ViewSamples {
-        sample_views(scene, &scene.mesh.pose(), None).unwrap().remove(0)
+        sample_views(scene, &scene.mesh.pose(), SurfaceBakes::default()).unwrap().remove(0)
     }
 
     fn at(scene: &Scene, set: &[(Param, f64)]) -> Point {
@@ -493,6 +497,14 @@ mod over_stored_texels {
         assert!(engine.loss(&point).is_finite() && engine.levels_made() == 2);
     }
 
+    fn atlas(scene: &Scene, occlusion: Option<&VertexOcclusion>) -> Arc<Atlas> {
+        let posed = scene.mesh.pose();
+        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        let bakes = SurfaceBakes { occlusion };
+        let surface = PosedSurface::new(scene, &posed, &rays, &scene.mesh.morphs, bakes).unwrap();
+        atlas_of(scene, &surface).unwrap().unwrap()
+    }
+
     #[test]
     fn the_processors_levels_and_image_are_the_renderers() {
         let Some(gpu) = gpu() else { return };
@@ -500,7 +512,7 @@ mod over_stored_texels {
         scene.params = truth(&scene).params;
         let facts = Facts::of_scene(&scene, &scene.params, Budget::Exact, false);
         let drawn_levels = skinfit::gpu::atlas::levels(gpu, &plan(&facts).unwrap(), content(&scene)).unwrap();
-        let atlas = atlas_of(&scene, &scene.mesh.pose(), None).unwrap().unwrap();
+        let atlas = atlas(&scene, None);
         let facts = Facts::of_samples(scene.setup(), FaceSizes::default(), false);
         let shading = Shading::new(&facts, &[], |_| None, Natives::Written).unwrap();
         let levels =
@@ -543,13 +555,7 @@ mod over_stored_texels {
         let facts = Facts::of_scene(&scene, params, Budget::Exact, false);
         let drawn_levels =
             skinfit::gpu::atlas::levels(gpu, &plan(&facts).unwrap(), Content::of(&head)).unwrap();
-        let open = skinfit::samples::posed_occlusion(
-            &scene,
-            &scene.mesh.morphs,
-            scene.mesh.positions.len(),
-            head.occlusion.as_deref(),
-        );
-        let atlas = atlas_of(&scene, &scene.mesh.pose(), open.unwrap().as_deref()).unwrap().unwrap();
+        let atlas = atlas(&scene, head.occlusion.as_deref());
         let faces = skinfit::engine::face_sizes(&head.illumination);
         let facts = Facts::of_samples(scene.setup(), faces, params.scalar(Param::EnvironmentRotation) != 0.0);
         let shading = Shading::new(&facts, &[], |_| None, Natives::Written).unwrap();

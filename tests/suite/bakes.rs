@@ -12,7 +12,7 @@ use skinfit::bake::{BakeStats, LobeStack, bake};
 use skinfit::model::cube::{Cube, texel_direction, texel_solid_angle};
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::scene::Scene;
-use skinfit::scene::maps::{Environment, Map};
+use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::mesh::PosedMesh;
 use skinfit::scene::view::Camera;
 
@@ -363,7 +363,8 @@ fn small_scene() -> Scene {
     let mut scene = bare_scene(Effects::SURFACE);
     let texels = (0..512).map(|i| [0.2 + (i % 7) as f32, 1.0, 0.01 * i as f32]).collect();
     let panorama = Map { width: 32, height: 16, texels };
-    scene.environment = Some(Environment { panorama, rotation_degrees: 30.0, intensity: 0.5 });
+    scene.environment =
+        Some(Environment { panorama, rotation_degrees: 30.0, intensity: 0.5, spots: Spots::default() });
     scene.quality.irradiance_size = 4;
     scene.quality.lobe_size = 4;
     scene.quality.hilite_size = 8;

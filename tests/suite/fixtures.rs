@@ -11,7 +11,7 @@ use serde_json::Value;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::Params;
-use skinfit::scene::maps::{Environment, Map, Maps};
+use skinfit::scene::maps::{Environment, Map, Maps, Spots};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
 use skinfit::scene::view::{Background, Camera, View};
 use skinfit::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene};
@@ -52,7 +52,7 @@ pub(crate) fn environment(path: &Path, rotation_degrees: f64) -> Environment {
     let planes = read_exr(path);
     let texels = planes.rgb(["R", "G", "B"]);
     let panorama = Map { width: planes.width, height: planes.height, texels };
-    Environment { panorama, rotation_degrees, intensity: 1.0 }
+    Environment { panorama, rotation_degrees, intensity: 1.0, spots: Spots::default() }
 }
 
 pub(crate) fn json(path: &Path) -> Value {
@@ -175,6 +175,8 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         },
         quality: Quality::default(),
         bloom: Bloom::default(),
+        lights: Vec::new(),
+        sky_lights: Vec::new(),
         diffusion: Diffusion::default(),
     }
 }

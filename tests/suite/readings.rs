@@ -13,7 +13,7 @@ use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::{Column, Param, Params};
 use skinfit::samples::surface_records::Unmade;
-use skinfit::samples::{LANES, ViewSamples, sample_views};
+use skinfit::samples::{LANES, SurfaceBakes, ViewSamples, sample_views};
 use skinfit::scene::maps::Map;
 use skinfit::scene::{Loss, Scene};
 
@@ -32,7 +32,7 @@ fn sampled(scene: &Scene) -> ViewSamples {
     for (normal, position) in mesh.normals.iter_mut().zip(&mesh.positions) {
         *normal = Vec3::new(0.7 * position.x, 0.5 * position.y, 0.6).normalize();
     }
-    sample_views(scene, &mesh, None).unwrap().remove(0)
+    sample_views(scene, &mesh, SurfaceBakes::default()).unwrap().remove(0)
 }
 
 /// Light of 1 from everywhere.
@@ -101,7 +101,7 @@ fn seen_from_the_side_every_corner_is_at_the_rim() {
     for (normal, position) in mesh.normals.iter_mut().zip(&mesh.positions) {
         *normal = (*position - eye).cross(Vec3::Y).normalize();
     }
-    let samples = sample_views(&scene, &mesh, None).unwrap().remove(0);
+    let samples = sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap().remove(0);
     assert!(samples.surface.places().silhouette.is_none());
     for slot in 0..samples.surface.slots() {
         let Unmade { corner_silhouettes, corner_shares, .. } = samples.surface.unmade(slot);

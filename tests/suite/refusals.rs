@@ -123,6 +123,12 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
             &["line 20", "background holds -1", "[0, 1000000000]"],
         ),
         ("[fit]", "background = [0, nan, 0]\n[fit]".into(), &["background holds NaN"]),
+        ("\"env.exr\"", "\"env.exr\"\nlights = 65".into(), &["line 11", "lights = 65", "[0, 64]"]),
+        (
+            "\"env.exr\"",
+            "\"env.exr\"\nlight_spot_degrees = 0".into(),
+            &["line 11", "light_spot_degrees = 0", "[0.05, 45]"],
+        ),
         ("[fit]", "[bloom]\nsigma = 0.3\n[fit]".into(), &["line 21", "sigma = 0.3", "[0, 0.25]"]),
         (
             "[fit]",

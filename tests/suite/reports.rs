@@ -66,7 +66,7 @@ fn ball(name: &str, side: usize, light: [f32; 3]) -> ViewEvidence {
     });
     let places = Places { facing: facing.collect(), ..Places::default() };
     let (name, terms) = (name.to_owned(), terms.to_vec());
-    ViewEvidence { name, target, fit, coverage, terms, haze: Vec::new(), places, clip: None }
+    ViewEvidence { name, target, fit, coverage, terms, haze: Vec::new(), places, clip: None, held_out: false }
 }
 
 fn run() -> RunInfo {
@@ -77,6 +77,7 @@ fn run() -> RunInfo {
 fn run_of(side: usize) -> RunInfo {
     RunInfo {
         scene: "scenes/<script>alert('forest')</script>/scene.toml".to_owned(),
+        scenes: Vec::new(),
         loss: Loss::RelativeL2,
         engine: "cpu".to_owned(),
         samples: 1_234_567,
@@ -99,6 +100,7 @@ fn run_of(side: usize) -> RunInfo {
         ],
         maps: None,
         named: Vec::new(),
+        files: Vec::new(),
     }
 }
 

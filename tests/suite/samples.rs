@@ -5,7 +5,7 @@
 use glam::{Vec2, Vec3};
 use skinfit::bake::VertexOcclusion;
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
-use skinfit::samples::{LANES, TargetRows, ViewSamples, sample_views};
+use skinfit::samples::{LANES, SurfaceBakes, TargetRows, ViewSamples, sample_views};
 use skinfit::scene::Scene;
 use skinfit::scene::maps::Map;
 use skinfit::scene::mesh::PosedMesh;
@@ -56,8 +56,8 @@ fn the_scanned_head_lies_where_the_independent_renderer_sees_it() {
     scene.views = head_views(&data);
     let position = PosedMesh { normals: mesh.positions.clone(), ..mesh.clone() };
     let uv = PosedMesh { normals: mesh.uvs.iter().map(|uv| uv.extend(0.0)).collect(), ..mesh.clone() };
-    let positions = sample_views(&scene, &position, None).unwrap();
-    let uvs = sample_views(&scene, &uv, None).unwrap();
+    let positions = sample_views(&scene, &position, SurfaceBakes::default()).unwrap();
+    let uvs = sample_views(&scene, &uv, SurfaceBakes::default()).unwrap();
     for ((view, positions), uvs) in scene.views.iter().zip(&positions).zip(&uvs) {
         let aov = read_exr(&data.join(format!("targets/aov_{}.exr", view.name)));
         let want = aov.rgb(["P.X", "P.Y", "P.Z"]);
@@ -97,7 +97,7 @@ fn the_scanned_heads_shading_normals_agree_with_the_independent_renderer() {
     let (mut medians, mut tails) = (Vec::new(), Vec::new());
     for map in [Some(normal_map(&data)), None] {
         scene.maps.normal = map;
-        let samples = sample_views(&scene, &mesh, None).unwrap();
+        let samples = sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap();
         let what = if scene.maps.normal.is_some() { "normal" } else { "normal without map" };
         for (view, samples) in scene.views.iter().zip(&samples) {
             let aov = read_exr(&data.join(format!("targets/aov_{}.exr", view.name)));
@@ -128,7 +128,9 @@ fn coverage_is_that_of_the_independent_renderer_but_for_its_wider_filter() {
     let mut scene = bare_scene(Effects::of(&[Effect::Diffuse]));
     scene.quality.samples_per_axis = 4;
     scene.views = head_views(&data);
-    for (view, samples) in scene.views.iter().zip(sample_views(&scene, &mesh, None).unwrap()) {
+    for (view, samples) in
+        scene.views.iter().zip(sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap())
+    {
         let aov = read_exr(&data.join(format!("targets/aov_{}.exr", view.name)));
         let alpha = &aov.planes["A"];
         let mut ours = vec![0.0_f32; alpha.len()];
@@ -209,7 +211,7 @@ fn groups_stand_by_their_count_of_records_and_weights_sum_to_one() {
     scene.maps.normal = Some(Map { width: 1, height: 1, texels: vec![[0.4, 0.6, 0.9]] });
     let mesh = sheet();
     let occlusion = VertexOcclusion { base: vec![0.5; mesh.positions.len()], morphs: Vec::new() };
-    let view = sample_views(&scene, &mesh, Some(&occlusion)).unwrap().remove(0);
+    let view = sample_views(&scene, &mesh, SurfaceBakes { occlusion: Some(&occlusion) }).unwrap().remove(0);
     let samples = view.records() * LANES;
     assert_eq!(view.pixel.len(), view.groups() * LANES);
     assert_eq!(view.surface.slots(), samples);
@@ -247,7 +249,7 @@ fn numbers_that_no_effect_asks_for_are_not_kept() {
     let kept = |effects: &[Effect], silhouette: Silhouette| {
         let mut scene = sheet_scene(Effects::of(effects));
         scene.silhouette = silhouette;
-        present(&sample_views(&scene, &mesh, None).unwrap().remove(0))
+        present(&sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap().remove(0))
     };
     use Effect as E;
     let fragment = Silhouette::Fragment;
@@ -280,7 +282,7 @@ fn silhouettes_per_vertex_and_per_fragment_follow_their_definitions() {
     for silhouette in [Silhouette::Vertex, Silhouette::Fragment] {
         let mut scene = sheet_scene(effects);
         scene.silhouette = silhouette;
-        let view = sample_views(&scene, &mesh, None).unwrap().remove(0);
+        let view = sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap().remove(0);
         let (mut apart, eye) = (0.0_f32, scene.views[0].camera.eye().as_vec3());
         for i in 0..view.surface.slots() {
             let f = view.surface.fragment(i);
@@ -311,7 +313,7 @@ fn hard_texels_and_normals_leave_a_base_that_is_a_direction() {
             } else {
                 mesh = sheet();
             }
-            let s = sample_views(&scene, &mesh, None).unwrap().remove(0).surface;
+            let s = sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap().remove(0).surface;
             for i in 0..s.slots() {
                 let f = s.fragment(i);
                 let (base, bump) = (Vec3::from(f.base), Vec3::from(f.bump));
@@ -334,7 +336,7 @@ fn samples_are_the_same_for_any_number_of_threads() {
     let mesh = sheet();
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        format!("{:?}", pool.install(|| sample_views(&scene, &mesh, None).unwrap()))
+        format!("{:?}", pool.install(|| sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap()))
     };
     let one = run(1);
     assert!((2..=4).all(|threads| run(threads) == one));
@@ -347,7 +349,7 @@ fn padding_is_below_a_hundredth_of_the_samples() {
     let mut scene = bare_scene(Effects::SURFACE);
     scene.views = head_views(&data);
     scene.maps.normal = Some(normal_map(&data));
-    let views = sample_views(&scene, &mesh, None).unwrap();
+    let views = sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap();
     let samples: usize = views.iter().map(ViewSamples::count).sum();
     let slots: usize = views.iter().map(|v| v.surface.slots()).sum();
     // Padding is confined to the groups between two counts.
@@ -362,7 +364,7 @@ fn a_texel_of_the_listing_that_is_no_direction_is_the_smooth_normal() {
     let mesh = sheet();
     let mut of = |texel: [f32; 3]| {
         scene.maps.normal = Some(Map { width: 1, height: 1, texels: vec![texel] });
-        sample_views(&scene, &mesh, None).unwrap().remove(0)
+        sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap().remove(0)
     };
     // (0, 0, 1) is N as printed.
     let smooth = of([0.0, 0.0, 1.0]);
@@ -399,7 +401,7 @@ fn a_target_with_haze_has_a_fourth_channel_over_its_coverage() {
 
 fn with_target(rgb: [f32; 3], alpha: Option<f32>, mask: Option<f32>) -> (Scene, ViewSamples) {
     let mut scene = sheet_scene(Effects::of(&[Effect::Diffuse]));
-    let view = sample_views(&scene, &sheet(), None).unwrap().remove(0);
+    let view = sample_views(&scene, &sheet(), SurfaceBakes::default()).unwrap().remove(0);
     scene.views[0].target = Some(Target {
         rgb: vec![rgb; 2500],
         alpha: alpha.map(|a| vec![a; 2500]),
@@ -443,11 +445,25 @@ fn what_cannot_be_sampled_or_compared_is_said() {
 
     let (mut scene, mut mesh) = (sheet_scene(Effects::of(&[Effect::Diffuse])), sheet());
     let wrong = VertexOcclusion { base: vec![1.0; 3], morphs: Vec::new() };
-    assert!(sample_views(&scene, &mesh, Some(&wrong)).unwrap_err().to_string().contains("3 vertices"));
+    assert!(
+        sample_views(&scene, &mesh, SurfaceBakes { occlusion: Some(&wrong) })
+            .unwrap_err()
+            .to_string()
+            .contains("3 vertices")
+    );
     mesh.uvs.clear();
-    assert!(sample_views(&scene, &mesh, None).unwrap_err().to_string().contains("TEXCOORD_0"));
+    assert!(
+        sample_views(&scene, &mesh, SurfaceBakes::default()).unwrap_err().to_string().contains("TEXCOORD_0")
+    );
     scene.views[0].camera.world_to_camera = glam::DMat4::from_translation(glam::DVec3::new(0.0, 0.0, 9.0));
-    let error = sample_views(&scene, &sheet(), None).unwrap_err().to_string();
+    let error = sample_views(&scene, &sheet(), SurfaceBakes::default()).unwrap_err().to_string();
     assert!(error.contains("front") && error.contains("no pixel shows the mesh"), "{error}");
-    assert!(sample_views(&scene, &PosedMesh { uvs: vec![Vec2::ZERO], ..Default::default() }, None).is_err());
+    assert!(
+        sample_views(
+            &scene,
+            &PosedMesh { uvs: vec![Vec2::ZERO], ..Default::default() },
+            SurfaceBakes::default()
+        )
+        .is_err()
+    );
 }

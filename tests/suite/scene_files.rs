@@ -8,7 +8,7 @@ use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::{Column, Param};
 use skinfit::render::backdrop::Backdrop;
-use skinfit::scene::maps::{Environment, Map};
+use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::view::Background;
 use skinfit::scene::{LoadOptions, Loss, Scene};
 
@@ -289,7 +289,8 @@ fn the_camera_sees_the_environment_turned_by_both_rotations() {
     let bright = |i: usize| if (14..18).contains(&(i % 32)) { [5.0, 1.0, 0.0] } else { [0.0; 3] };
     let panorama = Map { width: 32, height: 16, texels: (0..32 * 16).map(bright).collect() };
     let mut scene = bare_scene(Effects::of(&[Effect::Bloom]));
-    scene.environment = Some(Environment { panorama, rotation_degrees: 0.0, intensity: 2.0 });
+    scene.environment =
+        Some(Environment { panorama, rotation_degrees: 0.0, intensity: 2.0, spots: Spots::default() });
     let identity = [1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1., 0., 0., 0., 0., 1.];
     let camera = camera(identity, 60.0, 8);
     let middle = |scene: &Scene, turn: f64| {

@@ -20,7 +20,7 @@ use skinfit_core::program::graph::Input;
 
 use self::reader::{Node, Tolerance, Vectors};
 use crate::by_rules::{Cubes, Fragments, Function, Number, Shaded, Wanted};
-use crate::{bakes, common, evaluators, meshes, witness};
+use crate::{bakes, common, evaluators, lights, meshes, witness};
 
 /// Numbers as the vectors are compared with: how each evaluator makes them, and the files' tolerance for it.
 #[track_caller]
@@ -403,7 +403,7 @@ fn vectors_hold_in_simd_lanes_with_every_instruction_set_that_there_is() {
 const TINY: &str = "frag_09_tiny_frame";
 
 /// What is compared with nothing: a vector's name or kind, what its paths begin with, and why.
-const LEFT_OUT: [(&str, &str, &str); 12] = [
+const LEFT_OUT: [(&str, &str, &str); 13] = [
     ("", "note", "a sentence for people"),
     ("fragment", "inputs.skinColor[3]", "the colour map's alpha, which listing 3-4 does not read"),
     (
@@ -419,6 +419,7 @@ const LEFT_OUT: [(&str, &str, &str); 12] = [
         "expected",
         "errors of formats over pixels that are not in the file; experiments measure their own",
     ),
+    ("light", "inputs.cases[25].f32_rel", "the tolerance of evaluators in f32: lights are evaluated in f64"),
     ("vertex", "inputs.uv", "texture coordinates pass through the vertex stage as they are"),
     ("vertex", "expected.SkinUVST", "texture coordinates pass through the vertex stage as they are"),
     ("vertex", "inputs.cam_pos[3]", "the 1 of a point"),
@@ -441,6 +442,7 @@ fn every_number_of_every_vector_is_compared() {
     vectors.of_kind("latlong").iter().for_each(bakes::latlong_vector);
     vectors.of_kind("prefilter").iter().for_each(|file| bakes::prefilter_vector(&vectors, file));
     vectors.of_kind("vertex").iter().for_each(meshes::vertex_vector);
+    lights::light_vector(&vectors.one("light"));
     witness::bench_on(&vectors, &evaluators::on_cpu()[..2]);
     witness::fit_of_the_bench(&vectors);
     witness::fragments_on(&vectors, &evaluators::on_cpu()[..2]);

@@ -5,11 +5,11 @@ use web_time::Instant;
 
 use super::cache::{self, Found, Key};
 use super::panorama::Radiance;
-use super::prefilter::{Prefilter, luminance};
+use super::prefilter::Prefilter;
 use super::{BakeStats, VertexOcclusion, occlusion};
 use crate::model::cube::Cube;
 use crate::progress;
-use crate::scene::maps::Environment;
+use crate::scene::maps::{Environment, luminance};
 use crate::scene::mesh::PosedMesh;
 
 /// Bakes through the cache, and keeps count.

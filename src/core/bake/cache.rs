@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 13] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
     include_str!("lobe_kernel.rs"),
@@ -22,6 +22,7 @@ const SOURCES: [&str; 12] = [
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),
     include_str!("rays.rs"),
+    include_str!("../scene/sky_lights.rs"),
     crate::model::cube::SOURCE,
 ];
 const MAGIC: &[u8; 8] = b"SKINBAKE";

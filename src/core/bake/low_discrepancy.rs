@@ -1,21 +1,28 @@
-//! Owen-scrambled Sobol points over the hemisphere (Burley, *Practical Hash-based Owen
+//! Owen-scrambled Sobol points over disc and hemisphere (Burley, *Practical Hash-based Owen
 //! Scrambling*, JCGT 2020): for a few hundred rays, far less noise than random ones.
 
 use glam::{Vec3A, vec3a};
 
 /// The first two dimensions of the Sobol sequence, bit-reversed and ready to be scrambled.
-pub(super) struct Sobol(Vec<[u32; 2]>);
+pub(crate) struct Sobol(Vec<[u32; 2]>);
 
 impl Sobol {
     /// The first `count` points.
-    pub(super) fn new(count: u32) -> Self {
+    pub(crate) fn new(count: u32) -> Self {
         Self((0..count).map(|i| [i, second_dimension(i).reverse_bits()]).collect())
     }
 
-    /// Cosine-distributed unit directions about +Z, scrambled by `seed`.
-    pub(super) fn hemisphere(&self, seed: u32) -> impl Iterator<Item = Vec3A> {
+    /// Evenly distributed points of the unit disc, scrambled by `seed`: radius, then sine and cosine of the angle.
+    pub(crate) fn disc(&self, seed: u32) -> impl Iterator<Item = (f32, [f32; 2])> {
         let (first, second) = (mix(seed), mix(seed ^ 0x9e37_79b9));
-        self.0.iter().map(move |&[a, b]| cosine_hemisphere(scramble(a, first), scramble(b, second)))
+        self.0.iter().map(move |&[a, b]| concentric(scramble(a, first), scramble(b, second)))
+    }
+
+    /// Cosine-distributed unit directions about +Z, scrambled by `seed`: the disc lifted (Malley).
+    pub(super) fn hemisphere(&self, seed: u32) -> impl Iterator<Item = Vec3A> {
+        self.disc(seed).map(|(radius, [sine, cosine])| {
+            vec3a(radius * cosine, radius * sine, (1.0 - radius * radius).max(0.0).sqrt())
+        })
     }
 }
 
@@ -45,14 +52,15 @@ fn scramble(mut x: u32, seed: u32) -> f32 {
 }
 
 /// A hash of 32 bits (the finaliser of MurmurHash 3).
-pub(super) fn mix(mut x: u32) -> u32 {
+pub(crate) fn mix(mut x: u32) -> u32 {
     x = (x ^ (x >> 16)).wrapping_mul(0x85eb_ca6b);
     x = (x ^ (x >> 13)).wrapping_mul(0xc2b2_ae35);
     x ^ (x >> 16)
 }
 
-/// Shirley and Chiu's concentric map to the disc, lifted to the hemisphere (Malley).
-fn cosine_hemisphere(u: f32, v: f32) -> Vec3A {
+/// Shirley and Chiu's concentric map of the square to the disc: radius, then sine and cosine of the angle. A radius may
+/// be negative.
+fn concentric(u: f32, v: f32) -> (f32, [f32; 2]) {
     use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
     let (a, b) = (2.0 * u - 1.0, 2.0 * v - 1.0);
     let (radius, angle) = if a * a > b * b {
@@ -63,7 +71,7 @@ fn cosine_hemisphere(u: f32, v: f32) -> Vec3A {
         (0.0, 0.0)
     };
     let (sine, cosine) = angle.sin_cos();
-    vec3a(radius * cosine, radius * sine, (1.0 - radius * radius).max(0.0).sqrt())
+    (radius, [sine, cosine])
 }
 
 #[cfg(test)]

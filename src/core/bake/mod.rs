@@ -13,7 +13,7 @@ mod baker;
 pub mod cache;
 mod lobe_kernel;
 pub mod lobes;
-mod low_discrepancy;
+pub(crate) mod low_discrepancy;
 pub mod occlusion;
 pub mod panorama;
 pub mod prefilter;
@@ -27,6 +27,7 @@ use crate::model::cube::Cube;
 use crate::scene::Scene;
 use crate::scene::maps::Environment;
 use crate::scene::mesh::PosedMesh;
+use crate::scene::sky_lights::sky_lights;
 use baker::{Baker, EnvironmentBaker};
 pub use lobes::LobeStack;
 
@@ -197,8 +198,10 @@ pub fn bake_light(
     let mut baker = Baker { cache, stats: BakeStats::default() };
     let mut light = Illumination::default();
     if needs.environment() {
-        let environment = checked_environment(scene)?;
-        let mut cubes = EnvironmentBaker::new(environment);
+        let whole = checked_environment(scene)?;
+        // What became lights shines as such, with shadows.
+        let rest = (!scene.sky_lights.is_empty()).then(|| sky_lights(whole).rest);
+        let mut cubes = EnvironmentBaker::new(rest.as_ref().unwrap_or(whole));
         let quality = &scene.quality;
         if needs.irradiance {
             let size = quality.irradiance_size as usize;

@@ -179,7 +179,8 @@ fn bits(position: Vec3) -> [u32; 3] {
     position.to_array().map(|x| (x + 0.0).to_bits())
 }
 
-fn offset(positions: &[Vec3]) -> f32 {
+/// How far above a surface of these positions rays start.
+pub(crate) fn offset(positions: &[Vec3]) -> f32 {
     let low = positions.iter().copied().fold(Vec3::INFINITY, Vec3::min);
     let high = positions.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max);
     let (size, distance) = ((high - low).length(), low.abs().max(high.abs()).max_element());
@@ -189,7 +190,7 @@ fn offset(positions: &[Vec3]) -> f32 {
 
 /// A frame with Z along the unit `normal`, continuous but at -Z (Duff et al., *Building an
 /// Orthonormal Basis, Revisited*, JCGT 2017).
-fn frame(normal: Vec3A) -> Mat3A {
+pub(crate) fn frame(normal: Vec3A) -> Mat3A {
     let sign = 1_f32.copysign(normal.z);
     let a = -1.0 / (sign + normal.z);
     let b = normal.x * normal.y * a;

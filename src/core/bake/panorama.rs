@@ -206,6 +206,7 @@ fn halve(map: &Map<3>) -> Map<3> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::maps::Spots;
 
     /// A panorama whose colour is its direction.
     fn compass(height: usize) -> Map<3> {
@@ -221,7 +222,12 @@ mod tests {
 
     #[test]
     fn each_direction_finds_its_own_colour_and_a_rotation_turns_the_environment_the_right_way() {
-        let still = Environment { panorama: compass(256), rotation_degrees: 0.0, intensity: 1.0 };
+        let still = Environment {
+            panorama: compass(256),
+            rotation_degrees: 0.0,
+            intensity: 1.0,
+            spots: Spots::default(),
+        };
         let d = [0.48, -0.6, 0.64];
         let got = Radiance::new(&still).along(d);
         // Bilinear error: (pi / 256)^2 / 8 = 2e-5 in each axis, a little more towards the poles.
@@ -240,7 +246,8 @@ mod tests {
             let mut texels = black.clone();
             texels[y * width + x] = [16336.0; 3];
             let panorama = Map { width, height, texels };
-            let environment = Environment { panorama, rotation_degrees: 33.0, intensity: 1.0 };
+            let environment =
+                Environment { panorama, rotation_degrees: 33.0, intensity: 1.0, spots: Spots::default() };
             let cube = Radiance::new(&environment).to_cube(64);
             let edge = |y: usize| (y as f64 / height as f64 * std::f64::consts::PI).cos();
             let want = 16336.0 * (edge(y) - edge(y + 1)) * std::f64::consts::TAU / width as f64;
@@ -260,7 +267,8 @@ mod tests {
         let (width, height) = (4096, 4);
         let texels = (0..width * height).map(|i| [(i % 2) as f32; 3]).collect();
         let panorama = Map { width, height, texels };
-        let environment = Environment { panorama, rotation_degrees: 0.0, intensity: 1.0 };
+        let environment =
+            Environment { panorama, rotation_degrees: 0.0, intensity: 1.0, spots: Spots::default() };
         let contrast = |radiance: &Radiance<'_>| {
             let along = |column: usize| {
                 let phi = ((column as f64 + 0.5) / width as f64 - 0.5) * std::f64::consts::TAU;

@@ -11,6 +11,7 @@ use super::lobe_kernel::{BLOCK, Cells, Lobe, WIDE, gather};
 use super::panorama::Radiance;
 use super::pyramid::{Cell, Pyramid};
 use crate::model::cube::{Cube, texel_direction, texel_solid_angle};
+use crate::scene::maps::luminance;
 use crate::with_simd;
 
 /// Cells are wide by this share of a lobe's standard deviation, at most (see `pyramid`).
@@ -123,14 +124,6 @@ impl Prefilter {
         let block = |cells: &[Cell]| Block::new(cells, self.pyramid.mean, cut);
         cells.par_chunks(WIDE * BLOCK).map(block).collect()
     }
-}
-
-/// Rec.709 luminance.
-#[must_use]
-pub fn luminance(rgb: [f32; 3]) -> f32 {
-    let [r, g, b] = rgb.map(f64::from);
-    // In f64 and with weights that sum to exactly 1, so that grey 1 has luminance 1.
-    (0.2126 * r + 0.7152 * g + 0.0722 * b) as f32
 }
 
 impl Block {

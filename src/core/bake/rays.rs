@@ -91,6 +91,15 @@ impl RayMesh {
         !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
     }
 
+    /// Whether a triangle stands between two points, seen from either side.
+    #[must_use]
+    pub fn between(&self, from: Vec3A, to: Vec3A) -> bool {
+        let distance = (to - from).length();
+        let (Some(bvh), Some(direction)) = (&self.bvh, (to - from).try_normalize()) else { return false };
+        let ray = Ray { tmax: distance, ..ray(from, direction, 0.0) };
+        !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
+    }
+
     /// The nearest triangle along the ray, by `intersect`: the distance at which the ray meets a
     /// triangle (by its index in the mesh), or infinity.
     pub fn nearest(
@@ -168,6 +177,15 @@ mod tests {
                     },
                 );
             assert_eq!(found, Some(MANY as u32), "{hidden:?}");
+        }
+    }
+
+    #[test]
+    fn what_stands_behind_the_further_point_is_not_between() {
+        let mesh = RayMesh::new(&across(2.0), &[[0, 1, 2]]);
+        // The hierarchy's boxes are a little larger than what is in them, the triangle is not.
+        for (to, want) in [(1.999, false), (2.001, true), (1e9, true), (-1e9, false), (0.0, false)] {
+            assert_eq!(mesh.between(Vec3A::ZERO, to * Vec3A::Z), want, "{to}");
         }
     }
 

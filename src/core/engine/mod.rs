@@ -2,6 +2,7 @@
 //!
 //! - [`Objective`]: all that the solvers see of an engine; [`Engine`]: what else is asked of one, whatever it runs on
 //! - [`Task`]: what an engine is to evaluate
+//! - [`joint`]: scenes of different light as one objective
 //! - [`cpu`]: the engine on the processor
 //! - `gram`: columns to products; [`residual`]: the losses; [`pulls`]: where residuals stand in the images
 //! - [`lanes`]: sixteen f32 lanes as one number; `real_lanes`: its functions; `corners`: its lookups in cubes
@@ -12,6 +13,7 @@
 mod corners;
 pub mod cpu;
 mod gram;
+pub mod joint;
 pub mod lanes;
 pub mod levels;
 pub mod pulls;
@@ -109,6 +111,8 @@ pub trait Engine: Objective {
     fn surfaced_views(&self) -> Result<Arc<[ObservedView]>, EngineError>;
     /// Surface samples of positive weight, over all views.
     fn samples(&self) -> u64;
+    /// Sum of the residuals' weights: what the loss is a mean over, whatever the point.
+    fn weight(&self) -> f64;
     /// The seconds that making the samples took, where the engine made them itself.
     fn own_sample_seconds(&self) -> Option<f64> {
         None
@@ -159,6 +163,8 @@ pub fn face_sizes(illumination: &crate::bake::Illumination) -> crate::shader::fa
 pub enum Unknown {
     /// A parameter of the model (tied, or one channel of it).
     Param(Column),
+    /// The same in one scene alone, by its number, of several that are fitted as one skin.
+    Own(usize, Column),
     /// The gain of a view, by its index.
     Gain(usize),
 }
@@ -173,11 +179,21 @@ pub struct Point {
 }
 
 impl Unknown {
+    /// The parameter and its channels that it moves; none of a gain.
+    #[must_use]
+    pub const fn column(&self) -> Option<Column> {
+        match self {
+            Self::Param(column) | Self::Own(_, column) => Some(*column),
+            Self::Gain(_) => None,
+        }
+    }
+
     /// This unknown's value at `point`.
     #[must_use]
     pub fn get(&self, point: &Point) -> f64 {
         match self {
             Self::Param(column) => column.get(&point.params),
+            Self::Own(scene, column) => column.get_in(*scene, &point.params),
             Self::Gain(view) => point.gains[*view],
         }
     }
@@ -186,6 +202,7 @@ impl Unknown {
     pub fn set(&self, point: &mut Point, value: f64) {
         match self {
             Self::Param(column) => column.set(&mut point.params, value),
+            Self::Own(scene, column) => column.set_in(*scene, &mut point.params, value),
             Self::Gain(view) => point.gains[*view] = value,
         }
     }
@@ -194,7 +211,9 @@ impl Unknown {
     #[must_use]
     pub fn bounds(&self) -> (f64, f64) {
         match self {
-            Self::Param(column) => (column.param.info().lower, column.param.info().upper),
+            Self::Param(column) | Self::Own(_, column) => {
+                (column.param.info().lower, column.param.info().upper)
+            }
             // A gain of 0 would explain any image by darkness.
             Self::Gain(_) => (1e-3, 1e3),
         }
@@ -204,16 +223,17 @@ impl Unknown {
     #[must_use]
     pub fn linear(&self) -> bool {
         match self {
-            Self::Param(column) => column.param.info().linear,
+            Self::Param(column) | Self::Own(_, column) => column.param.info().linear,
             Self::Gain(_) => false,
         }
     }
 
-    /// The name in reports.
+    /// The name in reports: scenes and views by their numbers, as `1/environment_rotation` and `gain.2`.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
             Self::Param(column) => column.name(),
+            Self::Own(scene, column) => format!("{scene}/{}", column.name()),
             Self::Gain(view) => format!("gain.{view}"),
         }
     }

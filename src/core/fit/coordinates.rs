@@ -100,7 +100,7 @@ impl Coordinates {
     pub fn size(&self, i: usize, at: f64) -> f64 {
         match self.unknowns[i] {
             u if is_log(&u) => 1.0,
-            Unknown::Param(column) if column.param.info().unit == "degrees" => at.abs().max(1.0),
+            u if is_angle(&u) => at.abs().max(1.0),
             _ => at.abs().max(0.01),
         }
     }
@@ -109,10 +109,12 @@ impl Coordinates {
 /// Whether a solver steps through this unknown by its logarithm.
 #[must_use]
 pub fn is_log(unknown: &Unknown) -> bool {
-    match unknown {
-        Unknown::Param(column) => column.param.info().scale == Scale::Log,
-        Unknown::Gain(_) => false,
-    }
+    unknown.column().is_some_and(|column| column.param.info().scale == Scale::Log)
+}
+
+/// Whether it is an angle.
+pub(super) fn is_angle(unknown: &Unknown) -> bool {
+    unknown.column().is_some_and(|column| column.param.info().unit == "degrees")
 }
 
 fn inward(unknown: &Unknown, value: f64) -> f64 {

@@ -26,6 +26,13 @@ impl Fingerprint {
         self
     }
 
+    /// The same with all items of another one, which are those of `whose`.
+    #[must_use]
+    pub fn with_all(mut self, other: &Self, whose: &str) -> Self {
+        self.0.extend(other.0.iter().map(|(what, value)| (format!("{what} ({whose})"), value.clone())));
+        self
+    }
+
     /// The first item that another one has not, or has otherwise, or has besides.
     #[must_use]
     pub fn difference(&self, now: &Self) -> Option<Difference> {

@@ -15,6 +15,17 @@
 //! front = 1.0
 //! ```
 //!
+//! Of several scenes that were fitted as one skin, `[params]` holds the skin's values alone, and what each scene has of its
+//! own stands under its name:
+//!
+//! ```toml
+//! [scenes.noon.params]
+//! environment_rotation = 12.5     # +- 0.1
+//!
+//! [scenes.noon.gains]
+//! front = 1.0
+//! ```
+//!
 //! Reading is strict: an unknown name, a value outside its parameter's bounds or another form than the
 //! scene's is refused with its line. A parameter that the file does not name keeps the scene's value.
 //!
@@ -34,6 +45,7 @@ use crate::fit::outcome::{Outcome, UnknownOutcome};
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Channels, Param, Params};
 use crate::output::{self, OutputError};
+use crate::scene::names::names_of;
 use crate::scene::{Assignment, Loss};
 
 /// What a `params.toml` holds.
@@ -49,6 +61,21 @@ pub struct ParamsFile {
     pub params: Params,
     /// A gain for each view, by its name, in the file's order.
     pub gains: Vec<(String, f64)>,
+    /// What each of several scenes has of its own, in the order of their names.
+    pub scenes: Vec<SceneValues>,
+}
+
+/// What one of several scenes that were fitted as one skin has of its own.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneValues {
+    /// What it is called ([`names_of`]).
+    pub name: String,
+    /// Its effects, where they differ from the file's: by those of its light and its pose.
+    pub effects: Option<Effects>,
+    /// Its parameters' values.
+    pub params: Vec<(Param, [f64; 3])>,
+    /// A gain for each of its views.
+    pub gains: Vec<(String, f64)>,
 }
 
 /// Where the values of a `params.toml` come from, for its comments.
@@ -60,6 +87,9 @@ pub struct Origin<'a> {
     pub outcome: Option<&'a Outcome>,
     /// What was set instead of the scene's values.
     pub set: &'a [Assignment],
+    /// Of several scenes that were fitted as one skin their numbers in the outcome, and those of their first views; by the
+    /// order of [`ParamsFile::scenes`]. A scene that was not fitted has none.
+    pub numbers: &'a [Option<(usize, usize)>],
 }
 
 /// A `params.toml` cannot be used.
@@ -72,6 +102,19 @@ pub struct ParamsFileError {
 }
 
 impl ParamsFile {
+    /// The values for one scene by itself, with what it has of its own where the file knows it by name.
+    #[must_use]
+    pub fn of_scene(mut self, scene: &Path) -> Self {
+        let own =
+            names_of(scene).into_iter().find_map(|name| self.scenes.iter().find(|own| own.name == name));
+        if let Some(own) = own {
+            own.params.iter().for_each(|(param, rgb)| self.params.set_rgb(*param, *rgb));
+            self.gains.clone_from(&own.gains);
+            self.effects = own.effects.or(self.effects);
+        }
+        self
+    }
+
     /// The file's text, with comments that tell what it comes from.
     #[must_use]
     pub fn to_toml(&self, origin: Origin<'_>) -> String {
@@ -82,7 +125,7 @@ impl ParamsFile {
     }
 
     fn write_text(&self, text: &mut String, origin: Origin<'_>) -> std::fmt::Result {
-        let Origin { scene, outcome, set } = origin;
+        let Origin { scene, outcome, set, numbers } = origin;
         // A line break in a path must not end the comment.
         let scene: String =
             scene.display().to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
@@ -100,16 +143,15 @@ impl ParamsFile {
             writeln!(text, "# Set on the command line before the fit: {}.", set.join(", "))?;
         }
         writeln!(text, "form = \"{}\"", self.form.name())?;
-        if let Some(effects) = self.effects {
-            let names: Vec<&str> = effects.iter().map(Effect::name).collect();
-            writeln!(text, "effects = {names:?}")?;
-        }
+        write_effects(text, self.effects)?;
         if let Some(loss) = self.loss {
             writeln!(text, "loss = \"{}\"", loss.name())?;
         }
         writeln!(text, "\n[params]")?;
         let known = outcome.map_or(&[][..], |outcome| &outcome.unknowns);
-        for param in Param::of(self.effects.unwrap_or_default()) {
+        let shared = |param: &Param| self.scenes.is_empty() || !param.is_of_scene();
+        let written = |param: &Param| shared(param) && !param.info().held;
+        for param in Param::of(self.effects.unwrap_or_default()).filter(written) {
             let line = format!("{} = {}", key(param), value(self.params.rgb(param)));
             line_with_comment(text, &line, &comment(known, |unknown| param_channel(unknown, param)))?;
         }
@@ -120,6 +162,9 @@ impl ParamsFile {
             let line = format!("{} = {gain:?}", quoted(name));
             let of_view = |unknown: &Unknown| (*unknown == Unknown::Gain(view)).then_some(0);
             line_with_comment(text, &line, &comment(known, of_view))?;
+        }
+        for (place, own) in self.scenes.iter().enumerate() {
+            own.write_text(text, known, numbers.get(place).copied().flatten())?;
         }
         Ok(())
     }
@@ -165,6 +210,49 @@ impl ParamsFile {
             let line = place.map(|at| breaks(at.start) + 1);
             error(line, problem)
         })
+    }
+}
+
+fn write_effects(text: &mut String, effects: Option<Effects>) -> std::fmt::Result {
+    let Some(effects) = effects else { return Ok(()) };
+    let names: Vec<&str> = effects.iter().map(Effect::name).collect();
+    writeln!(text, "effects = {names:?}")
+}
+
+impl SceneValues {
+    /// The scene's tables; `numbers` are its own and its first view's among the unknowns.
+    fn write_text(
+        &self,
+        text: &mut String,
+        known: &[UnknownOutcome],
+        numbers: Option<(usize, usize)>,
+    ) -> std::fmt::Result {
+        let name = quoted(&self.name);
+        if self.effects.is_some() {
+            writeln!(text, "\n[scenes.{name}]")?;
+            write_effects(text, self.effects)?;
+        }
+        writeln!(text, "\n[scenes.{name}.params]")?;
+        for (param, rgb) in &self.params {
+            let own = |unknown: &Unknown| match unknown {
+                Unknown::Own(scene, column) if numbers.is_some_and(|(number, _)| number == *scene) => {
+                    param_channel(&Unknown::Param(*column), *param)
+                }
+                // Where one scene alone was fitted, and others were held out.
+                Unknown::Param(_) if numbers.is_some() => param_channel(unknown, *param),
+                _ => None,
+            };
+            let line = format!("{} = {}", key(*param), value(*rgb));
+            line_with_comment(text, &line, &comment(known, own))?;
+        }
+        writeln!(text, "\n[scenes.{name}.gains]")?;
+        for (view, (name, gain)) in self.gains.iter().enumerate() {
+            let line = format!("{} = {gain:?}", quoted(name));
+            let number = numbers.map(|(_, first)| Unknown::Gain(first + view));
+            let of_view = |unknown: &Unknown| (Some(*unknown) == number).then_some(0);
+            line_with_comment(text, &line, &comment(known, of_view))?;
+        }
+        Ok(())
     }
 }
 
@@ -239,9 +327,11 @@ mod tests {
             params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e8]);
             let gains = vec![("front \"left\"".to_owned(), 0.7), ("b\nc\u{7f}\u{1}".to_owned(), 1.0 / 3.0)];
             let effects = Some(Effects::SURFACE);
-            let file = ParamsFile { form, effects, loss: Some(Loss::Huber), params, gains };
+            let loss = Some(Loss::Huber);
+            let file = ParamsFile { form, effects, loss, params, gains, scenes: Vec::new() };
             let set = ["hilite=1,2,3".parse().unwrap()];
-            let text = file.to_toml(Origin { scene: Path::new("a\nform = 1"), outcome: None, set: &set });
+            let scene = Path::new("a\nform = 1");
+            let text = file.to_toml(Origin { scene, outcome: None, set: &set, numbers: &[] });
             assert_eq!(read(&text, form).unwrap(), file, "{text}");
             assert!(text.contains("\n# Set on the command line before the fit: hilite=1,2,3.\n"), "{text}");
             let folder = tempfile::tempdir().unwrap();
@@ -249,6 +339,42 @@ mod tests {
             std::fs::write(&path, &text).unwrap();
             assert_eq!(ParamsFile::read_alone(&path).unwrap(), file, "{text}");
         }
+    }
+
+    #[test]
+    fn what_scenes_have_of_their_own_reads_back_and_is_found_by_their_names() {
+        let form = Form::Corrected;
+        let own = |name: &str, turn: f64, gain: f64| SceneValues {
+            name: name.to_owned(),
+            effects: (gain < 1.0).then_some(Effects::SURFACE.with(Effect::KeyLight)),
+            params: vec![(Param::EnvironmentRotation, [turn; 3]), (Param::KeyColor, [0.1, 0.2, 0.3])],
+            gains: vec![("front".to_owned(), gain)],
+        };
+        let mut params = Params::defaults(form);
+        params.set(Param::RimExponent, 3.3);
+        let scenes = vec![own("a b", 12.5, 1.0), own("noon", -1.0 / 3.0, 0.7)];
+        let (effects, loss, gains) = (Some(Effects::SURFACE), Some(Loss::L2), Vec::new());
+        let file = ParamsFile { form, effects, loss, params, gains, scenes };
+        let scene = Path::new("noon.toml");
+        let text = file.to_toml(Origin { scene, outcome: None, set: &[], numbers: &[] });
+        assert_eq!(read(&text, form).unwrap(), file, "{text}");
+        // The skin's alone stand for all.
+        let shared = text.split("[scenes.").next().unwrap();
+        assert!(shared.contains("rim_exponent") && !shared.contains("environment_rotation"), "{text}");
+        let turn = |path: &str| {
+            let file = read(&text, form).unwrap().of_scene(Path::new(path));
+            (file.params.scalar(Param::EnvironmentRotation), file.gains.first().map(|(_, gain)| *gain))
+        };
+        assert_eq!(turn("/d/noon.toml"), (-1.0 / 3.0, Some(0.7)));
+        assert_eq!(turn("/noon/scene.toml"), (-1.0 / 3.0, Some(0.7)));
+        assert_eq!(turn("/run/scenes/a b.toml"), (12.5, Some(1.0)));
+        assert_eq!(turn("/d/dusk.toml"), (0.0, None));
+        let effects = |path: &str| read(&text, form).unwrap().of_scene(Path::new(path)).effects;
+        assert_eq!(effects("/d/noon.toml"), Some(Effects::SURFACE.with(Effect::KeyLight)));
+        assert_eq!(
+            (effects("/d/a b.toml"), effects("/d/dusk.toml")),
+            (Some(Effects::SURFACE), Some(Effects::SURFACE))
+        );
     }
 
     #[test]
@@ -279,6 +405,10 @@ mod tests {
             ("[params]\nhilite = 1\nhilite = 2", "line 3", "not TOML"),
             ("[gains]\nfront = 0.0", "line 2", "outside its bounds"),
             ("params = 3", "line 1", "wrong kind"),
+            ("[scenes]\nnoon = 3", "line 2", "wrong kind"),
+            ("[scenes.noon]\nparam = 3", "line 2", "unknown key `param`"),
+            ("[scenes.noon.params]\nhilite = 0.5", "line 2", "hilite is the skin's"),
+            ("[scenes.noon.gains]\nfront = 0.0", "line 2", "outside its bounds"),
         ];
         for (text, line, what) in cases {
             let error = read(text, Form::Corrected).unwrap_err();

@@ -7,10 +7,8 @@
 //! 37): its interval is where the loss rises by no more than the curvature says of one standard error.
 
 use super::bounded;
-use super::coordinates::{Coordinates, is_log};
+use super::coordinates::{Coordinates, is_angle, is_log};
 use super::linearisation::{Linearisation, Passes};
-use crate::engine::Unknown;
-use crate::model::params::Param;
 
 /// An unknown whose standard error is a smaller share of its size needs no profile: over it a valley is straight.
 const WEAK: f64 = 0.1;
@@ -99,11 +97,6 @@ pub(super) fn weakest(coordinates: &Coordinates, answer: &Answer<'_>) -> Option<
     };
     let shares = (0..answer.model.len()).filter_map(share).filter(|(_, share)| *share >= WEAK);
     shares.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(i, _)| i)
-}
-
-fn is_angle(unknown: &Unknown) -> bool {
-    let degrees = |param: Param| param.info().unit == "degrees";
-    matches!(unknown, Unknown::Param(column) if degrees(column.param))
 }
 
 /// The profile of unknown `i`; `stop` ends it early, with what there is. `None` where a pass fails.
@@ -211,9 +204,9 @@ fn others(coordinates: &Coordinates, model: &Linearisation, i: usize, damping: f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::{NormalEquations, Objective, Point};
+    use crate::engine::{NormalEquations, Objective, Point, Unknown};
     use crate::model::effects::Form;
-    use crate::model::params::{Column, Params};
+    use crate::model::params::{Column, Param, Params};
 
     /// Rows of a small problem in an exponent x and a weight y: value and slopes by both.
     type Row = fn(f64, f64) -> [f64; 3];

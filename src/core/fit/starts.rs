@@ -3,7 +3,7 @@
 use rand::rngs::StdRng;
 use rand::{RngExt, SeedableRng};
 
-use super::coordinates::{Coordinates, is_log};
+use super::coordinates::{Coordinates, is_angle, is_log};
 use crate::engine::Unknown;
 
 /// Intervals whose ends have a greater ratio than this are no guide to where an answer may be.
@@ -31,7 +31,6 @@ pub fn draw(coordinates: &Coordinates, seed: u64, index: u32) -> Vec<f64> {
 
 fn draw_one(unknown: &Unknown, given: f64, rng: &mut StdRng) -> f64 {
     let (lower, upper) = unknown.bounds();
-    let degrees = matches!(unknown, Unknown::Param(c) if c.param.info().unit == "degrees");
     if is_log(unknown) {
         rng.random_range(lower.ln()..upper.ln())
     } else if lower > 0.0 && upper / lower <= WIDEST_RATIO {
@@ -39,7 +38,7 @@ fn draw_one(unknown: &Unknown, given: f64, rng: &mut StdRng) -> f64 {
         rng.random_range(lower.ln()..upper.ln()).exp()
     } else if lower.is_finite() && upper.is_finite() && lower <= 0.0 {
         rng.random_range(lower..upper)
-    } else if degrees {
+    } else if is_angle(unknown) {
         given + rng.random_range(-180.0..180.0)
     } else if lower >= 0.0 {
         given.max(0.1) * rng.random_range(-FACTOR.ln()..FACTOR.ln()).exp()

@@ -272,7 +272,7 @@ fn different(path: &Path, what: &str, found: &str, expected: String) -> StateErr
 /// The first of two points' values that differs, named.
 fn first_difference(was: &[f64], is: &[f64]) -> (String, String) {
     let at = was.iter().zip(is).position(|(a, b)| a != b).unwrap_or(was.len().min(is.len()));
-    let name = Param::built_in().nth(at / 3).map_or("gain or added parameter", Param::name);
+    let name = Param::built_in().nth(at / 3).map_or("gain, added parameter or scene's own", Param::name);
     let say = |values: &[f64]| match values.get(at) {
         Some(value) => format!("{name} {value}"),
         None => format!("{} views", values.len().saturating_sub(3 * Param::COUNT)),
@@ -280,10 +280,13 @@ fn first_difference(was: &[f64], is: &[f64]) -> (String, String) {
     (say(was), say(is))
 }
 
-/// Every number of a point, in order. Of added parameters those alone that are not at their defaults: which of them
+/// Every number of a point, in order: parameters, gains, and what scenes have of their own. Of added parameters those alone that are not at their defaults: which of them
 /// there are depends on what else the process has read.
 fn values(point: &Point) -> Vec<f64> {
     let said = |param: &Param| param.is_built_in() || point.params.rgb(*param) != [param.info().corrected; 3];
     let params = Param::all().filter(said).flat_map(|param| point.params.rgb(param));
-    params.chain(point.gains.iter().copied()).collect()
+    let own = point.params.own();
+    let own = own.filter(|(_, param, rgb)| param.is_built_in() || *rgb != [param.info().corrected; 3]);
+    let own = own.flat_map(|(_, _, rgb)| rgb);
+    params.chain(point.gains.iter().copied()).chain(own).collect()
 }

@@ -121,6 +121,10 @@ impl Effect {
     pub const Morph: Self = Self(10);
     /// Skinning by bones.
     pub const Skin: Self = Self(11);
+    /// Lights beside the environment.
+    pub const Lights: Self = Self(12);
+    /// What stands in the lights' way.
+    pub const Shadows: Self = Self(13);
 }
 
 /// One row of the table of effects.
@@ -133,53 +137,75 @@ pub struct EffectInfo {
     /// What it asks of the stages before the model beside what the built-in effects do, when it is one of a set;
     /// `None` of a built-in one, whose needs [`Setup::needs`] knows.
     pub needs: Option<fn(Effect, &Setup) -> Needs>,
+    /// The effect that switches it on and off with others of its kind.
+    pub within: Option<Effect>,
 }
 
 const TABLE: [EffectInfo; Effect::BUILT_IN.len()] = [
-    EffectInfo { name: "diffuse", meaning: "Albedo times irradiance", needs: None },
+    EffectInfo { name: "diffuse", meaning: "Albedo times irradiance", needs: None, within: None },
     EffectInfo {
         name: "normal_map",
         meaning: "Tangent-space normal map; without it n is the smooth normal",
         needs: None,
+        within: None,
     },
     EffectInfo {
         name: "occlusion",
         meaning: "Ambient occlusion; without it everything is open",
         needs: None,
+        within: None,
     },
     EffectInfo {
         name: "rim",
         meaning: "The diffuse rim weight; without it only `base_weight` is left of the diffuse factor",
         needs: None,
+        within: None,
     },
     EffectInfo {
         name: "side_specular",
         meaning: "Specular map times the specular cube along the normal",
         needs: None,
+        within: None,
     },
     EffectInfo {
         name: "hilite",
         meaning: "Back light seen through the rim: the hilite cube along the view vector",
         needs: None,
+        within: None,
     },
     EffectInfo {
         name: "reflection",
         meaning: "The specular cube along the reflection vector, dappled",
         needs: None,
+        within: None,
     },
-    EffectInfo { name: "haze", meaning: "The reflection's alpha to the output alpha", needs: None },
+    EffectInfo {
+        name: "haze",
+        meaning: "The reflection's alpha to the output alpha",
+        needs: None,
+        within: None,
+    },
     EffectInfo {
         name: "bloom",
         meaning: "A blur pass over alpha-weighted colour, driven by the haze",
         needs: None,
+        within: None,
     },
     EffectInfo {
         name: "key_light",
         meaning: "The paper's second version: one key light gives the bump map's contribution",
         needs: None,
+        within: None,
     },
-    EffectInfo { name: "morph", meaning: "Morph targets", needs: None },
-    EffectInfo { name: "skin", meaning: "Skinning by bones", needs: None },
+    EffectInfo { name: "morph", meaning: "Morph targets", needs: None, within: None },
+    EffectInfo { name: "skin", meaning: "Skinning by bones", needs: None, within: None },
+    EffectInfo {
+        name: "lights",
+        meaning: "Lights beside the environment: the scene's own, and those that are taken out of it",
+        needs: None,
+        within: None,
+    },
+    EffectInfo { name: "shadows", meaning: "What stands in the lights' way", needs: None, within: None },
 ];
 
 /// What was added to the table.
@@ -187,7 +213,7 @@ static ADDED: Added<EffectInfo> = Added::new();
 
 impl Effect {
     /// The built-in effects, in the order of documentation.
-    pub const BUILT_IN: [Self; 12] = [
+    pub const BUILT_IN: [Self; 14] = [
         Self::Diffuse,
         Self::NormalMap,
         Self::Occlusion,
@@ -200,6 +226,8 @@ impl Effect {
         Self::KeyLight,
         Self::Morph,
         Self::Skin,
+        Self::Lights,
+        Self::Shadows,
     ];
 
     /// Every effect: the built-in ones, then what was added.
@@ -313,9 +341,14 @@ impl Effects {
         Self(bits)
     }
 
-    /// This set without `effect`.
+    /// This set without `effect`, and without those that it switches.
     #[must_use]
-    pub const fn without(self, effect: Effect) -> Self {
+    pub fn without(self, effect: Effect) -> Self {
+        let within = |other: &Effect| other.info().within == Some(effect);
+        self.added().filter(within).fold(self, Self::alone_without).alone_without(effect)
+    }
+
+    const fn alone_without(self, effect: Effect) -> Self {
         let mut bits = self.0;
         bits[effect.0 as usize / 64] &= !(1 << (effect.0 % 64));
         Self(bits)
@@ -515,7 +548,7 @@ mod tests {
         for place in 0..=u8::MAX {
             let set = Effects::default().with(Effect(place));
             assert_eq!(set.iter().map(|effect| effect.0).collect::<Vec<_>>(), [place]);
-            assert_eq!(set.without(Effect(place)), Effects::default());
+            assert_eq!(set.alone_without(Effect(place)), Effects::default());
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Fields of vertices: numbers of a mesh's vertices, beside position and frame, that rules read by name.
+//! Fields: numbers beside position, frame and maps that rules read by name.
 //!
-//! They are interpolated where a fragment, a stored sample or a texel reads them. Rows are added by files of rules
-//! (`field: ...`) and by what is baked a vertex.
+//! Those of vertices are interpolated where a fragment, a stored sample or a texel reads them; those of samples are found at
+//! each stored sample or texel by itself, as what reaches it of a light. Rows are added by files of rules.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -19,12 +19,23 @@ pub struct FieldInfo {
     pub name: &'static str,
     /// The name of the vertex attribute that holds it.
     pub attribute: &'static str,
-    /// How many numbers a vertex has, 1 to 3.
+    /// Where its numbers are found.
+    pub of: Found,
+    /// How many numbers it has, 1 to 3.
     pub numbers: usize,
     /// What each of them is where a mesh lacks the field.
     pub neutral: f32,
     /// What it is, in one line.
     pub meaning: &'static str,
+}
+
+/// Where the numbers of a field are found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Found {
+    /// At vertices.
+    Vertices,
+    /// At each stored sample or texel by itself. A rasteriser interpolates what is found so at the vertices.
+    Samples,
 }
 
 /// A field: the place of its row.
@@ -65,6 +76,12 @@ impl Field {
     pub fn from_name(name: &str) -> Option<Self> {
         let place = ADDED.rows().iter().position(|row| row.name == name)?;
         u16::try_from(place).ok().map(Self)
+    }
+
+    /// Whether vertices have it.
+    #[must_use]
+    pub fn is_of_vertices(self) -> bool {
+        self.info().of == Found::Vertices
     }
 
     /// The WGSL type.
@@ -147,6 +164,7 @@ mod tests {
         let row = |name, numbers| FieldInfo {
             name,
             attribute: name,
+            of: Found::Vertices,
             numbers,
             neutral: 0.5,
             meaning: "a test's own",

@@ -1,5 +1,6 @@
 //! Where the key light stands.
 
+use super::bearing::Bearing;
 use super::params::{Param, Params};
 
 /// The key light's direction, and how it moves.
@@ -17,13 +18,12 @@ impl KeyLight {
     /// The key light of `params`.
     #[must_use]
     pub fn new(params: &Params) -> Self {
-        let degree = std::f64::consts::PI / 180.0;
-        let (sa, ca) = params.scalar(Param::KeyAzimuth).to_radians().sin_cos();
-        let (se, ce) = params.scalar(Param::KeyElevation).to_radians().sin_cos();
+        let [azimuth, elevation] = [Param::KeyAzimuth, Param::KeyElevation].map(|angle| params.scalar(angle));
+        let bearing = Bearing { azimuth, elevation };
         Self {
-            direction: [ce * sa, se, ce * ca],
-            by_azimuth: [degree * ce * ca, 0.0, -degree * ce * sa],
-            by_elevation: [-degree * se * sa, degree * ce, -degree * se * ca],
+            direction: bearing.direction(),
+            by_azimuth: bearing.by_azimuth(),
+            by_elevation: bearing.by_elevation(),
         }
     }
 }

@@ -6,7 +6,7 @@
 //! - [`fields`]: numbers of vertices that rules read by name
 //! - [`registry`]: how tables of parameters, effects, terms and fields grow
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands;
-//!   [`mod@turn`]: how the environment is turned
+//!   [`bearing`]: directions as angles; [`mod@turn`]: how the environment is turned
 //! - [`fragment`]: a fragment as samples hold it
 //! - [`vertex`]: morphing, skinning and the frame of a vertex, of which meshes are posed
 //! - [`cube`]: cube maps and their seamless bilinear lookup
@@ -14,6 +14,7 @@
 //!   [`batch`]: several numbers as one; [`vector`]: three of them
 
 pub mod batch;
+pub mod bearing;
 pub mod cube;
 pub mod dapple;
 pub mod effects;

@@ -4,6 +4,7 @@
 //! Its first rows are built in ([`TABLE`]); terms and scenes add others ([`Param::register`]), which stay for as long
 //! as the process runs.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use super::effects::{Effect, Effects, Form};
@@ -46,6 +47,26 @@ pub enum Scale {
     Log,
 }
 
+/// Whose a parameter is, where several scenes are fitted as one skin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Owner {
+    /// The skin's: one value holds in all scenes.
+    Skin,
+    /// The scene's, as its light: each scene has a value of its own.
+    Scene,
+}
+
+impl Owner {
+    /// The name in the table as JSON.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Skin => "skin",
+            Self::Scene => "scene",
+        }
+    }
+}
+
 /// One row of the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ParamInfo {
@@ -71,6 +92,10 @@ pub struct ParamInfo {
     pub linear: bool,
     /// How a solver steps through it.
     pub scale: Scale,
+    /// Whose it is, where several scenes are fitted as one skin.
+    pub owner: Owner,
+    /// Whether it is a number that its scene gives elsewhere, which no fit moves and no file of constants holds.
+    pub held: bool,
     /// It is asked for when one of these effects is enabled.
     pub effects: &'static [Effect],
     /// Where it comes from.
@@ -100,11 +125,14 @@ impl ParamInfo {
 const INF: f64 = f64::INFINITY;
 
 macro_rules! row {
+    (scene: $($row:tt)*) => {
+        ParamInfo { owner: Owner::Scene, ..row!($($row)*) }
+    };
     ($param:ident $name:literal, $listing:expr, $corrected:expr, [$lower:expr, $upper:expr], $unit:literal,
      $rgb:literal, $linear:literal, $scale:ident, [$($effect:ident),*], $source:literal, $meaning:literal) => {
         ParamInfo {
             param: Param::$param, name: $name, identifier: $name, listing: $listing, corrected: $corrected, lower: $lower, upper: $upper,
-            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, effects: &[$(Effect::$effect),*],
+            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, held: false, effects: &[$(Effect::$effect),*],
             source: $source, meaning: $meaning,
         }
     };
@@ -114,11 +142,11 @@ macro_rules! row {
 #[rustfmt::skip]
 pub static TABLE: [ParamInfo; Param::COUNT] = [
     //  param               name                   listing corrected  bounds        unit  rgb   linear scale  asked for by
-    row!(BaseWeight          "base_weight",          0.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [Diffuse],
+    row!(BaseWeight          "base_weight",          0.0,  1.0,  [0.0, INF],       "",        true,  true,  Linear, [Diffuse, Lights],
          "MODEL 3 (corrected form)", "share of the diffuse light seen from any angle"),
-    row!(RimWeight           "rim_weight",           1.0,  0.5,  [-INF, INF],      "",        true,  true,  Linear, [Diffuse],
+    row!(RimWeight           "rim_weight",           1.0,  0.5,  [-INF, INF],      "",        true,  true,  Linear, [Diffuse, Lights],
          "listing 3-4, SkinSilhouetteVec.y", "diffuse light added towards the silhouette"),
-    row!(RimExponent         "rim_exponent",         2.0,  2.0,  [0.25, 16.0],     "",        false, false, Linear, [Diffuse, Hilite],
+    row!(RimExponent         "rim_exponent",         2.0,  2.0,  [0.25, 16.0],     "",        false, false, Linear, [Lights, Diffuse, Hilite],
          "listing 3-3, (1-|N.V|)^2", "power of the silhouette term 1-|N.V|"),
     row!(Hilite              "hilite",               0.7,  0.7,  [0.0, INF],       "",        true,  true,  Linear, [Hilite],
          "listing 3-4, 0.7", "weight of the back light that shines past the rim"),
@@ -132,15 +160,15 @@ pub static TABLE: [ParamInfo; Param::COUNT] = [
          "MODEL 3 (corrected form)", "scale of the normal map's slopes"),
     row!(SpecularLobe        "specular_lobe",        32.0, 32.0, [1.0, 2048.0],    "Phong exponent", false, false, Log, [SideSpecular, Reflection, Haze, Bloom],
          "MODEL 4", "sharpness of the specular cube"),
-    row!(EnvironmentRotation "environment_rotation", 0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [Diffuse, SideSpecular, Hilite, Reflection, Haze, Bloom],
+    row!(scene: EnvironmentRotation "environment_rotation", 0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [Diffuse, SideSpecular, Hilite, Reflection, Haze, Bloom],
          "MODEL 1", "turn of the environment about +Y, on top of the scene's own"),
     row!(HazeWeight          "haze_weight",          1.0,  1.0,  [0.0, INF],       "",        false, true,  Linear, [Haze, Bloom],
          "listing 3-4, alpha", "weight of the haze written to alpha"),
-    row!(KeyAzimuth          "key_azimuth",          0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [KeyLight],
+    row!(scene: KeyAzimuth          "key_azimuth",          0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [KeyLight],
          "GPU Gems ch. 3, last page", "key light's direction, from +Z towards +X"),
-    row!(KeyElevation        "key_elevation",        45.0, 45.0, [-90.0, 90.0],    "degrees", false, false, Linear, [KeyLight],
+    row!(scene: KeyElevation        "key_elevation",        45.0, 45.0, [-90.0, 90.0],    "degrees", false, false, Linear, [KeyLight],
          "GPU Gems ch. 3, last page", "key light's direction above the horizon"),
-    row!(KeyColor            "key_color",            1.0,  1.0,  [0.0, INF],       "radiance", true, true,  Linear, [KeyLight],
+    row!(scene: KeyColor            "key_color",            1.0,  1.0,  [0.0, INF],       "radiance", true, true,  Linear, [KeyLight],
          "GPU Gems ch. 3, last page", "key light's colour"),
 ];
 
@@ -228,6 +256,12 @@ impl Param {
         Self::all().find(|p| p.identifier() == name)
     }
 
+    /// Whether each of several scenes that are fitted as one skin has a value of its own.
+    #[must_use]
+    pub fn is_of_scene(self) -> bool {
+        self.info().owner == Owner::Scene
+    }
+
     /// The default in `form`.
     #[must_use]
     pub fn default(self, form: Form) -> f64 {
@@ -253,18 +287,21 @@ impl fmt::Debug for Param {
 }
 
 /// One value a parameter and channel. A parameter that is not `rgb` holds three equal values; one that was added
-/// to the table later has its default.
+/// to the table later has its default. Of scenes that are fitted as one skin, some values may hold in one scene alone.
 #[derive(Clone, Debug)]
 pub struct Params {
     form: Form,
     values: Vec<[f64; 3]>,
+    /// By the scene's number, and the parameter.
+    own: BTreeMap<(usize, Param), [f64; 3]>,
 }
 
 impl Params {
     /// The defaults of `form`.
     #[must_use]
     pub fn defaults(form: Form) -> Self {
-        Self { form, values: Param::all().map(|param| [param.default(form); 3]).collect() }
+        let values = Param::all().map(|param| [param.default(form); 3]).collect();
+        Self { form, values, own: BTreeMap::new() }
     }
 
     /// The value of a scalar parameter (the red value of a coloured one).
@@ -292,12 +329,37 @@ impl Params {
         }
         self.values[param.index()] = value;
     }
+
+    /// The three channels' values in a scene: its own, or else those of all scenes.
+    #[must_use]
+    pub fn rgb_in(&self, scene: usize, param: Param) -> [f64; 3] {
+        self.own.get(&(scene, param)).copied().unwrap_or_else(|| self.rgb(param))
+    }
+
+    /// Set each channel in one scene alone.
+    pub fn set_rgb_in(&mut self, scene: usize, param: Param, value: [f64; 3]) {
+        self.own.insert((scene, param), value);
+    }
+
+    /// The values that hold in a scene, as if there were no other.
+    #[must_use]
+    pub fn in_scene(&self, scene: usize) -> Self {
+        let mut params = Self { form: self.form, values: self.values.clone(), own: BTreeMap::new() };
+        let own = self.own.range((scene, Param(0))..=(scene, Param(u16::MAX)));
+        own.for_each(|(&(_, param), &value)| params.set_rgb(param, value));
+        params
+    }
+
+    /// What scenes have of their own, in their order.
+    pub fn own(&self) -> impl Iterator<Item = (usize, Param, [f64; 3])> {
+        self.own.iter().map(|(&(scene, param), &value)| (scene, param, value))
+    }
 }
 
 impl PartialEq for Params {
     fn eq(&self, other: &Self) -> bool {
         let most = self.values.len().max(other.values.len());
-        (0..most as u16).map(Param).all(|param| self.rgb(param) == other.rgb(param))
+        (0..most as u16).map(Param).all(|param| self.rgb(param) == other.rgb(param)) && self.own == other.own
     }
 }
 
@@ -355,22 +417,40 @@ impl Column {
     /// This column's value in `params`.
     #[must_use]
     pub fn get(&self, params: &Params) -> f64 {
-        match self.channels {
-            Channels::Tied => params.scalar(self.param),
-            Channels::One(c) => params.rgb(self.param)[c],
-        }
+        self.of(params.rgb(self.param))
     }
 
     /// Set this column's value in `params`.
     pub fn set(&self, params: &mut Params, value: f64) {
+        params.set_rgb(self.param, self.with(params.rgb(self.param), value));
+    }
+
+    /// This column's value in one scene of several.
+    #[must_use]
+    pub fn get_in(&self, scene: usize, params: &Params) -> f64 {
+        self.of(params.rgb_in(scene, self.param))
+    }
+
+    /// Set this column's value in one scene of several alone.
+    pub fn set_in(&self, scene: usize, params: &mut Params, value: f64) {
+        params.set_rgb_in(scene, self.param, self.with(params.rgb_in(scene, self.param), value));
+    }
+
+    /// Of a parameter's channels the value that it moves.
+    fn of(&self, rgb: [f64; 3]) -> f64 {
         match self.channels {
-            Channels::Tied => params.set(self.param, value),
-            Channels::One(c) => {
-                let mut rgb = params.rgb(self.param);
-                rgb[c] = value;
-                params.set_rgb(self.param, rgb);
-            }
+            Channels::Tied => rgb[0],
+            Channels::One(c) => rgb[c],
         }
+    }
+
+    /// A parameter's channels, with `value` where it moves them.
+    fn with(&self, mut rgb: [f64; 3], value: f64) -> [f64; 3] {
+        match self.channels {
+            Channels::Tied => rgb = [value; 3],
+            Channels::One(c) => rgb[c] = value,
+        }
+        rgb
     }
 }
 
@@ -396,5 +476,21 @@ mod tests {
             column.set(&mut params, 0.375);
             assert_eq!(column.get(&params), 0.375, "{}", column.name());
         }
+    }
+
+    #[test]
+    fn a_scenes_own_value_holds_there_alone() {
+        let mut params = Params::defaults(Form::Corrected);
+        let turn = Column::tied(Param::EnvironmentRotation);
+        turn.set(&mut params, 5.0);
+        turn.set_in(1, &mut params, 30.0);
+        let [_, green, _] = Column::per_channel(Param::KeyColor);
+        green.set_in(2, &mut params, 0.5);
+        assert_eq!([0, 1, 2].map(|scene| turn.get_in(scene, &params)), [5.0, 30.0, 5.0]);
+        assert_eq!(params.rgb_in(2, Param::KeyColor), [1.0, 0.5, 1.0]);
+        let mut alone = Params::defaults(Form::Corrected);
+        turn.set(&mut alone, 30.0);
+        assert!(params.in_scene(1) == alone && params != alone);
+        assert_eq!(params.own().count(), 2);
     }
 }

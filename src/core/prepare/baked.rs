@@ -11,7 +11,7 @@ use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
-use crate::samples::{self, ViewSamples};
+use crate::samples::{self, SurfaceBakes, ViewSamples};
 use crate::scene::Scene;
 use crate::scene::view::View;
 
@@ -74,6 +74,12 @@ impl Baked {
         self
     }
 
+    /// What is baked of the surface, for samples of it.
+    #[must_use]
+    pub fn surface_bakes(&self) -> SurfaceBakes<'_> {
+        SurfaceBakes { occlusion: self.occlusion.as_deref() }
+    }
+
     /// Trace the visible surface of each view.
     ///
     /// # Errors
@@ -81,8 +87,10 @@ impl Baked {
     pub fn sample(self) -> Result<Sampled, PrepareError> {
         let start = Instant::now();
         let posed = self.scene.mesh.pose();
-        let samples = samples::sample_views(&self.scene, &posed, self.occlusion.as_deref())?;
-        let seconds = StageSeconds { samples: start.elapsed().as_secs_f64(), ..self.seconds };
+        let samples = samples::sample_views(&self.scene, &posed, self.surface_bakes())?;
+        // Of views that were held out, some were spent before.
+        let samples_so_far = self.seconds.samples + start.elapsed().as_secs_f64();
+        let seconds = StageSeconds { samples: samples_so_far, ..self.seconds };
         Ok(Sampled { baked: Self { seconds, ..self }, samples })
     }
 

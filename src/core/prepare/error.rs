@@ -33,6 +33,24 @@ pub enum PrepareError {
     /// No view of that name.
     #[error("{scene}: there is no view `{view}`. {suggestion}.")]
     NoView { scene: String, view: String, suggestion: String },
+    /// Scenes that cannot be fitted as one skin.
+    #[error(
+        "{scene}: it cannot be fitted as one skin with {first}: its {what} differs ({here}; there {there}). {remedy}."
+    )]
+    NotOneSkin {
+        /// The scene that differs.
+        scene: String,
+        /// The first scene.
+        first: String,
+        /// What differs.
+        what: String,
+        /// What it is in the scene.
+        here: String,
+        /// What it is in the first one.
+        there: String,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// A fit without anything to match.
     #[error(
         "{scene}: no view names a target, so there is nothing to fit. Add target = \"image.exr\" to a [[view]]."

@@ -60,7 +60,7 @@ impl Loaded {
         options.views.choose(&mut scene)?;
         let (mut gains, mut fitted) = (vec![1.0; scene.views.len()], None);
         if let Some(path) = &options.params {
-            let file = ParamsFile::read(path, scene.form, &scene.params)?;
+            let file = ParamsFile::read(path, scene.form, &scene.params)?.of_scene(&scene.path);
             (scene.params, fitted) = (file.params, file.effects);
             for (gain, view) in gains.iter_mut().zip(&scene.views) {
                 let given = file.gains.iter().find(|(name, _)| *name == view.name);
@@ -77,6 +77,28 @@ impl Loaded {
         let seconds = StageSeconds { load: start.elapsed().as_secs_f64(), ..StageSeconds::default() };
         let warnings = warnings.iter().map(ToString::to_string).collect();
         Ok(Self { scene, fitted, gains, seconds, warnings, asked })
+    }
+
+    /// Leave these parameters free, instead of the scene's own: in each channel those that were so, or that start at three
+    /// values. One that no enabled effect asks for is warned of.
+    pub fn set_free(&mut self, params: &[Param]) {
+        let scene = &mut self.scene;
+        let split = |param: Param| {
+            let coloured = |column: &Column| column.param == param && column.channels != Channels::Tied;
+            scene.fit.free.iter().any(coloured)
+        };
+        let columns = |&param: &Param| match split(param) {
+            true => Column::per_channel(param).to_vec(),
+            false => vec![Column::tied(param)],
+        };
+        let free: Vec<Column> = params.iter().flat_map(columns).collect();
+        scene.fit.free = untied(&free, &scene.params, &[]);
+        let idle = params.iter().filter(|param| !param.asked_for(scene.effects));
+        let path = scene.path.display();
+        self.warnings.extend(idle.map(|param| {
+            let name = param.name();
+            format!("{path}: {name} is free, but no enabled effect asks for it: it will be reported as unidentifiable.")
+        }));
     }
 
     /// Bake what the scene's effects ask for.

@@ -5,21 +5,28 @@
 //! - [`Baked`]: it and its light and occlusion
 //! - [`Sampled`]: these and the visible surface of each view
 //! - [`Observed`]: of the views that have a target, samples beside what was observed there
+//! - [`HeldOut`]: views that are taken out of a scene before its fit, to score it on
+//!
+//! [`share_skin`] has several scenes agree on what a fit of them as one skin shares.
 //!
 //! A stage reads as the ones before it: `observed.scene`, `sampled.illumination`. Renderers start from a [`Baked`],
 //! engines from an [`Observed`].
 
 mod baked;
 mod error;
+mod held_out;
 mod loaded;
 mod observed;
+mod one_skin;
 mod options;
 mod sampled;
 
 pub use self::baked::Baked;
 pub use self::error::PrepareError;
+pub use self::held_out::HeldOut;
 pub use self::loaded::Loaded;
 pub use self::observed::Observed;
+pub use self::one_skin::share_skin;
 pub use self::options::{ClipOcclusion, PrepareOptions, Views};
 pub use self::sampled::Sampled;
 

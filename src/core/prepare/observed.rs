@@ -9,6 +9,7 @@ use crate::engine::Task;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::samples::{TargetRows, ViewSamples};
+use crate::scene::view::View;
 
 /// A scene of views that have a target, ready to be fitted.
 #[derive(Clone, Debug)]
@@ -32,14 +33,7 @@ impl Observed {
 
     /// Of views all of which have a target, with their samples.
     pub(super) fn of(baked: Baked, samples: Vec<ViewSamples>) -> Result<Self, PrepareError> {
-        let scene = || baked.scene.path.display().to_string();
-        let mut views = Vec::with_capacity(samples.len());
-        for (view, samples) in baked.scene.views.iter().zip(samples) {
-            let TargetRows { channels, weight, clip } = TargetRows::new(view, &samples)
-                .map_err(|error| PrepareError::Target { scene: scene(), error })?
-                .ok_or_else(|| PrepareError::NoTarget { scene: scene() })?;
-            views.push(ObservedView { samples, target: channels, weight, clip });
-        }
+        let views = beside(&baked.scene.path, &baked.scene.views, samples)?;
         Ok(Self { baked, views: views.into() })
     }
 
@@ -65,4 +59,20 @@ impl Deref for Observed {
     fn deref(&self) -> &Baked {
         &self.baked
     }
+}
+
+/// The samples of views beside their targets; `scene` is the file that they stand in.
+pub(super) fn beside(
+    scene: &Path,
+    views: &[View],
+    samples: Vec<ViewSamples>,
+) -> Result<Vec<ObservedView>, PrepareError> {
+    let scene = || scene.display().to_string();
+    let one = |(view, samples): (&View, ViewSamples)| {
+        let TargetRows { channels, weight, clip } = TargetRows::new(view, &samples)
+            .map_err(|error| PrepareError::Target { scene: scene(), error })?
+            .ok_or_else(|| PrepareError::NoTarget { scene: scene() })?;
+        Ok(ObservedView { samples, target: channels, weight, clip })
+    };
+    views.iter().zip(samples).map(one).collect()
 }

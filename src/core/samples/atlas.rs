@@ -10,7 +10,9 @@ use glam::{DVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::LANES;
+use super::posed::PosedSurface;
 use super::rows::Rows;
+use super::trace::Hit;
 use crate::model::evaluate::Setup;
 use crate::model::fields;
 use crate::program::graph::Input;
@@ -70,23 +72,18 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// The texels of a mesh as it is posed, `size` a side, with what the effects of `setup` read. `occlusion` holds one
-    /// value a vertex. All cores; the same for any number of threads.
+    /// The texels of a mesh as it is posed, `size` a side, with what the effects of `setup` read. All cores; the same for any number of threads.
     ///
     /// # Errors
     /// When the mesh has no texture coordinates, or does not lie in the unit square; or the effects cannot be computed.
-    pub fn new(
-        setup: &Setup,
-        posed: &PosedMesh,
-        occlusion: Option<&[f32]>,
-        maps: &Maps,
-        size: u32,
-    ) -> Result<Self, AtlasError> {
-        check(posed)?;
+    pub fn new(setup: &Setup, posed: &PosedSurface<'_>, maps: &Maps, size: u32) -> Result<Self, AtlasError> {
+        check(posed.mesh)?;
         let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1) };
         // Turned or not, the same is read.
         let inputs = texel_inputs(&Facts::of_samples(*setup, any, true))?;
-        let mesh = Textured { posed, occlusion, maps, size: f64::from(size) };
+        let find = |field, hit, numbers: &mut [f32]| posed.field(field, hit, numbers);
+        let (mesh, occlusion) = (posed.mesh, posed.open.as_deref());
+        let mesh = Textured { posed: mesh, occlusion, maps, find: &find, size: f64::from(size) };
         let fields = inputs.iter().map(Field::of).collect::<Result<Vec<_>, _>>()?;
         let triangles = cover(&mesh, size);
         let texels: Vec<u32> = (0..size * size).filter(|&texel| triangles[texel as usize] != EMPTY).collect();
@@ -174,11 +171,16 @@ struct Textured<'a> {
     posed: &'a PosedMesh,
     occlusion: Option<&'a [f32]>,
     maps: &'a Maps,
+    /// What finds a field of samples at a point of the mesh.
+    find: &'a (dyn Fn(fields::Field, Hit, &mut [f32]) + Sync),
     size: f64,
 }
 
 /// A triangle in the atlas, counter-clockwise as v runs downwards: its vertices, and their places in texels.
 struct Triangle {
+    index: u32,
+    /// Whether its second and third vertex changed places.
+    turned: bool,
     vertices: [usize; 3],
     corners: [DVec2; 3],
 }
@@ -188,10 +190,11 @@ impl Textured<'_> {
         let mut vertices = self.posed.triangles[index as usize].map(|i| i as usize);
         let corner = |i: usize| self.size * self.posed.uvs[i].as_dvec2();
         let [a, b, c] = vertices.map(corner);
-        if (b - a).perp_dot(c - a) < 0.0 {
+        let turned = (b - a).perp_dot(c - a) < 0.0;
+        if turned {
             vertices.swap(1, 2);
         }
-        Triangle { corners: vertices.map(corner), vertices }
+        Triangle { index, turned, corners: vertices.map(corner), vertices }
     }
 }
 
@@ -210,6 +213,14 @@ impl Triangle {
         let drawn = |edge: DVec2| edge.y < 0.0 || (edge.y == 0.0 && edge.x > 0.0);
         let areas = self.areas(at);
         edges.into_iter().zip(areas).all(|(edge, area)| area > 0.0 || (area == 0.0 && drawn(edge)))
+    }
+
+    /// The point of the mesh where its vertices count so much.
+    fn hit(&self, [_, mut u, mut v]: [f64; 3]) -> Hit {
+        if self.turned {
+            std::mem::swap(&mut u, &mut v);
+        }
+        Hit { triangle: self.index, barycentric: [u as f32, v as f32] }
     }
 
     /// What each vertex counts at a place.
@@ -276,6 +287,8 @@ enum Quantity {
     NormalMap,
     /// What files of rules declare.
     Declared(fields::Field),
+    /// Of those, what is found at each texel by itself.
+    Found(fields::Field),
 }
 
 impl Field {
@@ -295,8 +308,9 @@ impl Field {
             "attenuator" if step.is_none() => Quantity::Attenuator,
             "normal_texel" if step.is_none() => Quantity::NormalMap,
             other => match fields::Field::from_name(other) {
-                Some(field) => Quantity::Declared(field),
-                None => return Err(AtlasError::NotStored { quantity: name.to_owned() }),
+                Some(field) if field.is_of_vertices() => Quantity::Declared(field),
+                Some(field) if step.is_none() => Quantity::Found(field),
+                _ => return Err(AtlasError::NotStored { quantity: name.to_owned() }),
             },
         };
         Ok(Self { of, component: input.component, step })
@@ -318,6 +332,11 @@ impl Field {
             }
             Quantity::NormalMap => {
                 map(&|uv| normal.as_ref().map_or([0.5, 0.5, 1.0], |map| map.sample(uv.x, uv.y))[c])
+            }
+            Quantity::Found(field) => {
+                let mut numbers = [0.0; fields::MOST_NUMBERS];
+                (mesh.find)(field, triangle.hit(weights), &mut numbers[..field.info().numbers]);
+                numbers[c]
             }
             _ => {
                 let weights = self.step.map_or(weights, |axis| triangle.steps()[axis]);
@@ -361,7 +380,8 @@ mod tests {
             ..PosedMesh::default()
         };
         let maps = Box::leak(Box::<Maps>::default());
-        Textured { posed: Box::leak(Box::new(posed)), occlusion: None, maps, size: 8.0 }
+        let find = &|field: fields::Field, _, numbers: &mut [f32]| numbers.fill(field.info().neutral);
+        Textured { posed: Box::leak(Box::new(posed)), occlusion: None, maps, find, size: 8.0 }
     }
 
     #[test]

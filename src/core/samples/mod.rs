@@ -7,22 +7,26 @@
 //! samples) cost no padding inside.
 //!
 //! - `trace`: primary rays, and what they hit
-//! - `surface`: frames, silhouette and maps at a hit
+//! - `posed`: the mesh in a pose with what is baked of it; `lit`: what reaches samples of lights; `surface`: frames, silhouette and maps at a hit
 //! - `group`: samples packed into groups
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
 //! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
+//! - [`visibility`]: how much of a light reaches a place of the mesh
 //! - [`atlas`]: texels of the UV atlas, samples of the mesh as well
 
 pub mod atlas;
 pub mod covered;
 mod group;
+mod lit;
+mod posed;
 pub mod rows;
 mod surface;
 pub mod surface_records;
 pub mod targets;
 mod trace;
+pub mod visibility;
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -37,6 +41,7 @@ use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
 pub use atlas::Atlas;
 pub use group::z_order;
+pub use posed::{PosedSurface, SurfaceBakes};
 pub use surface_records::SurfaceRecords;
 pub use targets::TargetRows;
 pub use trace::Hit;
@@ -165,22 +170,35 @@ pub enum SampleError {
 
 /// The visible surface of each view of `scene`, with its mesh posed as `posed`.
 ///
-/// `occlusion` is what was baked, if anything; morph targets add theirs by the scene's weights.
+/// Of what was baked, morph targets add theirs by the scene's weights.
 ///
 /// # Errors
 /// When a view sees nothing of the mesh, or the mesh lacks what the effects ask for.
 pub fn sample_views(
     scene: &Scene,
     posed: &PosedMesh,
-    occlusion: Option<&VertexOcclusion>,
+    bakes: SurfaceBakes<'_>,
+) -> Result<Vec<ViewSamples>, SampleError> {
+    sample_these(scene, &scene.views, posed, bakes)
+}
+
+/// As [`sample_views`], of other views than the scene's own.
+///
+/// # Errors
+/// As of [`sample_views`].
+pub fn sample_these(
+    scene: &Scene,
+    views: &[View],
+    posed: &PosedMesh,
+    bakes: SurfaceBakes<'_>,
 ) -> Result<Vec<ViewSamples>, SampleError> {
     check_uvs(scene, &posed.uvs)?;
-    let open = posed_occlusion(scene, &scene.mesh.morphs, posed.positions.len(), occlusion)?;
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
-    let atlas = atlas_of(scene, posed, open.as_deref())?;
-    let bar = progress::bar("samples", scene.views.len() as u64);
-    let views = scene.views.iter().map(|view| {
-        let mut samples = sample_view(scene, posed, &rays, open.as_deref(), &view.camera);
+    let posed = PosedSurface::new(scene, posed, &rays, &scene.mesh.morphs, bakes)?;
+    let atlas = atlas_of(scene, &posed)?;
+    let bar = progress::bar("samples", views.len() as u64);
+    let views = views.iter().map(|view| {
+        let mut samples = sample_view(scene, &posed, &view.camera);
         samples.atlas.clone_from(&atlas);
         bar.inc(1);
         if samples.pixel.is_empty() { Err(nothing_visible(scene, view)) } else { Ok(samples) }
@@ -228,37 +246,26 @@ pub fn posed_occlusion(
     }
 }
 
-/// The texels of `posed` that the effects of `scene` are computed in; `None` where none is. `occlusion` holds one value a
-/// vertex.
+/// The texels of `posed` that the effects of `scene` are computed in; `None` where none is.
 ///
 /// # Errors
 /// When the mesh has no texture coordinates, or does not lie in the atlas; or an effect's rules cannot be computed.
-pub fn atlas_of(
-    scene: &Scene,
-    posed: &PosedMesh,
-    occlusion: Option<&[f32]>,
-) -> Result<Option<Arc<Atlas>>, SampleError> {
+pub fn atlas_of(scene: &Scene, posed: &PosedSurface<'_>) -> Result<Option<Arc<Atlas>>, SampleError> {
     if !scene.needs().atlas {
         return Ok(None);
     }
-    let made = Atlas::new(&scene.setup(), posed, occlusion, &scene.maps, scene.diffusion.light_map_size);
+    let made = Atlas::new(&scene.setup(), posed, &scene.maps, scene.diffusion.light_map_size);
     let named = |error| SampleError::Atlas { scene: scene.path.display().to_string(), error };
     Ok(Some(Arc::new(made.map_err(named)?)))
 }
 
-/// The visible surface from one camera, without an atlas; empty when it sees nothing. `rays` holds the triangles of
-/// `posed`, and `occlusion` one value a vertex. Deterministic for any number of threads.
+/// The visible surface from one camera, without an atlas; empty when it sees nothing. Deterministic for any number of
+/// threads.
 #[must_use]
-pub fn sample_view(
-    scene: &Scene,
-    posed: &PosedMesh,
-    rays: &RayMesh,
-    occlusion: Option<&[f32]>,
-    camera: &Camera,
-) -> ViewSamples {
+pub fn sample_view(scene: &Scene, posed: &PosedSurface<'_>, camera: &Camera) -> ViewSamples {
     let n = scene.quality.samples_per_axis.max(1);
-    let hits = trace::trace(rays, posed, camera, n);
-    let surface = surface::Surface::new(scene, posed, occlusion, camera.eye());
+    let hits = trace::trace(posed.rays, posed.mesh, camera, n);
+    let surface = surface::Surface::new(scene, posed, camera.eye());
     group::pack(&hits, &surface, camera.width, n * n)
 }
 

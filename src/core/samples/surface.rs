@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::posed::PosedSurface;
 use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
 use crate::model::effects::{Form, Silhouette};
@@ -49,6 +50,7 @@ fn asked(setup: &Setup, bumped: bool) -> Asked {
 
 /// The vertex stage of one view, ready to be read at any point.
 pub(super) struct Surface<'a> {
+    posed: &'a PosedSurface<'a>,
     mesh: &'a PosedMesh,
     maps: &'a Maps,
     occlusion: Option<&'a [f32]>,
@@ -64,12 +66,8 @@ pub(super) struct Surface<'a> {
 }
 
 impl<'a> Surface<'a> {
-    pub(super) fn new(
-        scene: &'a Scene,
-        mesh: &'a PosedMesh,
-        occlusion: Option<&'a [f32]>,
-        eye: DVec3,
-    ) -> Self {
+    pub(super) fn new(scene: &'a Scene, posed: &'a PosedSurface<'a>, eye: DVec3) -> Self {
+        let (mesh, occlusion) = (posed.mesh, posed.open.as_deref());
         let setup = scene.setup();
         let dapple = setup.dapple.turned(scene.params.scalar(Param::EnvironmentRotation)).into();
         let bumped = bumped(scene) && !mesh.tangents.is_empty();
@@ -83,7 +81,7 @@ impl<'a> Surface<'a> {
         let view = |p: &Vec3| (p.as_dvec3() - eye).normalize_or_zero().as_vec3();
         let views = if per_vertex { mesh.positions.par_iter().map(view).collect() } else { Vec::new() };
         let (form, maps) = (scene.form, &scene.maps);
-        Self { mesh, maps, occlusion, form, setup, dapple, eye, bitangents, views }
+        Self { posed, mesh, maps, occlusion, form, setup, dapple, eye, bitangents, views }
     }
 
     /// What the effects read of each sample.
@@ -143,16 +141,9 @@ impl<'a> Surface<'a> {
         self.mesh.triangles[hit.triangle as usize].map(|i| i as usize)
     }
 
-    /// What the mesh has of a field at `hit`, interpolated; what stands in for it where it lacks the field.
+    /// What there is of a field at `hit`.
     pub(super) fn field(&self, field: Field, hit: Hit, numbers: &mut [f32]) {
-        let Some(of) = self.mesh.fields.iter().find(|of| of.field == field) else {
-            return numbers.fill(field.info().neutral);
-        };
-        let corners = self.corners(hit).map(|corner| of.of(corner));
-        let weights = hit.weights();
-        for (k, number) in numbers.iter_mut().enumerate() {
-            *number = (0..3).map(|i| weights[i] * corners[i][k]).sum();
-        }
+        self.posed.field(field, hit, numbers);
     }
 
     /// S.z at three vertices; 0 where no one asks.

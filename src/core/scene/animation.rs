@@ -12,6 +12,7 @@ use super::maps::Maps;
 use super::mesh::Mesh;
 use super::numbers::{interval, number, short};
 use crate::model::effects::{Effect, Effects, Form, Needs};
+use crate::model::fields::Fields;
 
 /// The mesh of a scene through its animation 0.
 pub struct Animation {
@@ -86,6 +87,11 @@ impl Pose {
         })
     }
 
+    /// Seconds into the animation.
+    pub(super) const fn time(&self) -> Option<f64> {
+        self.time
+    }
+
     pub(super) fn at(self, time: Option<f64>) -> Self {
         Self { time: time.or(self.time), ..self }
     }
@@ -128,7 +134,7 @@ pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose:
         morphs: effects.has(Effect::Morph),
         morph_weights: pose.morph_weights.clone(),
         bones: effects.has(Effect::Skin),
-        fields: needs.fields,
+        fields: Fields::of(needs.fields.iter().filter(|field| field.is_of_vertices())),
         time: pose.time.filter(|_| effects.has_any(&[Effect::Morph, Effect::Skin])),
         clip: false,
     }

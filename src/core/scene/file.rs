@@ -21,6 +21,8 @@ pub(super) struct SceneFile {
     #[serde(default)]
     pub model: ModelTable,
     #[serde(default)]
+    pub light: Vec<Spanned<LightTable>>,
+    #[serde(default)]
     pub view: Vec<Spanned<ViewTable>>,
     #[serde(default)]
     pub fit: FitTable,
@@ -40,6 +42,8 @@ pub(super) struct MeshTable {
     pub morph_weights: Option<Spanned<Vec<f64>>>,
     pub time: Option<Spanned<f64>>,
     pub metres_per_unit: Option<Spanned<f64>>,
+    #[serde(default)]
+    pub lights: bool,
 }
 
 /// `[maps]`
@@ -61,6 +65,26 @@ pub(super) struct EnvironmentTable {
     pub rotation_degrees: Option<Spanned<f64>>,
     pub intensity: Option<Spanned<f64>>,
     pub dapple: Option<Spanned<Vec<f64>>>,
+    pub lights: Option<Spanned<i64>>,
+    pub light_spot_degrees: Option<Spanned<f64>>,
+}
+
+/// `[[light]]`
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LightTable {
+    pub name: Spanned<String>,
+    #[serde(rename = "type")]
+    pub kind: Spanned<String>,
+    pub direction: Option<Spanned<[f64; 3]>>,
+    pub irradiance: Option<Spanned<ParamValue>>,
+    pub angular_diameter_degrees: Option<Spanned<f64>>,
+    pub position: Option<Spanned<[f64; 3]>>,
+    pub intensity: Option<Spanned<ParamValue>>,
+    pub range: Option<Spanned<f64>>,
+    pub radius: Option<Spanned<f64>>,
+    pub inner_degrees: Option<Spanned<f64>>,
+    pub outer_degrees: Option<Spanned<f64>>,
 }
 
 /// `[model]`
@@ -187,6 +211,7 @@ pub(super) struct QualityTable {
     pub hilite_size: Option<Spanned<i64>>,
     pub lobes_per_octave: Option<Spanned<i64>>,
     pub occlusion_rays: Option<Spanned<i64>>,
+    pub shadow_rays: Option<Spanned<i64>>,
 }
 
 /// A number, or one for each channel.

@@ -10,9 +10,11 @@ use super::dapple::dapple;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, SceneFile, Source};
 use super::gltf::{Ask, Document};
+use super::lit::{self, Lights};
 use super::maps::{Environment, Map, Maps};
 use super::numbers::{interval, number};
-use super::settings;
+use super::settings::{self, spots};
+use super::sky_lights::sky_lights;
 use super::terms::terms;
 use super::view::{Background, View};
 use super::{FitSettings, Scene, images};
@@ -62,14 +64,12 @@ impl Scene {
         let (form, silhouette) = settings::form(&source, &file.model)?;
         let lookups = settings::lookups(&source, &file.model)?;
         let dapple = read_dapple(&source, &file)?;
-        let params = settings::params(&source, &file.model.params, form)?;
         let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
         let diffusion = settings::diffusion(&source, &file.diffusion)?;
         let pose = Pose::check(&source, &file)?.at(options.time);
         let metres_per_unit = metres(&source, &file)?;
-        let given = settings::effects(&source, &file.model)?;
 
         if let Some(background) = options.background {
             plans.iter_mut().for_each(|plan| plan.background = background);
@@ -77,11 +77,15 @@ impl Scene {
 
         let bar = progress::bar("loading", 3 + plans.len() as u64);
         let document = Document::open(&folder.join(&file.mesh.file))?;
+        let lights = Lights::read(&source, &file, Some((&document, pose.time())), &mut warnings)?;
+        let mut params = settings::params(&source, &file.model.params, form)?;
+        let given = settings::effects(&source, &file.model)?;
         let listed = options.effects.or(given);
         let mut effects = pose.effects(listed, &document)?;
         if listed.is_none() {
             effects = terms.iter().fold(effects, |effects, term| effects.with(term.effect));
         }
+        let effects = lights.switched(effects);
         let setup = Setup { lookups, dapple, ..Setup::new(form, silhouette, effects) };
         let needs = setup.needs();
         let mut idle = Warnings::new();
@@ -105,11 +109,19 @@ impl Scene {
         bar.inc(1);
         // Targets have a background of their own; it is a picture that shows the environment.
         let shown = !options.targets && plans.iter().any(|plan| plan.background == Background::Environment);
-        let environment = if needs.environment() || shown {
+        let of_sky = effects.has(Effect::Lights) && lights.are_of_sky();
+        let environment = if needs.environment() || shown || of_sky {
             Some(read_environment(&source, &file, folder, shown, &mut warnings)?)
         } else {
             None
         };
+        let sky_lights = match &environment {
+            Some(environment) if of_sky => sky_lights(environment).lights_in_world(environment),
+            _ => Vec::new(),
+        };
+        for light in lights.own.iter().chain(&sky_lights) {
+            lit::set(light, &mut params, |name| file.model.params.keys().any(|key| key.get_ref() == name));
+        }
         bar.inc(1);
         let views = read_views(plans, folder, options.targets, &bar, &mut warnings)?;
         bar.finish_and_clear();
@@ -120,6 +132,8 @@ impl Scene {
             metres_per_unit,
             maps,
             environment,
+            lights: lights.own,
+            sky_lights,
             form,
             silhouette,
             lookups,
@@ -232,10 +246,11 @@ fn read_environment(
             format!("Add [environment] with a lat-long EXR or HDR file, or {otherwise}"),
         ));
     };
-    let (rotation_degrees, intensity) = light(source, table)?;
+    let (rotation_degrees, intensity) = turn_and_intensity(source, table)?;
     Ok(Environment {
         rotation_degrees,
         intensity,
+        spots: spots(source, table)?,
         panorama: images::panorama(&folder.join(&table.file), warnings)?,
     })
 }
@@ -244,7 +259,7 @@ fn read_environment(
 const MOST_DEGREES: f64 = 36_000.0;
 
 /// The numbers of `[environment]`: its turn in degrees, and its intensity.
-fn light(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneError> {
+fn turn_and_intensity(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneError> {
     let turn = number(
         source,
         table.rotation_degrees.as_ref(),
@@ -261,8 +276,16 @@ fn light(source: &Source, table: &EnvironmentTable) -> Result<(f64, f64), SceneE
 /// Where light falls through leaves from, in the environment as it is turned.
 fn read_dapple(source: &Source, file: &SceneFile) -> Result<Dapple, SceneError> {
     let Some(table) = &file.environment else { return Ok(Dapple::default()) };
-    let (degrees, _) = light(source, table)?;
+    let (degrees, _) = turn_and_intensity(source, table)?;
     dapple(source, table.dapple.as_ref(), degrees)
+}
+
+/// The lights of a scene file, for what reads nothing else of its files: of the mesh file, where it names some.
+pub(super) fn read_lights(source: &Source, file: &SceneFile) -> Result<Lights, SceneError> {
+    let folder = source.path.parent().unwrap_or(Path::new(""));
+    let document = file.mesh.lights.then(|| Document::open(&folder.join(&file.mesh.file))).transpose()?;
+    let time = Pose::check(source, file)?.time();
+    Lights::read(source, file, document.as_ref().map(|document| (document, time)), &mut Warnings::new())
 }
 
 /// Refuse the text of a scene file for whatever [`Scene::load`] would refuse before it reads another file than those of
@@ -272,8 +295,9 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let file: SceneFile = source.parse()?;
     let terms = terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))?;
     let (form, _) = settings::form(&source, &file.model)?;
-    settings::lookups(&source, &file.model)?;
+    let lights = read_lights(&source, &file)?;
     settings::params(&source, &file.model.params, form)?;
+    settings::lookups(&source, &file.model)?;
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;
@@ -282,7 +306,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     metres(&source, &file)?;
     // What the mesh adds to the effects concerns no value here.
     let every = || terms.iter().fold(Effects::SURFACE, |effects, term| effects.with(term.effect));
-    let effects = settings::effects(&source, &file.model)?.unwrap_or_else(every);
+    let effects = lights.switched(settings::effects(&source, &file.model)?.unwrap_or_else(every));
     settings::fit(&source, &file.fit, &file.model.params, effects, &mut Warnings::new())?;
     normal_flip(&source, &file)?;
     read_dapple(&source, &file).map(drop)

@@ -64,4 +64,30 @@ pub struct Environment {
     pub rotation_degrees: f64,
     /// Factor on the radiance.
     pub intensity: f64,
+    /// What of it becomes lights of their own.
+    pub spots: Spots,
+}
+
+/// The brightest spots of a panorama, to be taken out as directional lights
+/// ([`sky_lights`](super::sky_lights)).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spots {
+    /// How many, at most.
+    pub count: u32,
+    /// The angle around its middle, degrees, within which all light is a spot's.
+    pub degrees: f64,
+}
+
+impl Default for Spots {
+    fn default() -> Self {
+        Self { count: 0, degrees: 4.0 }
+    }
+}
+
+/// Rec.709 luminance.
+#[must_use]
+pub fn luminance(rgb: [f32; 3]) -> f32 {
+    let [r, g, b] = rgb.map(f64::from);
+    // In f64 and with weights that sum to exactly 1, so that grey 1 has luminance 1.
+    (0.2126 * r + 0.7152 * g + 0.0722 * b) as f32
 }

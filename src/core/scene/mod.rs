@@ -3,10 +3,13 @@
 //! - [`mesh`]: the mesh as loaded, and posed
 //! - [`view`]: cameras and targets
 //! - [`maps`]: texture maps and the panorama
+//! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
-//!   `settings`, `cameras` and `dapple`, within the bounds of `numbers`
+//!   `settings`, `cameras`, `lights` and `dapple`, within the bounds of `numbers`
+//! - [`sky_lights`]: the panorama's brightest spots as lights; `lit`: the effect that each light is
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
+//! - [`names`]: what a scene is called among several
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
 //! - [`facts`]: what a scene calls for of the shader planner
 //! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
@@ -24,14 +27,19 @@ pub mod facts;
 mod file;
 mod gltf;
 pub mod images;
+pub mod light;
+mod lights;
+mod lit;
 pub mod load;
 pub mod map_fit;
 pub mod maps;
 pub mod mesh;
+pub mod names;
 mod normals;
 mod numbers;
 pub mod pose;
 mod settings;
+pub mod sky_lights;
 mod tangents;
 mod terms;
 pub mod view;
@@ -40,6 +48,7 @@ pub use assignment::Assignment;
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub use file::{Source, check_text};
+pub use light::{Light, LightKind};
 pub use load::LoadOptions;
 pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
@@ -66,6 +75,12 @@ pub struct Scene {
     pub maps: maps::Maps,
     /// The environment; absent when no effect asks for it.
     pub environment: Option<maps::Environment>,
+    /// The lights that the scene file and, where it says so, the mesh file name, in the world; those of the panorama
+    /// are not among them.
+    pub lights: Vec<Light>,
+    /// Those that were taken out of the panorama, where the scene's own turn has them; `environment_rotation` turns them
+    /// with it.
+    pub sky_lights: Vec<Light>,
     /// Which reading of the listings.
     pub form: Form,
     /// Where S.z is evaluated.
@@ -194,6 +209,8 @@ pub struct Quality {
     pub lobes_per_octave: u32,
     /// Rays a vertex for ambient occlusion.
     pub occlusion_rays: u32,
+    /// Rays a sample towards each light that has a size; those of a pixel's samples differ.
+    pub shadow_rays: u32,
 }
 
 impl Default for Quality {
@@ -205,6 +222,7 @@ impl Default for Quality {
             hilite_size: 128,
             lobes_per_octave: 1,
             occlusion_rays: 256,
+            shadow_rays: 1,
         }
     }
 }

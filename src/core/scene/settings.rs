@@ -3,7 +3,10 @@
 use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
-use super::file::{BloomTable, DiffusionTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
+use super::file::{
+    BloomTable, DiffusionTable, EnvironmentTable, FitTable, ModelTable, ParamsTable, QualityTable, Source,
+};
+use super::maps::Spots;
 use super::numbers::{interval, number, short, whole};
 use super::{Bloom, Diffusion, FitSettings, Loss, Quality, map_fit};
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
@@ -52,6 +55,10 @@ pub(super) fn params(source: &Source, table: &ParamsTable, form: Form) -> Result
     for (name, value) in table {
         let param = param(source, name)?;
         let values = value.get_ref().channels();
+        if param.info().held {
+            let what = format!("{} follows from the scene's lights", param.name());
+            return Err(source.error(name, what, "Change it there"));
+        }
         check_value(param, values).map_err(|(what, remedy)| source.error(value, what, remedy))?;
         params.set_rgb(param, values);
     }
@@ -140,6 +147,10 @@ fn free(
         if params.contains(&param) {
             return Err(listed_twice(source, name, "free"));
         }
+        if param.info().held {
+            let what = format!("{} is the scene's: no fit moves it", param.name());
+            return Err(source.error(name, what, "Take it out; free the light's `color` in its place"));
+        }
         if !param.asked_for(effects) {
             let message = format!(
                 "{} is free, but no enabled effect asks for it: it will be reported as unidentifiable",
@@ -211,6 +222,7 @@ pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, 
         hilite_size: pick(&table.hilite_size, "hilite_size", 4, 4096, default.hilite_size)?,
         lobes_per_octave: pick(&table.lobes_per_octave, "lobes_per_octave", 1, 8, default.lobes_per_octave)?,
         occlusion_rays: pick(&table.occlusion_rays, "occlusion_rays", 1, 1 << 16, default.occlusion_rays)?,
+        shadow_rays: pick(&table.shadow_rays, "shadow_rays", 1, 1 << 12, default.shadow_rays)?,
     })
 }
 
@@ -230,4 +242,22 @@ pub(super) fn diffusion(source: &Source, table: &DiffusionTable) -> Result<Diffu
     let default = Diffusion::default().light_map_size;
     let size = whole(source, table.light_map_size.as_ref(), "light_map_size", [64, 8192], default)?;
     Ok(Diffusion { light_map_size: size })
+}
+
+/// Each light costs shadows of its own.
+const MOST_SPOTS: i64 = 64;
+/// Below it a spot is about a texel of a panorama of 8192 columns, above it no light from one direction.
+const SPOT_DEGREES: [f64; 2] = [0.05, 45.0];
+
+/// Which spots of the panorama become lights.
+pub(super) fn spots(source: &Source, table: &EnvironmentTable) -> Result<Spots, SceneError> {
+    let default = Spots::default();
+    let [least, most] = SPOT_DEGREES;
+    let wanted = format!("degrees in {}", interval(least, most));
+    let given = table.light_spot_degrees.as_ref();
+    let degrees = number(source, given, default.degrees, "light_spot_degrees", &wanted, |degrees| {
+        (least..=most).contains(&degrees)
+    })?;
+    let count = whole(source, table.lights.as_ref(), "lights", [0, MOST_SPOTS], default.count)?;
+    Ok(Spots { count, degrees })
 }

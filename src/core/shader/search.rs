@@ -54,6 +54,14 @@ pub enum PlanError {
         /// The effect.
         effect: &'static str,
     },
+    /// Quantities that the processor alone finds.
+    #[error(
+        "{field} is found at each sample by rays, which samples made on an adapter have none of. Have the CPU make the samples."
+    )]
+    OfRays {
+        /// The field.
+        field: String,
+    },
     /// Quantities that need one another.
     #[error(
         "shader rules need one another in a circle, among {goals}. This is a fault of skinfit: please report it."
@@ -65,6 +73,12 @@ pub enum PlanError {
 }
 
 impl PlanError {
+    /// That samples made on an adapter lack a field.
+    #[must_use]
+    pub fn not_found_on_adapters(field: &str) -> Self {
+        Self::OfRays { field: field.to_owned() }
+    }
+
     /// That there are no texels for the one of `effects` that is computed there.
     #[must_use]
     pub fn no_atlas(effects: Effects) -> Self {

@@ -4,7 +4,7 @@ use std::sync::PoisonError;
 
 use super::GpuEngine;
 use super::fused::{ColumnOf, Sum, Wish};
-use skinfit_core::engine::{NormalEquations, Point, Unknown};
+use skinfit_core::engine::{Engine, NormalEquations, Point, Unknown};
 
 impl GpuEngine {
     /// A pass as normal equations; after a fault, numbers that no solver takes.
@@ -14,7 +14,7 @@ impl GpuEngine {
         let mut total = NormalEquations {
             loss: 0.0,
             residual: 0.0,
-            weight: self.weight.0 * f64::from(channels),
+            weight: Engine::weight(self),
             count: self.weight.1 * u64::from(channels),
             jtr: vec![0.0; k],
             jtj: vec![0.0; k * k],

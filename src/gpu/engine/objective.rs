@@ -98,6 +98,10 @@ impl Engine for GpuEngine {
         }
     }
 
+    fn weight(&self) -> f64 {
+        self.weight.0 * f64::from(if self.alpha { 4_u32 } else { 3 })
+    }
+
     fn own_sample_seconds(&self) -> Option<f64> {
         self.device_samples().map(|(_, seconds)| seconds)
     }

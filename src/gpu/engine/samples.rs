@@ -55,6 +55,9 @@ impl DeviceSamples {
         let start = Instant::now();
         let scene = Arc::clone(&content.scene);
         let scene = &*scene;
+        if let Some(field) = scene.needs().fields.iter().find(|field| !field.is_of_vertices()) {
+            return Err(GpuError::Plan(PlanError::not_found_on_adapters(field.name()).to_string()).into());
+        }
         if scene.needs().atlas {
             // Texels are the CPU's, as are the samples' places in them.
             return Err(GpuError::Plan(PlanError::no_atlas(scene.effects).to_string()).into());

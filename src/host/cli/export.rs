@@ -83,7 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
 /// The scene, with the parameters over its own.
 fn loaded(arguments: &Arguments, path: &Path, file: &mut ParamsFile) -> Result<Scene, Refusal> {
     let (scene, warnings) = Scene::load(path, &LoadOptions { targets: false, ..LoadOptions::default() })?;
-    *file = ParamsFile::read(&arguments.params, scene.form, &scene.params)?;
+    *file = ParamsFile::read(&arguments.params, scene.form, &scene.params)?.of_scene(path);
     if !arguments.constants && arguments.to.dialect().is_some() {
         tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
     }

@@ -2,6 +2,7 @@
 //! an engine computes is in it, so a fit goes on wherever its passes and its samples are made.
 
 use crate::fit::fingerprint::Fingerprint;
+use crate::prepare::HeldOut;
 use crate::scene::maps::{Environment, Map, Maps};
 use crate::scene::mesh::Mesh;
 use crate::scene::view::Target;
@@ -10,8 +11,8 @@ use crate::scene::{Quality, Scene};
 /// What stands for something that is not there.
 const NONE: &str = "none";
 
-/// The fingerprint of a fit of `scene`.
-pub(super) fn fingerprint(scene: &Scene) -> Fingerprint {
+/// The fingerprint of a fit of `scene` without the views that are held out.
+pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
     let effects: Vec<&str> = scene.effects.iter().map(crate::model::effects::Effect::name).collect();
     let Maps { color, normal, specular, attenuator } = &scene.maps;
     let all = Fingerprint::default()
@@ -38,6 +39,8 @@ pub(super) fn fingerprint(scene: &Scene) -> Fingerprint {
             Hash::default().words(&term.text).done(),
         )
     });
+    let held: Vec<&str> = held.views.iter().map(|view| view.name.as_str()).collect();
+    let all = if held.is_empty() { all } else { all.with("list of held-out views", held.join(" ")) };
     scene.views.iter().fold(all, |all, view| {
         let camera = Hash::default().words(&view.camera).done();
         all.with(format!("camera of view {}", view.name), camera)
@@ -76,7 +79,8 @@ fn map<const C: usize>(map: Option<&Map<C>>) -> String {
 }
 
 fn environment(environment: Option<&Environment>) -> String {
-    let Some(Environment { panorama, rotation_degrees, intensity }) = environment else {
+    // No effect looks at its lights.
+    let Some(Environment { panorama, rotation_degrees, intensity, spots: _ }) = environment else {
         return NONE.to_owned();
     };
     let of = Hash::default().words(&[panorama.width, panorama.height]).words(&[rotation_degrees, intensity]);
@@ -116,10 +120,12 @@ fn quality(quality: Quality) -> String {
         hilite_size,
         lobes_per_octave,
         occlusion_rays,
+        shadow_rays,
     } = quality;
     format!(
         "samples_per_axis {samples_per_axis}, irradiance_size {irradiance_size}, lobe_size {lobe_size}, hilite_size \
-         {hilite_size}, lobes_per_octave {lobes_per_octave}, occlusion_rays {occlusion_rays}"
+         {hilite_size}, lobes_per_octave {lobes_per_octave}, occlusion_rays {occlusion_rays}, \
+         shadow_rays {shadow_rays}"
     )
 }
 

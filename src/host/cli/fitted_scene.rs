@@ -17,6 +17,8 @@ const MAPS: [&str; 4] = ["color", "normal", "specular", "attenuator"];
 pub(super) struct Changes<'a> {
     /// The loss, instead of the file's.
     pub(super) loss: Option<&'a str>,
+    /// What is free, instead of the file's.
+    pub(super) free: Option<&'a [Column]>,
     /// The start values, instead of the file's.
     pub(super) start: Option<Start<'a>>,
     /// Fitted maps, instead of the file's: key in `[maps]` and path.
@@ -77,6 +79,11 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
     {
         set(fit, "loss", loss.into());
     }
+    if let Some(free) = changes.free
+        && let Some(fit) = section(scene.as_table_mut(), "fit")
+    {
+        set_free(fit, free);
+    }
     if let Some(start) = changes.start {
         let model = section(scene.as_table_mut(), "model");
         if let Some(params) = model.and_then(|model| section(model, "params")) {
@@ -127,6 +134,18 @@ fn set(table: &mut dyn TableLike, key: &str, mut value: Value) {
         None => {
             table.insert(key, Item::Value(value));
         }
+    }
+}
+
+/// What is free, and which of it in each channel.
+fn set_free(table: &mut dyn TableLike, free: &[Column]) {
+    let mut names: Vec<&str> = free.iter().map(|column| column.param.name()).collect();
+    names.dedup();
+    let coloured = free.iter().filter(|column| column.channels == Channels::One(0));
+    let coloured: Vec<&str> = coloured.map(|column| column.param.name()).collect();
+    set(table, "free", Value::Array(Array::from_iter(names)));
+    if !coloured.is_empty() || table.contains_key("per_channel") {
+        set(table, "per_channel", Value::Array(Array::from_iter(coloured)));
     }
 }
 
@@ -191,6 +210,21 @@ mod tests {
             assert_eq!(table["mesh"]["file"].as_str(), Some("/s/a b.glb"));
             let comments = |text: &str| text.matches('#').count();
             assert_eq!(comments(&text), comments(fit) + comments(SCENE), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_free_is_what_was() {
+        let free =
+            [vec![Column::tied(Param::RimExponent)], Column::per_channel(Param::Hilite).to_vec()].concat();
+        for fit in ["", "[fit] # why\nfree = [\"occlusion\"] # little\nper_channel = []\n"] {
+            let changes = Changes { free: Some(&free), ..Changes::default() };
+            let text = as_fitted(&format!("{fit}{SCENE}"), Path::new("/s"), changes).unwrap();
+            let table: toml::Table = text.parse().unwrap();
+            let names = |key: &str| table["fit"][key].as_array().unwrap().clone();
+            assert_eq!(names("free"), ["rim_exponent", "hilite"].map(toml::Value::from).to_vec(), "{text}");
+            assert_eq!(names("per_channel"), [toml::Value::from("hilite")].to_vec(), "{text}");
+            assert_eq!(text.matches("# little").count(), fit.matches("# little").count());
         }
     }
 

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 use std::path::PathBuf;
 
 use super::{Exit, Refusal, say};
-use crate::model::params::{ParamInfo, Scale, TABLE};
+use crate::model::params::{Owner, ParamInfo, Scale, TABLE};
 use crate::scene::{interval, register_terms};
 
 /// Print the parameter table: name, defaults, bounds, unit, kind, source
@@ -40,7 +40,8 @@ fn kind(row: &ParamInfo) -> String {
         (false, Scale::Linear) => "non-linear",
         (false, Scale::Log) => "non-linear, by its logarithm",
     };
-    format!("{channels}, {shape}")
+    let owner = if row.owner == Owner::Scene { ", each scene's own" } else { "" };
+    format!("{channels}, {shape}{owner}")
 }
 
 const HEAD: [&str; 8] = ["name", "corrected", "listing", "bounds", "unit", "kind", "source", "meaning"];
@@ -93,7 +94,7 @@ fn json(rows: &[&ParamInfo]) -> String {
             serde_json::json!({
                 "name": row.name, "default": {"corrected": row.corrected, "listing": row.listing},
                 "bounds": [finite(row.lower), finite(row.upper)], "unit": row.unit,
-                "rgb": row.rgb, "linear": row.linear, "effects": effects,
+                "rgb": row.rgb, "linear": row.linear, "owner": row.owner.name(), "effects": effects,
                 "source": row.source, "meaning": row.meaning,
             })
         })

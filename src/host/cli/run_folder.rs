@@ -60,8 +60,8 @@ impl Work {
 impl RunFolder {
     /// Make and lock `output`, or the [`default_folder`], for a fit; what was made for it goes when
     /// that is interrupted before it is under way.
-    pub(super) fn open(output: Option<&Path>, scene: Option<&Path>) -> Result<Self, Refusal> {
-        let folder = Self::locked(output.map_or_else(|| default_folder(scene), Path::to_owned))?;
+    pub(super) fn open(output: Option<&Path>, scenes: &[PathBuf]) -> Result<Self, Refusal> {
+        let folder = Self::locked(output.map_or_else(|| default_folder(scenes), Path::to_owned))?;
         folder.check(Work::Fit)?;
         Ok(folder.unfinished())
     }
@@ -131,9 +131,14 @@ impl RunFolder {
         self.keep();
     }
 
-    /// The scene file as it was fitted, comments and all: its paths are made absolute, so that it can
-    /// be used from here, and `changes` stand in place of its own words. Returns the maps that it names.
-    pub(super) fn write_scene(&self, scene: &Path, changes: Changes<'_>) -> Result<Vec<PathBuf>, Refusal> {
+    /// The scene file as it was fitted, comments and all, as `file` in the folder: its paths are made absolute, so that it
+    /// can be used from here, and `changes` stand in place of its own words. Returns the maps that it names.
+    pub(super) fn write_scene(
+        &self,
+        scene: &Path,
+        file: &str,
+        changes: Changes<'_>,
+    ) -> Result<Vec<PathBuf>, Refusal> {
         let refused = |reason: String| {
             Refusal::new(format!(
                 "{}: changed while it was fitted: {reason}. Run the fit again.",
@@ -145,7 +150,7 @@ impl RunFolder {
         let folder = absolute.parent().unwrap_or(Path::new("/"));
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         let text = as_fitted(&text, &folder, changes).map_err(|e| refused(e.message().to_owned()))?;
-        output::write(&self.path.join("scene.toml"), text.as_bytes())?;
+        output::write(&self.path.join(file), text.as_bytes())?;
         Ok(named_maps(&text))
     }
 }
@@ -161,16 +166,17 @@ impl Drop for RunFolder {
 }
 
 /// `runs/<the name of the scene's folder>`, with the file's own name after a full stop unless it is `scene.toml`; the
-/// built-in scene's is `runs/builtin`.
-fn default_folder(scene: Option<&Path>) -> PathBuf {
-    let named = scene.map(|scene| {
-        let absolute = std::path::absolute(scene).unwrap_or_else(|_| scene.to_owned());
+/// built-in scene's is `runs/builtin`, and that of several `runs/<these names with + between them>`.
+fn default_folder(scenes: &[PathBuf]) -> PathBuf {
+    let named = scenes.iter().map(|scene| {
+        let absolute = std::path::absolute(scene).unwrap_or_else(|_| scene.clone());
         let words = |part: Option<&std::ffi::OsStr>| part.map(|name| name.to_string_lossy().into_owned());
         let folder = words(absolute.parent().and_then(Path::file_name));
         let file = words(absolute.file_stem()).filter(|name| folder.is_none() || name != "scene");
         folder.into_iter().chain(file).collect::<Vec<_>>().join(".")
     });
-    Path::new("runs").join(named.unwrap_or_else(|| "builtin".to_owned()))
+    let named = named.collect::<Vec<_>>().join("+");
+    Path::new("runs").join(if named.is_empty() { "builtin" } else { &named })
 }
 
 #[cfg(test)]
@@ -179,7 +185,7 @@ mod tests {
 
     #[test]
     fn scene_files_of_one_folder_have_run_folders_of_their_own() {
-        let of = |scene: &str| default_folder(Some(Path::new(scene))).display().to_string();
+        let of = |scene: &str| default_folder(&[PathBuf::from(scene)]).display().to_string();
         assert_eq!(of("data/head/scene.toml"), "runs/head");
         assert_eq!(of("data/head/night.toml"), "runs/head.night");
         assert_eq!(of("data/head/night.v2.toml"), "runs/head.night.v2");
@@ -195,6 +201,8 @@ mod tests {
             (of("/scene.toml"), of("/night.toml")),
             ("runs/scene".to_owned(), "runs/night".to_owned())
         );
-        assert_eq!(default_folder(None), Path::new("runs/builtin"));
+        assert_eq!(default_folder(&[]), Path::new("runs/builtin"));
+        let several = ["data/noon/scene.toml", "data/head/night.toml"].map(PathBuf::from);
+        assert_eq!(default_folder(&several), Path::new("runs/noon+head.night"));
     }
 }

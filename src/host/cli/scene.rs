@@ -15,6 +15,9 @@ use crate::scene::suggestion;
 pub(super) struct SceneArguments {
     /// The scene file; the built-in scene when left out.
     pub scene: Option<PathBuf>,
+    /// Others, which these commands do not take: so that it can be said.
+    #[arg(hide = true)]
+    more: Vec<PathBuf>,
     #[command(flatten)]
     bakes: BakeArguments,
 }
@@ -46,6 +49,12 @@ impl SceneArguments {
 
     /// As [`BakeArguments::kept_path`], of the scene that is named.
     pub(super) fn kept_path(&self, folder: &Path) -> Result<PathBuf, Refusal> {
+        if let Some(other) = self.more.first() {
+            return Err(Refusal::new(format!(
+                "{}: this command takes one scene; `skinfit fit` alone takes several, as one skin. Name one.",
+                other.display()
+            )));
+        }
         self.bakes.kept_path(self.scene.as_deref(), folder)
     }
 

@@ -48,7 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
     let params = match &arguments.params {
         Some(path) => {
-            let file = ParamsFile::read(path, scene.form, &scene.params)?;
+            let file = ParamsFile::read(path, scene.form, &scene.params)?.of_scene(&scene.path);
             tell_foreign(arguments, path, &file, &scene);
             file.params
         }

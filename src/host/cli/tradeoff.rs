@@ -56,7 +56,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     folder.keep_results();
     let mut written = files::write(folder.path(), &name, &found)?.len();
     if let Some(choice) = found.choice() {
-        folder.write_scene(&path, Changes { settings: &choice.keys, ..Changes::default() })?;
+        folder.write_scene(&path, "scene.toml", Changes { settings: &choice.keys, ..Changes::default() })?;
         written += 1;
     }
     say(files::table(&found).trim_end())?;

@@ -50,6 +50,7 @@ pub(crate) fn view(mut fit: impl FnMut(usize, usize, f32) -> f32) -> ViewEvidenc
         haze: Vec::new(),
         places,
         clip: None,
+        held_out: false,
     }
 }
 

@@ -209,6 +209,8 @@ fn scene() -> Scene {
         },
         quality: Quality::default(),
         bloom: Bloom::default(),
+        lights: Vec::new(),
+        sky_lights: Vec::new(),
         diffusion: Diffusion::default(),
     }
 }

@@ -21,7 +21,7 @@ use crate::render::format::FormatShader;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
 use crate::samples::rows::Rows;
-use crate::samples::{self, Hit, ViewSamples, sample_hits};
+use crate::samples::{self, Atlas, Hit, PosedSurface, SampleError, SurfaceBakes, ViewSamples, sample_hits};
 use crate::scene::view::View;
 use crate::scene::{Loss, Quality, Scene};
 use crate::subject::shaded;
@@ -233,7 +233,7 @@ impl<'a> Bench<'a> {
         let mut surfaces = self.surfaces.to_vec();
         let Some(open) = open.map_err(PrepareError::from)? else { return Ok(surfaces) };
         // Texels of the atlas see the same occlusion.
-        let atlas = samples::atlas_of(scene, &mesh.pose(), Some(&open)).map_err(PrepareError::from)?;
+        let atlas = atlas(scene, SurfaceBakes { occlusion }).map_err(PrepareError::from)?;
         let hits = self.hits(scene);
         for (samples, hits) in surfaces.iter_mut().zip(hits.iter()) {
             samples.atlas.clone_from(&atlas);
@@ -261,9 +261,17 @@ impl<'a> Bench<'a> {
     }
 }
 
+/// The texels that effects of a scene are computed in.
+fn atlas(scene: &Scene, bakes: SurfaceBakes<'_>) -> Result<Option<Arc<Atlas>>, SampleError> {
+    let posed = scene.mesh.pose();
+    let rays = RayMesh::new(&posed.positions, &posed.triangles);
+    samples::atlas_of(scene, &PosedSurface::new(scene, &posed, &rays, &scene.mesh.morphs, bakes)?)
+}
+
 /// The visible surface of each view of a scene, by rays.
 fn traced(scene: &Scene, occlusion: Option<&VertexOcclusion>) -> Result<Vec<ViewSamples>, StudyError> {
-    Ok(samples::sample_views(scene, &scene.mesh.pose(), occlusion).map_err(PrepareError::from)?)
+    let bakes = SurfaceBakes { occlusion };
+    Ok(samples::sample_views(scene, &scene.mesh.pose(), bakes).map_err(PrepareError::from)?)
 }
 
 /// Bake what the effects of `scene` ask for at the constants of `at`.

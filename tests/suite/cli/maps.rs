@@ -99,7 +99,7 @@ fn what_cannot_be_held_out_or_fitted_is_refused_and_leaves_nothing() {
     refused(SCENE, &[&maps[..], &["sid"]].concat(), &["no view `sid`", "side"]);
     let (one, _) = SCENE.split_once("[[view]]\nname = \"side\"").unwrap();
     let (_, fit) = SCENE.split_once("[fit]").unwrap();
-    refused(&format!("{one}[fit]{fit}"), &[&maps[..], &["front"]].concat(), &["only view"]);
+    refused(&format!("{one}[fit]{fit}"), &[&maps[..], &["front"]].concat(), &["nothing is left to fit"]);
     let without = SCENE.replace("\"side_specular\", ", "");
     refused(&without, &["--maps", "specular"], &["specular", "side_specular"]);
 }

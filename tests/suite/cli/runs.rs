@@ -9,7 +9,7 @@ use crate::fixtures::read_exr;
 /// The fitted values are the truth within this share of it: half of the widest standard error that the roundings of f32
 /// targets leave these small images, 2e-5 of the occlusion (5e-7 was found). Solvers for comparison stop where the loss
 /// falls by less than 1e-12 of the first one: a millionth of what was off at first.
-const SHARE: f64 = 1e-5;
+pub(super) const SHARE: f64 = 1e-5;
 
 #[test]
 fn a_fit_finds_the_truth_and_leaves_every_file_of_a_run() {

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use skinfit::fit::params_file::{Origin, ParamsFile};
+use skinfit::fit::params_file::{Origin, ParamsFile, SceneValues};
 use skinfit::model::effects::{Effects, Form};
 use skinfit::model::params::{Param, Params};
 use skinfit::scene::Loss;
@@ -77,9 +77,16 @@ fn no_file_of_constants_makes_its_reader_panic_or_pass_what_is_out_of_bounds() {
         effects: Some(Effects::SURFACE),
         loss: Some(Loss::Huber),
         params: params.clone(),
-        gains,
+        gains: gains.clone(),
+        scenes: vec![SceneValues {
+            name: "noon".to_owned(),
+            effects: Some(Effects::SURFACE),
+            params: vec![(Param::KeyColor, [0.1, 0.2, 0.3])],
+            gains,
+        }],
     };
-    let whole = toml_tree(&file.to_toml(Origin { scene: Path::new("scene.toml"), outcome: None, set: &[] }));
+    let scene = Path::new("scene.toml");
+    let whole = toml_tree(&file.to_toml(Origin { scene, outcome: None, set: &[], numbers: &[] }));
     throw(1500, &harmed(toml_text), |harmed| {
         let Some(bytes) = harmed.of(&whole) else { return Ok(()) };
         std::fs::write(&path, bytes).unwrap();
@@ -91,7 +98,10 @@ fn no_file_of_constants_makes_its_reader_panic_or_pass_what_is_out_of_bounds() {
                         read.params.rgb(param).into_iter().all(|x| x.is_finite() && param.info().admits(x));
                     prop_assert!(admitted, "{}: {:?}", param.name(), read.params.rgb(param));
                 }
-                prop_assert!(read.gains.iter().all(|(_, gain)| gain.is_finite() && *gain > 0.0));
+                let gains = read.gains.iter().chain(read.scenes.iter().flat_map(|scene| &scene.gains));
+                prop_assert!(gains.into_iter().all(|(_, gain)| gain.is_finite() && *gain > 0.0));
+                let mut own = read.scenes.iter().flat_map(|scene| &scene.params);
+                prop_assert!(own.all(|(param, rgb)| rgb.iter().all(|x| param.info().admits(*x))));
                 Ok(())
             }
         }

@@ -335,7 +335,7 @@ impl Pixel {
         let column = match unknown {
             Unknown::Gain(view) if *view == self.view => return self.value(point, c, ripple) / gain,
             Unknown::Gain(_) => return 0.0,
-            Unknown::Param(column) => column,
+            Unknown::Param(column) | Unknown::Own(_, column) => column,
         };
         if !column.channels.includes(c) {
             return 0.0;

@@ -9,7 +9,7 @@ use super::sums::{CHUNK, Sums, Wish, pairwise};
 use super::view_pass::with_scratch;
 use crate::engine::gram::pair;
 use crate::engine::pulls::{Gathered, Pulls};
-use crate::engine::{BLOCK, NormalEquations, Point, Unknown};
+use crate::engine::{BLOCK, Engine, NormalEquations, Point, Unknown};
 use crate::with_simd;
 
 impl CpuEngine {
@@ -19,7 +19,7 @@ impl CpuEngine {
         let mut total = NormalEquations {
             loss: 0.0,
             residual: 0.0,
-            weight: self.weight.0 * channels as f64,
+            weight: Engine::weight(self),
             count: self.weight.1 * channels as u64,
             jtr: vec![0.0; k],
             jtj: vec![0.0; k * k],

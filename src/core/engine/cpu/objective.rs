@@ -67,6 +67,10 @@ impl Engine for CpuEngine {
         self.samples()
     }
 
+    fn weight(&self) -> f64 {
+        self.weight.0 * self.fitted.channels as f64
+    }
+
     fn set_stride(&mut self, stride: usize) {
         self.set_stride(stride);
     }

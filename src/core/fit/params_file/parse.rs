@@ -5,7 +5,7 @@ use std::ops::Range;
 use toml::Spanned;
 use toml::de::{DeArray, DeTable, DeValue};
 
-use super::ParamsFile;
+use super::{ParamsFile, SceneValues};
 use crate::engine::Unknown;
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Param, Params};
@@ -36,7 +36,8 @@ pub(super) fn parse(text: &str, scene: Option<(Form, &Params)>) -> Result<Params
     }
     let form = scene.map(|(form, _)| form).or(named.map(|(form, _)| form)).unwrap_or_default();
     let params = scene.map_or_else(|| Params::defaults(form), |(_, base)| base.clone());
-    let mut file = ParamsFile { form, effects: None, loss: None, params, gains: Vec::new() };
+    let mut file =
+        ParamsFile { form, effects: None, loss: None, params, gains: Vec::new(), scenes: Vec::new() };
     for (key, value) in table.get_ref() {
         match (key.get_ref().as_ref(), value.get_ref()) {
             ("form", DeValue::String(_)) => {}
@@ -44,12 +45,14 @@ pub(super) fn parse(text: &str, scene: Option<(Form, &Params)>) -> Result<Params
             ("loss", DeValue::String(name)) => file.loss = Some(read_loss(name, value.span())?),
             ("params", DeValue::Table(params)) => read_params(params, &mut file.params)?,
             ("gains", DeValue::Table(gains)) => file.gains = read_gains(gains)?,
-            ("form" | "effects" | "loss" | "params" | "gains", _) => {
-                let what = "form and loss are strings, effects a list of them, params and gains tables";
+            ("scenes", DeValue::Table(scenes)) => file.scenes = read_scenes(scenes)?,
+            ("form" | "effects" | "loss" | "params" | "gains" | "scenes", _) => {
+                let what =
+                    "form and loss are strings, effects a list of them, params, gains and scenes tables";
                 return problem(value.span(), format!("`{}` is of the wrong kind: {what}.", key.get_ref()));
             }
             (name, _) => {
-                let known = "form, effects, loss, [params] and [gains]";
+                let known = "form, effects, loss, [params], [gains] and [scenes]";
                 return problem(key.span(), format!("unknown key `{name}`. This file knows {known}."));
             }
         }
@@ -102,17 +105,71 @@ fn read_loss(name: &str, place: Range<usize>) -> Result<Loss, Problem> {
 
 fn read_params(table: &DeTable<'_>, params: &mut Params) -> Result<(), Problem> {
     for (key, value) in table {
-        let name = key.get_ref().as_ref();
-        let Some(param) = Param::from_name(name) else {
-            let known: Vec<_> = Param::all().map(Param::name).collect();
-            return problem(
-                key.span(),
-                format!("unknown parameter `{name}`. There are {}.", known.join(", ")),
-            );
-        };
+        let param = named(key)?;
         params.set_rgb(param, read_rgb(param, value)?);
     }
     Ok(())
+}
+
+/// The parameter that a key names.
+fn named(key: &Spanned<std::borrow::Cow<'_, str>>) -> Result<Param, Problem> {
+    let name = key.get_ref().as_ref();
+    let known = || Param::all().map(Param::name).collect::<Vec<_>>().join(", ");
+    Param::from_name(name).ok_or_else(|| Problem {
+        place: Some(key.span()),
+        problem: format!("unknown parameter `{name}`. There are {}.", known()),
+    })
+}
+
+/// What scenes have of their own.
+fn read_scenes(table: &DeTable<'_>) -> Result<Vec<SceneValues>, Problem> {
+    let mut scenes = Vec::new();
+    for (name, tables) in table {
+        let mut own = SceneValues { name: name.get_ref().to_string(), ..SceneValues::default() };
+        let DeValue::Table(parts) = tables.get_ref() else {
+            let name = &own.name;
+            return problem(tables.span(), format!("`{name}` is of the wrong kind: a scene is a table."));
+        };
+        for (key, value) in parts {
+            match (key.get_ref().as_ref(), value.get_ref()) {
+                ("effects", DeValue::Array(names)) => own.effects = Some(read_effects(names)?),
+                ("params", DeValue::Table(params)) => own.params = read_own(params)?,
+                ("gains", DeValue::Table(gains)) => own.gains = read_gains(gains)?,
+                ("effects" | "params" | "gains", _) => {
+                    let key = key.get_ref();
+                    return problem(
+                        value.span(),
+                        format!(
+                            "`{key}` is of the wrong kind: effects are a list of names, params and gains tables."
+                        ),
+                    );
+                }
+                (name, _) => {
+                    return problem(
+                        key.span(),
+                        format!("unknown key `{name}`. A scene has effects, params and gains."),
+                    );
+                }
+            }
+        }
+        scenes.push(own);
+    }
+    Ok(scenes)
+}
+
+/// The values of a scene's own parameters, in the order of the table.
+fn read_own(table: &DeTable<'_>) -> Result<Vec<(Param, [f64; 3])>, Problem> {
+    let mut own = Vec::new();
+    for (key, value) in table {
+        let param = named(key)?;
+        if !param.is_of_scene() {
+            let what = format!("{} is the skin's, for all scenes: it stands under [params].", param.name());
+            return problem(key.span(), what);
+        }
+        own.push((param, read_rgb(param, value)?));
+    }
+    own.sort_by_key(|(param, _)| *param);
+    Ok(own)
 }
 
 fn read_rgb(param: Param, value: &Spanned<DeValue<'_>>) -> Result<[f64; 3], Problem> {

@@ -3,6 +3,7 @@
 //! - [`document`]: the JSON, its buffers, and checked lookups of everything by index
 //! - [`accessor`]: typed arrays out of the buffers
 //! - [`nodes`]: the node tree, posed by an [`animation`] at a time
+//! - [`lights`]: the lights of its nodes (KHR_lights_punctual)
 //! - [`primitive`]: one primitive's attributes and triangles
 //! - [`skins`]: bones and their influences
 //! - [`assemble`]: every primitive of the scene in one [`Mesh`](super::mesh::Mesh)
@@ -14,6 +15,7 @@ mod accessor;
 mod animation;
 mod assemble;
 mod document;
+mod lights;
 mod nodes;
 mod primitive;
 mod skins;

@@ -125,6 +125,10 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
         }
         .at(line));
     }
+    if let Some(within) = effect.within.filter(|within| Effect::from_name(within).is_none()) {
+        let known = Effect::all().map(|effect| effect.name().to_owned()).collect();
+        return Err(Problem::NotThere { key: "effect", name: within.to_owned(), known }.at(line));
+    }
     if Facts::default().holds(effect.name).is_some() {
         return taken("effect or condition", effect.name, line);
     }

@@ -2,7 +2,8 @@
 
 use super::error::{Problem, TermError};
 use super::texels::{LEVEL_TYPES, blur, domains_of, kernel};
-use crate::model::params::{LARGEST, Scale};
+use crate::model::fields::Found;
+use crate::model::params::{LARGEST, Owner, Scale};
 use crate::model::registry::leaked;
 use crate::shader::domain::Domain;
 use crate::shader::rule::{Error, Rule};
@@ -24,6 +25,8 @@ pub(crate) struct Declaration {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredEffect {
     pub(super) name: &'static str,
+    /// The effect that switches it.
+    pub(super) within: Option<&'static str>,
     pub(super) meaning: &'static str,
 }
 
@@ -41,6 +44,8 @@ pub(super) struct DeclaredParameter {
     pub(super) rgb: bool,
     pub(super) linear: bool,
     pub(super) scale: Scale,
+    pub(super) owner: Owner,
+    pub(super) held: bool,
     pub(super) meaning: &'static str,
     pub(super) source: &'static str,
 }
@@ -49,16 +54,18 @@ pub(super) struct DeclaredParameter {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredField {
     pub(super) name: &'static str,
+    pub(super) of: Found,
     pub(super) wgsl: &'static str,
     pub(super) neutral: f32,
     pub(super) meaning: &'static str,
 }
 
 /// The keys that a header may have.
-const KEYS: [&str; 16] = [
+const KEYS: [&str; 17] = [
     "effect",
     "parameter",
     "field",
+    "sample_field",
     "gives",
     "adds",
     "shows",
@@ -129,7 +136,7 @@ impl Declaration {
         for &(at, words) in header {
             let (key, value) = words.split_once(": ").map_or(("", words), |(key, value)| (key, value.trim()));
             match KEYS.iter().find(|known| **known == key) {
-                Some(&"effect" | &"parameter" | &"field") => {
+                Some(&"effect" | &"parameter" | &"field" | &"sample_field") => {
                     self.declare(at, key, value)?;
                     // What stood before belongs to the file.
                     rule.about.clear();
@@ -168,17 +175,23 @@ impl Declaration {
                 return Err(Problem::Misplaced { key: "effect" }.at(line));
             }
             let (name, meaning) = value.split_once(',').unwrap_or((value, ""));
-            self.effect = Some((line, DeclaredEffect { name: name.trim(), meaning: meaning.trim() }));
+            let (name, within) = name.split_once(" within ").unwrap_or((name, ""));
+            let within = Some(within.trim()).filter(|within| !within.is_empty());
+            self.effect = Some((line, DeclaredEffect { name: name.trim(), within, meaning: meaning.trim() }));
             return Ok(());
         }
         let misplaced = |key| Problem::Misplaced { key }.at(line);
-        if key == "field" {
+        if let Some(of) = [("field", Found::Vertices), ("sample_field", Found::Samples)]
+            .into_iter()
+            .find(|(known, _)| *known == key)
+            .map(|(_, of)| of)
+        {
             if !self.rules.is_empty() {
                 return Err(misplaced("field"));
             }
             let wanted = "NAME: TYPE = NEUTRAL; what it is. The type is f32, vec2f or vec3f, and the number what stands \
                           in for each of a mesh that lacks it";
-            let field = field(value)
+            let field = field(of, value)
                 .ok_or_else(|| Problem::Value { key: "field", given: value.to_owned(), wanted }.at(line))?;
             self.fields.push((line, field));
             return Ok(());
@@ -186,8 +199,8 @@ impl Declaration {
         if !self.rules.is_empty() {
             return Err(misplaced("parameter"));
         }
-        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log` or `, unit UNIT` where they \
-                      hold, then `; what it does; where it comes from`. The default lies within the bounds";
+        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene` or `, unit UNIT` where \
+                      they hold, then `; what it does; where it comes from`. The default lies within the bounds";
         let parameter = parameter(value)
             .ok_or_else(|| Problem::Value { key: "parameter", given: value.to_owned(), wanted }.at(line))?;
         self.parameters.push((line, parameter));
@@ -247,14 +260,14 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
     Ok(())
 }
 
-fn field(value: &'static str) -> Option<DeclaredField> {
+fn field(of: Found, value: &'static str) -> Option<DeclaredField> {
     let (typed, meaning) = value.split_once(';')?;
     let (name, rest) = typed.split_once(':')?;
     let (wgsl, neutral) = rest.split_once('=')?;
     let (name, wgsl, meaning) = (name.trim(), wgsl.trim(), meaning.trim());
     let neutral = number(neutral)? as f32;
     let known = LEVEL_TYPES.contains(&wgsl) && neutral.is_finite() && !meaning.is_empty();
-    known.then_some(DeclaredField { name, wgsl, neutral, meaning })
+    known.then_some(DeclaredField { name, of, wgsl, neutral, meaning })
 }
 
 fn parameter(value: &'static str) -> Option<DeclaredParameter> {
@@ -281,6 +294,8 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         rgb: false,
         linear: false,
         scale: Scale::Linear,
+        owner: Owner::Skin,
+        held: false,
         meaning,
         source: parts.next().unwrap_or_default(),
     };
@@ -289,6 +304,8 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
             "rgb" => parameter.rgb = true,
             "linear" => parameter.linear = true,
             "log" => parameter.scale = Scale::Log,
+            "scene" => parameter.owner = Owner::Scene,
+            "held" => (parameter.held, parameter.owner) = (true, Owner::Scene),
             other => parameter.unit = other.strip_prefix("unit ")?.trim(),
         }
     }
@@ -317,7 +334,10 @@ mod tests {
     #[test]
     fn effects_parameters_and_several_rules_are_read() {
         let read = read(TEXT).unwrap();
-        assert_eq!(read.effect, Some((3, DeclaredEffect { name: "sheen", meaning: "light of fine hair" })));
+        assert_eq!(
+            read.effect,
+            Some((3, DeclaredEffect { name: "sheen", within: None, meaning: "light of fine hair" }))
+        );
         let [(4, weight), (5, width)] = read.parameters.as_slice() else { panic!("{:?}", read.parameters) };
         assert!(weight.rgb && weight.linear && weight.upper == f64::INFINITY && weight.source == "a paper");
         assert!(width.scale == Scale::Log && width.unit == "degrees" && width.default == 20.0);

@@ -66,6 +66,8 @@ pub enum Problem {
     NotThere { key: &'static str, name: String, known: Vec<String> },
     #[error("{0} is declared, but used by no rule")]
     Idle(String),
+    #[error("nothing finds {0} at samples")]
+    Unfound(String),
     #[error("it is no valid WGSL: {0}")]
     Wgsl(String),
     #[error("{0} has no derivative here")]
@@ -124,6 +126,7 @@ impl Problem {
             Self::Circle(_) => "Take one of the needs out".to_owned(),
             Self::NotThere { known: names, .. } => known(names),
             Self::Idle(_) => "Name it among a function's parameters, or take it out".to_owned(),
+            Self::Unfound(_) => "Declare it by `field:`, and give the mesh an attribute of its name".to_owned(),
             Self::Wgsl(_) => "Correct the function".to_owned(),
             Self::Derivative(_) => "Write it with what rules use: arithmetic, vectors, built-in functions".to_owned(),
         }

@@ -47,7 +47,7 @@ use super::domain::Domain;
 use super::rule::Rule;
 use super::search::components;
 use crate::model::effects::{Effect, EffectInfo, Effects};
-use crate::model::fields::{Field, FieldInfo, Fields};
+use crate::model::fields::{Field, FieldInfo, Fields, Found};
 use crate::model::params::{Param, ParamInfo};
 use crate::model::registry::{Added, RegistryError, leaked};
 use crate::model::terms::{TermInfo, TermName};
@@ -102,6 +102,20 @@ pub fn fields(effects: Effects) -> Fields {
 /// # Errors
 /// When the text is not as the module's documentation says, or does not fit the other rules.
 pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
+    register_from(Origin::File, name, text)
+}
+
+/// Where a term's text comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Origin {
+    /// From a file of the user's.
+    File,
+    /// It is the library's own, which finds its fields of samples.
+    Library,
+}
+
+/// As [`register`].
+pub(crate) fn register_from(origin: Origin, name: &str, text: &str) -> Result<&'static Term, TermError> {
     // One at a time, so that nothing is taken between the check and the entry.
     static ONE: Mutex<()> = Mutex::new(());
     let _one = ONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -110,6 +124,10 @@ pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
     }
     let text = leaked(text);
     let declaration = declaration::parse(Domain::Fragment, leaked(name), text)?;
+    let own = declaration.fields.iter().find(|(_, field)| field.of == Found::Samples);
+    if let Some((line, field)) = own.filter(|_| origin == Origin::File) {
+        return Err(Problem::Unfound(field.name.to_owned()).at(*line));
+    }
     let declaration = check::checked(declaration)?;
     wgsl::check(&declaration.rules)?;
     enter(declaration, text)
@@ -119,7 +137,9 @@ pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
 fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, TermError> {
     let Declaration { effect, parameters, fields, mut rules } = declaration;
     let (line, declared) = effect.ok_or(Problem::NoEffect.at(1))?;
-    let row = EffectInfo { name: declared.name, meaning: declared.meaning, needs: Some(needs::of_effect) };
+    let within = declared.within.and_then(Effect::from_name);
+    let (name, meaning) = (declared.name, declared.meaning);
+    let row = EffectInfo { name, meaning, needs: Some(needs::of_effect), within };
     let effect = Effect::register(row).map_err(|error| problem(error).at(line))?;
     let effects: &'static [Effect] = Box::leak(Box::new([effect]));
     let mut params = Vec::new();
@@ -136,6 +156,8 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
             rgb: declared.rgb,
             linear: declared.linear,
             scale: declared.scale,
+            owner: declared.owner,
+            held: declared.held,
             effects,
             source: declared.source,
             meaning: declared.meaning,
@@ -144,15 +166,19 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
     }
     let mut read = Vec::new();
     for (line, declared) in fields {
-        let DeclaredField { name, wgsl, neutral, meaning } = declared;
+        let DeclaredField { name, of, wgsl, neutral, meaning } = declared;
         let attribute = leaked(&format!("rest_{name}"));
-        let row = FieldInfo { name, attribute, numbers: components(wgsl), neutral, meaning };
+        let row = FieldInfo { name, attribute, of, numbers: components(wgsl), neutral, meaning };
         read.push(Field::register(row).map_err(|error| problem(error).at(line))?);
         rules.extend(of_vertex(&declared, attribute, line));
     }
     let mut layers = Vec::new();
     for rule in &mut rules {
+        // It is there where the effects are on that its rule asks for.
+        let others = rule.when.iter().filter_map(|condition| Effect::from_name(condition));
+        let effects: Vec<Effect> = effects.iter().copied().chain(others).collect();
         for &name in rule.adds.iter().chain(&rule.shows) {
+            let effects = effects.clone().leak();
             let layer = TermName::register(TermInfo { name, effects })
                 .map_err(|error| problem(error).at(rule.line))?;
             if !layers.contains(&layer) {
@@ -168,7 +194,8 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
     TERMS.add(|_| false, |_| false, |_| Ok(term), never)
 }
 
-/// The rule by which a field comes from its attribute, interpolated from there to fragments and texels.
+/// The rule by which a field comes from its attribute, interpolated from there to fragments and texels of a rasteriser. A
+/// field of samples is found at the vertices then.
 fn of_vertex(field: &DeclaredField, attribute: &'static str, line: usize) -> Option<Rule> {
     let &DeclaredField { name, wgsl, meaning, .. } = field;
     let text =

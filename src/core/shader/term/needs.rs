@@ -10,7 +10,7 @@ use crate::shader::domain::{Domain, UV};
 use crate::shader::emit::{SAMPLE, UNMADE};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
-use crate::shader::rule::rules;
+use crate::shader::rule::{Rule, rules};
 use crate::shader::search::search;
 
 use super::fields;
@@ -25,8 +25,11 @@ pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
         return *needs;
     }
     let own = rules(Effects::of(&[effect])).filter(|rule| rule.when.contains(&effect.name()));
-    let mut goals: Vec<&'static str> =
-        own.filter(|rule| !rule.adds.is_empty()).map(|rule| rule.gives[0].0).collect();
+    let on = |rule: &&'static Rule| {
+        let mut conditions = rule.when.iter().filter_map(|condition| Effect::from_name(condition));
+        !rule.adds.is_empty() && conditions.all(|effect| setup.effects.has(effect))
+    };
+    let mut goals: Vec<&'static str> = own.filter(on).map(|rule| rule.gives[0].0).collect();
     goals.dedup();
     let needs = of_goals(&goals, setup);
     known().insert(key, needs);

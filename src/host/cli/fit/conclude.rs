@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use super::Arguments;
 use super::evidence::evidence;
+use super::scenes::{Part, Scenes};
 use super::solve::Solving;
 use super::words::{Times, advice, advice_on_maps, tell_run};
-use crate::cli::fit_engine::SelectedEngine;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::machine::made;
 use crate::cli::maps::MapsLeft;
@@ -15,15 +15,16 @@ use crate::cli::run_folder::RunFolder;
 use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
 use crate::engine::Engine;
 use crate::fit::outcome::{Ending, Outcome};
-use crate::fit::params_file::{Origin, ParamsFile};
-use crate::prepare::Baked;
-use crate::report::{self, RunInfo, ViewEvidence};
+use crate::fit::params_file::{Origin, ParamsFile, SceneValues};
+use crate::model::effects::Effect;
+use crate::model::params::Param;
+use crate::report::{self, RunInfo, SCENES, ViewEvidence};
 use crate::scene::Scene;
 
-/// The scene file that was fitted, what was left of its maps, and when the command began.
+/// What was fitted, what was left of its maps, and when the command began.
 #[derive(Clone, Copy)]
 pub(super) struct Fitted<'a> {
-    pub(super) path: &'a Path,
+    pub(super) scenes: &'a Scenes,
     pub(super) maps: Option<&'a MapsLeft>,
     pub(super) begun: Instant,
 }
@@ -33,24 +34,31 @@ pub(super) fn conclude(
     arguments: &Arguments,
     solving: Solving,
     folder: &RunFolder,
-    Fitted { path, maps, begun }: Fitted<'_>,
-    baked: &Baked,
-    chosen: &SelectedEngine,
+    Fitted { scenes, maps, begun }: Fitted<'_>,
     outcome: &Outcome,
 ) -> Result<Exit, Refusal> {
-    let engine = &*chosen.engine;
     let clock = Instant::now();
-    let views = evidence(baked, engine, outcome)?;
-    let mut seconds = baked.seconds;
-    seconds.samples = engine.own_sample_seconds().unwrap_or(seconds.samples);
+    let views = evidence(scenes, &outcome.end)?;
+    let mut seconds = scenes.seconds();
     // Of every process that had a part in it, where the fit was resumed.
     seconds.fit = outcome.seconds;
     seconds.render = clock.elapsed().as_secs_f64();
-    let maps_named = maps.map_or(&[][..], |left| &left.named);
-    let named = folder.write_scene(path, Changes { maps: maps_named, ..changes(arguments, baked) })?;
-    let origin = Origin { scene: path, outcome: Some(outcome), set: arguments.set.checked() };
-    params_file(baked, outcome).write(&folder.path().join("params.toml"), origin)?;
-    let mut run = RunInfo { seconds, named, ..run_info(arguments, solving, path, baked, engine, views) };
+    let (mut named, mut files) = (Vec::new(), Vec::new());
+    for part in &scenes.parts {
+        let file = match scenes.several() {
+            true => format!("{SCENES}/{}.toml", part.name),
+            false => "scene.toml".to_owned(),
+        };
+        let maps = maps.map_or(&[][..], |left| &left.named);
+        named.extend(folder.write_scene(
+            &part.path,
+            &file,
+            Changes { maps, ..changes(arguments, scenes, part) },
+        )?);
+        files.extend(scenes.several().then_some(file));
+    }
+    write_params(arguments, scenes, folder, outcome)?;
+    let mut run = RunInfo { seconds, named, files, ..run_info(arguments, solving, scenes, views) };
     if let Some(left) = maps {
         tell_warnings(&left.warnings);
         run.warnings.extend(left.warnings.iter().cloned());
@@ -67,7 +75,7 @@ pub(super) fn conclude(
     } else {
         // All that there was to do is done: reading, bakes, samples, the fit, its pictures and the report.
         let times = Times { whole: begun.elapsed().as_secs_f64(), samples: seconds.samples };
-        tell_run(folder.path(), &baked.scene.views, chosen, outcome, &report.summary.misfit, times)?;
+        tell_run(folder.path(), scenes, &run, outcome, &report.summary, times)?;
     }
     let advice = match maps {
         Some(left) => advice_on_maps(arguments, folder.path(), left, outcome),
@@ -80,66 +88,120 @@ pub(super) fn conclude(
     Ok(Exit::Done)
 }
 
-/// Where the fit differed from its scene file.
-fn changes<'a>(arguments: &'a Arguments, baked: &'a Baked) -> Changes<'a> {
-    let Scene { form, params, fit, .. } = &*baked.scene;
+/// Where the fit differed from a scene's file.
+fn changes<'a>(arguments: &'a Arguments, scenes: &'a Scenes, part: &'a Part) -> Changes<'a> {
+    let Scene { form, params, fit, .. } = &*part.baked.scene;
     let start = Start { form: *form, params, free: &fit.free };
+    // Where maps are fitted, the constants start from what their last round found; of several scenes, from the first's.
+    let elsewhere = arguments.params.is_some() || !arguments.set.checked().is_empty() || arguments.maps.any();
     Changes {
         loss: arguments.loss.as_deref(),
-        // Where maps are fitted, the constants start from what their last round found.
-        start: (arguments.params.is_some() || !arguments.set.checked().is_empty() || arguments.maps.any())
-            .then_some(start),
+        start: (elsewhere || scenes.several()).then_some(start),
+        free: (!arguments.free.is_empty()).then_some(&fit.free),
         ..Changes::default()
     }
 }
 
-/// The fitted parameters, to be used again.
-fn params_file(baked: &Baked, outcome: &Outcome) -> ParamsFile {
-    let names = baked.scene.views.iter().map(|view| view.name.clone());
-    ParamsFile {
-        form: baked.scene.form,
-        effects: Some(baked.scene.effects),
-        loss: Some(baked.scene.fit.loss),
-        params: outcome.end.params.clone(),
-        gains: names.zip(outcome.end.gains.iter().copied()).collect(),
+/// Leave the fitted parameters, to be used again.
+fn write_params(
+    arguments: &Arguments,
+    scenes: &Scenes,
+    folder: &RunFolder,
+    outcome: &Outcome,
+) -> Result<(), Refusal> {
+    let Some(first) = scenes.parts.first() else { return Ok(()) };
+    let gains = |part: &Part| {
+        let fitted = part.baked.scene.views.iter().zip(scenes.point_of(part, &outcome.end).gains);
+        // They stand after those that were fitted, whose numbers the unknowns know.
+        let held = part.held.views.iter().zip(part.held.gains.iter().copied());
+        fitted.chain(held).map(|(view, gain)| (view.name.clone(), gain)).collect::<Vec<_>>()
+    };
+    let (mut numbers, mut first_view) = (Vec::new(), 0);
+    for part in &scenes.parts {
+        numbers.push(part.number.map(|number| (number, first_view)));
+        first_view += part.number.map_or(0, |_| part.baked.scene.views.len());
     }
+    let own = |part: &Part| {
+        let at = scenes.point_of(part, &outcome.end);
+        let params = Param::of(part.baked.scene.effects).filter(|param| param.is_of_scene());
+        let params = params.map(|param| (param, at.params.rgb(param))).collect();
+        let effects = Some(part.baked.scene.effects).filter(|own| *own != first.baked.scene.effects);
+        SceneValues { name: part.name.clone(), effects, params, gains: gains(part) }
+    };
+    let several = scenes.several();
+    let file = ParamsFile {
+        form: first.baked.scene.form,
+        effects: Some(first.baked.scene.effects),
+        loss: Some(first.baked.scene.fit.loss),
+        params: outcome.end.params.clone(),
+        gains: if several { Vec::new() } else { gains(first) },
+        scenes: if several { scenes.parts.iter().map(own).collect() } else { Vec::new() },
+    };
+    let files: Vec<String> = scenes.parts.iter().map(|part| part.path.display().to_string()).collect();
+    let (files, set) = (files.join(", "), arguments.set.checked());
+    let origin = Origin {
+        scene: Path::new(&files),
+        outcome: Some(outcome),
+        set,
+        numbers: if several { &numbers } else { &[] },
+    };
+    Ok(file.write(&folder.path().join("params.toml"), origin)?)
 }
 
-fn run_info(
-    arguments: &Arguments,
-    solving: Solving,
-    path: &Path,
-    baked: &Baked,
-    engine: &dyn Engine,
-    views: Vec<ViewEvidence>,
-) -> RunInfo {
-    let scene = match &arguments.scene.scene {
-        Some(_) => path.display().to_string(),
-        None => "the built-in scene".to_owned(),
+fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec<ViewEvidence>) -> RunInfo {
+    let each = |of: &dyn Fn(&Part) -> String| alike(scenes.parts.iter().map(of).collect());
+    let scene = match arguments.scenes.is_empty() {
+        false => {
+            scenes.parts.iter().map(|part| part.path.display().to_string()).collect::<Vec<_>>().join(", ")
+        }
+        true => "the built-in scene".to_owned(),
     };
     let set = arguments.set.words();
-    let effects: Vec<&str> = baked.scene.effects.iter().map(crate::model::effects::Effect::name).collect();
+    let held: Vec<String> = views.iter().filter(|view| view.held_out).map(|view| view.name.clone()).collect();
+    let effects = |part: &Part| {
+        let names: Vec<&str> = part.baked.scene.effects.iter().map(Effect::name).collect();
+        names.join(", ")
+    };
+    let mut engine_facts: Vec<(String, String)> = Vec::new();
+    for fact in scenes.joint.engines().flat_map(Engine::provenance) {
+        if !engine_facts.contains(&fact) {
+            engine_facts.push(fact);
+        }
+    }
+    let loss = scenes.parts.first().map_or_else(Default::default, |part| part.baked.scene.fit.loss);
     RunInfo {
         scene,
-        loss: baked.scene.fit.loss,
-        engine: engine.name().to_owned(),
-        samples: engine.samples(),
-        seconds: baked.seconds,
+        scenes: match scenes.several() {
+            true => scenes.fitted().map(|part| part.name.clone()).collect(),
+            false => Vec::new(),
+        },
+        loss,
+        engine: alike(scenes.joint.engines().map(|engine| engine.name().to_owned()).collect()),
+        samples: scenes.joint.engines().map(Engine::samples).sum(),
+        seconds: scenes.seconds(),
         views,
-        warnings: baked.warnings.clone(),
+        warnings: scenes.parts.iter().flat_map(|part| part.baked.warnings.iter().cloned()).collect(),
         provenance: vec![
-            ("form".to_owned(), baked.scene.form.name().to_owned()),
-            ("silhouette".to_owned(), baked.scene.silhouette.name().to_owned()),
-            ("lookups".to_owned(), baked.scene.lookups.name().to_owned()),
-            ("effects".to_owned(), effects.join(", ")),
+            ("form".to_owned(), each(&|part| part.baked.scene.form.name().to_owned())),
+            ("silhouette".to_owned(), each(&|part| part.baked.scene.silhouette.name().to_owned())),
+            ("lookups".to_owned(), each(&|part| part.baked.scene.lookups.name().to_owned())),
+            ("effects".to_owned(), each(&effects)),
             ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
         ]
         .into_iter()
         .chain((!set.is_empty()).then(|| ("set".to_owned(), set.join(", "))))
-        .chain(engine.provenance())
+        .chain((!held.is_empty()).then(|| ("held out".to_owned(), held.join(", "))))
+        .chain(engine_facts)
         .collect(),
         made: made(),
         maps: None,
         named: Vec::new(),
+        files: Vec::new(),
     }
+}
+
+/// What scenes have, once where it is the same in all.
+fn alike(mut all: Vec<String>) -> String {
+    all.dedup();
+    all.join("; ")
 }

@@ -1,53 +1,66 @@
 //! The evidence: each view's target, fit and terms.
 
+use super::scenes::{Part, Scenes};
 use crate::cli::Refusal;
 use crate::cli::compared::compared;
 use crate::cli::fit_engine::surfaced_views;
-use crate::engine::Engine;
-use crate::fit::outcome::Outcome;
+use crate::engine::Point;
+use crate::engine::view::ObservedView;
+use crate::model::params::Params;
 use crate::prepare::Baked;
 use crate::progress;
 use crate::render::places::places;
 use crate::render::shade::Shader;
 use crate::report::ViewEvidence;
+use crate::scene::view::View;
 
-/// For each view the target, the fit and its terms.
-pub(super) fn evidence(
-    baked: &Baked,
-    engine: &dyn Engine,
-    outcome: &Outcome,
-) -> Result<Vec<ViewEvidence>, Refusal> {
-    let observed = surfaced_views(engine)?;
-    let shader = Shader::new(baked.setup(), &baked.illumination, &outcome.end.params)?;
-    let bar = progress::bar("pictures", baked.scene.views.len() as u64);
-    let views = baked.scene.views.iter().zip(observed.iter()).enumerate();
-    let evidence = views
-        .map(|(index, (view, observed))| {
-            let shaded = shader.shade(&observed.samples, &view.camera, outcome.end.gains[index]);
-            let (target, coverage) = compared(view, observed, &shaded.image);
+/// For each view the target, the fit and its terms: those that were fitted, scene by scene, then those that were held
+/// out.
+pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>, Refusal> {
+    let count = |part: &Part| part.baked.scene.views.len() + part.held.views.len();
+    let bar = progress::bar("pictures", scenes.parts.iter().map(count).sum::<usize>() as u64);
+    let (mut fitted, mut others) = (Vec::new(), Vec::new());
+    for part in &scenes.parts {
+        let own = scenes.point_of(part, end);
+        let shader = Shader::new(part.baked.setup(), &part.baked.illumination, &own.params)?;
+        let shown = |(view, observed, gain, held_out): (&View, &ObservedView, f64, bool)| {
             bar.inc(1);
-            Ok(ViewEvidence {
-                name: view.name.clone(),
-                target,
-                fit: shaded.image,
-                coverage,
-                terms: shaded
-                    .terms
-                    .into_iter()
-                    .map(|(name, image)| (name.name().to_owned(), image))
-                    .collect(),
-                haze: shaded.haze,
-                places: places(
-                    &observed.samples,
-                    baked.setup(),
-                    &baked.illumination,
-                    &outcome.end.params,
-                    [view.camera.width, view.camera.height].map(|side| side as usize),
-                ),
-                clip: observed.clip,
-            })
-        })
-        .collect();
+            let name = scenes.view_name(part, &view.name);
+            ViewEvidence { name, held_out, ..shown(part, (&shader, &own.params), (view, observed, gain)) }
+        };
+        if let Some(engine) = part.number.and_then(|number| scenes.engine(number)) {
+            let observed = surfaced_views(engine)?;
+            let views = part.baked.scene.views.iter().zip(observed.iter()).zip(&own.gains);
+            fitted.extend(views.map(|((view, observed), &gain)| shown((view, observed, gain, false))));
+        }
+        let held = part.held.views.iter().zip(&part.held.observed).zip(&part.held.gains);
+        others.extend(held.map(|((view, observed), &gain)| shown((view, observed, gain, true))));
+    }
     bar.finish_and_clear();
-    evidence
+    fitted.extend(others);
+    Ok(fitted)
+}
+
+/// The images of a view of a scene, at the scene's constants.
+fn shown(
+    part: &Part,
+    (shader, params): (&Shader, &Params),
+    (view, observed, gain): (&View, &ObservedView, f64),
+) -> ViewEvidence {
+    let Baked { scene, illumination, .. } = &part.baked;
+    let shaded = shader.shade(&observed.samples, &view.camera, gain);
+    let (target, coverage) = compared(view, observed, &shaded.image);
+    let size = [view.camera.width, view.camera.height].map(|side| side as usize);
+    let terms = shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image));
+    ViewEvidence {
+        name: view.name.clone(),
+        target,
+        fit: shaded.image,
+        coverage,
+        terms: terms.collect(),
+        haze: shaded.haze,
+        places: places(&observed.samples, scene.setup(), illumination, params, size),
+        clip: observed.clip,
+        held_out: false,
+    }
 }

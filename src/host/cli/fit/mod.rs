@@ -1,39 +1,46 @@
 //! `skinfit fit`: a scene goes in, fitted constants come out, with the evidence of how good they are.
 //!
+//! - `scenes`: the scenes of a fit, each read, baked and given an engine; `hold_out`: which of their views it does not see
 //! - `solve`: the search, and what it goes on from
 //! - `evidence`: each view's target, fit and terms
 //! - `conclude`: what is left in the run folder; `words`: the outcome in words
 
 mod conclude;
 mod evidence;
+mod hold_out;
+mod scenes;
 mod solve;
 mod words;
 
 use std::path::PathBuf;
 use std::time::Instant;
 
-use super::fit_engine::{FitEngineArguments, SelectedEngine};
+use super::fit_engine::FitEngineArguments;
 use super::interrupt::Interrupt;
-use super::maps::{MapArguments, MapRun, MapsFound};
+use super::maps::MapArguments;
 use super::run_folder::RunFolder;
-use super::scene::SceneArguments;
+use super::scene::BakeArguments;
 use super::set::SetArguments;
-use super::{Exit, Refusal, quieten_graphics, tell_warnings, unfinished};
-use crate::prepare::{Baked, Loaded, Observed, PrepareOptions};
-use crate::scene::Loss;
+use super::{Exit, Refusal, quieten_graphics, unfinished};
+use crate::model::params::Param;
+use crate::scene::suggestion;
 use conclude::{Fitted, conclude};
+use scenes::Scenes;
 use solve::{Solving, solve};
 
-/// Fit a scene's free parameters to its target images
+/// Fit the free parameters of a scene, or of several as one skin, to their target images
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs; with --maps, maps.json and the fitted maps in maps/ instead of the latter.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --set hilite=0.7,0.6,0.5    start there\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
+    after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs; of several scenes, scenes/NAME.toml for each instead of scene.toml, and pictures named SCENE_VIEW; with --maps, maps.json and the fitted maps in maps/ instead of the latter.\n\nSeveral scenes are fitted as one skin: form, silhouette, lookups, loss, the skin's effects and what is free of it have to be the same in all; the skin's values start as in the first. Mesh, maps, views, gains, light and what belongs to it (`each scene's own` in `skinfit params`) stay each scene's. A scene is called by its file, or by its folder where the file is scene.toml.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --set hilite=0.7,0.6,0.5    start there\n  skinfit fit scene.toml --hold-out left    how well do the constants hold for a view that the fit has not seen?\n  skinfit fit noon.toml night.toml -o runs/skin    one skin in two lights\n  skinfit fit noon.toml night.toml dusk.toml --hold-out dusk    and how it does in a third\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
 )]
 pub(super) struct Arguments {
+    /// The scene file; several are fitted as one skin; the built-in scene when left out.
+    #[arg(value_name = "SCENE")]
+    scenes: Vec<PathBuf>,
     #[command(flatten)]
-    scene: SceneArguments,
+    bakes: BakeArguments,
     /// The run folder [default: runs/<the scene's folder>, or of a NAME.toml that is not scene.toml
-    /// runs/<the scene's folder>.NAME].
+    /// runs/<the scene's folder>.NAME; of several scenes these names with a + between them].
     #[arg(short, long, value_name = "RUN")]
     output: Option<PathBuf>,
     /// Start from these parameters, instead of the scene's start values.
@@ -41,6 +48,14 @@ pub(super) struct Arguments {
     params: Option<PathBuf>,
     #[command(flatten)]
     set: SetArguments,
+    /// Leave a view out of the fit, and tell how well it is matched all the same: the report has its scores beside
+    /// those of the views that were fitted. Of several scenes: a view in every one, a whole scene by its name, or
+    /// SCENE/VIEW. May be given several times; with --maps, once.
+    #[arg(long, value_name = "NAME")]
+    hold_out: Vec<String>,
+    /// What is free (comma-separated parameters), instead of the scenes' own [fit] free.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_param)]
+    free: Vec<Param>,
     /// Which solver: varpro and lm take few passes; lbfgs, nelder-mead and adam are there to
     /// compare
     /// [default: varpro].
@@ -73,68 +88,46 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let begun = Instant::now();
-    arguments.maps.check()?;
-    arguments.engine.check(arguments.maps.any())?;
+    arguments.check()?;
     if arguments.engine.may_be_gpu() {
         quieten_graphics();
     }
     unfinished::install_saying(
         "interrupted before the search began: the run folder is as it was; only bakes in the cache were kept.".into(),
     );
-    let mut folder = RunFolder::open(arguments.output.as_deref(), arguments.scene.scene.as_deref())?;
-    let path = arguments.scene.kept_path(folder.path())?;
-    let options = PrepareOptions {
-        fit: true,
-        params: arguments.params.clone(),
-        set: arguments.set.values()?.to_vec(),
-        cache: arguments.scene.cache(),
-        ..PrepareOptions::default()
-    };
-    let mut loaded = Loaded::read(&path, &options)?;
-    if let Some(loss) = &arguments.loss {
-        loaded.scene.fit.loss = Loss::ALL.into_iter().find(|l| l.name() == loss).unwrap_or_default();
-    }
-    arguments.maps.hold_constants(&mut loaded.scene.fit);
+    let mut folder = RunFolder::open(arguments.output.as_deref(), &arguments.scenes)?;
+    let loaded = scenes::read(arguments, folder.path())?;
     let solving = Solving::of(arguments, folder.path())?;
     let interrupt = Interrupt::default();
-    let Ready { observed, chosen, maps } = ready(arguments, loaded.bake()?, &interrupt)?;
-    let outcome = solve(arguments, solving, &folder, &observed, &*chosen.engine, &interrupt)?;
+    let (scenes, maps) = Scenes::ready(arguments, loaded, &interrupt)?;
+    let outcome = solve(arguments, solving, &folder, &scenes, &interrupt)?;
     folder.keep();
     let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
-    let fitted = Fitted { path: &path, maps: maps.as_ref(), begun };
-    conclude(arguments, solving, &folder, fitted, &observed, &chosen, &outcome)
+    let fitted = Fitted { scenes: &scenes, maps: maps.as_ref(), begun };
+    conclude(arguments, solving, &folder, fitted, &outcome)
 }
 
-/// All that a search needs.
-struct Ready {
-    observed: Observed,
-    chosen: SelectedEngine,
-    maps: Option<MapsFound>,
-}
-
-/// The views beside their targets, by the maps that are to be fitted, and the engine over them.
-fn ready(arguments: &Arguments, baked: Baked, interrupt: &Interrupt) -> Result<Ready, Refusal> {
-    if arguments.engine.makes_samples() {
-        let baked = baked.keep_targets()?;
-        tell_of(arguments, &baked);
-        let (observed, chosen) = arguments.engine.over_own_samples(baked)?;
-        return Ok(Ready { observed, chosen, maps: None });
+impl Arguments {
+    /// Refuse what cannot be together.
+    fn check(&self) -> Result<(), Refusal> {
+        self.maps.check()?;
+        self.engine.check(self.maps.any())?;
+        if self.scenes.len() > 1 && self.maps.any() {
+            return Err(Refusal::new(
+                "--maps fits the maps of one scene, and several are named. Name one scene, or leave --maps out.",
+            ));
+        }
+        if let Some(twice) = self.free.iter().enumerate().find(|(i, param)| self.free[..*i].contains(param)) {
+            let name = twice.1.name();
+            return Err(Refusal::new(format!("--free lists {name} twice. List it once.")));
+        }
+        Ok(())
     }
-    let observed = baked.sample()?.observe()?;
-    tell_of(arguments, &observed);
-    let (observed, maps) = if arguments.maps.any() {
-        let (adapter, quiet) = (arguments.engine.adapter(), arguments.json);
-        let run = MapRun { adapter, interrupt: interrupt.watch(), quiet };
-        arguments.maps.fit(observed, &run)?
-    } else {
-        (observed, None)
-    };
-    let chosen = arguments.engine.select(&observed)?;
-    Ok(Ready { observed, chosen, maps })
 }
 
-/// What the user should know before the search.
-fn tell_of(arguments: &Arguments, baked: &Baked) {
-    tell_warnings(&baked.warnings);
-    arguments.set.tell_idle(baked.scene.effects);
+/// A parameter by its name.
+fn parse_param(name: &str) -> Result<Param, String> {
+    let known: Vec<&str> = Param::all().map(Param::name).collect();
+    let unknown = || format!("unknown parameter `{name}`. {}.", suggestion(name, &known));
+    Param::from_name(name.trim()).ok_or_else(unknown)
 }

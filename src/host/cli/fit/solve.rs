@@ -4,17 +4,17 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::Arguments;
+use super::scenes::{Part, Scenes};
 use crate::cli::Refusal;
 use crate::cli::fingerprint::fingerprint;
 use crate::cli::interrupt::Interrupt;
 use crate::cli::run_folder::RunFolder;
-use crate::engine::Engine;
+use crate::fit::fingerprint::Fingerprint;
 use crate::fit::outcome::Outcome;
 use crate::fit::state::Saved;
 use crate::fit::state::StateError;
 use crate::fit::{self, FitError, FitOptions, SolverKind};
 use crate::output::OutputError;
-use crate::prepare::Observed;
 use crate::progress;
 
 /// How the unknowns are searched for: as the command line says, else as the fit that is resumed was
@@ -48,8 +48,7 @@ pub(super) fn solve(
     arguments: &Arguments,
     solving: Solving,
     folder: &RunFolder,
-    observed: &Observed,
-    engine: &dyn Engine,
+    scenes: &Scenes,
     interrupt: &Interrupt,
 ) -> Result<Outcome, Refusal> {
     let state = folder.path().join(STATE);
@@ -68,33 +67,45 @@ pub(super) fn solve(
         max_iterations: arguments.max_iterations,
         starts: solving.starts,
         seed: solving.seed,
-        fingerprint: fingerprint(&observed.scene),
+        fingerprint: fingerprint_of(scenes),
         resume: arguments.resume.then(|| state.clone()),
         state: (!maps).then_some(state),
         interrupt: Some(interrupt.watch()),
-        widths: observed.image_widths(),
+        widths: scenes.widths(),
         profile: true,
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");
-    let outcome = fit::fit(engine, &observed.start(), &options, &mut |iteration| {
+    let outcome = fit::fit(&scenes.joint, &scenes.start()?, &options, &mut |iteration| {
         bar.set_position(iteration.iteration);
         bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
     });
     bar.finish_and_clear();
+    let files: Vec<String> = scenes.parts.iter().map(|part| part.path.display().to_string()).collect();
+    let files = files.join(", ");
     outcome.map_err(|error| match error {
         // It names its file itself.
         FitError::State(StateError::Unwritable(error)) => Refusal::from(error),
         FitError::State(error) => with_option(&error, "without --resume"),
         FitError::Engine(fault) => Refusal::failure(format!(
-            "{}: {fault} What was found up to then is kept: go on with --resume.",
-            observed.scene.path.display()
+            "{files}: {fault} What was found up to then is kept: go on with --resume."
         )),
-        FitError::Solver { .. } => {
-            with_option(&format!("{}: {error}", observed.scene.path.display()), "(--solver varpro)")
-        }
-        error => Refusal::new(format!("{}: {error}", observed.scene.path.display())),
+        FitError::Solver { .. } => with_option(&format!("{files}: {error}"), "(--solver varpro)"),
+        error => Refusal::new(format!("{files}: {error}")),
     })
+}
+
+/// What the fit is of: a scene's own items, or those of all scenes by their names.
+fn fingerprint_of(scenes: &Scenes) -> Fingerprint {
+    let of = |part: &Part| fingerprint(&part.baked.scene, &part.held);
+    match scenes.parts.as_slice() {
+        [part] => of(part),
+        parts => {
+            let names: Vec<&str> = parts.iter().map(|part| part.name.as_str()).collect();
+            let all = Fingerprint::default().with("list of scenes", names.join(", "));
+            parts.iter().fold(all, |all, part| all.with_all(&of(part), &part.name))
+        }
+    }
 }
 
 /// The library's advice, which ends its words, with the option that follows it.

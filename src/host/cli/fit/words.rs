@@ -3,14 +3,16 @@
 use std::path::Path;
 
 use super::Arguments;
-use crate::cli::fit_engine::SelectedEngine;
+use super::scenes::Scenes;
 use crate::cli::maps::MapsLeft;
 use crate::cli::{Refusal, say};
-use crate::engine::Unknown;
+use crate::engine::Engine;
 use crate::fit::outcome::{Ending, Outcome};
+use crate::fit::profile::Profile;
 use crate::report::errors::{basis_in_words, profile_in_words};
+use crate::report::json::Summary;
 use crate::report::misfit::Misfit;
-use crate::scene::view::View;
+use crate::report::{RunInfo, held_out};
 
 /// Seconds of a run.
 #[derive(Clone, Copy)]
@@ -24,32 +26,36 @@ pub(super) struct Times {
 /// How the run went: the fitted values, what made the passes and the samples, and where it is.
 pub(super) fn tell_run(
     folder: &Path,
-    views: &[View],
-    chosen: &SelectedEngine,
+    scenes: &Scenes,
+    run: &RunInfo,
     outcome: &Outcome,
-    misfit: &Misfit,
+    summary: &Summary,
     times: Times,
 ) -> Result<(), Refusal> {
-    let (engine, sample_seconds) = (&chosen.engine, times.samples);
-    tell_outcome(outcome, views, times.whole)?;
-    tell_misfit(misfit)?;
-    if engine.name() == "gpu" {
-        let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
-        say(&format!("{} samples made by the {by} in {sample_seconds:.3} s", engine.samples()))?;
+    tell_outcome(outcome, run, times.whole)?;
+    tell_misfit(&summary.misfit)?;
+    if let Some(words) = held_out(summary) {
+        say(&words)?;
     }
-    if let Some(why) = &chosen.why {
-        say(&format!("passes on the {}: {why}", engine.name().to_uppercase()))?;
+    if let Some(engine) = scenes.joint.engines().find(|engine| engine.name() == "gpu") {
+        let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
+        say(&format!("{} samples made by the {by} in {:.3} s", run.samples, times.samples))?;
+    }
+    for part in scenes.fitted() {
+        let name = part.number.and_then(|number| scenes.engine(number)).map_or("", Engine::name);
+        let whose = if scenes.several() { format!("{}: ", part.name) } else { String::new() };
+        if let Some(why) = &part.why {
+            say(&format!("{whose}passes on the {}: {why}", name.to_uppercase()))?;
+        }
     }
     say(&format!("{}: final loss {:.6e}", folder.display(), outcome.loss_end))
 }
 
 /// The fitted values as a small table, and how the fit ended after so many seconds of the command.
-fn tell_outcome(outcome: &Outcome, views: &[View], whole: f64) -> Result<(), Refusal> {
+fn tell_outcome(outcome: &Outcome, run: &RunInfo, whole: f64) -> Result<(), Refusal> {
     for unknown in &outcome.unknowns {
-        let (name, unit) = match unknown.unknown {
-            Unknown::Gain(view) => (format!("gain.{}", views[view].name), ""),
-            Unknown::Param(column) => (column.name(), column.param.info().unit),
-        };
+        let name = run.label(&unknown.unknown.name());
+        let unit = unknown.unknown.column().map_or("", |column| column.param.info().unit);
         let error = match unknown.std_error {
             Some(error) => match unknown.noise_error.filter(|noise| error > 1.05 * noise) {
                 Some(noise) => format!("+- {error:.2e} (noise {noise:.1e})"),
@@ -62,7 +68,9 @@ fn tell_outcome(outcome: &Outcome, views: &[View], whole: f64) -> Result<(), Ref
         say(format!("{name:>22} {:>12.6}  {error:<11}  {unit}", unknown.value).trim_end())?;
     }
     let basis = basis_in_words(outcome.errors, outcome.most_over_noise());
-    for words in basis.into_iter().chain(outcome.profile.as_ref().and_then(profile_in_words)) {
+    let named = |profile: &Profile| Profile { name: run.label(&profile.name), ..profile.clone() };
+    let profile = outcome.profile.as_ref().and_then(|profile| profile_in_words(&named(profile)));
+    for words in basis.into_iter().chain(profile) {
         say(&words)?;
     }
     let ending = outcome.ending.words();
@@ -118,13 +126,16 @@ pub(super) fn advice_on_maps(
     outcome: &Outcome,
 ) -> Option<String> {
     if left.evidence.interrupted {
-        return Some(format!("the fit of the maps was interrupted. {}", arguments.maps.advice(folder)));
+        return Some(format!(
+            "the fit of the maps was interrupted. {}",
+            arguments.maps.advice(folder, &arguments.hold_out)
+        ));
     }
     let iterations = outcome.iterations;
     match outcome.ending {
         Ending::Interrupted => Some(format!(
             "the last solve of the constants was interrupted after {iterations} iterations; the maps are fitted. {}",
-            arguments.maps.advice(folder)
+            arguments.maps.advice(folder, &arguments.hold_out)
         )),
         Ending::RanOut => Some(format!(
             "the last solve of the constants ran out after {iterations} iterations and has not converged. Fit again \

@@ -20,7 +20,6 @@ use crate::progress;
 use crate::render::shade::Shader;
 use crate::report::maps::MapView;
 use crate::report::metrics::Comparison;
-use crate::scene::view::View;
 use crate::tensor::SharedDevice;
 use skinfit_core::program::shading::ShadingError;
 
@@ -37,7 +36,7 @@ impl MapArguments {
         }
         let clock = Instant::now();
         let Observed { baked, views } = observed;
-        let held_out = self.held_out(&baked.scene.views, &baked.scene.path)?;
+        let held_out = run.held_out;
         let choice = Choice { name: run.adapter.map(str::to_owned), ..Choice::default() };
         let shared = SharedDevice::open(&choice).map_err(|error| Refusal::new(tensor_words(&error)))?;
         let posed = baked.scene.mesh.pose();
@@ -65,23 +64,6 @@ impl MapArguments {
         let adapter = shared.gpu().name().to_owned();
         let found = MapsFound { views: gained, maps, history, adapter, settings, interrupted };
         Ok((Observed { baked, views: views.into() }, Some(found)))
-    }
-
-    fn held_out(&self, views: &[View], scene: &Path) -> Result<Option<usize>, Refusal> {
-        let Some(name) = &self.hold_out else { return Ok(None) };
-        let names: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
-        let path = scene.display();
-        match names.iter().position(|found| found == name) {
-            None => Err(Refusal::new(format!(
-                "{path}: --hold-out: there is no view `{name}` with a target. {}.",
-                crate::scene::suggestion(name, &names)
-            ))),
-            Some(_) if names.len() == 1 => Err(Refusal::new(format!(
-                "{path}: --hold-out {name}: it is the only view with a target, so nothing is left to fit. Leave \
-                 --hold-out out, or add a [[view]]."
-            ))),
-            found => Ok(found),
-        }
     }
 }
 

@@ -27,7 +27,7 @@ pub(super) use found::MapsFound;
 /// How to build the program so that it fits maps.
 const BUILD: &str = "cargo build --release --features burn";
 
-/// Which maps, and what is held out of their fit.
+/// Which maps.
 #[derive(clap::Args)]
 #[command(next_help_heading = "Maps")]
 pub(super) struct MapArguments {
@@ -35,9 +35,6 @@ pub(super) struct MapArguments {
     /// occlusion (every vertex), environment (every texel of the cubes). The scene's [fit.maps] says how.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = ["color", "specular", "attenuator", "occlusion", "environment"], conflicts_with = "resume")]
     maps: Vec<String>,
-    /// Leave a view out of the fit of maps, and tell how well it is met all the same.
-    #[arg(long, value_name = "VIEW", requires = "maps")]
-    hold_out: Option<String>,
 }
 
 /// How a fit of maps goes about it, beside what is fitted.
@@ -45,6 +42,8 @@ pub(super) struct MapArguments {
 pub(super) struct MapRun<'a> {
     /// Part of the name of the adapter to take.
     pub(super) adapter: Option<&'a str>,
+    /// The view that takes no part in it, by its number.
+    pub(super) held_out: Option<usize>,
     /// Set when somebody presses Ctrl-C.
     pub(super) interrupt: Arc<AtomicBool>,
     /// Whether nothing is said on standard output.
@@ -82,7 +81,7 @@ impl MapArguments {
 
     /// Refuse maps in a program that was built without them.
     pub(super) fn check(&self) -> Result<(), Refusal> {
-        if cfg!(feature = "burn") || (self.maps.is_empty() && self.hold_out.is_none()) {
+        if cfg!(feature = "burn") || self.maps.is_empty() {
             return Ok(());
         }
         Err(Refusal::new(format!(
@@ -90,10 +89,10 @@ impl MapArguments {
         )))
     }
 
-    /// What to do after Ctrl-C, which left maps in `folder`.
-    pub(super) fn advice(&self, folder: &Path) -> String {
+    /// What to do after Ctrl-C, which left maps in `folder`, of a fit without the views `held_out`.
+    pub(super) fn advice(&self, folder: &Path, held_out: &[String]) -> String {
         let (folder, maps) = (folder.display(), self.maps.join(","));
-        let held_out = self.hold_out.as_ref().map(|view| format!(" --hold-out {view}")).unwrap_or_default();
+        let held_out: String = held_out.iter().map(|view| format!(" --hold-out {view}")).collect();
         format!(
             "Its scene.toml names the maps so far and begins with the constants that belong to them. Go on from there \
              with `skinfit fit {folder}/scene.toml --maps {maps}{held_out}`; what is held of the maps \
@@ -115,7 +114,7 @@ mod tests {
             let free = [Param::EnvironmentRotation, Param::Hilite].map(Column::tied).to_vec();
             let (loss, settings) = (Loss::default(), MapSettings::default());
             let mut fit = FitSettings { free, loss, free_gains: false, maps: settings };
-            MapArguments { maps, hold_out: None }.hold_constants(&mut fit);
+            MapArguments { maps }.hold_constants(&mut fit);
             fit.free.len()
         };
         assert_eq!([held(&[]), held(&["color"]), held(&["color", "environment"])], [2, 2, 1]);

@@ -11,9 +11,9 @@ use crate::render::backdrop::Backdrop;
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
-use crate::samples::{self, Atlas, atlas_of, sample_view};
+use crate::samples::{Atlas, PosedSurface, SurfaceBakes, atlas_of, sample_view};
 use crate::scene::Scene;
-use crate::scene::mesh::{Mesh, PosedMesh};
+use crate::scene::mesh::{Mesh, Morph, PosedMesh};
 use crate::scene::view::Camera;
 
 /// What a frame shows.
@@ -56,10 +56,7 @@ pub(super) struct CpuPainter {
     scene: Arc<Scene>,
     occlusion: Option<Arc<VertexOcclusion>>,
     shader: Shader,
-    posed: PosedMesh,
-    rays: RayMesh,
-    /// Open share of each vertex' hemisphere.
-    open: Option<Vec<f32>>,
+    pose: Pose,
     atlas: Option<Arc<Atlas>>,
     seconds: f64,
 }
@@ -69,22 +66,35 @@ impl CpuPainter {
     pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
         let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
         let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
-        let (posed, rays, open) = pose(&scene, &scene.mesh, occlusion.as_deref())?;
-        let atlas = atlas_of(&scene, &posed, open.as_deref())?;
-        Ok(Self { scene, occlusion, shader, posed, rays, open, atlas, seconds: 0.0 })
+        let pose = Pose::of(&scene.mesh, None);
+        let mut painter = Self { scene, occlusion, shader, pose, atlas: None, seconds: 0.0 };
+        let atlas = atlas_of(&painter.scene, &painter.surface()?)?;
+        painter.atlas = atlas;
+        Ok(painter)
+    }
+
+    /// The mesh as it is posed, with what is baked of it.
+    fn surface(&self) -> Result<PosedSurface<'_>, Refusal> {
+        let Pose { mesh, rays, morphs, occlusion } = &self.pose;
+        let bakes = SurfaceBakes { occlusion: occlusion.as_ref().or(self.occlusion.as_deref()) };
+        Ok(PosedSurface::new(&self.scene, mesh, rays, morphs, bakes)?)
     }
 }
 
-/// The mesh in the world, as rays see it, and its occlusion.
-fn pose(
-    scene: &Scene,
-    mesh: &Mesh,
-    occlusion: Option<&VertexOcclusion>,
-) -> Result<(PosedMesh, RayMesh, Option<Vec<f32>>), Refusal> {
-    let posed = mesh.pose();
-    let rays = RayMesh::new(&posed.positions, &posed.triangles);
-    let open = samples::posed_occlusion(scene, &mesh.morphs, mesh.positions.len(), occlusion)?;
-    Ok((posed, rays, open))
+/// The mesh in the world, as rays see it; its targets at their weights, and the occlusion that it has of its own.
+struct Pose {
+    mesh: PosedMesh,
+    rays: RayMesh,
+    morphs: Vec<Morph>,
+    occlusion: Option<VertexOcclusion>,
+}
+
+impl Pose {
+    fn of(mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Self {
+        let posed = mesh.pose();
+        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        Self { mesh: posed, rays, morphs: mesh.morphs.clone(), occlusion: occlusion.cloned() }
+    }
 }
 
 impl Painter for CpuPainter {
@@ -93,16 +103,16 @@ impl Painter for CpuPainter {
     }
 
     fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal> {
-        let occlusion = occlusion.or(self.occlusion.as_deref());
-        (self.posed, self.rays, self.open) = pose(&self.scene, mesh, occlusion)?;
-        self.atlas = atlas_of(&self.scene, &self.posed, self.open.as_deref())?;
+        self.pose = Pose::of(mesh, occlusion);
+        let atlas = atlas_of(&self.scene, &self.surface()?)?;
+        self.atlas = atlas;
         Ok(())
     }
 
     fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal> {
         let start = std::time::Instant::now();
         let scene = &*self.scene;
-        let mut samples = sample_view(scene, &self.posed, &self.rays, self.open.as_deref(), camera);
+        let mut samples = sample_view(scene, &self.surface()?, camera);
         samples.atlas.clone_from(&self.atlas);
         let mut shaded = self.shader.shade(&samples, camera, gain);
         let mut layers: Vec<(String, Image)> =

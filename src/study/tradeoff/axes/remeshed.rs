@@ -8,7 +8,7 @@ use glam::Vec3;
 use crate::StudyError;
 use crate::bake::VertexOcclusion;
 use crate::prepare::PrepareError;
-use crate::samples;
+use crate::samples::{self, SurfaceBakes};
 use crate::scene::mesh::{Mesh, PosedMesh};
 use crate::tradeoff::bench::{Bench, Evaluated, Settings};
 
@@ -86,8 +86,8 @@ impl Remeshed {
         let PosedMesh { positions, normals, tangents, uvs, triangles, fields } = self.mesh.clone();
         scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, fields, ..Mesh::default() };
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
-        let samples =
-            samples::sample_views(&scene, &self.mesh, occlusion.as_ref()).map_err(PrepareError::from)?;
+        let bakes = SurfaceBakes { occlusion: occlusion.as_ref() };
+        let samples = samples::sample_views(&scene, &self.mesh, bakes).map_err(PrepareError::from)?;
         Ok(Evaluated { scene, illumination: bench.baked.illumination.clone(), samples: Arc::new(samples) })
     }
 

@@ -10,15 +10,16 @@ use glam::{Vec2, Vec3};
 
 use super::*;
 use crate::bake::Illumination;
+use crate::bake::rays::RayMesh;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::{Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Params};
-use crate::samples::SurfaceRecords;
 use crate::samples::rows::Rows;
 use crate::samples::surface_records::{Asked, NEUTRAL, Unmade};
+use crate::samples::{PosedSurface, SurfaceRecords};
 use crate::scene::Loss;
 use crate::scene::maps::Maps;
 use crate::scene::mesh::PosedMesh;
@@ -129,7 +130,9 @@ fn square() -> PosedMesh {
 
 fn atlas(setup: &Setup) -> Arc<Atlas> {
     let open = [0.2, 0.9, 0.6, 0.4];
-    Arc::new(Atlas::new(setup, &square(), Some(&open), &Maps::default(), SIZE).unwrap())
+    let (mesh, rays) = (square(), RayMesh::new(&[], &[]));
+    let surface = PosedSurface::bare(&mesh, &rays, Some(open.to_vec()));
+    Arc::new(Atlas::new(setup, &surface, &Maps::default(), SIZE).unwrap())
 }
 
 /// Sixteen times sixteen pixels over the square, one sample each, the first of them beyond the chart.

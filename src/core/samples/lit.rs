@@ -1,0 +1,81 @@
+//! What reaches samples of each light: fields of their own, by rays against the mesh.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::posed::Supply;
+use super::trace::Hit;
+use super::visibility::Shadows;
+use crate::bake::rays::RayMesh;
+use crate::model::effects::Effect;
+use crate::model::fields::Field;
+use crate::model::params::Param;
+use crate::scene::Scene;
+use crate::scene::light::{Light, LightKind};
+use crate::scene::mesh::PosedMesh;
+
+/// One field of one light.
+struct Reaching<'a> {
+    shadows: Arc<Shadows<'a>>,
+    light: Light,
+    what: What,
+}
+
+#[derive(Clone, Copy)]
+enum What {
+    /// The share of it that nothing stops.
+    Open,
+    /// The unit vector towards it.
+    Toward,
+    /// What distance and cone leave of it, and with `shadows` what stands between.
+    Arriving { shadows: bool },
+}
+
+impl Supply for Reaching<'_> {
+    fn find(&self, hit: Hit, numbers: &mut [f32]) {
+        let place = || self.shadows.place(hit.triangle, hit.weights().map(f64::from));
+        let [first, ..] = numbers else { return };
+        match self.what {
+            What::Open => *first = self.shadows.visible(&place(), &self.light),
+            What::Arriving { shadows: true } => *first = self.shadows.arriving(&place(), &self.light),
+            What::Arriving { shadows: false } => *first = self.light.attenuation(place().position) as f32,
+            What::Toward => {
+                let toward: DVec3 = self.light.towards(place().position);
+                numbers.copy_from_slice(&toward.as_vec3().to_array()[..numbers.len()]);
+            }
+        }
+    }
+}
+
+/// What finds the fields of a scene's lights at samples of its mesh. A light that a parameter has moved stands there;
+/// what is found is held while the parameter moves.
+pub(super) fn supplies<'a>(
+    scene: &Scene,
+    mesh: &'a PosedMesh,
+    rays: &'a RayMesh,
+) -> Vec<(Field, Box<dyn Supply + 'a>)> {
+    if !scene.effects.has(Effect::Lights) {
+        return Vec::new();
+    }
+    let shadows = Arc::new(Shadows::new(mesh, rays, scene.quality.shadow_rays));
+    let shadowed = scene.effects.has(Effect::Shadows);
+    let rotation = scene.params.scalar(Param::EnvironmentRotation);
+    let own = scene.lights.iter().map(|light| light.moved(&scene.params));
+    let of_sky = scene.sky_lights.iter().map(|light| light.moved(&scene.params).turned(rotation));
+    let mut supplies: Vec<(Field, Box<dyn Supply + 'a>)> = Vec::new();
+    for light in own.chain(of_sky) {
+        let fields = match light.kind {
+            LightKind::Directional(_) => vec![("open", What::Open)],
+            LightKind::Point(_) | LightKind::Spot(..) => {
+                vec![("toward", What::Toward), ("arriving", What::Arriving { shadows: shadowed })]
+            }
+        };
+        for (name, what) in fields {
+            let Some(field) = Field::from_name(&format!("light_{}_{name}", light.member())) else { continue };
+            let (shadows, light) = (Arc::clone(&shadows), light.clone());
+            supplies.push((field, Box::new(Reaching { shadows, light, what })));
+        }
+    }
+    supplies
+}

@@ -1,0 +1,98 @@
+//! A scene's mesh in one pose with all that its samples and texels are made of.
+
+use rayon::prelude::*;
+
+use super::trace::Hit;
+use super::{SampleError, lit, posed_occlusion};
+use crate::bake::VertexOcclusion;
+use crate::bake::rays::RayMesh;
+use crate::model::fields::{Field, FieldInfo};
+use crate::scene::Scene;
+use crate::scene::mesh::{Morph, PosedMesh};
+
+/// What is baked of a scene's surface.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SurfaceBakes<'a> {
+    /// Ambient occlusion, when asked for.
+    pub occlusion: Option<&'a VertexOcclusion>,
+}
+
+/// What finds a field of samples at any point of the mesh.
+pub(super) trait Supply: Sync {
+    /// The field's numbers there.
+    fn find(&self, hit: Hit, numbers: &mut [f32]);
+}
+
+/// A mesh in one pose, with its vertices' numbers and what finds others at any of its points.
+pub struct PosedSurface<'a> {
+    pub(super) mesh: &'a PosedMesh,
+    pub(super) rays: &'a RayMesh,
+    /// Open share of each vertex' hemisphere.
+    pub(super) open: Option<Vec<f32>>,
+    supplies: Vec<(Field, Box<dyn Supply + 'a>)>,
+}
+
+impl<'a> PosedSurface<'a> {
+    /// The mesh of `scene` as it is posed; `rays` holds its triangles, and `morphs` are the targets at their weights.
+    ///
+    /// # Errors
+    /// When something was baked for another mesh.
+    pub fn new(
+        scene: &Scene,
+        mesh: &'a PosedMesh,
+        rays: &'a RayMesh,
+        morphs: &[Morph],
+        bakes: SurfaceBakes<'_>,
+    ) -> Result<Self, SampleError> {
+        let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
+        Ok(Self { open, ..Self::with_fields(scene, mesh, rays) })
+    }
+
+    /// The mesh of `scene` as it is posed with all that is found at its points, and nothing that is baked.
+    #[must_use]
+    pub fn with_fields(scene: &Scene, mesh: &'a PosedMesh, rays: &'a RayMesh) -> Self {
+        Self { supplies: lit::supplies(scene, mesh, rays), ..Self::bare(mesh, rays, None) }
+    }
+
+    /// A mesh with the open share of each vertex' hemisphere, and nothing else.
+    #[must_use]
+    pub const fn bare(mesh: &'a PosedMesh, rays: &'a RayMesh, open: Option<Vec<f32>>) -> Self {
+        Self { mesh, rays, open, supplies: Vec::new() }
+    }
+
+    /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what
+    /// stands in for them. All cores.
+    #[must_use]
+    pub fn field_of_vertices(&self, field: Field) -> Vec<f32> {
+        let FieldInfo { numbers: count, neutral, .. } = *field.info();
+        let mut hits: Vec<Option<Hit>> = vec![None; self.mesh.positions.len()];
+        for (triangle, corners) in (0..).zip(&self.mesh.triangles) {
+            for (corner, barycentric) in corners.iter().zip([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) {
+                hits[*corner as usize] = Some(Hit { triangle, barycentric });
+            }
+        }
+        let mut numbers = vec![neutral; count * hits.len()];
+        let found = numbers.par_chunks_mut(count).zip(&hits);
+        found.for_each(|(numbers, hit)| {
+            if let Some(hit) = hit {
+                self.field(field, *hit, numbers);
+            }
+        });
+        numbers
+    }
+
+    /// What there is of a field at a point; what stands in for it where nothing has it.
+    pub(super) fn field(&self, field: Field, hit: Hit, numbers: &mut [f32]) {
+        if let Some((_, supply)) = self.supplies.iter().find(|(of, _)| *of == field) {
+            return supply.find(hit, numbers);
+        }
+        let Some(of) = self.mesh.fields.iter().find(|of| of.field == field) else {
+            return numbers.fill(field.info().neutral);
+        };
+        let corners = self.mesh.triangles[hit.triangle as usize].map(|corner| of.of(corner as usize));
+        let weights = hit.weights();
+        for (k, number) in numbers.iter_mut().enumerate() {
+            *number = (0..3).map(|i| weights[i] * corners[i][k]).sum();
+        }
+    }
+}

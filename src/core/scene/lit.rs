@@ -1,0 +1,100 @@
+//! The effect that each light of a scene is: a term of its own, and its numbers as parameters.
+
+use super::error::{SceneError, Warnings};
+use super::file::{SceneFile, Source};
+use super::gltf::Document;
+use super::light::{Light, LightKind};
+use super::lights;
+use super::settings::spots;
+use crate::model::effects::{Effect, Effects};
+use crate::model::params::{Param, Params};
+use crate::model::registry::leaked;
+use crate::shader::term::{self, MEMBER, Origin, Term, TermError};
+
+/// Light from one direction: [`IN_WORLD`] where it stays, or [`IN_SKY`] where it turns with the environment.
+const BEAM: &str = include_str!("../shader/rules/family/beam.wgsl");
+const IN_WORLD: &str = include_str!("../shader/rules/family/in_world.wgsl");
+const IN_SKY: &str = include_str!("../shader/rules/family/in_sky.wgsl");
+/// Light from one place.
+const LAMP: &str = include_str!("../shader/rules/family/lamp.wgsl");
+/// What any light shows.
+const LIT: &str = include_str!("../shader/rules/family/lit.wgsl");
+
+/// The effect of a light, known to this process from then on. Lights of one name and kind, of whatever scenes, are one
+/// effect: their numbers are parameters.
+///
+/// # Errors
+/// When a file of rules has taken its names.
+fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> {
+    let text = match (&light.kind, from_sky) {
+        (LightKind::Directional(_), true) => [BEAM, IN_SKY, LIT].concat(),
+        (LightKind::Directional(_), false) => [BEAM, IN_WORLD, LIT].concat(),
+        (LightKind::Point(_) | LightKind::Spot(..), _) => [LAMP, LIT].concat(),
+    };
+    let member = light.member();
+    term::register_from(Origin::Library, leaked(&member), &text.replace(MEMBER, &member))
+}
+
+/// The lights of a scene, each known as an effect.
+pub(super) struct Lights {
+    /// Those that the scene file and, where it says so, the mesh file name.
+    pub(super) own: Vec<Light>,
+    /// How many the panorama may yield.
+    spots: u32,
+    terms: Vec<&'static Term>,
+}
+
+impl Lights {
+    /// Read them. `time` is that of the mesh file's animation.
+    ///
+    /// # Errors
+    /// When one of them makes no sense, or a file of rules has taken its names.
+    pub(super) fn read(
+        source: &Source,
+        file: &SceneFile,
+        document: Option<(&Document, Option<f64>)>,
+        warnings: &mut Warnings,
+    ) -> Result<Self, SceneError> {
+        let mut own = lights::plan(source, &file.light)?;
+        if let Some((document, time)) = document.filter(|_| file.mesh.lights) {
+            document.lights(time, &mut own, warnings)?;
+        }
+        let spots = file.environment.as_ref().map(|table| spots(source, table)).transpose()?;
+        let spots = spots.map_or(0, |spots| spots.count);
+        let of_sky = (1..=spots).map(|number| effect_of(&Light::of_sky(number), true));
+        let terms = own.iter().map(|light| effect_of(light, false)).chain(of_sky).collect::<Result<_, _>>();
+        let taken = |error: TermError| {
+            let remedy = "Give the light, or what a file of [model] terms declares, another name";
+            SceneError::new(&source.path, error.problem.to_string(), remedy)
+        };
+        Ok(Self { own, spots, terms: terms.map_err(taken)? })
+    }
+
+    /// Those effects, and each light's where lights are on.
+    pub(super) fn switched(&self, effects: Effects) -> Effects {
+        if !effects.has(Effect::Lights) {
+            return effects;
+        }
+        self.terms.iter().fold(effects, |effects, term| effects.with(term.effect))
+    }
+
+    /// Whether some of them come out of the panorama.
+    pub(super) const fn are_of_sky(&self) -> bool {
+        self.spots > 0
+    }
+}
+
+/// Set the parameters that a light's numbers are, but for those that `given` says the scene file gives.
+pub(super) fn set(light: &Light, params: &mut Params, given: impl Fn(&str) -> bool) {
+    let mut set = |key: &str, values: [f64; 3]| {
+        let name = format!("light.{}.{key}", light.member());
+        if let Some(param) = Param::from_name(&name).filter(|_| !given(&name)) {
+            params.set_rgb(param, values);
+        }
+    };
+    set("irradiance", light.strength());
+    if let Some(bearing) = light.bearing() {
+        set("azimuth", [bearing.azimuth; 3]);
+        set("elevation", [bearing.elevation; 3]);
+    }
+}

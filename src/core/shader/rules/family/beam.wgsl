@@ -1,0 +1,39 @@
+// Light from one direction, beside the environment (MODEL 8; glTF's KHR_lights_punctual).
+//
+// effect: light_NAME within lights, the light NAME
+// parameter: light.NAME.color = 1 in [0, inf), rgb, linear, scene; factor on the light's irradiance; KHR_lights_punctual
+// parameter: light.NAME.irradiance = 0 in [0, inf), rgb, held; irradiance of a surface that faces it; KHR_lights_punctual
+// parameter: light.NAME.azimuth = 0 in [-inf, inf], unit degrees, scene; where it comes from, from +Z towards +X; KHR_lights_punctual
+// parameter: light.NAME.elevation = 45 in [-90, 90], unit degrees, scene; where it comes from, above the horizon; KHR_lights_punctual
+// sample_field: light_NAME_open: f32 = 1; share of the light NAME that nothing stops
+
+// Unit vector towards the light.
+//
+// gives: light_NAME_bearing
+// domain: texel, fragment
+// cost: 20
+fn light_NAME_direction(light_NAME_azimuth: f32, light_NAME_elevation: f32) -> vec3f {
+    let azimuth: f32 = 0.017453292519943295 * light_NAME_azimuth;
+    let elevation: f32 = 0.017453292519943295 * light_NAME_elevation;
+    return vec3f(cos(elevation) * sin(azimuth), sin(elevation), cos(elevation) * cos(azimuth));
+}
+
+// What arrives of it, as share of a facing surface's irradiance: all that nothing stops.
+//
+// gives: light_NAME_arriving
+// domain: texel, fragment
+// when: shadows
+// cost: 0
+fn light_NAME_unstopped(light_NAME_open: f32) -> f32 {
+    return light_NAME_open;
+}
+
+// What arrives of it where nothing has a shadow.
+//
+// gives: light_NAME_arriving
+// domain: texel, fragment
+// when: !shadows
+// cost: 0
+fn light_NAME_all() -> f32 {
+    return 1.0;
+}
