@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(of(&["night", "noon/side"]).unwrap(), [false, true, false, true, true, false]);
         let words = |names: &[&str]| of(names).unwrap_err().words;
         assert!(words(&["bare"]).contains("no scene and no view `bare` with a target"));
-        assert!(words(&["nite"]).contains("Did you mean `night`?"));
+        assert!(words(&["nigth"]).contains("Did you mean `night`?"));
         assert!(words(&["noon", "night"]).contains("nothing is left to fit"));
         let scenes = [("front", Path::new("front"), &views[..]), scenes[0]];
         let names = ["front".to_owned()];
