@@ -5,12 +5,17 @@
 //! - [`prefilter`]: the Phong-lobe filter (`pyramid`: the cells that it sums over, `lobe_kernel`:
 //!   the sum)
 //! - [`lobes`]: the stack of specular cubes over the exponent
-//! - [`occlusion`]: per-vertex ambient occlusion (`low_discrepancy`: its rays)
+//! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions)
+//! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
+//! - [`transfer`]: which of that light arrives at each vertex, past the mesh (`interreflection`: and by way of it)
 //! - [`rays`]: the mesh as rays see it
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
 mod baker;
 pub mod cache;
+pub mod coefficients;
+pub mod harmonics;
+pub mod interreflection;
 mod lobe_kernel;
 pub mod lobes;
 mod low_discrepancy;
@@ -19,6 +24,8 @@ pub mod panorama;
 pub mod prefilter;
 mod pyramid;
 pub mod rays;
+pub mod transfer;
+mod vertex_rays;
 
 use std::ops::RangeInclusive;
 use std::path::Path;
