@@ -21,6 +21,7 @@ mod figures;
 mod fits;
 mod fixtures;
 mod graphics;
+mod harmonics;
 mod instructions;
 mod meshes;
 mod occlusion;

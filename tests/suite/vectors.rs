@@ -20,7 +20,7 @@ use skinfit_core::program::graph::Input;
 
 use self::reader::{Node, Tolerance, Vectors};
 use crate::by_rules::{Cubes, Fragments, Function, Number, Shaded, Wanted};
-use crate::{bakes, common, evaluators, meshes, witness};
+use crate::{bakes, common, evaluators, harmonics, meshes, witness};
 
 /// Numbers as the vectors are compared with: how each evaluator makes them, and the files' tolerance for it.
 #[track_caller]
@@ -453,6 +453,7 @@ fn every_number_of_every_vector_is_compared() {
     vectors.of_kind("latlong").iter().for_each(bakes::latlong_vector);
     vectors.of_kind("prefilter").iter().for_each(|file| bakes::prefilter_vector(&vectors, file));
     vectors.of_kind("vertex").iter().for_each(meshes::vertex_vector);
+    vectors.of_kind("sh").iter().for_each(|file| harmonics::sh_vector(&vectors, file));
     witness::bench_on(&vectors, &evaluators::on_cpu()[..2]);
     witness::fit_of_the_bench(&vectors);
     witness::fragments_on(&vectors, &evaluators::on_cpu()[..2]);

@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 17] = [
+const SOURCES: [&str; 19] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
     include_str!("coefficients.rs"),
@@ -25,8 +25,10 @@ const SOURCES: [&str; 17] = [
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),
     include_str!("rays.rs"),
+    include_str!("shadowed.rs"),
     include_str!("transfer.rs"),
     include_str!("vertex_rays.rs"),
+    include_str!("wide_bvh.rs"),
     crate::model::cube::SOURCE,
 ];
 const MAGIC: &[u8; 8] = b"SKINBAKE";

@@ -6,8 +6,8 @@
 use glam::Vec3A;
 use rayon::prelude::*;
 
-use super::rays::RayMesh;
 use super::vertex_rays::{Found, Rays, VertexRays};
+use super::wide_bvh::{NOTHING, WideBvh};
 use crate::scene::maps::Map;
 use crate::scene::mesh::PosedMesh;
 
@@ -20,12 +20,10 @@ pub struct Albedo<'a> {
 
 /// The nearest triangle along a ray, by its index in the mesh, or [`NOTHING`].
 pub(super) type Nearest = u32;
-/// What a ray into the open meets.
-pub(super) const NOTHING: Nearest = u32::MAX;
 
 impl Found for Nearest {
-    fn along(mesh: &RayMesh, rays: &Rays) -> Vec<Self> {
-        rays.directions.iter().map(|&d| mesh.first(rays.origin, d).unwrap_or(NOTHING)).collect()
+    fn along(mesh: &WideBvh, rays: &Rays) -> Vec<Self> {
+        mesh.first(rays.origin, &rays.directions)
     }
 }
 

@@ -91,13 +91,15 @@ impl RayMesh {
         !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
     }
 
-    /// The first triangle along the ray, from either side, by its index in the mesh.
-    #[must_use]
-    pub fn first(&self, origin: Vec3A, direction: Vec3A) -> Option<u32> {
-        let bvh = self.bvh.as_ref()?;
-        let (mut hit, ray) = (RayHit::none(), ray(origin, direction, 0.0));
-        bvh.ray_traverse(ray, &mut hit, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
-            .then(|| self.index[bvh.primitive_indices[hit.primitive_id as usize] as usize])
+    /// The hierarchy; none without triangles.
+    pub(super) fn bvh(&self) -> Option<&CwBvh> {
+        self.bvh.as_ref()
+    }
+
+    /// A triangle by its place among those that can be hit: its corners, and which one it is in the mesh.
+    pub(super) fn triangle(&self, place: u32) -> ([Vec3A; 3], u32) {
+        let Triangle { v0, v1, v2 } = self.triangles[place as usize];
+        ([v0, v1, v2], self.index[place as usize])
     }
 
     /// The nearest triangle along the ray, by `intersect`: the distance at which the ray meets a

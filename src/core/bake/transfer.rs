@@ -10,8 +10,9 @@ use glam::{Vec3, Vec3A};
 
 use super::VertexOcclusion;
 use super::harmonics::{CONSTANT, Order, open_transfer_at, scale, unscaled};
-use super::interreflection::{Albedo, Gather, NOTHING, Nearest};
+use super::interreflection::{Albedo, Gather, Nearest};
 use super::vertex_rays::{Rays, VertexRays};
+use super::wide_bvh::NOTHING;
 use crate::progress;
 use crate::scene::mesh::PosedMesh;
 use crate::with_simd;

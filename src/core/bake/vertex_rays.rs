@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 use super::low_discrepancy::{Sobol, mix};
 use super::rays::RayMesh;
+use super::wide_bvh::WideBvh;
 use crate::scene::mesh::PosedMesh;
 
 /// How far above the surface rays start, as a share of the mesh's diagonal: well above the rounding
@@ -42,13 +43,13 @@ pub(super) struct Rays {
 /// What a ray may find of a mesh.
 pub(super) trait Found: Copy + Send + Sync {
     /// Of each of a vertex' rays.
-    fn along(mesh: &RayMesh, rays: &Rays) -> Vec<Self>;
+    fn along(mesh: &WideBvh, rays: &Rays) -> Vec<Self>;
 }
 
 /// Whether it meets any triangle.
 impl Found for bool {
-    fn along(mesh: &RayMesh, rays: &Rays) -> Vec<Self> {
-        rays.directions.iter().map(|&d| mesh.hits(rays.origin, d, 0.0)).collect()
+    fn along(mesh: &WideBvh, rays: &Rays) -> Vec<Self> {
+        mesh.hits(rays.origin, &rays.directions)
     }
 }
 
@@ -100,7 +101,7 @@ impl VertexRays {
 
     /// What `of` makes of each one's rays at rest, with what they found. All cores.
     pub(super) fn at_rest<F: Found, R: Send>(&self, of: impl Fn(usize, &Rays, Vec<F>) -> R + Sync) -> Vec<R> {
-        let mesh = RayMesh::new(&self.rest.positions, &self.rest.triangles);
+        let mesh = wide(&self.rest.positions, &self.rest.triangles);
         let found = |i: usize| {
             let rays = self.rays(i, &self.rest);
             let found = F::along(&mesh, &rays);
@@ -117,7 +118,7 @@ impl VertexRays {
         at_rest: &[Vec<F>],
         of: impl Fn(usize, &Rays, Vec<F>) -> R + Sync,
     ) -> Vec<R> {
-        let mesh = RayMesh::new(&target.positions, &target.triangles);
+        let mesh = wide(&target.positions, &target.triangles);
         let moved = moved_triangles(&self.rest, target);
         let found = |i: usize| {
             let rays = self.rays(i, target);
@@ -137,8 +138,12 @@ impl VertexRays {
     }
 }
 
+fn wide(positions: &[Vec3], triangles: &[[u32; 3]]) -> WideBvh {
+    WideBvh::new(&RayMesh::new(positions, triangles))
+}
+
 /// What rays from where nothing moved find, given what they found `before`.
-fn kept<F: Found>(before: &[F], moved: Option<&RayMesh>, mesh: &RayMesh, rays: &Rays) -> Vec<F> {
+fn kept<F: Found>(before: &[F], moved: Option<&WideBvh>, mesh: &WideBvh, rays: &Rays) -> Vec<F> {
     let mut found = before.to_vec();
     let Some(moved) = moved else { return found };
     let met = bool::along(moved, rays);
@@ -174,15 +179,14 @@ fn distinct(rest: &PosedMesh, targets: &[PosedMesh]) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// The triangles that differ between two poses, as they stand in both.
-fn moved_triangles(rest: &PosedMesh, target: &PosedMesh) -> Option<RayMesh> {
+fn moved_triangles(rest: &PosedMesh, target: &PosedMesh) -> Option<WideBvh> {
     let moved: Vec<[u32; 3]> = (rest.triangles.iter().copied())
         .filter(|t| t.iter().any(|&v| rest.positions[v as usize] != target.positions[v as usize]))
         .collect();
     let count = rest.positions.len() as u32;
     let shifted = moved.iter().map(|t| t.map(|v| v + count));
     let triangles: Vec<[u32; 3]> = moved.iter().copied().chain(shifted).collect();
-    (!triangles.is_empty())
-        .then(|| RayMesh::new(&[&rest.positions[..], &target.positions].concat(), &triangles))
+    (!triangles.is_empty()).then(|| wide(&[&rest.positions[..], &target.positions].concat(), &triangles))
 }
 
 /// Position bits in which 0 and -0 are one.

@@ -228,8 +228,9 @@ impl Vector {
         let given = self.root().at("tolerance");
         given.at("rule").assert_text("|got-want| <= abs*max(1,max|want|) + rel*|want|");
         let [abs, rel, double] = ["f32_abs", "f32_rel", "f64_rel"].map(|name| given.at(name).number());
-        // The files give f64 a relative figure alone; the same, absolutely, where a sum cancels.
-        Tolerances { double: Tolerance { abs: double, rel: double }, single: Tolerance { abs, rel } }
+        // Most files give f64 a relative figure alone; the same, absolutely, where a sum cancels.
+        let cancels = given.get("f64_abs").map_or(double, |given| given.number());
+        Tolerances { double: Tolerance { abs: cancels, rel: double }, single: Tolerance { abs, rel } }
     }
 }
 
