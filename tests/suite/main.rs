@@ -37,5 +37,6 @@ mod scheduler;
 mod shader;
 #[cfg(feature = "burn")]
 mod tensors;
+mod transfer;
 mod vectors;
 mod witness;

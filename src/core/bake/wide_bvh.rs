@@ -250,3 +250,71 @@ impl<S: Simd> Ray<S> {
 fn cross<S: Simd>(p: [f32x4<S>; 3], q: [f32x4<S>; 3]) -> [f32x4<S>; 3] {
     [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::low_discrepancy::mix;
+    use glam::{Vec3, vec3};
+
+    /// A number in [-1, 1) of a seed.
+    fn number(seed: u32) -> f32 {
+        (mix(seed) >> 8) as f32 / 8_388_608.0 - 1.0
+    }
+
+    fn place(seed: u32) -> Vec3 {
+        vec3(number(3 * seed), number(3 * seed + 1), number(3 * seed + 2))
+    }
+
+    #[test]
+    fn rays_meet_what_they_meet_triangle_by_triangle_with_every_instruction_set() {
+        let count = 300;
+        let corner = |i: u32| place(i / 3 + 10_000) + 0.2 * place(i);
+        let positions: Vec<Vec3> = (0..3 * count).map(corner).collect();
+        let triangles: Vec<[u32; 3]> = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+        let directions: Vec<Vec3A> =
+            (0..200).map(|i| Vec3A::from(place(20_000 + i)).normalize_or(Vec3A::X)).collect();
+        let origin = Vec3A::new(0.05, -0.1, 0.02);
+        let mesh = RayMesh::new(&positions, &triangles);
+        let one_by_one = |d: Vec3A| {
+            mesh.nearest(origin, d, |index| {
+                let [a, b, c] = triangles[index as usize].map(|i| positions[i as usize].as_dvec3());
+                let (o, d) = (origin.as_dvec3(), d.as_dvec3());
+                let normal = (b - a).cross(c - a);
+                let distance = (a - o).dot(normal) / d.dot(normal);
+                let hit = o + distance * d;
+                let inside =
+                    [(a, b), (b, c), (c, a)].iter().all(|&(p, q)| (q - p).cross(hit - p).dot(normal) >= 0.0);
+                if inside && distance >= 0.0 { distance as f32 } else { f32::INFINITY }
+            })
+        };
+        let want: Vec<u32> = directions.iter().map(|&d| one_by_one(d).unwrap_or(NOTHING)).collect();
+        assert!(want.contains(&NOTHING) && want.iter().any(|&found| found != NOTHING));
+        let mut wide = WideBvh::new(&mesh);
+        for level in crate::simd::levels() {
+            wide.level = level;
+            assert_eq!(wide.first(origin, &directions), want);
+            let hits: Vec<bool> = want.iter().map(|&found| found != NOTHING).collect();
+            assert_eq!(wide.hits(origin, &directions), hits);
+        }
+    }
+
+    #[test]
+    fn no_ray_slips_through_an_edge_or_past_a_flat_box_and_nothing_is_hit_of_nothing() {
+        // A floor of 16 x 16 squares whose edges and corners rays from above are aimed at.
+        let at = |i: u32| vec3((i % 17) as f32 - 8.0, 0.0, (i / 17) as f32 - 8.0);
+        let positions: Vec<Vec3> = (0..17 * 17).map(at).collect();
+        let squares = (0..256).map(|i| i / 16 * 17 + i % 16);
+        let triangles: Vec<[u32; 3]> =
+            squares.flat_map(|a| [[a, a + 17, a + 1], [a + 1, a + 17, a + 18]]).collect();
+        let wide = WideBvh::new(&RayMesh::new(&positions, &triangles));
+        let origin = Vec3A::new(0.0, 3.0, 0.0);
+        // Whole and half places, which lie on corners and edges.
+        let aims =
+            (0..31 * 31).map(|i| Vec3A::new((i % 31) as f32 * 0.5 - 7.5, 0.0, (i / 31) as f32 * 0.5 - 7.5));
+        let directions: Vec<Vec3A> = aims.map(|aim| (aim - origin).normalize()).collect();
+        assert!(wide.hits(origin, &directions).into_iter().all(|hit| hit));
+        let none = WideBvh::new(&RayMesh::new(&[], &[]));
+        assert!(!none.hits(origin, &directions)[0] && none.first(origin, &directions)[0] == NOTHING);
+    }
+}
