@@ -6,7 +6,7 @@
 //!   effects, terms, cubes, kinds of numbers. Knows nothing of files or meshes.
 //! - [`scene`]: scene files, meshes, maps, cameras: everything that is read.
 //! - [`builtin`]: the scene that the program makes by itself.
-//! - [`bake`]: environment to cube maps, ambient occlusion, and their cache.
+//! - [`bake`]: environment to cube maps and spherical harmonics, ambient occlusion and transfer, and their cache.
 //! - [`samples`]: the visible surface of each view, as records of sixteen pixels.
 //! - [`engine`]: loss, gradient and normal equations over samples.
 //! - [`fit`]: the solvers, and what is known of the answer afterwards.

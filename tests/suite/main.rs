@@ -23,6 +23,7 @@ mod figures;
 mod fits;
 mod fixtures;
 mod graphics;
+mod harmonics;
 mod instructions;
 mod joint;
 mod light_files;
@@ -42,5 +43,6 @@ mod scheduler;
 mod shader;
 #[cfg(feature = "burn")]
 mod tensors;
+mod transfer;
 mod vectors;
 mod witness;

@@ -20,7 +20,7 @@ use skinfit_core::program::graph::Input;
 
 use self::reader::{Node, Tolerance, Vectors};
 use crate::by_rules::{Cubes, Fragments, Function, Number, Shaded, Wanted};
-use crate::{bakes, common, evaluators, lights, meshes, witness};
+use crate::{bakes, common, evaluators, harmonics, lights, meshes, witness};
 
 /// Numbers as the vectors are compared with: how each evaluator makes them, and the files' tolerance for it.
 #[track_caller]
@@ -430,6 +430,16 @@ const LEFT_OUT: [(&str, &str, &str); 13] = [
 /// Kinds that another folder of the oracle's may hold, of what is not built.
 const NOT_BUILT: [&str; 1] = ["diffusion"];
 
+/// The vectors of a kind that the oracle keeps in a folder of its own, for which another folder may have none.
+pub(crate) fn of_light<'v>(vectors: &'v Vectors, kind: &str) -> Vec<Node<'v>> {
+    let folder = common::vectors();
+    if folder != common::own_vectors() && !vectors.have(kind) {
+        common::not_checked(&format!("{} holds no vectors of {kind}", folder.display()));
+        return Vec::new();
+    }
+    vectors.of_kind(kind)
+}
+
 /// Every comparison that there is, in f64 or on the CPU, and then what of the files was never looked at.
 #[test]
 fn every_number_of_every_vector_is_compared() {
@@ -443,6 +453,7 @@ fn every_number_of_every_vector_is_compared() {
     vectors.of_kind("prefilter").iter().for_each(|file| bakes::prefilter_vector(&vectors, file));
     vectors.of_kind("vertex").iter().for_each(meshes::vertex_vector);
     lights::light_vector(&vectors.one("light"));
+    of_light(&vectors, "sh").iter().for_each(|file| harmonics::sh_vector(&vectors, file));
     witness::bench_on(&vectors, &evaluators::on_cpu()[..2]);
     witness::fit_of_the_bench(&vectors);
     witness::fragments_on(&vectors, &evaluators::on_cpu()[..2]);

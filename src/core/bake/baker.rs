@@ -4,8 +4,11 @@ use std::path::Path;
 use web_time::Instant;
 
 use super::cache::{self, Found, Key};
+use super::harmonics::Order;
+use super::interreflection::Albedo;
 use super::panorama::Radiance;
 use super::prefilter::Prefilter;
+use super::transfer::{TransferSet, VertexTransfer, bake_transfer};
 use super::{BakeStats, VertexOcclusion, occlusion};
 use crate::model::cube::Cube;
 use crate::progress;
@@ -59,14 +62,7 @@ impl Baker<'_> {
         morphs: usize,
         rays: u32,
     ) -> VertexOcclusion {
-        let mut key = Key::new("occlusion").with(&[rays]);
-        let mut vertices = 0;
-        for target in 0..=morphs {
-            let weights: Vec<f32> = (1..=morphs).map(|i| f32::from(u8::from(i == target))).collect();
-            let posed = pose(&weights);
-            key = key.with(&posed.positions).with(&posed.normals).with(posed.triangles.as_flattened());
-            vertices = posed.positions.len();
-        }
+        let (key, vertices) = posed_key(Key::new("occlusion").with(&[rays]), pose, morphs);
         let count = (1 + morphs) * vertices;
         let floats = self.through_cache("occlusion".to_owned(), "occlusion", &key, count, |_| {
             let baked = occlusion::bake_occlusion(pose, morphs, rays);
@@ -75,6 +71,51 @@ impl Baker<'_> {
         let mut sets = floats.chunks_exact(vertices.max(1)).map(<[f32]>::to_vec);
         VertexOcclusion { base: sets.next().unwrap_or_default(), morphs: sets.collect() }
     }
+
+    /// Transfer vectors, with a set for each of `morphs` targets; with an `albedo` those of bounces too.
+    pub(super) fn transfer(
+        &mut self,
+        pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+        morphs: usize,
+        rays: u32,
+        order: Order,
+        albedo: Option<&Albedo<'_>>,
+    ) -> VertexTransfer {
+        let key = Key::new("transfer").with(&[rays, order.bands() as u32, u32::from(albedo.is_some())]);
+        let (mut key, vertices) = posed_key(key, pose, morphs);
+        if let Some(albedo) = albedo {
+            key = key.with(&pose(&[]).uvs);
+            if let Some(map) = albedo.map {
+                key = key.with(&[map.width as u64, map.height as u64]).with(map.texels.as_flattened());
+            }
+        }
+        // A vertex' numbers: T, and T' for three channels.
+        let (direct, bounced) = (order.functions(), if albedo.is_some() { 3 * order.functions() } else { 0 });
+        let count = (1 + morphs) * vertices * (direct + bounced);
+        let floats = self.through_cache("transfer".to_owned(), "transfer", &key, count, |_| {
+            let baked = bake_transfer(pose, morphs, rays, order, albedo);
+            let sets = std::iter::once(baked.base).chain(baked.morphs);
+            sets.flat_map(|set| [set.direct, set.bounced.into_flattened()]).flatten().collect()
+        });
+        let size = (vertices * (direct + bounced)).max(1);
+        let mut sets = floats.chunks_exact(size).map(|set| {
+            let (direct, bounced) = set.split_at(vertices * direct);
+            TransferSet { direct: direct.to_vec(), bounced: bounced.as_chunks().0.to_vec() }
+        });
+        VertexTransfer { order, base: sets.next().unwrap_or_default(), morphs: sets.collect() }
+    }
+}
+
+/// A key with the mesh at rest and with each of `morphs` targets at weight 1, and how many vertices it has.
+fn posed_key(mut key: Key, pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: usize) -> (Key, usize) {
+    let mut vertices = 0;
+    for target in 0..=morphs {
+        let weights: Vec<f32> = (1..=morphs).map(|i| f32::from(u8::from(i == target))).collect();
+        let posed = pose(&weights);
+        key = key.with(&posed.positions).with(&posed.normals).with(posed.triangles.as_flattened());
+        vertices = posed.positions.len();
+    }
+    (key, vertices)
 }
 
 /// Bakes of one environment; what they share is made when the first asks for it.

@@ -10,9 +10,12 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 13] = [
+const SOURCES: [&str; 20] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
+    include_str!("coefficients.rs"),
+    include_str!("harmonics.rs"),
+    include_str!("interreflection.rs"),
     include_str!("lobe_kernel.rs"),
     include_str!("lobes.rs"),
     include_str!("low_discrepancy.rs"),
@@ -22,6 +25,10 @@ const SOURCES: [&str; 13] = [
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),
     include_str!("rays.rs"),
+    include_str!("shadowed.rs"),
+    include_str!("transfer.rs"),
+    include_str!("vertex_rays.rs"),
+    include_str!("wide_bvh.rs"),
     include_str!("../scene/sky_lights.rs"),
     crate::model::cube::SOURCE,
 ];

@@ -1,16 +1,22 @@
-//! What is computed once for a scene: environment to cube maps, ambient occlusion, and the cache
-//! of both. Nothing is baked that no enabled effect asks for.
+//! What is computed once for a scene: environment to cube maps, ambient occlusion, transfer vectors, and the cache
+//! of all. Nothing is baked that no enabled effect asks for.
 //!
 //! - [`panorama`]: the lat-long lookup, and panorama to cube
 //! - [`prefilter`]: the Phong-lobe filter (`pyramid`: the cells that it sums over, `lobe_kernel`:
 //!   the sum)
 //! - [`lobes`]: the stack of specular cubes over the exponent
-//! - [`occlusion`]: per-vertex ambient occlusion (`low_discrepancy`: its rays)
-//! - [`rays`]: the mesh as rays see it
+//! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions)
+//! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
+//! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
+//!   [`shadowed`]: how much
+//! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
 mod baker;
 pub mod cache;
+pub mod coefficients;
+pub mod harmonics;
+pub mod interreflection;
 mod lobe_kernel;
 pub mod lobes;
 pub(crate) mod low_discrepancy;
@@ -19,6 +25,10 @@ pub mod panorama;
 pub mod prefilter;
 mod pyramid;
 pub mod rays;
+pub mod shadowed;
+pub mod transfer;
+pub(crate) mod vertex_rays;
+mod wide_bvh;
 
 use std::ops::RangeInclusive;
 use std::path::Path;
@@ -29,7 +39,10 @@ use crate::scene::maps::Environment;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::sky_lights::sky_lights;
 use baker::{Baker, EnvironmentBaker};
+use harmonics::Order;
+use interreflection::Albedo;
 pub use lobes::LobeStack;
+use transfer::VertexTransfer;
 
 /// Everything that was baked for a scene.
 #[derive(Clone, Debug, Default)]
@@ -86,7 +99,7 @@ pub struct BakeStats {
 /// One bake.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeRow {
-    /// `irradiance`, `lobe 32`, `hilite`, `occlusion`; `environment` for what these share.
+    /// `irradiance`, `lobe 32`, `hilite`, `occlusion`, `transfer`; `environment` for what these share.
     pub name: String,
     /// Whether it came from the cache.
     pub cached: bool,
@@ -143,24 +156,59 @@ pub enum BakeError {
     },
 }
 
+/// The morph targets that the scene or its animation gives a weight.
+fn used_morphs(scene: &Scene) -> Vec<usize> {
+    let morphs = &scene.mesh.morphs;
+    (0..morphs.len()).filter(|&i| morphs[i].weight != 0.0 || morphs[i].animated).collect()
+}
+
+/// All targets' weights from those of the `used` ones.
+fn all_weights(scene: &Scene, used: &[usize], weights: &[f32]) -> Vec<f32> {
+    let mut all = vec![0.0; scene.mesh.morphs.len()];
+    used.iter().zip(weights).for_each(|(&target, &weight)| all[target] = weight);
+    all
+}
+
+/// A set for each morph target from those of the `used` ones; the others' are empty.
+fn all_sets<T: Clone + Default>(scene: &Scene, used: &[usize], baked: Vec<T>) -> Vec<T> {
+    let mut sets = vec![T::default(); scene.mesh.morphs.len()];
+    used.iter().zip(baked).for_each(|(&target, set)| sets[target] = set);
+    sets
+}
+
 /// Ambient occlusion, with a set for each morph target that the scene or its animation gives a weight.
 fn occlusion_of_used(
     scene: &Scene,
     pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
     baker: &mut Baker<'_>,
 ) -> VertexOcclusion {
-    let morphs = &scene.mesh.morphs;
-    let moved = |&i: &usize| morphs[i].weight != 0.0 || morphs[i].animated;
-    let used: Vec<usize> = (0..morphs.len()).filter(moved).collect();
-    let pose_used = |weights: &[f32]| {
-        let mut all = vec![0.0; morphs.len()];
-        used.iter().zip(weights).for_each(|(&target, &weight)| all[target] = weight);
-        pose(&all)
-    };
+    let used = used_morphs(scene);
+    let pose_used = |weights: &[f32]| pose(&all_weights(scene, &used, weights));
     let baked = baker.occlusion(&pose_used, used.len(), scene.quality.occlusion_rays);
-    let mut sets = vec![Vec::new(); morphs.len()];
-    used.iter().zip(baked.morphs).for_each(|(&target, set)| sets[target] = set);
-    VertexOcclusion { base: baked.base, morphs: sets }
+    VertexOcclusion { base: baked.base, morphs: all_sets(scene, &used, baked.morphs) }
+}
+
+/// Transfer vectors of the scene's mesh, with a set for each morph target that the scene or its animation gives a
+/// weight, by as many rays a vertex as occlusion takes. With `bounces` also those of the light that the mesh throws
+/// back, for which `pose` has to give texture coordinates where there is a colour map.
+///
+/// The bake is looked for and kept in the folder `cache`.
+#[must_use]
+pub fn bake_scene_transfer(
+    scene: &Scene,
+    pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+    order: Order,
+    bounces: bool,
+    cache: Option<&Path>,
+) -> (VertexTransfer, BakeStats) {
+    let mut baker = Baker { cache, stats: BakeStats::default() };
+    let used = used_morphs(scene);
+    let pose_used = |weights: &[f32]| pose(&all_weights(scene, &used, weights));
+    let albedo = bounces.then_some(Albedo { map: scene.maps.color.as_ref() });
+    let rays = scene.quality.occlusion_rays;
+    let baked = baker.transfer(&pose_used, used.len(), rays, order, albedo.as_ref());
+    let morphs = all_sets(scene, &used, baked.morphs);
+    (VertexTransfer { order, base: baked.base, morphs }, baker.stats)
 }
 
 /// Bake what the scene's effects ask for, and no more.

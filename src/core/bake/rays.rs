@@ -91,6 +91,17 @@ impl RayMesh {
         !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
     }
 
+    /// The hierarchy; none without triangles.
+    pub(super) fn bvh(&self) -> Option<&CwBvh> {
+        self.bvh.as_ref()
+    }
+
+    /// A triangle by its place among those that can be hit: its corners, and which one it is in the mesh.
+    pub(super) fn triangle(&self, place: u32) -> ([Vec3A; 3], u32) {
+        let Triangle { v0, v1, v2 } = self.triangles[place as usize];
+        ([v0, v1, v2], self.index[place as usize])
+    }
+
     /// Whether a triangle stands between two points, seen from either side.
     #[must_use]
     pub fn between(&self, from: Vec3A, to: Vec3A) -> bool {

@@ -11,8 +11,8 @@
 use glam::{DVec3, Vec3, Vec3A};
 
 use crate::bake::low_discrepancy::{Sobol, mix};
-use crate::bake::occlusion::{frame, offset};
 use crate::bake::rays::RayMesh;
+use crate::bake::vertex_rays::{frame, offset};
 use crate::scene::light::{Beam, Lamp, Light, LightKind};
 use crate::scene::mesh::PosedMesh;
 

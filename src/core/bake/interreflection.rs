@@ -1,0 +1,122 @@
+//! Light that the mesh throws back, as transfer vectors (MODEL 10, `gathered`).
+//!
+//! A ray that meets the mesh brings the albedo there times the light there: T'_lm = sum over such rays of their share
+//! times albedo times T_lm of the place, in two rounds: K (T + K T), K the gather over all vertices.
+
+use glam::Vec3A;
+use rayon::prelude::*;
+
+use super::vertex_rays::{Found, Rays, VertexRays};
+use super::wide_bvh::{NOTHING, WideBvh};
+use crate::scene::maps::Map;
+use crate::scene::mesh::PosedMesh;
+
+/// What share of light the surface throws back.
+#[derive(Clone, Copy, Debug)]
+pub struct Albedo<'a> {
+    /// The colour map, linear; without one everything is white.
+    pub map: Option<&'a Map<3>>,
+}
+
+/// The nearest triangle along a ray, by its index in the mesh, or [`NOTHING`].
+pub(super) type Nearest = u32;
+
+impl Found for Nearest {
+    fn along(mesh: &WideBvh, rays: &Rays) -> Vec<Self> {
+        mesh.first(rays.origin, &rays.directions)
+    }
+}
+
+/// What a vertex gathers: of which vertices (by slot) what share of their light, rgb.
+pub(super) struct Gather(Vec<(u32, [f32; 3])>);
+
+impl Gather {
+    /// By the triangles that its rays found. Those that are met from behind bring nothing: no light is known there.
+    pub(super) fn of(
+        vertices: &VertexRays,
+        pose: &PosedMesh,
+        rays: &Rays,
+        found: &[Nearest],
+        albedo: &Albedo<'_>,
+    ) -> Self {
+        let share = 1.0 / found.len().max(1) as f32;
+        let mut gathered: Vec<(u32, [f32; 3])> = Vec::new();
+        for (&d, &triangle) in rays.directions.iter().zip(found).filter(|(_, found)| **found != NOTHING) {
+            let corners = pose.triangles[triangle as usize];
+            let Some(weights) = weights(rays.origin, d, corners.map(|i| pose.positions[i as usize].into()))
+            else {
+                continue;
+            };
+            let normals = corners.map(|i| Vec3A::from(pose.normals[i as usize]));
+            if (0..3).map(|k| weights[k] * normals[k]).sum::<Vec3A>().dot(d) >= 0.0 {
+                continue;
+            }
+            let albedo = albedo.at(pose, corners, weights);
+            for (corner, weight) in corners.into_iter().zip(weights) {
+                gathered.push((vertices.slot(corner), albedo.map(|albedo| albedo * weight * share)));
+            }
+        }
+        // Stable, so that sums have one order.
+        gathered.sort_by_key(|&(slot, _)| slot);
+        gathered.dedup_by(|next, sum| {
+            let same = next.0 == sum.0;
+            if same {
+                (0..3).for_each(|c| sum.1[c] += next.1[c]);
+            }
+            same
+        });
+        gathered.shrink_to_fit();
+        Self(gathered)
+    }
+
+    /// Two rounds of every vertex' gather, from `direct` of `width` numbers a slot. All cores.
+    pub(super) fn twice(gathers: &[Self], direct: &[f32], width: usize) -> Vec<[f32; 3]> {
+        let source: Vec<f32> =
+            direct.chunks_exact(width).flat_map(|t| [t, t, t]).flatten().copied().collect();
+        let first = Self::once(gathers, &source, width);
+        let both: Vec<f32> = source.iter().zip(&first).map(|(source, first)| source + first).collect();
+        let bounced = Self::once(gathers, &both, width);
+        let rgb = |planes: &[f32]| -> Vec<[f32; 3]> {
+            (0..width).map(|i| [0, 1, 2].map(|c| planes[c * width + i])).collect()
+        };
+        bounced.chunks_exact(3 * width).flat_map(rgb).collect()
+    }
+
+    /// One round: a slot's numbers are those of red, of green, of blue.
+    fn once(gathers: &[Self], source: &[f32], width: usize) -> Vec<f32> {
+        let mut sums = vec![0.0; gathers.len() * 3 * width];
+        sums.par_chunks_exact_mut(3 * width).zip(gathers).for_each(|(sum, gather)| {
+            for &(slot, share) in &gather.0 {
+                let source = &source[slot as usize * 3 * width..][..3 * width];
+                for ((sum, source), share) in
+                    sum.chunks_exact_mut(width).zip(source.chunks_exact(width)).zip(share)
+                {
+                    sum.iter_mut().zip(source).for_each(|(sum, source)| *sum += share * source);
+                }
+            }
+        });
+        sums
+    }
+}
+
+impl Albedo<'_> {
+    /// At a place of a triangle, by its corners' weights.
+    fn at(&self, pose: &PosedMesh, corners: [u32; 3], weights: [f32; 3]) -> [f32; 3] {
+        match self.map {
+            Some(map) if !map.texels.is_empty() && !pose.uvs.is_empty() => {
+                let uv = (0..3).map(|k| weights[k] * pose.uvs[corners[k] as usize]).sum::<glam::Vec2>();
+                map.sample(uv.x, uv.y)
+            }
+            _ => [1.0; 3],
+        }
+    }
+}
+
+/// How much each corner counts where a ray meets a triangle; none where rounding leaves no area.
+fn weights(origin: Vec3A, d: Vec3A, corners: [Vec3A; 3]) -> Option<[f32; 3]> {
+    let [a, b, c] = corners.map(|corner| corner - origin);
+    let parts = [b.cross(c), c.cross(a), a.cross(b)].map(|edge| d.dot(edge));
+    let whole = parts[0] + parts[1] + parts[2];
+    let weights = parts.map(|part| (part / whole).clamp(0.0, 1.0));
+    weights.iter().all(|weight| weight.is_finite()).then_some(weights)
+}

@@ -1,0 +1,219 @@
+//! Transfer vectors and the environment's coefficients put together: the light that arrives at each vertex (MODEL 10).
+//!
+//! A turn of the environment by r multiplies what goes with the azimuthal order m by cos(m r) and sin(m r). So a
+//! vertex' light at every turn is sum over m of cos(m r) P_m + sin(m r) Q_m, with P and Q made once.
+
+use super::coefficients::Coefficients;
+use super::harmonics::Order;
+
+/// The least that open light counts as, as a share of the mean radiance, where shadowed light is divided by it.
+const LEAST: f64 = 1e-4;
+
+/// A number of a transfer vector: of all channels alike, or rgb.
+pub trait Share: Copy + Sync {
+    /// As rgb.
+    fn rgb(self) -> [f64; 3];
+}
+
+impl Share for f32 {
+    fn rgb(self) -> [f64; 3] {
+        [f64::from(self); 3]
+    }
+}
+
+impl Share for f64 {
+    fn rgb(self) -> [f64; 3] {
+        [self; 3]
+    }
+}
+
+impl Share for [f32; 3] {
+    fn rgb(self) -> [f64; 3] {
+        self.map(f64::from)
+    }
+}
+
+/// Irradiance over pi of one vertex for every turn of the light, rgb; not floored at 0.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Turning {
+    /// P_m for m = 0 .. 5, of the order's bands.
+    pub cosines: [[f64; 3]; 6],
+    /// Q_m; Q_0 is 0.
+    pub sines: [[f64; 3]; 6],
+}
+
+impl Turning {
+    /// What arrives of `light` through a transfer vector, over the bands that both have.
+    #[must_use]
+    pub fn of<T: Share>(transfer: &[T], light: &Coefficients) -> Self {
+        let mut turning = Self::default();
+        for ((l, m), (share, _)) in light.order().of_each().zip(transfer.iter().zip(light.rgb())) {
+            let order = m.unsigned_abs() as usize;
+            // The partner of -m, m.
+            let own = light.rgb()[(l * l + l).wrapping_add_signed(m as isize)];
+            let other = light.rgb()[(l * l + l).wrapping_add_signed(-m as isize)];
+            // cos(m r) c - sin(m r) s with m > 0, cos(m r) s + sin(m r) c with m < 0.
+            let sign = f64::from(-m.signum());
+            for (c, share) in share.rgb().into_iter().enumerate() {
+                turning.cosines[order][c] += share * own[c];
+                turning.sines[order][c] += sign * share * other[c];
+            }
+        }
+        turning
+    }
+
+    /// At a turn about +Y.
+    #[must_use]
+    pub fn at(&self, radians: f64) -> [f64; 3] {
+        self.sum(|m| {
+            let (sine, cosine) = (m * radians).sin_cos();
+            [cosine, sine]
+        })
+    }
+
+    /// The derivative of [`Self::at`] by the angle.
+    #[must_use]
+    pub fn slope(&self, radians: f64) -> [f64; 3] {
+        self.sum(|m| {
+            let (sine, cosine) = (m * radians).sin_cos();
+            [-m * sine, m * cosine]
+        })
+    }
+
+    fn sum(&self, wave: impl Fn(f64) -> [f64; 2]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        for (m, (p, q)) in self.cosines.iter().zip(&self.sines).enumerate() {
+            let [cosine, sine] = wave(m as f64);
+            (0..3).for_each(|c| sum[c] += cosine * p[c] + sine * q[c]);
+        }
+        sum
+    }
+}
+
+/// [`Turning`] of each vertex, of transfer vectors of `order` one after another.
+#[must_use]
+pub fn by_azimuth<T: Share>(transfer: &[T], order: Order, light: &Coefficients) -> Vec<Turning> {
+    let light = light.truncated(order);
+    transfer.chunks_exact(order.functions()).map(|transfer| Turning::of(transfer, &light)).collect()
+}
+
+/// Irradiance over pi of each vertex under `light` turned by an angle about +Y, rgb, floored at 0.
+#[must_use]
+pub fn shadowed_irradiance<T: Share>(
+    transfer: &[T],
+    order: Order,
+    light: &Coefficients,
+    radians: f64,
+) -> Vec<[f32; 3]> {
+    let floored = |turning: Turning| turning.at(radians).map(|x| x.max(0.0) as f32);
+    by_azimuth(transfer, order, light).into_iter().map(floored).collect()
+}
+
+/// How much of the open light arrives, a channel, and its derivative by the turn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ratio {
+    /// The ratio, 1 where `transfer` is `open` to the bit and the light above the least that is counted.
+    pub value: [f64; 3],
+    /// Its derivative by the angle; 0 where shadowed light is floored.
+    pub slope: [f64; 3],
+}
+
+/// max(0, sum T L) / max(sum T_open L, 1e-4 M), M the mean radiance; 0 where M is not above 0.
+///
+/// `transfer` and `open` are split by [`Turning`]; `mean` is [`Coefficients::mean`] of the same light.
+#[must_use]
+pub fn shadow_ratio(shadowed: &Turning, open: &Turning, mean: [f64; 3], radians: f64) -> Ratio {
+    let [(s, ds), (u, du)] = [shadowed, open].map(|light| (light.at(radians), light.slope(radians)));
+    let mut ratio = Ratio { value: [0.0; 3], slope: [0.0; 3] };
+    for c in 0..3 {
+        let least = LEAST * mean[c];
+        if mean[c] > 0.0 && s[c] > 0.0 {
+            let (by, slope) = if u[c] > least { (u[c], du[c]) } else { (least, 0.0) };
+            ratio.value[c] = s[c] / by;
+            ratio.slope[c] = (ds[c] - ratio.value[c] * slope) / by;
+        }
+    }
+    ratio
+}
+
+/// The light that an occlusion lets through once the surface throws it back at itself (Jimenez et al. 2016,
+/// *Practical Real-Time Strategies for Accurate Indirect Occlusion*), a channel, and its derivatives by occlusion and by
+/// albedo: the cheap choice beside gathered bounces. Where both branches are equal, as for occlusion 0, the derivatives
+/// are those from above.
+#[must_use]
+pub fn bounce_polynomial(open: f64, albedo: f64) -> [f64; 3] {
+    let [a, b, c] =
+        [[2.0404, -0.3324], [-4.7951, 0.6417], [2.7552, 0.6903]].map(|[by, plus]| by * albedo + plus);
+    let value = ((open * a + b) * open + c) * open;
+    let by_open = (3.0 * open * a + 2.0 * b) * open + c;
+    if value > open || (value == open && by_open > 1.0) {
+        let by_albedo = ((2.0404 * open - 4.7951) * open + 2.7552) * open;
+        return [value, by_open, by_albedo];
+    }
+    [open, 1.0, 0.0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::harmonics::open_transfer;
+
+    fn light() -> Coefficients {
+        let numbers = (0..36_u8).map(|i| f64::from(i).sin());
+        let rgb = numbers.enumerate().map(|(i, x)| [x, 0.5 * x, if i == 0 { 0.0 } else { -x }]).collect();
+        Coefficients::new(Order::MOST, rgb)
+    }
+
+    #[test]
+    fn a_split_light_is_the_light_turned_and_its_slope_that_of_the_turned_coefficients() {
+        let transfer: Vec<f64> = (0..36_u8).map(|i| (2.0 * f64::from(i)).cos()).collect();
+        let light = light();
+        let turning = Turning::of(&transfer, &light);
+        for angle in [0.0, 0.7, -3.0, 12.0] {
+            for (got, want) in [
+                (turning.at(angle), light.turned(angle).through(&transfer)),
+                (turning.slope(angle), light.turning(angle).through(&transfer)),
+            ] {
+                // Roundings of sums of 36 numbers of up to 5.
+                assert!((0..3).all(|c| (got[c] - want[c]).abs() < 1e-12), "{angle}: {got:?} {want:?}");
+            }
+        }
+        // rgb transfer is three transfers; a lower order takes the first bands of the light.
+        let order = Order::new(3).unwrap();
+        let rgb: Vec<[f32; 3]> = transfer[..9].iter().map(|&t| [t as f32, 0.0, 2.0 * t as f32]).collect();
+        let single: Vec<f32> = rgb.iter().map(|t| t[0]).collect();
+        let [rgb, single] = [by_azimuth(&rgb, order, &light), by_azimuth(&single, order, &light)];
+        assert_eq!((rgb.len(), single.len()), (1, 1));
+        let [rgb, single] = [rgb[0].at(1.0), single[0].at(1.0)];
+        assert!(rgb[0] == single[0] && rgb[1] == 0.0 && (rgb[2] - 2.0 * single[2]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn open_is_exactly_1_and_a_slope_is_that_of_finite_differences() {
+        let light = Coefficients::new(Order::MOST, {
+            let mut rgb = light().rgb().to_vec();
+            rgb[0] = [9.0, 8.0, -1.0];
+            rgb
+        });
+        let open = Turning::of(&open_transfer(Order::MOST, [0.36, 0.48, 0.8]), &light);
+        let shadowed: Vec<f64> =
+            open_transfer(Order::MOST, [0.8, -0.36, 0.48]).iter().map(|t| 0.6 * t).collect();
+        let shadowed = Turning::of(&shadowed, &light);
+        for angle in [0.0, 1.3, -2.0] {
+            let same = shadow_ratio(&open, &open, light.mean(), angle);
+            // The third channel has no mean light.
+            assert_eq!((same.value, same.slope[2]), ([1.0, 1.0, 0.0], 0.0));
+            let at = |angle: f64| shadow_ratio(&shadowed, &open, light.mean(), angle);
+            let (step, ratio) = (1e-6, at(angle));
+            for c in 0..3 {
+                let slope = (at(angle + step).value[c] - at(angle - step).value[c]) / (2.0 * step);
+                // Roundings of 1e-15 over a step, and third derivatives times its square.
+                assert!((slope - ratio.slope[c]).abs() < 1e-8, "{angle}: {slope} {ratio:?}");
+            }
+            assert!((0..2).all(|c| ratio.value[c] > 0.1));
+        }
+        let black = Coefficients::new(Order::MOST, Vec::new());
+        let dark = Turning::of(&[1.0_f32; 36], &black);
+        assert_eq!(shadow_ratio(&dark, &dark, black.mean(), 0.5), Ratio { value: [0.0; 3], slope: [0.0; 3] });
+    }
+}
