@@ -10,7 +10,7 @@ use skinfit::bake::harmonics::{Order, basis, cosine_lobe, open_transfer};
 use skinfit::bake::shadowed::{Turning, bounce_polynomial, shadow_ratio};
 use skinfit::bake::transfer::bake_transfer;
 use skinfit::model::cube::{Cube, face_direction};
-use skinfit::scene::maps::{Environment, Map};
+use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::mesh::PosedMesh;
 
 use crate::common;
@@ -67,7 +67,7 @@ impl Light {
             sum.map(|x| (x / (sub * sub) as f64) as f32)
         };
         let texels = (0..width * height).map(texel).collect();
-        Environment { panorama: Map { width, height, texels }, rotation_degrees: 0.0, intensity: 1.0 }
+        Environment { panorama: Map { width, height, texels }, rotation_degrees: 0.0, intensity: 1.0, spots: Spots::default() }
     }
 
     /// The texel along `d`: that whose place on its face is nearest, of the face whose axis is.

@@ -13,7 +13,7 @@ use skinfit::bake::occlusion::bake_occlusion;
 use skinfit::bake::shadowed::shadowed_irradiance;
 use skinfit::bake::transfer::{VertexTransfer, bake_transfer};
 use skinfit::model::effects::Effects;
-use skinfit::scene::maps::{Environment, Map};
+use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::mesh::{Morph, PosedMesh};
 
 use crate::fixtures::bare_scene;
@@ -63,6 +63,7 @@ fn a_convex_shape_has_the_transfer_of_its_normals_and_is_lit_as_in_the_open() {
         panorama: Map { width: 4, height: 2, texels: vec![[1.0, 0.25, 4.0]; 8] },
         rotation_degrees: 10.0,
         intensity: 1.0,
+        spots: Spots::default(),
     };
     for order in orders() {
         let baked = bake_transfer(&|_| mesh.clone(), 0, 64, order, Some(&WHITE));
