@@ -358,10 +358,10 @@ mod over_stored_texels {
     use skinfit::bake::VertexOcclusion;
     use skinfit::bake::rays::RayMesh;
     use skinfit::engine::cpu::CpuEngine;
+    use skinfit::engine::cubes_at::CubesAt;
     use skinfit::engine::gpu::{GpuEngine, Memory};
     use skinfit::engine::levels::LevelMaker;
     use skinfit::engine::reference::{Reference, deviation};
-    use skinfit::engine::rules::CubesAt;
     use skinfit::engine::view::ObservedView;
     use skinfit::engine::{Objective, Point, Task, Unknown};
     use skinfit::fit::{FitOptions, fit};

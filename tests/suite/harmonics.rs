@@ -67,7 +67,12 @@ impl Light {
             sum.map(|x| (x / (sub * sub) as f64) as f32)
         };
         let texels = (0..width * height).map(texel).collect();
-        Environment { panorama: Map { width, height, texels }, rotation_degrees: 0.0, intensity: 1.0, spots: Spots::default() }
+        Environment {
+            panorama: Map { width, height, texels },
+            rotation_degrees: 0.0,
+            intensity: 1.0,
+            spots: Spots::default(),
+        }
     }
 
     /// The texel along `d`: that whose place on its face is nearest, of the face whose axis is.

@@ -12,6 +12,7 @@
 
 mod corners;
 pub mod cpu;
+pub mod cubes_at;
 mod gram;
 pub mod joint;
 pub mod lanes;

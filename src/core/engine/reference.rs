@@ -3,8 +3,9 @@
 
 use rayon::prelude::*;
 
+use super::cubes_at::CubesAt;
 use super::residual::Residuals;
-use super::rules::{CubesAt, Loads, Registers, SampleSteps, Setting, sample_facts};
+use super::rules::{Loads, Registers, SampleSteps, Setting, sample_facts};
 use super::view::ObservedView;
 use super::{HALF_UNIT, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;

@@ -2,7 +2,7 @@
 //! the kinds of numbers that they are computed in. The formulas themselves are the rules' (`shader/rules`).
 //!
 //! - [`params`]: the one table of parameters
-//! - [`effects`]: what can be switched on, and what each effect asks for; [`terms`]: parts of the sum
+//! - [`readings`]: how the paper is read; [`effects`]: what can be switched on, and what each effect asks for; [`terms`]: parts of the sum
 //! - [`fields`]: numbers of vertices that rules read by name
 //! - [`registry`]: how tables of parameters, effects, terms and fields grow
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands;
@@ -24,6 +24,7 @@ pub mod formats;
 pub mod fragment;
 pub mod key_light;
 pub mod params;
+pub mod readings;
 pub mod real;
 pub mod registry;
 pub mod terms;

@@ -4,7 +4,8 @@ use rayon::prelude::*;
 
 use super::image::Image;
 use crate::bake::Illumination;
-use crate::engine::rules::{CubesAt, Loads, Registers, SampleSteps, Setting, sample_facts};
+use crate::engine::cubes_at::CubesAt;
+use crate::engine::rules::{Loads, Registers, SampleSteps, Setting, sample_facts};
 use crate::model::effects::Form;
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};

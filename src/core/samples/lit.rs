@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::posed::Supply;
+use super::supply::Supply;
 use super::trace::Hit;
 use super::visibility::Shadows;
 use crate::bake::rays::RayMesh;

@@ -7,7 +7,7 @@
 //! samples) cost no padding inside.
 //!
 //! - `trace`: primary rays, and what they hit
-//! - `posed`: the mesh in a pose with what is baked of it; `lit`: what reaches samples of lights; `surface`: frames, silhouette and maps at a hit
+//! - `posed`: the mesh in a pose with what is baked of it; `supply`: what finds fields of samples, `lit`: what reaches them of lights; `surface`: frames, silhouette and maps at a hit
 //! - `group`: samples packed into groups
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
@@ -22,6 +22,7 @@ mod group;
 mod lit;
 mod posed;
 pub mod rows;
+mod supply;
 mod surface;
 pub mod surface_records;
 pub mod targets;

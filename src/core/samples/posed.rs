@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::supply::Supply;
 use super::trace::Hit;
 use super::{SampleError, lit, posed_occlusion};
 use crate::bake::VertexOcclusion;
@@ -15,12 +16,6 @@ use crate::scene::mesh::{Morph, PosedMesh};
 pub struct SurfaceBakes<'a> {
     /// Ambient occlusion, when asked for.
     pub occlusion: Option<&'a VertexOcclusion>,
-}
-
-/// What finds a field of samples at any point of the mesh.
-pub(super) trait Supply: Sync {
-    /// The field's numbers there.
-    fn find(&self, hit: Hit, numbers: &mut [f32]);
 }
 
 /// A mesh in one pose, with its vertices' numbers and what finds others at any of its points.

@@ -1,5 +1,8 @@
 //! The effect that each light of a scene is: a term of its own, and its numbers as parameters.
 
+use std::path::Path;
+
+use super::animation::Pose;
 use super::error::{SceneError, Warnings};
 use super::file::{SceneFile, Source};
 use super::gltf::Document;
@@ -68,6 +71,17 @@ impl Lights {
             SceneError::new(&source.path, error.problem.to_string(), remedy)
         };
         Ok(Self { own, spots, terms: terms.map_err(taken)? })
+    }
+
+    /// Those of a scene file, for what reads nothing else of its files: of the mesh file, where it names some.
+    ///
+    /// # Errors
+    /// As of [`Self::read`].
+    pub(super) fn of_file(source: &Source, file: &SceneFile) -> Result<Self, SceneError> {
+        let folder = source.path.parent().unwrap_or(Path::new(""));
+        let document = file.mesh.lights.then(|| Document::open(&folder.join(&file.mesh.file))).transpose()?;
+        let time = Pose::check(source, file)?.time();
+        Self::read(source, file, document.as_ref().map(|document| (document, time)), &mut Warnings::new())
     }
 
     /// Those effects, and each light's where lights are on.

@@ -280,14 +280,6 @@ fn read_dapple(source: &Source, file: &SceneFile) -> Result<Dapple, SceneError> 
     dapple(source, table.dapple.as_ref(), degrees)
 }
 
-/// The lights of a scene file, for what reads nothing else of its files: of the mesh file, where it names some.
-pub(super) fn read_lights(source: &Source, file: &SceneFile) -> Result<Lights, SceneError> {
-    let folder = source.path.parent().unwrap_or(Path::new(""));
-    let document = file.mesh.lights.then(|| Document::open(&folder.join(&file.mesh.file))).transpose()?;
-    let time = Pose::check(source, file)?.time();
-    Lights::read(source, file, document.as_ref().map(|document| (document, time)), &mut Warnings::new())
-}
-
 /// Refuse the text of a scene file for whatever [`Scene::load`] would refuse before it reads another file than those of
 /// its terms.
 pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
@@ -295,7 +287,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let file: SceneFile = source.parse()?;
     let terms = terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))?;
     let (form, _) = settings::form(&source, &file.model)?;
-    let lights = read_lights(&source, &file)?;
+    let lights = Lights::of_file(&source, &file)?;
     settings::params(&source, &file.model.params, form)?;
     settings::lookups(&source, &file.model)?;
     cameras::plan(&source, &file.view)?;

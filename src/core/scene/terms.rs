@@ -6,7 +6,7 @@ use toml::Spanned;
 
 use super::error::{SceneError, read_bytes};
 use super::file::{FamilyTable, ModelTable, SceneFile, Source, TermValue};
-use super::load::read_lights;
+use super::lit::Lights;
 use crate::model::registry::leaked;
 use crate::shader::term::{MEMBER, Term, register};
 
@@ -22,7 +22,7 @@ pub fn register_terms(path: &Path) -> Result<Vec<&'static Term>, SceneError> {
     let source = Source::read(path)?;
     let file: SceneFile = source.parse()?;
     // Lights are terms that the library brings along.
-    read_lights(&source, &file)?;
+    Lights::of_file(&source, &file)?;
     terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))
 }
 

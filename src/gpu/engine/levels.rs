@@ -7,8 +7,8 @@ use crate::model::params::Params;
 use crate::model::terms::TermName;
 use crate::samples::rows::Row;
 use crate::{Gpu, GpuError};
+use skinfit_core::engine::cubes_at::CubesAt;
 use skinfit_core::engine::levels::LevelMaker;
-use skinfit_core::engine::rules::CubesAt;
 use skinfit_core::engine::view::ObservedView;
 use skinfit_core::program::levels::LevelProgram;
 

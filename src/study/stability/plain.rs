@@ -6,7 +6,7 @@ use super::case::{Batch, FragmentInputs, VertexInputs};
 use super::evaluate::{Answer, Evaluator, Frame, Scalar};
 use super::lights::LightBox;
 use super::rules::Rules;
-use crate::engine::rules::CubesAt;
+use crate::engine::cubes_at::CubesAt;
 use crate::model::vertex::deform;
 
 /// The model, one fragment after the other.

@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use super::evaluate::{Rgba, Scalar, Slopes};
 use crate::bake::Illumination;
-use crate::engine::rules::{CubesAt, sample_facts};
+use crate::engine::cubes_at::CubesAt;
+use crate::engine::rules::sample_facts;
 use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;

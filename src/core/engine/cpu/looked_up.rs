@@ -5,7 +5,7 @@ use std::sync::{Arc, PoisonError};
 use super::CpuEngine;
 use super::pass::Pass;
 use crate::engine::Point;
-use crate::engine::rules::CubesAt;
+use crate::engine::cubes_at::CubesAt;
 use crate::samples::rows::Row;
 
 /// What samples look up of the UV atlas, and what that was made with.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::{LevelMaker, Levels, Number};
-use crate::engine::rules::CubesAt;
+use crate::engine::cubes_at::CubesAt;
 use crate::model::params::Params;
 use crate::samples::{Atlas, LANES, ViewSamples};
 

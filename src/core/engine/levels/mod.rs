@@ -20,7 +20,7 @@ use fearless_simd::Level as Instructions;
 use rayon::prelude::*;
 
 use self::blur::blurred;
-use super::rules::{CubesAt, Sixteen};
+use super::cubes_at::{CubesAt, Sixteen};
 use crate::model::batch::Batch;
 use crate::model::effects::Effects;
 use crate::model::params::{Param, Params};

@@ -1,0 +1,9 @@
+//! What finds numbers of samples that no vertex has.
+
+use super::trace::Hit;
+
+/// What finds a field of samples at any point of the mesh.
+pub(super) trait Supply: Sync {
+    /// The field's numbers there.
+    fn find(&self, hit: Hit, numbers: &mut [f32]);
+}
