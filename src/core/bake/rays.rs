@@ -59,7 +59,8 @@ fn kept(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
 /// A ray from `least` on. For a component near 0, `Ray::new` takes that of a slope of 1e-7, which
 /// leaves a box whose face the ray runs in: where a mirror-symmetric mesh is seen from its plane.
 fn ray(origin: Vec3A, direction: Vec3A, least: f32) -> Ray {
-    let inverse = |x: f32| if x.abs() < 1e-20 { 1e20_f32.copysign(x) } else { 1.0 / x };
+    // The traversal takes -0 for a positive number: its inverse must be one, too.
+    let inverse = |x: f32| if x.abs() < 1e-20 { 1e20_f32.copysign(x + 0.0) } else { 1.0 / x };
     let inv_direction = Vec3A::from(direction.to_array().map(inverse));
     Ray { origin, direction, inv_direction, tmin: least, tmax: f32::INFINITY }
 }
@@ -188,6 +189,17 @@ mod tests {
                     },
                 );
             assert_eq!(found, Some(MANY as u32), "{hidden:?}");
+        }
+    }
+
+    #[test]
+    fn zeros_of_either_sign_are_one_direction() {
+        let (positions, triangles) = before_the_last(across(1.0), 1);
+        let mesh = RayMesh::new(&positions, &triangles);
+        for (x, y) in [(0.0, 0.0), (-0.0, 0.0), (0.0, -0.0), (-0.0, -0.0)] {
+            let direction = Vec3A::new(x, y, 1.0);
+            assert!(mesh.hits(Vec3A::new(0.01, -0.02, 0.0), direction, 0.0), "{direction}");
+            assert!(mesh.hits(Vec3A::new(0.01, -0.02, 3.0), -direction, 0.0), "{direction}");
         }
     }
 

@@ -76,7 +76,9 @@ fn a_coarse_sphere_is_lit_wherever_its_smooth_normal_faces_the_light() {
                 facing += 1;
                 turned_away += u32::from(flat.dot(towards) < 0.0);
                 assert_eq!(visible, 1.0, "{place:?} {normal}");
-            } else if normal.dot(towards) < -0.3 {
+            } else if normal.dot(towards) < -0.4 {
+                // Rays start up to 3% outside the sphere, and a ball of 0.96 fits into the triangles: 22 degrees below
+                // the horizon every ray meets it.
                 assert_eq!(visible, 0.0, "{place:?} {normal}");
             }
         }
