@@ -110,7 +110,7 @@ fn refusals_of_lights_say_where_what_and_what_to_do() {
             "\"key\"",
             "\"key light\"",
             1,
-            &["\"key light\" cannot be part of a parameter's name", "digits and `_`"],
+            &["\"key light\" cannot be part of a parameter's name", "digits and single `_`"],
         ),
         (KEY, "\"key\"", "\"1st\"", 1, &["\"1st\"", "beginning with a letter"]),
         (KEY, "\"key\"", "\"\"", 1, &["cannot be part"]),

@@ -58,7 +58,7 @@ fn ratios(image: &Image, target: &Target) -> Vec<f64> {
 /// The image is the target but for its pixel filter, which shows at shadows' edges and silhouettes.
 fn assert_calibrated(name: &str, image: &Image, target: &Target) {
     let ratios = ratios(image, target);
-    assert!(ratios.len() > 10_000, "{name}: {} pixels", ratios.len());
+    assert!(ratios.len() > 5_000, "{name}: {} pixels", ratios.len());
     let at = |share: f64| quantile(&ratios, share);
     // The path tracer's own figures beside closed forms are 0.9996 to 1.0001 in the middle and 1% at the terminator.
     assert!((at(0.5) - 1.0).abs() < 1e-3, "{name}: median {}", at(0.5));
@@ -102,7 +102,7 @@ fn a_lamps_colour_is_fitted_on_both_engines() {
 fn quad(effects: &str, environment: &str) -> SceneFolder {
     let folder = SceneFolder::new();
     // A sky of 0.2 with a sun of a few texels.
-    let sun = |i: usize| (20..23).contains(&(i / 256)) && (180..183).contains(&(i % 256));
+    let sun = |i: usize| (20..23).contains(&(i / 256)) && (20..23).contains(&(i % 256));
     folder.write(
         "env.exr",
         &exr(256, 128, &["R", "G", "B"], |c, i| if sun(i) { 300.0 + c as f32 } else { 0.2 }),
@@ -206,9 +206,8 @@ fn the_renderer_draws_what_the_processor_does() {
     let camera = baked.scene.views[0].camera;
     let got = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
     for (i, (got, want)) in got.rgb.iter().zip(&want.rgb).enumerate() {
-        // A lamp's direction and distance are interpolated between the quad's four corners there: what a renderer does
-        // with meshes this coarse. The others agree to roundings.
-        assert!((0..3).all(|c| (got[c] - want[c]).abs() < 0.2 * want[c] + 1e-3), "{i}: {got:?} {want:?}");
+        // The processor interpolates in f64, the adapter in f32, and the quad's tangents vary.
+        assert!((0..3).all(|c| (got[c] - want[c]).abs() < 1e-4 * want[c] + 1e-5), "{i}: {got:?} {want:?}");
     }
 }
 

@@ -68,7 +68,8 @@ pub(super) fn supplies<'a>(
         let fields = match light.kind {
             LightKind::Directional(_) => vec![("open", What::Open)],
             LightKind::Point(_) | LightKind::Spot(..) => {
-                vec![("toward", What::Toward), ("arriving", What::Arriving { shadows: shadowed })]
+                let arriving = What::Arriving { shadows: shadowed };
+                vec![("found_toward", What::Toward), ("found_arriving", arriving), ("open", What::Open)]
             }
         };
         for (name, what) in fields {

@@ -107,6 +107,20 @@ pub(super) fn set(light: &Light, params: &mut Params, given: impl Fn(&str) -> bo
         }
     };
     set("irradiance", light.strength());
+    if let LightKind::Point(lamp) | LightKind::Spot(lamp, _) = &light.kind {
+        set("position", lamp.position.to_array());
+        set("range", [lamp.range.unwrap_or(0.0); 3]);
+        let (axis, [inner, outer]) = match &light.kind {
+            LightKind::Spot(_, cone) => {
+                let cosine = |degrees: f64| degrees.to_radians().cos();
+                (cone.direction.to_array(), [cosine(cone.inner_degrees), cosine(cone.outer_degrees)])
+            }
+            // No cosine is below -1: a point shines everywhere.
+            _ => ([0.0; 3], [-1.0, -2.0]),
+        };
+        set("axis", axis);
+        set("cone", [inner, outer, 0.0]);
+    }
     if let Some(bearing) = light.bearing() {
         set("azimuth", [bearing.azimuth; 3]);
         set("elevation", [bearing.elevation; 3]);

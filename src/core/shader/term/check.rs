@@ -4,9 +4,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::declaration::Declaration;
 use super::error::{Problem, TermError};
-use super::terms;
 use super::texels::LEVEL_TYPES;
 use super::there::{is_uniform, there};
+use super::{Origin, terms};
 use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
@@ -78,7 +78,7 @@ fn is_made(name: &str) -> bool {
 }
 
 /// The declaration, where it fits.
-pub(super) fn checked(declaration: Declaration) -> Result<Declaration, TermError> {
+pub(super) fn checked(origin: Origin, declaration: Declaration) -> Result<Declaration, TermError> {
     names(&declaration)?;
     adds(&declaration.rules)?;
     for rule in &declaration.rules {
@@ -86,7 +86,7 @@ pub(super) fn checked(declaration: Declaration) -> Result<Declaration, TermError
     }
     types(&declaration)?;
     circles(&declaration.rules)?;
-    there(&declaration)?;
+    there(origin, &declaration)?;
     Ok(declaration)
 }
 

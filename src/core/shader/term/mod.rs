@@ -128,7 +128,7 @@ pub(crate) fn register_from(origin: Origin, name: &str, text: &str) -> Result<&'
     if let Some((line, field)) = own.filter(|_| origin == Origin::File) {
         return Err(Problem::Unfound(field.name.to_owned()).at(*line));
     }
-    let declaration = check::checked(declaration)?;
+    let declaration = check::checked(origin, declaration)?;
     wgsl::check(&declaration.rules)?;
     enter(declaration, text)
 }

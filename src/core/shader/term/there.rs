@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use super::Origin;
 use super::declaration::Declaration;
 use super::error::{Problem, TermError};
 use crate::model::params::Param;
@@ -69,14 +70,16 @@ fn is_constant(name: &str) -> bool {
 }
 
 /// Everything that the rules need is there, for fragments and for samples, or for texels; every parameter is needed.
-pub(super) fn there(declaration: &Declaration) -> Result<(), TermError> {
+pub(super) fn there(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
     let parameters =
         declaration.parameters.iter().map(|(line, parameter)| (*line, parameter.identifier, parameter.name));
     let fields = declaration.fields.iter().map(|(line, field)| (*line, field.name, field.name));
     let declared: Vec<(usize, &str, &str)> = parameters.chain(fields).collect();
     let own: BTreeSet<&str> = declared.iter().map(|(_, identifier, _)| *identifier).collect();
     let (samples, texels) = (of_samples(&RULES.iter()), of_texels());
-    for rule in &declaration.rules {
+    // The library's own may have rules for rasterised fragments beside those for samples.
+    let for_both = |rule: &&Rule| origin == Origin::File || !rule.when.contains(&"raster");
+    for rule in declaration.rules.iter().filter(for_both) {
         let there = if rule.domain == Domain::Texel { &texels } else { &samples };
         for &(need, _) in &rule.needs {
             let mut givers = declaration.rules.iter().filter(|giver| giver.gives_quantity(need)).peekable();
