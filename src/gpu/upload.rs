@@ -14,13 +14,14 @@ use super::device::Gpu;
 use super::error::{GpuError, Oversized};
 use super::texels::{self, Texels};
 use super::vertices;
-use crate::bake::Illumination;
-use crate::bake::VertexOcclusion;
+use crate::bake::rays::RayMesh;
+use crate::bake::{Illumination, VertexOcclusion};
 use crate::model::cube::Cube;
 use crate::model::params::{Param, Params};
 use crate::prepare::Baked;
+use crate::samples::PosedSurface;
 use crate::scene::Scene;
-use crate::scene::mesh::Mesh;
+use crate::scene::mesh::{Mesh, PosedMesh};
 use crate::shader::{Attribute, Resource};
 
 /// What is rendered: a scene, its bakes, and the parameters. Whatever is large is shared: a clone copies none of it.
@@ -143,7 +144,11 @@ impl Uploads {
             return Ok(buffer.clone());
         }
         let (mesh, occlusion) = self.mesh();
-        let bytes = vertices::attribute(attribute, &self.content.scene, mesh, occlusion);
+        let bytes = vertices::attribute(attribute, mesh, occlusion, |field| {
+            let posed = mesh.pose();
+            let rays = RayMesh::new(&posed.positions, &posed.triangles);
+            PosedSurface::with_fields(&self.content.scene, &posed, &rays).field_of_vertices(field)
+        });
         let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
         self.bytes += bytes.len() as u64;
         self.attributes.insert(attribute, made.clone());
@@ -204,13 +209,19 @@ impl Uploads {
     pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
         let own = occlusion.is_some();
         let occlusion = occlusion.or(self.content.occlusion.as_deref());
+        // What is found at vertices is found anew in this pose.
+        let finds = self.attributes.keys().any(|attribute| matches!(attribute, Attribute::Field(_)));
+        let posed = if finds { mesh.pose() } else { PosedMesh::default() };
+        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        let surface = PosedSurface::with_fields(&self.content.scene, &posed, &rays);
         for (&attribute, buffer) in &self.attributes {
             let moves = matches!(
                 attribute,
                 Attribute::Position | Attribute::Normal | Attribute::Tangent | Attribute::Field(_)
             );
             if moves || own && attribute == Attribute::Occlusion {
-                let bytes = vertices::attribute(attribute, &self.content.scene, mesh, occlusion);
+                let bytes =
+                    vertices::attribute(attribute, mesh, occlusion, |field| surface.field_of_vertices(field));
                 gpu.queue.write_buffer(buffer, 0, &bytes);
             }
         }

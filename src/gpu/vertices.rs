@@ -3,21 +3,18 @@
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use crate::bake::VertexOcclusion;
-use crate::bake::rays::RayMesh;
 use crate::model::fields::Field;
 use crate::model::vertex::Bone;
-use crate::samples::PosedSurface;
-use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, Morph, VertexField};
 use crate::shader::Attribute;
 
 /// One attribute of every vertex, as bytes; what the mesh lacks is zero, which the vertex stage takes for
-/// "no direction", occlusion 1, and what a file of rules declares what it says.
+/// "no direction", and occlusion 1; `field` finds what a file of rules declares.
 pub(super) fn attribute(
     attribute: Attribute,
-    scene: &Scene,
     mesh: &Mesh,
     occlusion: Option<&VertexOcclusion>,
+    field: impl FnOnce(Field) -> Vec<f32>,
 ) -> Vec<u8> {
     let count = mesh.positions.len();
     let floats = |floats: Vec<f32>| bytemuck::cast_slice(&floats).to_vec();
@@ -32,7 +29,7 @@ pub(super) fn attribute(
             bytemuck::cast_slice(&joints).to_vec()
         }
         Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
-        Attribute::Field(field) => floats(field_of(field, scene, mesh)),
+        Attribute::Field(of) => floats(field(of)),
         Attribute::Corner => floats(corner_marks(count).into_flattened()),
     };
     bytes.resize(count * attribute.bytes() as usize, 0);
@@ -42,13 +39,6 @@ pub(super) fn attribute(
 /// Which corner of its triangle each vertex is, where triangles share none.
 fn corner_marks(count: usize) -> Vec<[f32; 3]> {
     (0..count).map(|i| Vec3::AXES[i % 3].to_array()).collect()
-}
-
-/// A field of every vertex, found by rays where it is one of samples.
-fn field_of(field: Field, scene: &Scene, mesh: &Mesh) -> Vec<f32> {
-    let posed = mesh.pose();
-    let rays = RayMesh::new(&posed.positions, &posed.triangles);
-    PosedSurface::with_fields(scene, &posed, &rays).field_of_vertices(field)
 }
 
 /// A mesh whose triangles share no vertices, with its occlusion: vertex i is corner i % 3 of triangle i / 3.

@@ -235,7 +235,6 @@ fn direct_light_and_its_shadows_are_those_of_the_path_tracers_images() {
     let Some(data) = common::data() else { return };
     for name in ["directional", "point", "spot", "directional_soft", "point_soft"] {
         let Compared { error, medians: [plane, sphere] } = compare(&data, name);
-        println!("{name}: relative L2 {error:.4}, plane {plane:.4}, sphere {sphere:.4}");
         measured(&format!("calibration light {name}"), error);
         // Half floats round by 2^-11, and the image is the mean of 256 noisy samples; the independent check that came
         // with it found medians within 0.0004.
@@ -277,7 +276,6 @@ fn lights_that_are_taken_out_of_a_real_panorama_leave_the_sum_of_light_as_it_was
             );
             assert!(found.lights.len() <= count as usize && !found.lights.is_empty());
             let shares: Vec<f64> = found.lights.iter().map(|light| light.strength()[1] / before[1]).collect();
-            println!("{name}: {} of {count} lights, shares of all green light {shares:.3?}", shares.len());
             // The brightest four have twice the light that as many even spots would.
             let even = 2.0 * PI * (1.0 - 4.0_f64.to_radians().cos()) / (4.0 * PI);
             assert!(shares.len() >= 4 && shares[..4].iter().sum::<f64>() > 8.0 * even, "{name}: {shares:?}");

@@ -10,10 +10,9 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 20] = [
+const SOURCES: [&str; 18] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
-    include_str!("coefficients.rs"),
     include_str!("harmonics.rs"),
     include_str!("interreflection.rs"),
     include_str!("lobe_kernel.rs"),
@@ -25,7 +24,6 @@ const SOURCES: [&str; 20] = [
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),
     include_str!("rays.rs"),
-    include_str!("shadowed.rs"),
     include_str!("transfer.rs"),
     include_str!("vertex_rays.rs"),
     include_str!("wide_bvh.rs"),

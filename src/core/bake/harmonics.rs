@@ -142,11 +142,11 @@ mod tests {
         let (rows, columns) = (2000, 16);
         let mut products = vec![0.0; 36 * 36];
         for i in 0..rows * columns {
-            let y = ((i / columns) as f64 + 0.5) / rows as f64 * 2.0 - 1.0;
-            let (sine, cosine) = ((i % columns) as f64 / columns as f64 * 2.0 * PI).sin_cos();
+            let y = (f64::from(i / columns) + 0.5) / f64::from(rows) * 2.0 - 1.0;
+            let (sine, cosine) = (f64::from(i % columns) / f64::from(columns) * 2.0 * PI).sin_cos();
             let radius = (1.0 - y * y).sqrt();
             let values = basis(Order::MOST, [radius * sine, y, radius * cosine]);
-            let weight = 4.0 * PI / (rows * columns) as f64;
+            let weight = 4.0 * PI / f64::from(rows * columns);
             for (k, product) in products.iter_mut().enumerate() {
                 *product += weight * values[k / 36] * values[k % 36];
             }

@@ -13,7 +13,13 @@ use crate::model::params::{Param, Params};
 
 /// The constants that their effects read.
 pub(super) fn text(target: Target, constants: Constants<'_>, from: &Provenance) -> String {
-    let used: Vec<Param> = Param::all().filter(|param| param.asked_for(constants.effects)).collect();
+    // What the scene's lights give stands in shaders, which are made of a scene.
+    let of_scene = |param: Param| {
+        let start = [param.default(constants.form); 3];
+        param.info().held || (param.info().found && constants.params.rgb(param) == start)
+    };
+    let used: Vec<Param> =
+        Param::all().filter(|param| param.asked_for(constants.effects) && !of_scene(*param)).collect();
     if target == Target::Json {
         return json_text(&used, constants, from);
     }

@@ -150,7 +150,11 @@ impl ParamsFile {
         writeln!(text, "\n[params]")?;
         let known = outcome.map_or(&[][..], |outcome| &outcome.unknowns);
         let shared = |param: &Param| self.scenes.is_empty() || !param.is_of_scene();
-        let written = |param: &Param| shared(param) && !param.info().held;
+        let was_free = |param: Param| {
+            known.iter().any(|known| known.unknown.column().is_some_and(|column| column.param == param))
+        };
+        let of_scene = |param: Param| param.info().held || (param.info().found && !was_free(param));
+        let written = |param: &Param| shared(param) && !of_scene(*param);
         for param in Param::of(self.effects.unwrap_or_default()).filter(written) {
             let line = format!("{} = {}", key(param), value(self.params.rgb(param)));
             line_with_comment(text, &line, &comment(known, |unknown| param_channel(unknown, param)))?;

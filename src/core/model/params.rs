@@ -96,6 +96,8 @@ pub struct ParamInfo {
     pub owner: Owner,
     /// Whether it is a number that its scene gives elsewhere, which no fit moves and no file of constants holds.
     pub held: bool,
+    /// Whether its start is what its scene gives elsewhere: files hold it only where it was free.
+    pub found: bool,
     /// It is asked for when one of these effects is enabled.
     pub effects: &'static [Effect],
     /// Where it comes from.
@@ -132,7 +134,7 @@ macro_rules! row {
      $rgb:literal, $linear:literal, $scale:ident, [$($effect:ident),*], $source:literal, $meaning:literal) => {
         ParamInfo {
             param: Param::$param, name: $name, identifier: $name, listing: $listing, corrected: $corrected, lower: $lower, upper: $upper,
-            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, held: false, effects: &[$(Effect::$effect),*],
+            unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, held: false, found: false, effects: &[$(Effect::$effect),*],
             source: $source, meaning: $meaning,
         }
     };
@@ -160,7 +162,7 @@ pub static TABLE: [ParamInfo; Param::COUNT] = [
          "MODEL 3 (corrected form)", "scale of the normal map's slopes"),
     row!(SpecularLobe        "specular_lobe",        32.0, 32.0, [1.0, 2048.0],    "Phong exponent", false, false, Log, [SideSpecular, Reflection, Haze, Bloom],
          "MODEL 4", "sharpness of the specular cube"),
-    row!(scene: EnvironmentRotation "environment_rotation", 0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [Diffuse, SideSpecular, Hilite, Reflection, Haze, Bloom],
+    row!(scene: EnvironmentRotation "environment_rotation", 0.0,  0.0,  [-INF, INF],      "degrees", false, false, Linear, [Diffuse, Lights, SideSpecular, Hilite, Reflection, Haze, Bloom],
          "MODEL 1", "turn of the environment about +Y, on top of the scene's own"),
     row!(HazeWeight          "haze_weight",          1.0,  1.0,  [0.0, INF],       "",        false, true,  Linear, [Haze, Bloom],
          "listing 3-4, alpha", "weight of the haze written to alpha"),

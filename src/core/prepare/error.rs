@@ -34,26 +34,31 @@ pub enum PrepareError {
     #[error("{scene}: there is no view `{view}`. {suggestion}.")]
     NoView { scene: String, view: String, suggestion: String },
     /// Scenes that cannot be fitted as one skin.
-    #[error(
-        "{scene}: it cannot be fitted as one skin with {first}: its {what} differs ({here}; there {there}). {remedy}."
-    )]
-    NotOneSkin {
-        /// The scene that differs.
-        scene: String,
-        /// The first scene.
-        first: String,
-        /// What differs.
-        what: String,
-        /// What it is in the scene.
-        here: String,
-        /// What it is in the first one.
-        there: String,
-        /// What to do.
-        remedy: &'static str,
-    },
+    #[error(transparent)]
+    NotOneSkin(#[from] Box<NotOneSkin>),
     /// A fit without anything to match.
     #[error(
         "{scene}: no view names a target, so there is nothing to fit. Add target = \"image.exr\" to a [[view]]."
     )]
     NoTarget { scene: String },
+}
+
+/// Scenes that cannot be fitted as one skin.
+#[derive(Debug, thiserror::Error)]
+#[error(
+    "{scene}: it cannot be fitted as one skin with {first}: its {what} differs ({here}; there {there}). {remedy}."
+)]
+pub struct NotOneSkin {
+    /// The scene that differs.
+    pub scene: String,
+    /// The first scene.
+    pub first: String,
+    /// What differs.
+    pub what: String,
+    /// What it is in the scene.
+    pub here: String,
+    /// What it is in the first one.
+    pub there: String,
+    /// What to do.
+    pub remedy: &'static str,
 }

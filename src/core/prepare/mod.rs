@@ -22,7 +22,7 @@ mod options;
 mod sampled;
 
 pub use self::baked::Baked;
-pub use self::error::PrepareError;
+pub use self::error::{NotOneSkin, PrepareError};
 pub use self::held_out::HeldOut;
 pub use self::loaded::Loaded;
 pub use self::observed::Observed;

@@ -1,5 +1,6 @@
 //! Scenes that are to be fitted as one skin: what they have to share, and what the first of them says for all.
 
+use super::error::NotOneSkin;
 use super::{Loaded, PrepareError};
 use crate::model::effects::Effect;
 use crate::model::params::{Channels, Column, Param};
@@ -23,13 +24,10 @@ pub fn share_skin(scenes: &mut [Loaded]) -> Result<(), PrepareError> {
     let Some((first, others)) = scenes.split_first_mut() else { return Ok(()) };
     for other in others {
         agree(&first.scene, &other.scene).map_err(
-            |Difference { what, first: one, other: two, remedy }| PrepareError::NotOneSkin {
-                scene: other.scene.path.display().to_string(),
-                first: first.scene.path.display().to_string(),
-                what,
-                here: two,
-                there: one,
-                remedy,
+            |Difference { what, first: one, other: two, remedy }| {
+                let path = |scene: &Scene| scene.path.display().to_string();
+                let (scene, first) = (path(&other.scene), path(&first.scene));
+                Box::new(NotOneSkin { scene, first, what, here: two, there: one, remedy })
             },
         )?;
         for param in Param::all().filter(|param| !param.is_of_scene()) {

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::animation::Pose;
-use super::error::{SceneError, Warnings};
+use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
 use super::gltf::Document;
 use super::light::{Light, LightKind};
@@ -12,7 +12,7 @@ use super::settings::spots;
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Param, Params};
 use crate::model::registry::leaked;
-use crate::shader::term::{self, MEMBER, Origin, Term, TermError};
+use crate::shader::term::{self, Origin, Term, TermError, stamped};
 
 /// Light from one direction: [`IN_WORLD`] where it stays, or [`IN_SKY`] where it turns with the environment.
 const BEAM: &str = include_str!("../shader/rules/family/beam.wgsl");
@@ -35,7 +35,8 @@ fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> 
         (LightKind::Point(_) | LightKind::Spot(..), _) => [LAMP, LIT].concat(),
     };
     let member = light.member();
-    term::register_from(Origin::Library, leaked(&member), &text.replace(MEMBER, &member))
+    let stamped = stamped(&text, &member).unwrap_or(text);
+    term::register_from(Origin::Library, leaked(&member), &stamped)
 }
 
 /// The lights of a scene, each known as an effect.
@@ -84,12 +85,27 @@ impl Lights {
         Self::read(source, file, document.as_ref().map(|document| (document, time)), &mut Warnings::new())
     }
 
-    /// Those effects, and each light's where lights are on.
+    /// Those effects, and each light's where lights are on and none of them is named by itself.
     pub(super) fn switched(&self, effects: Effects) -> Effects {
-        if !effects.has(Effect::Lights) {
+        let listed = self.terms.iter().any(|term| effects.has(term.effect));
+        if listed || !effects.has(Effect::Lights) {
             return effects;
         }
         self.terms.iter().fold(effects, |effects, term| effects.with(term.effect))
+    }
+
+    /// Say so where they do not shine, or an effect of theirs does nothing.
+    pub(super) fn idle(&self, path: &Path, effects: Effects, warnings: &mut Warnings) {
+        let (lights, shadows) = (effects.has(Effect::Lights), effects.has(Effect::Shadows));
+        if !self.terms.is_empty() && !lights {
+            warn(warnings, path, "has lights, but the effect `lights` is off: they do not shine");
+        }
+        if self.terms.is_empty() && lights {
+            warn(warnings, path, "has no light: the effect `lights` does nothing");
+        }
+        if shadows && !lights {
+            warn(warnings, path, "the effect `shadows` does nothing without `lights`");
+        }
     }
 
     /// Whether some of them come out of the panorama.

@@ -86,6 +86,7 @@ impl Scene {
             effects = terms.iter().fold(effects, |effects, term| effects.with(term.effect));
         }
         let effects = lights.switched(effects);
+        lights.idle(&source.path, effects, &mut warnings);
         let setup = Setup { lookups, dapple, ..Setup::new(form, silhouette, effects) };
         let needs = setup.needs();
         let mut idle = Warnings::new();
@@ -119,6 +120,13 @@ impl Scene {
             Some(environment) if of_sky => sky_lights(environment).lights_in_world(environment),
             _ => Vec::new(),
         };
+        if let Some(Environment { spots, .. }) = environment.as_ref().filter(|_| of_sky)
+            && sky_lights.len() < spots.count as usize
+        {
+            let (found, wanted) = (sky_lights.len(), spots.count);
+            let message = format!("has {found} bright spots, not {wanted}: the other lights are black");
+            warn(&mut warnings, &source.path, message);
+        }
         for light in lights.own.iter().chain(&sky_lights) {
             lit::set(light, &mut params, |name| file.model.params.keys().any(|key| key.get_ref() == name));
         }

@@ -55,10 +55,6 @@ pub(super) fn params(source: &Source, table: &ParamsTable, form: Form) -> Result
     for (name, value) in table {
         let param = param(source, name)?;
         let values = value.get_ref().channels();
-        if param.info().held {
-            let what = format!("{} follows from the scene's lights", param.name());
-            return Err(source.error(name, what, "Change it there"));
-        }
         check_value(param, values).map_err(|(what, remedy)| source.error(value, what, remedy))?;
         params.set_rgb(param, values);
     }
@@ -71,6 +67,10 @@ pub(super) fn params(source: &Source, table: &ParamsTable, form: Form) -> Result
 /// What is wrong, and what to do.
 pub(super) fn check_value(param: Param, values: [f64; 3]) -> Result<(), (String, String)> {
     let info = param.info();
+    if info.held {
+        let what = format!("{} follows from the scene's lights", info.name);
+        return Err((what, "Change it there".to_owned()));
+    }
     if let Some(&number) = values.iter().find(|&&number| !info.admits(number)) {
         let (lower, upper) = info.range();
         let what = format!("{} = {} is out of bounds", info.name, short(number));

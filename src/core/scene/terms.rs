@@ -8,7 +8,7 @@ use super::error::{SceneError, read_bytes};
 use super::file::{FamilyTable, ModelTable, SceneFile, Source, TermValue};
 use super::lit::Lights;
 use crate::model::registry::leaked;
-use crate::shader::term::{MEMBER, Term, register};
+use crate::shader::term::{Term, register, stamped};
 
 /// Rules are short; more is another kind of file.
 const MOST_BYTES: u64 = 1 << 20;
@@ -72,22 +72,21 @@ fn read(path: &Path, member: Option<&str>) -> Result<&'static Term, SceneError> 
     let text = String::from_utf8(read_bytes(path, MOST_BYTES)?)
         .map_err(|_| SceneError::new(path, "is not text in UTF-8", "Name a file of shader rules in WGSL"))?;
     let refused = |wrong: &str, remedy: &str| Err(SceneError::new(path, wrong, remedy));
-    match (text.contains(MEMBER), member) {
-        (true, None) => {
+    let text = match (stamped(&text, member.unwrap_or_default()), member) {
+        (Some(_), None) => {
             let remedy = "Name them in the scene file: { file = \"...\", names = [\"...\"] }";
             return refused(
                 "declares a family (NAME stands for its members), but no member has a name",
                 remedy,
             );
         }
-        (false, Some(_)) => {
+        (None, Some(_)) => {
             let remedy = "Write NAME where the names of its parameters, quantities and functions differ, or name the \
                           file alone";
             return refused("is given several names, but is no family: NAME does not stand in it", remedy);
         }
-        _ => {}
-    }
-    let text = member.map_or_else(|| text.clone(), |member| text.replace(MEMBER, member));
+        (stamped, _) => stamped.unwrap_or(text),
+    };
     let name = path.file_stem().map(|stem| stem.to_string_lossy()).unwrap_or_default();
     let name = member.map_or_else(|| name.to_string(), |member| format!("{name}_{member}"));
     register(leaked(&name), &text).map_err(|error| {

@@ -2,6 +2,7 @@
 //! an engine computes is in it, so a fit goes on wherever its passes and its samples are made.
 
 use crate::fit::fingerprint::Fingerprint;
+use crate::model::effects::Effect;
 use crate::prepare::HeldOut;
 use crate::scene::maps::{Environment, Map, Maps};
 use crate::scene::mesh::Mesh;
@@ -13,7 +14,7 @@ const NONE: &str = "none";
 
 /// The fingerprint of a fit of `scene` without the views that are held out.
 pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
-    let effects: Vec<&str> = scene.effects.iter().map(crate::model::effects::Effect::name).collect();
+    let effects: Vec<&str> = scene.effects.iter().map(Effect::name).collect();
     let Maps { color, normal, specular, attenuator } = &scene.maps;
     let all = Fingerprint::default()
         .with("form", scene.form.name())
@@ -29,6 +30,9 @@ pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
         .with("environment", environment(scene.environment.as_ref()))
         .with("mesh or its pose", mesh(&scene.mesh, scene.metres_per_unit))
         .with("quality", quality(scene.quality));
+    let lit = scene.effects.has(Effect::Lights);
+    let lights = lit.then(|| Hash::default().words(&scene.lights).words(&scene.sky_lights).done());
+    let all = lights.into_iter().fold(all, |all, lights| all.with("lights", lights));
     // Nothing else knows of the atlas' texels.
     let texels = scene.needs().atlas.then_some(scene.diffusion.light_map_size);
     let all = texels.into_iter().fold(all, |all, size| all.with("light map", size.to_string()));
@@ -79,7 +83,7 @@ fn map<const C: usize>(map: Option<&Map<C>>) -> String {
 }
 
 fn environment(environment: Option<&Environment>) -> String {
-    // No effect looks at its lights.
+    // What became lights stands by itself.
     let Some(Environment { panorama, rotation_degrees, intensity, spots: _ }) = environment else {
         return NONE.to_owned();
     };
@@ -103,6 +107,7 @@ fn mesh(mesh: &Mesh, metres_per_unit: f64) -> String {
         .numbers(mesh.joints.as_flattened())
         .numbers(mesh.weights.as_flattened())
         .numbers(&bones);
+    let rest = mesh.fields.iter().fold(rest, |all, of| all.words(&of.field).numbers(&of.numbers));
     // A target without weight moves nothing, and its occlusion is not baked.
     let moved = mesh.morphs.iter().filter(|morph| morph.weight != 0.0);
     moved

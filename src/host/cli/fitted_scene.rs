@@ -154,6 +154,12 @@ fn set_params(table: &mut dyn TableLike, start: Start<'_>) {
     for param in Param::all() {
         let rgb = start.params.rgb(param);
         let of = |column: &&Column| column.param == param;
+        // The scene gives these elsewhere.
+        let free = start.free.iter().any(|column| column.param == param);
+        let given = param.info().held || (param.info().found && !free && !table.contains_key(param.name()));
+        if given {
+            continue;
+        }
         let coloured = start.free.iter().filter(of).any(|column| column.channels != Channels::Tied);
         if coloured || rgb != [rgb[0]; 3] {
             set(table, param.name(), Value::Array(Array::from_iter(rgb)));

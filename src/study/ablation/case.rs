@@ -27,7 +27,12 @@ impl Part {
             let base = (base && effect == Effect::Diffuse).then_some(Self::Base);
             [Some(Self::Effect(effect)), base].into_iter().flatten()
         };
-        effects.iter().flat_map(with_base).collect()
+        // What leaves the only one of its kind out leaves all of the kind out.
+        let alone = |effect: &Effect| {
+            let within = effect.info().within;
+            within.is_some() && effects.iter().filter(|other| other.info().within == within).count() == 1
+        };
+        effects.iter().filter(|effect| !alone(effect)).flat_map(with_base).collect()
     }
 
     /// The name in tables and files.

@@ -92,7 +92,15 @@ fn read_effects(names: &DeArray<'_>) -> Result<Effects, Problem> {
             _ => problem(name.span(), format!("an effect is a name. There are {}.", known())),
         }
     };
-    names.iter().map(effect).collect()
+    let known = names
+        .iter()
+        .filter(|name| !matches!(name.get_ref(), DeValue::String(text) if is_of_no_light(text, "light_")));
+    known.map(effect).collect()
+}
+
+/// Whether a name is that of a light which no scene has that was read: it says nothing of this one.
+fn is_of_no_light(name: &str, head: &str) -> bool {
+    name.starts_with(head) && Effect::from_name(name).is_none() && Param::from_name(name).is_none()
 }
 
 fn read_loss(name: &str, place: Range<usize>) -> Result<Loss, Problem> {
@@ -104,7 +112,7 @@ fn read_loss(name: &str, place: Range<usize>) -> Result<Loss, Problem> {
 }
 
 fn read_params(table: &DeTable<'_>, params: &mut Params) -> Result<(), Problem> {
-    for (key, value) in table {
+    for (key, value) in table.iter().filter(|(key, _)| !is_of_no_light(key.get_ref(), "light.")) {
         let param = named(key)?;
         params.set_rgb(param, read_rgb(param, value)?);
     }
@@ -114,6 +122,9 @@ fn read_params(table: &DeTable<'_>, params: &mut Params) -> Result<(), Problem> 
 /// The parameter that a key names.
 fn named(key: &Spanned<std::borrow::Cow<'_, str>>) -> Result<Param, Problem> {
     let name = key.get_ref().as_ref();
+    if Param::from_name(name).is_some_and(|param| param.info().held) {
+        return problem(key.span(), format!("`{name}` is the scene's own: its lights give it."));
+    }
     let known = || Param::all().map(Param::name).collect::<Vec<_>>().join(", ");
     Param::from_name(name).ok_or_else(|| Problem {
         place: Some(key.span()),
@@ -160,7 +171,7 @@ fn read_scenes(table: &DeTable<'_>) -> Result<Vec<SceneValues>, Problem> {
 /// The values of a scene's own parameters, in the order of the table.
 fn read_own(table: &DeTable<'_>) -> Result<Vec<(Param, [f64; 3])>, Problem> {
     let mut own = Vec::new();
-    for (key, value) in table {
+    for (key, value) in table.iter().filter(|(key, _)| !is_of_no_light(key.get_ref(), "light.")) {
         let param = named(key)?;
         if !param.is_of_scene() {
             let what = format!("{} is the skin's, for all scenes: it stands under [params].", param.name());

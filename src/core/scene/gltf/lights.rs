@@ -159,9 +159,10 @@ impl Document {
 fn free_name(given: &str, lights: &[Light]) -> String {
     let letter = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
     // Room for a number behind it.
-    let mut name: String = given.chars().take(48).map(letter).collect();
+    let name: String = given.chars().take(48).map(letter).collect();
+    let mut name = name.split('_').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("_");
     if !is_name(&name) {
-        name.insert_str(0, "light_");
+        name = if name.is_empty() { "light".to_owned() } else { format!("light_{name}") };
     }
     let taken = |name: &str| is_skys(name) || lights.iter().any(|light| same_name(&light.name, name));
     let numbered = (2..).map(|number| format!("{name}_{number}"));

@@ -46,6 +46,7 @@ pub(super) struct DeclaredParameter {
     pub(super) scale: Scale,
     pub(super) owner: Owner,
     pub(super) held: bool,
+    pub(super) found: bool,
     pub(super) meaning: &'static str,
     pub(super) source: &'static str,
 }
@@ -187,7 +188,7 @@ impl Declaration {
             .map(|(_, of)| of)
         {
             if !self.rules.is_empty() {
-                return Err(misplaced("field"));
+                return Err(misplaced(if of == Found::Vertices { "field" } else { "sample_field" }));
             }
             let wanted = "NAME: TYPE = NEUTRAL; what it is. The type is f32, vec2f or vec3f, and the number what stands \
                           in for each of a mesh that lacks it";
@@ -296,6 +297,7 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         scale: Scale::Linear,
         owner: Owner::Skin,
         held: false,
+        found: false,
         meaning,
         source: parts.next().unwrap_or_default(),
     };
@@ -306,6 +308,7 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
             "log" => parameter.scale = Scale::Log,
             "scene" => parameter.owner = Owner::Scene,
             "held" => (parameter.held, parameter.owner) = (true, Owner::Scene),
+            "found" => (parameter.found, parameter.owner) = (true, Owner::Scene),
             other => parameter.unit = other.strip_prefix("unit ")?.trim(),
         }
     }

@@ -69,9 +69,24 @@ pub struct Term {
     pub text: &'static str,
 }
 
-/// What stands for a member's name in the file of a family: terms alike but for their names, such as the lamps of a
-/// scene.
-pub const MEMBER: &str = "NAME";
+/// The text of a family's file for one of its members, terms alike but for their names, such as the lamps of a scene:
+/// `NAME`, as a word or a part of one between `_` and `.`, stands for the member. `None` where it does not stand in it.
+#[must_use]
+pub fn stamped(text: &str, member: &str) -> Option<String> {
+    const MEMBER: &str = "NAME";
+    let (mut stamped, mut rest, mut found) = (String::with_capacity(text.len()), text, false);
+    while let Some(at) = rest.find(MEMBER) {
+        let (before, after) = (&rest[..at], &rest[at + MEMBER.len()..]);
+        stamped += before;
+        // A longer word, as FILENAME, is none.
+        let whole = !before.ends_with(|c: char| c.is_alphanumeric())
+            && !after.starts_with(|c: char| c.is_alphanumeric());
+        stamped += if whole { member } else { MEMBER };
+        found |= whole;
+        rest = after;
+    }
+    found.then(|| stamped + rest)
+}
 
 static TERMS: Added<Term> = Added::new();
 
@@ -128,6 +143,10 @@ pub(crate) fn register_from(origin: Origin, name: &str, text: &str) -> Result<&'
     if let Some((line, field)) = own.filter(|_| origin == Origin::File) {
         return Err(Problem::Unfound(field.name.to_owned()).at(*line));
     }
+    let of_scene = declaration.parameters.iter().find(|(_, parameter)| parameter.held || parameter.found);
+    if let Some((line, parameter)) = of_scene.filter(|_| origin == Origin::File) {
+        return Err(Problem::Unfound(parameter.name.to_owned()).at(*line));
+    }
     let declaration = check::checked(origin, declaration)?;
     wgsl::check(&declaration.rules)?;
     enter(declaration, text)
@@ -158,6 +177,7 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
             scale: declared.scale,
             owner: declared.owner,
             held: declared.held,
+            found: declared.found,
             effects,
             source: declared.source,
             meaning: declared.meaning,

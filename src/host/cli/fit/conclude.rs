@@ -123,7 +123,10 @@ fn write_params(
     }
     let own = |part: &Part| {
         let at = scenes.point_of(part, &outcome.end);
-        let params = Param::of(part.baked.scene.effects).filter(|param| param.is_of_scene());
+        let free = |param: Param| part.baked.scene.fit.free.iter().any(|column| column.param == param);
+        let given = |param: Param| param.info().held || (param.info().found && !free(param));
+        let params =
+            Param::of(part.baked.scene.effects).filter(|param| param.is_of_scene() && !given(*param));
         let params = params.map(|param| (param, at.params.rgb(param))).collect();
         let effects = Some(part.baked.scene.effects).filter(|own| *own != first.baked.scene.effects);
         SceneValues { name: part.name.clone(), effects, params, gains: gains(part) }

@@ -129,5 +129,12 @@ impl Arguments {
 fn parse_param(name: &str) -> Result<Param, String> {
     let known: Vec<&str> = Param::all().map(Param::name).collect();
     let unknown = || format!("unknown parameter `{name}`. {}.", suggestion(name, &known));
-    Param::from_name(name.trim()).ok_or_else(unknown)
+    let param = Param::from_name(name.trim()).ok_or_else(unknown)?;
+    if param.info().held {
+        return Err(format!(
+            "{} is the scene's: no fit moves it. Free the light's `color` in its place.",
+            param.name()
+        ));
+    }
+    Ok(param)
 }

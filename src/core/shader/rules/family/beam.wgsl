@@ -3,8 +3,8 @@
 // effect: light_NAME within lights, the light NAME
 // parameter: light.NAME.color = 1 in [0, inf), rgb, linear, scene; factor on the light's irradiance; KHR_lights_punctual
 // parameter: light.NAME.irradiance = 0 in [0, inf), rgb, held; irradiance of a surface that faces it; KHR_lights_punctual
-// parameter: light.NAME.azimuth = 0 in [-inf, inf], unit degrees, scene; where it comes from, from +Z towards +X; KHR_lights_punctual
-// parameter: light.NAME.elevation = 45 in [-90, 90], unit degrees, scene; where it comes from, above the horizon; KHR_lights_punctual
+// parameter: light.NAME.azimuth = 0 in [-inf, inf], unit degrees, found; where it comes from, from +Z towards +X; KHR_lights_punctual
+// parameter: light.NAME.elevation = 45 in [-90, 90], unit degrees, found; where it comes from, above the horizon; KHR_lights_punctual
 // sample_field: light_NAME_open: f32 = 1; share of the light NAME that nothing stops
 
 // Unit vector towards the light.

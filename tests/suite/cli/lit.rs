@@ -1,0 +1,114 @@
+//! A scene with lights of its own: fitted, kept, drawn again, exported.
+
+use super::sandbox::Sandbox;
+use crate::fixtures::read_exr;
+
+const LIGHTS: &str = "
+[[light]]
+name = \"key\"
+type = \"directional\"
+direction = [-0.5, -0.6, -0.6]
+irradiance = [3.0, 2.9, 2.7]
+[[light]]
+name = \"bulb\"
+type = \"point\"
+position = [1.5, 1.0, 2.0]
+intensity = 4
+[fit]
+";
+
+/// The scene with two lights, of which `free` is free beside the base weight; its targets show them.
+fn scene(free: &str) -> Sandbox {
+    let sandbox = Sandbox::new();
+    sandbox.edit("\"hilite\", \"reflection\"]", "\"hilite\", \"reflection\", \"lights\", \"shadows\"]");
+    sandbox.edit("[fit]\n", LIGHTS);
+    let text = sandbox.text("scene.toml");
+    let old = text.lines().find(|line| line.starts_with("free = ")).unwrap();
+    sandbox.edit(old, &format!("free = [\"base_weight\", {free}]"));
+    sandbox.write("made.toml", b"[params]\nbase_weight = 0.8\n\"light.key.color\" = [0.9, 0.7, 0.5]\n");
+    for view in ["front", "side"] {
+        let target = format!("targets/{view}.exr");
+        let render = ["render", "scene.toml", "--engine", "cpu", "--params", "made.toml", "--view", view];
+        sandbox.run(&[&render[..], &["-o", &target]].concat()).done();
+    }
+    sandbox
+}
+
+/// The pixels of an image.
+fn pixels(sandbox: &Sandbox, name: &str) -> Vec<[f32; 3]> {
+    read_exr(&sandbox.path(name)).rgb(["R", "G", "B"])
+}
+
+#[test]
+fn a_lit_scene_is_fitted_and_its_run_folder_draws_the_same_again() {
+    let sandbox = scene("\"light.key.color\", \"light.bulb.color\"");
+    let fit = ["fit", "scene.toml", "-o", "run", "--engine", "cpu", "--set", "light.key.color=0.5,0.5,0.5"];
+    assert_eq!(sandbox.run(&fit).code, Some(0));
+    let report = sandbox.json("run/report.json");
+    for (name, want) in [("light.key.color", [0.9, 0.7, 0.5]), ("light.bulb.color", [1.0; 3])] {
+        let value = &report["params"][name]["value"];
+        for (c, want) in want.iter().enumerate() {
+            let got = value.get(c).unwrap_or(value).as_f64().unwrap();
+            // The targets are 16-bit floats.
+            assert!((got - want).abs() < 5e-3, "{name}: {value}");
+        }
+    }
+    // What the scene's lights give stands in the scene alone.
+    for name in ["run/params.toml", "run/scene.toml"] {
+        let text = sandbox.text(name);
+        assert!(!text.contains("key.irradiance") && !text.contains("key.azimuth"), "{name}: {text}");
+    }
+    let draw =
+        ["render", "run/scene.toml", "--engine", "cpu", "--params", "run/params.toml", "--view", "front"];
+    sandbox.run(&[&draw[..], &["-o", "again.exr"]].concat()).done();
+    let (again, target) = (pixels(&sandbox, "again.exr"), pixels(&sandbox, "targets/front.exr"));
+    for (got, want) in again.iter().zip(&target) {
+        assert!((0..3).all(|c| (got[c] - want[c]).abs() < 0.01 * want[c] + 1e-3), "{got:?} {want:?}");
+    }
+    let constants = sandbox.run(&["export", "run/params.toml", "--to", "c", "--constants"]).done().out;
+    assert!(constants.contains("LIGHT_KEY_COLOR") && !constants.contains("IRRADIANCE"), "{constants}");
+    // Constants of lights that a scene has not say nothing of it.
+    let text = sandbox.text("run/params.toml").replace("light.bulb.color", "light.moon.color");
+    sandbox.write("moon.toml", text.as_bytes());
+    sandbox
+        .run(&[
+            "render",
+            "scene.toml",
+            "--engine",
+            "cpu",
+            "--params",
+            "moon.toml",
+            "-o",
+            "moon.exr",
+            "--view",
+            "front",
+        ])
+        .done();
+}
+
+#[test]
+fn what_the_scenes_lights_give_is_set_and_freed_nowhere_else() {
+    let sandbox = scene("\"light.key.color\"");
+    for (words, said) in [
+        (
+            &["render", "scene.toml", "--set", "light.bulb.position=1,2,3", "-o", "x.exr"][..],
+            "follows from the scene",
+        ),
+        (&["fit", "scene.toml", "--free", "light.key.irradiance", "-o", "x"], "no fit moves it"),
+    ] {
+        let ran = sandbox.run(words);
+        assert!(ran.code == Some(2) && ran.err.contains(said), "{ran:?}");
+    }
+    sandbox.write("bad.toml", b"[params]\n\"light.key.irradiance\" = 2\n");
+    let ran = sandbox.run(&["render", "scene.toml", "--params", "bad.toml", "-o", "x.exr"]);
+    assert!(ran.code == Some(2) && ran.err.contains("its lights give it"), "{ran:?}");
+}
+
+#[test]
+fn lights_that_do_not_shine_are_told() {
+    let sandbox = scene("\"light.key.color\"");
+    sandbox.edit(", \"lights\", \"shadows\"]", ", \"shadows\"]");
+    sandbox.edit(", \"light.key.color\"", "");
+    let said = sandbox.run(&["shader", "scene.toml"]).done().err;
+    assert!(said.contains("effect `lights` is off") && said.contains("`shadows` does nothing"), "{said}");
+}
