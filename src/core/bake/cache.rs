@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 14] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
     include_str!("lobe_kernel.rs"),
@@ -21,7 +21,9 @@ const SOURCES: [&str; 12] = [
     include_str!("panorama.rs"),
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),
+    include_str!("radial.rs"),
     include_str!("rays.rs"),
+    include_str!("reflected.rs"),
     crate::model::cube::SOURCE,
 ];
 const MAGIC: &[u8; 8] = b"SKINBAKE";
