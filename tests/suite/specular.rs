@@ -3,9 +3,8 @@
 
 use std::path::Path;
 
-use skinfit::bake::prefilter::Prefilter;
 use skinfit::bake::radial::Radial;
-use skinfit::model::cube::{Cube, texel_direction, texel_solid_angle};
+use skinfit::model::cube::{texel_direction, texel_solid_angle};
 use skinfit::shader::rule::LIBRARY;
 use skinfit::shader::term::register;
 use skinfit_core::specular::brdf::{self, beckmann};
@@ -122,7 +121,8 @@ fn lights_are_those_of_the_vectors_with_their_derivatives() {
             tolerance.check("by weight", &by_weight, &want.at("d_specular_weight"));
             tolerance.check("by roughness", &rgb(f[1] * m[1]), &want.at("d_roughness"));
             tolerance.check("by gloss", &rgb(f[1] * m[2]), &want.at("d_gloss"));
-            tolerance.check("by f0", &rgb(f[2]), &want.at("d_f0"));
+            // At f0 = 0 a root of 1e-12 stands for 0, which counts some twenty fold.
+            tolerance.times(4.0).check("by f0", &rgb(f[2]), &want.at("d_f0"));
             // In f32, with the roundings of directions that a fragment has, too.
             let narrow = rule.single(&arguments)[0];
             single(&file, given).check("radiance in f32", &rgb(narrow), &want.at("radiance"));
@@ -302,38 +302,7 @@ fn the_environment_in_a_lobe_is_that_of_the_vectors() {
             near.check("linear", &lights, &expected.at("linear_env"));
         }
     }
-    baked(&cube, &inputs, &expected);
     all_read(&vectors, "specular_environment.json", &[]);
-}
-
-/// The filter that bakes, at the texels of a cube that lie next to the vectors' directions.
-fn baked(cube: &Cube<f64>, inputs: &Node<'_>, expected: &Node<'_>) {
-    let fine = Cube::from_fn(64, |face, column, row| cube.texel(face, column / 16, row / 16));
-    let prefilter = Prefilter::new(&fine);
-    for (model, name, value) in
-        [(SpecularModel::Kelemen, "m", "E_r"), (SpecularModel::Ggx, "m_ggx", "E_r_ggx")]
-    {
-        for (m, want) in inputs.at(name).numbers().into_iter().zip(expected.at(value).items()) {
-            let size = 64;
-            let got = prefilter.radial(size, Radial::Brdf(model, m), |_| {});
-            for (r, want) in inputs.at("directions").items().iter().zip(want.items()) {
-                let r = r.three();
-                let nearest = (0..6 * size * size)
-                    .map(|i| (i / (size * size), i % size, i / size % size))
-                    .map(|(face, column, row)| {
-                        let d = texel_direction(face, column, row, size);
-                        ((0..3).map(|c| d[c] * r[c]).sum::<f64>(), (face, column, row))
-                    })
-                    .max_by(|a, b| a.0.total_cmp(&b.0))
-                    .unwrap();
-                let (face, column, row) = nearest.1;
-                let texel = got.texel(face, column, row).map(f64::from);
-                // Half a texel's diagonal, 0.02 radians, times the light's slope: less than 0.6 in the mean of the sharpest
-                // lobe.
-                Tolerance { abs: 1.5e-2, rel: 0.0 }.check("baked", &texel[..3], &want);
-            }
-        }
-    }
 }
 
 #[test]
@@ -371,6 +340,43 @@ fn occlusion_and_off_peak_directions_are_those_of_the_vectors() {
         }
     }
     all_read(&vectors, "specular_choices.json", &[]);
+}
+
+/// The share of the cap about `a` of that cosine which lies in the cap about `b`, by points spread evenly over it.
+fn shared(a: [f64; 3], a_cosine: f64, b: [f64; 3], b_cosine: f64) -> f64 {
+    // `a` is the z axis.
+    assert_eq!(a, [0.0, 0.0, 1.0]);
+    let count = 4000;
+    let inside = (0..count).filter(|&k| {
+        let z = 1.0 - (1.0 - a_cosine) * (f64::from(k) + 0.5) / f64::from(count);
+        // Golden angles.
+        let (sine, cosine) = (f64::from(k) * 2.399_963_229_728_653).sin_cos();
+        let across = (1.0 - z * z).sqrt();
+        across * cosine * b[0] + across * sine * b[1] + z * b[2] >= b_cosine
+    });
+    inside.count() as f64 / f64::from(count)
+}
+
+#[test]
+fn cones_overlap_as_caps_of_the_sphere_do() {
+    let rule = Rule::new("cone_visibility", &[1, 1, 1], &[0, 1, 2]);
+    let mut worst = 0.0_f64;
+    for degrees in [0.0, 10.0, 30.0, 50.0, 80.0, 120.0, 180.0_f64] {
+        for occ in [0.0, 0.05, 0.3, 0.6, 0.9, 1.0_f64] {
+            for alpha in [0.0025, 0.05, 0.2, 0.5, 1.0_f64] {
+                let (sine, cosine) = degrees.to_radians().sin_cos();
+                let all = rule.of(&[&[cosine], &[occ], &[alpha]]).concat();
+                let narrow = rule.single(&[&[cosine], &[occ], &[alpha]]);
+                assert!(all.iter().chain(&narrow).all(|x| x.is_finite()), "{degrees} {occ} {alpha}: {all:?}");
+                let (open, lobe) = ((1.0 - occ).sqrt(), 10_f64.powf(-alpha * alpha));
+                let want = shared([0.0, 0.0, 1.0], lobe, [sine, 0.0, cosine], open);
+                assert!((0.0..=1.0 + 1e-9).contains(&all[0]), "{degrees} {occ} {alpha}: {}", all[0]);
+                worst = worst.max((all[0] - want).abs());
+            }
+        }
+    }
+    // A cubic in the place of the lens of two caps (Oat and Sander 2007).
+    assert!(worst < 0.11, "{worst}");
 }
 
 #[test]

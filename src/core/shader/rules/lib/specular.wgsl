@@ -88,3 +88,26 @@ fn off_peak_direction(n: vec3f, mirrored: vec3f, alpha: f32) -> vec3f {
     let rest: f32 = 1.0 - alpha;
     return n + (rest * (sqrt(max(rest, 1e-12)) + alpha)) * (mirrored - n);
 }
+
+// The angle of a cosine in [-1, 1], to 7e-5 (Abramowitz and Stegun 4.4.45); its slope ends 1e-6 from 1 and -1.
+fn arc_cosine(cosine: f32) -> f32 {
+    let size: f32 = min(abs(cosine), 0.999999);
+    let series: f32 = 1.5707288 + size * (-0.2121144 + size * (0.074261 - size * 0.0187293));
+    let angle: f32 = sqrt(1.0 - size) * series;
+    return select(3.1415927 - angle, angle, cosine >= 0.0);
+}
+
+// How much of the specular lobe is open, by cones: the share of the lobe's that lies in the visible one, of cos^2 = 1 - occ
+// about the bent normal, which lies at `bent_cosine` from the mirrored view. The lobe's is of the cosine 10^(-alpha^2)
+// (Jimenez et al. 2016), the overlap Oat and Sander's (Ambient aperture lighting, 2007). alpha is m for kelemen, m^2 for ggx.
+fn cone_visibility(bent_cosine: f32, occ: f32, alpha: f32) -> f32 {
+    let open_cosine: f32 = sqrt(min(max(1.0 - occ, 1e-12), 1.0));
+    let lobe_cosine: f32 = exp2(-3.3219281 * alpha * alpha);
+    let open: f32 = arc_cosine(open_cosine);
+    let lobe: f32 = arc_cosine(lobe_cosine);
+    let nested: f32 = abs(open - lobe);
+    let reach: f32 = max(open + lobe - nested, 1e-4);
+    let inside: f32 = min(max(1.0 - (arc_cosine(bent_cosine) - nested) / reach, 0.0), 1.0);
+    let overlap: f32 = inside * inside * (3.0 - 2.0 * inside);
+    return overlap * (1.0 - max(open_cosine, lobe_cosine)) / (1.0 - lobe_cosine);
+}
