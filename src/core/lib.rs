@@ -35,3 +35,4 @@ pub mod samples;
 pub mod scene;
 pub mod shader;
 pub mod simd;
+pub mod specular;

@@ -10,6 +10,7 @@ use skinfit::model::params::{Param, Params};
 use skinfit::model::real::Real;
 use skinfit::samples::LANES;
 use skinfit::shader::facts::{FaceSizes, MapFacts};
+use skinfit::shader::tangent::Tangents;
 use skinfit::shader::tangent::chain::Seed;
 use skinfit::shader::{Facts, Source};
 use skinfit_core::program::graph::{Graph, Input};
@@ -182,6 +183,16 @@ impl Function {
         let arguments = arguments.iter().enumerate().map(&mut argument).collect();
         let outputs = source.call(&mut graph, name, arguments).unwrap();
         Self(Steps::new(&graph, &outputs, |_| Rounding::Plain))
+    }
+
+    /// How the function moves along one of its arguments, a number: of its arguments, then of that one's tangent.
+    pub(crate) fn tangent(texts: &[&str], name: &str, arguments: &[usize], moved: usize) -> Self {
+        let text = texts.concat();
+        let mut tangents = Tangents::new(&text).unwrap();
+        let moving: Vec<bool> = (0..arguments.len()).map(|i| i == moved).collect();
+        let tangent = tangents.of(name, &moving).unwrap().unwrap();
+        assert!(!tangent.of_all, "{name} has a tangent by hand");
+        Self::new(&[&text, tangents.text()], &tangent.name, &[arguments, &[1]].concat())
     }
 
     /// Its value.

@@ -8,12 +8,14 @@ use super::harmonics::Order;
 use super::interreflection::Albedo;
 use super::panorama::Radiance;
 use super::prefilter::Prefilter;
+use super::radial::Radial;
 use super::transfer::{TransferSet, VertexTransfer, bake_transfer};
 use super::{BakeStats, VertexOcclusion, occlusion};
 use crate::model::cube::Cube;
 use crate::progress;
 use crate::scene::maps::{Environment, luminance};
 use crate::scene::mesh::PosedMesh;
+use crate::specular::SpecularModel;
 
 /// Bakes through the cache, and keeps count.
 pub(super) struct Baker<'a> {
@@ -144,11 +146,38 @@ impl<'a> EnvironmentBaker<'a> {
         exponent: f64,
     ) -> Cube<f32> {
         let key = self.key.clone().with(&[size as u64]).with(&[exponent]);
-        let floats = baker.through_cache(name, "lobe", &key, 24 * size * size, |stats| {
+        let message = format!("exponent {exponent:.4}");
+        self.radial(baker, name, "lobe", &key, size, Radial::Phong(exponent), message)
+    }
+
+    /// The environment through a BRDF's lobe, for a roughness.
+    pub(super) fn reflected(
+        &mut self,
+        baker: &mut Baker<'_>,
+        model: SpecularModel,
+        size: usize,
+        m: f64,
+    ) -> Cube<f32> {
+        let key = self.key.clone().with(model.name().as_bytes()).with(&[size as u64]).with(&[m]);
+        let (name, message) = (format!("{} {m:.4}", model.name()), format!("roughness {m:.4}"));
+        self.radial(baker, name, "reflected", &key, size, Radial::Brdf(model, m), message)
+    }
+
+    fn radial(
+        &mut self,
+        baker: &mut Baker<'_>,
+        name: String,
+        kind: &str,
+        key: &Key,
+        size: usize,
+        radial: Radial,
+        message: String,
+    ) -> Cube<f32> {
+        let floats = baker.through_cache(name, kind, key, 24 * size * size, |stats| {
             let prefilter = self.prefilter(stats);
             let bar = progress::bar("prefilter", (6 * size * size) as u64);
-            bar.set_message(format!("exponent {exponent:.4}"));
-            let cube = prefilter.lobe(size, exponent, |n| bar.inc(n));
+            bar.set_message(message);
+            let cube = prefilter.radial(size, radial, |n| bar.inc(n));
             bar.finish_and_clear();
             cube_to_floats(&cube)
         });

@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 18] = [
+const SOURCES: [&str; 20] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
     include_str!("harmonics.rs"),
@@ -23,7 +23,9 @@ const SOURCES: [&str; 18] = [
     include_str!("panorama.rs"),
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),
+    include_str!("radial.rs"),
     include_str!("rays.rs"),
+    include_str!("reflected.rs"),
     include_str!("transfer.rs"),
     include_str!("vertex_rays.rs"),
     include_str!("wide_bvh.rs"),

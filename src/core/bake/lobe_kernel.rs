@@ -1,8 +1,9 @@
 //! The inner loop of the prefilter: the lobe's mean over cells, sixteen at a time.
 //!
-//! With X = r.w over a cell, the mean of X^e is m^e + e (e-1) / 2 m^(e-2) v to second order, where
-//! the mean m of X is r times the cell's mean direction, and its variance v is a twelfth of the
-//! solid angle times the squared sine.
+//! With X = r.w over a cell, the mean of k(X) is k(m) + k''(m) v / 2 to second order, where the mean m
+//! of X is r times the cell's mean direction, and its variance v is a twelfth of the solid angle times
+//! the squared sine. For X^e that is m^e + e (e-1) / 2 m^(e-2) v. The lobes of BRDFs are
+//! [`Radial`](super::radial::Radial)'s, of u = 1 - X.
 
 use fearless_simd::{Simd, f32x16, f64x8, i32x16, prelude::*};
 
@@ -25,7 +26,13 @@ pub(super) struct Cells {
     flux: [[f32; WIDE]; 3],
 }
 
-/// What the kernel needs beside the cells.
+/// A lobe, as the kernel weighs cells with it.
+pub(super) trait Weigh: Copy + Sync {
+    /// Its mean over sixteen cells; `fall` is 1 - r.m.
+    fn mean<S: Simd>(self, simd: S, fall: f32x16<S>, solid_angle: f32x16<S>) -> f32x16<S>;
+}
+
+/// A Phong lobe.
 #[derive(Clone, Copy)]
 pub(super) struct Lobe {
     exponent: f32,
@@ -38,6 +45,92 @@ impl Lobe {
         // Below exponent 4 the kink at the horizon, not the curvature, limits the accuracy.
         let curvature = if exponent < 4.0 { 0.0 } else { exponent * (exponent - 1.0) / 24.0 };
         Self { exponent: exponent as f32, curvature: curvature as f32 }
+    }
+}
+
+impl Weigh for Lobe {
+    #[inline(always)]
+    fn mean<S: Simd>(self, simd: S, fall: f32x16<S>, solid_angle: f32x16<S>) -> f32x16<S> {
+        let lit = |x: f32| f32x16::splat(simd, x);
+        let cosine = (lit(1.0) - fall).max(lit(1e-30));
+        let log2 = log2_of_one_minus(simd, fall, cosine);
+        let power = exp2(simd, log2 * lit(self.exponent - 2.0));
+        let variance = solid_angle * lit(self.curvature);
+        let sine_squared = fall * (lit(2.0) - fall);
+        power * cosine.mul_add(cosine, variance * sine_squared)
+    }
+}
+
+/// Kelemen's lobe: g(t) = exp(-t / m^2) (1 - t) (1 + t)^2 of t = u / (2 - u).
+#[derive(Clone, Copy)]
+pub(super) struct Kelemen {
+    /// 1 / m^2.
+    steepness: f32,
+}
+
+impl Kelemen {
+    pub(super) fn new(m: f64) -> Self {
+        Self { steepness: (1.0 / (m * m)) as f32 }
+    }
+}
+
+impl Weigh for Kelemen {
+    #[inline(always)]
+    fn mean<S: Simd>(self, simd: S, fall: f32x16<S>, solid_angle: f32x16<S>) -> f32x16<S> {
+        let lit = |x: f32| f32x16::splat(simd, x);
+        let (one, steep) = (lit(1.0), lit(self.steepness));
+        let u = fall.min(one);
+        let t = u / (lit(2.0) - u);
+        let above = one + t;
+        let power = exp2(simd, t * lit(-self.steepness * std::f32::consts::LOG2_E));
+        // g = power h; its derivatives by t, over power.
+        let h = (one - t) * above * above;
+        let h_slope = above * (one - lit(3.0) * t);
+        let slope = h_slope - steep * h;
+        let bend = steep * (steep * h - lit(2.0) * h_slope) - lit(6.0).mul_add(t, lit(2.0));
+        // t' = (1 + t)^2 / 2 and t'' = (1 + t)^3 / 2 by u.
+        let cube = above * above * above;
+        let curvature = cube * (lit(0.25) * above * bend + lit(0.5) * slope);
+        let variance = solid_angle * u * (lit(2.0) - u) * lit(1.0 / 24.0);
+        let mean = power * curvature.mul_add(variance, h);
+        fall.simd_lt(one).select(mean, lit(0.0))
+    }
+}
+
+/// The lobe of GGX: masking times 1 / (1 + sharpness u)^2.
+#[derive(Clone, Copy)]
+pub(super) struct Ggx {
+    /// alpha^2.
+    alpha_squared: f32,
+    /// (1 - alpha^2) / (2 alpha^2).
+    sharpness: f32,
+}
+
+impl Ggx {
+    pub(super) fn new(m: f64) -> Self {
+        let a2 = m.powi(4);
+        Self { alpha_squared: a2 as f32, sharpness: ((1.0 - a2) / (2.0 * a2)) as f32 }
+    }
+}
+
+impl Weigh for Ggx {
+    #[inline(always)]
+    fn mean<S: Simd>(self, simd: S, fall: f32x16<S>, solid_angle: f32x16<S>) -> f32x16<S> {
+        let lit = |x: f32| f32x16::splat(simd, x);
+        let (one, a2, sharp) = (lit(1.0), lit(self.alpha_squared), lit(self.sharpness));
+        let u = fall.min(one);
+        let cosine = one - u;
+        let root = ((one - a2) * cosine).mul_add(cosine, a2).sqrt();
+        let both = cosine + root;
+        // The masking and its slope by u; its own curvature moves nothing.
+        let masking = lit(2.0) * cosine / both;
+        let slope = lit(-2.0) * a2 / (root * both * both);
+        let inverse = one / sharp.mul_add(u, one);
+        let steep = sharp * inverse;
+        let curvature = steep * (lit(6.0) * masking * steep - lit(4.0) * slope);
+        let variance = solid_angle * u * (lit(2.0) - u) * lit(1.0 / 24.0);
+        let mean = inverse * inverse * curvature.mul_add(variance, masking);
+        fall.simd_lt(one).select(mean, lit(0.0))
     }
 }
 
@@ -67,15 +160,16 @@ pub(super) fn gather<'a, S: Simd>(
     simd: S,
     blocks: impl Iterator<Item = &'a [Cells; BLOCK]>,
     r: [f64; 3],
-    lobe: Lobe,
+    lobe: impl Weigh,
 ) -> [f64; 4] {
     let r = r.map(|x| f32x16::splat(simd, x as f32));
     let mut sums = [f64x8::splat(simd, 0.0); 4];
     for block in blocks {
         let mut partial = [f32x16::splat(simd, 0.0); 4];
         for cells in block {
-            let weight = weights(simd, cells, r, lobe);
-            partial[0] += weight * f32x16::from_slice(simd, &cells.solid_angle);
+            let solid_angle = f32x16::from_slice(simd, &cells.solid_angle);
+            let weight = lobe.mean(simd, fall(simd, cells, r), solid_angle);
+            partial[0] += weight * solid_angle;
             for c in 0..3 {
                 partial[c + 1] = weight.mul_add(f32x16::from_slice(simd, &cells.flux[c]), partial[c + 1]);
             }
@@ -88,25 +182,18 @@ pub(super) fn gather<'a, S: Simd>(
     sums.map(|sum| sum.as_slice().iter().sum())
 }
 
-/// The mean of max(r.w, 0)^e over each cell.
+/// t = 1 - r.m of each cell.
 #[inline(always)]
-fn weights<S: Simd>(simd: S, cells: &Cells, r: [f32x16<S>; 3], lobe: Lobe) -> f32x16<S> {
-    let lit = |x: f32| f32x16::splat(simd, x);
-    // t = 1 - r.m = shortness + |r - m|^2 / 2: near the lobe's axis, where a high power asks for
-    // it, this is far more precise than the dot product.
-    let half = lit(0.5);
+fn fall<S: Simd>(simd: S, cells: &Cells, r: [f32x16<S>; 3]) -> f32x16<S> {
+    // shortness + |r - m|^2 / 2: near the lobe's axis, where a high power asks for it, this is far more
+    // precise than the dot product.
+    let half = f32x16::splat(simd, 0.5);
     let mut t = f32x16::from_slice(simd, &cells.shortness);
     for i in 0..3 {
         let d = r[i] - f32x16::from_slice(simd, &cells.mean_direction[i]);
         t = (d * half).mul_add(d, t);
     }
-    let one = lit(1.0);
-    let cosine = (one - t).max(lit(1e-30));
-    let log2 = log2_of_one_minus(simd, t, cosine);
-    let power = exp2(simd, log2 * lit(lobe.exponent - 2.0));
-    let variance = f32x16::from_slice(simd, &cells.solid_angle) * lit(lobe.curvature);
-    let sine_squared = t * (lit(2.0) - t);
-    power * cosine.mul_add(cosine, variance * sine_squared)
+    t
 }
 
 /// log2(1 - t), given also `cosine` = 1 - t > 0, to a few units in the last place.

@@ -7,7 +7,7 @@ use crate::model::cube::Cube;
 /// Specular cubes for exponents that grow geometrically; alpha is the luminance.
 #[derive(Clone, Debug)]
 pub struct LobeStack {
-    /// Phong exponents, ascending, each the same ratio above the one before.
+    /// Phong exponents, or another lobe's sharpness, ascending, each the same ratio above the one before.
     pub exponents: Vec<f64>,
     /// One cube an exponent, all of one size.
     pub cubes: Vec<Cube<f32>>,

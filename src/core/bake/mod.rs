@@ -2,9 +2,9 @@
 //! of all. Nothing is baked that no enabled effect asks for.
 //!
 //! - [`panorama`]: the lat-long lookup, and panorama to cube
-//! - [`prefilter`]: the Phong-lobe filter (`pyramid`: the cells that it sums over, `lobe_kernel`:
-//!   the sum)
-//! - [`lobes`]: the stack of specular cubes over the exponent
+//! - [`prefilter`]: the filter by lobes ([`radial`]: their weights, `pyramid`: the cells that it sums over,
+//!   `lobe_kernel`: the sum)
+//! - [`lobes`]: the stack of specular cubes over the exponent; [`reflected`]: over a BRDF's roughness
 //! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions)
 //! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
@@ -24,7 +24,9 @@ pub mod occlusion;
 pub mod panorama;
 pub mod prefilter;
 mod pyramid;
+pub mod radial;
 pub mod rays;
+pub mod reflected;
 pub mod shadowed;
 pub mod transfer;
 pub(crate) mod vertex_rays;
@@ -38,10 +40,12 @@ use crate::scene::Scene;
 use crate::scene::maps::Environment;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::sky_lights::sky_lights;
+use crate::specular::SpecularModel;
 use baker::{Baker, EnvironmentBaker};
 use harmonics::Order;
 use interreflection::Albedo;
 pub use lobes::LobeStack;
+pub use reflected::ReflectedStack;
 use transfer::VertexTransfer;
 
 /// Everything that was baked for a scene.
@@ -99,7 +103,7 @@ pub struct BakeStats {
 /// One bake.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeRow {
-    /// `irradiance`, `lobe 32`, `hilite`, `occlusion`, `transfer`; `environment` for what these share.
+    /// `irradiance`, `lobe 32`, `kelemen 0.3536`, `hilite`, `occlusion`, `transfer`; `environment` for what these share.
     pub name: String,
     /// Whether it came from the cache.
     pub cached: bool,
@@ -267,6 +271,26 @@ pub fn bake_light(
         }
     }
     Ok((light, baker.stats))
+}
+
+/// E_r of MODEL 9, the environment through the lobe of `model`, for roughnesses in `range` (one, unless it is free); as fine
+/// as E_s. Kept in the folder `cache` too.
+///
+/// # Errors
+/// As of [`bake`].
+pub fn bake_reflected(
+    scene: &Scene,
+    model: SpecularModel,
+    range: RangeInclusive<f64>,
+    cache: Option<&Path>,
+) -> Result<(ReflectedStack, BakeStats), BakeError> {
+    let mut baker = Baker { cache, stats: BakeStats::default() };
+    let mut cubes = EnvironmentBaker::new(checked_environment(scene)?);
+    let size = scene.quality.lobe_size as usize;
+    let stack = ReflectedStack::new(model, &range, scene.quality.lobes_per_octave, |m| {
+        cubes.reflected(&mut baker, model, size, m)
+    });
+    Ok((stack, baker.stats))
 }
 
 /// Ambient occlusion of one pose of the scene's mesh, morphed and skinned, for that pose alone: what an animation

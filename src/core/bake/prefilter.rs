@@ -1,4 +1,5 @@
-//! The Phong-lobe filter F(r) = int L(w) max(r.w, 0)^e dw / int max(r.w, 0)^e dw (MODEL 4).
+//! The radial filter F(r) = int L(w) k(r.w) dw / int k(r.w) dw: Phong lobes k = max(r.w, 0)^e (MODEL 4), and
+//! the lobes of BRDFs (MODEL 9).
 //!
 //! Exponent 1 is irradiance / pi. Both integrals are sums over the same cells, and the mean radiance
 //! is taken out before and added after, so that a constant environment stays exactly that constant.
@@ -7,11 +8,13 @@
 use fearless_simd::Level;
 use rayon::prelude::*;
 
-use super::lobe_kernel::{BLOCK, Cells, Lobe, WIDE, gather};
+use super::lobe_kernel::{BLOCK, Cells, Ggx, Kelemen, Lobe, WIDE, Weigh, gather};
 use super::panorama::Radiance;
 use super::pyramid::{Cell, Pyramid};
+use super::radial::Radial;
 use crate::model::cube::{Cube, texel_direction, texel_solid_angle};
 use crate::scene::maps::luminance;
+use crate::specular::SpecularModel;
 use crate::with_simd;
 
 /// Cells are wide by this share of a lobe's standard deviation, at most (see `pyramid`).
@@ -20,8 +23,6 @@ const CELL_WIDTH: f64 = 0.5;
 const WIDEST_CELL: f64 = 0.05;
 /// An unevenly lit cell is split when it may move the result by this share of the mean radiance.
 const CELL_TOLERANCE: f64 = 3e-5;
-/// The lobe is cut where a share of this of its solid angle is left.
-const CUT: f64 = 1e-9;
 /// Texels along the face of the finest source: 0.35 degrees, a quarter of the standard deviation of
 /// the sharpest lobe (exponent 2048).
 const FINEST: usize = 256;
@@ -80,14 +81,46 @@ impl Prefilter {
         exponent: f64,
         progress: impl Fn(u64) + Sync,
     ) -> Cube<f32> {
+        self.radial_at(level, size, Radial::Phong(exponent), progress)
+    }
+
+    /// As [`Self::lobe`], with any radial weight.
+    #[must_use]
+    pub fn radial(&self, size: usize, radial: Radial, progress: impl Fn(u64) + Sync) -> Cube<f32> {
+        self.radial_at(Level::new(), size, radial, progress)
+    }
+
+    fn radial_at(
+        &self,
+        level: Level,
+        size: usize,
+        radial: Radial,
+        progress: impl Fn(u64) + Sync,
+    ) -> Cube<f32> {
+        let blocks = self.blocks(radial);
+        match radial {
+            Radial::Phong(exponent) => self.filtered(level, size, &blocks, Lobe::new(exponent), progress),
+            Radial::Brdf(SpecularModel::Kelemen, m) => {
+                self.filtered(level, size, &blocks, Kelemen::new(m), progress)
+            }
+            Radial::Brdf(SpecularModel::Ggx, m) => self.filtered(level, size, &blocks, Ggx::new(m), progress),
+        }
+    }
+
+    fn filtered(
+        &self,
+        level: Level,
+        size: usize,
+        blocks: &[Block],
+        lobe: impl Weigh,
+        progress: impl Fn(u64) + Sync,
+    ) -> Cube<f32> {
         let tiles = size.div_ceil(TILE);
-        let blocks = self.blocks(exponent);
-        let lobe = Lobe::new(exponent);
         let filtered: Vec<Vec<[f32; 4]>> = (0..6 * tiles * tiles)
             .into_par_iter()
             .map(|tile| {
                 let directions = tile_directions(tile, tiles, size);
-                let near = blocks_near(&blocks, &directions);
+                let near = blocks_near(blocks, &directions);
                 let texel = |&r: &[f64; 3]| {
                     let sums = with_simd!(level, simd => gather(simd, near.iter().map(|block| &block.cells), r, lobe));
                     self.finish(sums)
@@ -116,11 +149,11 @@ impl Prefilter {
         [rgb[0], rgb[1], rgb[2], luminance(rgb)]
     }
 
-    fn blocks(&self, exponent: f64) -> Vec<Block> {
+    fn blocks(&self, radial: Radial) -> Vec<Block> {
+        let exponent = radial.exponent();
         let width = (CELL_WIDTH / exponent.sqrt()).min(WIDEST_CELL);
         let cells = self.pyramid.cells_for(exponent, width, CELL_TOLERANCE);
-        // The share of max(cos, 0)^e beyond an angle is its cosine to the power e + 1.
-        let cut = CUT.powf(1.0 / (exponent + 1.0)).acos();
+        let cut = radial.reach();
         let block = |cells: &[Cell]| Block::new(cells, self.pyramid.mean, cut);
         cells.par_chunks(WIDE * BLOCK).map(block).collect()
     }
@@ -176,6 +209,12 @@ fn blocks_near<'a>(blocks: &'a [Block], directions: &[[f64; 3]]) -> Vec<&'a Bloc
 /// tested against; any four channels.
 #[must_use]
 pub fn by_brute_force(cube: &Cube<f64>, r: [f64; 3], exponent: f64, splits: usize) -> [f64; 4] {
+    radial_by_brute_force(cube, r, Radial::Phong(exponent), splits)
+}
+
+/// As [`by_brute_force`], with any radial weight.
+#[must_use]
+pub fn radial_by_brute_force(cube: &Cube<f64>, r: [f64; 3], radial: Radial, splits: usize) -> [f64; 4] {
     let fine = cube.size() * splits;
     let (mut sum, mut weights) = ([0.0; 4], 0.0);
     for face in 0..6 {
@@ -186,7 +225,7 @@ pub fn by_brute_force(cube: &Cube<f64>, r: [f64; 3], exponent: f64, splits: usiz
                 if cosine <= 0.0 {
                     continue;
                 }
-                let weight = cosine.powf(exponent) * texel_solid_angle(column, row, fine);
+                let weight = radial.weight(cosine) * texel_solid_angle(column, row, fine);
                 let texel = cube.texel(face, column / splits, row / splits);
                 (0..4).for_each(|c| sum[c] += weight * texel[c]);
                 weights += weight;

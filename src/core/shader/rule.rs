@@ -241,12 +241,15 @@ impl Rule {
 const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
-pub const LIBRARY: [(&str, &str); 5] = [
+pub const LIBRARY: [(&str, &str); 8] = [
     ("vector", include_str!("rules/lib/vector.wgsl")),
     ("frame", include_str!("rules/lib/frame.wgsl")),
     ("cube", include_str!("rules/lib/cube.wgsl")),
     ("texels", include_str!("rules/lib/texels.wgsl")),
     ("rim", include_str!("rules/lib/rim.wgsl")),
+    ("specular", include_str!("rules/lib/specular.wgsl")),
+    ("split_sum_kelemen", include_str!("rules/lib/split_sum_kelemen.wgsl")),
+    ("split_sum_ggx", include_str!("rules/lib/split_sum_ggx.wgsl")),
 ];
 
 /// The built-in rules.

@@ -249,8 +249,10 @@ mod tests {
 
     #[test]
     fn constants_of_mathematics_are_meant_and_not_their_nearest_f32() {
-        let exact = [std::f64::consts::LN_2, std::f64::consts::PI / 180.0, 0.1];
-        for (body, want) in ["0.6931472 * x", "0.017453292 * x", "0.1 * x"].into_iter().zip(exact) {
+        let exact = [std::f64::consts::LN_2, std::f64::consts::PI, std::f64::consts::PI / 180.0, 0.1];
+        for (body, want) in
+            ["0.6931472 * x", "3.1415927 * x", "0.017453292 * x", "0.1 * x"].into_iter().zip(exact)
+        {
             assert_eq!(values(body, &[1.0]), [want], "{body}");
         }
     }

@@ -1,0 +1,28 @@
+//! The rules' functions evaluated as the f64 reference does: for tests.
+
+use crate::program::graph::Graph;
+use crate::program::lower::{Natives, Source, Value};
+use crate::program::steps::{Rounding, Steps};
+
+/// A function of numbers.
+pub(super) struct Function(Steps);
+
+impl Function {
+    /// A function of a text that takes so many numbers.
+    pub(super) fn new(text: &str, name: &str, count: usize) -> Self {
+        let source = Source::new(text, Natives::Written).unwrap();
+        let mut graph = Graph::default();
+        let mut argument = |at: usize| Value::Numbers(vec![graph.field("x", at)]);
+        let arguments = (0..count).map(&mut argument).collect();
+        let outputs = source.call(&mut graph, name, arguments).unwrap();
+        Self(Steps::new(&graph, &outputs, |_| Rounding::Plain))
+    }
+
+    /// Its value.
+    pub(super) fn of(&self, numbers: &[f64]) -> Vec<f64> {
+        let setting = self.0.setting(0.0_f64, |_| 0.0, |name| panic!("it looks {name} up"));
+        let mut registers = Vec::new();
+        self.0.run(&setting, 0.0, &mut registers, |place| numbers[self.0.fields()[place].component]);
+        self.0.outputs(&setting, &registers).collect()
+    }
+}
