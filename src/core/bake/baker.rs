@@ -146,8 +146,7 @@ impl<'a> EnvironmentBaker<'a> {
         exponent: f64,
     ) -> Cube<f32> {
         let key = self.key.clone().with(&[size as u64]).with(&[exponent]);
-        let message = format!("exponent {exponent:.4}");
-        self.radial(baker, name, "lobe", &key, size, Radial::Phong(exponent), message)
+        self.radial(baker, name, &key, size, Radial::Phong(exponent))
     }
 
     /// The environment through a BRDF's lobe, for a roughness.
@@ -159,20 +158,22 @@ impl<'a> EnvironmentBaker<'a> {
         m: f64,
     ) -> Cube<f32> {
         let key = self.key.clone().with(model.name().as_bytes()).with(&[size as u64]).with(&[m]);
-        let (name, message) = (format!("{} {m:.4}", model.name()), format!("roughness {m:.4}"));
-        self.radial(baker, name, "reflected", &key, size, Radial::Brdf(model, m), message)
+        let name = format!("{} {m:.4}", model.name());
+        self.radial(baker, name, &key, size, Radial::Brdf(model, m))
     }
 
     fn radial(
         &mut self,
         baker: &mut Baker<'_>,
         name: String,
-        kind: &str,
         key: &Key,
         size: usize,
         radial: Radial,
-        message: String,
     ) -> Cube<f32> {
+        let (kind, message) = match radial {
+            Radial::Phong(exponent) => ("lobe", format!("exponent {exponent:.4}")),
+            Radial::Brdf(_, m) => ("reflected", format!("roughness {m:.4}")),
+        };
         let floats = baker.through_cache(name, kind, key, 24 * size * size, |stats| {
             let prefilter = self.prefilter(stats);
             let bar = progress::bar("prefilter", (6 * size * size) as u64);
