@@ -6,7 +6,7 @@ use skinfit::shader::tangent::Tangents;
 use crate::by_rules::Function;
 
 /// Expressions of `a` and `b`, all of whose components are positive, far from kinks.
-const EXPRESSIONS: [&str; 32] = [
+const EXPRESSIONS: [&str; 35] = [
     "a + b",
     "a.x + b",
     "a - b",
@@ -21,6 +21,9 @@ const EXPRESSIONS: [&str; 32] = [
     "abs(a - b)",
     "min(a, b)",
     "max(a, b)",
+    "clamp(a * b, vec3f(0.1), b * 9.0)",
+    "clamp(a, b, b * 1.6)",
+    "clamp(a * b, a, vec3f(9.0))",
     "mix(a, b, vec3f(0.3))",
     "mix(a, b, a.zxy)",
     "fma(a, b, a.yzx)",

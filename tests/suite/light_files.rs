@@ -225,7 +225,8 @@ fn lights_of_the_mesh_file_stand_where_their_nodes_do() {
     let LightKind::Point(lamp) = &point.kind else { panic!("{point:?}") };
     assert_eq!((lamp.position, lamp.radius), (DVec3::new(3.0, 4.0, 5.0), 0.0));
     let said: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-    assert!(said.len() == 2 && said[0].contains("\"Key.001\", is called `Key_001`"), "{said:?}");
+    assert!(said.len() == 3 && said[2].contains("the effect `lights` is off"), "{said:?}");
+    assert!(said[0].contains("\"Key.001\", is called `Key_001`"), "{said:?}");
     assert!(said[1].contains("`key_001_2`"), "{said:?}");
     // Nobody asked for them.
     let folder = SceneFolder::new();

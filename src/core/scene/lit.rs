@@ -12,7 +12,7 @@ use super::settings::spots;
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Param, Params};
 use crate::model::registry::leaked;
-use crate::shader::term::{self, Origin, Term, TermError, stamped};
+use crate::shader::term::{self, Origin, Problem, Term, TermError, stamped};
 
 /// Light from one direction: [`IN_WORLD`] where it stays, or [`IN_SKY`] where it turns with the environment.
 const BEAM: &str = include_str!("../shader/rules/family/beam.wgsl");
@@ -68,7 +68,12 @@ impl Lights {
         let of_sky = (1..=spots).map(|number| effect_of(&Light::of_sky(number), true));
         let terms = own.iter().map(|light| effect_of(light, false)).chain(of_sky).collect::<Result<_, _>>();
         let taken = |error: TermError| {
-            let remedy = "Give the light, or what a file of [model] terms declares, another name";
+            let remedy = match error.problem {
+                Problem::Taken { .. } => {
+                    "Give the light, or what a file of [model] terms declares, another name".to_owned()
+                }
+                _ => error.problem.remedy(),
+            };
             SceneError::new(&source.path, error.problem.to_string(), remedy)
         };
         Ok(Self { own, spots, terms: terms.map_err(taken)? })

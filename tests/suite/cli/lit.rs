@@ -1,6 +1,6 @@
 //! A scene with lights of its own: fitted, kept, drawn again, exported.
 
-use super::sandbox::Sandbox;
+use super::sandbox::{Ran, Sandbox};
 use crate::fixtures::read_exr;
 
 const LIGHTS: &str = "
@@ -66,7 +66,10 @@ fn a_lit_scene_is_fitted_and_its_run_folder_draws_the_same_again() {
         assert!((0..3).all(|c| (got[c] - want[c]).abs() < 0.01 * want[c] + 1e-3), "{got:?} {want:?}");
     }
     let constants = sandbox.run(&["export", "run/params.toml", "--to", "c", "--constants"]).done().out;
-    assert!(constants.contains("LIGHT_KEY_COLOR") && !constants.contains("IRRADIANCE"), "{constants}");
+    assert!(
+        constants.contains("skinfit_light_key_color") && !constants.contains("light_key_irradiance"),
+        "{constants}"
+    );
     // Constants of lights that a scene has not say nothing of it.
     let text = sandbox.text("run/params.toml").replace("light.bulb.color", "light.moon.color");
     sandbox.write("moon.toml", text.as_bytes());
@@ -109,6 +112,7 @@ fn lights_that_do_not_shine_are_told() {
     let sandbox = scene("\"light.key.color\"");
     sandbox.edit(", \"lights\", \"shadows\"]", ", \"shadows\"]");
     sandbox.edit(", \"light.key.color\"", "");
-    let said = sandbox.run(&["shader", "scene.toml"]).done().err;
+    let Ran { code, err: said, .. } = sandbox.run(&["shader", "scene.toml"]);
+    assert_eq!(code, Some(0));
     assert!(said.contains("effect `lights` is off") && said.contains("`shadows` does nothing"), "{said}");
 }

@@ -25,9 +25,9 @@ fn share_of_environment(n: vec3f, view: vec3f, lobe_roughness: f32, f0: f32) -> 
 
 // specular_weight s E_r(R) (f0 a + b) (MODEL 9); the mirrored environment in the place of E_r.
 //
-// gives: fresnel_part
+// gives: reflected_part
 // adds: fresnel
 // cost: 8
-fn fresnel_light(reflected_share: f32, specular: f32, mirror_light: vec4f, specular_weight: vec3f) -> vec3f {
+fn reflected_light(reflected_share: f32, specular: f32, mirror_light: vec4f, specular_weight: vec3f) -> vec3f {
     return specular_weight * (specular * reflected_share * mirror_light.rgb);
 }

@@ -249,6 +249,10 @@ impl Writer<'_> {
             M::Abs => format!("sign({}) * {}", a[0], d[0]),
             M::Min => format!("select({}, {}, {} < {})", d[1], d[0], a[0], a[1]),
             M::Max => format!("select({}, {}, {} > {})", d[1], d[0], a[0], a[1]),
+            M::Clamp => format!(
+                "select(select({2}, {0}, {3} < {5}), {1}, {3} <= {4})",
+                d[0], d[1], d[2], a[0], a[1], a[2]
+            ),
             M::Fract => d[0].clone(),
             M::Dot => product("dot", &a),
             M::Cross => product("cross", &a),
