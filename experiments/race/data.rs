@@ -182,5 +182,6 @@ pub(crate) fn illumination(folder: &Path, manifest: &Manifest) -> Result<Illumin
         irradiance: Some(cube(folder, "cube_diffuse", size)?),
         lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![cube(folder, "cube_spec", size)?] }),
         hilite: Some(cube(folder, "cube_hilite", size)?),
+        reflected: None,
     })
 }

@@ -15,9 +15,10 @@ use super::error::{GpuError, Oversized};
 use super::texels::{self, Texels};
 use super::vertices;
 use crate::bake::rays::RayMesh;
+use crate::bake::stacks::Stack;
 use crate::bake::{Illumination, VertexOcclusion};
 use crate::model::cube::Cube;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::prepare::Baked;
 use crate::samples::PosedSurface;
 use crate::scene::Scene;
@@ -57,7 +58,7 @@ pub(super) struct Uploads {
     split: Option<(Mesh, Option<VertexOcclusion>)>,
     /// The morph targets that are summed, by their index in the mesh.
     targets: Vec<usize>,
-    specular: Option<Cube<f32>>,
+    stacks: [Option<Cube<f32>>; Stack::ALL.len()],
     attributes: HashMap<Attribute, Buffer>,
     resources: HashMap<Resource, Bound>,
     indices: Buffer,
@@ -107,11 +108,11 @@ impl Uploads {
         let mesh = split.as_ref().map_or(&content.scene.mesh, |(mesh, _)| mesh);
         let triangles = bytemuck::cast_slice(&mesh.triangles);
         let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX)?;
-        let lobe = content.params.scalar(Param::SpecularLobe);
-        let specular = content.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
+        let looked_up = |stack: Stack| stack.at(&content.illumination, stack.place(&content.params));
+        let stacks = Stack::ALL.map(|stack| looked_up(stack).map(|(cube, _)| cube));
         let bytes = triangles.len() as u64;
         let (attributes, resources) = (HashMap::new(), HashMap::new());
-        Ok(Self { content, split, targets, specular, attributes, resources, indices, bytes, clipped: 0 })
+        Ok(Self { content, split, targets, stacks, attributes, resources, indices, bytes, clipped: 0 })
     }
 
     /// What attributes are of.
@@ -168,6 +169,7 @@ impl Uploads {
     fn make(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
         let (scene, illumination) = (Arc::clone(&self.content.scene), Arc::clone(&self.content.illumination));
         let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
+        let stacked = |stack: Stack| &self.stacks[stack as usize];
         let texels = match resource {
             Resource::MapSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::Repeat))),
             Resource::CubeSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::ClampToEdge))),
@@ -178,12 +180,16 @@ impl Uploads {
             }
             Resource::Bones => return self.storage(gpu, "bones", &vertices::bones(&scene.mesh.bones)),
             Resource::IrradianceFaces => cube(&illumination.irradiance, texels::faces),
-            Resource::SpecularFaces => cube(&self.specular, texels::faces),
-            // A fit's: no renderer's plan reads it.
-            Resource::SpecularSlopeFaces => None,
+            Resource::SpecularFaces => cube(stacked(Stack::Specular), texels::faces),
+            Resource::ReflectedFaces => cube(stacked(Stack::Reflected), texels::faces),
+            Resource::GlossyFaces => cube(stacked(Stack::Glossy), texels::faces),
+            // A fit's: no renderer's plan reads them.
+            Resource::SpecularSlopeFaces | Resource::ReflectedSlopeFaces | Resource::GlossySlopeFaces => None,
             Resource::HiliteFaces => cube(&illumination.hilite, texels::faces),
             Resource::IrradianceCube => cube(&illumination.irradiance, texels::cube),
-            Resource::SpecularCube => cube(&self.specular, texels::cube),
+            Resource::SpecularCube => cube(stacked(Stack::Specular), texels::cube),
+            Resource::ReflectedCube => cube(stacked(Stack::Reflected), texels::cube),
+            Resource::GlossyCube => cube(stacked(Stack::Glossy), texels::cube),
             Resource::HiliteCube => cube(&illumination.hilite, texels::cube),
             map => texels::map(map, &scene.maps),
         };

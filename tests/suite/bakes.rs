@@ -2,13 +2,14 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
+use std::ops::RangeInclusive;
 use std::time::Instant;
 
 use glam::{DMat4, DVec3, Vec3};
 use rayon::prelude::*;
 use skinfit::bake::panorama::{Radiance, sample_latlong, to_cube};
 use skinfit::bake::prefilter::{Prefilter, by_brute_force};
-use skinfit::bake::{BakeStats, LobeStack, bake};
+use skinfit::bake::{BakeStats, LobeStack, Ranges, bake};
 use skinfit::model::cube::{Cube, texel_direction, texel_solid_angle};
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::scene::Scene;
@@ -193,12 +194,17 @@ fn real_environments_are_filtered_close_to_convergence() {
     }
 }
 
+/// Exponents of E_s; nothing else is looked up.
+fn within(exponents: RangeInclusive<f64>) -> Ranges {
+    Ranges { exponents, roughnesses: 1.0..=1.0 }
+}
+
 #[test]
 fn bakes_are_the_same_for_any_number_of_threads() {
     let scene = small_scene();
     let run = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        format!("{:?}", pool.install(|| bake(&scene, &triangle, 20.0..=20.0, None).unwrap().0))
+        format!("{:?}", pool.install(|| bake(&scene, &triangle, &within(20.0..=20.0), None).unwrap().0))
     };
     let one = run(1);
     assert!((2..=4).all(|threads| run(threads) == one));
@@ -389,7 +395,7 @@ fn names(stats: &BakeStats) -> Vec<&str> {
 fn turning_an_effect_off_removes_what_only_it_asked_for() {
     let run = |effects: Effects| {
         let scene = Scene { effects, ..small_scene() };
-        bake(&scene, &triangle, 32.0..=32.0, None).unwrap()
+        bake(&scene, &triangle, &within(32.0..=32.0), None).unwrap()
     };
     let (all, stats) = run(Effects::SURFACE);
     assert_eq!(names(&stats), ["irradiance", "lobe 32.0000", "hilite", "occlusion"]);
@@ -411,7 +417,7 @@ fn turning_an_effect_off_removes_what_only_it_asked_for() {
         names(&stats).is_empty() && nothing.illumination.irradiance.is_none() && nothing.occlusion.is_none()
     );
     let scene = small_scene();
-    let stack = bake(&scene, &triangle, 1.0..=2048.0, None).unwrap().0.illumination.lobes.unwrap();
+    let stack = bake(&scene, &triangle, &within(1.0..=2048.0), None).unwrap().0.illumination.lobes.unwrap();
     assert_eq!(stack.exponents.len(), 12);
 }
 
@@ -419,7 +425,7 @@ fn turning_an_effect_off_removes_what_only_it_asked_for() {
 fn a_second_bake_comes_from_the_cache_and_a_damaged_file_is_made_anew() {
     let folder = tempfile::tempdir().unwrap();
     let scene = small_scene();
-    let run = |scene: &Scene| bake(scene, &triangle, 32.0..=32.0, Some(folder.path())).unwrap();
+    let run = |scene: &Scene| bake(scene, &triangle, &within(32.0..=32.0), Some(folder.path())).unwrap();
     let (first, stats) = run(&scene);
     assert!(stats.rows.iter().all(|row| !row.cached));
     let (second, stats) = run(&scene);
@@ -456,15 +462,17 @@ fn a_cache_that_cannot_be_written_is_a_warning_and_a_missing_environment_an_erro
     let file = folder.path().join("file");
     std::fs::write(&file, b"in the way").unwrap();
     let mut scene = small_scene();
-    let (baked, stats) = bake(&scene, &triangle, 32.0..=32.0, Some(&file.join("cache"))).unwrap();
+    let (baked, stats) = bake(&scene, &triangle, &within(32.0..=32.0), Some(&file.join("cache"))).unwrap();
     assert!(baked.illumination.irradiance.is_some());
     assert!(!stats.warnings.is_empty());
     scene.quality.lobe_size = 0;
-    let error = bake(&scene, &triangle, 32.0..=32.0, None).unwrap_err().to_string();
+    let error = bake(&scene, &triangle, &within(32.0..=32.0), None).unwrap_err().to_string();
     assert!(error.contains("lobe_size"), "{error}");
     scene.environment.as_mut().unwrap().panorama.texels.pop();
-    assert!(bake(&scene, &triangle, 32.0..=32.0, None).unwrap_err().to_string().contains("511 texels"));
+    assert!(
+        bake(&scene, &triangle, &within(32.0..=32.0), None).unwrap_err().to_string().contains("511 texels")
+    );
     scene.environment = None;
-    let error = bake(&scene, &triangle, 32.0..=32.0, None).unwrap_err().to_string();
+    let error = bake(&scene, &triangle, &within(32.0..=32.0), None).unwrap_err().to_string();
     assert!(error.contains("test/scene.toml") && error.contains("[environment]"), "{error}");
 }

@@ -82,6 +82,7 @@ impl<T: Copy> Cubes<T> {
             irradiance: Some(self.irradiance.size()),
             specular: Some(self.specular.size()),
             hilite: Some(self.hilite.size()),
+            reflected: None,
         }
     }
 

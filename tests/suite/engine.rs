@@ -102,6 +102,7 @@ pub(crate) fn illumination() -> Arc<Illumination> {
             cubes: vec![wavy(16, 0.7), wavy(16, 1.1), wavy(16, 1.3)],
         }),
         hilite: Some(wavy(16, 2.1)),
+        reflected: None,
     })
 }
 

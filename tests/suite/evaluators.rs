@@ -222,6 +222,7 @@ fn illumination(scene: &Scene) -> Arc<Illumination> {
             cubes: scene.lights.lobes.iter().map(|(_, cube)| single(cube)).collect(),
         }),
         hilite: Some(single(&scene.lights.hilite)),
+        reflected: None,
     })
 }
 

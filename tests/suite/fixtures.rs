@@ -163,6 +163,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         form: Form::Corrected,
         silhouette: Silhouette::Fragment,
         lookups: Lookups::default(),
+        choices: skinfit::model::choices::Choices::default(),
         dapple: Dapple::default(),
         effects,
         params: Params::defaults(Form::Corrected),

@@ -39,7 +39,7 @@ fn sampled(scene: &Scene) -> ViewSamples {
 fn white() -> Illumination {
     let cube = || Cube::from_fn(4, |_, _, _| [1.0_f32; 4]);
     let lobes = LobeStack { exponents: vec![16.0, 32.0, 64.0], cubes: vec![cube(), cube(), cube()] };
-    Illumination { irradiance: Some(cube()), lobes: Some(lobes), hilite: Some(cube()) }
+    Illumination { irradiance: Some(cube()), lobes: Some(lobes), hilite: Some(cube()), reflected: None }
 }
 
 /// What the rules show of a scene under white light at its parameters; slots that hold a pixel.

@@ -161,7 +161,7 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
         let kept: Vec<Unknown> = all.iter().copied().filter(held).collect();
         // Records shorter than their terms, and longer ones, with shares.
         let samples = if i % 2 == 0 { Layout::of_samples(&places, 6) } else { everything.clone() };
-        let sizes = FaceSizes { irradiance: Some(16), specular: Some(32), hilite: Some(8) };
+        let sizes = FaceSizes { irradiance: Some(16), specular: Some(32), hilite: Some(8), reflected: None };
         let fitted = |unknowns: Vec<Unknown>, layout: &Layout, bits: usize| Fitted {
             setup,
             output: None,

@@ -332,6 +332,7 @@ fn reduced<F: Format + Send + Sync>(vectors: &Vectors, want: &str, step: f64, fl
             irradiance: Some(diffuse),
             lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![spec] }),
             hilite: Some(hilite),
+            reflected: None,
         };
         let setup = Setup::new(Form::Listing, Silhouette::Vertex, ALL_TERMS);
         let mut samples = ViewSamples { group_start: vec![0, 1], ..ViewSamples::default() };

@@ -26,6 +26,7 @@ const SOURCES: [&str; 20] = [
     include_str!("radial.rs"),
     include_str!("rays.rs"),
     include_str!("reflected.rs"),
+    include_str!("stacks.rs"),
     include_str!("transfer.rs"),
     include_str!("vertex_rays.rs"),
     include_str!("wide_bvh.rs"),

@@ -5,6 +5,7 @@
 //! - [`prefilter`]: the filter by lobes ([`radial`]: their weights, `pyramid`: the cells that it sums over,
 //!   `lobe_kernel`: the sum)
 //! - [`lobes`]: the stack of specular cubes over the exponent; [`reflected`]: over a BRDF's roughness
+//! - [`stacks`]: which cube of which stack is looked up
 //! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions)
 //! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
@@ -28,6 +29,7 @@ pub mod radial;
 pub mod rays;
 pub mod reflected;
 pub mod shadowed;
+pub mod stacks;
 pub mod transfer;
 pub(crate) mod vertex_rays;
 mod wide_bvh;
@@ -36,16 +38,18 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use crate::model::cube::Cube;
+use crate::model::params::Param;
 use crate::scene::Scene;
 use crate::scene::maps::Environment;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::sky_lights::sky_lights;
-use crate::specular::SpecularModel;
+use crate::specular::SMOOTHEST;
 use baker::{Baker, EnvironmentBaker};
 use harmonics::Order;
 use interreflection::Albedo;
 pub use lobes::LobeStack;
 pub use reflected::ReflectedStack;
+use stacks::Stack;
 use transfer::VertexTransfer;
 
 /// Everything that was baked for a scene.
@@ -66,6 +70,8 @@ pub struct Illumination {
     pub lobes: Option<LobeStack>,
     /// E_h: the environment, lightly filtered for its resolution (alpha: its luminance, unused).
     pub hilite: Option<Cube<f32>>,
+    /// E_r for a stack of roughnesses.
+    pub reflected: Option<ReflectedStack>,
 }
 
 /// The open share of the hemisphere, 1 = unoccluded.
@@ -215,11 +221,40 @@ pub fn bake_scene_transfer(
     (VertexTransfer { order, base: baked.base, morphs }, baker.stats)
 }
 
+/// Where stacks of cubes will be looked up: at one place each, unless a fit moves it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ranges {
+    /// Exponents of E_s.
+    pub exponents: RangeInclusive<f64>,
+    /// Roughnesses of E_r.
+    pub roughnesses: RangeInclusive<f64>,
+}
+
+impl Ranges {
+    /// Those of a scene as it stands; with `fit` all that its free parameters may reach.
+    #[must_use]
+    pub fn of(scene: &Scene, fit: bool) -> Self {
+        let free = |name: &str| fit && scene.fit.free.iter().any(|column| column.param.name() == name);
+        let [exponent, rough, glossy] = Stack::ALL.map(|stack| stack.place(&scene.params));
+        let lobe = Param::SpecularLobe.info();
+        let exponents = if free(lobe.name) { lobe.lower..=lobe.upper } else { exponent..=exponent };
+        let widest = match Param::from_identifier("roughness") {
+            Some(roughness) if free("roughness") => roughness.info().upper,
+            _ => rough,
+        };
+        let sharpest = match scene.setup().choices.glossy {
+            _ if free("roughness") || free("gloss") => SMOOTHEST,
+            true => glossy,
+            false => rough,
+        };
+        Self { exponents, roughnesses: sharpest..=widest }
+    }
+}
+
 /// Bake what the scene's effects ask for, and no more.
 ///
-/// `pose` gives the scene's mesh with its morph targets at the listed weights. Of the specular
-/// cubes, those are made that [`LobeStack::at`] needs for exponents in `exponents` (the start
-/// value's alone, unless it is free). Bakes are looked for and kept in the folder `cache`.
+/// `pose` gives the scene's mesh with its morph targets at the listed weights. Of the stacks of
+/// cubes, those are made that are needed within `ranges`. Bakes are looked for and kept in the folder `cache`.
 ///
 /// # Errors
 /// When the scene lacks what its effects ask for. A cache that cannot be used is a warning in the
@@ -227,10 +262,10 @@ pub fn bake_scene_transfer(
 pub fn bake(
     scene: &Scene,
     pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
-    exponents: RangeInclusive<f64>,
+    ranges: &Ranges,
     cache: Option<&Path>,
 ) -> Result<(Bake, BakeStats), BakeError> {
-    let (illumination, stats) = bake_light(scene, exponents, cache)?;
+    let (illumination, stats) = bake_light(scene, ranges, cache)?;
     let mut baker = Baker { cache, stats };
     let needs = scene.needs();
     let occlusion = needs.occlusion.then(|| occlusion_of_used(scene, pose, &mut baker));
@@ -243,7 +278,7 @@ pub fn bake(
 /// As of [`bake`].
 pub fn bake_light(
     scene: &Scene,
-    exponents: RangeInclusive<f64>,
+    ranges: &Ranges,
     cache: Option<&Path>,
 ) -> Result<(Illumination, BakeStats), BakeError> {
     let needs = scene.needs();
@@ -260,7 +295,7 @@ pub fn bake_light(
             light.irradiance = Some(cubes.lobe(&mut baker, "irradiance".to_owned(), size, 1.0));
         }
         if needs.lobes {
-            let exponents = lobes::knots(&exponents, quality.lobes_per_octave);
+            let exponents = lobes::knots(&ranges.exponents, quality.lobes_per_octave);
             let size = quality.lobe_size as usize;
             let cube = |&e: &f64| cubes.lobe(&mut baker, format!("lobe {e:.4}"), size, e);
             let stack = exponents.iter().map(cube).collect();
@@ -269,28 +304,14 @@ pub fn bake_light(
         if needs.hilite {
             light.hilite = Some(cubes.hilite(&mut baker, quality.hilite_size as usize));
         }
+        if needs.reflected {
+            let (model, size) = (scene.choices.specular_model, quality.lobe_size as usize);
+            let cube = |m: f64| cubes.reflected(&mut baker, model, size, m);
+            let stack = ReflectedStack::new(model, &ranges.roughnesses, quality.lobes_per_octave, cube);
+            light.reflected = Some(stack);
+        }
     }
     Ok((light, baker.stats))
-}
-
-/// E_r of MODEL 9, the environment through the lobe of `model`, for roughnesses in `range` (one, unless it is free); as fine
-/// as E_s. Kept in the folder `cache` too.
-///
-/// # Errors
-/// As of [`bake`].
-pub fn bake_reflected(
-    scene: &Scene,
-    model: SpecularModel,
-    range: RangeInclusive<f64>,
-    cache: Option<&Path>,
-) -> Result<(ReflectedStack, BakeStats), BakeError> {
-    let mut baker = Baker { cache, stats: BakeStats::default() };
-    let mut cubes = EnvironmentBaker::new(checked_environment(scene)?);
-    let size = scene.quality.lobe_size as usize;
-    let stack = ReflectedStack::new(model, &range, scene.quality.lobes_per_octave, |m| {
-        cubes.reflected(&mut baker, model, size, m)
-    });
-    Ok((stack, baker.stats))
 }
 
 /// Ambient occlusion of one pose of the scene's mesh, morphed and skinned, for that pose alone: what an animation

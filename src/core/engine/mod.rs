@@ -150,12 +150,13 @@ pub fn rounding(views: &[ObservedView], loss: crate::scene::Loss, stride: usize)
 #[must_use]
 pub fn face_sizes(illumination: &crate::bake::Illumination) -> crate::shader::facts::FaceSizes {
     use crate::model::cube::Cube;
-    let crate::bake::Illumination { irradiance, lobes, hilite } = illumination;
+    let crate::bake::Illumination { irradiance, lobes, hilite, reflected } = illumination;
     let specular = lobes.as_ref().and_then(|stack| stack.cubes.first());
     crate::shader::facts::FaceSizes {
         irradiance: irradiance.as_ref().map(Cube::size),
         specular: specular.map(Cube::size),
         hilite: hilite.as_ref().map(Cube::size),
+        reflected: reflected.as_ref().and_then(|stack| stack.stack.cubes.first()).map(Cube::size),
     }
 }
 

@@ -24,7 +24,7 @@ use crate::shader::facts::Facts;
 #[must_use]
 pub fn sample_facts(setup: Setup, illumination: &Illumination, turned: bool) -> Facts {
     let mut faces = super::face_sizes(illumination);
-    for size in [&mut faces.irradiance, &mut faces.specular, &mut faces.hilite] {
+    for size in [&mut faces.irradiance, &mut faces.specular, &mut faces.hilite, &mut faces.reflected] {
         size.get_or_insert(1);
     }
     Facts::of_samples(setup, faces, turned)

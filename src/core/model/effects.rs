@@ -324,6 +324,7 @@ impl Setup {
             irradiance: effects.has(E::Diffuse),
             lobes: effects.has(E::SideSpecular) || reflection,
             hilite: effects.has(E::Hilite),
+            reflected: false,
             occlusion: effects.has(E::Occlusion) && effects.has_any(&[E::Diffuse, E::Hilite]),
             rim,
             dapple: reflection,
@@ -369,6 +370,8 @@ pub struct Needs {
     pub lobes: bool,
     /// The hilite cube `E_h`.
     pub hilite: bool,
+    /// The stack of cubes `E_r` over the roughness.
+    pub reflected: bool,
     /// Ambient occlusion.
     pub occlusion: bool,
     /// The silhouette term S.z.
@@ -400,6 +403,7 @@ impl Needs {
             irradiance: self.irradiance || other.irradiance,
             lobes: self.lobes || other.lobes,
             hilite: self.hilite || other.hilite,
+            reflected: self.reflected || other.reflected,
             occlusion: self.occlusion || other.occlusion,
             rim: self.rim || other.rim,
             dapple: self.dapple || other.dapple,
@@ -420,7 +424,7 @@ impl Needs {
     /// Whether any cube map is looked up, and so an environment is needed.
     #[must_use]
     pub const fn environment(self) -> bool {
-        self.irradiance || self.lobes || self.hilite
+        self.irradiance || self.lobes || self.hilite || self.reflected
     }
 }
 

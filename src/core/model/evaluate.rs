@@ -1,5 +1,6 @@
 //! What is evaluated.
 
+use super::choices::{Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility};
 use super::dapple::Dapple;
 use super::effects::{Effect, Effects, Form, Lookups, Silhouette};
 
@@ -20,6 +21,8 @@ pub struct Setup {
     /// taken where the fragment is. Of a lone fragment there is nothing to interpolate. Read where the silhouette is
     /// [`Silhouette::Vertex`].
     pub interpolated_rim: bool,
+    /// Which ways are taken where there are several.
+    pub choices: Choices,
 }
 
 impl Setup {
@@ -33,6 +36,13 @@ impl Setup {
             lookups: Lookups::Bumped,
             dapple: Dapple::LEAVES_AHEAD,
             interpolated_rim: false,
+            choices: Choices {
+                specular_model: SpecularModel::Kelemen,
+                specular_visibility: SpecularVisibility::Lagarde,
+                lobe_lookup: LobeLookup::Mirror,
+                specular_map: SpecularMap::Weight,
+                glossy: false,
+            },
         }
     }
 

@@ -3,6 +3,7 @@
 //!
 //! - [`params`]: the one table of parameters
 //! - [`readings`]: how the paper is read; [`effects`]: what can be switched on, and what each effect asks for; [`terms`]: parts of the sum
+//! - [`choices`]: which way is taken where there are several
 //! - [`fields`]: numbers of vertices that rules read by name
 //! - [`registry`]: how tables of parameters, effects, terms and fields grow
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands;
@@ -15,6 +16,7 @@
 
 pub mod batch;
 pub mod bearing;
+pub mod choices;
 pub mod cube;
 pub mod dapple;
 pub mod effects;

@@ -5,12 +5,11 @@ use std::sync::Arc;
 use web_time::Instant;
 
 use super::{Loaded, Observed, PrepareError, PrepareOptions, Sampled, StageSeconds};
-use crate::bake::{self, BakeStats, Illumination, VertexOcclusion};
+use crate::bake::{self, BakeStats, Illumination, Ranges, VertexOcclusion};
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
-use crate::model::params::Param;
 use crate::samples::{self, SurfaceBakes, ViewSamples};
 use crate::scene::Scene;
 use crate::scene::view::View;
@@ -48,16 +47,14 @@ impl Baked {
     pub(super) fn of(loaded: Loaded) -> Result<Self, PrepareError> {
         let start = Instant::now();
         let Loaded { scene, fitted, gains, seconds, mut warnings, asked } = loaded;
-        let (lobe, own) = (Param::SpecularLobe.info(), scene.params.scalar(Param::SpecularLobe));
-        let free = scene.fit.free.iter().any(|column| column.param == lobe.param);
-        let exponents = if asked.fit && free { lobe.lower..=lobe.upper } else { own..=own };
+        let ranges = Ranges::of(&scene, asked.fit);
         let cache = asked.cache.as_deref();
         let (illumination, occlusion, stats) = if asked.light_alone {
-            let (illumination, stats) = bake::bake_light(&scene, exponents, cache)?;
+            let (illumination, stats) = bake::bake_light(&scene, &ranges, cache)?;
             (illumination, None, stats)
         } else {
             let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
-            let (baked, stats) = bake::bake(&scene, &pose, exponents, cache)?;
+            let (baked, stats) = bake::bake(&scene, &pose, &ranges, cache)?;
             (baked.illumination, baked.occlusion.map(Arc::new), stats)
         };
         warnings.extend(stats.warnings.iter().cloned());

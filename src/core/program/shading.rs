@@ -18,6 +18,7 @@ use crate::shader::module::{sample_struct, uniform};
 use crate::shader::search::components;
 use crate::shader::tangent::chain::{Chain, Seed};
 use crate::shader::{Constant, Facts, plan};
+use crate::specular::glossy_paces;
 
 /// Radiance and haze of a sample, and how they move.
 #[derive(Debug)]
@@ -282,6 +283,10 @@ pub fn numbers(constant: Constant, params: &Params) -> Option<[f64; 3]> {
         Constant::KeyDirection => key().direction,
         Constant::KeyByAzimuth => key().by_azimuth,
         Constant::KeyByElevation => key().by_elevation,
+        Constant::GlossyPaces => {
+            let [roughness, gloss] = glossy_paces(params);
+            [roughness, gloss, 0.0]
+        }
         Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => return None,
     })
 }

@@ -154,6 +154,7 @@ mod tests {
             irradiance: Some(light(1)),
             lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![light(2)] }),
             hilite: None,
+            reflected: None,
         };
         let samples = samples(Asked::EVERYTHING);
         let mut params = Params::defaults(Form::Corrected);

@@ -184,7 +184,7 @@ mod tests {
         (0..LANES).for_each(|slot| samples.surface.set(slot, &facing, 1.0));
         let setup = Setup::new(Form::Corrected, Silhouette::Bumped, Effects::of(effects));
         let camera = Camera { world_to_camera: DMat4::IDENTITY, fov_y: 1.0, width: LANES as u32, height: 1 };
-        let dark = Illumination { irradiance: None, lobes: None, hilite: None };
+        let dark = Illumination::default();
         let mut params = Params::defaults(Form::Corrected);
         set(&mut params);
         Shader::new(setup, &dark, &params).unwrap().shade(&samples, &camera, 2.0)

@@ -94,6 +94,10 @@ pub(super) struct ModelTable {
     pub form: Option<Spanned<String>>,
     pub silhouette: Option<Spanned<String>>,
     pub lookups: Option<Spanned<String>>,
+    pub specular_model: Option<Spanned<String>>,
+    pub specular_visibility: Option<Spanned<String>>,
+    pub lobe_lookup: Option<Spanned<String>>,
+    pub specular_map: Option<Spanned<String>>,
     pub effects: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     pub terms: Vec<Spanned<TermValue>>,

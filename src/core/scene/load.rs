@@ -23,6 +23,7 @@ use crate::model::effects::{Effect, Effects, Needs};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::progress;
+use crate::shader::term::library;
 
 /// What a command wants of a scene beyond what its file says.
 #[derive(Clone, Copy, Debug)]
@@ -60,9 +61,11 @@ impl Scene {
         let file: SceneFile = source.parse()?;
         let mut warnings = Warnings::new();
         let folder = path.parent().unwrap_or(Path::new(""));
+        library::register_all();
         let terms = terms(&source, &file.model, folder)?;
         let (form, silhouette) = settings::form(&source, &file.model)?;
         let lookups = settings::lookups(&source, &file.model)?;
+        let choices = settings::choices(&source, &file.model)?;
         let dapple = read_dapple(&source, &file)?;
         let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
@@ -87,7 +90,7 @@ impl Scene {
         }
         let effects = lights.switched(effects);
         lights.idle(&source.path, effects, &mut warnings);
-        let setup = Setup { lookups, dapple, ..Setup::new(form, silhouette, effects) };
+        let setup = Setup { lookups, dapple, choices, ..Setup::new(form, silhouette, effects) };
         let needs = setup.needs();
         let mut idle = Warnings::new();
         let fit = settings::fit(&source, &file.fit, &file.model.params, effects, &mut idle)?;
@@ -146,6 +149,7 @@ impl Scene {
             silhouette,
             lookups,
             dapple,
+            choices,
             effects,
             params,
             views,

@@ -57,6 +57,7 @@ pub use terms::register_terms;
 
 use std::path::PathBuf;
 
+use crate::model::choices::Choices;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effects, Form, Lookups, Needs, Silhouette};
 use crate::model::evaluate::Setup;
@@ -89,6 +90,8 @@ pub struct Scene {
     pub lookups: Lookups,
     /// Where light falls through leaves from, before `environment_rotation`.
     pub dapple: Dapple,
+    /// Which ways are taken where there are several.
+    pub choices: Choices,
     /// What is switched on.
     pub effects: Effects,
     /// Start values.
@@ -113,7 +116,15 @@ impl Scene {
         let rotation = Param::EnvironmentRotation;
         let turns = self.fit.free.iter().any(|column| column.param == rotation);
         let interpolated_rim = form == Form::Listing;
-        Setup { form, silhouette, effects, lookups, dapple: dapple.turning(turns), interpolated_rim }
+        let choices = Choices { glossy: self.is_glossy(), ..self.choices };
+        Setup { form, silhouette, effects, lookups, dapple: dapple.turning(turns), interpolated_rim, choices }
+    }
+
+    /// Whether the specular map lowers the roughness, or will.
+    fn is_glossy(&self) -> bool {
+        Param::from_name("gloss").is_some_and(|gloss| {
+            self.params.scalar(gloss) != 0.0 || self.fit.free.iter().any(|column| column.param == gloss)
+        })
     }
 
     /// What its effects ask for.

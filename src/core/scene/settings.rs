@@ -9,6 +9,7 @@ use super::file::{
 use super::maps::Spots;
 use super::numbers::{interval, number, short, whole};
 use super::{Bloom, Diffusion, FitSettings, Loss, Quality, map_fit};
+use crate::model::choices::{Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility};
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
 
@@ -29,6 +30,52 @@ pub(super) fn form(source: &Source, model: &ModelTable) -> Result<(Form, Silhoue
 pub(super) fn lookups(source: &Source, model: &ModelTable) -> Result<Lookups, SceneError> {
     let known = Lookups::ALL.map(|lookups| (lookups.name(), lookups));
     model.lookups.as_ref().map_or(Ok(Lookups::default()), |name| source.choose("lookups", name, &known))
+}
+
+/// The `[model]` table's named choices.
+pub(super) fn choices(source: &Source, model: &ModelTable) -> Result<Choices, SceneError> {
+    let default = Choices::default();
+    Ok(Choices {
+        specular_model: choice(
+            source,
+            "specular_model",
+            model.specular_model.as_ref(),
+            SpecularModel::ALL.map(|choice| (choice.name(), choice)),
+        )?
+        .unwrap_or(default.specular_model),
+        specular_visibility: choice(
+            source,
+            "specular_visibility",
+            model.specular_visibility.as_ref(),
+            SpecularVisibility::ALL.map(|choice| (choice.name(), choice)),
+        )?
+        .unwrap_or(default.specular_visibility),
+        lobe_lookup: choice(
+            source,
+            "lobe_lookup",
+            model.lobe_lookup.as_ref(),
+            LobeLookup::ALL.map(|choice| (choice.name(), choice)),
+        )?
+        .unwrap_or(default.lobe_lookup),
+        specular_map: choice(
+            source,
+            "specular_map",
+            model.specular_map.as_ref(),
+            SpecularMap::ALL.map(|choice| (choice.name(), choice)),
+        )?
+        .unwrap_or(default.specular_map),
+        glossy: false,
+    })
+}
+
+/// The choice that a key names, where there is one.
+fn choice<T: Copy, const N: usize>(
+    source: &Source,
+    key: &str,
+    given: Option<&Spanned<String>>,
+    known: [(&'static str, T); N],
+) -> Result<Option<T>, SceneError> {
+    given.map(|name| source.choose(key, name, &known)).transpose()
 }
 
 /// The `effects` key, where there is one.

@@ -8,7 +8,7 @@ use super::error::{SceneError, read_bytes};
 use super::file::{FamilyTable, ModelTable, SceneFile, Source, TermValue};
 use super::lit::Lights;
 use crate::model::registry::leaked;
-use crate::shader::term::{Term, register, stamped};
+use crate::shader::term::{Term, library, register, stamped};
 
 /// Rules are short; more is another kind of file.
 const MOST_BYTES: u64 = 1 << 20;
@@ -21,6 +21,7 @@ const MOST_BYTES: u64 = 1 << 20;
 pub fn register_terms(path: &Path) -> Result<Vec<&'static Term>, SceneError> {
     let source = Source::read(path)?;
     let file: SceneFile = source.parse()?;
+    library::register_all();
     // Lights are terms that the library brings along.
     Lights::of_file(&source, &file)?;
     terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))

@@ -6,6 +6,7 @@ use crate::model::evaluate::Setup;
 use crate::model::terms::TermName;
 use crate::shader::domain::Work;
 use crate::shader::quantity::Resource;
+use crate::shader::term::library;
 
 /// How far the output may be off, relative to white diffuse light of unit irradiance.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -59,6 +60,8 @@ pub struct FaceSizes {
     pub specular: Option<usize>,
     /// Of E_h.
     pub hilite: Option<usize>,
+    /// Of E_r, at every roughness.
+    pub reflected: Option<usize>,
 }
 
 impl FaceSizes {
@@ -69,9 +72,19 @@ impl FaceSizes {
             Resource::IrradianceFaces => self.irradiance,
             Resource::SpecularFaces | Resource::SpecularSlopeFaces => self.specular,
             Resource::HiliteFaces => self.hilite,
+            Resource::ReflectedFaces
+            | Resource::ReflectedSlopeFaces
+            | Resource::GlossyFaces
+            | Resource::GlossySlopeFaces => self.reflected,
             _ => None,
         }
     }
+}
+
+/// Whether light is shared out before it is diffuse: the sky's by what a point sees of it, all by what is reflected
+/// above the skin.
+fn layered(effects: Effects) -> bool {
+    library::LAYERED.iter().filter_map(|name| Effect::from_name(name)).any(|effect| effects.has(effect))
 }
 
 /// What a scene calls for.
@@ -167,7 +180,8 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 22] = [
+    pub const CONDITIONS: [&'static str; 23] = [
+        "layered",
         "vertex_silhouette",
         "fragment_silhouette",
         "bumped_silhouette",
@@ -209,7 +223,11 @@ impl Facts {
         if let Some(at) = silhouette.and_then(|name| Silhouette::ALL.into_iter().find(|s| s.name() == name)) {
             return Some(setup.silhouette == at);
         }
+        if let Some(holds) = setup.choices.holds(condition) {
+            return Some(holds);
+        }
         Some(match condition {
+            "layered" => layered(setup.effects),
             "raster" => self.source == Source::Raster,
             "terms" => self.source == Source::Terms,
             "bumped" => self.bumped(),

@@ -201,6 +201,7 @@ fn literal(constant: Constant, params: &Params) -> Option<(&'static str, Vec<f64
         | Constant::ViewProjection
         | Constant::KeyByAzimuth
         | Constant::KeyByElevation
+        | Constant::GlossyPaces
         | Constant::MorphWeights => None,
     }
 }

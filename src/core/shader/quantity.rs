@@ -105,12 +105,24 @@ pub enum Resource {
     SpecularSlopeFaces,
     /// E_h, likewise.
     HiliteFaces,
+    /// E_r at the current roughness where the specular map is black, likewise.
+    ReflectedFaces,
+    /// d E_r / d roughness there, likewise; only for fits.
+    ReflectedSlopeFaces,
+    /// E_r at the current roughness where the specular map is white, likewise.
+    GlossyFaces,
+    /// d E_r / d roughness there, likewise; only for fits.
+    GlossySlopeFaces,
     /// E_d as `texture_cube<f32>`, 16-bit float RGBA.
     IrradianceCube,
     /// E_s at the current `specular_lobe`, likewise.
     SpecularCube,
     /// E_h, likewise.
     HiliteCube,
+    /// E_r at the current roughness where the specular map is black, likewise.
+    ReflectedCube,
+    /// E_r at the current roughness where the specular map is white, likewise.
+    GlossyCube,
     /// Colour map, linear, 32-bit float RGBA; `texture_2d<f32>`.
     ColorTexels,
     /// Normal map as stored in [0, 1], 32-bit float RGBA.
@@ -179,14 +191,20 @@ impl Kind {
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 23] = [
+    pub const ALL: [Self; 29] = [
         Self::IrradianceFaces,
         Self::SpecularFaces,
         Self::SpecularSlopeFaces,
         Self::HiliteFaces,
+        Self::ReflectedFaces,
+        Self::ReflectedSlopeFaces,
+        Self::GlossyFaces,
+        Self::GlossySlopeFaces,
         Self::IrradianceCube,
         Self::SpecularCube,
         Self::HiliteCube,
+        Self::ReflectedCube,
+        Self::GlossyCube,
         Self::ColorTexels,
         Self::NormalTexels,
         Self::SpecularTexels,
@@ -213,9 +231,15 @@ impl Resource {
             Self::SpecularFaces => "specular_faces",
             Self::SpecularSlopeFaces => "specular_slope_faces",
             Self::HiliteFaces => "hilite_faces",
+            Self::ReflectedFaces => "reflected_faces",
+            Self::ReflectedSlopeFaces => "reflected_slope_faces",
+            Self::GlossyFaces => "glossy_faces",
+            Self::GlossySlopeFaces => "glossy_slope_faces",
             Self::IrradianceCube => "irradiance_cube",
             Self::SpecularCube => "specular_cube",
             Self::HiliteCube => "hilite_cube",
+            Self::ReflectedCube => "reflected_cube",
+            Self::GlossyCube => "glossy_cube",
             Self::ColorTexels => "color_texels",
             Self::NormalTexels => "normal_texels",
             Self::SpecularTexels => "specular_texels",
@@ -239,10 +263,19 @@ impl Resource {
     #[must_use]
     pub const fn kind(self) -> Kind {
         match self {
-            Self::IrradianceFaces | Self::SpecularFaces | Self::SpecularSlopeFaces | Self::HiliteFaces => {
-                Kind::Faces
-            }
-            Self::IrradianceCube | Self::SpecularCube | Self::HiliteCube => Kind::Cube,
+            Self::IrradianceFaces
+            | Self::SpecularFaces
+            | Self::SpecularSlopeFaces
+            | Self::HiliteFaces
+            | Self::ReflectedFaces
+            | Self::ReflectedSlopeFaces
+            | Self::GlossyFaces
+            | Self::GlossySlopeFaces => Kind::Faces,
+            Self::IrradianceCube
+            | Self::SpecularCube
+            | Self::HiliteCube
+            | Self::ReflectedCube
+            | Self::GlossyCube => Kind::Cube,
             Self::ColorTexels
             | Self::NormalTexels
             | Self::SpecularTexels
@@ -281,19 +314,23 @@ pub enum Constant {
     KeyByAzimuth,
     /// Its derivative by `key_elevation`, a degree, in xyz; only for fits.
     KeyByElevation,
+    /// How fast the roughness where the specular map is white moves with `roughness` and with `gloss`, in xy; only for
+    /// fits.
+    GlossyPaces,
     /// A weight for each active morph target, in x of `array<vec4f, N>`.
     MorphWeights,
 }
 
 impl Constant {
     /// Those that are not parameters of the model.
-    pub const OWN: [Self; 7] = [
+    pub const OWN: [Self; 8] = [
         Self::Eye,
         Self::ViewProjection,
         Self::Turn,
         Self::KeyDirection,
         Self::KeyByAzimuth,
         Self::KeyByElevation,
+        Self::GlossyPaces,
         Self::MorphWeights,
     ];
 
@@ -317,6 +354,7 @@ impl Constant {
             Self::KeyDirection => "key_direction",
             Self::KeyByAzimuth => "key_by_azimuth",
             Self::KeyByElevation => "key_by_elevation",
+            Self::GlossyPaces => "glossy_paces",
             Self::MorphWeights => "morph_weights",
         }
     }

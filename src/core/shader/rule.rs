@@ -27,7 +27,7 @@ use std::sync::LazyLock;
 
 use super::domain::{DIRECTIONS, Domain, TAP_COST};
 use super::facts::{Budget, Facts};
-use super::term::{self, declaration};
+use super::term::{self, declaration, library};
 use crate::model::effects::Effects;
 
 /// One rule.
@@ -264,8 +264,8 @@ pub static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
 
 /// The rules that a scene with these effects has: the built-in ones, and those of the terms that its effects are of.
 pub fn rules(effects: Effects) -> impl Iterator<Item = &'static Rule> {
-    let added = term::terms().into_iter().filter(move |term| effects.has(term.effect));
-    RULES.iter().chain(added.flat_map(|term| &term.rules))
+    library::register_all();
+    RULES.iter().chain(term::enabled(effects).flat_map(|term| &term.rules))
 }
 
 #[cfg(test)]

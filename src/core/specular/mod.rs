@@ -16,34 +16,23 @@ mod gauss;
 mod rules;
 pub mod split_sum;
 
+pub use crate::model::choices::SpecularModel;
+use crate::model::params::{Param, Params};
+
 /// The least roughness that any formula takes.
 pub const SMOOTHEST: f64 = 0.05;
-
-/// A specular BRDF (the scene's `specular_model`).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SpecularModel {
-    /// Beckmann's distribution over |h|^2 (Kelemen and Szirmay-Kalos 2001; GPU Gems 3, chapter 14).
-    Kelemen,
-    /// GGX with height-correlated masking (Walter et al. 2007, Heitz 2014), alpha the square of the roughness.
-    Ggx,
-}
-
-impl SpecularModel {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Kelemen, Self::Ggx];
-
-    /// Its name in scenes.
-    #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Kelemen => "kelemen",
-            Self::Ggx => "ggx",
-        }
-    }
-}
 
 /// The roughness m that every formula takes, from the parameters and a texel's specular intensity s.
 #[must_use]
 pub fn roughness_of(roughness: f64, gloss: f64, s: f64) -> f64 {
     (roughness * (1.0 - gloss * s)).max(SMOOTHEST)
+}
+
+/// How fast the roughness where the specular map is white moves with `roughness` and with `gloss`.
+#[must_use]
+pub fn glossy_paces(params: &Params) -> [f64; 2] {
+    let own = |name: &str| Param::from_identifier(name).map_or(0.0, |param| params.scalar(param));
+    let (roughness, gloss) = (own("roughness"), own("gloss"));
+    // At the bound the product moves it, as the rules have it.
+    if roughness * (1.0 - gloss) >= SMOOTHEST { [1.0 - gloss, -roughness] } else { [0.0; 2] }
 }

@@ -1,5 +1,6 @@
 //! The cubes and the uniform block of a fit.
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use wgpu::{
@@ -9,27 +10,28 @@ use wgpu::{
 
 use super::pipeline::{UNIFORM, Uniform, layout};
 use crate::bake::Illumination;
+use crate::bake::stacks::{Content, Stack};
 use crate::constants::model_block;
 use crate::model::cube::Cube;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::shader::facts::FaceSizes;
 use crate::shader::{Plan, Resource};
 use crate::{Gpu, GpuError, texels, upload};
 
-/// The cubes, each uploaded once, but for the specular one: again when its exponent has changed.
+/// The cubes, each uploaded once, but for those of stacks: again when they are looked up elsewhere.
 pub(super) struct DeviceLights {
     illumination: Arc<Illumination>,
     irradiance: Option<TextureView>,
     hilite: Option<TextureView>,
-    /// The exponent, E_s there, and how it moves.
-    specular: Option<(f64, TextureView, TextureView)>,
+    /// Of a stack the place where it was looked up last, the cube there, and how it moves.
+    stacks: BTreeMap<Stack, (f64, TextureView, TextureView)>,
     /// Counts changes, so that bindings can follow.
     version: u64,
 }
 
 impl DeviceLights {
     pub(super) const fn new(illumination: Arc<Illumination>) -> Self {
-        Self { illumination, irradiance: None, hilite: None, specular: None, version: 0 }
+        Self { illumination, irradiance: None, hilite: None, stacks: BTreeMap::new(), version: 0 }
     }
 
     /// The cubes' sizes.
@@ -52,19 +54,17 @@ impl DeviceLights {
                     self.hilite = cube.map(|cube| upload("hilite faces", cube)).transpose()?;
                     self.version += 1;
                 }
-                Resource::SpecularFaces | Resource::SpecularSlopeFaces => {
-                    let exponent = params.scalar(Param::SpecularLobe);
-                    if self.specular.as_ref().is_none_or(|(at, ..)| *at != exponent)
-                        && let Some(stack) = &self.illumination.lobes
+                of_stack => {
+                    let Some((stack, _)) = Stack::named(of_stack.name()) else { continue };
+                    let place = stack.place(params);
+                    if self.stacks.get(&stack).is_none_or(|(at, ..)| *at != place)
+                        && let Some((cube, slope)) = stack.at(&self.illumination, place)
                     {
-                        let (cube, slope) = stack.at(exponent);
-                        let (cube, slope) =
-                            (upload("specular faces", &cube)?, upload("specular slope faces", &slope)?);
-                        self.specular = Some((exponent, cube, slope));
+                        let views = (place, upload("faces", &cube)?, upload("slope faces", &slope)?);
+                        self.stacks.insert(stack, views);
                         self.version += 1;
                     }
                 }
-                _ => {}
             }
         }
         inputs.bind(gpu, self, &model_block(&inputs.plan.constants, params))
@@ -75,9 +75,10 @@ impl DeviceLights {
         let found = match resource {
             Resource::IrradianceFaces => self.irradiance.as_ref(),
             Resource::HiliteFaces => self.hilite.as_ref(),
-            Resource::SpecularFaces => self.specular.as_ref().map(|(_, cube, _)| cube),
-            Resource::SpecularSlopeFaces => self.specular.as_ref().map(|(.., slope)| slope),
-            _ => None,
+            of_stack => Stack::named(of_stack.name()).and_then(|(stack, content)| {
+                let (_, cube, slope) = self.stacks.get(&stack)?;
+                Some(if content == Content::Light { cube } else { slope })
+            }),
         };
         found.ok_or_else(|| GpuError::Refused {
             adapter: gpu.name().to_owned(),

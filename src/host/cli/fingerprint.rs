@@ -36,8 +36,7 @@ pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
     // Nothing else knows of the atlas' texels.
     let texels = scene.needs().atlas.then_some(scene.diffusion.light_map_size);
     let all = texels.into_iter().fold(all, |all, size| all.with("light map", size.to_string()));
-    let terms = crate::shader::term::terms().into_iter().filter(|term| scene.effects.has(term.effect));
-    let all = terms.fold(all, |all, term| {
+    let all = crate::shader::term::enabled(scene.effects).fold(all, |all, term| {
         all.with(
             format!("rules of the effect {}", term.effect.name()),
             Hash::default().words(&term.text).done(),

@@ -112,7 +112,7 @@ fn grey(fragments: &[FragmentInputs], target: f32, free: &[Param]) -> (Task, Poi
     let even = Cube::from_fn(2, |_, _, _| [1.0_f32; 4]);
     let task = Task {
         setup,
-        illumination: Arc::new(Illumination { irradiance: Some(even), lobes: None, hilite: None }),
+        illumination: Arc::new(Illumination { irradiance: Some(even), ..Illumination::default() }),
         views: Arc::new([ObservedView {
             target: targets(&[target; 3], fragments.len().div_ceil(LANES)),
             ..view(setup, fragments, [0.0; 4])

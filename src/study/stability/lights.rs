@@ -81,7 +81,12 @@ fn wavy() -> Illumination {
             [1.0, 1.7, 2.3, 3.1].map(|k| wave(k).abs() as f32)
         })
     };
-    Illumination { irradiance: Some(cube(0.3)), lobes: Some(stack(cube)), hilite: Some(cube(2.1)) }
+    Illumination {
+        irradiance: Some(cube(0.3)),
+        lobes: Some(stack(cube)),
+        hilite: Some(cube(2.1)),
+        reflected: None,
+    }
 }
 
 /// Every second texel of a checkerboard shines; the lobes stay the same for every exponent, as the spline
@@ -92,10 +97,20 @@ fn glaring() -> Illumination {
             [if (face + column + row) % 2 == 1 { 65504.0 } else { 0.0 }; 4]
         })
     };
-    Illumination { irradiance: Some(cube(0.0)), lobes: Some(stack(cube)), hilite: Some(cube(0.0)) }
+    Illumination {
+        irradiance: Some(cube(0.0)),
+        lobes: Some(stack(cube)),
+        hilite: Some(cube(0.0)),
+        reflected: None,
+    }
 }
 
 fn dark() -> Illumination {
     let cube = |_: f64| Cube::from_fn(SIZE, |_, _, _| [0.0; 4]);
-    Illumination { irradiance: Some(cube(0.0)), lobes: Some(stack(cube)), hilite: Some(cube(0.0)) }
+    Illumination {
+        irradiance: Some(cube(0.0)),
+        lobes: Some(stack(cube)),
+        hilite: Some(cube(0.0)),
+        reflected: None,
+    }
 }

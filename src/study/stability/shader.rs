@@ -197,6 +197,7 @@ fn scene() -> Scene {
         form: Form::Corrected,
         silhouette: Silhouette::Fragment,
         lookups: Lookups::default(),
+        choices: crate::model::choices::Choices::default(),
         dapple: Dapple::default(),
         effects: Effects::default(),
         params: Params::defaults(Form::Corrected),

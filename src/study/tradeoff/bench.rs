@@ -8,13 +8,13 @@ use std::time::Instant;
 
 use crate::StudyError;
 use crate::bake::rays::RayMesh;
-use crate::bake::{self, Illumination, VertexOcclusion};
+use crate::bake::{self, Illumination, Ranges, VertexOcclusion};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Task};
 use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::prepare::{Baked, PrepareError, PrepareOptions, Sampled};
 use crate::reference::Difference;
 use crate::render::format::FormatShader;
@@ -283,9 +283,9 @@ pub fn baked(
     at: &Scene,
     cache: Option<&Path>,
 ) -> Result<(bake::Bake, bake::BakeStats), StudyError> {
-    let exponent = at.params.scalar(Param::SpecularLobe);
+    let ranges = Ranges::of(at, false);
     let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
-    Ok(bake::bake(scene, &pose, exponent..=exponent, cache).map_err(PrepareError::from)?)
+    Ok(bake::bake(scene, &pose, &ranges, cache).map_err(PrepareError::from)?)
 }
 
 impl Evaluated {

@@ -73,7 +73,7 @@ impl Adjoint {
 
     /// What moves for an input's sake, and what becomes of each tangent.
     fn seeds(&self, input: Input) -> Vec<(Seed, Vec<Gain>)> {
-        let named = |name: &'static str, tangent: &str| Seed::Named { name, tangent: tangent.to_owned() };
+        let named = Seed::named;
         match input {
             Input::Columns => {
                 let columns = || self.columns.iter().enumerate();

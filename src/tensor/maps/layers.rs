@@ -107,7 +107,7 @@ fn parts(task: &MapTask<'_>, kind: MapKind, hits: &[Hit], lobe: f64) -> Vec<Laye
             }]
         }
         MapKind::Environment => {
-            let Illumination { irradiance, lobes, hilite } = &task.illumination;
+            let Illumination { irradiance, lobes, hilite, .. } = &task.illumination;
             let lobe = lobes.as_ref().map(|stack| stack.at(lobe).0);
             [
                 cube("irradiance", Input::Irradiance, irradiance.as_ref()),

@@ -61,6 +61,7 @@ fn illumination(vectors: &Vectors, file: &Node<'_>) -> Arc<Illumination> {
         irradiance: Some(cube("diffuse")),
         lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![cube("spec")] }),
         hilite: Some(cube("hilite")),
+        reflected: None,
     })
 }
 

@@ -136,6 +136,7 @@ impl Case {
             irradiance: Some(cube(0)),
             lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![cube(1)] }),
             hilite: Some(cube(2)),
+            reflected: None,
         };
         let mut samples = self.samples.clone();
         for s in 0..N {

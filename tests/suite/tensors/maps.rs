@@ -207,6 +207,7 @@ fn every_kind_of_map_explains_what_was_changed_in_it() {
                     irradiance: baked.illumination.irradiance.as_ref().map(dim),
                     hilite: baked.illumination.hilite.as_ref().map(dim),
                     lobes: baked.illumination.lobes.clone(),
+                    reflected: None,
                 };
                 Baked { illumination: Arc::new(light), ..baked }
             }

@@ -132,7 +132,7 @@ impl Plan {
 
     pub(super) fn facts(&self) -> Facts {
         // Lookups take the size from the cube; the rules' text wants some number.
-        let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1) };
+        let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1), reflected: Some(1) };
         Facts::of_samples(self.setup(), any, self.turned())
     }
 }

@@ -1,27 +1,46 @@
-//! The specular cube of the last exponent.
+//! The cubes of stacks where parameters last looked them up.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
-use crate::bake::LobeStack;
+use crate::bake::Illumination;
+use crate::bake::stacks::{Content, Stack};
 use crate::model::cube::Cube;
+use crate::model::params::Params;
 
-/// The specular cube at an exponent, and how it moves with that.
+/// A stack's cube at a place, and how it moves with that.
 #[derive(Debug)]
 pub(super) struct Lobe {
-    exponent: f64,
-    pub(super) cube: Cube<f32>,
-    pub(super) slope: Cube<f32>,
+    place: f64,
+    cube: Cube<f32>,
+    slope: Cube<f32>,
 }
 
-impl Lobe {
-    /// The one in `slot` where its exponent is that; else a new one, left there.
-    pub(super) fn at(stack: &LobeStack, exponent: f64, slot: &mut Option<Arc<Self>>) -> Option<Arc<Self>> {
-        if let Some(lobe) = slot.as_ref().filter(|lobe| lobe.exponent == exponent) {
-            return Some(Arc::clone(lobe));
+/// A cube of each stack that is baked.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Lobes([Option<Arc<Lobe>>; Stack::ALL.len()]);
+
+impl Lobes {
+    /// Those at `params`; the last ones in `slot` where they stand there, else new ones, left there.
+    pub(super) fn at(light: &Illumination, params: &Params, slot: &Mutex<Self>) -> Self {
+        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
+        for (stack, last) in Stack::ALL.into_iter().zip(&mut slot.0) {
+            let place = stack.place(params);
+            if last.as_ref().is_none_or(|lobe| lobe.place != place) {
+                *last = stack.at(light, place).map(|(cube, slope)| Arc::new(Lobe { place, cube, slope }));
+            }
         }
-        let (cube, slope) = stack.at(exponent);
-        let lobe = Arc::new(Self { exponent, cube, slope });
-        *slot = Some(Arc::clone(&lobe));
-        Some(lobe)
+        slot.clone()
+    }
+
+    /// The cube that rules read by that name.
+    pub(super) fn named(&self, name: &str) -> Option<&Cube<f32>> {
+        let (stack, content) = Stack::named(name)?;
+        let lobe = self.0[stack as usize].as_ref()?;
+        Some(if content == Content::Light { &lobe.cube } else { &lobe.slope })
+    }
+
+    /// The places of the stacks that a tape reads.
+    pub(super) fn places(resources: &[String], params: &Params) -> Vec<f64> {
+        Stack::read(resources).into_iter().map(|stack| stack.place(params)).collect()
     }
 }

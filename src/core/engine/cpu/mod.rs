@@ -13,7 +13,7 @@
 //!   operations from memory to memory; `file`: its registers
 //! - `kept`: rows that no free parameter changes; `looked_up`: rows of what samples find of the UV atlas
 //! - `view_pass`: a view's blocks of records, from tapes' outputs to sums
-//! - `lobe`: the specular cube of the last exponent
+//! - `lobe`: the cubes of stacks where they were looked up last
 //! - `sums`: the sums of a chunk, and the fixed tree that adds chunks; `equations`: those of all views
 //! - `objective`: what solvers see
 
@@ -43,7 +43,7 @@ use rayon::prelude::*;
 
 use self::fitted::Fitted;
 use self::kept::Kept;
-use self::lobe::Lobe;
+use self::lobe::Lobes;
 use self::looked_up::LookedUp;
 use self::pass::{Pass, Reading};
 use self::program::Bound;
@@ -77,7 +77,7 @@ pub struct CpuEngine {
     neutral: Vec<Row>,
     /// What stands in for a cube that was not baked.
     dark: Cube<f32>,
-    lobe: Mutex<Option<Arc<Lobe>>>,
+    lobes: Mutex<Lobes>,
     kept: Mutex<Option<Arc<Kept>>>,
     looked_up: Mutex<Option<Arc<LookedUp>>>,
     /// Why a pass could not be made.
@@ -87,7 +87,7 @@ pub struct CpuEngine {
 /// What a pass at a point reads beside samples.
 struct Ready {
     pass: Arc<Pass>,
-    lobe: Option<Arc<Lobe>>,
+    lobes: Lobes,
     looked_up: Option<Arc<LookedUp>>,
     kept: Arc<Kept>,
 }
@@ -132,7 +132,7 @@ impl CpuEngine {
             passes: Mutex::default(),
             neutral: neutral_rows(stride.unwrap_or(0)),
             dark: Cube::from_fn(1, |_, _, _| [0.0; 4]),
-            lobe: Mutex::default(),
+            lobes: Mutex::default(),
             kept: Mutex::default(),
             looked_up: Mutex::default(),
             fault: OnceLock::new(),
@@ -167,7 +167,7 @@ impl CpuEngine {
     pub fn set_level(&mut self, level: Level) {
         self.level = level;
         // What was kept was made with other instructions.
-        (self.lobe, self.kept) = (Mutex::default(), Mutex::default());
+        (self.lobes, self.kept) = (Mutex::default(), Mutex::default());
     }
 
     /// The views.
@@ -228,37 +228,30 @@ impl CpuEngine {
     fn ready(&self, point: &Point) -> Result<Ready, ShadingError> {
         let turned = self.turned(point);
         let pass = self.pass_for(turned)?;
-        let lobe = self.lobe(point.params.scalar(Param::SpecularLobe));
+        let lobes = Lobes::at(&self.illumination, &point.params, &self.lobes);
         let looked_up = self.looked_up(&pass, turned, point);
-        let kept = self.kept(&pass, turned, point, lobe.as_deref());
-        Ok(Ready { pass, lobe, looked_up, kept })
-    }
-
-    fn lobe(&self, exponent: f64) -> Option<Arc<Lobe>> {
-        let mut slot = self.lobe.lock().unwrap_or_else(PoisonError::into_inner);
-        Lobe::at(self.illumination.lobes.as_ref()?, exponent, &mut slot)
+        let kept = self.kept(&pass, turned, point, &lobes);
+        Ok(Ready { pass, lobes, looked_up, kept })
     }
 
     /// A tape with what is the same for all records of a pass.
-    fn bound<'a>(&'a self, reading: &'a Reading, point: &Point, lobe: Option<&'a Lobe>) -> Bound<'a> {
+    fn bound<'a>(&'a self, reading: &'a Reading, point: &Point, lobes: &'a Lobes) -> Bound<'a> {
         let uniforms = reading.uniforms(&point.params).into_iter().map(|x| x as f32).collect();
         let cubes = reading
             .program
             .tape
             .resources
             .iter()
-            .map(|name| self.cube(name, lobe).unwrap_or(&self.dark))
+            .map(|name| self.cube(name, lobes).unwrap_or(&self.dark))
             .collect();
         Bound { program: &reading.program, level: self.level, loads: &reading.loads, cubes, uniforms }
     }
 
-    fn cube<'a>(&'a self, name: &str, lobe: Option<&'a Lobe>) -> Option<&'a Cube<f32>> {
+    fn cube<'a>(&'a self, name: &str, lobes: &'a Lobes) -> Option<&'a Cube<f32>> {
         match name {
             "irradiance_faces" => self.illumination.irradiance.as_ref(),
             "hilite_faces" => self.illumination.hilite.as_ref(),
-            "specular_faces" => lobe.map(|lobe| &lobe.cube),
-            "specular_slope_faces" => lobe.map(|lobe| &lobe.slope),
-            _ => None,
+            of_stack => lobes.named(of_stack),
         }
     }
 
@@ -273,7 +266,7 @@ impl CpuEngine {
         ViewPass {
             view: &self.views[view],
             streams: streams(&self.views[view], ready.beside(view), &self.neutral),
-            bound: self.bound(reading, point, ready.lobe.as_deref()),
+            bound: self.bound(reading, point, &ready.lobes),
             read,
             loss: self.loss,
             gain: point.gains.get(view).copied().unwrap_or(1.0) as f32,

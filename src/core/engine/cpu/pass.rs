@@ -211,16 +211,13 @@ impl Reading {
 fn live_names(seeds: &[Seed]) -> Vec<String> {
     let mut names = Vec::new();
     for seed in seeds {
-        match seed {
-            Seed::Named { name, .. } => {
-                names.push((*name).to_owned());
-                // Constants that tell how it moves, move as well.
-                names.extend(seed.constants().map(|constant| constant.name().to_owned()));
-            }
-            Seed::Resource { resource, slope } => {
-                names.extend([resource.name().to_owned(), slope.name().to_owned()]);
-            }
+        if let Some(named) = &seed.named {
+            names.push(named.name.to_owned());
         }
+        // Constants that tell how it moves, move as well.
+        names.extend(seed.constants().map(|constant| constant.name().to_owned()));
+        let looked = seed.resources.iter().flat_map(|looked| [looked.resource, looked.slope]);
+        names.extend(looked.map(|resource| resource.name().to_owned()));
     }
     names
 }

@@ -21,9 +21,10 @@ use rayon::prelude::*;
 
 use self::blur::blurred;
 use super::cubes_at::{CubesAt, Sixteen};
+use crate::bake::stacks::Stack;
 use crate::model::batch::Batch;
 use crate::model::effects::Effects;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::model::real::Real;
 use crate::program::graph::Input;
 use crate::program::levels::{LevelPass, LevelProgram};
@@ -53,8 +54,8 @@ pub struct LevelMaker<R> {
     program: LevelProgram,
     /// The numbers that texels share, for each pass.
     constants: Vec<Input>,
-    /// Whether a pass looks the specular cube up.
-    specular: bool,
+    /// Stacks of cubes that a pass looks up.
+    stacks: Vec<Stack>,
     last: Mutex<Vec<Made<R>>>,
     count: AtomicU64,
 }
@@ -77,9 +78,10 @@ impl<R: Number> LevelMaker<R> {
                 constants.push(input.clone());
             }
         }
-        let read = |pass: &LevelPass| pass.steps.resources().iter().any(|name| name.starts_with("specular"));
-        let specular = program.passes.iter().any(read);
-        Self { program, constants, specular, last: Mutex::default(), count: AtomicU64::new(0) }
+        let names = |pass: &LevelPass| -> Vec<String> { pass.steps.resources().to_vec() };
+        let read: Vec<String> = program.passes.iter().flat_map(names).collect();
+        let stacks = Stack::read(&read);
+        Self { program, constants, stacks, last: Mutex::default(), count: AtomicU64::new(0) }
     }
 
     /// The passes.
@@ -117,7 +119,7 @@ impl<R: Number> LevelMaker<R> {
     #[must_use]
     pub fn made_with(&self, params: &Params) -> Vec<f64> {
         let numbers = self.constants.iter().map(|input| constant(input, params).unwrap_or(0.0));
-        numbers.chain(self.specular.then(|| params.scalar(Param::SpecularLobe))).collect()
+        numbers.chain(self.stacks.iter().map(|stack| stack.place(params))).collect()
     }
 
     /// Refuse samples without the texels that `effects` are computed in, or without texture coordinates.

@@ -96,8 +96,8 @@ impl Along {
     /// How a kernel's value moves; `None` where it stays.
     fn kernel_slope(&self, pass: &Pass, rule: &Rule, seed: &Seed) -> Result<Option<Slope>, TangentError> {
         let mut levels = Vec::new();
-        let mut along = |name: &str| match seed {
-            Seed::Named { name: seeded, tangent } if *seeded == name => Some(tangent.clone()),
+        let mut along = |name: &str| match &seed.named {
+            Some(named) if named.name == name => Some(named.tangent.clone()),
             _ => self.moved.get(name).map(|level| {
                 levels.push(level.clone());
                 level.name.clone()

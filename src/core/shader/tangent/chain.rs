@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use super::{TangentError, Tangents};
+use crate::model::params::Param;
 use crate::shader::atlas::Level;
 use crate::shader::atlas::tangent::Along;
 use crate::shader::domain::Domain;
@@ -12,23 +13,33 @@ use crate::shader::module::uniform;
 use crate::shader::quantity::{Constant, Resource};
 use crate::shader::rule::Rule;
 
-/// What moves.
+/// What moves: a constant or a quantity, the content of resources, or all of these at once.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Seed {
+    /// A constant or a quantity.
+    pub named: Option<Named>,
+    /// Resources that every lookup is linear in.
+    pub resources: Vec<Looked>,
+}
+
+/// A constant or a quantity that moves.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Seed {
-    /// A constant or a quantity, by its name; `tangent` is WGSL of its type.
-    Named {
-        /// Its name in rules.
-        name: &'static str,
-        /// How it moves.
-        tangent: String,
-    },
-    /// The content of a resource, which every lookup is linear in: `slope` holds how its texels move.
-    Resource {
-        /// What rules read.
-        resource: Resource,
-        /// What is read instead.
-        slope: Resource,
-    },
+pub struct Named {
+    /// Its name in rules.
+    pub name: &'static str,
+    /// How it moves: WGSL of its type.
+    pub tangent: String,
+}
+
+/// A resource whose content moves.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Looked {
+    /// What rules read.
+    pub resource: Resource,
+    /// What holds how its texels move.
+    pub slope: Resource,
+    /// How fast, in WGSL of an `f32`; empty for 1.
+    pub pace: String,
 }
 
 /// How a plan's output moves along seeds.
@@ -123,27 +134,21 @@ impl Chain {
         mut moved: BTreeMap<&'static str, String>,
         tangents: &mut Tangents,
     ) -> Result<BTreeMap<&'static str, String>, TangentError> {
-        if let Seed::Named { name, tangent } = seed {
+        if let Some(Named { name, tangent }) = &seed.named {
             let typed = plan.rules(domain).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
             if let Some((_, kind)) = typed {
                 let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
                 moved.insert(name, format!("d{k}_{name}"));
-                for constant in seed.constants() {
-                    if !plan.constants.contains(&constant) && !self.constants.contains(&constant) {
-                        self.constants.push(constant);
-                    }
-                }
+                self.reads(plan, tangent);
             }
         }
         for rule in plan.rules(domain) {
-            let call = match seed {
-                Seed::Resource { resource, slope } if rule.reads.contains(&resource.name()) => {
-                    Some(self.slope_call(plan, rule, *resource, *slope))
-                }
-                _ => tangent_call(plan, rule, &moved, tangents)?,
-            };
+            let content = seed.resources.iter().filter(|looked| rule.reads.contains(&looked.resource.name()));
+            let content: Vec<String> = content.map(|looked| self.slope_call(plan, rule, looked)).collect();
+            let calls = content.into_iter().chain(tangent_call(plan, rule, &moved, tangents)?);
+            let call = calls.reduce(|all, call| format!("{all} + {call}"));
             // A seed's own quantity moves as it was told to.
-            let held = |quantity: &str| matches!(seed, Seed::Named { name, .. } if *name == quantity);
+            let held = |quantity: &str| seed.named.as_ref().is_some_and(|named| named.name == quantity);
             if let Some(call) = call {
                 self.lines_of(k, rule, &call, &mut moved, held);
             }
@@ -173,18 +178,30 @@ impl Chain {
         }
     }
 
+    /// Constants that a tangent is made of are read.
+    fn reads(&mut self, plan: &Plan, tangent: &str) {
+        for constant in constants(tangent) {
+            if !plan.constants.contains(&constant) && !self.constants.contains(&constant) {
+                self.constants.push(constant);
+            }
+        }
+    }
+
     /// A rule's function with another resource in the place of the one that it reads.
-    fn slope_call(&mut self, plan: &Plan, rule: &Rule, resource: Resource, slope: Resource) -> String {
+    fn slope_call(&mut self, plan: &Plan, rule: &Rule, looked: &Looked) -> String {
+        let Looked { resource, slope, pace } = looked;
         let name = format!("{}_slope", rule.function);
         let definition = format!("fn {name}(");
         if !self.functions.contains(&definition) {
             let body = rule.body.replacen(&format!("fn {}(", rule.function), &definition, 1);
             let _ = write!(self.functions, "\n{}", body.replace(resource.name(), slope.name()));
         }
-        if !self.resources.contains(&slope) {
-            self.resources.push(slope);
+        if !self.resources.contains(slope) {
+            self.resources.push(*slope);
         }
-        format!("{name}({})", arguments(plan, rule).join(", "))
+        self.reads(plan, pace);
+        let paced = if pace.is_empty() { String::new() } else { format!("{pace} * ") };
+        format!("{paced}{name}({})", arguments(plan, rule).join(", "))
     }
 }
 
@@ -222,34 +239,59 @@ fn arguments(plan: &Plan, rule: &Rule) -> Vec<String> {
     })
 }
 
+/// The constants that WGSL names.
+fn constants(wgsl: &str) -> impl Iterator<Item = Constant> {
+    let names = wgsl.split("constants.").skip(1);
+    names.filter_map(|rest| Constant::from_name(rest.split('.').next()?))
+}
+
 impl Seed {
+    /// A constant or a quantity; `tangent` is WGSL of its type.
+    #[must_use]
+    pub fn named(name: &'static str, tangent: &str) -> Self {
+        Self { named: Some(Named { name, tangent: tangent.to_owned() }), resources: Vec::new() }
+    }
+
+    /// The constants that tell how it moves.
+    pub fn constants(&self) -> impl Iterator<Item = Constant> {
+        let tangents = self.named.iter().map(|named| named.tangent.as_str());
+        tangents.chain(self.resources.iter().map(|looked| looked.pace.as_str())).flat_map(constants)
+    }
+
     /// A parameter of the model: each channel of a colour moves at once, as channels never mix.
     #[must_use]
-    pub fn of_param(param: crate::model::params::Param) -> Self {
-        use crate::model::params::Param;
-        let named = |name: &'static str, tangent: &str| Self::Named { name, tangent: tangent.to_owned() };
-        match param {
+    pub fn of_param(param: Param) -> Self {
+        let looked = |resource, slope, pace: &str| Looked { resource, slope, pace: pace.to_owned() };
+        let glossy = |pace| looked(Resource::GlossyFaces, Resource::GlossySlopeFaces, pace);
+        let (named, resources) = match param {
             Param::SpecularLobe => {
-                Self::Resource { resource: Resource::SpecularFaces, slope: Resource::SpecularSlopeFaces }
+                (None, vec![looked(Resource::SpecularFaces, Resource::SpecularSlopeFaces, "")])
             }
             // A degree.
             Param::EnvironmentRotation => {
-                named(Constant::Turn.name(), "0.017453292 * vec2f(-constants.turn.y, constants.turn.x)")
+                let tangent = "0.017453292 * vec2f(-constants.turn.y, constants.turn.x)";
+                (Some((Constant::Turn.name(), tangent)), Vec::new())
             }
-            Param::KeyAzimuth => named(Constant::KeyDirection.name(), "constants.key_by_azimuth.xyz"),
-            Param::KeyElevation => named(Constant::KeyDirection.name(), "constants.key_by_elevation.xyz"),
-            colour if colour.info().rgb => named(colour.identifier(), "vec3f(1.0)"),
-            scalar => named(scalar.identifier(), "1.0"),
-        }
-    }
-
-    /// The constants that its tangent is made of.
-    pub fn constants(&self) -> impl Iterator<Item = Constant> {
-        let tangent = match self {
-            Self::Named { tangent, .. } => tangent.as_str(),
-            Self::Resource { .. } => "",
+            Param::KeyAzimuth => {
+                (Some((Constant::KeyDirection.name(), "constants.key_by_azimuth.xyz")), Vec::new())
+            }
+            Param::KeyElevation => {
+                (Some((Constant::KeyDirection.name(), "constants.key_by_elevation.xyz")), Vec::new())
+            }
+            colour if colour.info().rgb => (Some((colour.identifier(), "vec3f(1.0)")), Vec::new()),
+            scalar => {
+                let resources = match scalar.identifier() {
+                    "roughness" => vec![
+                        looked(Resource::ReflectedFaces, Resource::ReflectedSlopeFaces, ""),
+                        glossy("constants.glossy_paces.x"),
+                    ],
+                    "gloss" => vec![glossy("constants.glossy_paces.y")],
+                    _ => Vec::new(),
+                };
+                (Some((scalar.identifier(), "1.0")), resources)
+            }
         };
-        let names = tangent.split("constants.").skip(1);
-        names.filter_map(|rest| Constant::from_name(rest.split('.').next()?))
+        let named = named.map(|(name, tangent)| Named { name, tangent: tangent.to_owned() });
+        Self { named, resources }
     }
 }

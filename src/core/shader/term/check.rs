@@ -2,11 +2,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::declaration::Declaration;
+use super::declaration::{Declaration, DeclaredEffect};
 use super::error::{Problem, TermError};
 use super::texels::LEVEL_TYPES;
 use super::there::{is_uniform, there};
 use super::{Origin, terms};
+use crate::model::choices::Choices;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
@@ -79,8 +80,8 @@ fn is_made(name: &str) -> bool {
 
 /// The declaration, where it fits.
 pub(super) fn checked(origin: Origin, declaration: Declaration) -> Result<Declaration, TermError> {
-    names(&declaration)?;
-    adds(&declaration.rules)?;
+    names(origin, &declaration)?;
+    adds(origin, &declaration.rules)?;
     for rule in &declaration.rules {
         references(rule, &declaration)?;
     }
@@ -114,9 +115,7 @@ fn quantity_name(name: &str, line: usize) -> Result<(), TermError> {
     Ok(())
 }
 
-fn names(declaration: &Declaration) -> Result<(), TermError> {
-    let taken = |kind, name: &str, line| Err(Problem::Taken { kind, name: name.to_owned() }.at(line));
-    let Some((line, effect)) = declaration.effect else { return Err(Problem::NoEffect.at(1)) };
+fn effect_name(line: usize, effect: &DeclaredEffect) -> Result<(), TermError> {
     if !is_word(effect.name) || effect.meaning.is_empty() {
         return Err(Problem::Value {
             key: "effect",
@@ -130,7 +129,19 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
         return Err(Problem::NotThere { key: "effect", name: within.to_owned(), known }.at(line));
     }
     if Facts::default().holds(effect.name).is_some() {
-        return taken("effect or condition", effect.name, line);
+        let name = effect.name.to_owned();
+        return Err(Problem::Taken { kind: "effect or condition", name }.at(line));
+    }
+    Ok(())
+}
+
+fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
+    let taken = |kind, name: &str, line| Err(Problem::Taken { kind, name: name.to_owned() }.at(line));
+    if declaration.effects.is_empty() {
+        return Err(Problem::NoEffect.at(1));
+    }
+    for (line, effect) in &declaration.effects {
+        effect_name(*line, effect)?;
     }
     let known: BTreeSet<&str> = RULES
         .iter()
@@ -145,6 +156,12 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
     let mut own = BTreeSet::new();
     for &(line, parameter) in &declaration.parameters {
         quantity_name(parameter.identifier, line)?;
+        if let Some(of) = parameter.of
+            && !declaration.effects.iter().any(|(_, effect)| effect.name == of)
+        {
+            let known = declaration.effects.iter().map(|(_, effect)| effect.name.to_owned()).collect();
+            return Err(Problem::NotThere { key: "parameter", name: of.to_owned(), known }.at(line));
+        }
         let there =
             known.contains(parameter.identifier) || Param::from_identifier(parameter.identifier).is_some();
         if there || !own.insert(parameter.identifier) {
@@ -167,7 +184,9 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
                 let wanted = "QUANTITY or QUANTITY.COMPONENTS, of the components that the function returns";
                 return Err(Problem::Value { key: "gives", given, wanted }.at(rule.line));
             }
-            let there = known.contains(quantity) || Param::from_identifier(quantity).is_some();
+            // The library may give in another way what its rules give.
+            let known = origin == Origin::File && known.contains(quantity);
+            let there = known || Param::from_identifier(quantity).is_some();
             if there || params.contains(quantity) {
                 return taken("quantity", quantity, rule.line);
             }
@@ -192,10 +211,10 @@ fn names(declaration: &Declaration) -> Result<(), TermError> {
 }
 
 /// Parts of the radiance: new names, one vec3f each.
-fn adds(rules: &[Rule]) -> Result<(), TermError> {
+fn adds(origin: Origin, rules: &[Rule]) -> Result<(), TermError> {
     for rule in rules {
         for name in rule.adds.iter().chain(&rule.shows) {
-            if TermName::from_name(name).is_some() {
+            if origin == Origin::File && TermName::from_name(name).is_some() {
                 return Err(Problem::Taken { kind: "term", name: (*name).to_owned() }.at(rule.line));
             }
             quantity_name(name, rule.line)?;
@@ -210,7 +229,7 @@ fn adds(rules: &[Rule]) -> Result<(), TermError> {
             }
         }
     }
-    if rules.iter().all(|rule| rule.adds.is_empty()) {
+    if origin == Origin::File && rules.iter().all(|rule| rule.adds.is_empty()) {
         return Err(Problem::NothingAdded.at(rules.first().map_or(1, |rule| rule.line)));
     }
     Ok(())
@@ -221,11 +240,18 @@ fn references(rule: &Rule, declaration: &Declaration) -> Result<(), TermError> {
     let missing = |key, name: &str, known: Vec<String>| {
         Err(Problem::NotThere { key, name: name.to_owned(), known }.at(rule.line))
     };
-    let own = declaration.effect.map(|(_, effect)| effect.name);
+    let own = |condition: &str| declaration.effects.iter().any(|(_, effect)| effect.name == condition);
     for condition in &rule.when {
-        if Some(*condition) != own && Facts::default().holds(condition).is_none() {
+        let fact = condition.strip_prefix('!').unwrap_or(condition);
+        if !own(fact) && Facts::default().holds(fact).is_none() {
             let known = Effect::all().map(|effect| effect.name().to_owned());
-            return missing("when", condition, known.chain(Facts::CONDITIONS.map(str::to_owned)).collect());
+            return missing(
+                "when",
+                condition,
+                known
+                    .chain(Facts::CONDITIONS.iter().chain(&Choices::CONDITIONS).map(|&c| c.to_owned()))
+                    .collect(),
+            );
         }
     }
     for name in &rule.uses {
@@ -241,12 +267,13 @@ fn references(rule: &Rule, declaration: &Declaration) -> Result<(), TermError> {
     Ok(())
 }
 
-/// The WGSL types of all quantities that built-in rules know.
+/// The WGSL types of all quantities that known rules know.
 fn known_types() -> BTreeMap<&'static str, &'static str> {
-    let given = RULES.iter().flat_map(|rule| {
+    let rules = || RULES.iter().chain(terms().into_iter().flat_map(|term| &term.rules));
+    let given = rules().flat_map(|rule| {
         rule.gives.iter().map(move |(quantity, components)| (*quantity, rule.given_type(components)))
     });
-    let needed = RULES.iter().flat_map(|rule| rule.needs.iter().copied());
+    let needed = rules().flat_map(|rule| rule.needs.iter().copied());
     SAMPLE.iter().copied().chain(given).chain(needed).collect()
 }
 

@@ -11,8 +11,8 @@ use crate::shader::rule::{Error, Rule};
 /// What a file of rules holds.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Declaration {
-    /// The effect, and its line.
-    pub(super) effect: Option<(usize, DeclaredEffect)>,
+    /// The effects, and their lines.
+    pub(super) effects: Vec<(usize, DeclaredEffect)>,
     /// Its parameters, and their lines.
     pub(super) parameters: Vec<(usize, DeclaredParameter)>,
     /// Numbers of vertices that it reads, and their lines.
@@ -47,6 +47,8 @@ pub(super) struct DeclaredParameter {
     pub(super) owner: Owner,
     pub(super) held: bool,
     pub(super) found: bool,
+    /// The effect of the file's that asks for it, where not all do.
+    pub(super) of: Option<&'static str>,
     pub(super) meaning: &'static str,
     pub(super) source: &'static str,
 }
@@ -172,13 +174,14 @@ impl Declaration {
 
     fn declare(&mut self, line: usize, key: &str, value: &'static str) -> Result<(), TermError> {
         if key == "effect" {
-            if self.effect.is_some() || !self.rules.is_empty() {
+            let early = self.parameters.is_empty() && self.fields.is_empty() && self.rules.is_empty();
+            if !early {
                 return Err(Problem::Misplaced { key: "effect" }.at(line));
             }
             let (name, meaning) = value.split_once(',').unwrap_or((value, ""));
             let (name, within) = name.split_once(" within ").unwrap_or((name, ""));
             let within = Some(within.trim()).filter(|within| !within.is_empty());
-            self.effect = Some((line, DeclaredEffect { name: name.trim(), within, meaning: meaning.trim() }));
+            self.effects.push((line, DeclaredEffect { name: name.trim(), within, meaning: meaning.trim() }));
             return Ok(());
         }
         let misplaced = |key| Problem::Misplaced { key }.at(line);
@@ -200,7 +203,7 @@ impl Declaration {
         if !self.rules.is_empty() {
             return Err(misplaced("parameter"));
         }
-        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene` or `, unit UNIT` where \
+        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene`, `, of EFFECT` or `, unit UNIT` where \
                       they hold, then `; what it does; where it comes from`. The default lies within the bounds";
         let parameter = parameter(value)
             .ok_or_else(|| Problem::Value { key: "parameter", given: value.to_owned(), wanted }.at(line))?;
@@ -298,6 +301,7 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         owner: Owner::Skin,
         held: false,
         found: false,
+        of: None,
         meaning,
         source: parts.next().unwrap_or_default(),
     };
@@ -309,7 +313,10 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
             "scene" => parameter.owner = Owner::Scene,
             "held" => (parameter.held, parameter.owner) = (true, Owner::Scene),
             "found" => (parameter.found, parameter.owner) = (true, Owner::Scene),
-            other => parameter.unit = other.strip_prefix("unit ")?.trim(),
+            other => match other.strip_prefix("of ") {
+                Some(effect) => parameter.of = Some(effect.trim()),
+                None => parameter.unit = other.strip_prefix("unit ")?.trim(),
+            },
         }
     }
     let DeclaredParameter { default, lower, upper, linear, scale, .. } = parameter;
@@ -338,8 +345,8 @@ mod tests {
     fn effects_parameters_and_several_rules_are_read() {
         let read = read(TEXT).unwrap();
         assert_eq!(
-            read.effect,
-            Some((3, DeclaredEffect { name: "sheen", within: None, meaning: "light of fine hair" }))
+            read.effects,
+            [(3, DeclaredEffect { name: "sheen", within: None, meaning: "light of fine hair" })]
         );
         let [(4, weight), (5, width)] = read.parameters.as_slice() else { panic!("{:?}", read.parameters) };
         assert!(weight.rgb && weight.linear && weight.upper == f64::INFINITY && weight.source == "a paper");

@@ -18,7 +18,8 @@
 //! }
 //! ```
 //!
-//! Each rule of the file holds only where its effect is enabled. What `adds` is a part of the radiance, and an image
+//! Each rule of the file holds only where its effect is enabled; of a file with several effects, where one of them is,
+//! or those that its `when` line names. What `adds` is a part of the radiance, and an image
 //! layer of that name. What the effect asks of the stages before (maps, cubes, fields of samples) follows from what
 //! its rules need.
 //!
@@ -30,10 +31,12 @@
 //! - `check`: whether its names and types fit the built-in rules, `there`: whether what it needs is there; `wgsl`:
 //!   whether its functions are valid and have derivatives
 //! - `needs`: what its effect asks for
+//! - [`library`]: the files that come with the library
 
 mod check;
 pub(crate) mod declaration;
 pub mod error;
+pub mod library;
 mod needs;
 mod texels;
 mod there;
@@ -41,7 +44,7 @@ mod wgsl;
 
 use std::sync::{Mutex, PoisonError};
 
-use self::declaration::{Declaration, DeclaredField};
+use self::declaration::{Declaration, DeclaredEffect, DeclaredField};
 pub use self::error::{Problem, TermError};
 use super::domain::Domain;
 use super::rule::Rule;
@@ -55,8 +58,10 @@ use crate::model::terms::{TermInfo, TermName};
 /// A term that was registered.
 #[derive(Debug)]
 pub struct Term {
-    /// Its effect.
+    /// Its effect; of several the first.
     pub effect: Effect,
+    /// All of its effects: it is there where one of them is on.
+    pub effects: &'static [Effect],
     /// Its parameters.
     pub params: Vec<Param>,
     /// Numbers of vertices that it reads.
@@ -67,6 +72,7 @@ pub struct Term {
     pub rules: Vec<Rule>,
     /// The text that declares it.
     pub text: &'static str,
+    pub(super) origin: Origin,
 }
 
 /// The text of a family's file for one of its members, terms alike but for their names, such as the lamps of a scene:
@@ -95,20 +101,20 @@ pub fn terms() -> Vec<&'static Term> {
     TERMS.rows()
 }
 
+/// The terms of which an effect is on.
+pub fn enabled(effects: Effects) -> impl Iterator<Item = &'static Term> {
+    terms().into_iter().filter(move |term| effects.has_any(term.effects))
+}
+
 /// An added effect of a set that has rules for texels of the atlas.
 pub fn of_texels(effects: Effects) -> Option<Effect> {
-    let enabled = |term: &&Term| effects.has(term.effect);
-    let term = terms()
-        .into_iter()
-        .filter(enabled)
-        .find(|term| term.rules.iter().any(|rule| rule.domain == Domain::Texel));
-    term.map(|term| term.effect)
+    let mut terms = enabled(effects);
+    terms.find(|term| term.rules.iter().any(|rule| rule.domain == Domain::Texel)).map(|term| term.effect)
 }
 
 /// The fields that the rules of added effects read of vertices.
 pub fn fields(effects: Effects) -> Fields {
-    let enabled = terms().into_iter().filter(|term| effects.has(term.effect));
-    enabled.fold(Fields::default(), |all, term| all.or(term.fields))
+    enabled(effects).fold(Fields::default(), |all, term| all.or(term.fields))
 }
 
 /// Make a term known to this process for as long as it runs, from the text of the file that declares it; `name` is
@@ -117,6 +123,7 @@ pub fn fields(effects: Effects) -> Fields {
 /// # Errors
 /// When the text is not as the module's documentation says, or does not fit the other rules.
 pub fn register(name: &str, text: &str) -> Result<&'static Term, TermError> {
+    library::register_all();
     register_from(Origin::File, name, text)
 }
 
@@ -149,18 +156,21 @@ pub(crate) fn register_from(origin: Origin, name: &str, text: &str) -> Result<&'
     }
     let declaration = check::checked(origin, declaration)?;
     wgsl::check(&declaration.rules)?;
-    enter(declaration, text)
+    enter(origin, declaration, text)
 }
 
 /// Enter a checked declaration into the tables.
-fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, TermError> {
-    let Declaration { effect, parameters, fields, mut rules } = declaration;
-    let (line, declared) = effect.ok_or(Problem::NoEffect.at(1))?;
-    let within = declared.within.and_then(Effect::from_name);
-    let (name, meaning) = (declared.name, declared.meaning);
-    let row = EffectInfo { name, meaning, needs: Some(needs::of_effect), within };
-    let effect = Effect::register(row).map_err(|error| problem(error).at(line))?;
-    let effects: &'static [Effect] = Box::leak(Box::new([effect]));
+fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result<&'static Term, TermError> {
+    let Declaration { effects: declared, parameters, fields, mut rules } = declaration;
+    let mut effects = Vec::new();
+    for &(line, DeclaredEffect { name, within, meaning }) in &declared {
+        let within = within.and_then(Effect::from_name);
+        let row = EffectInfo { name, meaning, needs: Some(needs::of_effect), within };
+        effects.push(Effect::register(row).map_err(|error| problem(error).at(line))?);
+    }
+    let line = declared.first().map_or(1, |(line, _)| *line);
+    let effects: &'static [Effect] = effects.leak();
+    let &effect = effects.first().ok_or(Problem::NoEffect.at(1))?;
     let mut params = Vec::new();
     for (line, declared) in parameters {
         let row = ParamInfo {
@@ -178,7 +188,7 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
             owner: declared.owner,
             held: declared.held,
             found: declared.found,
-            effects,
+            effects: asking(effects, declared.of),
             source: declared.source,
             meaning: declared.meaning,
         };
@@ -194,24 +204,35 @@ fn enter(declaration: Declaration, text: &'static str) -> Result<&'static Term, 
     }
     let mut layers = Vec::new();
     for rule in &mut rules {
-        // It is there where the effects are on that its rule asks for.
-        let others = rule.when.iter().filter_map(|condition| Effect::from_name(condition));
-        let effects: Vec<Effect> = effects.iter().copied().chain(others).collect();
+        // Where it names none of the file's effects, it is there with each of them.
+        let named = declared.iter().any(|(_, effect)| rule.when.contains(&effect.name));
+        if let ([(_, only)], false) = (declared.as_slice(), named) {
+            rule.when.push(only.name);
+        }
+        // A layer is there where the effects are on that its rule asks for.
+        let asked = rule.when.iter().filter_map(|condition| Effect::from_name(condition));
+        let asked: Vec<Effect> = asked.collect();
         for &name in rule.adds.iter().chain(&rule.shows) {
-            let effects = effects.clone().leak();
+            if origin == Origin::Library && TermName::from_name(name).is_some() {
+                continue;
+            }
+            let effects = asked.clone().leak();
             let layer = TermName::register(TermInfo { name, effects })
                 .map_err(|error| problem(error).at(rule.line))?;
             if !layers.contains(&layer) {
                 layers.push(layer);
             }
         }
-        if !rule.when.contains(&declared.name) {
-            rule.when.push(declared.name);
-        }
     }
-    let term = Term { effect, params, fields: Fields::of(read), layers, rules, text };
+    let term = Term { effect, effects, params, fields: Fields::of(read), layers, rules, text, origin };
     let never = || Problem::Full { kind: "term", most: 0 }.at(line);
     TERMS.add(|_| false, |_| false, |_| Ok(term), never)
+}
+
+/// The effects of a file that ask for a parameter: all of them, or the one that it names.
+fn asking(effects: &'static [Effect], of: Option<&str>) -> &'static [Effect] {
+    let place = of.and_then(|name| effects.iter().position(|effect| effect.name() == name));
+    place.map_or(effects, |place| &effects[place..=place])
 }
 
 /// The rule by which a field comes from its attribute, interpolated from there to fragments and texels of a rasteriser. A

@@ -7,13 +7,14 @@ use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::{Field, Fields};
 use crate::shader::domain::{Domain, UV};
-use crate::shader::emit::{SAMPLE, UNMADE};
+use crate::shader::emit::{SAMPLE, UNMADE, parts};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
 use crate::shader::rule::{Rule, rules};
 use crate::shader::search::search;
 
 use super::fields;
+use super::library::LAYERED;
 
 /// What `effect` asks for beside the others of `setup`.
 pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
@@ -30,6 +31,10 @@ pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
         !rule.adds.is_empty() && conditions.all(|effect| setup.effects.has(effect))
     };
     let mut goals: Vec<&'static str> = own.filter(on).map(|rule| rule.gives[0].0).collect();
+    if LAYERED.contains(&effect.name()) {
+        // It changes what other effects' rules read.
+        goals.extend(parts(&Facts { setup: *setup, source: Source::Samples, ..Facts::default() }));
+    }
     goals.dedup();
     let needs = of_goals(&goals, setup);
     known().insert(key, needs);
@@ -70,6 +75,7 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
         irradiance: read(Resource::IrradianceFaces),
         lobes: read(Resource::SpecularFaces),
         hilite: read(Resource::HiliteFaces),
+        reflected: read(Resource::ReflectedFaces) || read(Resource::GlossyFaces),
         occlusion: needed("open") || needed("vertex_occlusion"),
         rim: needed("silhouette") || needed("corner_silhouettes"),
         dapple: needed("dapple"),
@@ -85,7 +91,7 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
 mod tests {
     use super::*;
     use crate::model::effects::{Form, Lookups};
-    use crate::shader::emit::{hazy, parts};
+    use crate::shader::emit::hazy;
 
     #[test]
     fn what_the_built_in_rules_read_is_what_the_built_in_effects_ask_for() {

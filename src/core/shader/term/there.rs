@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use super::Origin;
 use super::declaration::Declaration;
 use super::error::{Problem, TermError};
+use super::{Origin, terms};
 use crate::model::params::Param;
 use crate::shader::domain::Domain;
 use crate::shader::emit::{SAMPLE, TEXEL};
@@ -13,8 +13,12 @@ use crate::shader::quantity::{Attribute, Constant};
 use crate::shader::rule::{RULES, Rule};
 
 /// The fields of stored samples, and all that rules give of them.
-fn of_samples<'a>(rules: &(impl Iterator<Item = &'a Rule> + Clone)) -> BTreeSet<&'static str> {
+fn of_samples<'a>(
+    rules: &(impl Iterator<Item = &'a Rule> + Clone),
+    own: &BTreeSet<&'static str>,
+) -> BTreeSet<&'static str> {
     let mut there: BTreeSet<&'static str> = SAMPLE.iter().map(|(name, _)| *name).collect();
+    there.extend(own);
     loop {
         let before = there.len();
         for rule in
@@ -76,7 +80,12 @@ pub(super) fn there(origin: Origin, declaration: &Declaration) -> Result<(), Ter
     let fields = declaration.fields.iter().map(|(line, field)| (*line, field.name, field.name));
     let declared: Vec<(usize, &str, &str)> = parameters.chain(fields).collect();
     let own: BTreeSet<&str> = declared.iter().map(|(_, identifier, _)| *identifier).collect();
-    let (samples, texels) = (of_samples(&RULES.iter()), of_texels());
+    // The library's own files know one another.
+    let known =
+        terms().into_iter().filter(|term| origin == Origin::Library && term.origin == Origin::Library);
+    let all = RULES.iter().chain(known.flat_map(|term| &term.rules));
+    let all: Vec<&Rule> = all.chain(&declaration.rules).collect();
+    let (samples, texels) = (of_samples(&all.iter().copied(), &own), of_texels());
     // The library's own may have rules for rasterised fragments beside those for samples.
     let for_both = |rule: &&Rule| origin == Origin::File || !rule.when.contains(&"raster");
     for rule in declaration.rules.iter().filter(for_both) {

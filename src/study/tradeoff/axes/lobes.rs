@@ -67,7 +67,12 @@ fn bake(bench: &Bench<'_>, settings: Settings) -> Result<f64, StudyError> {
     let mut scene = bench.scene(settings);
     scene.effects = Effects::of(&[Effect::SideSpecular]);
     let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
-    let stack = bake::bake(&scene, &pose, whole.lower..=whole.upper, None);
+    let stack = bake::bake(
+        &scene,
+        &pose,
+        &bake::Ranges { exponents: whole.lower..=whole.upper, ..bake::Ranges::of(&scene, false) },
+        None,
+    );
     let (_, stats) = stack.map_err(PrepareError::from)?;
     Ok(stats.rows.iter().filter(|row| row.name.starts_with("lobe")).map(|row| row.seconds).sum())
 }

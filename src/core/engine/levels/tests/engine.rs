@@ -74,7 +74,8 @@ fn levels_move_with_the_light_as_the_losses_do() {
         })
     };
     let lobes = LobeStack { exponents: vec![8.0, 16.0], cubes: vec![cube(0.7), cube(1.9)] };
-    let light = Illumination { irradiance: Some(cube(0.3)), lobes: Some(lobes), hilite: None };
+    let light =
+        Illumination { irradiance: Some(cube(0.3)), lobes: Some(lobes), hilite: None, reflected: None };
     // Parameters of the light are free where a built-in effect asks for them.
     let effects = [dunes().effect, Effect::Occlusion, Effect::Diffuse, Effect::SideSpecular];
     let effects = Effects::of(&effects);

@@ -16,6 +16,7 @@ use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::{Form, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::params::Param;
 use crate::model::params::{Column, Params};
 use crate::samples::rows::Rows;
 use crate::samples::surface_records::{Asked, NEUTRAL, Unmade};

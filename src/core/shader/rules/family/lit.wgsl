@@ -26,3 +26,47 @@ fn light_NAME_diffuse(albedo: vec3f, light_NAME_facing: f32, light_NAME_irradian
 fn light_NAME_shown(light_NAME_term: vec3f, diffuse_weight: vec3f, light_NAME_color: vec3f) -> vec3f {
     return light_NAME_color * diffuse_weight * light_NAME_term;
 }
+
+// The BRDF of Kelemen and Szirmay-Kalos for the light NAME, over weight and s.
+//
+// gives: light_NAME_brdf
+// when: light_specular, kelemen
+// cost: 60
+// uses: specular
+fn light_NAME_kelemen(n: vec3f, view: vec3f, light_NAME_toward: vec3f, lobe_roughness: f32, lobe_f0: f32) -> f32 {
+    return kelemen_brdf(n, view, light_NAME_toward, lobe_roughness, lobe_f0);
+}
+
+// GGX for the light NAME, over weight and s.
+//
+// gives: light_NAME_brdf
+// when: light_specular, ggx
+// cost: 80
+// uses: specular
+fn light_NAME_ggx(n: vec3f, view: vec3f, light_NAME_toward: vec3f, lobe_roughness: f32, lobe_f0: f32) -> f32 {
+    return ggx_brdf(n, view, light_NAME_toward, lobe_roughness, lobe_f0);
+}
+
+// s f E_l, before its colour and the specular weight; `facing` has E_l over pi.
+//
+// gives: light_NAME_glint
+// when: lights, light_specular
+// cost: 6
+fn light_NAME_in_lobe(
+    light_NAME_brdf: f32,
+    light_NAME_facing: f32,
+    light_NAME_irradiance: vec3f,
+    lobe_weight: f32,
+) -> vec3f {
+    return (3.141592653589793 * (lobe_weight * light_NAME_brdf * light_NAME_facing)) * light_NAME_irradiance;
+}
+
+// What the skin mirrors of the light NAME (MODEL 9).
+//
+// gives: light_NAME_specular_part
+// adds: light_NAME_specular
+// when: lights, light_specular
+// cost: 6
+fn light_NAME_mirrored(light_NAME_glint: vec3f, specular_weight: vec3f, light_NAME_color: vec3f) -> vec3f {
+    return light_NAME_color * specular_weight * light_NAME_glint;
+}

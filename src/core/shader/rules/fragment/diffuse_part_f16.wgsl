@@ -2,7 +2,7 @@
 //
 // gives: diffuse_part
 // adds: diffuse, rim
-// when: rim, f16
+// when: rim, f16, !layered
 // cost: 6
 // error: 0.002
 // paper: yes
