@@ -44,7 +44,8 @@ fn scene(choices: &str, params: &str) -> SceneFolder {
     folder
 }
 
-const PARAMS: &str = "roughness = 0.4\ngloss = 0.3\nspecular_weight = [0.9, 0.7, 0.5]\nf0 = 0.06\nfresnel_loss = 0.7";
+const PARAMS: &str =
+    "roughness = 0.4\ngloss = 0.3\nspecular_weight = [0.9, 0.7, 0.5]\nf0 = 0.06\nfresnel_loss = 0.7";
 
 fn free() -> Vec<Unknown> {
     let names = [
@@ -90,10 +91,13 @@ fn slopes_are_finite_differences_on_every_engine() {
     for choices in CHOICES {
         let mut bake = baked(&scene(choices, PARAMS));
         let unknowns = moving(choices);
-        let columns: Vec<Column> = unknowns.iter().filter_map(|unknown| match unknown {
-            Unknown::Param(column) => Some(*column),
-            _ => None,
-        }).collect();
+        let columns: Vec<Column> = unknowns
+            .iter()
+            .filter_map(|unknown| match unknown {
+                Unknown::Param(column) => Some(*column),
+                _ => None,
+            })
+            .collect();
         bake = free_in(&scene(choices, PARAMS), bake, &columns);
         let observed = bake.sample().unwrap().observe().unwrap();
         let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
@@ -149,10 +153,9 @@ fn furnace(model: SpecularModel, roughness: f64, f0: f64) -> (Image, Baked) {
         "[model]\neffects = [\"fresnel\"]\nspecular_model = \"{}\"\nspecular_visibility = \"none\"\n",
         model.name()
     );
-    let text = SCENE.replace("[model]\n", &lines).replace(
-        "[model.params]\n",
-        &format!("[model.params]\nroughness = {roughness}\nf0 = {f0}\n"),
-    );
+    let text = SCENE
+        .replace("[model]\n", &lines)
+        .replace("[model.params]\n", &format!("[model.params]\nroughness = {roughness}\nf0 = {f0}\n"));
     folder.write("scene.toml", text.replace("specular = \"data.png\"\n", "").as_bytes());
     let baked = baked(&folder);
     (image(&baked), baked)
@@ -179,7 +182,10 @@ fn in_a_white_furnace_the_lobe_shows_the_split_sum() {
                 let want = f0 * a + b;
                 for c in 0..3 {
                     // The fits' 1.5e-4, and a pixel's curvature of cosines near 1.
-                    assert!((f64::from(rgb[c]) - want).abs() < 4e-4, "{model:?} {roughness} {f0}: {rgb:?} {want}");
+                    assert!(
+                        (f64::from(rgb[c]) - want).abs() < 4e-4,
+                        "{model:?} {roughness} {f0}: {rgb:?} {want}"
+                    );
                 }
                 seen += 1;
             }
@@ -220,7 +226,11 @@ fn with_a_weight_of_nothing_the_image_is_that_without_the_effects() {
 
 #[test]
 fn hard_cases_are_finite_in_value_and_slope() {
-    let hard = ["roughness = 0.05\nf0 = 0", "roughness = 1\nf0 = 0.2\ngloss = 0.9", "roughness = 0.05\ngloss = 0.9\nf0 = 0.2"];
+    let hard = [
+        "roughness = 0.05\nf0 = 0",
+        "roughness = 1\nf0 = 0.2\ngloss = 0.9",
+        "roughness = 0.05\ngloss = 0.9\nf0 = 0.2",
+    ];
     for choices in CHOICES {
         for params in hard {
             let unknowns = moving(choices);
@@ -228,7 +238,10 @@ fn hard_cases_are_finite_in_value_and_slope() {
             let task = Task { unknowns: unknowns.clone(), ..observed.task() };
             let point: Point = observed.start();
             let (loss, slopes) = CpuEngine::new(task).unwrap().gradient(&point);
-            assert!(loss.is_finite() && slopes.iter().all(|slope| slope.is_finite()), "{choices} {params}: {slopes:?}");
+            assert!(
+                loss.is_finite() && slopes.iter().all(|slope| slope.is_finite()),
+                "{choices} {params}: {slopes:?}"
+            );
         }
     }
 }
@@ -244,9 +257,10 @@ fn both_engines_find_the_constants_that_made_the_target() {
             scene.params.set(param, value);
         }
     }));
-    folder.write("target.exr", &exr(4, 4, &["R", "G", "B", "A"], |c, i| {
-        if c == 3 { made.alpha[i] } else { made.rgb[i][c] }
-    }));
+    folder.write(
+        "target.exr",
+        &exr(4, 4, &["R", "G", "B", "A"], |c, i| if c == 3 { made.alpha[i] } else { made.rgb[i][c] }),
+    );
     let observed = baked(&folder).sample().unwrap().observe().unwrap();
     let unknowns = columns.map(Unknown::Param).to_vec();
     let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
