@@ -11,7 +11,7 @@ use super::stage::Stage;
 use super::targets::{Key, Precision, Targets};
 use super::timing::PassTime;
 use super::upload::{Content, Uploads};
-use crate::bake::VertexOcclusion;
+use crate::bake::PoseBake;
 use crate::model::effects::Effect;
 use crate::model::terms::TermName;
 use crate::render::antialias::Antialias;
@@ -145,12 +145,16 @@ impl Renderer {
         self.stages.clear();
     }
 
-    /// Move the mesh to another pose: the scene's at another time, with the occlusion of that pose where it has one of
+    /// Move the mesh to another pose: the scene's at another time, with what is baked of that pose where it has bakes of
     /// its own. Only with [`RenderOptions::animated`].
-    pub fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
-        self.uploads.set_mesh(&self.gpu, mesh, occlusion);
+    ///
+    /// # Errors
+    /// When something was baked for another mesh.
+    pub fn set_mesh(&mut self, mesh: &Mesh, own: Option<&PoseBake>) -> Result<(), GpuError> {
+        self.uploads.set_mesh(&self.gpu, mesh, own)?;
         let weights = mesh.morphs.iter().map(|morph| morph.weight);
         self.morph_weights.iter_mut().zip(weights).for_each(|(old, new)| *old = new);
+        Ok(())
     }
 
     /// The image that `camera` sees, times `gain`.

@@ -16,13 +16,14 @@ use super::texels::{self, Texels};
 use super::vertices;
 use crate::bake::rays::RayMesh;
 use crate::bake::stacks::Stack;
-use crate::bake::{Illumination, VertexOcclusion};
+use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion};
 use crate::model::cube::Cube;
+use crate::model::fields::Field;
 use crate::model::params::Params;
 use crate::prepare::Baked;
 use crate::samples::PosedSurface;
 use crate::scene::Scene;
-use crate::scene::mesh::{Mesh, PosedMesh};
+use crate::scene::mesh::Mesh;
 use crate::shader::{Attribute, Resource};
 
 /// What is rendered: a scene, its bakes, and the parameters. Whatever is large is shared: a clone copies none of it.
@@ -34,6 +35,8 @@ pub struct Content {
     pub illumination: Arc<Illumination>,
     /// Ambient occlusion, when asked for.
     pub occlusion: Option<Arc<VertexOcclusion>>,
+    /// The sky that each vertex sees, when asked for.
+    pub sky: Option<Arc<SkyBake>>,
     /// The constants of the model.
     pub params: Params,
 }
@@ -46,6 +49,7 @@ impl Content {
             scene: Arc::clone(&baked.scene),
             illumination: Arc::clone(&baked.illumination),
             occlusion: baked.occlusion.clone(),
+            sky: baked.sky.clone(),
             params: baked.scene.params.clone(),
         }
     }
@@ -145,15 +149,37 @@ impl Uploads {
             return Ok(buffer.clone());
         }
         let (mesh, occlusion) = self.mesh();
-        let bytes = vertices::attribute(attribute, mesh, occlusion, |field| {
-            let posed = mesh.pose();
-            let rays = RayMesh::new(&posed.positions, &posed.triangles);
-            PosedSurface::with_fields(&self.content.scene, &posed, &rays).field_of_vertices(field)
-        });
+        let fields = match attribute {
+            Attribute::Field(field) => self.fields(gpu, mesh, None, &[field])?,
+            _ => HashMap::new(),
+        };
+        let bytes = vertices::attribute(attribute, mesh, occlusion, &fields);
         let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
         self.bytes += bytes.len() as u64;
         self.attributes.insert(attribute, made.clone());
         Ok(made)
+    }
+
+    /// What is found of fields at each vertex of the mesh in its pose, whose own sky is `sky`.
+    fn fields(
+        &self,
+        gpu: &Gpu,
+        mesh: &Mesh,
+        sky: Option<&SkyBake>,
+        fields: &[Field],
+    ) -> Result<HashMap<Field, Vec<f32>>, GpuError> {
+        if fields.is_empty() {
+            return Ok(HashMap::new());
+        }
+        let posed = mesh.pose();
+        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        // Where triangles share no vertices, the fields are the mesh file's own.
+        let sky = sky.or(self.content.sky.as_deref()).filter(|_| self.split.is_none());
+        let surface =
+            PosedSurface::with_fields(&self.content.scene, &posed, &rays, &mesh.morphs, sky).map_err(
+                |error| GpuError::Refused { adapter: gpu.name().to_owned(), reason: error.to_string() },
+            )?;
+        Ok(fields.iter().map(|&field| (field, surface.field_of_vertices(field))).collect())
     }
 
     /// A resource, ready to be bound.
@@ -211,23 +237,24 @@ impl Uploads {
     }
 
     /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the
-    /// device; and `occlusion`, where that pose has one of its own, in place of the scene's.
-    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
-        let own = occlusion.is_some();
+    /// device; and what is baked of that pose, where it has bakes of its own, in place of the scene's.
+    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh, own: Option<&PoseBake>) -> Result<(), GpuError> {
+        let (occlusion, sky) = own.map_or((None, None), |own| (own.occlusion.as_ref(), own.sky.as_ref()));
+        let occluded = occlusion.is_some();
         let occlusion = occlusion.or(self.content.occlusion.as_deref());
         // What is found at vertices is found anew in this pose.
-        let finds = self.attributes.keys().any(|attribute| matches!(attribute, Attribute::Field(_)));
-        let posed = if finds { mesh.pose() } else { PosedMesh::default() };
-        let rays = RayMesh::new(&posed.positions, &posed.triangles);
-        let surface = PosedSurface::with_fields(&self.content.scene, &posed, &rays);
+        let finds = self.attributes.keys().filter_map(|attribute| match attribute {
+            Attribute::Field(field) => Some(*field),
+            _ => None,
+        });
+        let fields = self.fields(gpu, mesh, sky, &finds.collect::<Vec<_>>())?;
         for (&attribute, buffer) in &self.attributes {
             let moves = matches!(
                 attribute,
                 Attribute::Position | Attribute::Normal | Attribute::Tangent | Attribute::Field(_)
             );
-            if moves || own && attribute == Attribute::Occlusion {
-                let bytes =
-                    vertices::attribute(attribute, mesh, occlusion, |field| surface.field_of_vertices(field));
+            if moves || occluded && attribute == Attribute::Occlusion {
+                let bytes = vertices::attribute(attribute, mesh, occlusion, &fields);
                 gpu.queue.write_buffer(buffer, 0, &bytes);
             }
         }
@@ -241,6 +268,7 @@ impl Uploads {
                 gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&rows));
             }
         }
+        Ok(())
     }
 }
 

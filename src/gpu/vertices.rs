@@ -1,5 +1,7 @@
 //! The mesh as the vertex stage reads it: attributes at rest, morph deltas, bones.
 
+use std::collections::HashMap;
+
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
 use crate::bake::VertexOcclusion;
@@ -9,12 +11,12 @@ use crate::scene::mesh::{Mesh, Morph, VertexField};
 use crate::shader::Attribute;
 
 /// One attribute of every vertex, as bytes; what the mesh lacks is zero, which the vertex stage takes for
-/// "no direction", and occlusion 1; `field` finds what a file of rules declares.
+/// "no direction", and occlusion 1; `fields` holds what is found of what a file of rules declares.
 pub(super) fn attribute(
     attribute: Attribute,
     mesh: &Mesh,
     occlusion: Option<&VertexOcclusion>,
-    field: impl FnOnce(Field) -> Vec<f32>,
+    fields: &HashMap<Field, Vec<f32>>,
 ) -> Vec<u8> {
     let count = mesh.positions.len();
     let floats = |floats: Vec<f32>| bytemuck::cast_slice(&floats).to_vec();
@@ -29,7 +31,7 @@ pub(super) fn attribute(
             bytemuck::cast_slice(&joints).to_vec()
         }
         Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
-        Attribute::Field(of) => floats(field(of)),
+        Attribute::Field(of) => floats(fields.get(&of).cloned().unwrap_or_default()),
         Attribute::Corner => floats(corner_marks(count).into_flattened()),
     };
     bytes.resize(count * attribute.bytes() as usize, 0);

@@ -297,7 +297,7 @@ fn levels_move_as_their_differences_do() {
 /// The scene without any light.
 fn content(scene: &Scene) -> Content {
     let (scene, params) = (Arc::new(scene.clone()), scene.params.clone());
-    Content { scene, illumination: Arc::default(), occlusion: None, params }
+    Content { scene, illumination: Arc::default(), occlusion: None, sky: None, params }
 }
 
 fn drawn(scene: &Scene, options: RenderOptions) -> Option<(Image, Plan)> {
@@ -500,7 +500,7 @@ mod over_stored_texels {
     fn atlas(scene: &Scene, occlusion: Option<&VertexOcclusion>) -> Arc<Atlas> {
         let posed = scene.mesh.pose();
         let rays = RayMesh::new(&posed.positions, &posed.triangles);
-        let bakes = SurfaceBakes { occlusion };
+        let bakes = SurfaceBakes { occlusion, ..SurfaceBakes::default() };
         let surface = PosedSurface::new(scene, &posed, &rays, &scene.mesh.morphs, bakes).unwrap();
         atlas_of(scene, &surface).unwrap().unwrap()
     }

@@ -211,7 +211,10 @@ fn groups_stand_by_their_count_of_records_and_weights_sum_to_one() {
     scene.maps.normal = Some(Map { width: 1, height: 1, texels: vec![[0.4, 0.6, 0.9]] });
     let mesh = sheet();
     let occlusion = VertexOcclusion { base: vec![0.5; mesh.positions.len()], morphs: Vec::new() };
-    let view = sample_views(&scene, &mesh, SurfaceBakes { occlusion: Some(&occlusion) }).unwrap().remove(0);
+    let view =
+        sample_views(&scene, &mesh, SurfaceBakes { occlusion: Some(&occlusion), ..SurfaceBakes::default() })
+            .unwrap()
+            .remove(0);
     let samples = view.records() * LANES;
     assert_eq!(view.pixel.len(), view.groups() * LANES);
     assert_eq!(view.surface.slots(), samples);
@@ -446,7 +449,7 @@ fn what_cannot_be_sampled_or_compared_is_said() {
     let (mut scene, mut mesh) = (sheet_scene(Effects::of(&[Effect::Diffuse])), sheet());
     let wrong = VertexOcclusion { base: vec![1.0; 3], morphs: Vec::new() };
     assert!(
-        sample_views(&scene, &mesh, SurfaceBakes { occlusion: Some(&wrong) })
+        sample_views(&scene, &mesh, SurfaceBakes { occlusion: Some(&wrong), ..SurfaceBakes::default() })
             .unwrap_err()
             .to_string()
             .contains("3 vertices")

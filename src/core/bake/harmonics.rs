@@ -17,13 +17,17 @@ pub const CONSTANT: f64 = 0.282_094_791_773_878_14;
 pub struct Order(usize);
 
 impl Order {
+    /// The lowest order.
+    pub const LEAST: Self = Self(2);
+    /// Of four bands, by which light is known that is even but for its shadows.
+    pub const FOUR: Self = Self(4);
     /// The highest order.
     pub const MOST: Self = Self(6);
 
     /// The order of so many bands, where there is one.
     #[must_use]
     pub fn new(bands: usize) -> Option<Self> {
-        (2..=Self::MOST.0).contains(&bands).then_some(Self(bands))
+        (Self::LEAST.0..=Self::MOST.0).contains(&bands).then_some(Self(bands))
     }
 
     /// Bands.

@@ -9,7 +9,7 @@
 //! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions)
 //! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
-//!   [`shadowed`]: how much
+//!   [`shadowed`]: how much; [`sky`]: which of both a scene asks for
 //! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
@@ -29,6 +29,7 @@ pub mod radial;
 pub mod rays;
 pub mod reflected;
 pub mod shadowed;
+pub mod sky;
 pub mod stacks;
 pub mod transfer;
 pub(crate) mod vertex_rays;
@@ -46,9 +47,9 @@ use crate::scene::sky_lights::sky_lights;
 use crate::specular::SMOOTHEST;
 use baker::{Baker, EnvironmentBaker};
 use harmonics::Order;
-use interreflection::Albedo;
 pub use lobes::LobeStack;
 pub use reflected::ReflectedStack;
+pub use sky::{SkyBake, SkyLight};
 use stacks::Stack;
 use transfer::VertexTransfer;
 
@@ -59,6 +60,17 @@ pub struct Bake {
     pub illumination: Illumination,
     /// Ambient occlusion of each vertex.
     pub occlusion: Option<VertexOcclusion>,
+    /// The sky that each vertex sees.
+    pub sky: Option<SkyBake>,
+}
+
+/// What is baked of one pose of a mesh, for that pose alone.
+#[derive(Clone, Debug, Default)]
+pub struct PoseBake {
+    /// Ambient occlusion of each vertex.
+    pub occlusion: Option<VertexOcclusion>,
+    /// The sky that each vertex sees.
+    pub sky: Option<SkyBake>,
 }
 
 /// The environment's light: the cubes that the enabled effects ask for.
@@ -186,16 +198,16 @@ fn all_sets<T: Clone + Default>(scene: &Scene, used: &[usize], baked: Vec<T>) ->
     sets
 }
 
-/// Ambient occlusion, with a set for each morph target that the scene or its animation gives a weight.
+/// Ambient occlusion, with a set for each of the morph targets `used`.
 fn occlusion_of_used(
     scene: &Scene,
     pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+    used: &[usize],
     baker: &mut Baker<'_>,
 ) -> VertexOcclusion {
-    let used = used_morphs(scene);
-    let pose_used = |weights: &[f32]| pose(&all_weights(scene, &used, weights));
+    let pose_used = |weights: &[f32]| pose(&all_weights(scene, used, weights));
     let baked = baker.occlusion(&pose_used, used.len(), scene.quality.occlusion_rays);
-    VertexOcclusion { base: baked.base, morphs: all_sets(scene, &used, baked.morphs) }
+    VertexOcclusion { base: baked.base, morphs: all_sets(scene, used, baked.morphs) }
 }
 
 /// Transfer vectors of the scene's mesh, with a set for each morph target that the scene or its animation gives a
@@ -212,13 +224,7 @@ pub fn bake_scene_transfer(
     cache: Option<&Path>,
 ) -> (VertexTransfer, BakeStats) {
     let mut baker = Baker { cache, stats: BakeStats::default() };
-    let used = used_morphs(scene);
-    let pose_used = |weights: &[f32]| pose(&all_weights(scene, &used, weights));
-    let albedo = bounces.then_some(Albedo { map: scene.maps.color.as_ref() });
-    let rays = scene.quality.occlusion_rays;
-    let baked = baker.transfer(&pose_used, used.len(), rays, order, albedo.as_ref());
-    let morphs = all_sets(scene, &used, baked.morphs);
-    (VertexTransfer { order, base: baked.base, morphs }, baker.stats)
+    (sky::transfer_of_used(scene, pose, &used_morphs(scene), order, bounces, &mut baker), baker.stats)
 }
 
 /// Where stacks of cubes will be looked up: at one place each, unless a fit moves it.
@@ -267,9 +273,30 @@ pub fn bake(
 ) -> Result<(Bake, BakeStats), BakeError> {
     let (illumination, stats) = bake_light(scene, ranges, cache)?;
     let mut baker = Baker { cache, stats };
-    let needs = scene.needs();
-    let occlusion = needs.occlusion.then(|| occlusion_of_used(scene, pose, &mut baker));
-    Ok((Bake { illumination, occlusion }, baker.stats))
+    let used = used_morphs(scene);
+    let (sky, occlusion) = surface(scene, pose, &used, SkyLight::of_scene, &mut baker);
+    Ok((Bake { illumination, occlusion, sky }, baker.stats))
+}
+
+/// What is baked of a scene's mesh, with a set for each of the morph targets `used`; `light` gives the environment's,
+/// where it is asked for.
+fn surface(
+    scene: &Scene,
+    pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+    used: &[usize],
+    light: impl FnOnce(&Scene) -> Option<SkyLight>,
+    baker: &mut Baker<'_>,
+) -> (Option<SkyBake>, Option<VertexOcclusion>) {
+    let sky = sky::Wanted::of(scene).map(|wanted| SkyBake {
+        transfer: sky::transfer_of_used(scene, pose, used, wanted.order, wanted.bounces, baker),
+        light: wanted.light.then(|| light(scene)).flatten(),
+    });
+    // The open share is the transfer's first number, so rays are cast once.
+    let occlusion = scene.needs().occlusion.then(|| match &sky {
+        Some(sky) => sky.transfer.occlusion(),
+        None => occlusion_of_used(scene, pose, used, baker),
+    });
+    (sky, occlusion)
 }
 
 /// The environment's part of [`bake`].
@@ -314,13 +341,21 @@ pub fn bake_light(
     Ok((light, baker.stats))
 }
 
-/// Ambient occlusion of one pose of the scene's mesh, morphed and skinned, for that pose alone: what an animation
-/// has per frame where sums over morph targets are not enough. Kept in the folder `cache` too.
+/// What the scene's effects ask for of one pose of its mesh, morphed and skinned, for that pose alone: what an animation
+/// has per frame where sums over morph targets are not enough. `light` is the environment's, where it is known already.
+/// Kept in the folder `cache` too.
 #[must_use]
-pub fn bake_pose(scene: &Scene, posed: &PosedMesh, cache: Option<&Path>) -> (VertexOcclusion, BakeStats) {
+pub fn bake_pose(
+    scene: &Scene,
+    posed: &PosedMesh,
+    light: Option<&SkyLight>,
+    cache: Option<&Path>,
+) -> (PoseBake, BakeStats) {
     let mut baker = Baker { cache, stats: BakeStats::default() };
-    let occlusion = baker.occlusion(&|_| posed.clone(), 0, scene.quality.occlusion_rays);
-    (occlusion, baker.stats)
+    // Of a pose no target is used: it is the mesh.
+    let light = |scene: &Scene| light.cloned().or_else(|| SkyLight::of_scene(scene));
+    let (sky, occlusion) = surface(scene, &|_| posed.clone(), &[], light, &mut baker);
+    (PoseBake { occlusion, sky }, baker.stats)
 }
 
 fn checked_environment(scene: &Scene) -> Result<&Environment, BakeError> {

@@ -136,6 +136,27 @@ pub fn shadow_ratio(shadowed: &Turning, open: &Turning, mean: [f64; 3], radians:
     ratio
 }
 
+/// What of `light` arrives through a transfer vector, over the bands that both have, rgb; not floored at 0.
+#[must_use]
+pub fn arriving<T: Share>(transfer: &[T], light: &Coefficients) -> [f64; 3] {
+    let mut sum = [0.0; 3];
+    for (share, light) in transfer.iter().zip(light.rgb()) {
+        let share = share.rgb();
+        (0..3).for_each(|c| sum[c] += share[c] * light[c]);
+    }
+    sum
+}
+
+/// What arrives, as a share of open light: max(0, `arrived`) / max(`open`, 1e-4 M), M the mean radiance; 0 where M is not
+/// above 0.
+#[must_use]
+pub fn share_of_open(arrived: [f64; 3], open: [f64; 3], mean: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|c| match mean[c] > 0.0 {
+        true => arrived[c].max(0.0) / open[c].max(LEAST * mean[c]),
+        false => 0.0,
+    })
+}
+
 /// The light that an occlusion lets through once the surface throws it back at itself (Jimenez et al. 2016,
 /// *Practical Real-Time Strategies for Accurate Indirect Occlusion*), a channel, and its derivatives by occlusion and by
 /// albedo: the cheap choice beside gathered bounces. Where both branches are equal, as for occlusion 0, the derivatives

@@ -12,6 +12,10 @@ pub struct Choices {
     pub lobe_lookup: LobeLookup,
     /// What the specular map scales.
     pub specular_map: SpecularMap,
+    /// How the sky that a point sees is found.
+    pub visibility: Visibility,
+    /// How light counts that the skin throws back.
+    pub bounces: Bounces,
     /// Whether the specular map lowers the roughness, or will: `gloss` is not 0.
     pub glossy: bool,
 }
@@ -119,7 +123,103 @@ impl SpecularMap {
     }
 }
 
+/// How the sky that a point sees is found (the scene's `visibility`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Visibility {
+    /// By the open share of the hemisphere, whatever light comes from there.
+    Scalar,
+    /// As a cone of that share about the bent normal.
+    Cone,
+    /// By transfer vectors of two bands of spherical harmonics (Sloan, Kautz and Snyder 2002).
+    Sh2,
+    /// Of three bands.
+    Sh3,
+    /// Of four bands.
+    #[default]
+    Sh4,
+    /// Of five bands.
+    Sh5,
+    /// Of six bands.
+    Sh6,
+    /// By rays from every sample: the reference.
+    Rays,
+}
+
+impl Visibility {
+    /// Every choice, in the order of documentation.
+    pub const ALL: [Self; 8] =
+        [Self::Scalar, Self::Cone, Self::Sh2, Self::Sh3, Self::Sh4, Self::Sh5, Self::Sh6, Self::Rays];
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Scalar => "scalar",
+            Self::Cone => "cone",
+            Self::Sh2 => "sh2",
+            Self::Sh3 => "sh3",
+            Self::Sh4 => "sh4",
+            Self::Sh5 => "sh5",
+            Self::Sh6 => "sh6",
+            Self::Rays => "rays",
+        }
+    }
+
+    /// How many bands of spherical harmonics it is by, where it is by these alone.
+    #[must_use]
+    pub const fn bands(self) -> Option<usize> {
+        match self {
+            Self::Scalar | Self::Cone | Self::Rays => None,
+            Self::Sh2 => Some(2),
+            Self::Sh3 => Some(3),
+            Self::Sh4 => Some(4),
+            Self::Sh5 => Some(5),
+            Self::Sh6 => Some(6),
+        }
+    }
+}
+
+/// How light counts that the skin throws back at itself (the scene's `bounces`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Bounces {
+    /// Not at all.
+    None,
+    /// By a polynomial of the open share and the albedo (Jimenez et al. 2016).
+    Polynomial,
+    /// Gathered over the mesh, in two rounds.
+    #[default]
+    Gathered,
+}
+
+impl Bounces {
+    /// Every choice, in the order of documentation.
+    pub const ALL: [Self; 3] = [Self::None, Self::Polynomial, Self::Gathered];
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Polynomial => "polynomial",
+            Self::Gathered => "gathered",
+        }
+    }
+}
+
 impl Choices {
+    /// Those that a scene file names, each by its key.
+    #[must_use]
+    pub const fn named(&self) -> [(&'static str, &'static str); 6] {
+        [
+            ("specular_model", self.specular_model.name()),
+            ("specular_visibility", self.specular_visibility.name()),
+            ("lobe_lookup", self.lobe_lookup.name()),
+            ("specular_map", self.specular_map.name()),
+            ("visibility", self.visibility.name()),
+            ("bounces", self.bounces.name()),
+        ]
+    }
+
     /// Whether a condition of a rule holds that names a choice; `None` of any other.
     #[must_use]
     pub fn holds(&self, condition: &str) -> Option<bool> {
@@ -133,13 +233,15 @@ impl Choices {
             "lobe_visibility" => visibility(SpecularVisibility::Lobe),
             "off_peak" => self.lobe_lookup == LobeLookup::OffPeak,
             "f0_map" => self.specular_map == SpecularMap::F0,
+            "polynomial_bounces" => self.bounces == Bounces::Polynomial,
+            "gathered_bounces" => self.bounces == Bounces::Gathered,
             "glossy" => self.glossy,
             _ => return None,
         })
     }
 
     /// The conditions that [`Self::holds`] knows.
-    pub const CONDITIONS: [&'static str; 9] = [
+    pub const CONDITIONS: [&'static str; 11] = [
         "kelemen",
         "ggx",
         "unoccluded_lobe",
@@ -148,6 +250,8 @@ impl Choices {
         "lobe_visibility",
         "off_peak",
         "f0_map",
+        "polynomial_bounces",
+        "gathered_bounces",
         "glossy",
     ];
 }

@@ -1,6 +1,8 @@
 //! What is evaluated.
 
-use super::choices::{Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility};
+use super::choices::{
+    Bounces, Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility, Visibility,
+};
 use super::dapple::Dapple;
 use super::effects::{Effect, Effects, Form, Lookups, Silhouette};
 
@@ -41,6 +43,8 @@ impl Setup {
                 specular_visibility: SpecularVisibility::Lagarde,
                 lobe_lookup: LobeLookup::Mirror,
                 specular_map: SpecularMap::Weight,
+                visibility: Visibility::Sh4,
+                bounces: Bounces::Gathered,
                 glossy: false,
             },
         }

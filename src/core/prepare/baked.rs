@@ -5,7 +5,7 @@ use std::sync::Arc;
 use web_time::Instant;
 
 use super::{Loaded, Observed, PrepareError, PrepareOptions, Sampled, StageSeconds};
-use crate::bake::{self, BakeStats, Illumination, Ranges, VertexOcclusion};
+use crate::bake::{self, BakeStats, Illumination, Ranges, SkyBake, VertexOcclusion};
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::Effects;
@@ -14,7 +14,7 @@ use crate::samples::{self, SurfaceBakes, ViewSamples};
 use crate::scene::Scene;
 use crate::scene::view::View;
 
-/// A scene with its light and occlusion, which are shared with what is made of them: a clone copies neither.
+/// A scene with its light and occlusion, which are shared with what is made of them: a clone copies none of it.
 #[derive(Clone, Debug)]
 pub struct Baked {
     /// The scene; its params are those to start from.
@@ -27,6 +27,8 @@ pub struct Baked {
     pub illumination: Arc<Illumination>,
     /// Ambient occlusion, when asked for.
     pub occlusion: Option<Arc<VertexOcclusion>>,
+    /// The sky that each vertex sees, when asked for.
+    pub sky: Option<Arc<SkyBake>>,
     /// What was baked, and what came from the cache.
     pub stats: BakeStats,
     /// Seconds by stage so far.
@@ -49,18 +51,18 @@ impl Baked {
         let Loaded { scene, fitted, gains, seconds, mut warnings, asked } = loaded;
         let ranges = Ranges::of(&scene, asked.fit);
         let cache = asked.cache.as_deref();
-        let (illumination, occlusion, stats) = if asked.light_alone {
+        let (illumination, occlusion, sky, stats) = if asked.light_alone {
             let (illumination, stats) = bake::bake_light(&scene, &ranges, cache)?;
-            (illumination, None, stats)
+            (illumination, None, None, stats)
         } else {
             let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
             let (baked, stats) = bake::bake(&scene, &pose, &ranges, cache)?;
-            (baked.illumination, baked.occlusion.map(Arc::new), stats)
+            (baked.illumination, baked.occlusion.map(Arc::new), baked.sky.map(Arc::new), stats)
         };
         warnings.extend(stats.warnings.iter().cloned());
         let seconds = StageSeconds { bake: start.elapsed().as_secs_f64(), ..seconds };
         let (scene, illumination) = (Arc::new(scene), Arc::new(illumination));
-        Ok(Self { scene, fitted, gains, illumination, occlusion, stats, seconds, warnings })
+        Ok(Self { scene, fitted, gains, illumination, occlusion, sky, stats, seconds, warnings })
     }
 
     /// The same bakes of a scene that differs in what they do not depend on, such as constants (a lobe's exponent within
@@ -74,7 +76,7 @@ impl Baked {
     /// What is baked of the surface, for samples of it.
     #[must_use]
     pub fn surface_bakes(&self) -> SurfaceBakes<'_> {
-        SurfaceBakes { occlusion: self.occlusion.as_deref() }
+        SurfaceBakes { occlusion: self.occlusion.as_deref(), sky: self.sky.as_deref() }
     }
 
     /// Trace the visible surface of each view.

@@ -14,7 +14,7 @@ fn is_of_scene(effect: Effect) -> bool {
     OF_SCENE.contains(&effect) || effect.info().within.is_some_and(is_of_scene)
 }
 
-/// Have `scenes` share one skin: form, silhouette, lookups, loss, the skin's effects and what is free of its parameters
+/// Have `scenes` share one skin: form, silhouette, lookups, named choices, loss, the skin's effects and what is free of its parameters
 /// have to be the same in all of them. Free parameters of the skin then start everywhere as in the first scene; those that
 /// are held have to stand at one value. Meshes, maps, views, poses, lights and their parameters are each scene's own.
 ///
@@ -57,6 +57,9 @@ fn agree(first: &Scene, other: &Scene) -> Result<(), Difference> {
     let named =
         ["form", "silhouette", "lookups", "loss"].into_iter().zip(of(first).into_iter().zip(of(other)));
     for (what, (one, two)) in named {
+        same(what, one.to_owned(), two.to_owned(), alike)?;
+    }
+    for ((what, one), (_, two)) in first.choices.named().into_iter().zip(other.choices.named()) {
         same(what, one.to_owned(), two.to_owned(), alike)?;
     }
     same("list of the skin's effects", effects(first), effects(other), "Switch the same on in both scenes")?;

@@ -7,7 +7,8 @@
 //! samples) cost no padding inside.
 //!
 //! - `trace`: primary rays, and what they hit
-//! - `posed`: the mesh in a pose with what is baked of it; `supply`: what finds fields of samples, `lit`: what reaches them of lights; `surface`: frames, silhouette and maps at a hit
+//! - `posed`: the mesh in a pose with what is baked of it; `supply`: what finds fields of samples, `lit`: what reaches
+//!   them of lights, `sky`: what they see of the sky; `surface`: frames, silhouette and maps at a hit
 //! - `group`: samples packed into groups
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
@@ -22,6 +23,7 @@ mod group;
 mod lit;
 mod posed;
 pub mod rows;
+mod sky;
 mod supply;
 mod surface;
 pub mod surface_records;
@@ -130,6 +132,18 @@ pub enum SampleError {
          scene anew."
     )]
     OcclusionLength {
+        /// The scene file.
+        scene: String,
+        /// Vertices that were baked.
+        found: usize,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// Transfer vectors of another mesh.
+    #[error(
+        "{scene}: the sky was baked for {found} vertices, but the mesh has {vertices}. Bake the scene anew."
+    )]
+    TransferLength {
         /// The scene file.
         scene: String,
         /// Vertices that were baked.

@@ -4,9 +4,9 @@ use rayon::prelude::*;
 
 use super::supply::Supply;
 use super::trace::Hit;
-use super::{SampleError, lit, posed_occlusion};
-use crate::bake::VertexOcclusion;
+use super::{SampleError, lit, posed_occlusion, sky};
 use crate::bake::rays::RayMesh;
+use crate::bake::{Bake, SkyBake, VertexOcclusion};
 use crate::model::fields::{Field, FieldInfo};
 use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
@@ -16,6 +16,14 @@ use crate::scene::mesh::{Morph, PosedMesh};
 pub struct SurfaceBakes<'a> {
     /// Ambient occlusion, when asked for.
     pub occlusion: Option<&'a VertexOcclusion>,
+    /// The sky that each vertex sees, when asked for.
+    pub sky: Option<&'a SkyBake>,
+}
+
+impl<'a> From<&'a Bake> for SurfaceBakes<'a> {
+    fn from(bake: &'a Bake) -> Self {
+        Self { occlusion: bake.occlusion.as_ref(), sky: bake.sky.as_ref() }
+    }
 }
 
 /// A mesh in one pose, with its vertices' numbers and what finds others at any of its points.
@@ -40,13 +48,23 @@ impl<'a> PosedSurface<'a> {
         bakes: SurfaceBakes<'_>,
     ) -> Result<Self, SampleError> {
         let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
-        Ok(Self { open, ..Self::with_fields(scene, mesh, rays) })
+        Ok(Self { open, ..Self::with_fields(scene, mesh, rays, morphs, bakes.sky)? })
     }
 
-    /// The mesh of `scene` as it is posed with all that is found at its points, and nothing that is baked.
-    #[must_use]
-    pub fn with_fields(scene: &Scene, mesh: &'a PosedMesh, rays: &'a RayMesh) -> Self {
-        Self { supplies: lit::supplies(scene, mesh, rays), ..Self::bare(mesh, rays, None) }
+    /// The mesh of `scene` as it is posed with all that is found at its points, and no open shares; as of [`Self::new`].
+    ///
+    /// # Errors
+    /// When the sky was baked for another mesh.
+    pub fn with_fields(
+        scene: &Scene,
+        mesh: &'a PosedMesh,
+        rays: &'a RayMesh,
+        morphs: &[Morph],
+        sky: Option<&SkyBake>,
+    ) -> Result<Self, SampleError> {
+        let mut supplies = lit::supplies(scene, mesh, rays);
+        supplies.extend(sky::supplies(scene, mesh, morphs, sky)?);
+        Ok(Self { supplies, ..Self::bare(mesh, rays, None) })
     }
 
     /// A mesh with the open share of each vertex' hemisphere, and nothing else.

@@ -98,6 +98,8 @@ pub(super) struct ModelTable {
     pub specular_visibility: Option<Spanned<String>>,
     pub lobe_lookup: Option<Spanned<String>>,
     pub specular_map: Option<Spanned<String>>,
+    pub visibility: Option<Spanned<String>>,
+    pub bounces: Option<Spanned<String>>,
     pub effects: Option<Vec<Spanned<String>>>,
     #[serde(default)]
     pub terms: Vec<Spanned<TermValue>>,
@@ -216,6 +218,7 @@ pub(super) struct QualityTable {
     pub lobes_per_octave: Option<Spanned<i64>>,
     pub occlusion_rays: Option<Spanned<i64>>,
     pub shadow_rays: Option<Spanned<i64>>,
+    pub sky_rays: Option<Spanned<i64>>,
 }
 
 /// A number, or one for each channel.

@@ -22,6 +22,10 @@ const IN_SKY: &str = include_str!("../shader/rules/family/in_sky.wgsl");
 const LAMP: &str = include_str!("../shader/rules/family/lamp.wgsl");
 /// What any light shows.
 const LIT: &str = include_str!("../shader/rules/family/lit.wgsl");
+/// What it is of, but for light that the skin throws back; of the panorama's lights that is in the sky's.
+const UNBOUNCED: &str = include_str!("../shader/rules/family/unbounced.wgsl");
+/// The same with it: a declaration, and rules.
+const BOUNCED: &str = include_str!("../shader/rules/family/bounced.wgsl");
 
 /// The effect of a light, known to this process from then on. Lights of one name and kind, of whatever scenes, are one
 /// effect: their numbers are parameters.
@@ -30,13 +34,19 @@ const LIT: &str = include_str!("../shader/rules/family/lit.wgsl");
 /// When a file of rules has taken its names.
 fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> {
     let text = match (&light.kind, from_sky) {
-        (LightKind::Directional(_), true) => [BEAM, IN_SKY, LIT].concat(),
-        (LightKind::Directional(_), false) => [BEAM, IN_WORLD, LIT].concat(),
-        (LightKind::Point(_) | LightKind::Spot(..), _) => [LAMP, LIT].concat(),
+        (LightKind::Directional(_), true) => [BEAM, IN_SKY, UNBOUNCED, LIT].concat(),
+        (LightKind::Directional(_), false) => [&bounced(BEAM), IN_WORLD, LIT].concat(),
+        (LightKind::Point(_) | LightKind::Spot(..), _) => [&bounced(LAMP), LIT].concat(),
     };
     let member = light.member();
     let stamped = stamped(&text, &member).unwrap_or(text);
     term::register_from(Origin::Library, leaked(&member), &stamped)
+}
+
+/// A light's rules with those of what the skin throws back of it: declarations stand before all rules.
+fn bounced(rules: &str) -> String {
+    let (declared, rules) = rules.split_once("\n\n").unwrap_or((rules, ""));
+    [declared, "\n", BOUNCED, "\n", rules].concat()
 }
 
 /// The lights of a scene, each known as an effect.

@@ -302,6 +302,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     let lights = Lights::of_file(&source, &file)?;
     settings::params(&source, &file.model.params, form)?;
     settings::lookups(&source, &file.model)?;
+    settings::choices(&source, &file.model)?;
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;

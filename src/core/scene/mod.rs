@@ -224,6 +224,8 @@ pub struct Quality {
     pub occlusion_rays: u32,
     /// Rays a sample towards each light that has a size; those of a pixel's samples differ.
     pub shadow_rays: u32,
+    /// Rays a sample over its hemisphere, where the sky that it sees is found by rays.
+    pub sky_rays: u32,
 }
 
 impl Default for Quality {
@@ -236,6 +238,7 @@ impl Default for Quality {
             lobes_per_octave: 1,
             occlusion_rays: 256,
             shadow_rays: 1,
+            sky_rays: 256,
         }
     }
 }

@@ -9,7 +9,9 @@ use super::file::{
 use super::maps::Spots;
 use super::numbers::{interval, number, short, whole};
 use super::{Bloom, Diffusion, FitSettings, Loss, Quality, map_fit};
-use crate::model::choices::{Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility};
+use crate::model::choices::{
+    Bounces, Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility, Visibility,
+};
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
 
@@ -64,6 +66,20 @@ pub(super) fn choices(source: &Source, model: &ModelTable) -> Result<Choices, Sc
             SpecularMap::ALL.map(|choice| (choice.name(), choice)),
         )?
         .unwrap_or(default.specular_map),
+        visibility: choice(
+            source,
+            "visibility",
+            model.visibility.as_ref(),
+            Visibility::ALL.map(|choice| (choice.name(), choice)),
+        )?
+        .unwrap_or(default.visibility),
+        bounces: choice(
+            source,
+            "bounces",
+            model.bounces.as_ref(),
+            Bounces::ALL.map(|choice| (choice.name(), choice)),
+        )?
+        .unwrap_or(default.bounces),
         glossy: false,
     })
 }
@@ -270,6 +286,7 @@ pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, 
         lobes_per_octave: pick(&table.lobes_per_octave, "lobes_per_octave", 1, 8, default.lobes_per_octave)?,
         occlusion_rays: pick(&table.occlusion_rays, "occlusion_rays", 1, 1 << 16, default.occlusion_rays)?,
         shadow_rays: pick(&table.shadow_rays, "shadow_rays", 1, 1 << 12, default.shadow_rays)?,
+        sky_rays: pick(&table.sky_rays, "sky_rays", 1, 1 << 16, default.sky_rays)?,
     })
 }
 

@@ -1,5 +1,6 @@
 //! What a scene calls for: the input of the planner.
 
+use crate::model::choices::Bounces;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
@@ -85,6 +86,12 @@ impl FaceSizes {
 /// above the skin.
 fn layered(effects: Effects) -> bool {
     library::LAYERED.iter().filter_map(|name| Effect::from_name(name)).any(|effect| effects.has(effect))
+}
+
+/// Whether the skin throws back what its lamps bring.
+fn lights_bounce(setup: &Setup) -> bool {
+    let seen = Effect::from_name("directional_occlusion").is_some_and(|effect| setup.effects.has(effect));
+    seen && setup.choices.bounces == Bounces::Gathered
 }
 
 /// What a scene calls for.
@@ -180,8 +187,9 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 23] = [
+    pub const CONDITIONS: [&'static str; 24] = [
         "layered",
+        "lights_bounce",
         "vertex_silhouette",
         "fragment_silhouette",
         "bumped_silhouette",
@@ -228,6 +236,7 @@ impl Facts {
         }
         Some(match condition {
             "layered" => layered(setup.effects),
+            "lights_bounce" => lights_bounce(&setup),
             "raster" => self.source == Source::Raster,
             "terms" => self.source == Source::Terms,
             "bumped" => self.bumped(),

@@ -16,10 +16,12 @@ const NONE: &str = "none";
 pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
     let effects: Vec<&str> = scene.effects.iter().map(Effect::name).collect();
     let Maps { color, normal, specular, attenuator } = &scene.maps;
-    let all = Fingerprint::default()
+    let read = Fingerprint::default()
         .with("form", scene.form.name())
         .with("silhouette", scene.silhouette.name())
-        .with("lookups", scene.lookups.name())
+        .with("lookups", scene.lookups.name());
+    let all = (scene.choices.named().into_iter())
+        .fold(read, |all, (key, name)| all.with(key, name))
         .with("dapple", format!("{:?}", scene.dapple))
         .with("list of effects", effects.join(" "))
         .with("loss", scene.fit.loss.name())
@@ -125,11 +127,12 @@ fn quality(quality: Quality) -> String {
         lobes_per_octave,
         occlusion_rays,
         shadow_rays,
+        sky_rays,
     } = quality;
     format!(
         "samples_per_axis {samples_per_axis}, irradiance_size {irradiance_size}, lobe_size {lobe_size}, hilite_size \
          {hilite_size}, lobes_per_octave {lobes_per_octave}, occlusion_rays {occlusion_rays}, \
-         shadow_rays {shadow_rays}"
+         shadow_rays {shadow_rays}, sky_rays {sky_rays}"
     )
 }
 

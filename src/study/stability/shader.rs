@@ -101,6 +101,7 @@ impl Rules {
             scene: Arc::new(scene()),
             illumination: Arc::clone(lights),
             occlusion: None,
+            sky: None,
             params: params.clone(),
         };
         let block = constants(probe, params);

@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use crate::StudyError;
 use crate::bake::rays::RayMesh;
-use crate::bake::{self, Illumination, Ranges, VertexOcclusion};
+use crate::bake::{self, Illumination, Ranges};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Task};
@@ -184,7 +184,7 @@ impl<'a> Bench<'a> {
     pub fn evaluate(&self, settings: Settings) -> Result<Evaluated, StudyError> {
         let scene = self.scene(settings);
         let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
-        let samples = self.surfaces(&scene, settings.into(), bake.occlusion.as_ref())?;
+        let samples = self.surfaces(&scene, settings.into(), (&bake).into())?;
         Ok(Evaluated { scene, illumination: Arc::new(bake.illumination), samples })
     }
 
@@ -195,7 +195,7 @@ impl<'a> Bench<'a> {
     pub fn evaluate_anew(&self, settings: Settings) -> Result<Evaluated, StudyError> {
         let scene = self.scene(settings);
         let (bake, _) = baked(&scene, &scene, self.cache.as_deref())?;
-        let samples = Arc::new(traced(&scene, bake.occlusion.as_ref())?);
+        let samples = Arc::new(traced(&scene, (&bake).into())?);
         Ok(Evaluated { scene, illumination: Arc::new(bake.illumination), samples })
     }
 
@@ -204,7 +204,7 @@ impl<'a> Bench<'a> {
         &self,
         scene: &Scene,
         settings: Traced,
-        occlusion: Option<&VertexOcclusion>,
+        bakes: SurfaceBakes<'_>,
     ) -> Result<Surfaces, StudyError> {
         let own = Traced::from(self.settings());
         if settings == own {
@@ -216,24 +216,22 @@ impl<'a> Bench<'a> {
         // These go first: there is no need of both.
         self.last.replace(None);
         let occluded = Traced { occlusion_rays: own.occlusion_rays, ..settings } == own;
-        let made = if occluded { self.occluded(scene, occlusion)? } else { traced(scene, occlusion)? };
+        // What is found of the sky follows from the same rays.
+        let occluded = occluded && bakes.sky.is_none();
+        let made = if occluded { self.occluded(scene, bakes)? } else { traced(scene, bakes)? };
         let surfaces = Arc::new(made);
         self.last.replace(Some((settings, Arc::clone(&surfaces))));
         Ok(surfaces)
     }
 
     /// The scene's own samples with another occlusion: what they show stays.
-    fn occluded(
-        &self,
-        scene: &Scene,
-        occlusion: Option<&VertexOcclusion>,
-    ) -> Result<Vec<ViewSamples>, StudyError> {
+    fn occluded(&self, scene: &Scene, bakes: SurfaceBakes<'_>) -> Result<Vec<ViewSamples>, StudyError> {
         let mesh = &scene.mesh;
-        let open = samples::posed_occlusion(scene, &mesh.morphs, mesh.positions.len(), occlusion);
+        let open = samples::posed_occlusion(scene, &mesh.morphs, mesh.positions.len(), bakes.occlusion);
         let mut surfaces = self.surfaces.to_vec();
         let Some(open) = open.map_err(PrepareError::from)? else { return Ok(surfaces) };
         // Texels of the atlas see the same occlusion.
-        let atlas = atlas(scene, SurfaceBakes { occlusion }).map_err(PrepareError::from)?;
+        let atlas = atlas(scene, bakes).map_err(PrepareError::from)?;
         let hits = self.hits(scene);
         for (samples, hits) in surfaces.iter_mut().zip(hits.iter()) {
             samples.atlas.clone_from(&atlas);
@@ -269,8 +267,7 @@ fn atlas(scene: &Scene, bakes: SurfaceBakes<'_>) -> Result<Option<Arc<Atlas>>, S
 }
 
 /// The visible surface of each view of a scene, by rays.
-fn traced(scene: &Scene, occlusion: Option<&VertexOcclusion>) -> Result<Vec<ViewSamples>, StudyError> {
-    let bakes = SurfaceBakes { occlusion };
+fn traced(scene: &Scene, bakes: SurfaceBakes<'_>) -> Result<Vec<ViewSamples>, StudyError> {
     Ok(samples::sample_views(scene, &scene.mesh.pose(), bakes).map_err(PrepareError::from)?)
 }
 

@@ -75,9 +75,9 @@ fn goes_through_an_animation(gpu: &Gpu, of_its_own: bool) {
         Renderer::new(gpu, Content::of(&baked), RenderOptions { animated: true, ..EXACT }).unwrap();
     let (mut frames, mut occlusions) = (Vec::new(), Vec::new());
     for mesh in &meshes {
-        let occlusion = of_its_own.then(|| bake_pose(&baked.scene, &mesh.pose(), Some(&cache())).0);
-        renderer.set_mesh(mesh, occlusion.as_ref());
-        occlusions.push(occlusion);
+        let own = of_its_own.then(|| bake_pose(&baked.scene, &mesh.pose(), None, Some(&cache())).0);
+        renderer.set_mesh(mesh, own.as_ref()).unwrap();
+        occlusions.push(own.and_then(|own| own.occlusion));
         frames.push(renderer.render(&camera, 1.0).unwrap().image);
     }
     assert!(frames[0].rgb != frames[1].rgb, "nothing moves");

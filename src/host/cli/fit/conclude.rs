@@ -16,6 +16,7 @@ use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
 use crate::engine::Engine;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::params_file::{Origin, ParamsFile, SceneValues};
+use crate::model::choices::Choices;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::report::{self, RunInfo, SCENES, ViewEvidence};
@@ -188,10 +189,16 @@ fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec
             ("form".to_owned(), each(&|part| part.baked.scene.form.name().to_owned())),
             ("silhouette".to_owned(), each(&|part| part.baked.scene.silhouette.name().to_owned())),
             ("lookups".to_owned(), each(&|part| part.baked.scene.lookups.name().to_owned())),
-            ("effects".to_owned(), each(&effects)),
-            ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
         ]
         .into_iter()
+        .chain((0..Choices::default().named().len()).map(|i| {
+            let chosen = |part: &Part| part.baked.scene.choices.named()[i].1.to_owned();
+            (Choices::default().named()[i].0.to_owned(), each(&chosen))
+        }))
+        .chain([
+            ("effects".to_owned(), each(&effects)),
+            ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
+        ])
         .chain((!set.is_empty()).then(|| ("set".to_owned(), set.join(", "))))
         .chain((!held.is_empty()).then(|| ("held out".to_owned(), held.join(", "))))
         .chain(engine_facts)

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use super::scene::{SceneArguments, parse_effects};
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell_warnings};
-use crate::bake::{self, VertexOcclusion};
+use crate::bake::{self, PoseBake, SkyLight};
 use crate::fit::params_file::Foreign;
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{LARGEST, Param, Params};
@@ -125,11 +125,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let painting = engine::Painting { animated: animation.is_some(), timed: arguments.stats };
     let mut painter = arguments.engine.painter(&baked, painting)?;
     let bar = progress::bar("frames", frames.len() as u64);
+    let mut light = None;
     for frame in &frames {
         if let (Some(animation), Some(time)) = (&animation, frame.time) {
             let mesh = animation.mesh(time)?;
-            let occlusion = frame_occlusion(arguments, &baked, &mesh);
-            painter.set_mesh(&mesh, occlusion.as_ref())?;
+            let own = frame_bake(arguments, &baked, &mesh, light.as_ref());
+            light = light.or_else(|| own.as_ref()?.sky.as_ref()?.light.clone());
+            painter.set_mesh(&mesh, own)?;
         }
         let picture = painter.paint(&frame.camera, baked.gains[0], beside)?;
         if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
@@ -215,14 +217,20 @@ impl Arguments {
     }
 }
 
-/// The occlusion of a frame's pose alone, where each frame is to be baked and an effect asks for it.
-fn frame_occlusion(arguments: &Arguments, baked: &Baked, mesh: &Mesh) -> Option<VertexOcclusion> {
-    let scene = &baked.scene;
-    let wanted = arguments.follows() == ClipOcclusion::Frames && scene.needs().occlusion;
+/// What is baked of a frame's pose alone, where each frame is to be baked; `light` is the environment's, where an earlier
+/// frame has it.
+fn frame_bake(
+    arguments: &Arguments,
+    baked: &Baked,
+    mesh: &Mesh,
+    light: Option<&SkyLight>,
+) -> Option<PoseBake> {
     let cache = arguments.scene.cache();
-    let (occlusion, stats) = wanted.then(|| bake::bake_pose(scene, &mesh.pose(), cache.as_deref()))?;
+    let wanted = arguments.follows() == ClipOcclusion::Frames;
+    let (own, stats) =
+        wanted.then(|| bake::bake_pose(&baked.scene, &mesh.pose(), light, cache.as_deref()))?;
     tell_warnings(&stats.warnings);
-    Some(occlusion)
+    Some(own)
 }
 
 fn tell_done(

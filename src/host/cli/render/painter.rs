@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::Refusal;
-use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
+use crate::bake::{PoseBake, SkyBake, VertexOcclusion};
 use crate::model::effects::Effect;
 use crate::prepare::Baked;
 use crate::render::backdrop::Backdrop;
@@ -40,8 +40,8 @@ pub(super) struct Beside {
 pub(super) trait Painter {
     /// The engine, in words.
     fn name(&self) -> String;
-    /// Move the mesh to another pose, with the occlusion of that pose where it has one of its own.
-    fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal>;
+    /// Move the mesh to another pose, with what is baked of that pose where it has bakes of its own.
+    fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), Refusal>;
     /// The image that `camera` sees, times `gain`.
     fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal>;
     /// What the last frame took, a line each.
@@ -55,6 +55,7 @@ const BACKGROUND: &str = "background";
 pub(super) struct CpuPainter {
     scene: Arc<Scene>,
     occlusion: Option<Arc<VertexOcclusion>>,
+    sky: Option<Arc<SkyBake>>,
     shader: Shader,
     pose: Pose,
     atlas: Option<Arc<Atlas>>,
@@ -66,8 +67,8 @@ impl CpuPainter {
     pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
         let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
         let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
-        let pose = Pose::of(&scene.mesh, None);
-        let mut painter = Self { scene, occlusion, shader, pose, atlas: None, seconds: 0.0 };
+        let (pose, sky) = (Pose::of(&scene.mesh, None), baked.sky.clone());
+        let mut painter = Self { scene, occlusion, sky, shader, pose, atlas: None, seconds: 0.0 };
         let atlas = atlas_of(&painter.scene, &painter.surface()?)?;
         painter.atlas = atlas;
         Ok(painter)
@@ -75,25 +76,28 @@ impl CpuPainter {
 
     /// The mesh as it is posed, with what is baked of it.
     fn surface(&self) -> Result<PosedSurface<'_>, Refusal> {
-        let Pose { mesh, rays, morphs, occlusion } = &self.pose;
-        let bakes = SurfaceBakes { occlusion: occlusion.as_ref().or(self.occlusion.as_deref()) };
+        let Pose { mesh, rays, morphs, own } = &self.pose;
+        let bakes = SurfaceBakes {
+            occlusion: own.occlusion.as_ref().or(self.occlusion.as_deref()),
+            sky: own.sky.as_ref().or(self.sky.as_deref()),
+        };
         Ok(PosedSurface::new(&self.scene, mesh, rays, morphs, bakes)?)
     }
 }
 
-/// The mesh in the world, as rays see it; its targets at their weights, and the occlusion that it has of its own.
+/// The mesh in the world, as rays see it; its targets at their weights, and what is baked of this pose alone.
 struct Pose {
     mesh: PosedMesh,
     rays: RayMesh,
     morphs: Vec<Morph>,
-    occlusion: Option<VertexOcclusion>,
+    own: PoseBake,
 }
 
 impl Pose {
-    fn of(mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Self {
+    fn of(mesh: &Mesh, own: Option<PoseBake>) -> Self {
         let posed = mesh.pose();
         let rays = RayMesh::new(&posed.positions, &posed.triangles);
-        Self { mesh: posed, rays, morphs: mesh.morphs.clone(), occlusion: occlusion.cloned() }
+        Self { mesh: posed, rays, morphs: mesh.morphs.clone(), own: own.unwrap_or_default() }
     }
 }
 
@@ -102,8 +106,8 @@ impl Painter for CpuPainter {
         "cpu".to_owned()
     }
 
-    fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal> {
-        self.pose = Pose::of(mesh, occlusion);
+    fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), Refusal> {
+        self.pose = Pose::of(mesh, own);
         let atlas = atlas_of(&self.scene, &self.surface()?)?;
         self.atlas = atlas;
         Ok(())
@@ -141,8 +145,8 @@ pub(super) use gpu::GpuPainter;
 
 mod gpu {
     use super::{
-        Arc, BACKGROUND, Backdrop, Baked, Beside, Camera, Image, Mesh, Painter, Picture, Refusal, Scene,
-        VertexOcclusion,
+        Arc, BACKGROUND, Backdrop, Baked, Beside, Camera, Image, Mesh, Painter, Picture, PoseBake, Refusal,
+        Scene,
     };
     use crate::cli::graphics::Task;
     use crate::gpu::timing::PassTime;
@@ -220,9 +224,9 @@ mod gpu {
             format!("gpu: {}{kind}", self.gpu.name())
         }
 
-        fn set_mesh(&mut self, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> Result<(), Refusal> {
-            self.renderer.set_mesh(mesh, occlusion);
-            Ok(())
+        fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), Refusal> {
+            let refused = |error: GpuError| Task::Render.refusal(&error);
+            self.renderer.set_mesh(mesh, own.as_ref()).map_err(refused)
         }
 
         fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, Refusal> {

@@ -7,9 +7,13 @@ use glam::Vec3;
 
 use crate::StudyError;
 use crate::bake::VertexOcclusion;
+use crate::bake::rays::RayMesh;
+use crate::bake::sky::{BENT_NORMAL, SKY_RATIO};
+use crate::model::fields::Field;
 use crate::prepare::PrepareError;
-use crate::samples::{self, SurfaceBakes};
-use crate::scene::mesh::{Mesh, PosedMesh};
+use crate::samples::{self, PosedSurface, SampleError, SurfaceBakes};
+use crate::scene::Scene;
+use crate::scene::mesh::{Mesh, PosedMesh, VertexField};
 use crate::tradeoff::bench::{Bench, Evaluated, Settings};
 
 /// A mesh in the world, cut finer or coarser, with the occlusion of its vertices.
@@ -21,10 +25,12 @@ pub(super) struct Remeshed {
 impl Remeshed {
     /// The scene's own mesh.
     pub(super) fn of(bench: &Bench<'_>) -> Result<Self, StudyError> {
-        let scene = &bench.baked.scene;
-        let mesh = scene.mesh.pose();
-        let occlusion = bench.baked.occlusion.as_deref();
-        let open = samples::posed_occlusion(scene, &scene.mesh.morphs, mesh.positions.len(), occlusion);
+        let (scene, bakes) = (&bench.baked.scene, bench.baked.surface_bakes());
+        let mut mesh = scene.mesh.pose();
+        let vertices = mesh.positions.len();
+        let open = samples::posed_occlusion(scene, &scene.mesh.morphs, vertices, bakes.occlusion);
+        let fields = seen_of_sky(scene, &mesh, bakes).map_err(PrepareError::from)?;
+        mesh.fields.extend(fields);
         Ok(Self { mesh, open: open.map_err(PrepareError::from)? })
     }
 
@@ -86,7 +92,7 @@ impl Remeshed {
         let PosedMesh { positions, normals, tangents, uvs, triangles, fields } = self.mesh.clone();
         scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, fields, ..Mesh::default() };
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
-        let bakes = SurfaceBakes { occlusion: occlusion.as_ref() };
+        let bakes = SurfaceBakes { occlusion: occlusion.as_ref(), ..SurfaceBakes::default() };
         let samples = samples::sample_views(&scene, &self.mesh, bakes).map_err(PrepareError::from)?;
         Ok(Evaluated { scene, illumination: bench.baked.illumination.clone(), samples: Arc::new(samples) })
     }
@@ -104,6 +110,19 @@ impl Remeshed {
         let middle = lengths.len() / 2;
         if lengths.is_empty() { 0.0 } else { *lengths.select_nth_unstable_by(middle, f64::total_cmp).1 }
     }
+}
+
+/// What the vertices see of the sky, which other vertices of the same surface have from them.
+fn seen_of_sky(
+    scene: &Scene,
+    mesh: &PosedMesh,
+    bakes: SurfaceBakes<'_>,
+) -> Result<Vec<VertexField>, SampleError> {
+    let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+    let surface = PosedSurface::new(scene, mesh, &rays, &scene.mesh.morphs, bakes)?;
+    let of_sky = |field: &Field| [SKY_RATIO, BENT_NORMAL].contains(&field.name());
+    let fields = scene.needs().fields.iter().filter(of_sky);
+    Ok(fields.map(|field| VertexField { field, numbers: surface.field_of_vertices(field) }).collect())
 }
 
 /// By how much edges must have become longer, of twice as long, for a mesh to count as the coarser one.

@@ -5,7 +5,7 @@
 
 // occ = 1 - occlusion (1 - ratio), a channel (MODEL 10).
 //
-// gives: ambient_open
+// gives: sky_seen
 // when: directional_occlusion, occlusion
 // cost: 6
 fn seen_of_sky(sky_ratio: vec3f, occlusion: f32) -> vec3f {
@@ -14,9 +14,31 @@ fn seen_of_sky(sky_ratio: vec3f, occlusion: f32) -> vec3f {
 
 // Where the effect `occlusion` is off its parameter counts as 1.
 //
-// gives: ambient_open
+// gives: sky_seen
 // when: directional_occlusion, !occlusion
 // cost: 0
 fn all_seen_of_sky(sky_ratio: vec3f) -> vec3f {
     return sky_ratio;
+}
+
+// What the skin throws back is none, or in the ratio.
+//
+// gives: ambient_open
+// when: directional_occlusion, !polynomial_bounces
+// cost: 0
+fn open_to_sky(sky_seen: vec3f) -> vec3f {
+    return sky_seen;
+}
+
+// With what the skin throws back, by its albedo (Jimenez et al. 2016, Practical Real-Time Strategies for Accurate
+// Indirect Occlusion).
+//
+// gives: ambient_open
+// when: directional_occlusion, polynomial_bounces
+// cost: 30
+fn open_to_sky_and_skin(sky_seen: vec3f, albedo: vec3f) -> vec3f {
+    let a: vec3f = 2.0404 * albedo - 0.3324;
+    let b: vec3f = 0.6417 - 4.7951 * albedo;
+    let c: vec3f = 2.7552 * albedo + 0.6903;
+    return max(sky_seen, ((sky_seen * a + b) * sky_seen + c) * sky_seen);
 }

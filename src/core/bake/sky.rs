@@ -1,0 +1,120 @@
+//! What is baked for the sky that each vertex sees: transfer vectors, and the environment as coefficients (MODEL 10).
+
+use std::borrow::Cow;
+
+use super::baker::Baker;
+use super::coefficients::Coefficients;
+use super::harmonics::Order;
+use super::interreflection::Albedo;
+use super::transfer::VertexTransfer;
+use super::{all_sets, all_weights};
+use crate::model::choices::{Bounces, Visibility};
+use crate::model::fields::Field;
+use crate::scene::Scene;
+use crate::scene::maps::Environment;
+use crate::scene::mesh::PosedMesh;
+use crate::scene::sky_lights::sky_lights;
+
+/// The field of the sky that a sample sees: a share of what an open point receives, rgb.
+pub const SKY_RATIO: &str = "sky_ratio";
+/// The field of the mean direction of the open sky.
+pub const BENT_NORMAL: &str = "bent_normal";
+
+/// The sky as each vertex sees it.
+#[derive(Clone, Debug)]
+pub struct SkyBake {
+    /// What arrives at each vertex of it.
+    pub transfer: VertexTransfer,
+    /// The environment, where its light is asked for.
+    pub light: Option<SkyLight>,
+}
+
+/// The light of the environment before `environment_rotation`.
+#[derive(Clone, Debug)]
+pub struct SkyLight {
+    /// Without the lights that were taken out of it: what the cubes are made of.
+    pub rest: Coefficients,
+    /// All of it: what the skin throws back.
+    pub whole: Coefficients,
+    /// The rest as a picture, where rays look it up.
+    pub panorama: Option<Environment>,
+}
+
+/// Which transfer vectors the fields of a scene's samples are found from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// Bands.
+    pub order: Order,
+    /// Whether with those of light that the mesh throws back.
+    pub bounces: bool,
+    /// Whether the environment's light is looked at.
+    pub light: bool,
+}
+
+impl Wanted {
+    /// What `scene` asks for; `None` where it asks for no transfer at all.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Option<Self> {
+        let fields = scene.needs().fields;
+        let wanted = |name| Field::from_name(name).is_some_and(|field| fields.iter().any(|of| of == field));
+        if !wanted(SKY_RATIO) {
+            return wanted(BENT_NORMAL).then_some(Self { order: Order::LEAST, bounces: false, light: false });
+        }
+        let choices = scene.choices;
+        let gathered = choices.bounces == Bounces::Gathered;
+        let order = match choices.visibility {
+            // Rays meet places whose light is known by as many bands as there are.
+            Visibility::Rays if gathered => Order::MOST,
+            // What is thrown back is smooth.
+            Visibility::Scalar | Visibility::Cone if gathered => Order::FOUR,
+            visibility => visibility.bands().and_then(Order::new).unwrap_or(Order::LEAST),
+        };
+        // Rays gather by themselves.
+        let bounces = gathered && choices.visibility != Visibility::Rays;
+        Some(Self { order, bounces, light: true })
+    }
+}
+
+impl SkyLight {
+    /// Of an environment, by as many bands as any choice looks at; with `panorama` also what rays look up.
+    #[must_use]
+    pub fn of(environment: &Environment, panorama: bool) -> Self {
+        let whole = Coefficients::of(environment, Order::MOST);
+        let rest = match environment.spots.count {
+            0 => Cow::Borrowed(environment),
+            _ => Cow::Owned(sky_lights(environment).rest),
+        };
+        Self {
+            rest: Coefficients::of(&rest, Order::MOST),
+            whole,
+            panorama: panorama.then(|| rest.into_owned()),
+        }
+    }
+
+    /// That of a scene, where it has an environment. What became lights is left out of the rest.
+    pub(super) fn of_scene(scene: &Scene) -> Option<Self> {
+        let mut environment = Cow::Borrowed(scene.environment.as_ref()?);
+        if scene.sky_lights.is_empty() && environment.spots.count > 0 {
+            environment.to_mut().spots.count = 0;
+        }
+        Some(Self::of(&environment, scene.choices.visibility == Visibility::Rays))
+    }
+}
+
+/// Transfer vectors of the scene's mesh, with a set for each of the morph targets `used`, by as many rays a vertex as
+/// occlusion takes. With `bounces` also those of the light that the mesh throws back, for which `pose` has to give
+/// texture coordinates where there is a colour map.
+pub(super) fn transfer_of_used(
+    scene: &Scene,
+    pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+    used: &[usize],
+    order: Order,
+    bounces: bool,
+    baker: &mut Baker<'_>,
+) -> VertexTransfer {
+    let pose_used = |weights: &[f32]| pose(&all_weights(scene, used, weights));
+    let albedo = bounces.then_some(Albedo { map: scene.maps.color.as_ref() });
+    let rays = scene.quality.occlusion_rays;
+    let baked = baker.transfer(&pose_used, used.len(), rays, order, albedo.as_ref());
+    VertexTransfer { order, base: baked.base, morphs: all_sets(scene, used, baked.morphs) }
+}

@@ -1,0 +1,212 @@
+//! What each vertex sees of the sky, as fields of samples: found at the vertices, and interpolated between them (MODEL
+//! 10).
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::SampleError;
+use super::supply::Supply;
+use super::trace::Hit;
+use crate::bake::coefficients::Coefficients;
+use crate::bake::harmonics::{CONSTANT, Order, basis, open_transfer_at};
+use crate::bake::shadowed::{arriving, share_of_open};
+use crate::bake::sky::{BENT_NORMAL, SKY_RATIO};
+use crate::bake::transfer::TransferSet;
+use crate::bake::{SkyBake, SkyLight};
+use crate::model::choices::Visibility;
+use crate::model::fields::Field;
+use crate::model::params::Param;
+use crate::scene::Scene;
+use crate::scene::mesh::{Morph, PosedMesh};
+
+/// Numbers of each vertex, interpolated over a triangle.
+pub(super) struct OfVertices<'a> {
+    pub(super) triangles: &'a [[u32; 3]],
+    pub(super) numbers: Vec<[f32; 3]>,
+}
+
+impl Supply for OfVertices<'_> {
+    fn find(&self, hit: Hit, numbers: &mut [f32]) {
+        let corners = self.triangles[hit.triangle as usize].map(|corner| self.numbers[corner as usize]);
+        let weights = hit.weights();
+        for (k, number) in numbers.iter_mut().enumerate() {
+            // From the first corner on, so that what is the same at all three stays that.
+            let [first, second, third] = corners.map(|corner| corner[k]);
+            *number = first + (weights[1] * (second - first) + weights[2] * (third - first));
+        }
+    }
+}
+
+/// The transfer of a scene's mesh as it is posed, and its light as it is turned.
+pub(super) struct Sky<'a> {
+    mesh: &'a PosedMesh,
+    order: Order,
+    set: TransferSet,
+    rest: Coefficients,
+    whole: Coefficients,
+}
+
+/// What finds the fields of the sky that effects of `scene` ask for; `morphs` are its targets at their weights.
+///
+/// # Errors
+/// When the transfer is that of another mesh.
+pub(super) fn supplies<'a>(
+    scene: &Scene,
+    mesh: &'a PosedMesh,
+    morphs: &[Morph],
+    sky: Option<&SkyBake>,
+) -> Result<Vec<(Field, Box<dyn Supply + 'a>)>, SampleError> {
+    let Some(bake) = sky else { return Ok(Vec::new()) };
+    let asked = scene.needs().fields;
+    let asked = |name| Field::from_name(name).filter(|field| asked.iter().any(|of| of == *field));
+    let [ratio, bent] = [SKY_RATIO, BENT_NORMAL].map(asked);
+    let mut supplies: Vec<(Field, Box<dyn Supply + 'a>)> = Vec::new();
+    let mut add = |field: Field, numbers: Vec<[f32; 3]>| {
+        supplies.push((field, Box::new(OfVertices { triangles: &mesh.triangles, numbers })));
+    };
+    let sky = Sky::new(scene, mesh, morphs, bake)?;
+    if let Some(field) = bent {
+        add(field, sky.each(|vertex| sky.bent_normal(vertex).to_array()));
+    }
+    if let (Some(field), Some(_)) = (ratio, &bake.light) {
+        add(field, sky.each(|vertex| sky.ratio(scene.choices.visibility, vertex)));
+    }
+    Ok(supplies)
+}
+
+impl<'a> Sky<'a> {
+    fn new(
+        scene: &Scene,
+        mesh: &'a PosedMesh,
+        morphs: &[Morph],
+        bake: &SkyBake,
+    ) -> Result<Self, SampleError> {
+        let order = bake.transfer.order;
+        let weights: Vec<f32> = morphs.iter().map(|morph| morph.weight).collect();
+        let set = bake.transfer.posed(&weights);
+        let (found, vertices) = (set.direct.len() / order.functions(), mesh.positions.len());
+        if found != vertices {
+            return Err(SampleError::TransferLength {
+                scene: scene.path.display().to_string(),
+                found,
+                vertices,
+            });
+        }
+        let turn = scene.params.scalar(Param::EnvironmentRotation).to_radians();
+        let dark = || Coefficients::new(Order::MOST, Vec::new());
+        let light = |of: fn(&SkyLight) -> &Coefficients| {
+            bake.light.as_ref().map_or_else(dark, |l| of(l).turned(turn))
+        };
+        Ok(Self { mesh, order, set, rest: light(|light| &light.rest), whole: light(|light| &light.whole) })
+    }
+
+    /// What `of` finds at each vertex. All cores.
+    fn each(&self, of: impl Fn(usize) -> [f32; 3] + Send + Sync) -> Vec<[f32; 3]> {
+        (0..self.mesh.positions.len()).into_par_iter().map(of).collect()
+    }
+
+    fn direct(&self, vertex: usize) -> &[f32] {
+        let functions = self.order.functions();
+        &self.set.direct[vertex * functions..][..functions]
+    }
+
+    /// The mean direction of the open sky, as long as its share of the hemisphere; 0 where nothing is open.
+    fn bent_normal(&self, vertex: usize) -> Vec3 {
+        // The first band is the direction's x, y and z, but for a factor.
+        let [share, x, y, z, ..] = *self.direct(vertex) else { return Vec3::ZERO };
+        let share = (f64::from(share) / CONSTANT) as f32;
+        share.clamp(0.0, 1.0) * Vec3::new(x, y, z).normalize_or_zero()
+    }
+
+    /// The share of what an open vertex receives that arrives here, with what the mesh throws back where that is baked;
+    /// 0 in a channel without light.
+    fn ratio(&self, visibility: Visibility, vertex: usize) -> [f32; 3] {
+        let functions = self.order.functions();
+        let thrown = match self.set.bounced.get(vertex * functions..(vertex + 1) * functions) {
+            Some(bounced) => arriving(bounced, &self.whole),
+            None => [0.0; 3],
+        };
+        let transfer = self.direct(vertex);
+        let normal = self.mesh.normals[vertex];
+        let order = if visibility.bands().is_some() { self.order } else { Order::MOST };
+        let open = open_transfer_at(order, normal);
+        let lit = arriving(&open, &self.rest);
+        let shadowed = match visibility {
+            Visibility::Scalar => lit.map(|lit| lit * (f64::from(transfer[0]) / CONSTANT)),
+            Visibility::Cone => self.through_cone(vertex, lit),
+            _ => arriving(transfer, &self.rest),
+        };
+        let arrived = [0, 1, 2].map(|c| shadowed[c] + thrown[c]);
+        share_of_open(arrived, lit, self.rest.mean()).map(|share| share as f32)
+    }
+
+    /// What arrives through a cone about the bent normal that is as open as the vertex; `lit` where it is open.
+    fn through_cone(&self, vertex: usize, lit: [f64; 3]) -> [f64; 3] {
+        let share = self.direct(vertex)[0];
+        if share >= CONSTANT as f32 {
+            return lit;
+        }
+        let bent = self.bent_normal(vertex);
+        let along =
+            if bent == Vec3::ZERO { self.mesh.normals[vertex].normalize_or_zero() } else { bent.normalize() };
+        let cap = cap(1.0 - f64::from(share) / CONSTANT);
+        let mut through = basis(Order::MOST, along.to_array().map(f64::from));
+        through.iter_mut().zip(Order::MOST.of_each()).for_each(|(value, (l, _))| *value *= cap[l]);
+        arriving(&through, &self.rest)
+    }
+}
+
+/// What light counts by band that comes through a cone about a surface's own normal, as the cosine: c_l = 2 times the
+/// integral of x P_l(x) from the cosine of the cone's angle to 1. `square` is that cosine's square, the closed share of
+/// the hemisphere; of a whole hemisphere these are the factors of the cosine lobe.
+fn cap(square: f64) -> [f64; 6] {
+    let square = square.clamp(0.0, 1.0);
+    let x = square.sqrt();
+    let beyond = |n: i32| 1.0 - x.powi(n);
+    [
+        beyond(2),
+        2.0 / 3.0 * beyond(3),
+        0.75 * beyond(4) - 0.5 * beyond(2),
+        beyond(5) - beyond(3),
+        (35.0 * beyond(6) - 45.0 * beyond(4) + 9.0 * beyond(2)) / 24.0,
+        (9.0 * beyond(7) - 14.0 * beyond(5) + 5.0 * beyond(3)) / 4.0,
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::harmonics::cosine_lobe;
+
+    #[test]
+    fn a_cone_of_a_whole_hemisphere_is_the_cosine_lobe_and_the_first_number_is_its_share() {
+        for (l, factor) in cap(0.0).into_iter().enumerate() {
+            // Roundings of a few sums of numbers up to 2.
+            assert!((factor - cosine_lobe(l)).abs() < 1e-14, "{l}: {factor}");
+        }
+        for closed in [0.0, 0.25, 0.7, 1.0] {
+            assert!((cap(closed)[0] - (1.0 - closed)).abs() < 1e-15);
+        }
+        assert_eq!(cap(1.0), [0.0; 6]);
+    }
+
+    #[test]
+    fn a_cones_factors_are_the_integrals_of_legendre_polynomials() {
+        let legendre = |l: usize, x: f64| {
+            let (mut before, mut own) = (1.0, x);
+            for k in 2..=l {
+                let k = k as f64;
+                (before, own) = (own, ((2.0 * k - 1.0) * x * own - (k - 1.0) * before) / k);
+            }
+            if l == 0 { 1.0 } else { own }
+        };
+        let (from, steps) = (0.6, 10_000);
+        for (l, factor) in cap(from * from).into_iter().enumerate() {
+            let at = |i: usize| from + (1.0 - from) * (i as f64 + 0.5) / steps as f64;
+            let sum: f64 = (0..steps).map(|i| 2.0 * at(i) * legendre(l, at(i))).sum();
+            let want = sum * (1.0 - from) / steps as f64;
+            // The midpoint rule's step squared, 2e-9, times curvatures of up to 100.
+            assert!((factor - want).abs() < 1e-7, "{l}: {factor} {want}");
+        }
+    }
+}
