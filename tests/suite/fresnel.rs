@@ -14,7 +14,7 @@ use skinfit::prepare::Baked;
 use skinfit::render::image::Image;
 use skinfit::shader::Facts;
 use skinfit::shader::facts::Budget;
-use skinfit::specular::split_sum::{Quadrature, split_sum};
+use skinfit_core::specular::split_sum::{Quadrature, split_sum};
 
 use crate::graphics::bench::{EXACT, gpu};
 use crate::lit::{baked, image, param, quad};
@@ -178,7 +178,7 @@ fn in_a_white_furnace_the_lobe_shows_the_split_sum() {
                 let [u, v] = [x - 0.5 * f64::from(camera.width), y - 0.5 * f64::from(camera.height)]
                     .map(|offset| offset * tangent);
                 let cosine = 1.0 / (1.0 + u * u + v * v).sqrt();
-                let [a, b] = split_sum(model, cosine, roughness, Quadrature::default()).map(|sum| sum.value);
+                let [a, b] = split_sum(model, cosine, roughness, Quadrature::FINE).map(|sum| sum.value);
                 let want = f0 * a + b;
                 for c in 0..3 {
                     // The fits' 1.5e-4, and a pixel's curvature of cosines near 1.

@@ -81,12 +81,14 @@ fn json(scene: &str, found: &Suggestion) -> Result<String, serde_json::Error> {
         adapter: Option<&'a String>,
         warnings: &'a [String],
     }
-    let judged = |set| Judged { effects: names(set.effects), front: on_front(found, set), set };
+    fn judged<'a>(found: &Suggestion, set: &'a Set) -> Judged<'a> {
+        Judged { effects: names(set.effects), front: on_front(found, set), set }
+    }
     let file = File {
         scene,
         suggested: names(found.sets[found.chosen].effects),
         steps: &found.steps,
-        sets: found.sets.iter().map(judged).collect(),
+        sets: found.sets.iter().map(|set| judged(found, set)).collect(),
         adapter: found.adapter.as_ref(),
         warnings: &found.warnings,
     };

@@ -20,7 +20,6 @@ use super::StudyError;
 use super::ablation::GpuTiming;
 use super::ablation::measure::Clocks;
 use super::cost::Counts;
-use super::subject::Subject;
 use super::timing::Timed;
 use crate::engine::Point;
 use crate::model::effects::{Effect, Effects, Form};
