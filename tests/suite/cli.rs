@@ -21,6 +21,7 @@ mod runs;
 pub(crate) mod sandbox;
 mod stability;
 mod stages;
+mod suggest;
 mod sweeps;
 mod tradeoffs;
 mod words;

@@ -30,7 +30,7 @@ pub fn write(folder: &Path, scene: &str, found: &Suggestion) -> Result<Vec<PathB
     ];
     let names: Vec<String> =
         ["results.csv", "report.html", "front.svg", "results.json", CHOSEN].map(str::to_owned).to_vec();
-    files.push(("results.json", json(scene, found).map_err(|e| OutputError::new(folder, &e))?));
+    files.push(("results.json", json(scene, found, &names).map_err(|e| OutputError::new(folder, &e))?));
     let mut written = Vec::new();
     for (name, text) in files {
         output::write(&folder.join(name), text.as_bytes())?;
@@ -64,7 +64,7 @@ fn csv(found: &Suggestion) -> String {
     text
 }
 
-fn json(scene: &str, found: &Suggestion) -> Result<String, serde_json::Error> {
+fn json(scene: &str, found: &Suggestion, files: &[String]) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
     struct Judged<'a> {
         effects: Vec<&'static str>,
@@ -80,6 +80,7 @@ fn json(scene: &str, found: &Suggestion) -> Result<String, serde_json::Error> {
         sets: Vec<Judged<'a>>,
         adapter: Option<&'a String>,
         warnings: &'a [String],
+        files: &'a [String],
     }
     fn judged<'a>(found: &Suggestion, set: &'a Set) -> Judged<'a> {
         Judged { effects: names(set.effects), front: on_front(found, set), set }
@@ -91,6 +92,7 @@ fn json(scene: &str, found: &Suggestion) -> Result<String, serde_json::Error> {
         sets: found.sets.iter().map(|set| judged(found, set)).collect(),
         adapter: found.adapter.as_ref(),
         warnings: &found.warnings,
+        files,
     };
     Ok(serde_json::to_string_pretty(&file)? + "\n")
 }

@@ -12,6 +12,7 @@ fn every_help_page_holds_an_example_that_is_understood() {
         "fit",
         "ablate",
         "tradeoff",
+        "suggest",
         "render",
         "bake",
         "demo",
