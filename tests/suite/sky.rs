@@ -256,14 +256,29 @@ fn a_turned_environment_is_found_turned_and_held_while_it_turns() {
     let pairs = got.iter().flatten().zip(want.iter().flatten());
     // Coefficients turned once or twice, rounded to f32.
     pairs.for_each(|(got, want)| assert!((got - want).abs() < 1e-5, "{got} {want}"));
-    // Samples hold what was found where they were made.
-    let bakes = bakes(&still);
-    let samples = sample_views(&still, &still.mesh.pose(), (&bakes).into()).unwrap();
-    let before = samples[0].surface.rows().all().to_vec();
-    let shader = Shader::new(by_parameter.setup(), &bakes.illumination, &by_parameter.params).unwrap();
-    shader.shade(&samples[0], &still.views[0].camera, 1.0);
-    assert_eq!(before, samples[0].surface.rows().all());
-    assert!(ratios(&still, &bakes) != want);
+    // Samples hold what was found where they were made: only the cubes turn beside them.
+    let (at_rest, moved) = (bakes(&still), bakes(&by_parameter));
+    let shader = Shader::new(by_parameter.setup(), &at_rest.illumination, &by_parameter.params).unwrap();
+    let shaded = |made: &Scene, bakes: &Bake| {
+        let samples = sample_views(made, &made.mesh.pose(), bakes.into()).unwrap();
+        shader.shade(&samples[0], &made.views[0].camera, 1.0).image
+    };
+    let (held, found) = (shaded(&still, &at_rest), shaded(&by_parameter, &moved));
+    let mut open = by_parameter;
+    open.effects = Effects::of(&[Effect::Diffuse]);
+    let cubes = image(&open, &at_rest);
+    assert!(apart(&held, &found) > 0.01);
+    // What is held is the ratio of the still scene: the image over that without occlusion, a pixel.
+    let mut still_open = still.clone();
+    still_open.effects = open.effects;
+    let (before, before_open) = (image(&still, &at_rest), image(&still_open, &at_rest));
+    for i in (0..held.rgb.len()).filter(|&i| held.alpha[i] == 1.0) {
+        for c in 0..3 {
+            let (now, then) = (held.rgb[i][c] / cubes.rgb[i][c], before.rgb[i][c] / before_open.rgb[i][c]);
+            // Quotients of numbers in f32.
+            assert!((now - then).abs() < 1e-5 * then.max(1.0), "{now} {then}");
+        }
+    }
 }
 
 #[test]
