@@ -32,6 +32,12 @@ pub enum StudyError {
          Name some of {settable} with --axis, too."
     )]
     NothingToSet { goal: &'static str, swept: String, settable: String },
+    /// Nothing is left to be scored on.
+    #[error(
+        "{scene}: has {views} views with targets, but effects are judged on views that their fit did not see. Give it two \
+         or more."
+    )]
+    FewViews { scene: String, views: usize },
     #[error(transparent)]
     Output(#[from] OutputError),
     #[error(transparent)]

@@ -2,6 +2,7 @@
 //!
 //! - [`ablation`]: what each effect and term is worth, and what it costs
 //! - [`tradeoff`]: error against time for every approximation
+//! - [`suggest`]: which effects a scene calls for
 //! - [`stability`]: hard cases on every evaluator, and a random search for new ones
 //! - [`sweep`]: many jobs over scenes and settings, on this machine or under a scheduler
 //! - [`subject`]: a scene ready to be evaluated in one setting; [`mod@reference`]: what images are compared with
@@ -24,6 +25,7 @@ pub mod reference;
 pub mod significance;
 pub mod stability;
 pub mod subject;
+pub mod suggest;
 pub mod sweep;
 pub mod timing;
 pub mod titles;

@@ -7,7 +7,7 @@ use burn::tensor::Tensor;
 use super::TensorError;
 use super::buffer::{plain, tracked};
 
-pub use crate::adjoint::Input;
+pub use crate::adjoint::{INPUTS, Input};
 
 /// What the shading operation takes, on the shared device. What the enabled effects do not read is not looked at, and
 /// may have any shape.
@@ -34,6 +34,10 @@ pub struct Inputs {
     pub lobe: Tensor<2>,
     /// E_h, likewise.
     pub hilite: Tensor<2>,
+    /// E_r where the specular map is black, likewise.
+    pub reflected: Tensor<2>,
+    /// E_r where it is white, likewise.
+    pub glossy: Tensor<2>,
 }
 
 /// A tensor of the tracked backend.
@@ -42,13 +46,15 @@ pub(super) type TrackedTensor = FloatTensor<Autodiff<CubeBackend>>;
 impl Inputs {
     /// Whether any of them is tracked.
     pub(super) fn is_tracked(&self) -> bool {
-        let Self { columns, albedo, specular, attenuator, open, bump, irradiance, lobe, hilite } = self;
-        let matrices = [albedo, specular, attenuator, open, bump, irradiance, lobe, hilite];
+        let Self { columns, albedo, specular, attenuator, open, bump, .. } = self;
+        let Self { irradiance, lobe, hilite, reflected, glossy, .. } = self;
+        let of_samples = [albedo, specular, attenuator, open, bump];
+        let matrices = of_samples.into_iter().chain([irradiance, lobe, hilite, reflected, glossy]);
         columns.is_autodiff() || matrices.into_iter().any(Tensor::is_autodiff)
     }
 
     /// Their primitives in the order of [`Input::ALL`], cut from any graph.
-    pub(super) fn plain(self) -> Result<[CubeTensor; 9], TensorError> {
+    pub(super) fn plain(self) -> Result<[CubeTensor; INPUTS], TensorError> {
         let name = |input: Input| input.name();
         Ok([
             plain(name(Input::Columns), self.columns)?,
@@ -60,11 +66,13 @@ impl Inputs {
             plain(name(Input::Irradiance), self.irradiance)?,
             plain(name(Input::Lobe), self.lobe)?,
             plain(name(Input::Hilite), self.hilite)?,
+            plain(name(Input::Reflected), self.reflected)?,
+            plain(name(Input::Glossy), self.glossy)?,
         ])
     }
 
     /// Their primitives in the order of [`Input::ALL`], with their places in the graph.
-    pub(super) fn tracked(self) -> Result<[TrackedTensor; 9], TensorError> {
+    pub(super) fn tracked(self) -> Result<[TrackedTensor; INPUTS], TensorError> {
         let name = |input: Input| input.name();
         Ok([
             tracked(name(Input::Columns), self.columns)?,
@@ -76,6 +84,8 @@ impl Inputs {
             tracked(name(Input::Irradiance), self.irradiance)?,
             tracked(name(Input::Lobe), self.lobe)?,
             tracked(name(Input::Hilite), self.hilite)?,
+            tracked(name(Input::Reflected), self.reflected)?,
+            tracked(name(Input::Glossy), self.glossy)?,
         ])
     }
 }

@@ -11,14 +11,14 @@ use burn::backend::wgpu::{CubeBackend, CubeTensor};
 use burn::tensor::{Tensor, TensorData};
 
 use super::drawn::Planes;
-use super::inputs::{Input, Inputs, TrackedTensor};
+use super::inputs::{INPUTS, Input, Inputs, TrackedTensor};
 use super::shaded::{Scatter, Shaded};
-use super::stage::Stage;
+use super::stage::{CUBES, Stage};
 use super::{SharedDevice, TensorError};
+use crate::bake::stacks::Stack;
 use crate::gpu::engine::DeviceSamples;
 use crate::model::cube::Cube;
 use crate::model::fragment::Fragment;
-use crate::model::params::Param;
 use crate::samples::ViewSamples;
 
 /// The shading model over the samples of some views; it is cheap to clone.
@@ -62,10 +62,16 @@ impl Shade {
         made: Option<&DeviceSamples>,
         scatter: Scatter,
     ) -> Result<(Self, Inputs), TensorError> {
-        let lobe = shaded.params.scalar(Param::SpecularLobe);
-        let specular = shaded.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
-        let cubes =
-            [shaded.illumination.irradiance.as_ref(), specular.as_ref(), shaded.illumination.hilite.as_ref()];
+        let light = shaded.illumination;
+        let at = |stack: Stack| stack.at(light, stack.place(shaded.params)).map(|(cube, _)| cube);
+        let [specular, reflected, glossy] = Stack::ALL.map(at);
+        let cubes = [
+            light.irradiance.as_ref(),
+            specular.as_ref(),
+            light.hilite.as_ref(),
+            reflected.as_ref(),
+            glossy.as_ref(),
+        ];
         let (stage, drawn) = Stage::new(shared, shaded, cubes, views, made, scatter)?;
         let inputs = inputs(shared, &stage, shaded, cubes, views, drawn.as_ref());
         Ok((Self(Arc::new(stage)), inputs))
@@ -116,10 +122,10 @@ impl Shade {
 #[derive(Debug)]
 struct Adjoints;
 
-impl Backward<CubeBackend, 9> for Adjoints {
-    type State = (Shade, [CubeTensor; 9]);
+impl Backward<CubeBackend, INPUTS> for Adjoints {
+    type State = (Shade, [CubeTensor; INPUTS]);
 
-    fn backward(self, ops: Ops<Self::State, 9>, gradients: &mut Gradients, _: &mut Checkpointer) {
+    fn backward(self, ops: Ops<Self::State, INPUTS>, gradients: &mut Gradients, _: &mut Checkpointer) {
         let adjoint = gradients.consume::<CubeBackend>(&ops.node);
         let (Shade(stage), inputs) = ops.state;
         let nodes = || Input::ALL.into_iter().zip(&ops.parents);
@@ -143,7 +149,7 @@ fn inputs(
     shared: &SharedDevice,
     stage: &Stage,
     shaded: &Shaded<'_>,
-    cubes: [Option<&Cube<f32>>; 3],
+    cubes: [Option<&Cube<f32>>; CUBES.len()],
     views: &[&ViewSamples],
     drawn: Option<&Planes>,
 ) -> Inputs {
@@ -180,5 +186,7 @@ fn inputs(
         irradiance: cube(cubes[0]),
         lobe: cube(cubes[1]),
         hilite: cube(cubes[2]),
+        reflected: cube(cubes[3]),
+        glossy: cube(cubes[4]),
     }
 }

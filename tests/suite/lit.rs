@@ -24,7 +24,7 @@ use crate::scene_folder::{SCENE, SceneFolder, exr};
 /// Reflectance of sphere and plane.
 const ALBEDO: f64 = 0.5;
 
-fn param(name: &str) -> Param {
+pub(crate) fn param(name: &str) -> Param {
     Param::from_name(name).unwrap_or_else(|| panic!("no parameter {name}"))
 }
 
@@ -99,7 +99,7 @@ fn a_lamps_colour_is_fitted_on_both_engines() {
 }
 
 /// A quad under a light from one direction, a spot, and the sun of a panorama.
-fn quad(effects: &str, environment: &str) -> SceneFolder {
+pub(crate) fn quad(effects: &str, environment: &str) -> SceneFolder {
     let folder = SceneFolder::new();
     // A sky of 0.2 with a sun of a few texels.
     let sun = |i: usize| (20..23).contains(&(i / 256)) && (20..23).contains(&(i % 256));
@@ -129,12 +129,12 @@ outer_degrees = 25
     folder
 }
 
-fn baked(folder: &SceneFolder) -> Baked {
+pub(crate) fn baked(folder: &SceneFolder) -> Baked {
     let options = PrepareOptions { fit: true, ..PrepareOptions::default() };
     Baked::new(&folder.path("scene.toml"), &options).unwrap()
 }
 
-fn image(baked: &Baked) -> Image {
+pub(crate) fn image(baked: &Baked) -> Image {
     let sampled = baked.clone().sample().unwrap();
     let shader = Shader::new(sampled.setup(), &sampled.illumination, &sampled.scene.params).unwrap();
     shader.shade(&sampled.samples[0], &sampled.scene.views[0].camera, 1.0).image

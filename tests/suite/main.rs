@@ -22,6 +22,7 @@ mod exports;
 mod figures;
 mod fits;
 mod fixtures;
+mod fresnel;
 mod graphics;
 mod harmonics;
 mod instructions;

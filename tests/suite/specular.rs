@@ -6,7 +6,6 @@ use std::path::Path;
 use skinfit::bake::radial::Radial;
 use skinfit::model::cube::{texel_direction, texel_solid_angle};
 use skinfit::shader::rule::LIBRARY;
-use skinfit::shader::term::register;
 use skinfit_core::specular::brdf::{self, beckmann};
 use skinfit_core::specular::split_sum::{Quadrature, dielectric_sum, split_sum};
 use skinfit_core::specular::{SpecularModel, roughness_of};
@@ -419,11 +418,4 @@ fn values_and_derivatives_are_finite_in_hard_cases() {
             }
         }
     }
-}
-
-#[test]
-fn the_environment_s_share_is_a_term_of_rules() {
-    // Its names, types and WGSL are checked, and that every function has a derivative.
-    let term = register("fresnel", include_str!("specular/fresnel.wgsl")).unwrap();
-    assert_eq!((term.params.len(), term.rules.len()), (4, 3));
 }

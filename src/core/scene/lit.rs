@@ -100,6 +100,11 @@ impl Lights {
         Self::read(source, file, document.as_ref().map(|document| (document, time)), &mut Warnings::new())
     }
 
+    /// Whether there is one.
+    pub(super) fn any(&self) -> bool {
+        !self.terms.is_empty()
+    }
+
     /// Those effects, and each light's where lights are on and none of them is named by itself.
     pub(super) fn switched(&self, effects: Effects) -> Effects {
         let listed = self.terms.iter().any(|term| effects.has(term.effect));

@@ -9,7 +9,7 @@
 //! - [`sky_lights`]: the panorama's brightest spots as lights; `lit`: the effect that each light is
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
-//! - [`names`]: what a scene is called among several
+//! - [`names`]: what a scene is called among several; `offers`: what it has for effects that may be off
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
 //! - [`facts`]: what a scene calls for of the shader planner
 //! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
@@ -37,6 +37,7 @@ pub mod mesh;
 pub mod names;
 mod normals;
 mod numbers;
+mod offers;
 pub mod pose;
 mod settings;
 pub mod sky_lights;
@@ -53,6 +54,7 @@ pub use load::LoadOptions;
 pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
 pub use numbers::{interval, short};
+pub use offers::Offers;
 pub use terms::register_terms;
 
 use std::path::PathBuf;

@@ -25,6 +25,8 @@ pub(super) struct Changes<'a> {
     pub(super) maps: &'a [(&'static str, String)],
     /// Settings, instead of the file's.
     pub(super) settings: &'a [Choose],
+    /// The effects that are on, instead of the file's.
+    pub(super) effects: Option<&'a [&'static str]>,
 }
 
 /// Start values that a fit used.
@@ -89,6 +91,11 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
         if let Some(params) = model.and_then(|model| section(model, "params")) {
             set_params(params, start);
         }
+    }
+    if let Some(effects) = changes.effects
+        && let Some(model) = section(scene.as_table_mut(), "model")
+    {
+        set(model, "effects", Value::Array(effects.iter().copied().collect::<Array>()));
     }
     for choose in changes.settings {
         let (table, key, value): (_, _, Value) = match choose {

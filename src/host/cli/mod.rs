@@ -31,6 +31,7 @@ mod scene;
 mod set;
 mod shader;
 mod stability;
+mod suggest;
 mod sweep;
 mod tradeoff;
 mod unfinished;
@@ -42,6 +43,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 use crate::scene::register_terms;
+use crate::shader::term::library;
 use crate::{output, progress};
 
 /// How a command ended, as an exit code; `EXIT_CODES` says what each means.
@@ -118,6 +120,7 @@ enum Command {
     Fit(fit::Arguments),
     Ablate(ablate::Arguments),
     Tradeoff(tradeoff::Arguments),
+    Suggest(suggest::Arguments),
     Render(render::Arguments),
     Bake(bake::Arguments),
     Demo(demo::Arguments),
@@ -141,6 +144,7 @@ pub fn main() -> ExitCode {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Ablate(arguments) => ablate::run(&arguments),
         Command::Tradeoff(arguments) => tradeoff::run(&arguments),
+        Command::Suggest(arguments) => suggest::run(&arguments),
         Command::Render(arguments) => render::run(&arguments),
         Command::Bake(arguments) => bake::run(&arguments),
         Command::Demo(arguments) => demo::run(&arguments),
@@ -165,6 +169,7 @@ pub fn main() -> ExitCode {
 /// Know the effects of the scenes that the command line names before it is understood, as options name them. What is
 /// wrong with a scene is told when it is read.
 fn know_terms() {
+    library::register_all();
     for argument in std::env::args_os().skip(1) {
         let path = Path::new(&argument);
         if path.extension().is_some_and(|ending| ending == "toml") && path.is_file() {

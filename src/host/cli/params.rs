@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use super::{Exit, Refusal, say};
 use crate::model::params::{Owner, ParamInfo, Scale, TABLE};
 use crate::scene::{interval, register_terms};
+use crate::shader::term::library;
 
 /// Print the parameter table: name, defaults, bounds, unit, kind, source
 #[derive(clap::Args)]
@@ -23,7 +24,8 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let terms = arguments.scene.as_deref().map(register_terms).transpose()?.unwrap_or_default();
     let added = terms.iter().flat_map(|term| &term.params).map(|param| param.info());
-    let rows: Vec<&ParamInfo> = TABLE.iter().chain(added).collect();
+    let library = library::terms().iter().flat_map(|term| &term.params).map(|param| param.info());
+    let rows: Vec<&ParamInfo> = TABLE.iter().chain(library).chain(added).collect();
     let text = match arguments.format.as_str() {
         "json" => json(&rows),
         "markdown" => markdown(&rows),

@@ -27,10 +27,11 @@ pub(super) enum Work {
     Ablation,
     Tradeoff,
     Stability,
+    Suggestion,
 }
 
 impl Work {
-    const ALL: [Self; 4] = [Self::Fit, Self::Ablation, Self::Tradeoff, Self::Stability];
+    const ALL: [Self; 5] = [Self::Fit, Self::Ablation, Self::Tradeoff, Self::Stability, Self::Suggestion];
 
     const fn command(self) -> &'static str {
         match self {
@@ -38,6 +39,7 @@ impl Work {
             Self::Ablation => "skinfit ablate",
             Self::Tradeoff => "skinfit tradeoff",
             Self::Stability => "skinfit stability",
+            Self::Suggestion => "skinfit suggest",
         }
     }
 
@@ -53,6 +55,7 @@ impl Work {
             Self::Ablation => results("rows"),
             Self::Tradeoff => results("axes"),
             Self::Stability => folder.join("stability.json").is_file(),
+            Self::Suggestion => results("suggested"),
         }
     }
 }

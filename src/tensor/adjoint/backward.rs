@@ -95,7 +95,7 @@ impl Adjoint {
             Input::Specular | Input::Attenuator | Input::Open => {
                 vec![(named(input.name(), "1.0"), vec![Gain::Field(input, Some(0))])]
             }
-            Input::Irradiance | Input::Lobe | Input::Hilite => self
+            Input::Irradiance | Input::Lobe | Input::Hilite | Input::Reflected | Input::Glossy => self
                 .lookups(input)
                 .into_iter()
                 .map(|(i, lookup)| {

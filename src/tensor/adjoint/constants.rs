@@ -46,6 +46,8 @@ impl Adjoint {
                 Constant::KeyByElevation => {
                     "DEGREE * vec4f(-sin(elevation) * sin(azimuth), cos(elevation), -sin(elevation) * cos(azimuth), 0.0)"
                 }
+                // No column moves a sharpness.
+                Constant::GlossyPaces => "vec4f()",
                 // Of the vertex stage: no plan over samples has them.
                 Constant::Eye | Constant::ViewProjection | Constant::MorphWeights => "vec4f()",
             };

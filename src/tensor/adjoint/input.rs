@@ -23,11 +23,18 @@ pub enum Input {
     Lobe,
     /// E_h's texels with their border, RGBA.
     Hilite,
+    /// E_r's texels with their border where the specular map is black, RGBA.
+    Reflected,
+    /// E_r's texels with their border where it is white, RGBA.
+    Glossy,
 }
+
+/// How many inputs there are.
+pub const INPUTS: usize = Input::ALL.len();
 
 impl Input {
     /// Every input.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Columns,
         Self::Albedo,
         Self::Specular,
@@ -37,6 +44,8 @@ impl Input {
         Self::Irradiance,
         Self::Lobe,
         Self::Hilite,
+        Self::Reflected,
+        Self::Glossy,
     ];
 
     /// The name in messages; of a sample's field, that of the quantity too.
@@ -52,6 +61,8 @@ impl Input {
             Self::Irradiance => "irradiance",
             Self::Lobe => "lobe",
             Self::Hilite => "hilite",
+            Self::Reflected => "reflected",
+            Self::Glossy => "glossy",
         }
     }
 
@@ -62,6 +73,8 @@ impl Input {
             Self::Irradiance => Some(Resource::IrradianceFaces),
             Self::Lobe => Some(Resource::SpecularFaces),
             Self::Hilite => Some(Resource::HiliteFaces),
+            Self::Reflected => Some(Resource::ReflectedFaces),
+            Self::Glossy => Some(Resource::GlossyFaces),
             _ => None,
         }
     }

@@ -12,7 +12,7 @@ mod constants;
 mod input;
 mod text;
 
-pub use self::input::Input;
+pub use self::input::{INPUTS, Input};
 
 use std::fmt::Write as _;
 
@@ -41,11 +41,13 @@ pub struct Lookup {
     kind: &'static str,
 }
 
-const LOOKUPS: [Lookup; 4] = [
+const LOOKUPS: [Lookup; 6] = [
     Lookup { cube: Input::Irradiance, light: "irradiance", place: "n_place", kind: "vec3f" },
     Lookup { cube: Input::Lobe, light: "side_light", place: "n_place", kind: "vec3f" },
     Lookup { cube: Input::Lobe, light: "mirror_light", place: "reflected_place", kind: "vec4f" },
     Lookup { cube: Input::Hilite, light: "hilite_light", place: "view_place", kind: "vec3f" },
+    Lookup { cube: Input::Reflected, light: "rough_light", place: "lobe_place", kind: "vec3f" },
+    Lookup { cube: Input::Glossy, light: "glossy_light", place: "lobe_place", kind: "vec3f" },
 ];
 
 /// What is bound in group 1; the binding is the place in a module's list.
@@ -102,10 +104,10 @@ pub enum AdjointError {
     Tangent(#[from] TangentError),
     /// A column that acts through a cube.
     #[error(
-        "specular_lobe cannot be a free column here: it acts through the specular cube, which is an input of its own. \
-         Give the cube of another lobe instead."
+        "{0} cannot be a free column here: it acts through cubes that are inputs of their own. Give the cubes of another \
+         lobe instead."
     )]
-    Lobe,
+    Lobe(&'static str),
 }
 
 impl Adjoint {
@@ -113,11 +115,12 @@ impl Adjoint {
     /// rotation is free.
     ///
     /// # Errors
-    /// When `specular_lobe` is free, or the planner yields nothing.
+    /// When a lobe's sharpness is free, or the planner yields nothing.
     pub fn new(setup: Setup, columns: &[Column], turned: bool) -> Result<Self, AdjointError> {
         let free = |param: Param| columns.iter().any(|column| column.param == param);
-        if free(Param::SpecularLobe) {
-            return Err(AdjointError::Lobe);
+        let sharpness = |param: &Param| ["specular_lobe", "roughness", "gloss"].contains(&param.name());
+        if let Some(param) = columns.iter().map(|column| column.param).find(sharpness) {
+            return Err(AdjointError::Lobe(param.name()));
         }
         let facts = Facts {
             setup,

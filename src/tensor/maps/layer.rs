@@ -156,6 +156,8 @@ fn slot(input: Input, inputs: &mut Inputs) -> &mut Tensor<2> {
         Input::Irradiance => &mut inputs.irradiance,
         Input::Lobe => &mut inputs.lobe,
         Input::Hilite => &mut inputs.hilite,
+        Input::Reflected => &mut inputs.reflected,
+        Input::Glossy => &mut inputs.glossy,
         // A column is no map.
         Input::Bump | Input::Columns => &mut inputs.bump,
     }

@@ -15,7 +15,7 @@ use wgpu::{
 use self::resident::{Constants, Faces, fixed_planes, group_starts};
 use super::buffer::{TensorBuffer, check_shape, lend};
 use super::drawn::Planes;
-use super::inputs::Input;
+use super::inputs::{INPUTS, Input};
 use super::scatter::Scattering;
 use super::shaded::{Scatter, Shaded};
 use super::{SharedDevice, TensorError, pass};
@@ -38,7 +38,7 @@ pub(super) struct Stage {
     group_start: Buffer,
     constants: Option<Constants>,
     /// The cubes' faces, in the order of irradiance, lobe and hilite.
-    faces: [Option<Faces>; 3],
+    faces: [Option<Faces>; CUBES.len()],
     fill_faces: ComputePipeline,
     forward: Compiled,
     /// By what is wanted.
@@ -53,7 +53,8 @@ struct Compiled {
     bindings: Vec<Binding>,
 }
 
-const CUBES: [Input; 3] = [Input::Irradiance, Input::Lobe, Input::Hilite];
+pub(super) const CUBES: [Input; 5] =
+    [Input::Irradiance, Input::Lobe, Input::Hilite, Input::Reflected, Input::Glossy];
 
 /// Where an input stands in [`Input::ALL`].
 const fn at(input: Input) -> usize {
@@ -64,7 +65,7 @@ impl Stage {
     pub(super) fn new(
         shared: &SharedDevice,
         shaded: &Shaded<'_>,
-        cubes: [Option<&Cube<f32>>; 3],
+        cubes: [Option<&Cube<f32>>; CUBES.len()],
         views: &[&ViewSamples],
         made: Option<&DeviceSamples>,
         scatter: Scatter,
@@ -83,7 +84,7 @@ impl Stage {
         };
         let slots = views.iter().map(|view| view.pixel.len()).sum();
         let samples = views.iter().map(|view| view.records() * LANES).sum();
-        let mut faces = [None, None, None];
+        let mut faces = [const { None }; CUBES.len()];
         for (i, cube) in cubes.into_iter().enumerate() {
             if let Some(cube) = cube.filter(|_| adjoint.reads(CUBES[i])) {
                 faces[i] = Some(Faces::new(gpu, cube.size())?);
@@ -125,7 +126,7 @@ impl Stage {
     }
 
     /// The image of those inputs.
-    pub(super) fn forward(&self, inputs: &[CubeTensor; 9]) -> Result<CubeTensor, TensorError> {
+    pub(super) fn forward(&self, inputs: &[CubeTensor; INPUTS]) -> Result<CubeTensor, TensorError> {
         let (lent, mut made) = self.lend(inputs, None, &[Shape::new([self.slots, 4])])?;
         let image = made.remove(0);
         let mut encoder = self.encoder("shade");
@@ -142,7 +143,7 @@ impl Stage {
     /// What each of `wanted` gets of an adjoint of the image, in their order.
     pub(super) fn backward(
         &self,
-        inputs: &[CubeTensor; 9],
+        inputs: &[CubeTensor; INPUTS],
         adjoint: CubeTensor,
         wanted: &[Input],
     ) -> Result<Vec<CubeTensor>, TensorError> {
@@ -202,7 +203,7 @@ impl Stage {
     #[allow(clippy::type_complexity, reason = "the two lists of `lend`, the first by place")]
     fn lend(
         &self,
-        inputs: &[CubeTensor; 9],
+        inputs: &[CubeTensor; INPUTS],
         adjoint: Option<CubeTensor>,
         results: &[Shape],
     ) -> Result<(HashMap<usize, TensorBuffer>, Vec<TensorBuffer>), TensorError> {

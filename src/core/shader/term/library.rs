@@ -4,7 +4,8 @@
 
 use std::sync::OnceLock;
 
-use super::{Origin, register_from};
+use super::{Origin, Term, register_from};
+use crate::model::effects::Effect;
 
 /// Files, by name, in the order of documentation.
 const FILES: [(&str, &str); 2] = [
@@ -15,17 +16,28 @@ const FILES: [(&str, &str); 2] = [
 /// Effects that share light out before it is diffuse.
 pub const LAYERED: [&str; 2] = ["directional_occlusion", "fresnel"];
 
-/// Make the library's terms known to this process.
+/// The library's terms, made known to this process.
 ///
 /// # Panics
 /// When one of its own files does not fit its own rules, which every use would show.
+pub fn terms() -> &'static [&'static Term] {
+    static TERMS: OnceLock<Vec<&'static Term>> = OnceLock::new();
+    TERMS.get_or_init(|| {
+        let register = |(name, text): (&str, &str)| {
+            let term = register_from(Origin::Library, name, text);
+            term.unwrap_or_else(|error| panic!("rules/term/{name}.wgsl, line {}: {error}", error.line))
+        };
+        FILES.into_iter().map(register).collect()
+    })
+}
+
+/// Make the library's terms known to this process.
 pub fn register_all() {
-    static DONE: OnceLock<()> = OnceLock::new();
-    DONE.get_or_init(|| {
-        for (name, text) in FILES {
-            if let Err(error) = register_from(Origin::Library, name, text) {
-                panic!("rules/term/{name}.wgsl, line {}: {error}", error.line);
-            }
-        }
-    });
+    let _ = terms();
+}
+
+/// Whether an effect is of one of them.
+#[must_use]
+pub fn is_own(effect: Effect) -> bool {
+    terms().iter().any(|term| term.effects.contains(&effect))
 }

@@ -92,7 +92,8 @@ pub(super) fn there(origin: Origin, declaration: &Declaration) -> Result<(), Ter
         let there = if rule.domain == Domain::Texel { &texels } else { &samples };
         for &(need, _) in &rule.needs {
             let mut givers = declaration.rules.iter().filter(|giver| giver.gives_quantity(need)).peekable();
-            let constant = Param::from_identifier(need).is_some_and(Param::is_built_in) || is_constant(need);
+            let ours = |param: Param| param.is_built_in() || origin == Origin::Library;
+            let constant = Param::from_identifier(need).is_some_and(ours) || is_constant(need);
             let quantity = need.to_owned();
             if givers.peek().is_some() {
                 // Only texels of one file feed its texels; fragments look up what may be sampled.

@@ -1,0 +1,295 @@
+//! The effects `fresnel` and `light_specular`: closed forms, slopes against finite differences on every engine, the
+//! renderer, exports, fits, and neutral values.
+
+use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::gpu::{GpuEngine, Memory};
+use skinfit::engine::reference::Reference;
+use skinfit::engine::{Objective, Point, Task, Unknown};
+use skinfit::fit::{FitOptions, fit};
+use skinfit::gpu::Renderer;
+use skinfit::gpu::upload::Content;
+use skinfit::model::choices::SpecularModel;
+use skinfit::model::params::{Column, Param};
+use skinfit::prepare::Baked;
+use skinfit::render::image::Image;
+use skinfit::shader::Facts;
+use skinfit::shader::facts::Budget;
+use skinfit_core::specular::split_sum::{Quadrature, split_sum};
+
+use crate::graphics::bench::{EXACT, gpu};
+use crate::lit::{baked, image, param, quad};
+use crate::scene_folder::{SCENE, SceneFolder, encode, exr};
+
+const EFFECTS: &str = "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"lights\", \"shadows\", \"light_specular\", \
+                       \"fresnel\"";
+
+/// The choices that are told apart: a scene's lines of `[model]`.
+const CHOICES: [&str; 5] = [
+    "specular_model = \"kelemen\"",
+    "specular_model = \"ggx\"\nspecular_map = \"f0\"",
+    "specular_model = \"ggx\"\nspecular_visibility = \"none\"\nlobe_lookup = \"off_peak\"",
+    "specular_visibility = \"cone\"\nspecular_map = \"f0\"",
+    "specular_visibility = \"cone\"\nlobe_lookup = \"off_peak\"",
+];
+
+/// The quad of the lights' tests with maps that vary, under those choices.
+fn scene(choices: &str, params: &str) -> SceneFolder {
+    let folder = quad(EFFECTS, "lights = 1");
+    let gradient = |x: u32, y: u32| image::Rgb([(40 * x + 20 * y) as u8, 0, 0]);
+    folder.write("data.png", &encode(image::RgbImage::from_fn(4, 4, gradient), image::ImageFormat::Png));
+    let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
+    let text = text.replace("[model]\n", &format!("[model]\n{choices}\n"));
+    let text = text.replace("[model.params]\n", &format!("[model.params]\n{params}\n"));
+    folder.write("scene.toml", text.as_bytes());
+    folder
+}
+
+const PARAMS: &str =
+    "roughness = 0.4\ngloss = 0.3\nspecular_weight = [0.9, 0.7, 0.5]\nf0 = 0.06\nfresnel_loss = 0.7";
+
+fn free() -> Vec<Unknown> {
+    let names = [
+        "roughness",
+        "gloss",
+        "f0",
+        "f0_floor",
+        "fresnel_loss",
+        "normal_strength",
+        "occlusion",
+        "base_weight",
+        "rim_exponent",
+        "environment_rotation",
+        "light.key.azimuth",
+        "light.sky_1.color",
+    ];
+    let weights = Column::per_channel(param("specular_weight"));
+    let tied = names.map(|name| Column::tied(param(name)));
+    weights.into_iter().chain(tied).map(Unknown::Param).collect()
+}
+
+/// The columns that those choices ask for.
+fn moving(choices: &str) -> Vec<Unknown> {
+    let floor = param("f0_floor");
+    let keeps = |unknown: &Unknown| match unknown {
+        Unknown::Param(column) => column.param != floor || choices.contains("specular_map = \"f0\""),
+        _ => true,
+    };
+    free().into_iter().filter(keeps).collect()
+}
+
+fn within(got: &[f64], want: &[f64], unknowns: &[Unknown], what: &str) {
+    let most = want.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
+    for ((unknown, got), want) in unknowns.iter().zip(got).zip(want) {
+        // Roundings of f32: some tens in each residual, of sums that cancel.
+        let close = (got - want).abs() <= 3e-4 * want.abs() + 1e-5 * most;
+        assert!(close, "{what}: {}: {got} {want}", unknown.name());
+    }
+}
+
+#[test]
+fn slopes_are_finite_differences_on_every_engine() {
+    for choices in CHOICES {
+        let mut bake = baked(&scene(choices, PARAMS));
+        let unknowns = moving(choices);
+        let columns: Vec<Column> = unknowns
+            .iter()
+            .filter_map(|unknown| match unknown {
+                Unknown::Param(column) => Some(*column),
+                _ => None,
+            })
+            .collect();
+        bake = free_in(&scene(choices, PARAMS), bake, &columns);
+        let observed = bake.sample().unwrap().observe().unwrap();
+        let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
+        let point = observed.start();
+        let own = task();
+        let exact = Reference::new(own.setup, &own.illumination, &own.views, own.loss, &unknowns).unwrap();
+        let (loss, slopes) = exact.gradient(&point);
+        for (unknown, slope) in unknowns.iter().zip(&slopes) {
+            let at = |by: f64| {
+                let mut moved = point.clone();
+                unknown.set(&mut moved, unknown.get(&point) + by);
+                exact.loss(&moved)
+            };
+            // Cubes hold f32: a step of 1e-4 leaves roundings of 1e-4 in what moves between them, and an error of its
+            // square.
+            let difference = (at(1e-4) - at(-1e-4)) / 2e-4;
+            let close = (slope - difference).abs() <= 2e-4 * (loss + slope.abs());
+            assert!(close, "{choices}: {}: {slope} {difference}", unknown.name());
+            assert!(*slope != 0.0, "{choices}: {} moves nothing", unknown.name());
+        }
+        let check = |engine: &dyn Objective, what: &str| {
+            let (got, gradient) = engine.gradient(&point);
+            assert!((got - loss).abs() <= 3e-5 * loss, "{choices}: {what}: {got} {loss}");
+            within(&gradient, &slopes, &unknowns, &format!("{choices}: {what}"));
+        };
+        check(&CpuEngine::new(task()).unwrap(), "cpu");
+        let Some(gpu) = gpu() else { continue };
+        check(&GpuEngine::new(gpu, task(), &point, Memory::default()).unwrap(), "gpu");
+    }
+}
+
+/// The same scene baked with those columns free.
+fn free_in(folder: &SceneFolder, baked_before: Baked, columns: &[Column]) -> Baked {
+    drop(baked_before);
+    let mut names: Vec<String> = Vec::new();
+    for column in columns {
+        let name = format!("\"{}\"", column.param.name());
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
+    let text = text.replace("[fit]\n", &format!("[fit]\nfree = [{}]\n", names.join(", ")));
+    folder.write("scene.toml", text.as_bytes());
+    baked(folder)
+}
+
+/// A scene of nothing but the environment's lobe, under light of 1 from everywhere.
+fn furnace(model: SpecularModel, roughness: f64, f0: f64) -> (Image, Baked) {
+    let folder = SceneFolder::new();
+    folder.write("env.exr", &exr(8, 4, &["R", "G", "B"], |_, _| 1.0));
+    let lines = format!(
+        "[model]\neffects = [\"fresnel\"]\nspecular_model = \"{}\"\nspecular_visibility = \"none\"\n",
+        model.name()
+    );
+    let text = SCENE
+        .replace("[model]\n", &lines)
+        .replace("[model.params]\n", &format!("[model.params]\nroughness = {roughness}\nf0 = {f0}\n"));
+    folder.write("scene.toml", text.replace("specular = \"data.png\"\n", "").as_bytes());
+    let baked = baked(&folder);
+    (image(&baked), baked)
+}
+
+#[test]
+fn in_a_white_furnace_the_lobe_shows_the_split_sum() {
+    for model in SpecularModel::ALL {
+        for (roughness, f0) in [(0.05, 0.028), (0.35, 0.0), (0.35, 0.2), (1.0, 0.1)] {
+            let (image, baked) = furnace(model, roughness, f0);
+            let camera = baked.scene.views[0].camera;
+            let mut seen = 0;
+            for (i, (rgb, alpha)) in image.rgb.iter().zip(&image.alpha).enumerate() {
+                if *alpha < 1.0 {
+                    continue;
+                }
+                // The quad faces the camera; the mean of a pixel's four samples is nearly that of its middle.
+                let (x, y) = ((i as u32 % camera.width) as f64 + 0.5, (i as u32 / camera.width) as f64 + 0.5);
+                let tangent = (0.5 * camera.fov_y).tan() / (0.5 * f64::from(camera.height));
+                let [u, v] = [x - 0.5 * f64::from(camera.width), y - 0.5 * f64::from(camera.height)]
+                    .map(|offset| offset * tangent);
+                let cosine = 1.0 / (1.0 + u * u + v * v).sqrt();
+                let [a, b] = split_sum(model, cosine, roughness, Quadrature::FINE).map(|sum| sum.value);
+                let want = f0 * a + b;
+                for c in 0..3 {
+                    // The fits' 1.5e-4, and a pixel's curvature of cosines near 1.
+                    assert!(
+                        (f64::from(rgb[c]) - want).abs() < 4e-4,
+                        "{model:?} {roughness} {f0}: {rgb:?} {want}"
+                    );
+                }
+                seen += 1;
+            }
+            assert!(seen > 3, "{seen}");
+        }
+    }
+}
+
+#[test]
+fn the_renderer_draws_what_the_processor_does() {
+    let Some(gpu) = gpu() else { return };
+    for choices in CHOICES {
+        let baked = baked(&scene(choices, PARAMS));
+        let want = image(&baked);
+        let camera = baked.scene.views[0].camera;
+        let got = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
+        for (i, (got, want)) in got.rgb.iter().zip(&want.rgb).enumerate() {
+            // The processor interpolates in f64, the adapter in f32; a lobe's peak sharpens that.
+            let close = (0..3).all(|c| (got[c] - want[c]).abs() < 1e-3 * want[c] + 1e-4);
+            assert!(close, "{choices}: {i}: {got:?} {want:?}");
+        }
+    }
+}
+
+#[test]
+fn with_a_weight_of_nothing_the_image_is_that_without_the_effects() {
+    let neutral = "specular_weight = 0";
+    let with = image(&baked(&scene(CHOICES[0], neutral)));
+    let folder = scene("", "");
+    let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
+    folder.write("scene.toml", text.replace(", \"light_specular\", \"fresnel\"", "").as_bytes());
+    let without = image(&baked(&folder));
+    for (with, without) in with.rgb.iter().zip(&without.rgb) {
+        // The same products in another order.
+        assert!((0..3).all(|c| (with[c] - without[c]).abs() <= 1e-6 * without[c]), "{with:?} {without:?}");
+    }
+}
+
+#[test]
+fn hard_cases_are_finite_in_value_and_slope() {
+    let hard = [
+        "roughness = 0.05\nf0 = 0",
+        "roughness = 1\nf0 = 0.2\ngloss = 0.9",
+        "roughness = 0.05\ngloss = 0.9\nf0 = 0.2",
+    ];
+    for choices in CHOICES {
+        for params in hard {
+            let unknowns = moving(choices);
+            let observed = baked(&scene(choices, params)).sample().unwrap().observe().unwrap();
+            let task = Task { unknowns: unknowns.clone(), ..observed.task() };
+            let point: Point = observed.start();
+            let (loss, slopes) = CpuEngine::new(task).unwrap().gradient(&point);
+            assert!(
+                loss.is_finite() && slopes.iter().all(|slope| slope.is_finite()),
+                "{choices} {params}: {slopes:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn both_engines_find_the_constants_that_made_the_target() {
+    let folder = scene(CHOICES[1], PARAMS);
+    let names = ["specular_weight", "roughness", "base_weight"].map(param);
+    let columns = names.map(Column::tied);
+    let bake = free_in(&folder, baked(&folder), &columns);
+    let made = image(&bake.clone().with_scene(|scene| {
+        for (param, value) in names.into_iter().zip([0.8, 0.33, 0.9]) {
+            scene.params.set(param, value);
+        }
+    }));
+    folder.write(
+        "target.exr",
+        &exr(4, 4, &["R", "G", "B", "A"], |c, i| if c == 3 { made.alpha[i] } else { made.rgb[i][c] }),
+    );
+    let observed = baked(&folder).sample().unwrap().observe().unwrap();
+    let unknowns = columns.map(Unknown::Param).to_vec();
+    let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
+    let start = {
+        let mut start = observed.start();
+        start.params.set(names[0], 0.5);
+        start.params.set(names[1], 0.45);
+        start
+    };
+    let fitted = |engine: &dyn Objective| -> Vec<f64> {
+        let end = fit(engine, &start, &FitOptions::default(), &mut |_| {}).unwrap().end;
+        names.iter().map(|&param: &Param| end.params.scalar(param)).collect()
+    };
+    let check = |got: Vec<f64>, what: &str| {
+        for (got, want) in got.iter().zip([0.8, 0.33, 0.9]) {
+            // Twelve pixels in f32 tell roughness and weight apart to some 1e-3.
+            assert!((got - want).abs() < 1e-2, "{what}: {got} {want}");
+        }
+    };
+    check(fitted(&CpuEngine::new(task()).unwrap()), "cpu");
+    let Some(gpu) = gpu() else { return };
+    check(fitted(&GpuEngine::new(gpu, task(), &start, Memory::default()).unwrap()), "gpu");
+}
+
+#[test]
+fn exports_hold_the_lobe() {
+    let scene = baked(&scene(CHOICES[1], PARAMS)).scene;
+    let facts = Facts::of_scene(&scene, &scene.params, Budget::Paper, false);
+    let facts = Facts { setup: facts.setup, ..crate::exports::engine_facts() };
+    let text = crate::exports::compiled_glsl("specular", &facts);
+    assert!(text.contains("skinfit_share_of_ggx(") && text.contains("ROUGHNESS"), "{text}");
+}
