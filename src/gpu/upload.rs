@@ -18,7 +18,7 @@ use crate::bake::rays::RayMesh;
 use crate::bake::stacks::Stack;
 use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion};
 use crate::model::cube::Cube;
-use crate::model::fields::Field;
+use crate::model::fields::{Field, Fields};
 use crate::model::params::Params;
 use crate::prepare::Baked;
 use crate::samples::PosedSurface;
@@ -64,6 +64,8 @@ pub(super) struct Uploads {
     targets: Vec<usize>,
     stacks: [Option<Cube<f32>>; Stack::ALL.len()],
     attributes: HashMap<Attribute, Buffer>,
+    /// What was found of fields at the vertices.
+    found: HashMap<Field, Vec<f32>>,
     resources: HashMap<Resource, Bound>,
     indices: Buffer,
     /// Bytes that were uploaded.
@@ -115,8 +117,18 @@ impl Uploads {
         let looked_up = |stack: Stack| stack.at(&content.illumination, stack.place(&content.params));
         let stacks = Stack::ALL.map(|stack| looked_up(stack).map(|(cube, _)| cube));
         let bytes = triangles.len() as u64;
-        let (attributes, resources) = (HashMap::new(), HashMap::new());
-        Ok(Self { content, split, targets, stacks, attributes, resources, indices, bytes, clipped: 0 })
+        Ok(Self {
+            content,
+            split,
+            targets,
+            stacks,
+            attributes: HashMap::new(),
+            found: HashMap::new(),
+            resources: HashMap::new(),
+            indices,
+            bytes,
+            clipped: 0,
+        })
     }
 
     /// What attributes are of.
@@ -148,12 +160,15 @@ impl Uploads {
         if let Some(buffer) = self.attributes.get(&attribute) {
             return Ok(buffer.clone());
         }
+        if let Attribute::Field(field) = attribute
+            && !self.found.contains_key(&field)
+        {
+            // What rays find of one field they may find of others.
+            let all = self.content.scene.needs().fields.or(Fields::of([field]));
+            self.found = self.fields(gpu, self.mesh().0, None, all)?;
+        }
         let (mesh, occlusion) = self.mesh();
-        let fields = match attribute {
-            Attribute::Field(field) => self.fields(gpu, mesh, None, &[field])?,
-            _ => HashMap::new(),
-        };
-        let bytes = vertices::attribute(attribute, mesh, occlusion, &fields);
+        let bytes = vertices::attribute(attribute, mesh, occlusion, &self.found);
         let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
         self.bytes += bytes.len() as u64;
         self.attributes.insert(attribute, made.clone());
@@ -166,7 +181,7 @@ impl Uploads {
         gpu: &Gpu,
         mesh: &Mesh,
         sky: Option<&SkyBake>,
-        fields: &[Field],
+        fields: Fields,
     ) -> Result<HashMap<Field, Vec<f32>>, GpuError> {
         if fields.is_empty() {
             return Ok(HashMap::new());
@@ -176,10 +191,12 @@ impl Uploads {
         // Where triangles share no vertices, the fields are the mesh file's own.
         let sky = sky.or(self.content.sky.as_deref()).filter(|_| self.split.is_none());
         let surface =
-            PosedSurface::with_fields(&self.content.scene, &posed, &rays, &mesh.morphs, sky).map_err(
-                |error| GpuError::Refused { adapter: gpu.name().to_owned(), reason: error.to_string() },
-            )?;
-        Ok(fields.iter().map(|&field| (field, surface.field_of_vertices(field))).collect())
+            PosedSurface::with_fields(&self.content.scene, &posed, &rays, &mesh.morphs, sky, fields)
+                .map_err(|error| GpuError::Refused {
+                    adapter: gpu.name().to_owned(),
+                    reason: error.to_string(),
+                })?;
+        Ok(fields.iter().map(|field| (field, surface.field_of_vertices(field))).collect())
     }
 
     /// A resource, ready to be bound.
@@ -247,7 +264,7 @@ impl Uploads {
             Attribute::Field(field) => Some(*field),
             _ => None,
         });
-        let fields = self.fields(gpu, mesh, sky, &finds.collect::<Vec<_>>())?;
+        let fields = self.fields(gpu, mesh, sky, Fields::of(finds))?;
         for (&attribute, buffer) in &self.attributes {
             let moves = matches!(
                 attribute,

@@ -42,6 +42,7 @@ mod scene_folder;
 #[cfg(target_os = "linux")]
 mod scheduler;
 mod shader;
+mod sky;
 mod specular;
 #[cfg(feature = "burn")]
 mod tensors;

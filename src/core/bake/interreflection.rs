@@ -8,6 +8,7 @@ use rayon::prelude::*;
 
 use super::vertex_rays::{Found, Rays, VertexRays};
 use super::wide_bvh::{NOTHING, WideBvh};
+use crate::progress;
 use crate::scene::maps::Map;
 use crate::scene::mesh::PosedMesh;
 
@@ -42,16 +43,9 @@ impl Gather {
         let share = 1.0 / found.len().max(1) as f32;
         let mut gathered: Vec<(u32, [f32; 3])> = Vec::new();
         for (&d, &triangle) in rays.directions.iter().zip(found).filter(|(_, found)| **found != NOTHING) {
-            let corners = pose.triangles[triangle as usize];
-            let Some(weights) = weights(rays.origin, d, corners.map(|i| pose.positions[i as usize].into()))
-            else {
+            let Some(Met { corners, weights, albedo }) = albedo.met(pose, triangle, rays.origin, d) else {
                 continue;
             };
-            let normals = corners.map(|i| Vec3A::from(pose.normals[i as usize]));
-            if (0..3).map(|k| weights[k] * normals[k]).sum::<Vec3A>().dot(d) >= 0.0 {
-                continue;
-            }
-            let albedo = albedo.at(pose, corners, weights);
             for (corner, weight) in corners.into_iter().zip(weights) {
                 gathered.push((vertices.slot(corner), albedo.map(|albedo| albedo * weight * share)));
             }
@@ -99,7 +93,70 @@ impl Gather {
     }
 }
 
+/// What each vertex of a mesh gathers of the others' light, whatever that is.
+pub struct VertexGather {
+    vertices: VertexRays,
+    gathers: Vec<Gather>,
+}
+
+impl VertexGather {
+    /// Of a mesh as it is posed, by so many rays a vertex. All cores.
+    #[must_use]
+    pub fn new(mesh: &PosedMesh, rays: u32, albedo: &Albedo<'_>) -> Self {
+        let vertices = VertexRays::new(&|_| mesh.clone(), 0, rays);
+        let bar = progress::bar("bounces", vertices.len() as u64);
+        let gathers = vertices.at_rest(|_, rays, found: Vec<Nearest>| {
+            bar.inc(1);
+            Gather::of(&vertices, mesh, rays, &found, albedo)
+        });
+        bar.finish_and_clear();
+        Self { vertices, gathers }
+    }
+
+    /// What is thrown back to each vertex of the light that `direct` has at each, in two rounds, rgb.
+    #[must_use]
+    pub fn bounced(&self, direct: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<[f32; 3]> {
+        self.of_vertices(Gather::once(&self.gathers, &self.lit_once(direct), 1))
+    }
+
+    /// The light that `direct` has at each vertex, and what is thrown back to it in one round, rgb.
+    #[must_use]
+    pub fn lit(&self, direct: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<[f32; 3]> {
+        self.of_vertices(self.lit_once(direct))
+    }
+
+    /// Of each vertex that rays start from, red, green and blue.
+    fn lit_once(&self, direct: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<f32> {
+        let slots = (0..self.vertices.len()).into_par_iter();
+        let source: Vec<[f32; 3]> = slots.map(|i| direct(self.vertices.vertex(i))).collect();
+        let source = source.into_flattened();
+        let first = Gather::once(&self.gathers, &source, 1);
+        source.iter().zip(&first).map(|(source, first)| source + first).collect()
+    }
+
+    fn of_vertices(&self, slots: Vec<f32>) -> Vec<[f32; 3]> {
+        self.vertices.spread(slots.as_chunks::<3>().0, 1)
+    }
+}
+
+/// Where a ray meets a mesh: a triangle's corners with how much each counts, and the albedo there.
+pub(crate) struct Met {
+    pub(crate) corners: [u32; 3],
+    pub(crate) weights: [f32; 3],
+    pub(crate) albedo: [f32; 3],
+}
+
 impl Albedo<'_> {
+    /// Where the ray from `origin` along `d` meets a triangle of the mesh; `None` where that is from behind, or rounding
+    /// leaves no area.
+    pub(crate) fn met(&self, pose: &PosedMesh, triangle: u32, origin: Vec3A, d: Vec3A) -> Option<Met> {
+        let corners = pose.triangles[triangle as usize];
+        let weights = weights(origin, d, corners.map(|i| pose.positions[i as usize].into()))?;
+        let normals = corners.map(|i| Vec3A::from(pose.normals[i as usize]));
+        let faces_away = (0..3).map(|k| weights[k] * normals[k]).sum::<Vec3A>().dot(d) >= 0.0;
+        (!faces_away).then(|| Met { corners, weights, albedo: self.at(pose, corners, weights) })
+    }
+
     /// At a place of a triangle, by its corners' weights.
     fn at(&self, pose: &PosedMesh, corners: [u32; 3], weights: [f32; 3]) -> [f32; 3] {
         match self.map {

@@ -19,7 +19,7 @@ impl Sobol {
     }
 
     /// Cosine-distributed unit directions about +Z, scrambled by `seed`: the disc lifted (Malley).
-    pub(super) fn hemisphere(&self, seed: u32) -> impl Iterator<Item = Vec3A> {
+    pub(crate) fn hemisphere(&self, seed: u32) -> impl Iterator<Item = Vec3A> {
         self.disc(seed).map(|(radius, [sine, cosine])| {
             vec3a(radius * cosine, radius * sine, (1.0 - radius * radius).max(0.0).sqrt())
         })

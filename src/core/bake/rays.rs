@@ -112,6 +112,16 @@ impl RayMesh {
         !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
     }
 
+    /// The nearest triangle along the ray, by its index in the mesh, from either side.
+    #[must_use]
+    pub fn first(&self, origin: Vec3A, direction: Vec3A) -> Option<u32> {
+        let bvh = self.bvh.as_ref()?;
+        let (mut hit, ray) = (RayHit::none(), ray(origin, direction, 0.0));
+        let intersect = |ray: &Ray, slot: usize| self.intersect(ray, bvh.primitive_indices[slot]);
+        let found = bvh.ray_traverse(ray, &mut hit, intersect);
+        found.then(|| self.index[bvh.primitive_indices[hit.primitive_id as usize] as usize])
+    }
+
     /// The nearest triangle along the ray, by `intersect`: the distance at which the ray meets a
     /// triangle (by its index in the mesh), or infinity.
     pub fn nearest(

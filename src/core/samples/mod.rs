@@ -8,7 +8,8 @@
 //!
 //! - `trace`: primary rays, and what they hit
 //! - `posed`: the mesh in a pose with what is baked of it; `supply`: what finds fields of samples, `lit`: what reaches
-//!   them of lights, `sky`: what they see of the sky; `surface`: frames, silhouette and maps at a hit
+//!   them of lights, `bounced`: what the skin throws back of these, `sky`: what they see of the sky, `sky_rays`: by
+//!   rays; `surface`: frames, silhouette and maps at a hit
 //! - `group`: samples packed into groups
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
@@ -18,12 +19,14 @@
 //! - [`atlas`]: texels of the UV atlas, samples of the mesh as well
 
 pub mod atlas;
+mod bounced;
 pub mod covered;
 mod group;
 mod lit;
 mod posed;
 pub mod rows;
 mod sky;
+mod sky_rays;
 mod supply;
 mod surface;
 pub mod surface_records;

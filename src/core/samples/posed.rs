@@ -4,10 +4,10 @@ use rayon::prelude::*;
 
 use super::supply::Supply;
 use super::trace::Hit;
-use super::{SampleError, lit, posed_occlusion, sky};
+use super::{SampleError, bounced, lit, posed_occlusion, sky};
 use crate::bake::rays::RayMesh;
 use crate::bake::{Bake, SkyBake, VertexOcclusion};
-use crate::model::fields::{Field, FieldInfo};
+use crate::model::fields::{Field, FieldInfo, Fields};
 use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
 
@@ -35,35 +35,50 @@ pub struct PosedSurface<'a> {
     supplies: Vec<(Field, Box<dyn Supply + 'a>)>,
 }
 
+/// Each vertex as a point of a triangle; none of one that is of no triangle.
+pub(super) fn hits_of_vertices(mesh: &PosedMesh) -> Vec<Option<Hit>> {
+    let mut hits = vec![None; mesh.positions.len()];
+    for (triangle, corners) in (0..).zip(&mesh.triangles) {
+        for (corner, barycentric) in corners.iter().zip([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) {
+            hits[*corner as usize] = Some(Hit { triangle, barycentric });
+        }
+    }
+    hits
+}
+
 impl<'a> PosedSurface<'a> {
     /// The mesh of `scene` as it is posed; `rays` holds its triangles, and `morphs` are the targets at their weights.
     ///
     /// # Errors
     /// When something was baked for another mesh.
     pub fn new(
-        scene: &Scene,
+        scene: &'a Scene,
         mesh: &'a PosedMesh,
         rays: &'a RayMesh,
         morphs: &[Morph],
-        bakes: SurfaceBakes<'_>,
+        bakes: SurfaceBakes<'a>,
     ) -> Result<Self, SampleError> {
         let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
-        Ok(Self { open, ..Self::with_fields(scene, mesh, rays, morphs, bakes.sky)? })
+        Ok(Self { open, ..Self::with_fields(scene, mesh, rays, morphs, bakes.sky, scene.needs().fields)? })
     }
 
-    /// The mesh of `scene` as it is posed with all that is found at its points, and no open shares; as of [`Self::new`].
+    /// The mesh of `scene` as it is posed with what finds `fields` at its points, and no open shares.
     ///
     /// # Errors
     /// When the sky was baked for another mesh.
     pub fn with_fields(
-        scene: &Scene,
+        scene: &'a Scene,
         mesh: &'a PosedMesh,
         rays: &'a RayMesh,
         morphs: &[Morph],
-        sky: Option<&SkyBake>,
+        sky: Option<&'a SkyBake>,
+        fields: Fields,
     ) -> Result<Self, SampleError> {
         let mut supplies = lit::supplies(scene, mesh, rays);
-        supplies.extend(sky::supplies(scene, mesh, morphs, sky)?);
+        supplies.extend(bounced::supplies(scene, mesh, rays, fields));
+        if let Some(sky) = sky {
+            supplies.extend(sky::supplies(scene, mesh, rays, morphs, sky, fields)?);
+        }
         Ok(Self { supplies, ..Self::bare(mesh, rays, None) })
     }
 
@@ -78,12 +93,7 @@ impl<'a> PosedSurface<'a> {
     #[must_use]
     pub fn field_of_vertices(&self, field: Field) -> Vec<f32> {
         let FieldInfo { numbers: count, neutral, .. } = *field.info();
-        let mut hits: Vec<Option<Hit>> = vec![None; self.mesh.positions.len()];
-        for (triangle, corners) in (0..).zip(&self.mesh.triangles) {
-            for (corner, barycentric) in corners.iter().zip([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]) {
-                hits[*corner as usize] = Some(Hit { triangle, barycentric });
-            }
-        }
+        let hits = hits_of_vertices(self.mesh);
         let mut numbers = vec![neutral; count * hits.len()];
         let found = numbers.par_chunks_mut(count).zip(&hits);
         found.for_each(|(numbers, hit)| {

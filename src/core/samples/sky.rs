@@ -5,18 +5,24 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::SampleError;
+use super::sky_rays::ByRays;
 use super::supply::Supply;
 use super::trace::Hit;
+use super::visibility::Shadows;
 use crate::bake::coefficients::Coefficients;
 use crate::bake::harmonics::{CONSTANT, Order, basis, open_transfer_at};
+use crate::bake::interreflection::{Albedo, VertexGather};
+use crate::bake::panorama::Radiance;
+use crate::bake::rays::RayMesh;
 use crate::bake::shadowed::{arriving, share_of_open};
 use crate::bake::sky::{BENT_NORMAL, SKY_RATIO};
 use crate::bake::transfer::TransferSet;
 use crate::bake::{SkyBake, SkyLight};
-use crate::model::choices::Visibility;
-use crate::model::fields::Field;
+use crate::model::choices::{Bounces, Visibility};
+use crate::model::fields::{Field, Fields};
 use crate::model::params::Param;
 use crate::scene::Scene;
+use crate::scene::maps::Environment;
 use crate::scene::mesh::{Morph, PosedMesh};
 
 /// Numbers of each vertex, interpolated over a triangle.
@@ -46,30 +52,35 @@ pub(super) struct Sky<'a> {
     whole: Coefficients,
 }
 
-/// What finds the fields of the sky that effects of `scene` ask for; `morphs` are its targets at their weights.
+/// What finds those of `fields` that are of the sky; `morphs` are the targets of `scene` at their weights.
 ///
 /// # Errors
 /// When the transfer is that of another mesh.
 pub(super) fn supplies<'a>(
-    scene: &Scene,
+    scene: &'a Scene,
     mesh: &'a PosedMesh,
+    rays: &'a RayMesh,
     morphs: &[Morph],
-    sky: Option<&SkyBake>,
+    bake: &'a SkyBake,
+    fields: Fields,
 ) -> Result<Vec<(Field, Box<dyn Supply + 'a>)>, SampleError> {
-    let Some(bake) = sky else { return Ok(Vec::new()) };
-    let asked = scene.needs().fields;
-    let asked = |name| Field::from_name(name).filter(|field| asked.iter().any(|of| of == *field));
+    let asked = |name| Field::from_name(name).filter(|field| fields.iter().any(|of| of == *field));
     let [ratio, bent] = [SKY_RATIO, BENT_NORMAL].map(asked);
-    let mut supplies: Vec<(Field, Box<dyn Supply + 'a>)> = Vec::new();
-    let mut add = |field: Field, numbers: Vec<[f32; 3]>| {
-        supplies.push((field, Box::new(OfVertices { triangles: &mesh.triangles, numbers })));
-    };
     let sky = Sky::new(scene, mesh, morphs, bake)?;
+    let of_vertices = |numbers: Vec<[f32; 3]>| -> Box<dyn Supply + 'a> {
+        Box::new(OfVertices { triangles: &mesh.triangles, numbers })
+    };
+    let mut supplies: Vec<(Field, Box<dyn Supply + 'a>)> = Vec::new();
     if let Some(field) = bent {
-        add(field, sky.each(|vertex| sky.bent_normal(vertex).to_array()));
+        supplies.push((field, of_vertices(sky.each(|vertex| sky.bent_normal(vertex).to_array()))));
     }
-    if let (Some(field), Some(_)) = (ratio, &bake.light) {
-        add(field, sky.each(|vertex| sky.ratio(scene.choices.visibility, vertex)));
+    if let (Some(field), Some(light)) = (ratio, &bake.light) {
+        let by_rays = light.panorama.as_ref().map(|panorama| sky.by_rays(scene, rays, panorama));
+        let visibility = scene.choices.visibility;
+        supplies.push(match by_rays {
+            Some(by_rays) => (field, Box::new(by_rays)),
+            None => (field, of_vertices(sky.each(|vertex| sky.ratio(visibility, vertex)))),
+        });
     }
     Ok(supplies)
 }
@@ -138,6 +149,27 @@ impl<'a> Sky<'a> {
         };
         let arrived = [0, 1, 2].map(|c| shadowed[c] + thrown[c]);
         share_of_open(arrived, lit, self.rest.mean()).map(|share| share as f32)
+    }
+
+    /// The same by rays from each sample; `panorama` is the environment without its lights.
+    fn by_rays(&self, scene: &'a Scene, rays: &'a RayMesh, panorama: &'a Environment) -> ByRays<'a> {
+        let (mesh, albedo) = (self.mesh, Albedo { map: scene.maps.color.as_ref() });
+        let light = if scene.choices.bounces == Bounces::Gathered {
+            let gather = VertexGather::new(mesh, scene.quality.occlusion_rays, &albedo);
+            gather.lit(|vertex| arriving(self.direct(vertex), &self.whole).map(|light| light.max(0.0) as f32))
+        } else {
+            Vec::new()
+        };
+        let turn = panorama.rotation_degrees + scene.params.scalar(Param::EnvironmentRotation);
+        ByRays {
+            mesh,
+            rays,
+            shadows: Shadows::new(mesh, rays, scene.quality.sky_rays),
+            radiance: Radiance::turned(panorama, turn),
+            mean: self.rest.mean(),
+            albedo,
+            light,
+        }
     }
 
     /// What arrives through a cone about the bent normal that is as open as the vertex; `lit` where it is open.

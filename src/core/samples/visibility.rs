@@ -81,6 +81,13 @@ impl<'a> Shadows<'a> {
         }
     }
 
+    /// Unit vectors distributed as the cosine over the hemisphere about the unit vector `normal`, as many as there are
+    /// rays a place.
+    pub(super) fn hemisphere(&self, place: &Place, normal: Vec3A) -> impl Iterator<Item = Vec3A> {
+        let frame = frame(normal);
+        self.spread.hemisphere(seed(place)).map(move |d| frame * d)
+    }
+
     fn beam(&self, place: &Place, beam: &Beam, towards: DVec3) -> f32 {
         if towards == DVec3::ZERO {
             return 0.0;
