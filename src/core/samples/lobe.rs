@@ -86,9 +86,7 @@ impl<'a> Lobes<'a> {
             }
             let weight = match self.model {
                 SpecularModel::Kelemen => light / (half_view * cosine),
-                SpecularModel::Ggx => {
-                    4.0 * ggx_visibility(light, view, m * m) * light * half_view / cosine
-                }
+                SpecularModel::Ggx => 4.0 * ggx_visibility(light, view, m * m) * light * half_view / cosine,
             };
             all += weight;
             if !self.rays.hits(place.origin, along, 0.0) {

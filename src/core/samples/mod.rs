@@ -9,7 +9,7 @@
 //! - `trace`: primary rays, and what they hit
 //! - `posed`: the mesh in a pose with what is baked of it; `supply`: what finds fields of samples, `lit`: what reaches
 //!   them of lights, `bounced`: what the skin throws back of these, `sky`: what they see of the sky, `sky_rays`: by
-//!   rays; `surface`: frames, silhouette and maps at a hit
+//!   rays; `surface`: frames, silhouette and maps at a hit; `lobe`: how much of a specular lobe is open there
 //! - `group`: samples packed into groups
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
@@ -23,6 +23,7 @@ mod bounced;
 pub mod covered;
 mod group;
 mod lit;
+mod lobe;
 mod posed;
 pub mod rows;
 mod sky;

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::lobe::Lobes;
 use super::posed::PosedSurface;
 use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
@@ -63,6 +64,8 @@ pub(super) struct Surface<'a> {
     bitangents: Vec<Vec3>,
     /// Unit vectors from the eye to each vertex; empty where no one asks.
     views: Vec<Vec3>,
+    /// How much of specular lobes is open, where that is asked for.
+    lobes: Option<Lobes<'a>>,
 }
 
 impl<'a> Surface<'a> {
@@ -81,7 +84,8 @@ impl<'a> Surface<'a> {
         let view = |p: &Vec3| (p.as_dvec3() - eye).normalize_or_zero().as_vec3();
         let views = if per_vertex { mesh.positions.par_iter().map(view).collect() } else { Vec::new() };
         let (form, maps) = (scene.form, &scene.maps);
-        Self { posed, mesh, maps, occlusion, form, setup, dapple, eye, bitangents, views }
+        let lobes = Lobes::new(scene, mesh, posed.rays);
+        Self { posed, mesh, maps, occlusion, form, setup, dapple, eye, bitangents, views, lobes }
     }
 
     /// What the effects read of each sample.
@@ -143,7 +147,10 @@ impl<'a> Surface<'a> {
 
     /// What there is of a field at `hit`.
     pub(super) fn field(&self, field: Field, hit: Hit, numbers: &mut [f32]) {
-        self.posed.field(field, hit, numbers);
+        match self.lobes.as_ref().filter(|lobes| lobes.field == field) {
+            Some(lobes) => numbers.fill(lobes.open(hit.triangle, hit.weights(), &self.at(hit).0)),
+            None => self.posed.field(field, hit, numbers),
+        }
     }
 
     /// S.z at three vertices; 0 where no one asks.

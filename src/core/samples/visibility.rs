@@ -141,7 +141,7 @@ impl<'a> Shadows<'a> {
 }
 
 /// A place's own number.
-fn seed(place: &Place) -> u32 {
+pub(super) fn seed(place: &Place) -> u32 {
     // 0 and -0 are one place.
     let [x, y, z] = place.position.as_vec3().to_array().map(|x| (x + 0.0).to_bits());
     mix(x ^ mix(y ^ mix(z)))

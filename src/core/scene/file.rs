@@ -219,6 +219,7 @@ pub(super) struct QualityTable {
     pub occlusion_rays: Option<Spanned<i64>>,
     pub shadow_rays: Option<Spanned<i64>>,
     pub sky_rays: Option<Spanned<i64>>,
+    pub lobe_rays: Option<Spanned<i64>>,
 }
 
 /// A number, or one for each channel.

@@ -226,6 +226,8 @@ pub struct Quality {
     pub shadow_rays: u32,
     /// Rays a sample over its hemisphere, where the sky that it sees is found by rays.
     pub sky_rays: u32,
+    /// Rays a sample into the specular lobe, where its visibility is found by rays.
+    pub lobe_rays: u32,
 }
 
 impl Default for Quality {
@@ -239,6 +241,7 @@ impl Default for Quality {
             occlusion_rays: 256,
             shadow_rays: 1,
             sky_rays: 256,
+            lobe_rays: 64,
         }
     }
 }

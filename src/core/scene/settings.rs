@@ -287,6 +287,7 @@ pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, 
         occlusion_rays: pick(&table.occlusion_rays, "occlusion_rays", 1, 1 << 16, default.occlusion_rays)?,
         shadow_rays: pick(&table.shadow_rays, "shadow_rays", 1, 1 << 12, default.shadow_rays)?,
         sky_rays: pick(&table.sky_rays, "sky_rays", 1, 1 << 16, default.sky_rays)?,
+        lobe_rays: pick(&table.lobe_rays, "lobe_rays", 1, 1 << 12, default.lobe_rays)?,
     })
 }
 

@@ -128,11 +128,12 @@ fn quality(quality: Quality) -> String {
         occlusion_rays,
         shadow_rays,
         sky_rays,
+        lobe_rays,
     } = quality;
     format!(
         "samples_per_axis {samples_per_axis}, irradiance_size {irradiance_size}, lobe_size {lobe_size}, hilite_size \
          {hilite_size}, lobes_per_octave {lobes_per_octave}, occlusion_rays {occlusion_rays}, \
-         shadow_rays {shadow_rays}, sky_rays {sky_rays}"
+         shadow_rays {shadow_rays}, sky_rays {sky_rays}, lobe_rays {lobe_rays}"
     )
 }
 

@@ -286,6 +286,16 @@ pub fn baked(
 }
 
 impl Evaluated {
+    /// A scene baked and sampled without a cache.
+    ///
+    /// # Errors
+    /// When a stage refuses its input.
+    pub fn anew(scene: Scene) -> Result<Self, StudyError> {
+        let (bake, _) = baked(&scene, &scene, None)?;
+        let samples = Arc::new(traced(&scene, (&bake).into())?);
+        Ok(Self { scene, illumination: Arc::new(bake.illumination), samples })
+    }
+
     /// The switches of the model.
     #[must_use]
     pub fn setup(&self) -> Setup {

@@ -4,7 +4,7 @@ use serde_json::Value;
 
 use super::sandbox::{Ran, Sandbox};
 
-/// Every axis, in the order of documentation.
+/// Every axis that the scene asks for, in the order of documentation.
 pub(super) const AXES: [&str; 11] = [
     "format",
     "silhouette",
@@ -282,4 +282,30 @@ fn what_makes_no_sense_is_refused() {
     ]);
     sandbox.write("scene.toml", &before[&sandbox.path("scene.toml")]);
     assert!(sandbox.files() == before, "something was left");
+}
+
+#[test]
+fn ways_to_the_skys_light_are_measured_beside_rays() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"fresnel\", \"directional_occlusion\"]");
+    sandbox.edit("occlusion_rays = 32", "occlusion_rays = 256\nlobe_rays = 32");
+    let axes = ["--axis", "visibility", "--axis", "specular_visibility"];
+    done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &axes].concat()));
+    for (axis, reference, present) in
+        [("visibility", "rays", "sh4"), ("specular_visibility", "lobe", "lagarde")]
+    {
+        let settings = settings(&sandbox, "cost", axis);
+        let of = |key: &str| -> Vec<&str> {
+            settings.iter().filter(|s| s[key] == true).map(|s| s["name"].as_str().unwrap()).collect()
+        };
+        assert_eq!((of("reference"), of("present")), (vec![reference], vec![present]), "{settings:?}");
+        assert_eq!(error(named(&settings, reference)), 0.0);
+        assert!(settings.iter().all(|s| error(s) < 1.0), "{settings:?}");
+    }
+    // A direction of what is hidden is worth something.
+    let settings = settings(&sandbox, "cost", "visibility");
+    assert!(error(named(&settings, "sh4")) < error(named(&settings, "scalar")), "{settings:?}");
+    sandbox.write("plain.toml", super::sandbox::SCENE.as_bytes());
+    let idle = ["tradeoff", "plain.toml", "-o", "none", "--axis", "visibility"];
+    sandbox.run(&idle).refused(&["visibility", "directional_occlusion is off"]);
 }

@@ -12,6 +12,7 @@ mod remeshed;
 mod samples;
 mod silhouette;
 mod solver;
+mod ways;
 
 use super::axis::Axis;
 
@@ -27,6 +28,8 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &filter::Filters,
         &lobes::Density,
         &rays::Rays,
+        &ways::SKY,
+        &ways::LOBE,
         &samples::Samples,
         &pixels::Pixels,
         &solver::Solvers,

@@ -9,6 +9,7 @@
 // parameter: f0 = 0.028 in [0, 0.2]; reflectance when facing; Schlick 1994
 // parameter: f0_floor = 0.3 in [0, 1]; share of f0 where the specular map is black, if it scales f0; MODEL 9
 // parameter: fresnel_loss = 1 in [0, 1], of fresnel; how much of what is reflected the diffuse light lacks; MODEL 9
+// sample_field: lobe_seen: f32 = 1; open share of the specular lobe, by rays
 // sample_field: bent_normal: vec3f = 0; mean direction of the open sky, as long as its share of the hemisphere
 
 // m, the roughness that every formula takes.
@@ -128,6 +129,25 @@ fn lobe_by_occlusion(view_cosine: f32, occ: f32, lobe_roughness: f32) -> f32 {
 fn lobe_by_cones(bent_normal: vec3f, n: vec3f, reflected: vec3f, occ: f32, lobe_width: f32) -> f32 {
     let bent: vec3f = normalize_or(bent_normal, n);
     return cone_visibility(dot(bent, reflected), occ, lobe_width);
+}
+
+// How much of the lobe is open, by rays into it.
+//
+// gives: lobe_open
+// when: lobe_visibility, !raster
+// cost: 0
+fn lobe_by_rays(lobe_seen: f32) -> f32 {
+    return lobe_seen;
+}
+
+// A rasteriser has no rays: the open share of the hemisphere tells (Lagarde and de Rousiers 2014).
+//
+// gives: lobe_open
+// when: lobe_visibility, raster
+// cost: 30
+// uses: specular
+fn lobe_by_occlusion_of_raster(view_cosine: f32, occ: f32, lobe_roughness: f32) -> f32 {
+    return lagarde_visibility(view_cosine, occ, lobe_roughness);
 }
 
 // E_r(R), the environment through the lobe, at the roughness where s = 0.

@@ -1,0 +1,120 @@
+//! Named choices of the model: several ways to one quantity, each beside the reference by rays.
+
+use std::time::Instant;
+
+use crate::StudyError;
+use crate::engine::Objective;
+use crate::model::choices::{SpecularVisibility, Visibility};
+use crate::model::effects::Effect;
+use crate::reference::Difference;
+use crate::render::image::Image;
+use crate::scene::Scene;
+use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
+use crate::tradeoff::bench::{Bench, Evaluated};
+
+/// A way, by its name in scene files, and what it changes of a scene.
+type Way = (&'static str, fn(&mut Scene));
+
+/// The ways to a quantity. The last one is the reference.
+pub(super) struct Ways {
+    axis: &'static str,
+    title: &'static str,
+    method: &'static str,
+    effect: &'static str,
+    idle: &'static str,
+    ways: &'static [Way],
+}
+
+/// How a point sees the sky.
+pub(super) const SKY: Ways = Ways {
+    axis: "visibility",
+    title: "The sky that a point sees",
+    method: "Images with the sky's light found by each way; rays a sample are the reference. Seconds are those of baking, tracing \
+             and one pass, nothing cached.",
+    effect: "directional_occlusion",
+    idle: "the effect directional_occlusion is off",
+    ways: &[
+        ("scalar", |scene| scene.choices.visibility = Visibility::Scalar),
+        ("cone", |scene| scene.choices.visibility = Visibility::Cone),
+        ("sh2", |scene| scene.choices.visibility = Visibility::Sh2),
+        ("sh3", |scene| scene.choices.visibility = Visibility::Sh3),
+        ("sh4", |scene| scene.choices.visibility = Visibility::Sh4),
+        ("sh5", |scene| scene.choices.visibility = Visibility::Sh5),
+        ("sh6", |scene| scene.choices.visibility = Visibility::Sh6),
+        ("rays", |scene| scene.choices.visibility = Visibility::Rays),
+    ],
+};
+
+/// How much of the specular lobe is open.
+pub(super) const LOBE: Ways = Ways {
+    axis: "specular_visibility",
+    title: "The open share of the specular lobe",
+    method: "Images with the open share of the lobe found by each way; rays into the lobe are the reference. Seconds are those \
+             of baking, tracing and one pass, nothing cached.",
+    effect: "fresnel",
+    idle: "the effect fresnel is off",
+    ways: &[
+        ("none", |scene| scene.choices.specular_visibility = SpecularVisibility::None),
+        ("lagarde", |scene| scene.choices.specular_visibility = SpecularVisibility::Lagarde),
+        ("cone", |scene| scene.choices.specular_visibility = SpecularVisibility::Cone),
+        ("lobe", |scene| scene.choices.specular_visibility = SpecularVisibility::Lobe),
+    ],
+};
+
+impl Axis for Ways {
+    fn name(&self) -> &'static str {
+        self.axis
+    }
+
+    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
+        let effects = bench.baked.scene.effects;
+        let on = Effect::from_name(self.effect).is_some_and(|effect| effects.has(effect));
+        on.then_some(()).ok_or(self.idle)
+    }
+
+    fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+        // Rays a sample take about as long as tracing it that often, and bakes are made anew.
+        let each = rates.trace + rates.images + rates.pass + bench.baked.seconds.bake;
+        Ok(each * self.ways.len() as f64 + 30.0 * rates.trace)
+    }
+
+    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
+        let own = &bench.baked.scene;
+        let mut found: Vec<(&str, bool, f64, Vec<Image>)> = Vec::new();
+        for &(name, way) in self.ways {
+            let mut scene = Scene::clone(own);
+            way(&mut scene);
+            let present = scene.choices == own.choices;
+            let since = Instant::now();
+            let evaluated = Evaluated::anew(scene)?;
+            evaluated.live_engine()?.loss(&bench.point());
+            let seconds = since.elapsed().as_secs_f64();
+            found.push((name, present, seconds, evaluated.images(&bench.point())?));
+        }
+        let exact = found.last().map(|(.., images)| images.clone()).unwrap_or_default();
+        let last = found.len().saturating_sub(1);
+        let setting =
+            |(i, (name, present, seconds, images)): (usize, (&str, bool, f64, Vec<Image>))| Setting {
+                name: name.to_owned(),
+                choose: None,
+                error: Difference::of_all(&exact, &images),
+                cost: seconds,
+                time: None,
+                counts: Vec::new(),
+                reference: i == last,
+                present,
+                pareto: false,
+            };
+        let mut settings: Vec<Setting> = found.into_iter().enumerate().map(setting).collect();
+        mark_pareto(&mut settings);
+        let method = self.method.to_owned();
+        Ok(Sweep {
+            axis: self.axis,
+            title: self.title,
+            method,
+            cost: "seconds",
+            settings,
+            traces: Vec::new(),
+        })
+    }
+}
