@@ -254,6 +254,7 @@ fn light() -> Illumination {
         irradiance: Some(cube(16, 1.0)),
         lobes: Some(LobeStack { exponents: vec![32.0], cubes: vec![cube(32, 8.0)] }),
         hilite: Some(cube(32, 4.0)),
+        reflected: None,
     }
 }
 

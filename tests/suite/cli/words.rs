@@ -1,6 +1,7 @@
 //! Help pages, the parameter table, and words that are not understood.
 
 use skinfit::model::params::{ParamInfo, TABLE};
+use skinfit::shader::term::library;
 
 use super::sandbox::Sandbox;
 
@@ -77,9 +78,12 @@ fn the_parameter_table_is_whole_in_every_format() {
     let print = |format: &str| sandbox.run(&["params", "--format", format]).done().out;
     assert_eq!(sandbox.run(&["params"]).done().out, print("text"));
     let (text, markdown) = (print("text"), print("markdown"));
-    assert_eq!(text.lines().count(), 1 + TABLE.len());
-    assert_eq!(markdown.lines().count(), 2 + TABLE.len());
-    for (i, row) in TABLE.iter().enumerate() {
+    let library = library::terms().iter().flat_map(|term| &term.params).map(|param| param.info());
+    let table: Vec<&ParamInfo> = TABLE.iter().chain(library).collect();
+    assert!(table.iter().any(|row| row.name == "roughness"));
+    assert_eq!(text.lines().count(), 1 + table.len());
+    assert_eq!(markdown.lines().count(), 2 + table.len());
+    for (i, row) in table.iter().enumerate() {
         let line = text.lines().nth(1 + i).unwrap();
         assert!(line.starts_with(row.name), "{line}");
         assert!(told(row).iter().all(|word| line.contains(word.as_str())), "{line}");
@@ -89,8 +93,8 @@ fn the_parameter_table_is_whole_in_every_format() {
     }
     let json: serde_json::Value = serde_json::from_str(&print("json")).unwrap();
     let rows = json.as_array().unwrap();
-    assert_eq!(rows.len(), TABLE.len());
-    for (json, row) in rows.iter().zip(&TABLE) {
+    assert_eq!(rows.len(), table.len());
+    for (json, row) in rows.iter().zip(&table) {
         assert_eq!((json["name"].as_str(), json["unit"].as_str()), (Some(row.name), Some(row.unit)));
         assert_eq!(json["default"]["corrected"].as_f64(), Some(row.corrected));
         assert_eq!(json["default"]["listing"].as_f64(), Some(row.listing));

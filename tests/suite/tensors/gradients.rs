@@ -187,6 +187,9 @@ impl Case {
             irradiance,
             lobe,
             hilite,
+            // No effect here reads them.
+            reflected: matrix(vec![0.0], 1, &device),
+            glossy: matrix(vec![0.0], 1, &device),
         };
         let image = shade.image(inputs).unwrap();
         let gradients = (image * matrix(weights, 4, &device)).sum().backward();
