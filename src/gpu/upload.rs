@@ -5,14 +5,16 @@ use std::sync::Arc;
 
 use wgpu::util::{DeviceExt as _, TextureDataOrder};
 use wgpu::{
-    AddressMode, BindingResource, Buffer, BufferUsages, Extent3d, FilterMode, MipmapFilterMode, Sampler,
-    SamplerDescriptor, TextureDescriptor, TextureDimension, TextureUsages, TextureView,
-    TextureViewDescriptor,
+    AddressMode, BindingResource, Buffer, BufferUsages, CommandEncoder, Extent3d, FilterMode,
+    MipmapFilterMode, Sampler, SamplerDescriptor, TextureDescriptor, TextureDimension, TextureUsages,
+    TextureView, TextureViewDescriptor,
 };
 
 use super::device::Gpu;
 use super::error::{GpuError, Oversized};
+use super::shadow::{self, Mapped};
 use super::texels::{self, Texels};
+use super::timing::Timer;
 use super::vertices;
 use crate::bake::rays::RayMesh;
 use crate::bake::{Illumination, VertexOcclusion};
@@ -22,7 +24,7 @@ use crate::prepare::Baked;
 use crate::samples::PosedSurface;
 use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, PosedMesh};
-use crate::shader::{Attribute, Resource};
+use crate::shader::{Attribute, Facts, Resource};
 
 /// What is rendered: a scene, its bakes, and the parameters. Whatever is large is shared: a clone copies none of it.
 #[derive(Clone)]
@@ -60,6 +62,9 @@ pub(super) struct Uploads {
     specular: Option<Cube<f32>>,
     attributes: HashMap<Attribute, Buffer>,
     resources: HashMap<Resource, Bound>,
+    /// The lights that have shadow maps, and those, once a plan reads them.
+    mapped: Vec<Mapped>,
+    shadow_maps: Option<shadow::Maps>,
     indices: Buffer,
     /// Bytes that were uploaded.
     bytes: u64,
@@ -100,10 +105,12 @@ impl Uploads {
 
     fn of_mesh(
         gpu: &Gpu,
-        content: Content,
+        mut content: Content,
         targets: Vec<usize>,
         split: Option<(Mesh, Option<VertexOcclusion>)>,
     ) -> Result<Self, GpuError> {
+        let mapped = shadow::mapped(&content.scene, &content.params);
+        content.params = shadow::with_layers(content.params, &mapped);
         let mesh = split.as_ref().map_or(&content.scene.mesh, |(mesh, _)| mesh);
         let triangles = bytemuck::cast_slice(&mesh.triangles);
         let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX)?;
@@ -111,7 +118,20 @@ impl Uploads {
         let specular = content.illumination.lobes.as_ref().map(|stack| stack.at(lobe).0);
         let bytes = triangles.len() as u64;
         let (attributes, resources) = (HashMap::new(), HashMap::new());
-        Ok(Self { content, split, targets, specular, attributes, resources, indices, bytes, clipped: 0 })
+        let shadow_maps = None;
+        Ok(Self {
+            content,
+            split,
+            targets,
+            specular,
+            attributes,
+            resources,
+            mapped,
+            shadow_maps,
+            indices,
+            bytes,
+            clipped: 0,
+        })
     }
 
     /// What attributes are of.
@@ -165,6 +185,39 @@ impl Uploads {
         Ok(bound)
     }
 
+    /// Have the shadow maps that plans of these facts read.
+    pub(super) fn make_shadow_maps(&mut self, gpu: &Gpu, facts: &Facts) -> Result<(), GpuError> {
+        if self.shadow_maps.is_some() {
+            return Ok(());
+        }
+        let scene = Arc::clone(&self.content.scene);
+        let lights = std::mem::take(&mut self.mapped);
+        let mut maps = shadow::Maps::new(gpu, facts, lights, scene.shadow_maps, self)?;
+        maps.set_pose(gpu, &scene.mesh.pose().positions);
+        self.bytes += maps.bytes();
+        self.resources.extend(maps.bound(gpu));
+        self.shadow_maps = Some(maps);
+        Ok(())
+    }
+
+    /// Draw the shadow maps, where a plan reads them and what they show has changed.
+    pub(super) fn draw_shadow_maps(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut CommandEncoder,
+        morph_weights: &[f32],
+        timer: Option<&mut Timer>,
+    ) {
+        if let Some(maps) = &mut self.shadow_maps {
+            maps.draw(gpu, encoder, morph_weights, timer);
+        }
+    }
+
+    /// How often shadow maps were drawn, layer by layer.
+    pub(super) fn shadow_maps_drawn(&self) -> u64 {
+        self.shadow_maps.as_ref().map_or(0, shadow::Maps::drawn)
+    }
+
     fn make(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
         let (scene, illumination) = (Arc::clone(&self.content.scene), Arc::clone(&self.content.illumination));
         let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
@@ -179,8 +232,11 @@ impl Uploads {
             Resource::Bones => return self.storage(gpu, "bones", &vertices::bones(&scene.mesh.bones)),
             Resource::IrradianceFaces => cube(&illumination.irradiance, texels::faces),
             Resource::SpecularFaces => cube(&self.specular, texels::faces),
-            // A fit's: no renderer's plan reads it.
-            Resource::SpecularSlopeFaces => None,
+            // A fit's: no renderer's plan reads it. Shadow maps are there before they are asked for.
+            Resource::SpecularSlopeFaces
+            | Resource::ShadowMaps
+            | Resource::ShadowSampler
+            | Resource::ShadowViews => None,
             Resource::HiliteFaces => cube(&illumination.hilite, texels::faces),
             Resource::IrradianceCube => cube(&illumination.irradiance, texels::cube),
             Resource::SpecularCube => cube(&self.specular, texels::cube),
@@ -206,14 +262,18 @@ impl Uploads {
 
     /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the
     /// device; and `occlusion`, where that pose has one of its own, in place of the scene's.
-    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
+    pub(super) fn set_mesh(&mut self, gpu: &Gpu, mesh: &Mesh, occlusion: Option<&VertexOcclusion>) {
         let own = occlusion.is_some();
         let occlusion = occlusion.or(self.content.occlusion.as_deref());
         // What is found at vertices is found anew in this pose.
         let finds = self.attributes.keys().any(|attribute| matches!(attribute, Attribute::Field(_)));
-        let posed = if finds { mesh.pose() } else { PosedMesh::default() };
-        let rays = RayMesh::new(&posed.positions, &posed.triangles);
-        let surface = PosedSurface::with_fields(&self.content.scene, &posed, &rays);
+        let posed = if finds || self.shadow_maps.is_some() { mesh.pose() } else { PosedMesh::default() };
+        if let Some(maps) = &mut self.shadow_maps {
+            maps.set_pose(gpu, &posed.positions);
+        }
+        let traced = if finds { posed } else { PosedMesh::default() };
+        let rays = RayMesh::new(&traced.positions, &traced.triangles);
+        let surface = PosedSurface::with_fields(&self.content.scene, &traced, &rays);
         for (&attribute, buffer) in &self.attributes {
             let moves = matches!(
                 attribute,

@@ -24,12 +24,12 @@ use crate::scene_folder::{SCENE, SceneFolder, exr};
 /// Reflectance of sphere and plane.
 const ALBEDO: f64 = 0.5;
 
-fn param(name: &str) -> Param {
+pub(crate) fn param(name: &str) -> Param {
     Param::from_name(name).unwrap_or_else(|| panic!("no parameter {name}"))
 }
 
 /// A calibration scene with its lamp on: sphere and plane are white, and `base_weight` makes them grey.
-fn calibration(name: &str) -> Option<Baked> {
+pub(crate) fn calibration(name: &str) -> Option<Baked> {
     let path = common::data()?.join(format!("calib_lights/{name}.toml"));
     let effects = Some(Effects::of(&[Effect::Lights, Effect::Shadows]));
     let options = PrepareOptions { fit: true, effects, ..PrepareOptions::default() };
@@ -99,7 +99,7 @@ fn a_lamps_colour_is_fitted_on_both_engines() {
 }
 
 /// A quad under a light from one direction, a spot, and the sun of a panorama.
-fn quad(effects: &str, environment: &str) -> SceneFolder {
+pub(crate) fn quad(effects: &str, environment: &str) -> SceneFolder {
     let folder = SceneFolder::new();
     // A sky of 0.2 with a sun of a few texels.
     let sun = |i: usize| (20..23).contains(&(i / 256)) && (20..23).contains(&(i % 256));
@@ -129,7 +129,7 @@ outer_degrees = 25
     folder
 }
 
-fn baked(folder: &SceneFolder) -> Baked {
+pub(crate) fn baked(folder: &SceneFolder) -> Baked {
     let options = PrepareOptions { fit: true, ..PrepareOptions::default() };
     Baked::new(&folder.path("scene.toml"), &options).unwrap()
 }

@@ -22,6 +22,8 @@ const IN_SKY: &str = include_str!("../shader/rules/family/in_sky.wgsl");
 const LAMP: &str = include_str!("../shader/rules/family/lamp.wgsl");
 /// What any light shows.
 const LIT: &str = include_str!("../shader/rules/family/lit.wgsl");
+/// What shadow maps leave of it.
+const SHADOW: &str = include_str!("../shader/rules/family/shadow.wgsl");
 
 /// The effect of a light, known to this process from then on. Lights of one name and kind, of whatever scenes, are one
 /// effect: their numbers are parameters.
@@ -30,9 +32,9 @@ const LIT: &str = include_str!("../shader/rules/family/lit.wgsl");
 /// When a file of rules has taken its names.
 fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> {
     let text = match (&light.kind, from_sky) {
-        (LightKind::Directional(_), true) => [BEAM, IN_SKY, LIT].concat(),
-        (LightKind::Directional(_), false) => [BEAM, IN_WORLD, LIT].concat(),
-        (LightKind::Point(_) | LightKind::Spot(..), _) => [LAMP, LIT].concat(),
+        (LightKind::Directional(_), true) => [BEAM, IN_SKY, LIT, SHADOW].concat(),
+        (LightKind::Directional(_), false) => [BEAM, IN_WORLD, LIT, SHADOW].concat(),
+        (LightKind::Point(_) | LightKind::Spot(..), _) => [LAMP, LIT, SHADOW].concat(),
     };
     let member = light.member();
     let stamped = stamped(&text, &member).unwrap_or(text);

@@ -10,6 +10,7 @@ mod quality;
 mod rays;
 mod remeshed;
 mod samples;
+mod shadows;
 mod silhouette;
 mod solver;
 
@@ -28,6 +29,7 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &lobes::Density,
         &rays::Rays,
         &samples::Samples,
+        &shadows::Shadows,
         &pixels::Pixels,
         &solver::Solvers,
     ]
