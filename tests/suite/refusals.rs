@@ -141,12 +141,12 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         (
             "[quality]",
             "[quality]\nshadow_map_size = 15".into(),
-            &["line 21", "shadow_map_size = 15", "[16, 8192]"],
+            &["line 22", "shadow_map_size = 15", "[16, 8192]"],
         ),
         (
             "[quality]",
             "[quality]\nshadow_bias = -1.0".into(),
-            &["line 21", "shadow_bias = -1", "texels in [0, 64]"],
+            &["line 22", "shadow_bias = -1", "texels in [0, 64]"],
         ),
         ("[quality]", "[quality]\nshadow_radius = nan".into(), &["shadow_radius = NaN", "texels in [0, 64]"]),
         ("[quality]", "[quality]\nshadow_taps = 0".into(), &["shadow_taps = 0", "[1, 256]"]),

@@ -20,9 +20,14 @@ fn with_maps(baked: &Baked, change: impl Fn(&mut ShadowMaps)) -> Baked {
     baked.clone().with_scene(|scene: &mut Scene| change(&mut scene.shadow_maps))
 }
 
-/// A scene's one light, moved.
-fn with_light(baked: &Baked, change: impl Fn(&mut LightKind)) -> Baked {
-    baked.clone().with_scene(|scene: &mut Scene| change(&mut scene.lights[0].kind))
+/// A scene's one lamp at another place, and as large.
+fn with_lamp(baked: &Baked, position: DVec3, radius: f64) -> Baked {
+    baked.clone().with_scene(|scene: &mut Scene| {
+        if let LightKind::Point(lamp) = &mut scene.lights[0].kind {
+            (lamp.position, lamp.radius) = (position, radius);
+        }
+        scene.params.set_rgb(param("light.point.position"), position.to_array());
+    })
 }
 
 /// The mean absolute error of pixels that both cover wholly, over their mean radiance.
@@ -142,13 +147,7 @@ fn a_quad_that_nothing_shades_is_lit_as_by_rays() {
 fn lamps_within_behind_and_around_the_mesh_are_as_by_rays() {
     let Some(gpu) = gpu() else { return };
     let Some(baked) = calibration("point") else { return };
-    let at = |position: DVec3, radius: f64| {
-        with_light(&baked, |kind| {
-            if let LightKind::Point(lamp) = kind {
-                (lamp.position, lamp.radius) = (position, radius);
-            }
-        })
-    };
+    let at = |position: DVec3, radius: f64| with_lamp(&baked, position, radius);
     let sphere = DVec3::new(0.0, 1.6, 0.0);
     for filter in [ShadowFilter::Hardware, ShadowFilter::Pcf, ShadowFilter::Pcss] {
         let change = |maps: &mut ShadowMaps| (maps.filter, maps.size) = (filter, 512);
