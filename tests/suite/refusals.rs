@@ -133,7 +133,7 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
             "[quality]",
             "[quality]\nshadow_filter = \"pfc\"".into(),
             &[
-                "line 21",
+                "line 22",
                 "unknown shadow_filter `pfc`",
                 "Did you mean `pcf`? Known: vertices, hardware, pcf, pcss",
             ],
