@@ -111,6 +111,7 @@ pub fn levels(gpu: &Gpu, plan: &Plan, content: Content) -> Result<HashMap<String
     let params = &uploads.content().params;
     atlas.set(gpu, &Values { params, camera: &camera, tile, morph_weights: &morph_weights });
     let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("atlas") });
+    uploads.draw_shadow_maps(gpu, &mut encoder, &morph_weights, None);
     atlas.draw(&mut encoder, None);
     let copies: Vec<(String, Copy)> =
         atlas.levels.iter().map(|(name, view)| (name.clone(), Copy::new(gpu, &mut encoder, view))).collect();

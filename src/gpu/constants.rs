@@ -40,6 +40,23 @@ pub(super) fn block(constants: &[Constant], values: &Values<'_>) -> Vec<f32> {
     block
 }
 
+/// The block of a plan that places the mesh and does nothing else, by another matrix than a camera's.
+pub(super) fn outline_block(constants: &[Constant], to_clip: &DMat4, morph_weights: &[f32]) -> Vec<f32> {
+    let mut block = Vec::new();
+    for &constant in constants {
+        match constant {
+            Constant::ViewProjection => {
+                to_clip.to_cols_array().chunks(4).for_each(|column| push(&mut block, column));
+            }
+            Constant::MorphWeights => {
+                morph_weights.iter().for_each(|&weight| push(&mut block, &[f64::from(weight)]));
+            }
+            _ => push(&mut block, &[]),
+        }
+    }
+    block
+}
+
 /// The block of constants that the parameters alone give, as those of stored samples are.
 pub(crate) fn model_block(constants: &[Constant], params: &Params) -> Vec<f32> {
     let mut block = Vec::new();

@@ -21,6 +21,8 @@ pub enum Oversized {
     Mesh,
     /// Samples of views, or what is computed of them.
     Samples,
+    /// A shadow map.
+    ShadowMap,
 }
 
 /// The renderer could not do its work.
@@ -62,6 +64,16 @@ pub enum GpuError {
         limit: u32,
         /// What is too large.
         of: Oversized,
+    },
+    /// A scene's lights take more shadow maps than a texture has layers.
+    #[error("adapter {adapter}: {layers} shadow maps, but there may be {limit} at most there.")]
+    ShadowMaps {
+        /// The adapter.
+        adapter: String,
+        /// Maps of all lights, six for one that shines to all sides.
+        layers: usize,
+        /// The limit.
+        limit: u32,
     },
     /// A buffer is beyond the adapter's limit.
     #[error(

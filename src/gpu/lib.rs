@@ -7,6 +7,7 @@
 //! - `constants`: the uniform block
 //! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
 //! - `program`: a plan on the device: its `pipeline`, and before it its passes over the UV atlas ([`atlas`])
+//! - `shadow`: shadow maps: what each light sees first
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
 //! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
 //! - `records`: where the numbers of a stored sample stand on the device
@@ -39,6 +40,7 @@ pub(crate) mod readback;
 pub mod records;
 pub mod renderer;
 mod resolve;
+mod shadow;
 mod stage;
 mod targets;
 pub(crate) mod texels;

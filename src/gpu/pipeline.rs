@@ -16,7 +16,7 @@ use super::error::GpuError;
 use super::targets::DEPTH;
 use super::upload::{Bound, Uploads};
 use crate::shader::quantity::Kind;
-use crate::shader::{Attribute, Plan};
+use crate::shader::{Attribute, Plan, Resource};
 
 /// A plan's pipeline, and what is bound to it.
 pub(super) struct Pipeline {
@@ -50,6 +50,9 @@ impl Pipeline {
         levels: Vec<Bound>,
         outputs: Outputs<'_>,
     ) -> Result<Self, GpuError> {
+        if plan.resources.contains(&Resource::ShadowMaps) {
+            uploads.make_shadow_maps(gpu, &plan.facts)?;
+        }
         let attributes =
             plan.attributes.iter().map(|&a| uploads.attribute(gpu, a)).collect::<Result<Vec<_>, _>>()?;
         let mut resources =
@@ -102,7 +105,7 @@ fn constant_buffer(gpu: &Gpu, plan: &Plan) -> Option<Buffer> {
     (size > 0).then(|| gpu.buffer("constants", &vec![0; size], BufferUsages::UNIFORM))
 }
 
-fn layout(gpu: &Gpu, plan: &Plan) -> BindGroupLayout {
+pub(super) fn layout(gpu: &Gpu, plan: &Plan) -> BindGroupLayout {
     let entry = |binding, visibility, ty| BindGroupLayoutEntry { binding, visibility, ty, count: None };
     let constants = (!plan.constants.is_empty()).then(|| {
         let ty = BindingType::Buffer {
@@ -114,7 +117,7 @@ fn layout(gpu: &Gpu, plan: &Plan) -> BindGroupLayout {
     });
     let resources = plan.resources.iter().enumerate().map(|(i, resource)| {
         let kind = resource.kind();
-        // Storage is what the vertex stage reads; textures are the fragment stage's.
+        // Storage is what the vertex stage reads; textures and rows are the fragment stage's.
         let stage = if kind == Kind::Storage { ShaderStages::VERTEX } else { ShaderStages::FRAGMENT };
         entry(1 + i as u32, stage, binding_type(kind))
     });
@@ -138,7 +141,13 @@ fn binding_type(kind: Kind) -> BindingType {
         Kind::Texels => texture(false, TextureViewDimension::D2),
         Kind::Map => texture(true, TextureViewDimension::D2),
         Kind::Sampler => BindingType::Sampler(SamplerBindingType::Filtering),
-        Kind::Storage => BindingType::Buffer {
+        Kind::Depth => BindingType::Texture {
+            sample_type: TextureSampleType::Depth,
+            view_dimension: TextureViewDimension::D2Array,
+            multisampled: false,
+        },
+        Kind::Comparison => BindingType::Sampler(SamplerBindingType::Comparison),
+        Kind::Storage | Kind::Rows => BindingType::Buffer {
             ty: BufferBindingType::Storage { read_only: true },
             has_dynamic_offset: false,
             min_binding_size: None,
@@ -146,7 +155,12 @@ fn binding_type(kind: Kind) -> BindingType {
     }
 }
 
-fn bind(gpu: &Gpu, layout: &BindGroupLayout, constants: Option<&Buffer>, resources: &[Bound]) -> BindGroup {
+pub(super) fn bind(
+    gpu: &Gpu,
+    layout: &BindGroupLayout,
+    constants: Option<&Buffer>,
+    resources: &[Bound],
+) -> BindGroup {
     let constants =
         constants.map(|buffer| BindGroupEntry { binding: 0, resource: buffer.as_entire_binding() });
     let resources = resources
@@ -172,7 +186,7 @@ fn vertex_format(attribute: Attribute) -> VertexFormat {
     }
 }
 
-fn pipeline(
+pub(super) fn pipeline(
     gpu: &Gpu,
     plan: &Plan,
     layout: &BindGroupLayout,

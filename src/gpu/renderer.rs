@@ -138,6 +138,12 @@ impl Renderer {
         self.uploads.clipped()
     }
 
+    /// How often a layer of the shadow maps was drawn: once each, and again where the mesh has moved.
+    #[must_use]
+    pub fn shadow_maps_drawn(&self) -> u64 {
+        self.uploads.shadow_maps_drawn()
+    }
+
     /// Put something behind the mesh in the frames to come.
     pub fn set_background(&mut self, background: Background) {
         self.background = background;

@@ -9,8 +9,9 @@ use super::device::Gpu;
 use super::error::GpuError;
 use super::readback::map;
 
-/// The passes of one tile: an image's own few, and those over the atlas, two for each blur.
-const MOST_PASSES: u32 = 64;
+/// The passes of one tile: an image's own few, those over the atlas, two for each blur, and one for each layer of shadow
+/// maps.
+const MOST_PASSES: u32 = 320;
 
 /// GPU time of a pass, over all tiles.
 #[derive(Clone, Debug, PartialEq)]

@@ -5,14 +5,16 @@ use std::sync::Arc;
 
 use wgpu::util::{DeviceExt as _, TextureDataOrder};
 use wgpu::{
-    AddressMode, BindingResource, Buffer, BufferUsages, Extent3d, FilterMode, MipmapFilterMode, Sampler,
-    SamplerDescriptor, TextureDescriptor, TextureDimension, TextureUsages, TextureView,
-    TextureViewDescriptor,
+    AddressMode, BindingResource, Buffer, BufferUsages, CommandEncoder, Extent3d, FilterMode,
+    MipmapFilterMode, Sampler, SamplerDescriptor, TextureDescriptor, TextureDimension, TextureUsages,
+    TextureView, TextureViewDescriptor,
 };
 
 use super::device::Gpu;
 use super::error::{GpuError, Oversized};
+use super::shadow::{self, Mapped};
 use super::texels::{self, Texels};
+use super::timing::Timer;
 use super::vertices;
 use crate::bake::rays::RayMesh;
 use crate::bake::stacks::Stack;
@@ -24,7 +26,7 @@ use crate::prepare::Baked;
 use crate::samples::PosedSurface;
 use crate::scene::Scene;
 use crate::scene::mesh::Mesh;
-use crate::shader::{Attribute, Resource};
+use crate::shader::{Attribute, Facts, Resource};
 
 /// What is rendered: a scene, its bakes, and the parameters. Whatever is large is shared: a clone copies none of it.
 #[derive(Clone)]
@@ -67,6 +69,9 @@ pub(super) struct Uploads {
     /// What was found of fields at the vertices.
     found: HashMap<Field, Vec<f32>>,
     resources: HashMap<Resource, Bound>,
+    /// The lights that have shadow maps, and those, once a plan reads them.
+    mapped: Vec<Mapped>,
+    shadow_maps: Option<shadow::Maps>,
     indices: Buffer,
     /// Bytes that were uploaded.
     bytes: u64,
@@ -107,10 +112,12 @@ impl Uploads {
 
     fn of_mesh(
         gpu: &Gpu,
-        content: Content,
+        mut content: Content,
         targets: Vec<usize>,
         split: Option<(Mesh, Option<VertexOcclusion>)>,
     ) -> Result<Self, GpuError> {
+        let mapped = shadow::mapped(&content.scene, &content.params);
+        content.params = shadow::with_layers(content.params, &mapped);
         let mesh = split.as_ref().map_or(&content.scene.mesh, |(mesh, _)| mesh);
         let triangles = bytemuck::cast_slice(&mesh.triangles);
         let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX)?;
@@ -125,6 +132,8 @@ impl Uploads {
             attributes: HashMap::new(),
             found: HashMap::new(),
             resources: HashMap::new(),
+            mapped,
+            shadow_maps: None,
             indices,
             bytes,
             clipped: 0,
@@ -209,6 +218,39 @@ impl Uploads {
         Ok(bound)
     }
 
+    /// Have the shadow maps that plans of these facts read.
+    pub(super) fn make_shadow_maps(&mut self, gpu: &Gpu, facts: &Facts) -> Result<(), GpuError> {
+        if self.shadow_maps.is_some() {
+            return Ok(());
+        }
+        let scene = Arc::clone(&self.content.scene);
+        let lights = std::mem::take(&mut self.mapped);
+        let mut maps = shadow::Maps::new(gpu, facts, lights, scene.shadow_maps, self)?;
+        maps.set_pose(gpu, &scene.mesh.pose().positions);
+        self.bytes += maps.bytes();
+        self.resources.extend(maps.bound(gpu));
+        self.shadow_maps = Some(maps);
+        Ok(())
+    }
+
+    /// Draw the shadow maps, where a plan reads them and what they show has changed.
+    pub(super) fn draw_shadow_maps(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut CommandEncoder,
+        morph_weights: &[f32],
+        timer: Option<&mut Timer>,
+    ) {
+        if let Some(maps) = &mut self.shadow_maps {
+            maps.draw(gpu, encoder, morph_weights, timer);
+        }
+    }
+
+    /// How often shadow maps were drawn, layer by layer.
+    pub(super) fn shadow_maps_drawn(&self) -> u64 {
+        self.shadow_maps.as_ref().map_or(0, shadow::Maps::drawn)
+    }
+
     fn make(&mut self, gpu: &Gpu, resource: Resource) -> Result<Bound, GpuError> {
         let (scene, illumination) = (Arc::clone(&self.content.scene), Arc::clone(&self.content.illumination));
         let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
@@ -226,8 +268,13 @@ impl Uploads {
             Resource::SpecularFaces => cube(stacked(Stack::Specular), texels::faces),
             Resource::ReflectedFaces => cube(stacked(Stack::Reflected), texels::faces),
             Resource::GlossyFaces => cube(stacked(Stack::Glossy), texels::faces),
-            // A fit's: no renderer's plan reads them.
-            Resource::SpecularSlopeFaces | Resource::ReflectedSlopeFaces | Resource::GlossySlopeFaces => None,
+            // A fit's: no renderer's plan reads them. Shadow maps are there before they are asked for.
+            Resource::SpecularSlopeFaces
+            | Resource::ReflectedSlopeFaces
+            | Resource::GlossySlopeFaces
+            | Resource::ShadowMaps
+            | Resource::ShadowSampler
+            | Resource::ShadowViews => None,
             Resource::HiliteFaces => cube(&illumination.hilite, texels::faces),
             Resource::IrradianceCube => cube(&illumination.irradiance, texels::cube),
             Resource::SpecularCube => cube(stacked(Stack::Specular), texels::cube),
@@ -255,7 +302,15 @@ impl Uploads {
 
     /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the
     /// device; and what is baked of that pose, where it has bakes of its own, in place of the scene's.
-    pub(super) fn set_mesh(&self, gpu: &Gpu, mesh: &Mesh, own: Option<&PoseBake>) -> Result<(), GpuError> {
+    pub(super) fn set_mesh(
+        &mut self,
+        gpu: &Gpu,
+        mesh: &Mesh,
+        own: Option<&PoseBake>,
+    ) -> Result<(), GpuError> {
+        if let Some(maps) = &mut self.shadow_maps {
+            maps.set_pose(gpu, &mesh.pose().positions);
+        }
         let (occlusion, sky) = own.map_or((None, None), |own| (own.occlusion.as_ref(), own.sky.as_ref()));
         let occluded = occlusion.is_some();
         let occlusion = occlusion.or(self.content.occlusion.as_deref());

@@ -14,7 +14,7 @@ use skinfit::model::params::Params;
 use skinfit::scene::maps::{Environment, Map, Maps, Spots};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
 use skinfit::scene::view::{Background, Camera, View};
-use skinfit::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene};
+use skinfit::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene, ShadowMaps};
 
 /// The named planes of an EXR file, and its width and height.
 pub(crate) struct Planes {
@@ -175,6 +175,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
             maps: MapSettings::default(),
         },
         quality: Quality::default(),
+        shadow_maps: ShadowMaps::default(),
         bloom: Bloom::default(),
         lights: Vec::new(),
         sky_lights: Vec::new(),

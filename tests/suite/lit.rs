@@ -29,7 +29,7 @@ pub(crate) fn param(name: &str) -> Param {
 }
 
 /// A calibration scene with its lamp on: sphere and plane are white, and `base_weight` makes them grey.
-fn calibration(name: &str) -> Option<Baked> {
+pub(crate) fn calibration(name: &str) -> Option<Baked> {
     let path = common::data()?.join(format!("calib_lights/{name}.toml"));
     let effects = Some(Effects::of(&[Effect::Lights, Effect::Shadows]));
     let options = PrepareOptions { fit: true, effects, ..PrepareOptions::default() };

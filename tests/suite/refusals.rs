@@ -129,6 +129,27 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
             "\"env.exr\"\nlight_spot_degrees = 0".into(),
             &["line 11", "light_spot_degrees = 0", "[0.05, 45]"],
         ),
+        (
+            "[quality]",
+            "[quality]\nshadow_filter = \"pfc\"".into(),
+            &[
+                "line 22",
+                "unknown shadow_filter `pfc`",
+                "Did you mean `pcf`? Known: vertices, hardware, pcf, pcss",
+            ],
+        ),
+        (
+            "[quality]",
+            "[quality]\nshadow_map_size = 15".into(),
+            &["line 22", "shadow_map_size = 15", "[16, 8192]"],
+        ),
+        (
+            "[quality]",
+            "[quality]\nshadow_bias = -1.0".into(),
+            &["line 22", "shadow_bias = -1", "texels in [0, 64]"],
+        ),
+        ("[quality]", "[quality]\nshadow_radius = nan".into(), &["shadow_radius = NaN", "texels in [0, 64]"]),
+        ("[quality]", "[quality]\nshadow_taps = 0".into(), &["shadow_taps = 0", "[1, 256]"]),
         ("[fit]", "[bloom]\nsigma = 0.3\n[fit]".into(), &["line 21", "sigma = 0.3", "[0, 0.25]"]),
         (
             "[fit]",

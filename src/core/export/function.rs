@@ -27,8 +27,15 @@ pub(super) fn text(
     };
     let idle = idle(facts.setup.effects, params);
     let effects = facts.setup.effects.iter().filter(|&effect| !idle.has(effect)).collect();
-    // Not every language has 16-bit numbers, nor every engine's adapter; one function draws no atlas.
-    let plan = plan(&Facts { setup: Setup { effects, ..facts.setup }, f16: false, atlas: None, ..*facts })?;
+    // Not every language has 16-bit numbers, nor every engine's adapter; one function draws no atlas; and an engine has
+    // shadow maps of its own, of which the function takes what they leave of each light.
+    let plan = plan(&Facts {
+        setup: Setup { effects, ..facts.setup },
+        f16: false,
+        atlas: None,
+        shadows: None,
+        ..*facts
+    })?;
     let mut text = header(&plan, idle, params, from);
     let _ = write!(text, "\n{}", dialect.prologue);
     let literals = plan.literals(params);

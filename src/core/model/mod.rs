@@ -8,6 +8,7 @@
 //! - [`registry`]: how tables of parameters, effects, terms and fields grow
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands;
 //!   [`bearing`]: directions as angles; [`mod@turn`]: how the environment is turned
+//! - [`shadow_filter`]: how a renderer finds shadows
 //! - [`fragment`]: a fragment as samples hold it
 //! - [`vertex`]: morphing, skinning and the frame of a vertex, of which meshes are posed
 //! - [`cube`]: cube maps and their seamless bilinear lookup
@@ -29,6 +30,7 @@ pub mod params;
 pub mod readings;
 pub mod real;
 pub mod registry;
+pub mod shadow_filter;
 pub mod terms;
 pub mod turn;
 pub mod vector;

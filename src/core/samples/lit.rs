@@ -10,7 +10,6 @@ use super::visibility::Shadows;
 use crate::bake::rays::RayMesh;
 use crate::model::effects::Effect;
 use crate::model::fields::Field;
-use crate::model::params::Param;
 use crate::scene::Scene;
 use crate::scene::light::{Light, LightKind};
 use crate::scene::mesh::PosedMesh;
@@ -60,11 +59,8 @@ pub(super) fn supplies<'a>(
     }
     let shadows = Arc::new(Shadows::new(mesh, rays, scene.quality.shadow_rays));
     let shadowed = scene.effects.has(Effect::Shadows);
-    let rotation = scene.params.scalar(Param::EnvironmentRotation);
-    let own = scene.lights.iter().map(|light| light.moved(&scene.params));
-    let of_sky = scene.sky_lights.iter().map(|light| light.moved(&scene.params).turned(rotation));
     let mut supplies: Vec<(Field, Box<dyn Supply + 'a>)> = Vec::new();
-    for light in own.chain(of_sky) {
+    for light in scene.lights_at(&scene.params) {
         let fields = match light.kind {
             LightKind::Directional(_) => vec![("open", What::Open)],
             LightKind::Point(_) | LightKind::Spot(..) => {

@@ -1,10 +1,12 @@
 //! What a scene calls for of the shader planner.
 
-use super::Scene;
 use super::mesh::Mesh;
+use super::{Scene, ShadowMaps};
+use crate::model::effects::Effect;
 use crate::model::params::{Param, Params};
+use crate::model::shadow_filter::ShadowFilter;
 use crate::shader::domain::{Domain, Work};
-use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, Source};
+use crate::shader::facts::{Budget, FaceSizes, Facts, MapFacts, ShadowFacts, Source};
 
 impl Facts {
     /// Of a scene at `params`, within `budget`, on an adapter with or without 16-bit arithmetic.
@@ -36,11 +38,19 @@ impl Facts {
             f16,
             tessellation: tessellation_error(scene),
             atlas: atlas.then_some(scene.diffusion.light_map_size),
+            shadows: shadows(scene),
             work: if atlas { work(scene) } else { Work::default() },
             budget,
             output: None,
         }
     }
+}
+
+/// Shadow maps, where lights shine that have shadows.
+fn shadows(scene: &Scene) -> Option<ShadowFacts> {
+    let ShadowMaps { filter, taps, .. } = scene.shadow_maps;
+    let shaded = scene.effects.has(Effect::Lights) && scene.effects.has(Effect::Shadows);
+    (shaded && filter != ShadowFilter::Vertices).then_some(ShadowFacts { filter, taps })
 }
 
 /// How many vertices, texels of the atlas and fragments an image of the first view takes. Where the charts overlap,

@@ -220,6 +220,11 @@ pub(super) struct QualityTable {
     pub shadow_rays: Option<Spanned<i64>>,
     pub sky_rays: Option<Spanned<i64>>,
     pub lobe_rays: Option<Spanned<i64>>,
+    pub shadow_filter: Option<Spanned<String>>,
+    pub shadow_map_size: Option<Spanned<i64>>,
+    pub shadow_bias: Option<Spanned<f64>>,
+    pub shadow_radius: Option<Spanned<f64>>,
+    pub shadow_taps: Option<Spanned<i64>>,
 }
 
 /// A number, or one for each channel.

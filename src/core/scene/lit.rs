@@ -26,6 +26,8 @@ const LIT: &str = include_str!("../shader/rules/family/lit.wgsl");
 const UNBOUNCED: &str = include_str!("../shader/rules/family/unbounced.wgsl");
 /// The same with it: a declaration, and rules.
 const BOUNCED: &str = include_str!("../shader/rules/family/bounced.wgsl");
+/// What shadow maps leave of it.
+const SHADOW: &str = include_str!("../shader/rules/family/shadow.wgsl");
 
 /// The effect of a light, known to this process from then on. Lights of one name and kind, of whatever scenes, are one
 /// effect: their numbers are parameters.
@@ -34,9 +36,9 @@ const BOUNCED: &str = include_str!("../shader/rules/family/bounced.wgsl");
 /// When a file of rules has taken its names.
 fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> {
     let text = match (&light.kind, from_sky) {
-        (LightKind::Directional(_), true) => [BEAM, IN_SKY, UNBOUNCED, LIT].concat(),
-        (LightKind::Directional(_), false) => [&bounced(BEAM), IN_WORLD, LIT].concat(),
-        (LightKind::Point(_) | LightKind::Spot(..), _) => [&bounced(LAMP), LIT].concat(),
+        (LightKind::Directional(_), true) => [BEAM, IN_SKY, UNBOUNCED, LIT, SHADOW].concat(),
+        (LightKind::Directional(_), false) => [&bounced(BEAM), IN_WORLD, LIT, SHADOW].concat(),
+        (LightKind::Point(_) | LightKind::Spot(..), _) => [&bounced(LAMP), LIT, SHADOW].concat(),
     };
     let member = light.member();
     let stamped = stamped(&text, &member).unwrap_or(text);

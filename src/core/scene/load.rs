@@ -14,6 +14,7 @@ use super::lit::{self, Lights};
 use super::maps::{Environment, Map, Maps};
 use super::numbers::{interval, number};
 use super::settings::{self, spots};
+use super::shadow_maps::shadow_maps;
 use super::sky_lights::sky_lights;
 use super::terms::terms;
 use super::view::{Background, View};
@@ -69,6 +70,7 @@ impl Scene {
         let dapple = read_dapple(&source, &file)?;
         let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
+        let shadow_maps = shadow_maps(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
         let diffusion = settings::diffusion(&source, &file.diffusion)?;
         let pose = Pose::check(&source, &file)?.at(options.time);
@@ -155,6 +157,7 @@ impl Scene {
             views,
             fit,
             quality,
+            shadow_maps,
             bloom,
             diffusion,
         };
@@ -305,6 +308,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     settings::choices(&source, &file.model)?;
     cameras::plan(&source, &file.view)?;
     settings::quality(&source, &file.quality)?;
+    shadow_maps(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;
     settings::diffusion(&source, &file.diffusion)?;
     Pose::check(&source, &file)?;

@@ -6,6 +6,7 @@
 //! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings`, `cameras`, `lights` and `dapple`, within the bounds of `numbers`
+//! - [`shadow_maps`]: how the renderer finds shadows
 //! - [`sky_lights`]: the panorama's brightest spots as lights; `lit`: the effect that each light is
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
@@ -40,6 +41,7 @@ mod numbers;
 mod offers;
 pub mod pose;
 mod settings;
+pub mod shadow_maps;
 pub mod sky_lights;
 mod tangents;
 mod terms;
@@ -55,6 +57,7 @@ pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
 pub use numbers::{interval, short};
 pub use offers::Offers;
+pub use shadow_maps::ShadowMaps;
 pub use terms::register_terms;
 
 use std::path::PathBuf;
@@ -104,6 +107,8 @@ pub struct Scene {
     pub fit: FitSettings,
     /// How finely bakes and samples are made.
     pub quality: Quality,
+    /// How the renderer finds what stands in a light's way.
+    pub shadow_maps: ShadowMaps,
     /// How far the bloom reaches.
     pub bloom: Bloom,
     /// How finely texels of the UV atlas are made, where an effect is computed there.
@@ -133,6 +138,14 @@ impl Scene {
     #[must_use]
     pub fn needs(&self) -> Needs {
         self.setup().needs()
+    }
+
+    /// Every light where `params` have it stand, those of the panorama turned with it.
+    #[must_use]
+    pub fn lights_at(&self, params: &Params) -> Vec<Light> {
+        let rotation = params.scalar(Param::EnvironmentRotation);
+        let of_sky = self.sky_lights.iter().map(|light| light.moved(params).turned(rotation));
+        self.lights.iter().map(|light| light.moved(params)).chain(of_sky).collect()
     }
 }
 

@@ -54,6 +54,7 @@ impl Plan {
         }
         if domains.contains(&Domain::Fragment) {
             wgsl.push_str(&self.face_sizes());
+            wgsl.push_str(&self.shadow_taps());
             wgsl.push_str(&self.dapple_axis());
         }
         for step in steps().filter(|step| step.rule.plain_value().is_none()) {
@@ -81,6 +82,14 @@ impl Plan {
             format!("\nfn {name}_size() -> f32 {{\n    return {size};\n}}\n")
         };
         faces.map(function).collect()
+    }
+
+    /// `shadow_taps()`, where a rule compares with shadow maps.
+    fn shadow_taps(&self) -> String {
+        let compares = self.steps.iter().any(|step| step.rule.uses.contains(&"shadow"));
+        let taps = self.facts.shadows.filter(|_| compares).map(|shadows| shadows.taps);
+        let function = |taps| format!("\nfn shadow_taps() -> u32 {{\n    return {taps}u;\n}}\n");
+        taps.map(function).unwrap_or_default()
     }
 
     /// `axis_of_dapple()`, where a rule asks for it.

@@ -4,6 +4,7 @@ use crate::model::choices::Bounces;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::shadow_filter::ShadowFilter;
 use crate::model::terms::TermName;
 use crate::shader::domain::Work;
 use crate::shader::quantity::Resource;
@@ -94,6 +95,15 @@ fn lights_bounce(setup: &Setup) -> bool {
     seen && setup.choices.bounces == Bounces::Gathered
 }
 
+/// Shadow maps that fragments compare themselves with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct ShadowFacts {
+    /// How they are compared.
+    pub filter: ShadowFilter,
+    /// Comparisons a fragment and light, where the filter takes several.
+    pub taps: u32,
+}
+
 /// What a scene calls for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Facts {
@@ -121,6 +131,8 @@ pub struct Facts {
     /// Texels along a side of the UV atlas; without one nothing is computed in texels. Of stored samples it only counts
     /// whether there is one.
     pub atlas: Option<u32>,
+    /// Shadow maps, where lights have them.
+    pub shadows: Option<ShadowFacts>,
     /// How often each domain is evaluated.
     pub work: Work,
     /// The accuracy allowed.
@@ -152,6 +164,7 @@ impl Default for Facts {
             f16: false,
             tessellation: 0.0,
             atlas: None,
+            shadows: None,
             work: Work::default(),
             budget: Budget::Exact,
             output: None,
@@ -187,7 +200,7 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 24] = [
+    pub const CONDITIONS: [&'static str; 28] = [
         "layered",
         "lights_bounce",
         "vertex_silhouette",
@@ -212,6 +225,10 @@ impl Facts {
         "square_rim",
         "f16",
         "atlas",
+        "shadow_maps",
+        "shadow_hardware",
+        "shadow_pcf",
+        "shadow_pcss",
     ];
 
     /// Whether a condition of a rule's `when` line holds; `None` for one that is not known.
@@ -255,9 +272,19 @@ impl Facts {
             "turned" => self.turned,
             "square_rim" => self.square_rim,
             "f16" => self.f16,
+            "shadow_maps" => self.shadow_filter().is_some(),
+            "shadow_hardware" => self.shadow_filter() == Some(ShadowFilter::Hardware),
+            "shadow_pcf" => self.shadow_filter() == Some(ShadowFilter::Pcf),
+            "shadow_pcss" => self.shadow_filter() == Some(ShadowFilter::Pcss),
             "atlas" => self.source != Source::Terms && self.atlas.is_some_and(|size| size > 0),
             _ => return None,
         })
+    }
+
+    /// How shadow maps are compared, where there are any.
+    fn shadow_filter(&self) -> Option<ShadowFilter> {
+        let mapped = |shadows: &ShadowFacts| shadows.filter != ShadowFilter::Vertices;
+        self.shadows.filter(mapped).map(|shadows| shadows.filter)
     }
 
     /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads

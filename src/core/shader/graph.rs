@@ -119,6 +119,8 @@ impl<'a> Graph<'a> {
 
     pub(super) fn error(&self, means: &Means) -> f64 {
         match means {
+            // What the scene names counts beside the budget.
+            Means::Rule(rule) if rule.named => 0.0,
             Means::Rule(rule) => rule.error(self.facts),
             Means::Edge(carried) => carried.error,
         }

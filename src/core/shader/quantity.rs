@@ -156,6 +156,12 @@ pub enum Resource {
     MorphDeltas,
     /// `array<vec4f>`: for each bone three rows of its affine map, then three of what it does to normals.
     Bones,
+    /// How deep each light sees: `texture_depth_2d_array`, near / distance or the like: greater is nearer.
+    ShadowMaps,
+    /// Whether a depth is no further than those, blended over four texels: `sampler_comparison`.
+    ShadowSampler,
+    /// `array<vec4f>`: for each layer of the maps the rows that `rules/lib/shadow.wgsl` lists.
+    ShadowViews,
 }
 
 /// How a resource is declared in WGSL.
@@ -171,8 +177,14 @@ pub enum Kind {
     Map,
     /// `sampler`, filtering.
     Sampler,
-    /// Read-only storage, `array<vec4f>`.
+    /// Read-only storage of the vertex stage, `array<vec4f>`.
     Storage,
+    /// Read-only storage of the fragment stage, `array<vec4f>`.
+    Rows,
+    /// `texture_depth_2d_array`, for comparisons and single texels.
+    Depth,
+    /// `sampler_comparison`.
+    Comparison,
 }
 
 impl Kind {
@@ -184,14 +196,16 @@ impl Kind {
             Self::Cube => ("var", "texture_cube<f32>"),
             Self::Texels | Self::Map => ("var", "texture_2d<f32>"),
             Self::Sampler => ("var", "sampler"),
-            Self::Storage => ("var<storage, read>", "array<vec4f>"),
+            Self::Storage | Self::Rows => ("var<storage, read>", "array<vec4f>"),
+            Self::Depth => ("var", "texture_depth_2d_array"),
+            Self::Comparison => ("var", "sampler_comparison"),
         }
     }
 }
 
 impl Resource {
     /// Every resource.
-    pub const ALL: [Self; 29] = [
+    pub const ALL: [Self; 32] = [
         Self::IrradianceFaces,
         Self::SpecularFaces,
         Self::SpecularSlopeFaces,
@@ -221,6 +235,9 @@ impl Resource {
         Self::CubeSampler,
         Self::MorphDeltas,
         Self::Bones,
+        Self::ShadowMaps,
+        Self::ShadowSampler,
+        Self::ShadowViews,
     ];
 
     /// Its name in WGSL.
@@ -256,6 +273,9 @@ impl Resource {
             Self::CubeSampler => "cube_sampler",
             Self::MorphDeltas => "morph_deltas",
             Self::Bones => "bones",
+            Self::ShadowMaps => "shadow_maps",
+            Self::ShadowSampler => "shadow_sampler",
+            Self::ShadowViews => "shadow_views",
         }
     }
 
@@ -290,6 +310,9 @@ impl Resource {
             | Self::NormalAttenuatorMap => Kind::Map,
             Self::MapSampler | Self::CubeSampler => Kind::Sampler,
             Self::MorphDeltas | Self::Bones => Kind::Storage,
+            Self::ShadowMaps => Kind::Depth,
+            Self::ShadowSampler => Kind::Comparison,
+            Self::ShadowViews => Kind::Rows,
         }
     }
 }

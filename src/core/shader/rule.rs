@@ -18,7 +18,8 @@
 //! ([`domain`](super::domain)): a vertex' quantity that a fragment rule names is interpolated. Other header lines:
 //! `domain` (where it holds, in the place of the folder's; one function may be a rule of several), `reads` (resources
 //! and constants that the body names), `uses` (files of `rules/lib`), `error` (relative to white; a number or
-//! `tessellation`), `paper: yes` (the paper's own programs made this approximation), `adds` (the quantity is a part of
+//! `tessellation`), `paper: yes` (the paper's own programs made this approximation), `named: yes`
+//! (the scene file itself names this approximation, and no budget refuses it), `adds` (the quantity is a part of
 //! the sum that the radiance is, and holds these terms), `shows` (it is that term alone), `fallback` (quantities that it
 //! takes where others fail, and for which nothing needs to be stored), `sampled` (fragments may look a texel's quantity
 //! up, which is off by so much), `pass` (a blur of a texel's quantity; the function is its kernel, see [`Blur`]).
@@ -49,12 +50,15 @@ pub struct Rule {
     pub shows: Option<&'static str>,
     /// Conditions on the [`Facts`], all of which must hold.
     pub when: Vec<&'static str>,
-    /// Operations, about; and how many more for each morph target.
+    /// Operations, about; and how many more for each morph target, and each comparison with a shadow map.
     cost: f64,
     cost_a_morph: f64,
+    cost_a_tap: f64,
     pub(super) error: Error,
     /// Whether the paper's own programs made this approximation.
     pub paper: bool,
+    /// Whether the scene file itself names this approximation: no budget refuses it.
+    pub named: bool,
     /// How far its quantities are off, relative to white, where a fragment looks them up in the atlas; `None` where
     /// none may.
     pub sampled: Option<f64>,
@@ -105,7 +109,9 @@ impl Rule {
     /// Operations in a scene.
     #[must_use]
     pub fn cost(&self, facts: &Facts) -> f64 {
-        let once = self.cost + self.cost_a_morph * f64::from(facts.morphs);
+        let taps = facts.shadows.map_or(0, |shadows| shadows.taps);
+        let once =
+            self.cost + self.cost_a_morph * f64::from(facts.morphs) + self.cost_a_tap * f64::from(taps);
         self.blur.as_ref().map_or(once, |blur| DIRECTIONS * f64::from(blur.taps) * (once + TAP_COST))
     }
 
@@ -147,7 +153,7 @@ impl Rule {
                 fact.strip_prefix("has_").unwrap_or(fact).replace('_', " ")
             ));
         }
-        if self.error == Error::Fixed(0.0) {
+        if self.error == Error::Fixed(0.0) || self.named {
             return None;
         }
         let error = self.error(facts);
@@ -190,8 +196,10 @@ impl Rule {
             when: Vec::new(),
             cost: f64::NAN,
             cost_a_morph: 0.0,
+            cost_a_tap: 0.0,
             error: Error::Fixed(0.0),
             paper: false,
+            named: false,
             sampled: None,
             blur: None,
             uses: Vec::new(),
@@ -212,6 +220,11 @@ impl Rule {
     /// Set the operations that it takes, and those for each morph target.
     pub(super) const fn set_cost(&mut self, (fixed, each): (f64, f64)) {
         (self.cost, self.cost_a_morph) = (fixed, each);
+    }
+
+    /// Set the operations that it takes for each comparison with a shadow map.
+    pub(super) const fn set_cost_a_tap(&mut self, each: f64) {
+        self.cost_a_tap = each;
     }
 
     pub(super) const fn has_cost(&self) -> bool {
@@ -241,7 +254,7 @@ impl Rule {
 const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
-pub const LIBRARY: [(&str, &str); 8] = [
+pub const LIBRARY: [(&str, &str); 9] = [
     ("vector", include_str!("rules/lib/vector.wgsl")),
     ("frame", include_str!("rules/lib/frame.wgsl")),
     ("cube", include_str!("rules/lib/cube.wgsl")),
@@ -250,6 +263,7 @@ pub const LIBRARY: [(&str, &str); 8] = [
     ("specular", include_str!("rules/lib/specular.wgsl")),
     ("split_sum_kelemen", include_str!("rules/lib/split_sum_kelemen.wgsl")),
     ("split_sum_ggx", include_str!("rules/lib/split_sum_ggx.wgsl")),
+    ("shadow", include_str!("rules/lib/shadow.wgsl")),
 ];
 
 /// The built-in rules.

@@ -47,7 +47,7 @@ struct Field {
 ///
 /// # Errors
 /// When no rules yield a position.
-pub(super) fn outline(facts: &Facts) -> Result<Plan, PlanError> {
+pub(crate) fn outline(facts: &Facts) -> Result<Plan, PlanError> {
     let plan = Plan::search(&raster(facts), &["clip"], &[], &[])?;
     Ok(Plan { wgsl: plan.vertex_module("@invariant "), ..plan })
 }
@@ -73,7 +73,7 @@ pub(super) fn draws(facts: &Facts, places: &Places) -> Result<Vec<Draw>, PlanErr
 
 /// Fragments of the rasteriser, filtered in the shader, and no atlas: what the CPU's samples are.
 fn raster(facts: &Facts) -> Facts {
-    Facts { source: Source::Raster, output: None, atlas: None, ..*facts }
+    Facts { source: Source::Raster, output: None, atlas: None, shadows: None, ..*facts }
 }
 
 impl Draw {

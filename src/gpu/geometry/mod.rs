@@ -21,7 +21,8 @@ use rayon::prelude::*;
 use wgpu::{Buffer, BufferUsages, CommandEncoder, CommandEncoderDescriptor};
 
 use self::compute::{Coverage, Gather};
-use self::draw::{ELSEWHERE, draws, outline};
+pub(crate) use self::draw::outline;
+use self::draw::{ELSEWHERE, draws};
 use self::surfaces::Surfaces;
 use super::constants::Values;
 use super::device::Gpu;

@@ -28,14 +28,16 @@ impl Renderer {
     pub fn frame_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
         let program = self.program(None)?;
         let stage = self.stage(camera, hazy(self.programs[program].plan()))?;
-        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[stage]);
+        let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
+        let (program, stage, morph_weights) = (&programs[program], &stages[stage], morph_weights.as_slice());
         let mut timers = Vec::with_capacity(frames);
         for _ in 0..frames {
             for (i, &tile) in stage.targets.tiles.iter().enumerate() {
                 let mut timer = Timer::new(gpu);
-                let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
+                let params = &uploads.content().params;
                 program.set(gpu, &Values { params, camera, tile, morph_weights });
                 let mut encoder = gpu.device.create_command_encoder(&CommandEncoderDescriptor::default());
+                uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, Some(&mut timer));
                 stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, Some(&mut timer));
                 timer.finish(&mut encoder);
                 gpu.queue.submit([encoder.finish()]);
@@ -80,14 +82,16 @@ impl Renderer {
     ) -> Result<(usize, Vec<Copy>), GpuError> {
         let program = self.program(output)?;
         let place = self.stage(camera, hazy(self.programs[program].plan()))?;
-        let (gpu, program, stage) = (&self.gpu, &self.programs[program], &self.stages[place]);
+        let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
+        let (program, stage, morph_weights) = (&programs[program], &stages[place], morph_weights.as_slice());
         let mut copies = Vec::new();
         let tiles = &stage.targets.tiles;
         for (i, &tile) in tiles.iter().enumerate() {
-            let (params, morph_weights) = (&self.uploads.content().params, self.morph_weights.as_slice());
+            let params = &uploads.content().params;
             program.set(gpu, &Values { params, camera, tile, morph_weights });
             let mut encoder =
                 gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
+            uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, timer.as_deref_mut());
             stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, timer.as_deref_mut());
             if i + 1 == tiles.len() {
                 copies = stage.encode_end(gpu, &mut encoder, gain, finished, timer.as_deref_mut());

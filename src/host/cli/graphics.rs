@@ -43,6 +43,9 @@ impl Task {
             GpuError::TextureSize { of, .. } | GpuError::BufferSize { of, .. } => {
                 self.or_another(self.smaller(*of))
             }
+            GpuError::ShadowMaps { .. } => self.or_another(
+                "Use fewer lights, or spots in the place of lights to all sides, or shadow_filter = \"vertices\" in [quality]",
+            ),
             GpuError::OutOfMemory { .. } => match self {
                 Self::Render => self
                     .or_another("Use a smaller image (--size), fewer samples (--antialias) or smaller maps"),
@@ -92,6 +95,7 @@ impl Task {
     const fn smaller(self, what: Oversized) -> &'static str {
         match (what, self) {
             (Oversized::Map, _) => "Scale the map down",
+            (Oversized::ShadowMap, _) => "Give a smaller shadow_map_size in [quality]",
             (Oversized::Image, Self::Render) => "Give a smaller --size",
             (Oversized::Pixel, _) => "Give a smaller samples_per_axis in [quality]",
             (Oversized::Mesh, _) => "Use a smaller mesh or fewer morph targets",

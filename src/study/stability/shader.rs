@@ -15,7 +15,9 @@ use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene, maps, mesh};
+use crate::scene::{
+    Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene, ShadowMaps, maps, mesh,
+};
 use crate::shader::Domain;
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;
@@ -210,6 +212,7 @@ fn scene() -> Scene {
             maps: MapSettings::default(),
         },
         quality: Quality::default(),
+        shadow_maps: ShadowMaps::default(),
         bloom: Bloom::default(),
         lights: Vec::new(),
         sky_lights: Vec::new(),

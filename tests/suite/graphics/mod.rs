@@ -9,6 +9,7 @@
 //! - `vectors`: the conformance vectors through the shader rules
 //! - `fused`: the fit engine on the adapter against the plain f64 model
 //! - `samples`: samples that the adapter makes, beside the CPU's
+//! - `shadow_maps`: what the renderer has in the place of rays to lights
 //! - `exported`: exported GLSL in place of the renderer's own
 
 mod accuracy;
@@ -20,5 +21,6 @@ mod fused;
 mod parity;
 mod pictures;
 mod samples;
+mod shadow_maps;
 mod stability;
 mod vectors;

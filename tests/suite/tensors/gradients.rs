@@ -188,8 +188,8 @@ impl Case {
             lobe,
             hilite,
             // No effect here reads them.
-            reflected: matrix(vec![0.0], 1, &device),
-            glossy: matrix(vec![0.0], 1, &device),
+            reflected: matrix(&[0.0], 1, &device),
+            glossy: matrix(&[0.0], 1, &device),
         };
         let image = shade.image(inputs).unwrap();
         let gradients = (image * matrix(weights, 4, &device)).sum().backward();

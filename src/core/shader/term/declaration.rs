@@ -64,7 +64,7 @@ pub(super) struct DeclaredField {
 }
 
 /// The keys that a header may have.
-const KEYS: [&str; 17] = [
+const KEYS: [&str; 18] = [
     "effect",
     "parameter",
     "field",
@@ -76,6 +76,7 @@ const KEYS: [&str; 17] = [
     "cost",
     "error",
     "paper",
+    "named",
     "uses",
     "reads",
     "fallback",
@@ -239,6 +240,7 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
         "reads" => rule.reads = list(value).collect(),
         "fallback" => rule.fallback = list(value).collect(),
         "paper" => rule.paper = value == "yes",
+        "named" => rule.named = value == "yes",
         "error" if value == "tessellation" => rule.error = Error::Tessellation,
         "sampled" => {
             rule.sampled = Some(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
@@ -253,12 +255,18 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
             rule.error = Error::Fixed(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
         }
         _ => {
+            let (value, tap) = match value.strip_suffix(" a tap") {
+                Some(costs) => costs.split_once(" and ").unwrap_or(("0", costs)),
+                None => (value, "0"),
+            };
             let (fixed, each) = match value.strip_suffix(" a morph") {
                 Some(costs) => costs.split_once(" and ").unwrap_or(("0", costs)),
                 None => (value, "0"),
             };
             let costs = amount(fixed).zip(amount(each));
-            rule.set_cost(costs.ok_or_else(|| unread("how many operations it takes, about"))?);
+            let unread = || unread("how many operations it takes, about");
+            rule.set_cost(costs.ok_or_else(unread)?);
+            rule.set_cost_a_tap(amount(tap).ok_or_else(unread)?);
         }
     }
     Ok(())

@@ -72,6 +72,9 @@ fn surroundings(rule: &Rule) -> String {
                 writeln!(text, "fn {name}_size() -> f32 {{ return f32(textureDimensions({name}).x - 2u); }}");
         }
     }
+    if rule.uses.contains(&"shadow") {
+        text.push_str("fn shadow_taps() -> u32 { return 1u; }\n");
+    }
     for (_, library) in LIBRARY.iter().filter(|(name, _)| rule.uses.contains(name)) {
         text.push_str(library);
     }

@@ -10,6 +10,7 @@ mod quality;
 mod rays;
 mod remeshed;
 mod samples;
+mod shadows;
 mod silhouette;
 mod solver;
 mod ways;
@@ -31,6 +32,7 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &ways::SKY,
         &ways::LOBE,
         &samples::Samples,
+        &shadows::Shadows,
         &pixels::Pixels,
         &solver::Solvers,
     ]

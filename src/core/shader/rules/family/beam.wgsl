@@ -5,6 +5,7 @@
 // parameter: light.NAME.irradiance = 0 in [0, inf), rgb, held; irradiance of a surface that faces it; KHR_lights_punctual
 // parameter: light.NAME.azimuth = 0 in [-inf, inf], unit degrees, found; where it comes from, from +Z towards +X; KHR_lights_punctual
 // parameter: light.NAME.elevation = 45 in [-90, 90], unit degrees, found; where it comes from, above the horizon; KHR_lights_punctual
+// parameter: light.NAME.shadow_map = -1 in [-1, inf], held; first layer of its shadow map, -1 where it has none; Williams 1978
 // sample_field: light_NAME_open: f32 = 1; share of the light NAME that nothing stops
 
 // Unit vector towards the light.
@@ -22,10 +23,20 @@ fn light_NAME_direction(light_NAME_azimuth: f32, light_NAME_elevation: f32) -> v
 //
 // gives: light_NAME_arriving
 // domain: texel, fragment
-// when: shadows
+// when: shadows, !shadow_maps
 // cost: 0
 fn light_NAME_unstopped(light_NAME_open: f32) -> f32 {
     return light_NAME_open;
+}
+
+// What arrives of it, as shadow maps have it.
+//
+// gives: light_NAME_arriving
+// domain: texel, fragment
+// when: raster, shadows, shadow_maps
+// cost: 0
+fn light_NAME_mapped(light_NAME_seen: f32) -> f32 {
+    return light_NAME_seen;
 }
 
 // What arrives of it where nothing has a shadow.

@@ -7,6 +7,7 @@
 // parameter: light.NAME.axis = 0 in [-1, 1], rgb, held; unit vector that a spot shines along; KHR_lights_punctual
 // parameter: light.NAME.cone = 0 in [-2, 1], rgb, held; cosines of a spot's inner and outer angle; KHR_lights_punctual
 // parameter: light.NAME.range = 0 in [0, inf), held; where its light ends, 0 where it never does; KHR_lights_punctual
+// parameter: light.NAME.shadow_map = -1 in [-1, inf], held; first layer of its shadow map, -1 where it has none; Williams 1978
 // sample_field: light_NAME_found_toward: vec3f = 0; unit vector towards the light NAME
 // sample_field: light_NAME_found_arriving: f32 = 0; what distance, cone and shadow leave of the light NAME
 // sample_field: light_NAME_open: f32 = 1; share of the light NAME that nothing stops
@@ -67,10 +68,20 @@ fn light_NAME_attenuation(
 //
 // gives: light_NAME_arriving
 // domain: texel, fragment
-// when: raster, shadows
+// when: raster, shadows, !shadow_maps
 // cost: 1
 fn light_NAME_unstopped(light_NAME_reach: f32, light_NAME_open: f32) -> f32 {
     return light_NAME_reach * light_NAME_open;
+}
+
+// What arrives of it, as shadow maps have it.
+//
+// gives: light_NAME_arriving
+// domain: texel, fragment
+// when: raster, shadows, shadow_maps
+// cost: 1
+fn light_NAME_mapped(light_NAME_reach: f32, light_NAME_seen: f32) -> f32 {
+    return light_NAME_reach * light_NAME_seen;
 }
 
 // What arrives of it where nothing has a shadow.

@@ -1,0 +1,155 @@
+// Shadow maps (Williams 1978): what each light sees first. A layer of shadow_maps is what a light sees one way, six for
+// one that shines to all sides; greater depths are nearer to the light, and 0 is nothing. shadow_views has seven rows a
+// layer: the columns of the matrix to clip space; where the light stands and 1, or the unit vector towards it and 0; a
+// texel's width where w is 1, the bias and the radius in texels, and how many layers the light has; how wide it is (of
+// parallel light the tangent of half the angle, of a lamp the radius), what depth is of (of parallel light the distance
+// between 1 and 0, of a lamp that of 1), how near to a lamp something may stand, and texels along a side.
+fn shadow_row(layer: u32, row: u32) -> vec4f {
+    return shadow_views[7u * layer + row];
+}
+
+// The layer that shows a place: of six, that of the axis along which it lies furthest from the light.
+fn shadow_layer(map: f32, place: vec3f) -> u32 {
+    let first = u32(map);
+    if (shadow_row(first, 5u).w < 6.0) {
+        return first;
+    }
+    let way = place - shadow_row(first, 4u).xyz;
+    let size = abs(way);
+    if (size.x >= size.y && size.x >= size.z) {
+        return first + select(0u, 1u, way.x < 0.0);
+    }
+    if (size.y >= size.z) {
+        return first + select(2u, 3u, way.y < 0.0);
+    }
+    return first + select(4u, 5u, way.z < 0.0);
+}
+
+// Where a layer shows a place, how deep it lies there, and w.
+fn shadow_seen(layer: u32, place: vec3f) -> vec4f {
+    let a = shadow_row(layer, 0u) * place.x + shadow_row(layer, 1u) * place.y;
+    let clip = a + shadow_row(layer, 2u) * place.z + shadow_row(layer, 3u);
+    return vec4f(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w, clip.z / clip.w, clip.w);
+}
+
+// Whether a layer shows what was seen; behind a lamp and beside its map there is nothing.
+fn shadow_holds(seen: vec4f) -> bool {
+    return seen.w > 0.0 && all(abs(seen.xy - 0.5) <= vec2f(0.5));
+}
+
+// The share of four texels around a place that hold nothing nearer to the light, by how near they are.
+fn shadow_compare(map: f32, place: vec3f) -> f32 {
+    let layer = shadow_layer(map, place);
+    let seen = shadow_seen(layer, place);
+    if (!shadow_holds(seen)) {
+        return 1.0;
+    }
+    // A tap may lie below all that is drawn, where there is nothing either.
+    return textureSampleCompareLevel(shadow_maps, shadow_sampler, seen.xy, layer, max(seen.z, 0.0));
+}
+
+// A place moved towards the light, off all that the four texels around it show of its own plane, and a texel's width
+// there. On a plane with normal n such a texel shows at most a texel of each of the map's axes times how far n leans along
+// it. What is added to that is for rounding, and where light grazes the surface it goes no further than 20 texels.
+fn shadow_raised(map: f32, place: vec3f, n: vec3f, toward: vec3f) -> vec4f {
+    let layer = shadow_layer(map, place);
+    let filter_row = shadow_row(layer, 5u);
+    let a = vec3f(shadow_row(layer, 0u).x, shadow_row(layer, 1u).x, shadow_row(layer, 2u).x);
+    let b = vec3f(shadow_row(layer, 0u).y, shadow_row(layer, 1u).y, shadow_row(layer, 2u).y);
+    let texel = filter_row.x * shadow_seen(layer, place).w;
+    let leaning = 0.5 * filter_row.x * shadow_row(layer, 6u).w * (abs(dot(a, n)) + abs(dot(b, n)));
+    let lift = filter_row.y * texel * (leaning + 0.05) / max(dot(n, toward), 0.05);
+    return vec4f(place + lift * toward, texel);
+}
+
+// The tap with number i of a disc of unit radius that faces the light, slid along the light to the plane of the surface:
+// points of a spiral that are evenly spread (Vogel 1979).
+fn shadow_tap(i: u32, n: vec3f, toward: vec3f) -> vec3f {
+    let across = normalize_or(vec3f(toward.z, 0.0, -toward.x), vec3f(1.0, 0.0, 0.0));
+    let angle = 2.399963229728653 * f32(i);
+    let off = cos(angle) * across + sin(angle) * cross(toward, across);
+    let slide = dot(n, off) / max(dot(n, toward), 0.1);
+    return sqrt((f32(i) + 0.5) / f32(shadow_taps())) * (off - slide * toward);
+}
+
+// The mean over a disc around a place.
+fn shadow_disc(map: f32, place: vec3f, n: vec3f, toward: vec3f, radius: f32) -> f32 {
+    var sum = 0.0;
+    for (var i = 0u; i < shadow_taps(); i++) {
+        sum += shadow_compare(map, place + radius * shadow_tap(i, n, toward));
+    }
+    return sum / f32(shadow_taps());
+}
+
+// One comparison.
+fn shadow_compared(map: f32, place: vec3f, normal: vec3f, toward: vec3f) -> f32 {
+    if (map < 0.0) {
+        return 1.0;
+    }
+    return shadow_compare(map, shadow_raised(map, place, normalize_or(normal, toward), toward).xyz);
+}
+
+// Comparisons within a radius of so many texels.
+fn shadow_filtered(map: f32, place: vec3f, normal: vec3f, toward: vec3f) -> f32 {
+    if (map < 0.0) {
+        return 1.0;
+    }
+    let n = normalize_or(normal, toward);
+    let raised = shadow_raised(map, place, n, toward);
+    return shadow_disc(map, raised.xyz, n, toward, shadow_row(u32(map), 5u).z * raised.w);
+}
+
+// How far from the light a depth lies.
+fn shadow_distance(about: vec4f, parallel: bool, depth: f32) -> f32 {
+    return select(about.y / max(depth, 1e-30), (1.0 - depth) * about.y, parallel);
+}
+
+// The mean distance from the light of what stands before a place, within a radius; none is negative.
+fn shadow_blockers(map: f32, place: vec3f, n: vec3f, toward: vec3f, radius: f32) -> f32 {
+    let about = shadow_row(u32(map), 6u);
+    let parallel = shadow_row(u32(map), 4u).w == 0.0;
+    var sum = 0.0;
+    var count = 0.0;
+    for (var i = 0u; i < shadow_taps(); i++) {
+        let tap = place + radius * shadow_tap(i, n, toward);
+        let layer = shadow_layer(map, tap);
+        let seen = shadow_seen(layer, tap);
+        if (shadow_holds(seen)) {
+            let texel = clamp(vec2i(seen.xy * about.w), vec2i(0), vec2i(i32(about.w) - 1));
+            let depth = textureLoad(shadow_maps, texel, layer, 0);
+            if (depth > seen.z) {
+                sum += shadow_distance(about, parallel, depth);
+                count += 1.0;
+            }
+        }
+    }
+    return select(-1.0, sum / max(count, 1.0), count > 0.0);
+}
+
+// Comparisons within the radius of a penumbra, which widens from the blockers to the place as it does from them to the
+// light (Fernando 2005).
+fn shadow_softened(map: f32, place: vec3f, normal: vec3f, toward: vec3f) -> f32 {
+    if (map < 0.0) {
+        return 1.0;
+    }
+    let about = shadow_row(u32(map), 6u);
+    let parallel = shadow_row(u32(map), 4u).w == 0.0;
+    let n = normalize_or(normal, toward);
+    let raised = shadow_raised(map, place, n, toward);
+    let least = shadow_row(u32(map), 5u).z * raised.w;
+    if (about.x <= 0.0) {
+        return shadow_disc(map, raised.xyz, n, toward, least);
+    }
+    let depth = shadow_seen(shadow_layer(map, raised.xyz), raised.xyz).z;
+    let far = shadow_distance(about, parallel, depth);
+    // As wide as the light shows through the nearest place where something may stand, and no wider than a few taps can see.
+    let widest = about.x * select((far - about.z) / about.z, far, parallel);
+    let search = clamp(widest, least, max(least, 0.25 * far));
+    let blocker = shadow_blockers(map, raised.xyz, n, toward, search);
+    if (blocker < 0.0) {
+        return 1.0;
+    }
+    let gap = max(far - blocker, 0.0);
+    let penumbra = about.x * select(gap / max(blocker, 1e-30), gap, parallel);
+    return shadow_disc(map, raised.xyz, n, toward, clamp(penumbra, least, search));
+}
