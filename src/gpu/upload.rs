@@ -23,7 +23,7 @@ use crate::model::cube::Cube;
 use crate::model::fields::{Field, Fields};
 use crate::model::params::Params;
 use crate::prepare::Baked;
-use crate::samples::PosedSurface;
+use crate::samples::{PosedSurface, SurfaceBakes};
 use crate::scene::Scene;
 use crate::scene::mesh::Mesh;
 use crate::shader::{Attribute, Facts, Resource};
@@ -199,8 +199,9 @@ impl Uploads {
         let rays = RayMesh::new(&posed.positions, &posed.triangles);
         // Where triangles share no vertices, the fields are the mesh file's own.
         let sky = sky.or(self.content.sky.as_deref()).filter(|_| self.split.is_none());
+        let bakes = SurfaceBakes { sky, ..SurfaceBakes::default() };
         let surface =
-            PosedSurface::with_fields(&self.content.scene, &posed, &rays, &mesh.morphs, sky, fields)
+            PosedSurface::with_fields(&self.content.scene, &posed, &rays, &mesh.morphs, bakes, fields)
                 .map_err(|error| GpuError::Refused {
                     adapter: gpu.name().to_owned(),
                     reason: error.to_string(),

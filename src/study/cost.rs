@@ -79,5 +79,10 @@ fn bakes(baked: &Baked) -> (Vec<String>, usize) {
         names.push("occlusion".to_owned());
         floats += occlusion.base.len() + occlusion.morphs.iter().map(Vec::len).sum::<usize>();
     }
+    if let Some(sky) = &baked.sky {
+        names.push("sky".to_owned());
+        // A renderer's vertices have the ratio alone.
+        floats += 3 * sky.transfer.occlusion().base.len();
+    }
     (names, floats * size_of::<f32>())
 }

@@ -93,8 +93,7 @@ fn ratios(scene: &Scene, bakes: &Bake) -> Vec<[f32; 3]> {
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
     let field = Field::from_name(SKY_RATIO).unwrap();
     let fields = Fields::of([field]);
-    let surface =
-        PosedSurface::with_fields(scene, &posed, &rays, &scene.mesh.morphs, bakes.sky.as_ref(), fields);
+    let surface = PosedSurface::with_fields(scene, &posed, &rays, &scene.mesh.morphs, bakes.into(), fields);
     surface.unwrap().field_of_vertices(field).as_chunks().0.to_vec()
 }
 
@@ -322,11 +321,25 @@ fn only_what_is_asked_for_is_baked() {
     let posed = scene.mesh.pose();
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
     let field = Field::from_name("bent_normal").unwrap();
-    let surface =
-        PosedSurface::with_fields(&scene, &posed, &rays, &[], bakes.sky.as_ref(), Fields::of([field]));
+    let surface = PosedSurface::with_fields(&scene, &posed, &rays, &[], (&bakes).into(), Fields::of([field]));
     let bent = surface.unwrap().field_of_vertices(field);
     // Every place of the bowl sees its opening, which is above.
     assert!(bent.as_chunks::<3>().0.iter().all(|&v| Vec3::from(v).length() < 1.0 && v[1] > 0.0));
+}
+
+#[test]
+fn a_sun_that_is_left_in_the_panorama_is_told() {
+    let bowl = shape(1.2, false);
+    let warned = |texel: fn(usize, usize) -> [f32; 3], visibility: Visibility| {
+        let scene = scene(&bowl, texel, chosen(visibility, Bounces::None));
+        let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
+        let (_, stats) = bake(&scene, &pose, &Ranges::of(&scene, false), None).unwrap();
+        stats.warnings.iter().any(|warning| warning.contains("lights = 4"))
+    };
+    let sun = |x: usize, y: usize| if (x, y) == (3, 2) { [900.0; 3] } else { [0.1; 3] };
+    assert!(warned(sun, Visibility::Sh4) && warned(sun, Visibility::Sh2));
+    assert!(!warned(sun, Visibility::Scalar) && !warned(sun, Visibility::Rays));
+    assert!(!warned(|_, y| [1.0 + y as f32; 3], Visibility::Sh4));
 }
 
 /// The built-in head with a lamp beside its environment.

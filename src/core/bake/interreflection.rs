@@ -99,6 +99,12 @@ pub struct VertexGather {
     gathers: Vec<Gather>,
 }
 
+impl std::fmt::Debug for VertexGather {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("VertexGather").field("vertices", &self.gathers.len()).finish_non_exhaustive()
+    }
+}
+
 impl VertexGather {
     /// Of a mesh as it is posed, by so many rays a vertex. All cores.
     #[must_use]

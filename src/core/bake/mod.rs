@@ -114,7 +114,7 @@ impl VertexOcclusion {
 pub struct BakeStats {
     /// A row for each bake, in the order in which they were made.
     pub rows: Vec<BakeRow>,
-    /// Cache files that were damaged or could not be written.
+    /// Cache files that were damaged or could not be written; light that is not fit for what is asked of it.
     pub warnings: Vec<String>,
 }
 
@@ -275,6 +275,7 @@ pub fn bake(
     let mut baker = Baker { cache, stats };
     let used = used_morphs(scene);
     let (sky, occlusion) = surface(scene, pose, &used, SkyLight::of_scene, &mut baker);
+    baker.stats.warnings.extend(sky.as_ref().and_then(|sky| sky::ringing(scene, sky)));
     Ok((Bake { illumination, occlusion, sky }, baker.stats))
 }
 
@@ -353,8 +354,11 @@ pub fn bake_pose(
 ) -> (PoseBake, BakeStats) {
     let mut baker = Baker { cache, stats: BakeStats::default() };
     // Of a pose no target is used: it is the mesh.
-    let light = |scene: &Scene| light.cloned().or_else(|| SkyLight::of_scene(scene));
-    let (sky, occlusion) = surface(scene, &|_| posed.clone(), &[], light, &mut baker);
+    let known = |scene: &Scene| light.cloned().or_else(|| SkyLight::of_scene(scene));
+    let (sky, occlusion) = surface(scene, &|_| posed.clone(), &[], known, &mut baker);
+    // Whoever knows the light was told before.
+    let told = sky.as_ref().filter(|_| light.is_none());
+    baker.stats.warnings.extend(told.and_then(|sky| sky::ringing(scene, sky)));
     (PoseBake { occlusion, sky }, baker.stats)
 }
 

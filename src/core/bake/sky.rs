@@ -101,6 +101,40 @@ impl SkyLight {
     }
 }
 
+/// Directions in which light is looked at.
+const DIRECTIONS: u32 = 256;
+/// The least share of the mean that open light is to be: what is divided by less may be anything.
+const DIM: f64 = 0.01;
+
+/// What the user should know of a scene's light where so few bands make it of a sun that they ring.
+pub(super) fn ringing(scene: &Scene, sky: &SkyBake) -> Option<String> {
+    let light = sky.light.as_ref()?;
+    let visibility = scene.choices.visibility;
+    let order = match visibility {
+        Visibility::Scalar | Visibility::Rays => return None,
+        Visibility::Cone => Order::MOST,
+        bands => bands.bands().and_then(Order::new)?,
+    };
+    let (light, mean) = (light.rest.truncated(order), light.rest.mean());
+    let dim = |i: u32| {
+        // Even over the sphere: a spiral by the golden angle.
+        let y = 1.0 - 2.0 * (f64::from(i) + 0.5) / f64::from(DIRECTIONS);
+        let (sine, cosine) = (2.399_963_229_728_653 * f64::from(i)).sin_cos();
+        let radius = (1.0 - y * y).sqrt();
+        let lit = light.irradiance([radius * sine, y, radius * cosine]);
+        (0..3).any(|c| mean[c] > 0.0 && lit[c] < DIM * mean[c])
+    };
+    (0..DIRECTIONS).any(dim).then(|| {
+        format!(
+            "{}: the environment is too uneven for visibility = \"{}\": what its harmonics make of open light falls to \
+             nothing on one side. Take its sun out with lights = 4 in [environment] and the effects `lights` and \
+             `shadows`, or choose visibility = \"scalar\".",
+            scene.path.display(),
+            visibility.name()
+        )
+    })
+}
+
 /// Transfer vectors of the scene's mesh, with a set for each of the morph targets `used`, by as many rays a vertex as
 /// occlusion takes. With `bounces` also those of the light that the mesh throws back, for which `pose` has to give
 /// texture coordinates where there is a colour map.

@@ -76,7 +76,7 @@ impl Baked {
     /// What is baked of the surface, for samples of it.
     #[must_use]
     pub fn surface_bakes(&self) -> SurfaceBakes<'_> {
-        SurfaceBakes { occlusion: self.occlusion.as_deref(), sky: self.sky.as_deref() }
+        SurfaceBakes { occlusion: self.occlusion.as_deref(), sky: self.sky.as_deref(), gather: None }
     }
 
     /// Trace the visible surface of each view.

@@ -47,6 +47,7 @@ use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
 pub use atlas::Atlas;
+pub use bounced::gather_of;
 pub use group::z_order;
 pub use posed::{PosedSurface, SurfaceBakes};
 pub use surface_records::SurfaceRecords;

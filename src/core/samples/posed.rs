@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::supply::Supply;
 use super::trace::Hit;
 use super::{SampleError, bounced, lit, posed_occlusion, sky};
+use crate::bake::interreflection::VertexGather;
 use crate::bake::rays::RayMesh;
 use crate::bake::{Bake, SkyBake, VertexOcclusion};
 use crate::model::fields::{Field, FieldInfo, Fields};
@@ -18,11 +19,13 @@ pub struct SurfaceBakes<'a> {
     pub occlusion: Option<&'a VertexOcclusion>,
     /// The sky that each vertex sees, when asked for.
     pub sky: Option<&'a SkyBake>,
+    /// What its vertices gather of one another ([`super::gather_of`]), where it is known already.
+    pub gather: Option<&'a VertexGather>,
 }
 
 impl<'a> From<&'a Bake> for SurfaceBakes<'a> {
     fn from(bake: &'a Bake) -> Self {
-        Self { occlusion: bake.occlusion.as_ref(), sky: bake.sky.as_ref() }
+        Self { occlusion: bake.occlusion.as_ref(), sky: bake.sky.as_ref(), gather: None }
     }
 }
 
@@ -59,7 +62,7 @@ impl<'a> PosedSurface<'a> {
         bakes: SurfaceBakes<'a>,
     ) -> Result<Self, SampleError> {
         let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
-        Ok(Self { open, ..Self::with_fields(scene, mesh, rays, morphs, bakes.sky, scene.needs().fields)? })
+        Ok(Self { open, ..Self::with_fields(scene, mesh, rays, morphs, bakes, scene.needs().fields)? })
     }
 
     /// The mesh of `scene` as it is posed with what finds `fields` at its points, and no open shares.
@@ -71,13 +74,13 @@ impl<'a> PosedSurface<'a> {
         mesh: &'a PosedMesh,
         rays: &'a RayMesh,
         morphs: &[Morph],
-        sky: Option<&'a SkyBake>,
+        bakes: SurfaceBakes<'a>,
         fields: Fields,
     ) -> Result<Self, SampleError> {
         let mut supplies = lit::supplies(scene, mesh, rays);
-        supplies.extend(bounced::supplies(scene, mesh, rays, fields));
-        if let Some(sky) = sky {
-            supplies.extend(sky::supplies(scene, mesh, rays, morphs, sky, fields)?);
+        supplies.extend(bounced::supplies(scene, mesh, rays, bakes.gather, fields));
+        if let Some(sky) = bakes.sky {
+            supplies.extend(sky::supplies(scene, mesh, rays, morphs, (sky, bakes.gather), fields)?);
         }
         Ok(Self { supplies, ..Self::bare(mesh, rays, None) })
     }

@@ -5,6 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::SampleError;
+use super::bounced::new_gather;
 use super::sky_rays::ByRays;
 use super::supply::Supply;
 use super::trace::Hit;
@@ -61,7 +62,7 @@ pub(super) fn supplies<'a>(
     mesh: &'a PosedMesh,
     rays: &'a RayMesh,
     morphs: &[Morph],
-    bake: &'a SkyBake,
+    (bake, gather): (&'a SkyBake, Option<&VertexGather>),
     fields: Fields,
 ) -> Result<Vec<(Field, Box<dyn Supply + 'a>)>, SampleError> {
     let asked = |name| Field::from_name(name).filter(|field| fields.iter().any(|of| of == *field));
@@ -75,7 +76,7 @@ pub(super) fn supplies<'a>(
         supplies.push((field, of_vertices(sky.each(|vertex| sky.bent_normal(vertex).to_array()))));
     }
     if let (Some(field), Some(light)) = (ratio, &bake.light) {
-        let by_rays = light.panorama.as_ref().map(|panorama| sky.by_rays(scene, rays, panorama));
+        let by_rays = light.panorama.as_ref().map(|panorama| sky.by_rays(scene, rays, gather, panorama));
         let visibility = scene.choices.visibility;
         supplies.push(match by_rays {
             Some(by_rays) => (field, Box::new(by_rays)),
@@ -152,11 +153,17 @@ impl<'a> Sky<'a> {
     }
 
     /// The same by rays from each sample; `panorama` is the environment without its lights.
-    fn by_rays(&self, scene: &'a Scene, rays: &'a RayMesh, panorama: &'a Environment) -> ByRays<'a> {
+    fn by_rays(
+        &self,
+        scene: &'a Scene,
+        rays: &'a RayMesh,
+        gather: Option<&VertexGather>,
+        panorama: &'a Environment,
+    ) -> ByRays<'a> {
         let (mesh, albedo) = (self.mesh, Albedo { map: scene.maps.color.as_ref() });
         let light = if scene.choices.bounces == Bounces::Gathered {
-            let gather = VertexGather::new(mesh, scene.quality.occlusion_rays, &albedo);
-            gather.lit(|vertex| arriving(self.direct(vertex), &self.whole).map(|light| light.max(0.0) as f32))
+            let lit = |vertex| arriving(self.direct(vertex), &self.whole).map(|light| light.max(0.0) as f32);
+            gather.map_or_else(|| new_gather(scene, mesh).lit(lit), |gather| gather.lit(lit))
         } else {
             Vec::new()
         };

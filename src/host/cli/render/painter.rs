@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::Refusal;
+use crate::bake::interreflection::VertexGather;
 use crate::bake::rays::RayMesh;
 use crate::bake::{PoseBake, SkyBake, VertexOcclusion};
 use crate::model::effects::Effect;
@@ -11,7 +12,7 @@ use crate::render::backdrop::Backdrop;
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
-use crate::samples::{Atlas, PosedSurface, SurfaceBakes, atlas_of, sample_view};
+use crate::samples::{Atlas, PosedSurface, SurfaceBakes, atlas_of, gather_of, sample_view};
 use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, Morph, PosedMesh};
 use crate::scene::view::Camera;
@@ -67,7 +68,7 @@ impl CpuPainter {
     pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
         let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
         let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
-        let (pose, sky) = (Pose::of(&scene.mesh, None), baked.sky.clone());
+        let (pose, sky) = (Pose::of(&scene, &scene.mesh, None), baked.sky.clone());
         let mut painter = Self { scene, occlusion, sky, shader, pose, atlas: None, seconds: 0.0 };
         let atlas = atlas_of(&painter.scene, &painter.surface()?)?;
         painter.atlas = atlas;
@@ -76,10 +77,11 @@ impl CpuPainter {
 
     /// The mesh as it is posed, with what is baked of it.
     fn surface(&self) -> Result<PosedSurface<'_>, Refusal> {
-        let Pose { mesh, rays, morphs, own } = &self.pose;
+        let Pose { mesh, rays, morphs, own, gather } = &self.pose;
         let bakes = SurfaceBakes {
             occlusion: own.occlusion.as_ref().or(self.occlusion.as_deref()),
             sky: own.sky.as_ref().or(self.sky.as_deref()),
+            gather: gather.as_ref(),
         };
         Ok(PosedSurface::new(&self.scene, mesh, rays, morphs, bakes)?)
     }
@@ -91,13 +93,16 @@ struct Pose {
     rays: RayMesh,
     morphs: Vec<Morph>,
     own: PoseBake,
+    gather: Option<VertexGather>,
 }
 
 impl Pose {
-    fn of(mesh: &Mesh, own: Option<PoseBake>) -> Self {
+    fn of(scene: &Scene, mesh: &Mesh, own: Option<PoseBake>) -> Self {
         let posed = mesh.pose();
         let rays = RayMesh::new(&posed.positions, &posed.triangles);
-        Self { mesh: posed, rays, morphs: mesh.morphs.clone(), own: own.unwrap_or_default() }
+        let gather = gather_of(scene, &posed);
+        let (morphs, own) = (mesh.morphs.clone(), own.unwrap_or_default());
+        Self { mesh: posed, rays, morphs, own, gather }
     }
 }
 
@@ -107,7 +112,7 @@ impl Painter for CpuPainter {
     }
 
     fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), Refusal> {
-        self.pose = Pose::of(mesh, own);
+        self.pose = Pose::of(&self.scene, mesh, own);
         let atlas = atlas_of(&self.scene, &self.surface()?)?;
         self.atlas = atlas;
         Ok(())
