@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 use glam::{DVec3, Vec3};
 use skinfit::bake::coefficients::Coefficients;
 use skinfit::bake::harmonics::{Order, basis, cosine_lobe, open_transfer};
-use skinfit::bake::shadowed::{Turning, bounce_polynomial, shadow_ratio};
+use skinfit::bake::shadowed::{Turning, arriving, bounce_polynomial, shadow_ratio, share_of_open};
 use skinfit::bake::transfer::bake_transfer;
 use skinfit::model::cube::{Cube, face_direction};
 use skinfit::scene::maps::{Environment, Map, Spots};
@@ -210,6 +210,8 @@ fn transfer_vector(vectors: &Vectors, file: &Node<'_>) {
             .flat_map(|order| light.truncated(order).through(&transfer[..order.functions()]))
             .collect();
         exact.check("shadowed", &shadowed, &want.at("shadowed"));
+        let share = share_of_open(arriving(&transfer, &light), arriving(&open, &light), light.mean());
+        exact.check("share of open light", &share, &want.at("ratio"));
         let [split, open] = [&transfer, &open].map(|transfer| Turning::of(transfer, &light));
         let degree = |slope: [f64; 3]| slope.map(|x| x * PI / 180.0);
         exact.check("d shadowed", &degree(split.slope(0.0)), &want.at("d_shadowed"));

@@ -67,6 +67,9 @@ pub(super) fn supplies<'a>(
 ) -> Result<Vec<(Field, Box<dyn Supply + 'a>)>, SampleError> {
     let asked = |name| Field::from_name(name).filter(|field| fields.iter().any(|of| of == *field));
     let [ratio, bent] = [SKY_RATIO, BENT_NORMAL].map(asked);
+    if ratio.is_none() && bent.is_none() {
+        return Ok(Vec::new());
+    }
     let sky = Sky::new(scene, mesh, morphs, bake)?;
     let of_vertices = |numbers: Vec<[f32; 3]>| -> Box<dyn Supply + 'a> {
         Box::new(OfVertices { triangles: &mesh.triangles, numbers })
