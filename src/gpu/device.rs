@@ -283,6 +283,10 @@ fn limits(adapter: &Limits, choice: &Choice) -> Limits {
         max_texture_dimension_2d: side,
         max_buffer_size: adapter.max_buffer_size,
         max_storage_buffer_binding_size: adapter.max_storage_buffer_binding_size,
+        // Each light has fields of its own.
+        max_vertex_buffers: adapter.max_vertex_buffers,
+        max_vertex_attributes: adapter.max_vertex_attributes,
+        max_inter_stage_shader_variables: adapter.max_inter_stage_shader_variables,
         ..Limits::default().or_worse_values_from(adapter)
     }
 }

@@ -41,6 +41,20 @@ pub(super) struct Outputs<'a> {
     pub(super) depth: bool,
 }
 
+/// Refuse a plan that reads more of a vertex than the adapter takes: each light has numbers of its own there.
+fn check_attributes(gpu: &Gpu, plan: &Plan) -> Result<(), GpuError> {
+    let limits = gpu.device.limits();
+    let most = limits.max_vertex_buffers.min(limits.max_vertex_attributes) as usize;
+    if plan.attributes.len() <= most {
+        return Ok(());
+    }
+    let count = plan.attributes.len();
+    let reason = format!(
+        "the shader reads {count} attributes of a vertex, of which it takes {most}; fewer lights, or shadow maps, take fewer"
+    );
+    Err(GpuError::Refused { adapter: gpu.name().to_owned(), reason })
+}
+
 impl Pipeline {
     /// The plan's pipeline; `levels` are those that it reads.
     pub(super) fn new(
@@ -53,6 +67,7 @@ impl Pipeline {
         if plan.resources.contains(&Resource::ShadowMaps) {
             uploads.make_shadow_maps(gpu, &plan.facts)?;
         }
+        check_attributes(gpu, &plan)?;
         let attributes =
             plan.attributes.iter().map(|&a| uploads.attribute(gpu, a)).collect::<Result<Vec<_>, _>>()?;
         let mut resources =

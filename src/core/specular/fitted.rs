@@ -243,8 +243,14 @@ fn file(model: usize) -> String {
         let l = if fit.power == 1 { "roughness" } else { "roughness * roughness" };
         format!("{:?} * {l}", fit.layer)
     };
-    let mut text = format!(
-        "// The split sum of {name} (MODEL 9): a and b, with which a constant environment of 1 is reflected as f0 a + b, at
+    // Languages that it is translated to know a function from its definition on.
+    let mut text = String::from("// The root of what a white furnace does not give back.\n");
+    text.push_str(&lost.print(&lost.solve(&nodes)));
+    text.push_str("\n// 1 - H.V' in the mean of its fifth power.\n");
+    text.push_str(&mean.print(&mean.solve(&nodes)));
+    let _ = write!(
+        text,
+        "\n// The split sum of {name} (MODEL 9): a and b, with which a constant environment of 1 is reflected as f0 a + b, at
 // N.V' and a roughness of [{SMOOTHEST}, 1], to {LARGEST_ERROR:e}. At views that graze more than 1e-6 it stays: there its slope is
 // infinite. Fitted to the exact integrals and printed by specular/fitted.rs; nobody writes here.
 fn split_sum_{name}(view_cosine: f32, roughness: f32) -> vec2f {{
@@ -265,10 +271,6 @@ fn split_sum_{name}(view_cosine: f32, roughness: f32) -> vec2f {{
         x(&lost),
         x(&mean),
     );
-    text.push_str("\n// The root of what a white furnace does not give back.\n");
-    text.push_str(&lost.print(&lost.solve(&nodes)));
-    text.push_str("\n// 1 - H.V' in the mean of its fifth power.\n");
-    text.push_str(&mean.print(&mean.solve(&nodes)));
     text
 }
 

@@ -18,6 +18,9 @@ use crate::subject::Subject;
 /// Views are left out one at a time up to so many; of more, so many parts are left out in turn.
 const MOST_FOLDS: usize = 6;
 
+/// Views count as alike from so many dB on: a sixteenth of a step of 8 bits. What a set gains beyond is nothing.
+const ALIKE: f64 = 72.0;
+
 /// What sets are judged by.
 pub struct Judge<'a> {
     /// The scene file.
@@ -58,7 +61,7 @@ impl Judge<'_> {
             for i in (0..views.len()).filter(|&i| held(i)) {
                 let reference = ReferenceView::new(&subject.observed.scene.views[i], &views[i]);
                 let errors = reference.errors(&images[i], subject.observed.scene.fit.loss);
-                scores.extend(errors.scores.map(|scores| scores.psnr));
+                scores.extend(errors.scores.map(|scores| scores.psnr.min(ALIKE)));
             }
         }
         let scene = &subject.observed.scene;
@@ -103,6 +106,9 @@ impl Judge<'_> {
             let scene = &mut loaded.scene;
             scene.fit.free_gains = false;
             scene.fit.free = free(effects, &scene.fit.free);
+            // What is free of a set is chosen here: what else the scene frees is not to be warned of.
+            loaded.warnings.retain(|warning| !warning.contains("no enabled effect asks for it"));
+            let scene = &mut loaded.scene;
             if let Some(samples) = samples {
                 scene.quality.samples_per_axis = samples;
             }

@@ -110,6 +110,12 @@ pub enum AdjointError {
     Lobe(&'static str),
 }
 
+/// Whether a parameter acts through cubes that are inputs of their own.
+#[must_use]
+pub fn is_sharpness(param: Param) -> bool {
+    matches!(param.name(), "specular_lobe" | "roughness" | "gloss")
+}
+
 impl Adjoint {
     /// The model under those switches, with free columns; the environment is turned when `turned` says so or its
     /// rotation is free.
@@ -118,8 +124,7 @@ impl Adjoint {
     /// When a lobe's sharpness is free, or the planner yields nothing.
     pub fn new(setup: Setup, columns: &[Column], turned: bool) -> Result<Self, AdjointError> {
         let free = |param: Param| columns.iter().any(|column| column.param == param);
-        let sharpness = |param: &Param| ["specular_lobe", "roughness", "gloss"].contains(&param.name());
-        if let Some(param) = columns.iter().map(|column| column.param).find(sharpness) {
+        if let Some(param) = columns.iter().map(|column| column.param).find(|&param| is_sharpness(param)) {
             return Err(AdjointError::Lobe(param.name()));
         }
         let facts = Facts {

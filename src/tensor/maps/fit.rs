@@ -12,6 +12,7 @@ use super::parts::{Cut, cuts, most_samples};
 use super::problem::{Observed, Problem};
 use super::task::MapTask;
 use super::{MapError, adam, cg};
+use crate::adjoint::is_sharpness;
 use crate::bake::Illumination;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
@@ -247,12 +248,12 @@ impl Rounds<'_, '_> {
     }
 }
 
-/// Every parameter but the lobe, each channel its own.
+/// Every parameter but those of lobes' sharpness, each channel its own.
 fn all_columns() -> Vec<Column> {
     let of = |param: Param| {
         if param.info().rgb { Column::per_channel(param).to_vec() } else { vec![Column::tied(param)] }
     };
-    Param::all().filter(|&param| param != Param::SpecularLobe).flat_map(of).collect()
+    Param::all().filter(|&param| !is_sharpness(param)).flat_map(of).collect()
 }
 
 fn column_tensor(shared: &SharedDevice, columns: &[Column], point: &Point) -> Tensor<1> {

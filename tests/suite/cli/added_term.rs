@@ -29,7 +29,7 @@ fn its_parameters_are_listed_and_its_rules_are_in_the_shader_of_its_scene() {
         listed.contains("fresnel_f0") && listed.contains("[0, 0.2]") && listed.contains("Schlick 1994"),
         "{listed}"
     );
-    assert!(!sandbox.run(&["params"]).done().out.contains("fresnel"));
+    assert!(!sandbox.run(&["params"]).done().out.contains("fresnel_f0"));
     let shader = sandbox.run(&["shader", "scene.toml"]).done().out;
     assert!(shader.contains("fresnel_part") && shader.contains("fn schlick("), "{shader}");
     // An option may name its effect, and leave it out.

@@ -35,6 +35,7 @@ fn what_made_the_targets_is_found_and_fitted() {
     // The targets are the model's own: what was found explains them.
     let end = score(place(&steps[steps.len() - 1]));
     assert!(end > score(0) + 10.0, "{end} {}", score(0));
+    assert!(!chosen.iter().any(|name| name == "fresnel"), "{chosen:?}");
     // Of sets that are dearer and no better, none is on the front.
     let on_front: Vec<_> = sets.iter().filter(|set| set["front"] == true).collect();
     for set in &on_front {

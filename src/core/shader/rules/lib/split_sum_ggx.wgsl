@@ -1,19 +1,3 @@
-// The split sum of ggx (MODEL 9): a and b, with which a constant environment of 1 is reflected as f0 a + b, at
-// N.V' and a roughness of [0.05, 1], to 2e-4. At views that graze more than 1e-6 it stays: there its slope is
-// infinite. Fitted to the exact integrals and printed by specular/fitted.rs; nobody writes here.
-fn split_sum_ggx(view_cosine: f32, roughness: f32) -> vec2f {
-    let view: f32 = max(view_cosine, 1e-6);
-    let y: f32 = 2.1052632 * roughness - 1.1052631;
-    let lost_layer: f32 = 1.0 * roughness;
-    let lost: f32 = ggx_lost(2.0 * sqrt(view * (1.0 + lost_layer) / (view + lost_layer)) - 1.0, y);
-    let mean_layer: f32 = 2.0 * roughness * roughness;
-    let mean: f32 = max(ggx_mean(2.0 * sqrt(view * (1.0 + mean_layer) / (view + mean_layer)) - 1.0, y), 0.0);
-    let all: f32 = 1.0 - lost * lost;
-    let square: f32 = mean * mean;
-    let grazing: f32 = all * (square * square * mean);
-    return vec2f(all - grazing, grazing);
-}
-
 // The root of what a white furnace does not give back.
 fn ggx_lost(x: f32, y: f32) -> f32 {
     let n0: f32 = 0.33402863 + y * (0.8169048 + y * (1.1159594 + y * (0.98953736 + y * (0.43588084 + y * (0.065510236 + y * -0.0009552404)))));
@@ -50,4 +34,20 @@ fn ggx_mean(x: f32, y: f32) -> f32 {
     let d5: f32 = 0.02002914 + y * 0.030954488;
     let d6: f32 = -0.0021627273;
     return (n0 + x * (n1 + x * (n2 + x * (n3 + x * (n4 + x * (n5 + x * n6)))))) / (d0 + x * (d1 + x * (d2 + x * (d3 + x * (d4 + x * (d5 + x * d6))))));
+}
+
+// The split sum of ggx (MODEL 9): a and b, with which a constant environment of 1 is reflected as f0 a + b, at
+// N.V' and a roughness of [0.05, 1], to 2e-4. At views that graze more than 1e-6 it stays: there its slope is
+// infinite. Fitted to the exact integrals and printed by specular/fitted.rs; nobody writes here.
+fn split_sum_ggx(view_cosine: f32, roughness: f32) -> vec2f {
+    let view: f32 = max(view_cosine, 1e-6);
+    let y: f32 = 2.1052632 * roughness - 1.1052631;
+    let lost_layer: f32 = 1.0 * roughness;
+    let lost: f32 = ggx_lost(2.0 * sqrt(view * (1.0 + lost_layer) / (view + lost_layer)) - 1.0, y);
+    let mean_layer: f32 = 2.0 * roughness * roughness;
+    let mean: f32 = max(ggx_mean(2.0 * sqrt(view * (1.0 + mean_layer) / (view + mean_layer)) - 1.0, y), 0.0);
+    let all: f32 = 1.0 - lost * lost;
+    let square: f32 = mean * mean;
+    let grazing: f32 = all * (square * square * mean);
+    return vec2f(all - grazing, grazing);
 }

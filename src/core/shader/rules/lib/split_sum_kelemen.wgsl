@@ -1,19 +1,3 @@
-// The split sum of kelemen (MODEL 9): a and b, with which a constant environment of 1 is reflected as f0 a + b, at
-// N.V' and a roughness of [0.05, 1], to 2e-4. At views that graze more than 1e-6 it stays: there its slope is
-// infinite. Fitted to the exact integrals and printed by specular/fitted.rs; nobody writes here.
-fn split_sum_kelemen(view_cosine: f32, roughness: f32) -> vec2f {
-    let view: f32 = max(view_cosine, 1e-6);
-    let y: f32 = 2.1052632 * roughness - 1.1052631;
-    let lost_layer: f32 = 2.0 * roughness;
-    let lost: f32 = kelemen_lost(2.0 * sqrt(view * (1.0 + lost_layer) / (view + lost_layer)) - 1.0, y);
-    let mean_layer: f32 = 2.0 * roughness;
-    let mean: f32 = max(kelemen_mean(2.0 * sqrt(view * (1.0 + mean_layer) / (view + mean_layer)) - 1.0, y), 0.0);
-    let all: f32 = 1.0 - lost * lost;
-    let square: f32 = mean * mean;
-    let grazing: f32 = all * (square * square * mean);
-    return vec2f(all - grazing, grazing);
-}
-
 // The root of what a white furnace does not give back.
 fn kelemen_lost(x: f32, y: f32) -> f32 {
     let n0: f32 = 0.46966124 + y * (0.5919148 + y * (0.22342183 + y * (0.037257563 + y * (0.010026506 + y * (0.005592176 + y * 0.001990831)))));
@@ -48,4 +32,20 @@ fn kelemen_mean(x: f32, y: f32) -> f32 {
     let d4: f32 = -0.20412116 + y * -0.0875524;
     let d5: f32 = 0.028578583;
     return (n0 + x * (n1 + x * (n2 + x * (n3 + x * (n4 + x * n5))))) / (d0 + x * (d1 + x * (d2 + x * (d3 + x * (d4 + x * d5)))));
+}
+
+// The split sum of kelemen (MODEL 9): a and b, with which a constant environment of 1 is reflected as f0 a + b, at
+// N.V' and a roughness of [0.05, 1], to 2e-4. At views that graze more than 1e-6 it stays: there its slope is
+// infinite. Fitted to the exact integrals and printed by specular/fitted.rs; nobody writes here.
+fn split_sum_kelemen(view_cosine: f32, roughness: f32) -> vec2f {
+    let view: f32 = max(view_cosine, 1e-6);
+    let y: f32 = 2.1052632 * roughness - 1.1052631;
+    let lost_layer: f32 = 2.0 * roughness;
+    let lost: f32 = kelemen_lost(2.0 * sqrt(view * (1.0 + lost_layer) / (view + lost_layer)) - 1.0, y);
+    let mean_layer: f32 = 2.0 * roughness;
+    let mean: f32 = max(kelemen_mean(2.0 * sqrt(view * (1.0 + mean_layer) / (view + mean_layer)) - 1.0, y), 0.0);
+    let all: f32 = 1.0 - lost * lost;
+    let square: f32 = mean * mean;
+    let grazing: f32 = all * (square * square * mean);
+    return vec2f(all - grazing, grazing);
 }
