@@ -11,6 +11,7 @@
 
 mod accuracy;
 mod lab;
+mod light;
 mod pages;
 mod results;
 mod strays;
@@ -30,6 +31,7 @@ type Measure = fn(&Lab) -> Result<Value>;
 /// The raw files, and what measures each.
 const FILES: &[(&str, Measure)] = &[
     ("docs/results.json", results::measure),
+    ("docs/light.json", light::measure),
     ("docs/accuracy.json", accuracy::tests),
     ("docs/noise.json", accuracy::noise),
     ("experiments/ablation/results.json", studies::ablation),

@@ -198,7 +198,9 @@ impl Effect {
     /// The effect of that name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::all().find(|effect| effect.name() == name)
+        let own = TABLE.iter().position(|row| row.name == name);
+        let place = own.or_else(|| Some(TABLE.len() + ADDED.position(|row| row.name == name)?));
+        place.map(|place| Self(place as u8))
     }
 }
 
@@ -249,6 +251,12 @@ impl Effects {
     #[must_use]
     pub fn has_any(self, effects: &[Effect]) -> bool {
         effects.iter().any(|&effect| self.has(effect))
+    }
+
+    /// Whether an effect is in both sets.
+    #[must_use]
+    pub fn overlaps(self, other: Self) -> bool {
+        self.0.iter().zip(other.0).any(|(bits, other)| bits & other != 0)
     }
 
     /// This set and `effect`.

@@ -74,7 +74,7 @@ impl Field {
     /// The field of that name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        let place = ADDED.rows().iter().position(|row| row.name == name)?;
+        let place = ADDED.position(|row| row.name == name)?;
         u16::try_from(place).ok().map(Self)
     }
 

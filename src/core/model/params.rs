@@ -249,13 +249,19 @@ impl Param {
     /// The parameter of that name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::all().find(|p| p.name() == name)
+        Self::found(|row| row.name == name)
     }
 
     /// The parameter of that name in shaders.
     #[must_use]
     pub fn from_identifier(name: &str) -> Option<Self> {
-        Self::all().find(|p| p.identifier() == name)
+        Self::found(|row| row.identifier == name)
+    }
+
+    fn found(is: impl Fn(&ParamInfo) -> bool) -> Option<Self> {
+        let own = TABLE.iter().position(&is);
+        let place = own.or_else(|| Some(Self::COUNT + ADDED.position(&is)?));
+        place.map(|place| Self(place as u16))
     }
 
     /// Whether each of several scenes that are fitted as one skin has a value of its own.

@@ -43,6 +43,11 @@ impl<T> Added<T> {
         self.0.read().unwrap_or_else(PoisonError::into_inner).len()
     }
 
+    /// The place of the first row that `is` what is looked for.
+    pub(crate) fn position(&self, is: impl Fn(&T) -> bool) -> Option<usize> {
+        self.0.read().unwrap_or_else(PoisonError::into_inner).iter().position(|row| is(row))
+    }
+
     /// The row at `place`, which must have been added.
     pub(crate) fn row(&self, place: usize) -> &'static T {
         self.0.read().unwrap_or_else(PoisonError::into_inner)[place]

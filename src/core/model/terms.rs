@@ -71,13 +71,18 @@ impl TermName {
     /// The terms that `effects` have.
     #[must_use]
     pub fn of(effects: Effects) -> Vec<Self> {
-        Self::all().filter(|term| term.info().effects.iter().all(|&effect| effects.has(effect))).collect()
+        let on = |info: &TermInfo| info.effects.iter().all(|&effect| effects.has(effect));
+        let added = ADDED.rows();
+        let all = TABLE.iter().chain(added);
+        (0..).map(Self).zip(all).filter(|(_, info)| on(info)).map(|(term, _)| term).collect()
     }
 
     /// The term of that name.
     #[must_use]
     pub fn from_name(name: &str) -> Option<Self> {
-        Self::all().find(|term| term.name() == name)
+        let own = TABLE.iter().position(|row| row.name == name);
+        let place = own.or_else(|| Some(TABLE.len() + ADDED.position(|row| row.name == name)?));
+        place.map(|place| Self(place as u16))
     }
 
     /// Its place in the table.

@@ -83,16 +83,9 @@ impl FaceSizes {
     }
 }
 
-/// Whether light is shared out before it is diffuse: the sky's by what a point sees of it, all by what is reflected
-/// above the skin.
-fn layered(effects: Effects) -> bool {
-    library::LAYERED.iter().filter_map(|name| Effect::from_name(name)).any(|effect| effects.has(effect))
-}
-
 /// Whether the skin throws back what its lamps bring.
 fn lights_bounce(setup: &Setup) -> bool {
-    let seen = Effect::from_name("directional_occlusion").is_some_and(|effect| setup.effects.has(effect));
-    seen && setup.choices.bounces == Bounces::Gathered
+    library::sees_sky(setup.effects) && setup.choices.bounces == Bounces::Gathered
 }
 
 /// Shadow maps that fragments compare themselves with.
@@ -238,9 +231,6 @@ impl Facts {
             return self.holds(condition).map(|holds| !holds);
         }
         let setup = self.setup;
-        if let Some(effect) = Effect::from_name(condition) {
-            return Some(setup.effects.has(effect));
-        }
         if let Some(form) = Form::ALL.into_iter().find(|form| form.name() == condition) {
             return Some(setup.form == form);
         }
@@ -252,7 +242,7 @@ impl Facts {
             return Some(holds);
         }
         Some(match condition {
-            "layered" => layered(setup.effects),
+            "layered" => library::layers(setup.effects),
             "lights_bounce" => lights_bounce(&setup),
             "raster" => self.source == Source::Raster,
             "terms" => self.source == Source::Terms,
@@ -277,7 +267,8 @@ impl Facts {
             "shadow_pcf" => self.shadow_filter() == Some(ShadowFilter::Pcf),
             "shadow_pcss" => self.shadow_filter() == Some(ShadowFilter::Pcss),
             "atlas" => self.source != Source::Terms && self.atlas.is_some_and(|size| size > 0),
-            _ => return None,
+            // Last, as many may have been added.
+            effect => return Effect::from_name(effect).map(|effect| setup.effects.has(effect)),
         })
     }
 

@@ -303,9 +303,9 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
         assert_eq!(error(named(&settings, reference)), 0.0);
         assert!(settings.iter().all(|s| error(s) < 1.0), "{settings:?}");
     }
-    // A direction of what is hidden is worth something.
+    // Little is hidden on a ball with a brow: all ways are near, if they are right.
     let settings = settings(&sandbox, "cost", "visibility");
-    assert!(error(named(&settings, "sh4")) < error(named(&settings, "scalar")), "{settings:?}");
+    assert!(settings.iter().all(|setting| error(setting) < 0.01), "{settings:?}");
     sandbox.write("plain.toml", super::sandbox::SCENE.as_bytes());
     let idle = ["tradeoff", "plain.toml", "-o", "none", "--axis", "visibility"];
     sandbox.run(&idle).refused(&["visibility", "directional_occlusion is off"]);

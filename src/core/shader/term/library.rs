@@ -5,7 +5,7 @@
 use std::sync::OnceLock;
 
 use super::{Origin, Term, register_from};
-use crate::model::effects::Effect;
+use crate::model::effects::{Effect, Effects};
 
 /// Files, by name, in the order of documentation.
 const FILES: [(&str, &str); 2] = [
@@ -13,15 +13,20 @@ const FILES: [(&str, &str); 2] = [
     ("specular", include_str!("../rules/term/specular.wgsl")),
 ];
 
-/// Effects that share light out before it is diffuse.
-pub const LAYERED: [&str; 2] = ["directional_occlusion", "fresnel"];
+/// Effects that share light out before it is diffuse: the sky's by what a point sees of it, all by what is reflected above
+/// the skin.
+const LAYERED: [&str; 2] = [SKY, "fresnel"];
+
+/// The effect of what a point sees of the sky.
+const SKY: &str = "directional_occlusion";
+
+static TERMS: OnceLock<Vec<&'static Term>> = OnceLock::new();
 
 /// The library's terms, made known to this process.
 ///
 /// # Panics
 /// When one of its own files does not fit its own rules, which every use would show.
 pub fn terms() -> &'static [&'static Term] {
-    static TERMS: OnceLock<Vec<&'static Term>> = OnceLock::new();
     TERMS.get_or_init(|| {
         let register = |(name, text): (&str, &str)| {
             let term = register_from(Origin::Library, name, text);
@@ -40,4 +45,23 @@ pub fn register_all() {
 #[must_use]
 pub fn is_own(effect: Effect) -> bool {
     terms().iter().any(|term| term.effects.contains(&effect))
+}
+
+/// Whether one of a set shares light out before it is diffuse.
+pub fn layers(effects: Effects) -> bool {
+    static SET: OnceLock<Effects> = OnceLock::new();
+    any(effects, &SET, &LAYERED)
+}
+
+/// Whether one of a set knows what a point sees of the sky.
+pub fn sees_sky(effects: Effects) -> bool {
+    static SET: OnceLock<Effects> = OnceLock::new();
+    any(effects, &SET, &[SKY])
+}
+
+/// Whether an effect of these names is in a set; before they are known, none is.
+fn any(effects: Effects, known: &OnceLock<Effects>, names: &[&str]) -> bool {
+    // Conditions of rules are asked thousands of times: names are looked up once.
+    let found = || names.iter().filter_map(|name| Effect::from_name(name)).collect();
+    TERMS.get().is_some() && effects.overlaps(*known.get_or_init(found))
 }

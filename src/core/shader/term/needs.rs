@@ -14,7 +14,7 @@ use crate::shader::rule::{Rule, rules};
 use crate::shader::search::search;
 
 use super::fields;
-use super::library::LAYERED;
+use super::library;
 
 /// What `effect` asks for beside the others of `setup`.
 pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
@@ -31,7 +31,7 @@ pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
         !rule.adds.is_empty() && conditions.all(|effect| setup.effects.has(effect))
     };
     let mut goals: Vec<&'static str> = own.filter(on).map(|rule| rule.gives[0].0).collect();
-    if LAYERED.contains(&effect.name()) {
+    if library::layers(Effects::of(&[effect])) {
         // It changes what other effects' rules read.
         goals.extend(parts(&Facts { setup: *setup, source: Source::Samples, ..Facts::default() }));
     }

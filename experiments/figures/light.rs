@@ -1,0 +1,90 @@
+//! docs/light.json: the scanned head under lamps and skies that it casts shadows in, fitted with each choice of its light.
+
+use std::path::PathBuf;
+
+use serde_json::{Map, Value, json};
+
+use crate::lab::{Lab, Result};
+
+/// The scenes, and whether their light comes out of a panorama.
+const SCENES: [(&str, bool); 3] = [("forest", true), ("sunrise", true), ("studio_dry", false)];
+
+/// What is fitted: its row's name, and settings of the scene file; those of `[environment]` are for light out of a panorama.
+const CHOICES: [(&str, &[(&str, &str)]); 9] = [
+    ("as the scene has it", &[]),
+    ("without `bounces`", &[("model.bounces", "\"none\"")]),
+    ("`visibility = \"scalar\"`", &[("model.visibility", "\"scalar\"")]),
+    ("`visibility = \"cone\"`", &[("model.visibility", "\"cone\"")]),
+    ("`specular_visibility = \"none\"`", &[("model.specular_visibility", "\"none\"")]),
+    ("`specular_visibility = \"lagarde\"`", &[("model.specular_visibility", "\"lagarde\"")]),
+    ("`specular_model = \"kelemen\"`", &[("model.specular_model", "\"kelemen\"")]),
+    ("finest in real time", FINEST),
+    ("by rays", RAYS),
+];
+
+const FINEST: &[(&str, &str)] = &[
+    ("environment.lights", "16"),
+    ("model.visibility", "\"sh6\""),
+    ("model.lobe_lookup", "\"off_peak\""),
+    ("quality", "{ samples_per_axis = 4, lobe_size = 128 }"),
+];
+
+const RAYS: &[(&str, &str)] = &[
+    ("environment.lights", "16"),
+    ("model.visibility", "\"rays\""),
+    ("model.specular_visibility", "\"lobe\""),
+    ("model.lobe_lookup", "\"off_peak\""),
+];
+
+/// All of them, as docs/results.md has them in a table.
+pub(crate) fn measure(lab: &Lab) -> Result<Value> {
+    let mut choices = Vec::new();
+    for (name, settings) in CHOICES {
+        let mut row = Map::new();
+        row.insert("name".to_owned(), json!(name));
+        for (scene, sky) in SCENES {
+            let own: Vec<(&str, &str)> =
+                settings.iter().copied().filter(|(key, _)| sky || !key.starts_with("environment")).collect();
+            let what = format!("{scene}, {name}");
+            let file = lab.scene(&what, &file(lab, scene), &own)?;
+            row.insert(scene.to_owned(), fitted(&lab.fit(&what, Some(&file), &[])?.0));
+        }
+        choices.push(Value::Object(row));
+    }
+    Ok(json!({ "choices": choices, "held_out": held_out(lab)? }))
+}
+
+/// A scene file of the scanned head.
+fn file(lab: &Lab, scene: &str) -> PathBuf {
+    lab.data.join(format!("lps_{scene}/light.toml"))
+}
+
+/// A row's figures of a fit of one scene.
+fn fitted(report: &Value) -> Value {
+    let psnr = |view: &str| report["views"][view]["psnr"].clone();
+    json!({
+        "front": psnr("front"),
+        "three_quarter": psnr("threequarter"),
+        "profile": psnr("profile"),
+        "loss": report["loss"]["end"],
+        "params": report["params"],
+        "seconds": report["seconds"],
+    })
+}
+
+/// One skin for all scenes, each scored by a fit of the others.
+fn held_out(lab: &Lab) -> Result<Value> {
+    let files: Vec<String> = SCENES.iter().map(|(scene, _)| file(lab, scene).display().to_string()).collect();
+    let mut rows = Vec::new();
+    for (out, (scene, _)) in SCENES.iter().enumerate() {
+        let run = lab.scratch.path().join(format!("held_{scene}")).display().to_string();
+        let name = format!("lps_{scene}.light");
+        let mut arguments: Vec<&str> = vec!["fit", "--engine", "cpu", "--json", "-o", &run];
+        arguments.extend(files.iter().map(String::as_str));
+        arguments.extend(["--hold-out", &name]);
+        let text = lab.skinfit(&format!("one skin without {scene}"), &arguments, true)?;
+        let report: Value = serde_json::from_str(&text)?;
+        rows.push(json!({ "name": scene, "scores": report["scores"], "place": out }));
+    }
+    Ok(Value::Array(rows))
+}
