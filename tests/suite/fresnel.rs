@@ -89,7 +89,6 @@ fn within(got: &[f64], want: &[f64], unknowns: &[Unknown], what: &str) {
 #[test]
 fn slopes_are_finite_differences_on_every_engine() {
     for choices in CHOICES {
-        let mut bake = baked(&scene(choices, PARAMS));
         let unknowns = moving(choices);
         let columns: Vec<Column> = unknowns
             .iter()
@@ -98,7 +97,7 @@ fn slopes_are_finite_differences_on_every_engine() {
                 _ => None,
             })
             .collect();
-        bake = free_in(&scene(choices, PARAMS), bake, &columns);
+        let bake = free_in(&scene(choices, PARAMS), &columns);
         let observed = bake.sample().unwrap().observe().unwrap();
         let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
         let point = observed.start();
@@ -130,8 +129,7 @@ fn slopes_are_finite_differences_on_every_engine() {
 }
 
 /// The same scene baked with those columns free.
-fn free_in(folder: &SceneFolder, baked_before: Baked, columns: &[Column]) -> Baked {
-    drop(baked_before);
+fn free_in(folder: &SceneFolder, columns: &[Column]) -> Baked {
     let mut names: Vec<String> = Vec::new();
     for column in columns {
         let name = format!("\"{}\"", column.param.name());
@@ -173,7 +171,8 @@ fn in_a_white_furnace_the_lobe_shows_the_split_sum() {
                     continue;
                 }
                 // The quad faces the camera; the mean of a pixel's four samples is nearly that of its middle.
-                let (x, y) = ((i as u32 % camera.width) as f64 + 0.5, (i as u32 / camera.width) as f64 + 0.5);
+                let (x, y) =
+                    (f64::from(i as u32 % camera.width) + 0.5, f64::from(i as u32 / camera.width) + 0.5);
                 let tangent = (0.5 * camera.fov_y).tan() / (0.5 * f64::from(camera.height));
                 let [u, v] = [x - 0.5 * f64::from(camera.width), y - 0.5 * f64::from(camera.height)]
                     .map(|offset| offset * tangent);
@@ -251,7 +250,7 @@ fn both_engines_find_the_constants_that_made_the_target() {
     let folder = scene(CHOICES[1], PARAMS);
     let names = ["specular_weight", "roughness", "base_weight"].map(param);
     let columns = names.map(Column::tied);
-    let bake = free_in(&folder, baked(&folder), &columns);
+    let bake = free_in(&folder, &columns);
     let made = image(&bake.clone().with_scene(|scene| {
         for (param, value) in names.into_iter().zip([0.8, 0.33, 0.9]) {
             scene.params.set(param, value);

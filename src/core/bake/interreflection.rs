@@ -122,13 +122,13 @@ impl VertexGather {
     /// What is thrown back to each vertex of the light that `direct` has at each, in two rounds, rgb.
     #[must_use]
     pub fn bounced(&self, direct: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<[f32; 3]> {
-        self.of_vertices(Gather::once(&self.gathers, &self.lit_once(direct), 1))
+        self.of_vertices(&Gather::once(&self.gathers, &self.lit_once(direct), 1))
     }
 
     /// The light that `direct` has at each vertex, and what is thrown back to it in one round, rgb.
     #[must_use]
     pub fn lit(&self, direct: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<[f32; 3]> {
-        self.of_vertices(self.lit_once(direct))
+        self.of_vertices(&self.lit_once(direct))
     }
 
     /// Of each vertex that rays start from, red, green and blue.
@@ -140,7 +140,7 @@ impl VertexGather {
         source.iter().zip(&first).map(|(source, first)| source + first).collect()
     }
 
-    fn of_vertices(&self, slots: Vec<f32>) -> Vec<[f32; 3]> {
+    fn of_vertices(&self, slots: &[f32]) -> Vec<[f32; 3]> {
         self.vertices.spread(slots.as_chunks::<3>().0, 1)
     }
 }

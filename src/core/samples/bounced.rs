@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::posed::hits_of_vertices;
 use super::sky::OfVertices;
-use super::supply::Supply;
+use super::supply::{Supplies, Supply};
 use super::visibility::Shadows;
 use crate::bake::interreflection::{Albedo, VertexGather};
 use crate::bake::rays::RayMesh;
@@ -51,7 +51,7 @@ pub(super) fn supplies<'a>(
     rays: &RayMesh,
     gather: Option<&VertexGather>,
     fields: Fields,
-) -> Vec<(Field, Box<dyn Supply + 'a>)> {
+) -> Supplies<'a> {
     let asked = |light: &Light| {
         let field = Field::from_name(&field_name(light))?;
         fields.iter().any(|of| of == field).then(|| (field, light.moved(&scene.params)))

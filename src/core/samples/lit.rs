@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::supply::Supply;
+use super::supply::{Supplies, Supply};
 use super::trace::Hit;
 use super::visibility::Shadows;
 use crate::bake::rays::RayMesh;
@@ -49,17 +49,13 @@ impl Supply for Reaching<'_> {
 
 /// What finds the fields of a scene's lights at samples of its mesh. A light that a parameter has moved stands there;
 /// what is found is held while the parameter moves.
-pub(super) fn supplies<'a>(
-    scene: &Scene,
-    mesh: &'a PosedMesh,
-    rays: &'a RayMesh,
-) -> Vec<(Field, Box<dyn Supply + 'a>)> {
+pub(super) fn supplies<'a>(scene: &Scene, mesh: &'a PosedMesh, rays: &'a RayMesh) -> Supplies<'a> {
     if !scene.effects.has(Effect::Lights) {
         return Vec::new();
     }
     let shadows = Arc::new(Shadows::new(mesh, rays, scene.quality.shadow_rays));
     let shadowed = scene.effects.has(Effect::Shadows);
-    let mut supplies: Vec<(Field, Box<dyn Supply + 'a>)> = Vec::new();
+    let mut supplies: Supplies<'a> = Vec::new();
     for light in scene.lights_at(&scene.params) {
         let fields = match light.kind {
             LightKind::Directional(_) => vec![("open", What::Open)],

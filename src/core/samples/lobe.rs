@@ -79,8 +79,7 @@ impl<'a> Lobes<'a> {
             let sine = ((1.0 - cosine * cosine).max(0.0).sqrt() as f32).copysign(radius);
             let half = frame * Vec3A::new(sine * cos, sine * sin, cosine as f32);
             let along = 2.0 * eye.dot(half) * half - eye;
-            let [view, light, half_view] =
-                [n.dot(eye), n.dot(along), eye.dot(half)].map(|cosine| f64::from(cosine));
+            let [view, light, half_view] = [n.dot(eye), n.dot(along), eye.dot(half)].map(f64::from);
             if view <= 0.0 || light <= 0.0 || half_view <= 0.0 {
                 continue;
             }

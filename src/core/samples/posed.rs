@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::supply::Supply;
+use super::supply::Supplies;
 use super::trace::Hit;
 use super::{SampleError, bounced, lit, posed_occlusion, sky};
 use crate::bake::interreflection::VertexGather;
@@ -35,7 +35,7 @@ pub struct PosedSurface<'a> {
     pub(super) rays: &'a RayMesh,
     /// Open share of each vertex' hemisphere.
     pub(super) open: Option<Vec<f32>>,
-    supplies: Vec<(Field, Box<dyn Supply + 'a>)>,
+    supplies: Supplies<'a>,
 }
 
 /// Each vertex as a point of a triangle; none of one that is of no triangle.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::SampleError;
 use super::bounced::new_gather;
 use super::sky_rays::ByRays;
-use super::supply::Supply;
+use super::supply::{Supplies, Supply};
 use super::trace::Hit;
 use super::visibility::Shadows;
 use crate::bake::coefficients::Coefficients;
@@ -64,7 +64,7 @@ pub(super) fn supplies<'a>(
     morphs: &[Morph],
     (bake, gather): (&'a SkyBake, Option<&VertexGather>),
     fields: Fields,
-) -> Result<Vec<(Field, Box<dyn Supply + 'a>)>, SampleError> {
+) -> Result<Supplies<'a>, SampleError> {
     let asked = |name| Field::from_name(name).filter(|field| fields.iter().any(|of| of == *field));
     let [ratio, bent] = [SKY_RATIO, BENT_NORMAL].map(asked);
     if ratio.is_none() && bent.is_none() {
@@ -74,7 +74,7 @@ pub(super) fn supplies<'a>(
     let of_vertices = |numbers: Vec<[f32; 3]>| -> Box<dyn Supply + 'a> {
         Box::new(OfVertices { triangles: &mesh.triangles, numbers })
     };
-    let mut supplies: Vec<(Field, Box<dyn Supply + 'a>)> = Vec::new();
+    let mut supplies: Supplies<'a> = Vec::new();
     if let Some(field) = bent {
         supplies.push((field, of_vertices(sky.each(|vertex| sky.bent_normal(vertex).to_array()))));
     }

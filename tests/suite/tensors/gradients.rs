@@ -20,8 +20,21 @@ const SIZES: [usize; 3] = [3, 4, 6];
 const GROUPS: usize = 3;
 const N: usize = (1 + 2 + 4) * LANES;
 
-/// Everything that the operation takes, in f64: by the order of [`Input::ALL`], cubes without their borders.
-type Numbers = [Vec<f64>; 9];
+/// What the paper's effects read of the operation's inputs: the first of [`Input::ALL`].
+const READ: [Input; 9] = [
+    Input::Columns,
+    Input::Albedo,
+    Input::Specular,
+    Input::Attenuator,
+    Input::Open,
+    Input::Bump,
+    Input::Irradiance,
+    Input::Lobe,
+    Input::Hilite,
+];
+
+/// All of that in f64, cubes without their borders.
+type Numbers = [Vec<f64>; READ.len()];
 
 struct Case {
     setup: Setup,
@@ -273,7 +286,7 @@ fn every_adjoint_is_what_finite_differences_say() {
     let weights = weights();
     for (name, case) in cases() {
         let got = case.adjoints(Scatter::Exact, &weights);
-        for (i, input) in Input::ALL.into_iter().enumerate() {
+        for (i, input) in READ.into_iter().enumerate() {
             let what = format!("{name}, {}", input.name());
             let got = got[i].as_ref().unwrap_or_else(|| panic!("{what}: no gradient"));
             let want: Vec<f64> = (0..case.numbers[i].len()).map(|at| slope(&case, i, at, &weights)).collect();
@@ -294,7 +307,7 @@ fn exact_sums_have_the_same_bits_and_fast_ones_the_same_value() {
     let once = case.adjoints(Scatter::Exact, &weights);
     assert!((0..3).all(|_| case.adjoints(Scatter::Exact, &weights) == once));
     let fast = case.adjoints(Scatter::Fast, &weights);
-    for (i, input) in Input::ALL.into_iter().enumerate() {
+    for (i, input) in READ.into_iter().enumerate() {
         let (exact, fast) = (once[i].as_ref().unwrap(), fast[i].as_ref().unwrap());
         let exact: Vec<f64> = exact.iter().map(|&x| f64::from(x)).collect();
         // Sums of some tens of floats, in another order.

@@ -50,7 +50,7 @@ impl Axis for Shadows {
         let mut frames = Ok(Vec::new());
         let cheapest = ShadowMaps { filter: ShadowFilter::Vertices, ..ShadowMaps::default() };
         let first = seconds_of(|| {
-            frames = Drawn::new(&gpu, bench, &evaluated, cheapest).and_then(|mut d| d.frames())
+            frames = Drawn::new(&gpu, bench, &evaluated, cheapest).and_then(|mut d| d.frames());
         });
         frames?;
         let settings = settings(bench.baked.scene.shadow_maps).len() as f64;
