@@ -10,9 +10,10 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 21] = [
+const SOURCES: [&str; 24] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
+    include_str!("coefficients.rs"),
     include_str!("harmonics.rs"),
     include_str!("interreflection.rs"),
     include_str!("lobe_kernel.rs"),
@@ -26,6 +27,8 @@ const SOURCES: [&str; 21] = [
     include_str!("radial.rs"),
     include_str!("rays.rs"),
     include_str!("reflected.rs"),
+    include_str!("shadowed.rs"),
+    include_str!("sky.rs"),
     include_str!("stacks.rs"),
     include_str!("transfer.rs"),
     include_str!("vertex_rays.rs"),

@@ -139,10 +139,10 @@ fn a_value_a_slope_and_a_sum_that_are_wrong_are_each_found_and_named() {
         model(Part::Value, "green is ");
         engine(Part::Value, "green is ");
         // The batch shows every parameter, so that each one's slope and sums can be wrong. Haze is in alpha alone.
-        for param in Param::all().filter(|&param| param != Param::HazeWeight) {
+        for param in Param::built_in().filter(|&param| param != Param::HazeWeight) {
             model(Part::Slope(param), &format!("d green / d {} is ", param.name()));
         }
-        for param in Param::all() {
+        for param in Param::built_in() {
             engine(Part::Jtr(param), &format!("J^T r of {} is ", param.name()));
             engine(Part::Gradient(param), &format!("gradient by {} is ", param.name()));
             engine(Part::Jtj(param, param), &format!("J^T J of {0} and {0} is ", param.name()));
