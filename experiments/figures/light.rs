@@ -10,14 +10,11 @@ use crate::lab::{Lab, Result};
 const SCENES: [(&str, bool); 3] = [("forest", true), ("sunrise", true), ("studio_dry", false)];
 
 /// What is fitted: its row's name, and settings of the scene file; those of `[environment]` are for light out of a panorama.
-const CHOICES: [(&str, &[(&str, &str)]); 9] = [
+const CHOICES: [(&str, &[(&str, &str)]); 6] = [
     ("as the scene has it", &[]),
     ("without `bounces`", &[("model.bounces", "\"none\"")]),
     ("`visibility = \"scalar\"`", &[("model.visibility", "\"scalar\"")]),
-    ("`visibility = \"cone\"`", &[("model.visibility", "\"cone\"")]),
-    ("`specular_visibility = \"none\"`", &[("model.specular_visibility", "\"none\"")]),
     ("`specular_visibility = \"lagarde\"`", &[("model.specular_visibility", "\"lagarde\"")]),
-    ("`specular_model = \"kelemen\"`", &[("model.specular_model", "\"kelemen\"")]),
     ("finest in real time", FINEST),
     ("by rays", RAYS),
 ];
@@ -68,7 +65,6 @@ fn fitted(report: &Value) -> Value {
         "profile": psnr("profile"),
         "loss": report["loss"]["end"],
         "params": report["params"],
-        "seconds": report["seconds"],
     })
 }
 
