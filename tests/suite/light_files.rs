@@ -278,3 +278,17 @@ fn lights_of_a_mesh_file_that_make_no_sense_are_refused_and_missing_ones_are_tol
         }
     }
 }
+
+#[test]
+fn lights_whose_names_would_mean_each_others_quantities_are_refused() {
+    let folder = SceneFolder::new();
+    let light = |name: &str| {
+        format!(
+            "[[light]]\nname = \"{name}\"\ntype = \"directional\"\ndirection = [0, -1, 0]\nirradiance = [1, 1, 1]\n"
+        )
+    };
+    let text = format!("{SCENE}{}{}", light("glow"), light("glow_specular"));
+    folder.write("scene.toml", text.as_bytes());
+    let error = folder.load().unwrap_err().to_string();
+    assert!(error.contains("is there already") && error.contains("Give the light"), "{error}");
+}

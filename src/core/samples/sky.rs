@@ -146,13 +146,19 @@ impl<'a> Sky<'a> {
         let order = if visibility.bands().is_some() { self.order } else { Order::MOST };
         let open = open_transfer_at(order, normal);
         let lit = arriving(&open, &self.rest);
+        let mean = self.rest.mean();
+        if visibility == Visibility::Scalar {
+            // Whatever light comes from there, and so also where its harmonics ring.
+            let open = f64::from(transfer[0]) / CONSTANT;
+            let thrown = share_of_open(thrown, lit, mean);
+            return [0, 1, 2].map(|c| if mean[c] > 0.0 { (open + thrown[c]) as f32 } else { 0.0 });
+        }
         let shadowed = match visibility {
-            Visibility::Scalar => lit.map(|lit| lit * (f64::from(transfer[0]) / CONSTANT)),
             Visibility::Cone => self.through_cone(vertex, lit),
             _ => arriving(transfer, &self.rest),
         };
         let arrived = [0, 1, 2].map(|c| shadowed[c] + thrown[c]);
-        share_of_open(arrived, lit, self.rest.mean()).map(|share| share as f32)
+        share_of_open(arrived, lit, mean).map(|share| share as f32)
     }
 
     /// The same by rays from each sample; `panorama` is the environment without its lights.

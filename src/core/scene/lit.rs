@@ -128,6 +128,10 @@ impl Lights {
         if shadows && !lights {
             warn(warnings, path, "the effect `shadows` does nothing without `lights`");
         }
+        let glints = Effect::from_name("light_specular").is_some_and(|effect| effects.has(effect));
+        if glints && !lights {
+            warn(warnings, path, "the effect `light_specular` does nothing without `lights`");
+        }
     }
 
     /// Whether some of them come out of the panorama.

@@ -202,7 +202,9 @@ impl Search<'_> {
             let place = self.judged(own.without(effect))?;
             let (before, after) = (&self.sets[from], &self.sets[place]);
             let loss = before.held_out - after.held_out;
-            if loss < self.options.least && best.as_ref().is_none_or(|(least, ..)| loss < *least) {
+            let share = (before.operations - after.operations) / after.operations.max(1.0);
+            let idle = loss < self.options.least || loss < self.options.worth * share;
+            if idle && best.as_ref().is_none_or(|(least, ..)| loss < *least) {
                 best = Some((loss, format!("without {}", effect.name()), place));
             }
         }

@@ -153,6 +153,11 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
         .chain(Constant::OWN.iter().map(|constant| constant.name()))
         .chain(["vertex_index"])
         .collect();
+    let of_terms: BTreeSet<&str> = terms()
+        .into_iter()
+        .flat_map(|term| &term.rules)
+        .flat_map(|rule| rule.gives.iter().map(|(quantity, _)| *quantity))
+        .collect();
     let mut own = BTreeSet::new();
     for &(line, parameter) in &declaration.parameters {
         quantity_name(parameter.identifier, line)?;
@@ -184,8 +189,11 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
                 let wanted = "QUANTITY or QUANTITY.COMPONENTS, of the components that the function returns";
                 return Err(Problem::Value { key: "gives", given, wanted }.at(rule.line));
             }
-            // The library may give in another way what its rules give.
-            let known = origin == Origin::File && known.contains(quantity);
+            // The library may give in another way what the built-in rules give, but nothing that a term does.
+            let known = match origin {
+                Origin::File => known.contains(quantity),
+                Origin::Library => of_terms.contains(quantity),
+            };
             let there = known || Param::from_identifier(quantity).is_some();
             if there || params.contains(quantity) {
                 return taken("quantity", quantity, rule.line);
@@ -214,7 +222,7 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
 fn adds(origin: Origin, rules: &[Rule]) -> Result<(), TermError> {
     for rule in rules {
         for name in rule.adds.iter().chain(&rule.shows) {
-            if origin == Origin::File && TermName::from_name(name).is_some() {
+            if TermName::from_name(name).is_some() {
                 return Err(Problem::Taken { kind: "term", name: (*name).to_owned() }.at(rule.line));
             }
             quantity_name(name, rule.line)?;

@@ -213,9 +213,6 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
         let asked = rule.when.iter().filter_map(|condition| Effect::from_name(condition));
         let asked: Vec<Effect> = asked.collect();
         for &name in rule.adds.iter().chain(&rule.shows) {
-            if origin == Origin::Library && TermName::from_name(name).is_some() {
-                continue;
-            }
             let effects = asked.clone().leak();
             let layer = TermName::register(TermInfo { name, effects })
                 .map_err(|error| problem(error).at(rule.line))?;

@@ -128,7 +128,8 @@ fn lobe_by_occlusion(view_cosine: f32, occ: f32, lobe_roughness: f32) -> f32 {
 // uses: specular, vector
 fn lobe_by_cones(bent_normal: vec3f, n: vec3f, reflected: vec3f, occ: f32, lobe_width: f32) -> f32 {
     let bent: vec3f = normalize_or(bent_normal, n);
-    return cone_visibility(dot(bent, reflected), occ, lobe_width);
+    // In the listing the mirrored view is of any length.
+    return cone_visibility(dot(bent, normalize_or(reflected, n)), occ, lobe_width);
 }
 
 // How much of the lobe is open, by rays into it.
@@ -217,10 +218,10 @@ fn lobe_at_peak(reflected_in_environment: vec3f) -> vec3f {
 //
 // gives: lobe_mean
 // when: off_peak
-// cost: 14
-// uses: specular
+// cost: 24
+// uses: specular, vector
 fn lobe_off_peak(n: vec3f, reflected: vec3f, lobe_width: f32) -> vec3f {
-    return off_peak_direction(n, reflected, lobe_width);
+    return off_peak_direction(n, normalize_or(reflected, n), lobe_width);
 }
 
 // Ry(r)^-1 d (MODEL 1).
