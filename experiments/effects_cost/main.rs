@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use clap::Parser;
 use naga::valid::{Capabilities, ValidationFlags, Validator};
-use skinfit::engine::gpu::{DeviceSamples, GpuEngine, Memory};
+use skinfit::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory};
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{Task, Unknown};
 use skinfit::gpu::upload::Content;
@@ -15,6 +15,7 @@ use skinfit::model::effects::{Effect, Effects};
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::{Baked, Loaded, PrepareOptions, Views};
 use skinfit::render::antialias::Antialias;
+use skinfit::samples::ViewSamples;
 use skinfit::samples::rows::Rows;
 use skinfit::scene::view::Camera;
 use skinfit::shader::{Budget, Plan};
@@ -134,16 +135,13 @@ fn measure(
     let budget = if arguments.exact { Budget::Exact } else { Budget::Paper };
     let render = RenderOptions { antialias: Antialias::Grid(1), budget, timed: true, animated: false };
     let mut renderer = Renderer::with_shader(gpu, content.clone(), render, change)?;
-    let (made, groups) = DeviceSamples::new(gpu, content)?;
-    let views = groups.into_iter().map(|samples| {
-        // With alpha where the image has the haze there.
-        let hazy = baked.scene.needs().haze;
-        let target = Rows::new(if hazy { 4 } else { 3 }, samples.groups());
-        ObservedView { samples, target, ..ObservedView::default() }
-    });
-    let views: Vec<ObservedView> = views.collect();
     let whole = renderer.plan().wgsl != renderer.plan().fetches_alone().wgsl;
-    let engine = if whole { over_samples(made, &baked, views)? } else { None };
+    let engine = match DeviceSamples::new(gpu, content) {
+        Ok(made) if whole => over_samples(made, &baked)?,
+        // What is found by rays, samples made there have none of.
+        Ok(_) | Err(DeviceSampleError::Gpu(GpuError::Plan(_))) => None,
+        Err(error) => return Err(error.into()),
+    };
     let start = baked.start();
     // The first frames wake the adapter up.
     renderer.frame_times(&camera, arguments.frames)?;
@@ -177,10 +175,16 @@ fn measure(
 
 /// The fused engine over the samples of the image, its lookups live; `None` where the effects show nothing.
 fn over_samples(
-    made: DeviceSamples,
+    (made, groups): (DeviceSamples, Vec<ViewSamples>),
     baked: &Baked,
-    views: Vec<ObservedView>,
 ) -> Result<Option<GpuEngine>, GpuError> {
+    let views = groups.into_iter().map(|samples| {
+        // With alpha where the image has the haze there.
+        let hazy = baked.scene.needs().haze;
+        let target = Rows::new(if hazy { 4 } else { 3 }, samples.groups());
+        ObservedView { samples, target, ..ObservedView::default() }
+    });
+    let views: Vec<ObservedView> = views.collect();
     let task = Task {
         // What moves normals forbids to keep what they look up.
         unknowns: vec![Unknown::Param(Column::tied(Param::NormalStrength))],
@@ -188,7 +192,7 @@ fn over_samples(
     };
     match GpuEngine::over_device_samples(Arc::new(made), task, &baked.start(), Memory::default()) {
         Ok(engine) => Ok(Some(engine)),
-        Err(GpuError::Plan(_)) => Ok(None),
+        Err(GpuError::NothingShown) => Ok(None),
         Err(error) => Err(error),
     }
 }

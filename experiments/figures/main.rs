@@ -13,6 +13,7 @@ mod accuracy;
 mod lab;
 mod light;
 mod pages;
+mod race;
 mod results;
 mod strays;
 mod studies;
@@ -37,12 +38,13 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/ablation/results.json", studies::ablation),
     ("experiments/accuracy_vs_time/results.json", studies::tradeoff),
     ("experiments/effects_cost/results.json", timings::effects_cost),
-    ("experiments/effects_cost/h200.json", timings::effects_cost_elsewhere),
+    ("experiments/effects_cost/card.json", timings::effects_cost_on_a_card),
     ("experiments/scaling/results.json", timings::scaling),
     ("experiments/bench/results.json", timings::bench),
     ("experiments/network/results.json", timings::network),
-    ("experiments/race/results.json", timings::race),
-    ("experiments/race/h200.json", timings::race_elsewhere),
+    ("experiments/race/results.json", race::processor),
+    ("experiments/race/card.json", race::graphics_card),
+    ("experiments/race/h200.json", race::earlier),
 ];
 
 #[derive(Parser)]

@@ -112,11 +112,9 @@ pub(crate) fn tradeoff(lab: &Lab) -> Result<Value> {
         for row in &settings {
             let axis = row["axis"].as_str().unwrap_or_default();
             let of_axis: Vec<&Value> = settings.iter().filter(|other| other["axis"] == axis).collect();
-            let reference = of_axis.iter().find(|other| other["reference"] == "true");
             let mut found = json!({
                 "percent": 100.0 * number(&row["relative_rms"]),
                 "flip": row["flip"],
-                "times": reference.and_then(|reference| Some(row["seconds"].as_f64()? / reference["seconds"].as_f64()?)),
             });
             // Counts stand in one cell: `passes 9; loss 0.0166`.
             for count in row["counts"].as_str().unwrap_or_default().split("; ") {

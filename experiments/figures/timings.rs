@@ -1,4 +1,4 @@
-//! Times: of passes and fits, of each effect in the renderer, over workers and threads, of a network's training.
+//! Times: of each effect in the renderer, over workers and threads, of the benchmarks, of a network's training.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -6,8 +6,7 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 
-use crate::lab::{Lab, Result, csv, head_of};
-use crate::pages::significant;
+use crate::lab::{Lab, Result, csv};
 use crate::studies::number;
 
 /// experiments/effects_cost: what each effect costs in the renderer, on the adapter that is there.
@@ -27,16 +26,35 @@ pub(crate) fn effects_cost(lab: &Lab) -> Result<Value> {
     Ok(raw)
 }
 
-/// experiments/effects_cost: what was measured on a card that is not here, each table with a head of its own.
-pub(crate) fn effects_cost_elsewhere(lab: &Lab) -> Result<Value> {
-    let folder = lab.root.join("experiments/effects_cost/results");
-    let mut raw = json!({});
-    for name in ["paper", "paper-3840x2160", "exact"] {
-        let text = std::fs::read_to_string(folder.join(format!("h200-{name}.csv")))?;
-        raw["head"] = head_of(&text);
-        effects(&mut raw, &name.replace('-', "_"), csv(&text)?);
+/// experiments/effects_cost: the same on a graphics card, in the sizes of screens.
+pub(crate) fn effects_cost_on_a_card(lab: &Lab) -> Result<Value> {
+    let scene = lab.data.join("lps_forest/scene.toml").display().to_string();
+    let table = lab.scratch.path().join("effects.csv").display().to_string();
+    let mut raw = json!({ "adapter": card(lab)? });
+    for (name, options) in [
+        ("paper", &[][..]),
+        ("paper_3840x2160", &["--full", "--width", "3840", "--height", "2160"]),
+        ("exact", &["--full", "--exact"]),
+    ] {
+        let mut arguments = vec![scene.as_str(), "-o", &table];
+        arguments.extend(options);
+        lab.example("effects_cost", &format!("effects' cost on a card, {name}"), &arguments)?;
+        effects(&mut raw, name, csv(&std::fs::read_to_string(&table)?)?);
     }
     Ok(raw)
+}
+
+/// The graphics card that is here.
+///
+/// # Errors
+/// Where there is none, or a driver that is a program on the CPU.
+pub(crate) fn card(lab: &Lab) -> Result<Value> {
+    let info: Value = serde_json::from_str(&lab.skinfit("the adapters", &["info", "--json"], false)?)?;
+    let of = |what: &str| info["adapters"][0][what].as_str().unwrap_or_default();
+    if of("kind").is_empty() || of("kind").contains("software") {
+        return Err("there is no graphics card here".into());
+    }
+    Ok(format!("{} ({}, driver {})", of("name"), of("interface"), of("driver")).into())
 }
 
 /// A table of effects, and how far the full model is from its fetches alone.
@@ -131,96 +149,4 @@ pub(crate) fn network(lab: &Lab) -> Result<Value> {
     let numbers: Vec<f64> = line.split([' ', ':']).filter_map(|word| word.parse().ok()).collect();
     let [first, last, ..] = numbers[..] else { return Err(format!("no losses in `{line}`").into()) };
     Ok(json!({ "first": first, "last": last, "times": first / last }))
-}
-
-/// experiments/race: our rows on the CPU, beside what the other frameworks' program left of theirs.
-pub(crate) fn race(lab: &Lab) -> Result<Value> {
-    let folder = lab.race.as_ref().ok_or("name the folder of the race's data by --race")?;
-    let mut raw = json!({});
-    for pixels in ["65536", "1048576"] {
-        let data = folder.join("data").join(pixels).display().to_string();
-        for mode in ["sampled", "pre"] {
-            let row = lab.scratch.path().join("row.json").display().to_string();
-            lab.example("race", &format!("the race, {pixels} {mode}"), &[&data, "--mode", mode, "-o", &row])?;
-            let ours: Value = serde_json::from_str(&std::fs::read_to_string(&row)?)?;
-            let others = folder.join("results").join(format!("{pixels}_{mode}_cpu.json"));
-            let others: Vec<Value> = match std::fs::read_to_string(others) {
-                Ok(text) => serde_json::from_str(&text)?,
-                Err(_) => Vec::new(),
-            };
-            let rows: Vec<Value> =
-                [&ours].into_iter().chain(&others).filter(|row| row["error"].is_null()).map(racer).collect();
-            raw[format!("{mode}_{pixels}")] = rows.into();
-        }
-    }
-    Ok(raw)
-}
-
-/// A framework's row: nanoseconds a pixel of the fastest repetition, milliseconds of its fastest fits.
-fn racer(row: &Value) -> Value {
-    let a_pixel =
-        |what: &str| row[what]["min"].as_f64().map(|seconds| 1e9 * seconds / number(&row["pixels"]));
-    let fit = |target: &str| {
-        let fits = row["fits"].as_object().into_iter().flatten();
-        let seconds =
-            fits.filter(|(name, _)| name.starts_with(target)).filter_map(|(_, fit)| fit["min"].as_f64());
-        seconds.min_by(f64::total_cmp).map(|seconds| 1e3 * seconds)
-    };
-    json!({
-        "name": row["peer"], "version": row["version"], "device": row["device"],
-        "forward": a_pixel("forward"), "gradient": a_pixel("grad"), "normal": a_pixel("normal"),
-        "clean": fit("clean"), "noisy": fit("noisy"), "max_error": row["forward_max_err"],
-        "peak_mb": row["peak_rss_mb"], "raw": row,
-    })
-}
-
-/// experiments/race: what was measured on a card that is not here, from the least to the greatest of several runs.
-pub(crate) fn race_elsewhere(lab: &Lab) -> Result<Value> {
-    let text = std::fs::read_to_string(lab.root.join("experiments/race/results/h200.csv"))?;
-    // Pixels and lookups, then programs in their order, then what was measured.
-    /// Variants of a program, each with its columns.
-    type Table = Vec<(String, BTreeMap<String, Vec<f64>>)>;
-    let mut tables: BTreeMap<String, Table> = BTreeMap::new();
-    for row in csv(&text)? {
-        let program = row["program"].as_str().unwrap_or_default();
-        // Runs of the same program; what differs in the kernel has a comma.
-        let program = if program.starts_with("skinfit (") { "skinfit" } else { program };
-        let (table, variant) = match program.strip_prefix("skinfit, ") {
-            Some(variant) => ("kernels".to_owned(), variant),
-            None => {
-                let lookups = if row["lookups"] == "before" { "kept" } else { "live" };
-                (format!("{lookups}_{}", number(&row["pixels"])), program)
-            }
-        };
-        let table = tables.entry(table).or_default();
-        let at = table.iter().position(|(name, _)| name == variant).unwrap_or_else(|| {
-            table.push((variant.to_owned(), BTreeMap::new()));
-            table.len() - 1
-        });
-        let measure = row["measure"].as_str().unwrap_or_default().to_owned();
-        table[at].1.entry(measure).or_default().push(number(&row["milliseconds"]));
-    }
-    let mut raw = json!({ "head": head_of(&text) });
-    for (table, programs) in tables {
-        let rows = programs.iter().map(|(name, measured)| {
-            let mut row = json!({ "name": name });
-            for (key, measure) in [
-                ("forward", "forward"),
-                ("gradient", "loss and gradient"),
-                ("normal", "loss, JtJ and Jtr"),
-                ("clean", "fit of the clean target"),
-                ("noisy", "fit of the noisy target"),
-            ] {
-                row[key] = measured.get(measure).map_or(Value::Null, |times| {
-                    let (least, most) =
-                        times.iter().fold((f64::MAX, 0.0_f64), |(a, b), &x| (a.min(x), b.max(x)));
-                    let (least, most) = (significant(least, 2), significant(most, 2));
-                    if least == most { least.into() } else { format!("{least} to {most}").into() }
-                });
-            }
-            row
-        });
-        raw[table] = rows.collect::<Vec<_>>().into();
-    }
-    Ok(raw)
 }

@@ -44,6 +44,9 @@ struct Arguments {
     /// Time the passes and leave the fits out.
     #[arg(long)]
     passes_only: bool,
+    /// Threads of the CPU; all of them when left out.
+    #[arg(long)]
+    threads: Option<usize>,
 }
 
 const SETUP: Setup = Setup::new(Form::Corrected, Silhouette::Bumped, Effects::SURFACE.with(Effect::Haze));
@@ -212,6 +215,7 @@ fn run(arguments: &Arguments) -> Result<Value> {
     let mut row = json!({
         "peer": "skinfit", "version": format!("skinfit {} ({})", env!("CARGO_PKG_VERSION"), engine.version()),
         "pixels": manifest.pixels, "mode": arguments.mode, "device": engine.name(),
+        "threads": rayon::current_num_threads(),
         "forward": forward, "grad": grad, "normal": normal,
         "first_forward_s": first_forward, "forward_max_err": max_error,
         "rss_import_mb": before, "rss_before_fits_mb": inputs, "other_cpu": 0,
@@ -227,8 +231,10 @@ fn run(arguments: &Arguments) -> Result<Value> {
 
 fn main() -> std::process::ExitCode {
     let arguments = Arguments::parse();
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(arguments.threads.unwrap_or(0)).build_global();
     // From within the pool, so that a pass does not begin by waking another thread.
-    let written = rayon::scope(|_| run(&arguments)).and_then(|row| {
+    let row = pool.map_err(|e| e.to_string()).and_then(|()| rayon::scope(|_| run(&arguments)));
+    let written = row.and_then(|row| {
         let text = format!("{row:#}\n");
         match &arguments.output {
             None => {

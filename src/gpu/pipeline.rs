@@ -68,6 +68,7 @@ impl Pipeline {
             uploads.make_shadow_maps(gpu, &plan.facts)?;
         }
         check_attributes(gpu, &plan)?;
+        uploads.find_fields(gpu, &plan.attributes)?;
         let attributes =
             plan.attributes.iter().map(|&a| uploads.attribute(gpu, a)).collect::<Result<Vec<_>, _>>()?;
         let mut resources =

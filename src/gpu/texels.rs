@@ -14,6 +14,8 @@ pub(crate) struct Texels {
     pub(super) width: u32,
     pub(super) height: u32,
     pub(super) layers: u32,
+    /// Mip levels; those of a layer follow one another.
+    pub(super) levels: u32,
     pub(super) format: TextureFormat,
     pub(super) dimension: TextureViewDimension,
     pub(super) bytes: Vec<u8>,
@@ -31,6 +33,7 @@ pub(crate) fn faces(cube: &Cube<f32>) -> Texels {
         width: side,
         height: side,
         layers: 6,
+        levels: 1,
         format: TextureFormat::Rgba32Float,
         dimension: TextureViewDimension::D2Array,
         bytes: bytemuck::cast_slice(cube.padded()).to_vec(),
@@ -55,6 +58,7 @@ pub(super) fn cube(cube: &Cube<f32>) -> Texels {
         width: size as u32,
         height: size as u32,
         layers: 6,
+        levels: 1,
         format: TextureFormat::Rgba16Float,
         dimension: TextureViewDimension::Cube,
         bytes: bytemuck::cast_slice(&halves).to_vec(),
@@ -62,8 +66,19 @@ pub(super) fn cube(cube: &Cube<f32>) -> Texels {
     }
 }
 
-/// The map that `resource` names; `None` where the scene has none, or it is no map.
-pub(super) fn map(resource: Resource, maps: &Maps) -> Option<Texels> {
+/// The map that `resource` names, with its coarser levels where there are any; `None` where the scene has none, or it is
+/// no map.
+pub(super) fn map(resource: Resource, maps: &Maps, coarser: &[Maps]) -> Option<Texels> {
+    let mut texels = level(resource, maps)?;
+    for next in coarser.iter().map_while(|maps| level(resource, maps)) {
+        texels.levels += 1;
+        texels.bytes.extend(next.bytes);
+    }
+    Some(texels)
+}
+
+/// One level of it.
+fn level(resource: Resource, maps: &Maps) -> Option<Texels> {
     use TextureFormat as F;
     let Maps { color, normal, specular, attenuator } = maps;
     let linear = |x: f32| x;
@@ -128,7 +143,8 @@ fn single<const N: usize>(map: &Map<1>, format: TextureFormat, encode: fn(f32) -
 
 fn plane<const C: usize>(map: &Map<C>, format: TextureFormat, bytes: Vec<u8>) -> Texels {
     let (width, height) = (map.width as u32, map.height as u32);
-    Texels { width, height, layers: 1, format, dimension: TextureViewDimension::D2, bytes, clipped: 0 }
+    let dimension = TextureViewDimension::D2;
+    Texels { width, height, layers: 1, levels: 1, format, dimension, bytes, clipped: 0 }
 }
 
 #[cfg(test)]

@@ -22,10 +22,13 @@ use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion};
 use crate::model::cube::Cube;
 use crate::model::fields::{Field, Fields};
 use crate::model::params::Params;
+use crate::model::texture_filter::TextureFilter;
 use crate::prepare::Baked;
 use crate::samples::{PosedSurface, SurfaceBakes};
 use crate::scene::Scene;
+use crate::scene::maps::Maps;
 use crate::scene::mesh::Mesh;
+use crate::scene::mip_maps::MipMaps;
 use crate::shader::{Attribute, Facts, Resource};
 
 /// What is rendered: a scene, its bakes, and the parameters. Whatever is large is shared: a clone copies none of it.
@@ -69,6 +72,8 @@ pub(super) struct Uploads {
     /// What was found of fields at the vertices.
     found: HashMap<Field, Vec<f32>>,
     resources: HashMap<Resource, Bound>,
+    /// The coarser levels of the scene's maps, once a plan reads a map that is filtered by them.
+    mip_maps: Option<MipMaps>,
     /// The lights that have shadow maps, and those, once a plan reads them.
     mapped: Vec<Mapped>,
     shadow_maps: Option<shadow::Maps>,
@@ -132,6 +137,7 @@ impl Uploads {
             attributes: HashMap::new(),
             found: HashMap::new(),
             resources: HashMap::new(),
+            mip_maps: None,
             mapped,
             shadow_maps: None,
             indices,
@@ -164,18 +170,23 @@ impl Uploads {
         self.clipped
     }
 
-    /// An attribute's vertex buffer.
+    /// Have the fields that a plan reads of vertices found together: what rays find of one they may find of others.
+    pub(super) fn find_fields(&mut self, gpu: &Gpu, attributes: &[Attribute]) -> Result<(), GpuError> {
+        let unfound = attributes.iter().filter_map(|attribute| match attribute {
+            Attribute::Field(field) if !self.found.contains_key(field) => Some(*field),
+            _ => None,
+        });
+        let found = self.fields(gpu, self.mesh().0, None, Fields::of(unfound))?;
+        self.found.extend(found);
+        Ok(())
+    }
+
+    /// An attribute's vertex buffer; a field's once it is found.
     pub(super) fn attribute(&mut self, gpu: &Gpu, attribute: Attribute) -> Result<Buffer, GpuError> {
         if let Some(buffer) = self.attributes.get(&attribute) {
             return Ok(buffer.clone());
         }
-        if let Attribute::Field(field) = attribute
-            && !self.found.contains_key(&field)
-        {
-            // What rays find of one field they may find of others.
-            let all = self.content.scene.needs().fields.or(Fields::of([field]));
-            self.found = self.fields(gpu, self.mesh().0, None, all)?;
-        }
+        self.find_fields(gpu, &[attribute])?;
         let (mesh, occlusion) = self.mesh();
         let bytes = vertices::attribute(attribute, mesh, occlusion, &self.found);
         let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
@@ -257,8 +268,14 @@ impl Uploads {
         let cube = |cube: &Option<Cube<f32>>, form: fn(&Cube<f32>) -> Texels| cube.as_ref().map(form);
         let stacked = |stack: Stack| &self.stacks[stack as usize];
         let texels = match resource {
-            Resource::MapSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::Repeat))),
-            Resource::CubeSampler => return Ok(Bound::Sampler(sampler(gpu, AddressMode::ClampToEdge))),
+            Resource::MapSampler => {
+                let filter = scene.quality.texture_filter;
+                return Ok(Bound::Sampler(sampler(gpu, AddressMode::Repeat, filter)));
+            }
+            Resource::CubeSampler => {
+                let filter = TextureFilter::Bilinear;
+                return Ok(Bound::Sampler(sampler(gpu, AddressMode::ClampToEdge, filter)));
+            }
             Resource::MorphDeltas => {
                 let (mesh, occlusion) = self.mesh();
                 let deltas = vertices::morph_deltas(mesh, &self.targets, occlusion);
@@ -282,7 +299,7 @@ impl Uploads {
             Resource::ReflectedCube => cube(stacked(Stack::Reflected), texels::cube),
             Resource::GlossyCube => cube(stacked(Stack::Glossy), texels::cube),
             Resource::HiliteCube => cube(&illumination.hilite, texels::cube),
-            map => texels::map(map, &scene.maps),
+            map => texels::map(map, &scene.maps, self.coarser_maps(&scene)),
         };
         let texels = texels.ok_or_else(|| GpuError::Refused {
             adapter: gpu.name().to_owned(),
@@ -291,6 +308,14 @@ impl Uploads {
         self.bytes += texels.bytes.len() as u64;
         self.clipped += texels.clipped;
         Ok(Bound::Texture(texture(gpu, resource.name(), &texels)?))
+    }
+
+    /// The levels of the scene's maps below the finest; none where its filter reads none.
+    fn coarser_maps(&mut self, scene: &Scene) -> &[Maps] {
+        if self.mip_maps.is_none() {
+            self.mip_maps = MipMaps::new(&scene.maps, scene.quality.texture_filter);
+        }
+        self.mip_maps.as_ref().map_or(&[], MipMaps::levels)
     }
 
     fn storage(&mut self, gpu: &Gpu, what: &str, rows: &[[f32; 4]]) -> Result<Bound, GpuError> {
@@ -375,7 +400,7 @@ pub(crate) fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureV
     let descriptor = TextureDescriptor {
         label: Some(name),
         size: Extent3d { width: texels.width, height: texels.height, depth_or_array_layers: texels.layers },
-        mip_level_count: 1,
+        mip_level_count: texels.levels,
         sample_count: 1,
         dimension: TextureDimension::D2,
         format: texels.format,
@@ -391,15 +416,18 @@ pub(crate) fn texture(gpu: &Gpu, name: &str, texels: &Texels) -> Result<TextureV
     }))
 }
 
-/// Bilinear in the one level that there is: what the CPU does.
-fn sampler(gpu: &Gpu, mode: AddressMode) -> Sampler {
+/// Bilinear within a level, and as `filter` says between levels, where a texture has several. An adapter that cannot
+/// filter anisotropically looks up once.
+fn sampler(gpu: &Gpu, mode: AddressMode, filter: TextureFilter) -> Sampler {
+    let between = if filter.reads_levels() { MipmapFilterMode::Linear } else { MipmapFilterMode::Nearest };
     gpu.device.create_sampler(&SamplerDescriptor {
         address_mode_u: mode,
         address_mode_v: mode,
         address_mode_w: mode,
         mag_filter: FilterMode::Linear,
         min_filter: FilterMode::Linear,
-        mipmap_filter: MipmapFilterMode::Nearest,
+        mipmap_filter: between,
+        anisotropy_clamp: filter.most_taps(),
         ..SamplerDescriptor::default()
     })
 }

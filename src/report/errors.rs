@@ -10,7 +10,8 @@ use crate::fit::sandwich::Blocks;
 const NOTABLE: f64 = 1.5;
 
 /// What the errors rest on, in a sentence; `over_noise` is by how many times the most they exceed those of independent
-/// residuals, `None` without errors. `None` where there is nothing to say: residuals are independent as far as one sees, or are roundings.
+/// residuals, `None` without errors. `None` where there is nothing to say: residuals are independent as far as one
+/// sees, or are roundings.
 #[must_use]
 pub fn basis_in_words(basis: ErrorBasis, over_noise: Option<f64>) -> Option<String> {
     match basis {

@@ -7,6 +7,7 @@ use crate::prepare::PrepareError;
 use crate::program::shading::ShadingError;
 use crate::render::files::ImageFileError;
 use crate::shader::PlanError;
+use crate::shader::term::TermError;
 
 /// A study cannot be done.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +20,9 @@ pub enum StudyError {
     Fit { scene: String, error: FitError },
     #[error(transparent)]
     Shading(#[from] ShadingError),
+    /// A light's effect could not be made.
+    #[error("{scene}: {error}")]
+    Light { scene: String, error: TermError },
     #[error(transparent)]
     Plan(#[from] PlanError),
     #[error("{0} Update its driver, or choose another adapter with WGPU_ADAPTER_NAME.")]

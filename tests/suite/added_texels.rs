@@ -571,8 +571,8 @@ mod over_stored_texels {
                 off.extend((0..3).map(|c| (texel[c] - f64::from(there[c])).abs()));
             }
         }
-        // Adapters snap corners to 1/256 of a texel: along the charts' outlines one texel in five hundred may be covered by one
-        // of the two alone.
+        // Adapters snap corners to 1/256 of a texel: along the charts' outlines one texel in five hundred may be
+        // covered by one of the two alone.
         let both = off.len() / 3;
         assert!(both > 50_000, "{both}");
         for alone in [atlas.covered() - both, covered - both] {

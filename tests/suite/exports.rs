@@ -10,6 +10,7 @@ use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
+use skinfit::model::texture_filter::TextureFilter;
 use skinfit::shader::facts::MapFacts;
 use skinfit::shader::{Budget, Facts, plan};
 
@@ -37,6 +38,7 @@ fn scenes() -> Vec<(&'static str, Facts)> {
     let all = Effects::SURFACE.with(Effect::KeyLight).with(Effect::Haze);
     let corrected =
         |silhouette, effects| Facts { setup: setup(Form::Corrected, silhouette, effects), ..exact };
+    let filtered = |filter| Facts { maps: MapFacts { filter, ..exact.maps }, ..exact };
     vec![
         ("surface", corrected(Silhouette::Fragment, Effects::SURFACE)),
         ("everything", Facts { turned: true, morphs: 3, bones: true, ..corrected(Silhouette::Bumped, all) }),
@@ -69,6 +71,8 @@ fn scenes() -> Vec<(&'static str, Facts)> {
                 ..exact
             },
         ),
+        ("mip_maps", filtered(TextureFilter::Trilinear)),
+        ("anisotropic", filtered(TextureFilter::Anisotropic)),
         ("bare", Facts { maps: MapFacts::default(), ..corrected(Silhouette::Fragment, all) }),
     ]
 }
@@ -183,6 +187,7 @@ const CG_IN_HLSL: &str = "SamplerState map_sampler;
 SamplerState cube_sampler;
 #define sampler2D Texture2D<float4>
 #define samplerCUBE TextureCube<float4>
+#define tex2D(t, c) t.Sample(map_sampler, c)
 #define tex2Dlod(t, c) t.SampleLevel(map_sampler, (c).xy, (c).w)
 #define texCUBElod(t, c) t.SampleLevel(cube_sampler, (c).xyz, (c).w)";
 
@@ -210,7 +215,14 @@ fn godot_in_glsl(exported: &str) -> String {
         let (what, hints) = declared.trim_end_matches(';').split_once(" : ").unwrap_or((declared, ""));
         for hint in hints.split(", ") {
             // Those of Godot 4's shading language.
-            assert!(["source_color", "filter_linear", "repeat_enable"].contains(&hint), "{line}");
+            const HINTS: [&str; 5] = [
+                "source_color",
+                "filter_linear",
+                "filter_linear_mipmap",
+                "filter_linear_mipmap_anisotropic",
+                "repeat_enable",
+            ];
+            assert!(HINTS.contains(&hint), "{line}");
         }
         bindings += 1;
         format!("layout(binding = {bindings}) uniform {what};\n")
@@ -248,6 +260,9 @@ fn metal_in_hlsl(exported: &str) -> String {
     let before = before.replace("#include <metal_stdlib>", "").replace("using namespace metal;", "");
     let text = before + inside;
     let text = text.replace("<float>", "<float4>").replace("as_type<uint3>", "asuint");
+    // Without a level, it is another function in HLSL.
+    let text =
+        text.replace(".sample(skinfit_map_sampler, vertex_uv)", ".Sample(skinfit_map_sampler, vertex_uv)");
     let defined = [
         ("constant", "static const"),
         ("texture2d", "Texture2D"),
@@ -490,4 +505,45 @@ fn data_formats_hold_no_shader_and_say_so() {
             "{words}"
         );
     }
+}
+
+#[test]
+fn exports_filter_maps_as_the_scene_does() {
+    let facts = engine_facts();
+    let filtered = |filter| Facts { maps: MapFacts { filter, ..facts.maps }, ..facts };
+    // What says in each language that a map is read at the level that fits the fragment, and how.
+    for (target, trilinear, anisotropic) in [
+        (Target::Wgsl, "textureSample(skinfit_color_map, skinfit_map_sampler, vertex_uv)", "textureSample("),
+        (Target::Glsl, "texture(skinfit_color_map, vertex_uv)", "texture("),
+        (Target::Hlsl, "skinfit_color_map.Sample(skinfit_map_sampler, vertex_uv)", ".Sample("),
+        (Target::Cg, "tex2D(skinfit_color_map, vertex_uv)", "tex2D("),
+        (Target::Msl, "skinfit_color_map.sample(skinfit_map_sampler, vertex_uv)", "vertex_uv)"),
+        (
+            Target::Godot,
+            ": source_color, filter_linear_mipmap, repeat_enable",
+            "filter_linear_mipmap_anisotropic, repeat",
+        ),
+        (
+            Target::Unity,
+            "SamplerState skinfit_trilinear_repeat_sampler;",
+            "Sample(skinfit_trilinear_repeat_aniso16_sampler",
+        ),
+    ] {
+        let name = target.name();
+        let bilinear = exported(target, &facts);
+        let [two, sixteen] = [TextureFilter::Trilinear, TextureFilter::Anisotropic]
+            .map(|filter| exported(target, &filtered(filter)));
+        assert!(
+            !bilinear.contains(trilinear) && !bilinear.contains("mip levels and a sampler"),
+            "{name}\n{bilinear}"
+        );
+        assert!(two.contains(trilinear) && two.contains("a sampler that is trilinear"), "{name}\n{two}");
+        assert!(
+            sixteen.contains(anisotropic) && sixteen.contains("that is anisotropic"),
+            "{name}\n{sixteen}"
+        );
+    }
+    // Cubes keep their one level.
+    let cube = "textureSampleLevel(skinfit_hilite_cube, skinfit_cube_sampler";
+    assert!(exported(Target::Wgsl, &filtered(TextureFilter::Trilinear)).contains(cube));
 }

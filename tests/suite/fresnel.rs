@@ -3,34 +3,39 @@
 
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::gpu::{GpuEngine, Memory};
-use skinfit::engine::reference::Reference;
 use skinfit::engine::{Objective, Point, Task, Unknown};
 use skinfit::fit::{FitOptions, fit};
 use skinfit::gpu::Renderer;
 use skinfit::gpu::upload::Content;
-use skinfit::model::choices::SpecularModel;
+use skinfit::model::choices::{SpecularModel, SplitSum};
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Baked;
 use skinfit::render::image::Image;
 use skinfit::shader::Facts;
 use skinfit::shader::facts::Budget;
-use skinfit_core::specular::split_sum::{Quadrature, split_sum};
+use skinfit_core::specular::split_sum::{Quadrature, dielectric_sum, split_sum};
 
 use crate::graphics::bench::{EXACT, gpu};
 use crate::lit::{baked, image, param, quad};
 use crate::scene_folder::{SCENE, SceneFolder, encode, exr};
+use crate::slopes::{self, Nearness};
 
 const EFFECTS: &str = "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"lights\", \"shadows\", \"light_specular\", \
                        \"fresnel\"";
 
 /// The choices that are told apart: a scene's lines of `[model]`.
-const CHOICES: [&str; 5] = [
+const CHOICES: [&str; 6] = [
     "specular_model = \"kelemen\"",
     "specular_model = \"ggx\"\nspecular_map = \"f0\"",
+    "specular_model = \"ggx\"\nsplit_sum = \"exact\"\nspecular_map = \"f0\"",
     "specular_model = \"ggx\"\nspecular_visibility = \"none\"\nlobe_lookup = \"off_peak\"",
     "specular_visibility = \"cone\"\nspecular_map = \"f0\"",
     "specular_visibility = \"cone\"\nlobe_lookup = \"off_peak\"",
 ];
+
+/// Light by rays, which a rasteriser has not.
+const TRACED: &str =
+    "specular_visibility = \"rays\"\nspecular_model = \"ggx\"\nsplit_sum = \"exact\"\nspecular_map = \"f0\"";
 
 /// The quad of the lights' tests with maps that vary, under those choices.
 fn scene(choices: &str, params: &str) -> SceneFolder {
@@ -77,18 +82,15 @@ fn moving(choices: &str) -> Vec<Unknown> {
     free().into_iter().filter(keeps).collect()
 }
 
-fn within(got: &[f64], want: &[f64], unknowns: &[Unknown], what: &str) {
-    let most = want.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
-    for ((unknown, got), want) in unknowns.iter().zip(got).zip(want) {
-        // Roundings of f32: some tens in each residual, of sums that cancel.
-        let close = (got - want).abs() <= 3e-4 * want.abs() + 1e-5 * most;
-        assert!(close, "{what}: {}: {got} {want}", unknown.name());
-    }
-}
+/// Cubes hold f32: a step leaves roundings of 1e-4 in what moves between them, and an error of its square. Sums of f32
+/// cancel: some tens of roundings in each residual.
+const NEAR: Nearness = Nearness { step: 1e-4, difference: 2e-4, loss: 3e-5, slope: [3e-4, 1e-5] };
 
 #[test]
 fn slopes_are_finite_differences_on_every_engine() {
-    for choices in CHOICES {
+    // A light's parameters are known once a scene was read.
+    drop(baked(&scene(CHOICES[0], PARAMS)));
+    for choices in CHOICES.into_iter().chain([TRACED]) {
         let unknowns = moving(choices);
         let columns: Vec<Column> = unknowns
             .iter()
@@ -99,32 +101,7 @@ fn slopes_are_finite_differences_on_every_engine() {
             .collect();
         let bake = free_in(&scene(choices, PARAMS), &columns);
         let observed = bake.sample().unwrap().observe().unwrap();
-        let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
-        let point = observed.start();
-        let own = task();
-        let exact = Reference::new(own.setup, &own.illumination, &own.views, own.loss, &unknowns).unwrap();
-        let (loss, slopes) = exact.gradient(&point);
-        for (unknown, slope) in unknowns.iter().zip(&slopes) {
-            let at = |by: f64| {
-                let mut moved = point.clone();
-                unknown.set(&mut moved, unknown.get(&point) + by);
-                exact.loss(&moved)
-            };
-            // Cubes hold f32: a step of 1e-4 leaves roundings of 1e-4 in what moves between them, and an error of its
-            // square.
-            let difference = (at(1e-4) - at(-1e-4)) / 2e-4;
-            let close = (slope - difference).abs() <= 2e-4 * (loss + slope.abs());
-            assert!(close, "{choices}: {}: {slope} {difference}", unknown.name());
-            assert!(*slope != 0.0, "{choices}: {} moves nothing", unknown.name());
-        }
-        let check = |engine: &dyn Objective, what: &str| {
-            let (got, gradient) = engine.gradient(&point);
-            assert!((got - loss).abs() <= 3e-5 * loss, "{choices}: {what}: {got} {loss}");
-            within(&gradient, &slopes, &unknowns, &format!("{choices}: {what}"));
-        };
-        check(&CpuEngine::new(task()).unwrap(), "cpu");
-        let Some(gpu) = gpu() else { continue };
-        check(&GpuEngine::new(gpu, task(), &point, Memory::default()).unwrap(), "gpu");
+        slopes::assert_slopes(&observed, &unknowns, &NEAR, choices);
     }
 }
 
@@ -144,12 +121,13 @@ fn free_in(folder: &SceneFolder, columns: &[Column]) -> Baked {
 }
 
 /// A scene of nothing but the environment's lobe, under light of 1 from everywhere.
-fn furnace(model: SpecularModel, roughness: f64, f0: f64) -> (Image, Baked) {
+fn furnace(model: SpecularModel, sum: SplitSum, roughness: f64, f0: f64) -> (Image, Baked) {
     let folder = SceneFolder::new();
     folder.write("env.exr", &exr(8, 4, &["R", "G", "B"], |_, _| 1.0));
     let lines = format!(
-        "[model]\neffects = [\"fresnel\"]\nspecular_model = \"{}\"\nspecular_visibility = \"none\"\n",
-        model.name()
+        "[model]\neffects = [\"fresnel\"]\nspecular_model = \"{}\"\nsplit_sum = \"{}\"\nspecular_visibility = \"none\"\n",
+        model.name(),
+        sum.name()
     );
     let text = SCENE
         .replace("[model]\n", &lines)
@@ -161,9 +139,10 @@ fn furnace(model: SpecularModel, roughness: f64, f0: f64) -> (Image, Baked) {
 
 #[test]
 fn in_a_white_furnace_the_lobe_shows_the_split_sum() {
-    for model in SpecularModel::ALL {
+    let all = || SpecularModel::ALL.into_iter().flat_map(|model| SplitSum::ALL.map(|sum| (model, sum)));
+    for (model, sum) in all() {
         for (roughness, f0) in [(0.05, 0.028), (0.35, 0.0), (0.35, 0.2), (1.0, 0.1)] {
-            let (image, baked) = furnace(model, roughness, f0);
+            let (image, baked) = furnace(model, sum, roughness, f0);
             let camera = baked.scene.views[0].camera;
             let mut seen = 0;
             for (i, (rgb, alpha)) in image.rgb.iter().zip(&image.alpha).enumerate() {
@@ -177,13 +156,21 @@ fn in_a_white_furnace_the_lobe_shows_the_split_sum() {
                 let [u, v] = [x - 0.5 * f64::from(camera.width), y - 0.5 * f64::from(camera.height)]
                     .map(|offset| offset * tangent);
                 let cosine = 1.0 / (1.0 + u * u + v * v).sqrt();
-                let [a, b] = split_sum(model, cosine, roughness, Quadrature::FINE).map(|sum| sum.value);
-                let want = f0 * a + b;
+                // Kelemen's own factor is Schlick's.
+                let want = match (model, sum) {
+                    (SpecularModel::Ggx, SplitSum::Exact) => {
+                        dielectric_sum(model, cosine, roughness, f0, Quadrature::FINE).0.value
+                    }
+                    _ => {
+                        let [a, b] = split_sum(model, cosine, roughness, Quadrature::FINE).map(|x| x.value);
+                        f0 * a + b
+                    }
+                };
                 for c in 0..3 {
-                    // The fits' 1.5e-4, and a pixel's curvature of cosines near 1.
+                    // The fits' 2e-4, and a pixel's curvature of cosines near 1.
                     assert!(
                         (f64::from(rgb[c]) - want).abs() < 4e-4,
-                        "{model:?} {roughness} {f0}: {rgb:?} {want}"
+                        "{model:?} {sum:?} {roughness} {f0}: {rgb:?} {want}"
                     );
                 }
                 seen += 1;
@@ -230,7 +217,7 @@ fn hard_cases_are_finite_in_value_and_slope() {
         "roughness = 1\nf0 = 0.2\ngloss = 0.9",
         "roughness = 0.05\ngloss = 0.9\nf0 = 0.2",
     ];
-    for choices in CHOICES {
+    for choices in CHOICES.into_iter().chain([TRACED]) {
         for params in hard {
             let unknowns = moving(choices);
             let observed = baked(&scene(choices, params)).sample().unwrap().observe().unwrap();
@@ -285,10 +272,38 @@ fn both_engines_find_the_constants_that_made_the_target() {
 }
 
 #[test]
+fn a_lobe_that_goes_by_an_occlusion_which_is_off_is_told() {
+    let warned = |choices: &str, effects: (&str, &str)| {
+        let folder = scene(choices, "");
+        let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
+        folder.write("scene.toml", text.replace(effects.0, effects.1).as_bytes());
+        let said: Vec<String> = folder.load().unwrap().1.iter().map(ToString::to_string).collect();
+        said.into_iter().filter(|said| said.contains("specular_visibility")).collect::<Vec<_>>()
+    };
+    let (as_it_is, off) = (("", ""), (" \"occlusion\",", ""));
+    for way in ["lagarde", "cone"] {
+        let named = format!("specular_visibility = \"{way}\"");
+        assert_eq!(warned(&named, as_it_is), [""; 0]);
+        let said = warned(&named, off).concat();
+        assert!(
+            said.contains("scene.toml") && said.contains(&named) && said.contains("Add \"occlusion\""),
+            "{said}"
+        );
+    }
+    assert_eq!(warned("", off), [""; 0]);
+    assert_eq!(warned("", (" \"occlusion\",", " \"directional_occlusion\",")).len(), 1);
+    for way in ["none", "lobe", "rays"] {
+        assert_eq!(warned(&format!("specular_visibility = \"{way}\""), off), [""; 0]);
+    }
+}
+
+#[test]
 fn exports_hold_the_lobe() {
-    let scene = baked(&scene(CHOICES[1], PARAMS)).scene;
-    let facts = Facts::of_scene(&scene, &scene.params, Budget::Paper, false);
-    let facts = Facts { setup: facts.setup, ..crate::exports::engine_facts() };
-    let text = crate::exports::compiled_glsl("specular", &facts);
-    assert!(text.contains("skinfit_share_of_ggx(") && text.contains("ROUGHNESS"), "{text}");
+    for (choices, share) in [(CHOICES[1], "share_of_ggx"), (CHOICES[2], "dielectric_share_of_ggx")] {
+        let scene = baked(&scene(choices, PARAMS)).scene;
+        let facts = Facts::of_scene(&scene, &scene.params, Budget::Paper, false);
+        let facts = Facts { setup: facts.setup, ..crate::exports::engine_facts() };
+        let text = crate::exports::compiled_glsl(share, &facts);
+        assert!(text.contains(&format!("skinfit_{share}(")) && text.contains("ROUGHNESS"), "{text}");
+    }
 }

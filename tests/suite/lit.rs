@@ -3,7 +3,6 @@
 
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::gpu::{GpuEngine, Memory};
-use skinfit::engine::reference::Reference;
 use skinfit::engine::{Objective, Task, Unknown};
 use skinfit::fit::{FitOptions, fit};
 use skinfit::gpu::Renderer;
@@ -20,11 +19,14 @@ use crate::common;
 use crate::fixtures::quantile;
 use crate::graphics::bench::{EXACT, gpu};
 use crate::scene_folder::{SCENE, SceneFolder, exr};
+use crate::slopes;
 
 /// Reflectance of sphere and plane.
 const ALBEDO: f64 = 0.5;
 
 pub(crate) fn param(name: &str) -> Param {
+    // Those of the library are known to whoever asks first.
+    skinfit::shader::term::library::register_all();
     Param::from_name(name).unwrap_or_else(|| panic!("no parameter {name}"))
 }
 
@@ -98,6 +100,15 @@ fn a_lamps_colour_is_fitted_on_both_engines() {
     assert!((0..3).all(|c| (gpu[c] - cpu[c]).abs() < 1e-4), "{gpu:?} {cpu:?}");
 }
 
+/// A light from one direction.
+pub(crate) const KEY: &str = "
+[[light]]
+name = \"key\"
+type = \"directional\"
+direction = [-0.5, -0.6, -0.6]
+irradiance = [3.0, 2.9, 2.7]
+";
+
 /// A quad under a light from one direction, a spot, and the sun of a panorama.
 pub(crate) fn quad(effects: &str, environment: &str) -> SceneFolder {
     let folder = SceneFolder::new();
@@ -108,11 +119,6 @@ pub(crate) fn quad(effects: &str, environment: &str) -> SceneFolder {
         &exr(256, 128, &["R", "G", "B"], |c, i| if sun(i) { 300.0 + c as f32 } else { 0.2 }),
     );
     let lights = "
-[[light]]
-name = \"key\"
-type = \"directional\"
-direction = [-0.5, -0.6, -0.6]
-irradiance = [3.0, 2.9, 2.7]
 [[light]]
 name = \"Lamp\"
 type = \"spot\"
@@ -125,7 +131,7 @@ outer_degrees = 25
     let scene = SCENE
         .replace("file = \"env.exr\"", &format!("file = \"env.exr\"\n{environment}"))
         .replace("[model]\n", &format!("[model]\neffects = [{effects}]\n"));
-    folder.write("scene.toml", format!("{scene}{lights}").as_bytes());
+    folder.write("scene.toml", format!("{scene}{KEY}{lights}").as_bytes());
     folder
 }
 
@@ -160,42 +166,7 @@ fn slopes_along_a_lights_numbers_are_finite_differences_on_every_engine() {
         "normal_strength",
     ];
     let unknowns: Vec<Unknown> = names.map(|name| Unknown::Param(Column::tied(param(name)))).to_vec();
-    let task = Task { unknowns: unknowns.clone(), ..observed.task() };
-    let point = observed.start();
-    let exact = Reference::new(task.setup, &task.illumination, &task.views, task.loss, &unknowns).unwrap();
-    let (loss, slopes) = exact.gradient(&point);
-    for (unknown, slope) in unknowns.iter().zip(&slopes) {
-        // In f64 a step of 1e-5 leaves an error of its square, and roundings of 1e-11.
-        let at = |by: f64| {
-            let mut moved = point.clone();
-            unknown.set(&mut moved, unknown.get(&point) + by);
-            exact.loss(&moved)
-        };
-        let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-        assert!(
-            (slope - difference).abs() <= 1e-6 * (loss + slope.abs()),
-            "{}: {slope} {difference}",
-            unknown.name()
-        );
-        assert!(*slope != 0.0, "{} moves nothing", unknown.name());
-    }
-    let check = |engine: &dyn Objective, what: &str| {
-        let (got, gradient) = engine.gradient(&point);
-        // Roundings of f32, some tens of them in each residual.
-        assert!((got - loss).abs() <= 1e-5 * loss, "{what}: {got} {loss}");
-        for ((unknown, got), want) in unknowns.iter().zip(&gradient).zip(&slopes) {
-            let most = slopes.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
-            assert!(
-                (got - want).abs() <= 1e-4 * want.abs() + 1e-6 * most,
-                "{what}: {}: {got} {want}",
-                unknown.name()
-            );
-        }
-    };
-    let views = || Task { unknowns: unknowns.clone(), ..observed.task() };
-    check(&CpuEngine::new(views()).unwrap(), "cpu");
-    let Some(gpu) = gpu() else { return };
-    check(&GpuEngine::new(gpu, views(), &point, Memory::default()).unwrap(), "gpu");
+    slopes::assert_slopes(&observed, &unknowns, &slopes::EXACT, "lights");
 }
 
 #[test]

@@ -140,6 +140,15 @@ fn refusals_of_scene_files_say_where_what_and_what_to_do() {
         ),
         (
             "[quality]",
+            "[quality]\ntexture_filter = \"trilinaer\"".into(),
+            &[
+                "line 22",
+                "unknown texture_filter `trilinaer`",
+                "Did you mean `trilinear`? Known: bilinear, trilinear, anisotropic",
+            ],
+        ),
+        (
+            "[quality]",
             "[quality]\nshadow_map_size = 15".into(),
             &["line 22", "shadow_map_size = 15", "[16, 8192]"],
         ),

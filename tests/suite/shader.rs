@@ -8,6 +8,7 @@ use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::terms::TermName;
+use skinfit::model::texture_filter::TextureFilter;
 use skinfit::shader::domain::Work;
 use skinfit::shader::facts::{FaceSizes, MapFacts};
 use skinfit::shader::{Budget, Facts, Plan, Resource, Source, plan};
@@ -208,6 +209,7 @@ fn shaders_of_every_combination_of_facts_validate() {
             attenuator: bit(bits, 3),
             color_specular: bit(bits, 0) && bit(bits, 2),
             normal_attenuator: bit(bits, 1) && bit(bits, 3),
+            filter: TextureFilter::ALL[bits as usize % 3],
         },
         faces: FaceSizes::default(),
         morphs: if bit(bits, 4) { 2 } else { 0 },
@@ -310,4 +312,35 @@ fn maps_of_one_size_are_packed_when_both_are_asked_for() {
     assert!(with(&[Effect::Diffuse, Effect::SideSpecular]).contains(&Resource::ColorSpecularTexels));
     assert!(with(&[Effect::Diffuse]).contains(&Resource::ColorTexels));
     assert!(with(&[Effect::SideSpecular]).contains(&Resource::SpecularTexels));
+}
+
+#[test]
+fn maps_are_filtered_over_fragments_only_where_that_is_asked_for() {
+    let facts = |filter, budget| {
+        let default = Facts::default();
+        Facts { maps: MapFacts { filter, ..default.maps }, budget, ..default }
+    };
+    for budget in [Budget::Exact, Budget::Paper] {
+        let [bilinear, trilinear, anisotropic] =
+            TextureFilter::ALL.map(|filter| plan(&facts(filter, budget)).unwrap());
+        for word in ["dpdx", "textureSample(", "sample_mip", "textureNumLevels"] {
+            assert!(!bilinear.wgsl.contains(word), "{word}");
+        }
+        let exact = budget == Budget::Exact;
+        for filtered in [&trilinear, &anisotropic] {
+            assert!(filtered.wgsl.contains(if exact { "sample_mip_texels(" } else { "textureSample(" }));
+            assert!(
+                !filtered.wgsl.contains("sample_texels(")
+                    && !filtered.wgsl.contains("map_sampler, vertex_uv, 0.0")
+            );
+            // What is fetched alone is fetched in the same way.
+            for plan in [filtered, &filtered.fetches_alone()] {
+                let module = naga::front::wgsl::parse_str(&plan.wgsl).unwrap();
+                let mut validator = Validator::new(ValidationFlags::all(), Capabilities::empty());
+                validator.validate(&module).unwrap_or_else(|error| panic!("{error:?}\n{}", plan.wgsl));
+            }
+        }
+        // The sampler says how many places there are; in the shader it is a number.
+        assert_eq!(trilinear.wgsl == anisotropic.wgsl, !exact);
+    }
 }

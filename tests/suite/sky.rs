@@ -2,13 +2,10 @@
 
 use glam::{DVec3, Vec2, Vec3};
 use skinfit::bake::rays::RayMesh;
-use skinfit::bake::sky::{SKY_RATIO, Wanted};
+use skinfit::bake::sky::{SKY_RATIO, SKY_TURNS, Wanted};
 use skinfit::bake::{Bake, Ranges, bake};
-use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::Unknown;
 use skinfit::engine::gpu::DeviceSamples;
-use skinfit::engine::gpu::{GpuEngine, Memory};
-use skinfit::engine::reference::Reference;
-use skinfit::engine::{Objective, Task, Unknown};
 use skinfit::gpu::Renderer;
 use skinfit::gpu::upload::Content;
 use skinfit::model::choices::{Bounces, Choices, SpecularVisibility, Visibility};
@@ -29,14 +26,15 @@ use crate::fixtures::{bare_scene, camera};
 use crate::graphics::bench::{Difference, EXACT, built_in, cache, gpu, quantile};
 use crate::harmonics::add_band;
 use crate::scene_folder::SceneFolder;
+use crate::slopes;
 
-fn effect(name: &str) -> Effect {
+pub(crate) fn effect(name: &str) -> Effect {
     library::register_all();
     Effect::from_name(name).unwrap()
 }
 
 /// The inside of a sphere, open above an angle from +Y; with an angle of 0 and `outside` a convex shape.
-fn shape(opening: f64, outside: bool) -> PosedMesh {
+pub(crate) fn shape(opening: f64, outside: bool) -> PosedMesh {
     let mut mesh = PosedMesh::default();
     add_band(&mut mesh, DVec3::Y, [opening, std::f64::consts::PI]);
     if outside {
@@ -47,7 +45,7 @@ fn shape(opening: f64, outside: bool) -> PosedMesh {
 }
 
 /// A scene of `mesh` seen from above, under a panorama of 16 x 8 texels.
-fn scene(mesh: &PosedMesh, texel: impl Fn(usize, usize) -> [f32; 3], choices: Choices) -> Scene {
+pub(crate) fn scene(mesh: &PosedMesh, texel: impl Fn(usize, usize) -> [f32; 3], choices: Choices) -> Scene {
     let effects = Effects::of(&[Effect::Diffuse, effect("directional_occlusion")]);
     let PosedMesh { positions, normals, uvs, triangles, .. } = mesh.clone();
     let texels = (0..128).map(|i| texel(i % 16, i / 16)).collect();
@@ -79,15 +77,15 @@ fn chosen(visibility: Visibility, bounces: Bounces) -> Choices {
 }
 
 /// Light whose first two bands are nowhere near 0.
-fn gentle(x: usize, y: usize) -> [f32; 3] {
+pub(crate) fn gentle(x: usize, y: usize) -> [f32; 3] {
     [1.0 + x as f32 / 16.0, 1.5 + (y % 3) as f32 / 4.0, if (4..7).contains(&x) && y < 4 { 4.0 } else { 1.0 }]
 }
 
-fn uneven(x: usize, y: usize) -> [f32; 3] {
+pub(crate) fn uneven(x: usize, y: usize) -> [f32; 3] {
     [0.2 + x as f32 / 8.0, 0.5 + (y % 3) as f32, if (4..7).contains(&x) && y < 4 { 6.0 } else { 0.1 }]
 }
 
-fn bakes(scene: &Scene) -> Bake {
+pub(crate) fn bakes(scene: &Scene) -> Bake {
     let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
     bake(scene, &pose, &Ranges::of(scene, false), None).unwrap().0
 }
@@ -102,14 +100,14 @@ fn ratios(scene: &Scene, bakes: &Bake) -> Vec<[f32; 3]> {
     surface.unwrap().field_of_vertices(field).as_chunks().0.to_vec()
 }
 
-fn image(scene: &Scene, bakes: &Bake) -> Image {
+pub(crate) fn image(scene: &Scene, bakes: &Bake) -> Image {
     let samples = sample_views(scene, &scene.mesh.pose(), bakes.into()).unwrap();
     let shader = Shader::new(scene.setup(), &bakes.illumination, &scene.params).unwrap();
     shader.shade(&samples[0], &scene.views[0].camera, 1.0).image
 }
 
 /// The largest difference between two images' channels.
-fn apart(a: &Image, b: &Image) -> f32 {
+pub(crate) fn apart(a: &Image, b: &Image) -> f32 {
     assert!(a.alpha == b.alpha && a.alpha.contains(&1.0));
     let pairs = a.rgb.iter().flatten().zip(b.rgb.iter().flatten());
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
@@ -296,6 +294,46 @@ fn a_turned_environment_is_found_turned_and_held_while_it_turns() {
 }
 
 #[test]
+fn a_turned_sky_moves_as_its_harmonics_do() {
+    let bowl = shape(1.2, false);
+    for visibility in [Visibility::Scalar, Visibility::Cone, Visibility::Sh3, Visibility::Sh6] {
+        let at = |degrees: f64| {
+            let mut scene = scene(&bowl, gentle, chosen(visibility, Bounces::Gathered));
+            scene.fit.free = vec![Column::tied(Param::EnvironmentRotation)];
+            scene.params.set(Param::EnvironmentRotation, degrees);
+            scene
+        };
+        let found = |degrees: f64| ratios(&at(degrees), &bakes(&at(degrees)));
+        let (own, h) = (at(35.0), 0.2_f64);
+        let bakes = bakes(&own);
+        let posed = own.mesh.pose();
+        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        let fields = SKY_TURNS.map(|name| Field::from_name(name).unwrap());
+        assert!(fields.iter().all(|field| own.needs().fields.iter().any(|asked| asked == *field)));
+        let surface =
+            PosedSurface::with_fields(&own, &posed, &rays, &[], (&bakes).into(), Fields::of(fields)).unwrap();
+        let [cosine, sine] = fields.map(|field| surface.field_of_vertices(field));
+        let (above, below) = (found(35.0 + h), found(35.0 - h));
+        let (sin, cos) = 35_f64.to_radians().sin_cos();
+        let mut steepest = 0.0_f64;
+        for (i, (above, below)) in above.iter().flatten().zip(below.iter().flatten()).enumerate() {
+            let slope = f64::from(sine[i]) * cos - f64::from(cosine[i]) * sin;
+            let want = f64::from(above - below) / (2.0 * h.to_radians());
+            // Ratios of about 1 in f32 over 0.007 radians, and the third derivative of up to six waves a turn.
+            assert!((slope - want).abs() < 1e-3, "{visibility:?} {i}: {slope} {want}");
+            // At the angle itself what is added is nothing.
+            let added = f64::from(cosine[i]) * cos + f64::from(sine[i]) * sin;
+            assert!(added.abs() < 1e-6, "{added}");
+            steepest = steepest.max(want.abs());
+        }
+        assert!(steepest > 0.02, "{visibility:?}: {steepest}");
+    }
+    // Nothing turns: nobody asks.
+    let held = scene(&bowl, gentle, chosen(Visibility::Sh4, Bounces::Gathered));
+    assert!(held.needs().fields.iter().all(|field| !SKY_TURNS.contains(&field.name())));
+}
+
+#[test]
 fn results_are_the_same_for_any_number_of_threads() {
     let bowl = shape(1.2, false);
     for visibility in [Visibility::Cone, Visibility::Sh4, Visibility::Rays] {
@@ -359,6 +397,11 @@ fn a_sun_that_is_left_in_the_panorama_is_told() {
 
 /// The built-in head with a lamp beside its environment.
 fn head() -> Baked {
+    head_with(&[Effect::Lights, Effect::Shadows, effect("directional_occlusion")])
+}
+
+/// The same with effects beside diffuse light, occlusion and rim; the lamp's own where lights are among them.
+pub(crate) fn head_with(more: &[Effect]) -> Baked {
     let built_in = built_in();
     let text = std::fs::read_to_string(&built_in).unwrap();
     let path = built_in.with_file_name("sky.toml");
@@ -367,16 +410,17 @@ fn head() -> Baked {
     library::register_all();
     let options = PrepareOptions { views: Views::First, cache: Some(cache()), ..PrepareOptions::default() };
     let mut loaded = Loaded::read(&path, &PrepareOptions { effects: None, ..options }).unwrap();
-    let lights =
-        Effects::of(&[Effect::Diffuse, Effect::Occlusion, Effect::Rim, Effect::Lights, Effect::Shadows]);
-    loaded.scene.effects = lights.with(effect("directional_occlusion")).with(effect("light_side"));
+    let plain = Effects::of(&[Effect::Diffuse, Effect::Occlusion, Effect::Rim]);
+    let effects = more.iter().fold(plain, |all, &one| all.with(one));
+    let lit = effects.has(Effect::Lights);
+    loaded.scene.effects = if lit { effects.with(effect("light_side")) } else { effects };
     let camera = &mut loaded.scene.views[0].camera;
     (camera.width, camera.height) = (64, 64);
     loaded.scene.quality.occlusion_rays = 64;
     loaded.bake().unwrap()
 }
 
-fn on_cpu(baked: &Baked) -> Image {
+pub(crate) fn on_cpu(baked: &Baked) -> Image {
     let sampled = baked.clone().sample().unwrap();
     let shader = Shader::new(sampled.setup(), &sampled.illumination, &sampled.scene.params).unwrap();
     shader.shade(&sampled.samples[0], &sampled.scene.views[0].camera, 1.0).image
@@ -446,33 +490,7 @@ fn slopes_are_finite_differences_on_every_engine() {
         let names = ["base_weight", "rim_weight", "rim_exponent", "occlusion", "light.side.color"];
         let column = |name: &str| Column::tied(Param::from_name(name).unwrap());
         let unknowns: Vec<Unknown> = names.map(|name| Unknown::Param(column(name))).to_vec();
-        let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
-        let (own, point) = (task(), observed.start());
-        let exact = Reference::new(own.setup, &own.illumination, &own.views, own.loss, &unknowns).unwrap();
-        let (loss, slopes) = exact.gradient(&point);
-        for (unknown, slope) in unknowns.iter().zip(&slopes) {
-            let at = |by: f64| {
-                let mut moved = point.clone();
-                unknown.set(&mut moved, unknown.get(&point) + by);
-                exact.loss(&moved)
-            };
-            // In f64 a step of 1e-5 leaves an error of its square, and roundings of 1e-11.
-            let difference = (at(1e-5) - at(-1e-5)) / 2e-5;
-            let near = (slope - difference).abs() <= 1e-6 * (loss + slope.abs());
-            assert!(near && *slope != 0.0, "{}: {slope} {difference}", unknown.name());
-        }
-        let check = |engine: &dyn Objective, what: &str| {
-            let (got, gradient) = engine.gradient(&point);
-            // Roundings of f32, some tens of them in each residual.
-            assert!((got - loss).abs() <= 1e-5 * loss, "{what}: {got} {loss}");
-            let most = slopes.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
-            for (got, want) in gradient.iter().zip(&slopes) {
-                assert!((got - want).abs() <= 1e-4 * want.abs() + 1e-6 * most, "{what}: {got} {want}");
-            }
-        };
-        check(&CpuEngine::new(task()).unwrap(), "cpu");
-        let Some(gpu) = gpu() else { return };
-        check(&GpuEngine::new(gpu, task(), &point, Memory::default()).unwrap(), "gpu");
+        slopes::assert_slopes(&observed, &unknowns, &slopes::EXACT, bounces.name());
     }
 }
 

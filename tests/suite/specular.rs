@@ -23,7 +23,7 @@ fn read() -> Vectors {
 
 /// The rules' text of specular light.
 fn library() -> Vec<&'static str> {
-    let names = ["specular", "split_sum_kelemen", "split_sum_ggx"];
+    let names = ["specular", "split_sum_kelemen", "split_sum_ggx", "dielectric_sum_ggx"];
     names.map(|name| LIBRARY.iter().find(|(known, _)| *known == name).unwrap().1).to_vec()
 }
 
@@ -230,13 +230,33 @@ fn split_sums_are_those_of_the_vectors_and_the_rules_fits_are_near_them() {
                 tolerance.check("es", &column(&|k| all[k].0.value), &expected.at("es_dielectric"));
                 tolerance.check("by m", &column(&|k| all[k].0.by_roughness), &expected.at("d_es_dm"));
                 tolerance.check("by f0", &column(&|k| all[k].1), &expected.at("d_es_df0"));
+                dielectric_fit(&f0s, &places, &expected);
             }
         }
         all_read(&vectors, name, &[]);
     }
 }
 
-/// The nodes of a quadrature of the sphere that a cube's texels are even in: directions with solid angles, and the texel.
+/// The rules' split sum with a dielectric's Fresnel factor and its slopes beside the vectors'.
+fn dielectric_fit(f0s: &[f64], places: &[(f64, f64)], expected: &Node<'_>) {
+    let fit = Rule::new("dielectric_sum_ggx", &[1, 1, 1], &[1, 2]);
+    let all: Vec<[[f64; 1]; 3]> =
+        f0s.iter().flat_map(|&f0| places.iter().map(move |&(v, m)| [[v], [m], [f0]])).collect();
+    let column = |of: &dyn Fn(&[&[f64]]) -> f64| -> Vec<f64> {
+        all.iter().map(|at| of(&at.each_ref().map(|x| &x[..]))).collect()
+    };
+    // The fit's stated error, and in f32 some roundings of sums of up to 5.
+    let [stated, single] = [3e-4, 3.2e-4].map(|abs| Tolerance { abs, rel: 0.0 });
+    stated.check("dielectric", &column(&|at| fit.of(at)[0][0]), &expected.at("es_dielectric"));
+    single.check("dielectric in f32", &column(&|at| fit.single(at)[0]), &expected.at("es_dielectric"));
+    // That error turns within a tenth of the range of m, and within about as much as f0 is.
+    let [by_m, by_f0] = [2e-2, 3e-2].map(|abs| Tolerance { abs, rel: 0.0 });
+    by_m.check("dielectric by m", &column(&|at| fit.of(at)[1][0]), &expected.at("d_es_dm"));
+    by_f0.check("dielectric by f0", &column(&|at| fit.of(at)[2][0]), &expected.at("d_es_df0"));
+}
+
+/// The nodes of a quadrature of the sphere that a cube's texels are even in: directions with solid angles, and the
+/// texel.
 fn sphere(size: usize, splits: usize) -> Vec<([f64; 3], f64, [usize; 3])> {
     let fine = size * splits;
     let node = |i: usize| {
@@ -273,8 +293,8 @@ fn the_environment_in_a_lobe_is_that_of_the_vectors() {
         }
         [0, 1, 2, 3, 4].map(|i| sums[i] / sums[5])
     };
-    // The midpoint rule over cells of 0.008 radians: of the sharpest lobe's deviation, 0.14, the 18th part; its square over
-    // 24, times what the light varies.
+    // The midpoint rule over cells of 0.008 radians: of the sharpest lobe's deviation, 0.14, the 18th part; its
+    // square over 24, times what the light varies.
     let (near, steep) = (Tolerance { abs: 1e-4, rel: 0.0 }, Tolerance { abs: 1e-3, rel: 0.0 });
     for (model, name, value, slope) in [
         (SpecularModel::Kelemen, "m", "E_r", "dE_r_dm"),
@@ -415,6 +435,21 @@ fn values_and_derivatives_are_finite_in_hard_cases() {
                 );
                 // A white furnace yields at most what it has.
                 assert!(all[0] >= 0.0 && all[1] >= 0.0 && all[0] + all[1] <= 1.0, "{view} {m}: {all:?}");
+            }
+        }
+    }
+    let fit = Rule::new("dielectric_sum_ggx", &[1, 1, 1], &[0, 1, 2]);
+    for view in [-1.0, 0.0, 1e-30, 1e-6, 1e-3, 0.5, 1.0, 1.0 + 1e-7] {
+        for m in [0.05, 0.35, 1.0] {
+            for f0 in [0.0, 1e-30, 1e-8, 0.028, 0.2, 1.0] {
+                let arguments: [&[f64]; 3] = [&[view], &[m], &[f0]];
+                let all = fit.of(&arguments).concat();
+                let single = fit.single(&arguments);
+                assert!(
+                    all.iter().chain(&single).all(|x| x.is_finite()),
+                    "{view} {m} {f0}: {all:?} {single:?}"
+                );
+                assert!((0.0..=1.0).contains(&all[0]), "{view} {m} {f0}: {all:?}");
             }
         }
     }

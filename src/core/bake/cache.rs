@@ -10,13 +10,14 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 24] = [
+const SOURCES: [&str; 25] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
     include_str!("coefficients.rs"),
     include_str!("harmonics.rs"),
     include_str!("interreflection.rs"),
     include_str!("lobe_kernel.rs"),
+    include_str!("lobe_sky.rs"),
     include_str!("lobes.rs"),
     include_str!("low_discrepancy.rs"),
     include_str!("mod.rs"),

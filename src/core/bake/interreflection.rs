@@ -29,7 +29,11 @@ impl Found for Nearest {
 }
 
 /// What a vertex gathers: of which vertices (by slot) what share of their light, rgb.
-pub(super) struct Gather(Vec<(u32, [f32; 3])>);
+pub(super) struct Gather {
+    shares: Vec<(u32, [f32; 3])>,
+    /// The share of its rays that met a lit side of the mesh.
+    met: f32,
+}
 
 impl Gather {
     /// By the triangles that its rays found. Those that are met from behind bring nothing: no light is known there.
@@ -41,11 +45,12 @@ impl Gather {
         albedo: &Albedo<'_>,
     ) -> Self {
         let share = 1.0 / found.len().max(1) as f32;
-        let mut gathered: Vec<(u32, [f32; 3])> = Vec::new();
+        let (mut gathered, mut met): (Vec<(u32, [f32; 3])>, u32) = (Vec::new(), 0);
         for (&d, &triangle) in rays.directions.iter().zip(found).filter(|(_, found)| **found != NOTHING) {
             let Some(Met { corners, weights, albedo }) = albedo.met(pose, triangle, rays.origin, d) else {
                 continue;
             };
+            met += 1;
             for (corner, weight) in corners.into_iter().zip(weights) {
                 gathered.push((vertices.slot(corner), albedo.map(|albedo| albedo * weight * share)));
             }
@@ -60,7 +65,7 @@ impl Gather {
             same
         });
         gathered.shrink_to_fit();
-        Self(gathered)
+        Self { shares: gathered, met: met as f32 * share }
     }
 
     /// Two rounds of every vertex' gather, from `direct` of `width` numbers a slot. All cores.
@@ -80,7 +85,7 @@ impl Gather {
     fn once(gathers: &[Self], source: &[f32], width: usize) -> Vec<f32> {
         let mut sums = vec![0.0; gathers.len() * 3 * width];
         sums.par_chunks_exact_mut(3 * width).zip(gathers).for_each(|(sum, gather)| {
-            for &(slot, share) in &gather.0 {
+            for &(slot, share) in &gather.shares {
                 let source = &source[slot as usize * 3 * width..][..3 * width];
                 for ((sum, source), share) in
                     sum.chunks_exact_mut(width).zip(source.chunks_exact(width)).zip(share)
@@ -123,6 +128,13 @@ impl VertexGather {
     #[must_use]
     pub fn bounced(&self, direct: impl Fn(usize) -> [f32; 3] + Sync) -> Vec<[f32; 3]> {
         self.of_vertices(&Gather::once(&self.gathers, &self.lit_once(direct), 1))
+    }
+
+    /// The share of each vertex' hemisphere, weighted by the cosine, in which it sees the mesh from outside.
+    #[must_use]
+    pub fn met(&self) -> Vec<f32> {
+        let met: Vec<[f32; 3]> = self.gathers.iter().map(|gather| [gather.met; 3]).collect();
+        self.vertices.spread(&met, 1).into_iter().map(|[met, ..]| met).collect()
     }
 
     /// The light that `direct` has at each vertex, and what is thrown back to it in one round, rgb.

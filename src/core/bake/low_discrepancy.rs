@@ -12,6 +12,11 @@ impl Sobol {
         Self((0..count).map(|i| [i, second_dimension(i).reverse_bits()]).collect())
     }
 
+    /// How many points there are.
+    pub(crate) fn count(&self) -> u32 {
+        self.0.len() as u32
+    }
+
     /// Evenly distributed points of the unit disc, scrambled by `seed`: radius, then sine and cosine of the angle.
     pub(crate) fn disc(&self, seed: u32) -> impl Iterator<Item = (f32, [f32; 2])> {
         let (first, second) = (mix(seed), mix(seed ^ 0x9e37_79b9));

@@ -6,6 +6,7 @@
 //!   `lobe_kernel`: the sum)
 //! - [`lobes`]: the stack of specular cubes over the exponent; [`reflected`]: over a BRDF's roughness
 //! - [`stacks`]: which cube of which stack is looked up
+//! - [`lobe_sky`]: as rays into a lobe look it up
 //! - [`occlusion`]: per-vertex ambient occlusion (`vertex_rays`: its rays; `low_discrepancy`: their directions)
 //! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
@@ -19,6 +20,7 @@ pub mod coefficients;
 pub mod harmonics;
 pub mod interreflection;
 mod lobe_kernel;
+pub mod lobe_sky;
 pub mod lobes;
 pub(crate) mod low_discrepancy;
 pub mod occlusion;

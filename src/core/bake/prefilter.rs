@@ -5,12 +5,15 @@
 //! is taken out before and added after, so that a constant environment stays exactly that constant.
 //! Each cell counts with the mean of the lobe over it to second order (see `lobe_kernel`).
 
+use std::borrow::Borrow;
+use std::f64::consts::{FRAC_PI_2, TAU};
+
 use fearless_simd::Level;
 use rayon::prelude::*;
 
 use super::lobe_kernel::{BLOCK, Cells, Ggx, Kelemen, Lobe, WIDE, Weigh, gather};
 use super::panorama::Radiance;
-use super::pyramid::{Cell, Pyramid};
+use super::pyramid::{Cell, Pyramid, Visit};
 use super::radial::Radial;
 use crate::model::cube::{Cube, texel_direction, texel_solid_angle};
 use crate::scene::maps::luminance;
@@ -97,21 +100,30 @@ impl Prefilter {
         radial: Radial,
         progress: impl Fn(u64) + Sync,
     ) -> Cube<f32> {
-        let blocks = self.blocks(radial);
         match radial {
-            Radial::Phong(exponent) => self.filtered(level, size, &blocks, Lobe::new(exponent), progress),
-            Radial::Brdf(SpecularModel::Kelemen, m) => {
-                self.filtered(level, size, &blocks, Kelemen::new(m), progress)
+            Radial::Phong(exponent) => {
+                let blocks = self.blocks(radial);
+                let near = |directions: &[[f64; 3]]| blocks_near(&blocks, directions);
+                self.filtered(level, size, near, Lobe::new(exponent), progress)
             }
-            Radial::Brdf(SpecularModel::Ggx, m) => self.filtered(level, size, &blocks, Ggx::new(m), progress),
+            Radial::Brdf(SpecularModel::Kelemen, m) => {
+                let blocks = self.blocks(radial);
+                let near = |directions: &[[f64; 3]]| blocks_near(&blocks, directions);
+                self.filtered(level, size, near, Kelemen::new(m), progress)
+            }
+            Radial::Brdf(SpecularModel::Ggx, m) => {
+                let about = |directions: &[[f64; 3]]| self.blocks_about(m * m, directions);
+                self.filtered(level, size, about, Ggx::new(m), progress)
+            }
         }
     }
 
-    fn filtered(
+    /// `near` yields the blocks that lobes about the directions of a tile reach.
+    fn filtered<B: Borrow<Block>>(
         &self,
         level: Level,
         size: usize,
-        blocks: &[Block],
+        near: impl Fn(&[[f64; 3]]) -> Vec<B> + Sync,
         lobe: impl Weigh,
         progress: impl Fn(u64) + Sync,
     ) -> Cube<f32> {
@@ -120,9 +132,10 @@ impl Prefilter {
             .into_par_iter()
             .map(|tile| {
                 let directions = tile_directions(tile, tiles, size);
-                let near = blocks_near(blocks, &directions);
+                let near = near(&directions);
                 let texel = |&r: &[f64; 3]| {
-                    let sums = with_simd!(level, simd => gather(simd, near.iter().map(|block| &block.cells), r, lobe));
+                    let cells = || near.iter().map(|block| &block.borrow().cells);
+                    let sums = with_simd!(level, simd => gather(simd, cells(), r, lobe));
                     self.finish(sums)
                 };
                 let texels: Vec<[f32; 4]> = directions.iter().map(texel).collect();
@@ -156,6 +169,32 @@ impl Prefilter {
         let cut = radial.reach();
         let block = |cells: &[Cell]| Block::new(cells, self.pyramid.mean, cut);
         cells.par_chunks(WIDE * BLOCK).map(block).collect()
+    }
+
+    /// Blocks of cells for lobes of GGX about directions that are near one another. The tail of such a lobe,
+    /// 1 / (1 + (t / 2 alpha)^2)^2 of the angle t, reaches to the horizon, but falls the more slowly the further out:
+    /// over a quarter of the angle. So cells are the wider, and may be the more unevenly lit, the further they are off. At the
+    /// horizon masking takes over, which falls to 0 within about alpha.
+    fn blocks_about(&self, alpha: f64, directions: &[[f64; 3]]) -> Vec<Block> {
+        let (axis, radius) = cone(directions);
+        let peak = (alpha.powi(-2) + 1.0) / TAU;
+        let unseen = CELL_TOLERANCE * self.pyramid.brightness();
+        let visit = |cell: &Cell| {
+            let side = cell.solid_angle.sqrt();
+            let off = (angle(axis, unit(cell.moment)) - radius - side).max(0.0);
+            if off >= FRAC_PI_2 {
+                return Visit::Skip;
+            }
+            let height = peak * (1.0 + (0.5 * off / alpha).powi(2)).powi(-2);
+            let falls_over = alpha.max(0.25 * off);
+            let widest = (CELL_WIDTH * falls_over).min(WIDEST_CELL);
+            let masked_over = (0.5 * alpha).max(FRAC_PI_2 - off - 2.0 * (radius + side));
+            // The flux of a cell lies 0.3 of its width beside its centre.
+            let moved = 0.3 * side * height / falls_over.min(masked_over) * cell.unevenness;
+            if side > widest || moved > unseen { Visit::Split } else { Visit::Take }
+        };
+        let cells = self.pyramid.cells(visit);
+        cells.chunks(WIDE * BLOCK).map(|cells| Block::new(cells, self.pyramid.mean, FRAC_PI_2)).collect()
     }
 }
 
@@ -193,14 +232,19 @@ fn tile_directions(tile: usize, tiles: usize, size: usize) -> Vec<[f64; 3]> {
     rows.flat_map(|y| columns.clone().map(move |x| texel_direction(face, x, y, size))).collect()
 }
 
-/// The blocks that a lobe about any of `directions` reaches.
-fn blocks_near<'a>(blocks: &'a [Block], directions: &[[f64; 3]]) -> Vec<&'a Block> {
+/// The middle of directions, and how far they lie from it.
+fn cone(directions: &[[f64; 3]]) -> ([f64; 3], f64) {
     let mut sum = [0.0; 3];
     for d in directions {
         (0..3).for_each(|i| sum[i] += d[i]);
     }
     let axis = unit(sum);
-    let radius = directions.iter().map(|&d| angle(axis, d)).fold(0.0, f64::max);
+    (axis, directions.iter().map(|&d| angle(axis, d)).fold(0.0, f64::max))
+}
+
+/// The blocks that a lobe about any of `directions` reaches.
+fn blocks_near<'a>(blocks: &'a [Block], directions: &[[f64; 3]]) -> Vec<&'a Block> {
+    let (axis, radius) = cone(directions);
     blocks.iter().filter(|block| angle(axis, block.axis) <= block.reach + radius).collect()
 }
 

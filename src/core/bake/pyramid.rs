@@ -25,6 +25,17 @@ impl Cell {
     }
 }
 
+/// What becomes of a cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Visit {
+    /// It counts as it is.
+    Take,
+    /// The four that it is made of are visited in its place.
+    Split,
+    /// It counts nothing.
+    Skip,
+}
+
 /// Cells of every size, the finest first.
 pub(super) struct Pyramid {
     levels: Vec<Level>,
@@ -69,33 +80,43 @@ impl Pyramid {
         Self { levels, mean, range }
     }
 
+    /// The mean radiance of the brightest channel.
+    pub(super) fn brightness(&self) -> f64 {
+        self.mean.iter().fold(0.0, |a: f64, &x| a.max(f64::from(x.abs())))
+    }
+
     /// The cells for a lobe of the given Phong exponent, in an order that keeps neighbours together.
     ///
-    /// A cell is split while it is wider than `width` (radians), or while taking it as evenly lit may move the result by more than `tolerance` times the mean radiance.
+    /// A cell is split while it is wider than `width` (radians), or while taking it as evenly lit may move the result
+    /// by more than `tolerance` times the mean radiance.
     pub(super) fn cells_for(&self, exponent: f64, width: f64, tolerance: f64) -> Vec<Cell> {
         let deviation = 1.0 / exponent.sqrt();
         let peak = (exponent + 1.0) / std::f64::consts::TAU;
         // The steepest slope of a Gaussian is 0.6 of its height over its deviation, and the flux of
         // a cell lies 0.3 of its width beside its centre.
         let slope = 0.6 * 0.3 * peak / deviation;
-        let brightness = self.mean.iter().fold(0.0, |a: f64, &x| a.max(f64::from(x.abs())));
+        let brightness = self.brightness();
         let split = |cell: &Cell| {
             let side = cell.solid_angle.sqrt();
             side > width || slope * side * cell.unevenness > tolerance * brightness
         };
-        let top = self.levels.len() - 1;
-        let faces: Vec<Vec<Cell>> = (0..6)
-            .into_par_iter()
-            .map(|face| {
-                let mut cells = Vec::new();
-                let size = self.levels[top].size;
-                for i in 0..size * size {
-                    self.gather(top, face, i % size, i / size, &split, &mut cells);
-                }
-                cells
-            })
-            .collect();
+        let visit = |cell: &Cell| if split(cell) { Visit::Split } else { Visit::Take };
+        let faces: Vec<Vec<Cell>> = (0..6).into_par_iter().map(|face| self.of_face(face, &visit)).collect();
         faces.concat()
+    }
+
+    /// The cells that `visit` takes, in an order that keeps neighbours together. The finest are not split.
+    pub(super) fn cells(&self, visit: impl Fn(&Cell) -> Visit) -> Vec<Cell> {
+        (0..6).flat_map(|face| self.of_face(face, &visit)).collect()
+    }
+
+    fn of_face(&self, face: usize, visit: &impl Fn(&Cell) -> Visit) -> Vec<Cell> {
+        let (mut cells, top) = (Vec::new(), self.levels.len() - 1);
+        let size = self.levels[top].size;
+        for i in 0..size * size {
+            self.gather(top, face, i % size, i / size, visit, &mut cells);
+        }
+        cells
     }
 
     /// The mean radiance over each texel of a cube of `size` texels a side, where the pyramid has
@@ -114,16 +135,18 @@ impl Pyramid {
         face: usize,
         column: usize,
         row: usize,
-        split: &impl Fn(&Cell) -> bool,
+        visit: &impl Fn(&Cell) -> Visit,
         into: &mut Vec<Cell>,
     ) {
         let cell = self.levels[level].at(face, column, row);
-        if level == 0 || !split(cell) {
-            into.push(*cell);
-            return;
-        }
-        for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
-            self.gather(level - 1, face, 2 * column + dx, 2 * row + dy, split, into);
+        match visit(cell) {
+            Visit::Skip => {}
+            Visit::Split if level > 0 => {
+                for (dx, dy) in [(0, 0), (1, 0), (0, 1), (1, 1)] {
+                    self.gather(level - 1, face, 2 * column + dx, 2 * row + dy, visit, into);
+                }
+            }
+            Visit::Split | Visit::Take => into.push(*cell),
         }
     }
 }

@@ -8,6 +8,11 @@ use super::harmonics::Order;
 
 /// The least that open light counts as, as a share of the mean radiance, where shadowed light is divided by it.
 const LEAST: f64 = 1e-4;
+/// The same where light that the surface throws back is divided by it and the sky's own is not. Six bands make
+/// irradiance over pi too small by up to an eighth of the mean radiance: most by a light from one direction, opposite
+/// to it, where the series of the cosine lobe from l = 6 on is 1/8 of it; of all light together no more. So a surface
+/// that really receives E, times this share, shows at most twice what is thrown back, however its harmonics ring.
+const SHORTFALL: f64 = 0.125;
 
 /// A number of a transfer vector: of all channels alike, or rgb.
 pub trait Share: Copy + Sync {
@@ -80,6 +85,17 @@ impl Turning {
         })
     }
 
+    /// What arrives of both.
+    #[must_use]
+    pub fn with(mut self, other: &Self) -> Self {
+        let add = |sums: &mut [[f64; 3]; 6], more: &[[f64; 3]; 6]| {
+            sums.iter_mut().flatten().zip(more.iter().flatten()).for_each(|(sum, more)| *sum += more);
+        };
+        add(&mut self.cosines, &other.cosines);
+        add(&mut self.sines, &other.sines);
+        self
+    }
+
     fn sum(&self, wave: impl Fn(f64) -> [f64; 2]) -> [f64; 3] {
         let mut sum = [0.0; 3];
         for (m, (p, q)) in self.cosines.iter().zip(&self.sines).enumerate() {
@@ -123,10 +139,20 @@ pub struct Ratio {
 /// `transfer` and `open` are split by [`Turning`]; `mean` is [`Coefficients::mean`] of the same light.
 #[must_use]
 pub fn shadow_ratio(shadowed: &Turning, open: &Turning, mean: [f64; 3], radians: f64) -> Ratio {
+    ratio_above(LEAST, shadowed, open, mean, radians)
+}
+
+/// The same of light that the surface throws back alone: [`thrown_share`].
+#[must_use]
+pub fn thrown_ratio(thrown: &Turning, open: &Turning, mean: [f64; 3], radians: f64) -> Ratio {
+    ratio_above(SHORTFALL, thrown, open, mean, radians)
+}
+
+fn ratio_above(share: f64, shadowed: &Turning, open: &Turning, mean: [f64; 3], radians: f64) -> Ratio {
     let [(s, ds), (u, du)] = [shadowed, open].map(|light| (light.at(radians), light.slope(radians)));
     let mut ratio = Ratio { value: [0.0; 3], slope: [0.0; 3] };
     for c in 0..3 {
-        let least = LEAST * mean[c];
+        let least = share * mean[c];
         if mean[c] > 0.0 && s[c] > 0.0 {
             let (by, slope) = if u[c] > least { (u[c], du[c]) } else { (least, 0.0) };
             ratio.value[c] = s[c] / by;
@@ -147,20 +173,31 @@ pub fn arriving<T: Share>(transfer: &[T], light: &Coefficients) -> [f64; 3] {
     sum
 }
 
-/// What arrives, as a share of open light: max(0, `arrived`) / max(`open`, 1e-4 M), M the mean radiance; 0 where M is not
-/// above 0.
+/// What arrives, as a share of open light: max(0, `arrived`) / max(`open`, 1e-4 M), M the mean radiance; 0 where M is
+/// not above 0.
 #[must_use]
 pub fn share_of_open(arrived: [f64; 3], open: [f64; 3], mean: [f64; 3]) -> [f64; 3] {
+    share_above(LEAST, arrived, open, mean)
+}
+
+/// What the surface throws back, as a share of open light by six bands: max(0, `thrown`) / max(`open`, M / 8), where
+/// the open share of the sky is known beside. Nothing hidden throws nothing back, so the guard changes nothing there.
+#[must_use]
+pub fn thrown_share(thrown: [f64; 3], open: [f64; 3], mean: [f64; 3]) -> [f64; 3] {
+    share_above(SHORTFALL, thrown, open, mean)
+}
+
+fn share_above(least: f64, arrived: [f64; 3], open: [f64; 3], mean: [f64; 3]) -> [f64; 3] {
     [0, 1, 2].map(|c| match mean[c] > 0.0 {
-        true => arrived[c].max(0.0) / open[c].max(LEAST * mean[c]),
+        true => arrived[c].max(0.0) / open[c].max(least * mean[c]),
         false => 0.0,
     })
 }
 
 /// The light that an occlusion lets through once the surface throws it back at itself (Jimenez et al. 2016,
-/// *Practical Real-Time Strategies for Accurate Indirect Occlusion*), a channel, and its derivatives by occlusion and by
-/// albedo: the cheap choice beside gathered bounces. Where both branches are equal, as for occlusion 0, the derivatives
-/// are those from above.
+/// *Practical Real-Time Strategies for Accurate Indirect Occlusion*), a channel, and its derivatives by occlusion and
+/// by albedo: the cheap choice beside gathered bounces. Where both branches are equal, as for occlusion 0, the
+/// derivatives are those from above.
 #[must_use]
 pub fn bounce_polynomial(open: f64, albedo: f64) -> [f64; 3] {
     let [a, b, c] =
@@ -177,7 +214,7 @@ pub fn bounce_polynomial(open: f64, albedo: f64) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bake::harmonics::open_transfer;
+    use crate::bake::harmonics::{basis, open_transfer};
 
     fn light() -> Coefficients {
         let numbers = (0..36_u8).map(|i| f64::from(i).sin());
@@ -207,6 +244,36 @@ mod tests {
         assert_eq!((rgb.len(), single.len()), (1, 1));
         let [rgb, single] = [rgb[0].at(1.0), single[0].at(1.0)];
         assert!(rgb[0] == single[0] && rgb[1] == 0.0 && (rgb[2] - 2.0 * single[2]).abs() < 1e-12);
+    }
+
+    #[test]
+    fn light_that_is_thrown_back_is_at_most_doubled_where_a_sun_rings() {
+        let toward = [0.48, 0.6, 0.64];
+        // A sun of mean radiance 1.
+        let four_pi = 4.0 * std::f64::consts::PI;
+        let sun = basis(Order::MOST, toward).iter().map(|y| [four_pi * y; 3]).collect();
+        let sun = Coefficients::new(Order::MOST, sun);
+        let (mut short, mut least) = (0.0_f64, f64::INFINITY);
+        for i in 0..2000_i32 {
+            let y = 1.0 - (2.0 * f64::from(i) + 1.0) / 2000.0;
+            let (sine, cosine) = (2.399_963_229_728_653 * f64::from(i)).sin_cos();
+            let radius = (1.0 - y * y).sqrt();
+            let normal = [radius * sine, y, radius * cosine];
+            let lit = arriving(&open_transfer(Order::MOST, normal), &sun);
+            let real = 4.0 * (0..3).map(|k| normal[k] * toward[k]).sum::<f64>().max(0.0);
+            short = short.max(real - lit[0]);
+            least = least.min(lit[0]);
+            let share = thrown_share([0.3, 0.02, 0.0], lit, sun.mean());
+            let shown = share.map(|share| real * share);
+            // Roundings of sums of 36 numbers of up to 40.
+            assert!(shown[0] <= 0.6 + 1e-9 && shown[1] <= 0.04 + 1e-9 && shown[2] == 0.0, "{normal:?}");
+            assert!(share[0] <= 2.4 + 1e-9, "{share:?}");
+            if lit[0] > 0.125 {
+                assert_eq!(share, share_of_open([0.3, 0.02, 0.0], lit, sun.mean()));
+            }
+        }
+        // They do ring, and fall short by as much as the guard is.
+        assert!(least < -0.1 && (0.12..0.125 + 1e-9).contains(&short), "{least} {short}");
     }
 
     #[test]

@@ -8,8 +8,8 @@ use super::harmonics::Order;
 use super::interreflection::Albedo;
 use super::transfer::VertexTransfer;
 use super::{all_sets, all_weights};
-use crate::model::choices::{Bounces, Visibility};
-use crate::model::fields::Field;
+use crate::model::choices::{Bounces, SpecularVisibility, Visibility};
+use crate::model::fields::Fields;
 use crate::scene::Scene;
 use crate::scene::maps::Environment;
 use crate::scene::mesh::PosedMesh;
@@ -17,8 +17,31 @@ use crate::scene::sky_lights::sky_lights;
 
 /// The field of the sky that a sample sees: a share of what an open point receives, rgb.
 pub const SKY_RATIO: &str = "sky_ratio";
+/// The fields of how that moves with the cosine and the sine of the environment's turn.
+pub const SKY_TURNS: [&str; 2] = ["sky_cosine", "sky_sine"];
 /// The field of the mean direction of the open sky.
 pub const BENT_NORMAL: &str = "bent_normal";
+
+/// The field of the skin that a point sees: its mean radiance, rgb.
+pub const SKIN_SEEN: &str = "skin_seen";
+
+/// The fields of light that rays into a specular lobe bring, each at one of three roughnesses.
+pub const LOBES: [&str; 3] = ["lobe_sharp", "lobe_middle", "lobe_wide"];
+/// The field of these roughnesses.
+pub const LOBE_NODES: &str = "lobe_nodes";
+
+/// Whether a scene's samples, which are to have `fields`, have light of their lobes by rays.
+#[must_use]
+pub fn traces_lobes(scene: &Scene, fields: Fields) -> bool {
+    scene.choices.specular_visibility == SpecularVisibility::Rays
+        && LOBES.iter().any(|name| fields.named(name).is_some())
+}
+
+/// Whether what is found for `fields` of a scene's samples is found of the skin's own light.
+#[must_use]
+pub fn sees_skin(scene: &Scene, fields: Fields) -> bool {
+    fields.named(SKIN_SEEN).is_some() || traces_lobes(scene, fields) && scene.reflects_skin()
+}
 
 /// The sky as each vertex sees it.
 #[derive(Clone, Debug)]
@@ -56,9 +79,12 @@ impl Wanted {
     #[must_use]
     pub fn of(scene: &Scene) -> Option<Self> {
         let fields = scene.needs().fields;
-        let wanted = |name| Field::from_name(name).is_some_and(|field| fields.iter().any(|of| of == field));
+        let wanted = |name| fields.named(name).is_some();
         if !wanted(SKY_RATIO) {
-            return wanted(BENT_NORMAL).then_some(Self { order: Order::LEAST, bounces: false, light: false });
+            // The skin's own light is as smooth as what it throws back.
+            let skin = sees_skin(scene, fields);
+            let order = if skin { Order::FOUR } else { Order::LEAST };
+            return (skin || wanted(BENT_NORMAL)).then_some(Self { order, bounces: false, light: skin });
         }
         let choices = scene.choices;
         let gathered = choices.bounces == Bounces::Gathered;

@@ -54,11 +54,10 @@ impl Stack {
     /// The exponent or the roughness that it is looked up at.
     #[must_use]
     pub fn place(self, params: &Params) -> f64 {
-        let own = |name: &str| Param::from_identifier(name).map_or(0.0, |param| params.scalar(param));
         match self {
             Self::Specular => params.scalar(Param::SpecularLobe),
-            Self::Reflected => own("roughness").max(SMOOTHEST),
-            Self::Glossy => roughness_of(own("roughness"), own("gloss"), 1.0),
+            Self::Reflected => params.scalar_named("roughness").max(SMOOTHEST),
+            Self::Glossy => roughness_of(params.scalar_named("roughness"), params.scalar_named("gloss"), 1.0),
         }
     }
 

@@ -70,8 +70,9 @@ impl<const N: usize> Weighted<Batch<f64, N>> {
 /// least squares with the weight `1 / (m + e)^2` held at the model's value, so that `sum(weight J (m - t))` has a mean of 0
 /// at the truth whatever the noise, and the loss is the integral whose slope that is. For m and t above 0 it is the
 /// deviance of a gamma distribution, `2 (ln(p / q) + q / p - 1)` of p = m + e and q = t + e: near m = t the relative square
-/// `(m - t)^2 / (m + e)^2`. Of the variances that grow as the square of the radiance, `(m + e)^2` rather than `m^2 + e^2` is
-/// taken as its integral needs no arctangent. Below 0, where only noise and odd constants lead, the weight stays `1 / e^2`.
+/// `(m - t)^2 / (m + e)^2`. Of the variances that grow as the square of the radiance, `(m + e)^2` rather than `m^2 +
+/// e^2` is taken as its integral needs no arctangent. Below 0, where only noise and odd constants lead, the weight
+/// stays `1 / e^2`.
 ///
 /// With `s = (p - q) / (p + q)` it is `2 s (p - q) / p + 4 (artanh s - s)`: no digit is lost where m is near t.
 #[derive(Clone, Copy, Debug)]
@@ -217,7 +218,8 @@ use crate::program::graph::Unary;
                 let single =
                     weighted_residual(Loss::RelativeL2, None, [model as f32, target as f32, 1.0]).loss;
                 // Numbers of the series are decimals of f32, 2e-8 off, and it ends where f32 does: of a twentieth of the
-                // loss at most. Simpson's rule to some 1e-12 of integrals of both signs, which of near numbers nearly cancel.
+                // loss at most. Simpson's rule to some 1e-12 of integrals of both signs, which of near numbers nearly
+                // cancel.
                 assert!(
                     (double - want).abs() <= 2e-9 * (want.abs() + 1e-3),
                     "{model} {target}: {double} {want}"

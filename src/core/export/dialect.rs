@@ -1,6 +1,7 @@
 //! How each shading language spells what the shader rules say in WGSL.
 
 use super::names::{PREFIX, function};
+use crate::model::texture_filter::TextureFilter;
 use crate::shader::quantity::{Kind, Resource};
 
 /// Families that share most of their grammar.
@@ -25,6 +26,8 @@ pub struct Dialect {
     pub constant: &'static str,
     /// A bilinear lookup of a 2D map: `{t}` texture, `{s}` sampler, `{c}` coordinates.
     pub map_lookup: &'static str,
+    /// One filtered to the fragment, by its mip levels.
+    pub mip_map_lookup: &'static str,
     /// A lookup of a cube.
     pub cube_lookup: &'static str,
     /// Declarations of a 2D map, a cube and a sampler: `{n}` name, `{b}` binding, `{h}` what a map of
@@ -34,6 +37,9 @@ pub struct Dialect {
     pub colour_hint: &'static str,
     /// The names of the samplers of maps and cubes.
     pub samplers: [&'static str; 2],
+    /// What says in declarations and samplers' names how maps are filtered, in the order of [`TextureFilter::ALL`]; empty
+    /// where what is bound says so.
+    pub filters: [&'static str; 3],
     /// The bits of a vector's floats; empty where the language has none, but `isfinite`.
     pub bits: &'static str,
     /// Lines that come first.
@@ -47,10 +53,12 @@ const BASE: Dialect = Dialect {
     family: Family::Glsl,
     constant: "const",
     map_lookup: "textureLod({t}, {c}, 0.0)",
+    mip_map_lookup: "texture({t}, {c})",
     cube_lookup: "textureLod({t}, {c}, 0.0)",
     declarations: [""; 3],
     colour_hint: "",
     samplers: ["skinfit_map_sampler", "skinfit_cube_sampler"],
+    filters: [""; 3],
     bits: "",
     prologue: "",
     epilogue: "",
@@ -60,6 +68,7 @@ const BASE: Dialect = Dialect {
 pub const WGSL: Dialect = Dialect {
     family: Family::Wgsl,
     map_lookup: "textureSampleLevel({t}, {s}, {c}, 0.0)",
+    mip_map_lookup: "textureSample({t}, {s}, {c})",
     cube_lookup: "textureSampleLevel({t}, {s}, {c}, 0.0)",
     declarations: [
         "@group(0) @binding({b}) var {n}: texture_2d<f32>;",
@@ -89,6 +98,11 @@ pub const GODOT: Dialect = Dialect {
         "",
     ],
     colour_hint: "source_color, ",
+    filters: [
+        "filter_linear, repeat",
+        "filter_linear_mipmap, repeat",
+        "filter_linear_mipmap_anisotropic, repeat",
+    ],
     ..GLSL
 };
 
@@ -97,6 +111,7 @@ pub const HLSL: Dialect = Dialect {
     family: Family::Hlsl,
     constant: "static const",
     map_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
+    mip_map_lookup: "{t}.Sample({s}, {c})",
     cube_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
     declarations: [
         "Texture2D<float4> {n} : register(t{b});",
@@ -111,6 +126,7 @@ pub const HLSL: Dialect = Dialect {
 pub const UNITY: Dialect = Dialect {
     declarations: ["Texture2D<float4> {n};", "TextureCube<float4> {n};", "SamplerState {n};"],
     samplers: ["skinfit_linear_repeat_sampler", "skinfit_linear_clamp_sampler"],
+    filters: ["_linear_repeat", "_trilinear_repeat", "_trilinear_repeat_aniso16"],
     prologue: "#ifndef SKINFIT_INCLUDED\n#define SKINFIT_INCLUDED\n",
     epilogue: "\n#endif\n",
     ..HLSL
@@ -119,6 +135,7 @@ pub const UNITY: Dialect = Dialect {
 /// The paper's language (profiles with `texCUBElod`: fp40, gp4 and up).
 pub const CG: Dialect = Dialect {
     map_lookup: "tex2Dlod({t}, float4({c}, 0.0, 0.0))",
+    mip_map_lookup: "tex2D({t}, {c})",
     cube_lookup: "texCUBElod({t}, float4({c}, 0.0))",
     declarations: ["uniform sampler2D {n};", "uniform samplerCUBE {n};", ""],
     bits: "",
@@ -130,6 +147,7 @@ pub const MSL: Dialect = Dialect {
     family: Family::Msl,
     constant: "constant",
     map_lookup: "{t}.sample({s}, {c}, level(0.0))",
+    mip_map_lookup: "{t}.sample({s}, {c})",
     cube_lookup: "{t}.sample({s}, {c}, level(0.0))",
     declarations: ["texture2d<float> {n};", "texturecube<float> {n};", "sampler {n};"],
     bits: "as_type<uint3>",
@@ -186,6 +204,16 @@ impl Dialect {
             Some("map_sampler") => self.samplers[0],
             Some("cube_sampler") => self.samplers[1],
             _ => name,
+        }
+    }
+
+    /// Declarations and functions whose maps are filtered that way, of those whose maps are filtered bilinearly.
+    #[must_use]
+    pub fn filtering(&self, text: &str, filter: TextureFilter) -> String {
+        let own = TextureFilter::ALL.into_iter().zip(self.filters).find(|(known, _)| *known == filter);
+        match own {
+            Some((_, word)) if !word.is_empty() => text.replace(self.filters[0], word),
+            _ => text.to_owned(),
         }
     }
 

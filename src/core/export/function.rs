@@ -42,12 +42,13 @@ pub(super) fn text(
     for (name, kind, value) in &literals {
         let _ = writeln!(text, "{}", dialect.definition(&names::constant(name), kind, value));
     }
-    let declared = declarations(dialect, &plan);
+    let filter = plan.facts.maps.filter;
+    let declared = dialect.filtering(&declarations(dialect, &plan), filter);
     let constants: Vec<String> = literals.into_iter().map(|(name, ..)| name).collect();
     let resources: Vec<&str> = plan.resources.iter().map(|resource| resource.name()).collect();
     let fields: Vec<&str> = plan.surface().iter().map(|(name, _)| *name).collect();
     let wgsl = names::prefixed(&plan.function(), &constants, &resources, &fields);
-    let functions = translate(dialect, &names::cited(&wgsl));
+    let functions = dialect.filtering(&translate(dialect, &names::cited(&wgsl)), filter);
     if dialect.family == Family::Msl {
         let body = indented(&format!("{declared}\n{functions}"));
         let _ = write!(
@@ -97,6 +98,14 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
                 .to_owned(),
         ]);
         lines.extend(bound);
+    }
+    let filter = plan.facts.maps.filter;
+    if filter.reads_levels() && plan.resources.iter().any(|resource| resource.kind() == Kind::Map) {
+        lines.extend([
+            String::new(),
+            format!("Maps are to have mip levels and a sampler that is {}, as where the constants were found. Which level a", filter.name()),
+            "fragment reads follows from its neighbours: call skinfit_shade in a fragment stage, outside of any branch.".to_owned(),
+        ]);
     }
     let comment = |line: String| if line.is_empty() { "//\n".to_owned() } else { format!("// {line}\n") };
     lines.into_iter().map(comment).collect()

@@ -115,6 +115,11 @@ impl<'a> Translation<'a> {
                 let sampler = self.dialect.resource(sampler);
                 lookup.replace("{t}", texture).replace("{s}", sampler).replace("{c}", at)
             }
+            ("textureSample", [texture, sampler, at]) => {
+                let sampler = self.dialect.resource(sampler);
+                let lookup = self.dialect.mip_map_lookup;
+                lookup.replace("{t}", texture).replace("{s}", sampler).replace("{c}", at)
+            }
             // HLSL has no vector of one number repeated.
             ("vec3f" | "vec3u", [one]) if self.dialect.family == Family::Hlsl => {
                 format!("{}({one}, {one}, {one})", self.dialect.kind(function))
@@ -177,6 +182,9 @@ mod tests {
         assert_eq!(translate(&GLSL, lookup), "textureLod(hilite_cube, d, 0.0).rgb");
         assert_eq!(translate(&MSL, lookup), "hilite_cube.sample(cube_sampler, d, level(0.0)).rgb");
         assert_eq!(translate(&CG, lookup), "texCUBElod(hilite_cube, float4(d, 0.0)).rgb");
+        let filtered = "textureSample(color_map, map_sampler, vertex_uv).rgb";
+        assert_eq!(translate(&GLSL, filtered), "texture(color_map, vertex_uv).rgb");
+        assert_eq!(translate(&CG, filtered), "tex2D(color_map, vertex_uv).rgb");
         let bits = "bitcast<vec3u>(v) & vec3u(0x7f800000u)";
         assert_eq!(translate(&GLSL, bits), "floatBitsToUint(v) & uvec3(0x7f800000u)");
         assert_eq!(translate(&HLSL, bits), "asuint(v) & uint3(0x7f800000u, 0x7f800000u, 0x7f800000u)");

@@ -298,7 +298,8 @@ mod tests {
         // tanh rises from 0.905 to 1 at most: no x above the answer is told apart.
         assert!(!profile.closed[1] && profile.is_valley(), "{profile:?}");
         assert!(profile.interval[1] > profile.value + 8.0 * profile.std_error, "{profile:?}");
-        // Below, tanh is 1e-4 over 1e-3 lower at 0.805, that is at x = 3.71; the root's line over 1.8 misses its bend by 0.2.
+        // Below, tanh is 1e-4 over 1e-3 lower at 0.805, that is at x = 3.71; the root's line over 1.8 misses its bend
+        // by 0.2.
         assert!(profile.closed[0] && (profile.interval[0] - 3.71).abs() < 0.25, "{profile:?}");
     }
 

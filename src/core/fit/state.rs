@@ -280,8 +280,8 @@ fn first_difference(was: &[f64], is: &[f64]) -> (String, String) {
     (say(was), say(is))
 }
 
-/// Every number of a point, in order: parameters, gains, and what scenes have of their own. Of added parameters those alone that are not at their defaults: which of them
-/// there are depends on what else the process has read.
+/// Every number of a point, in order: parameters, gains, and what scenes have of their own. Of added parameters those
+/// alone that are not at their defaults: which of them there are depends on what else the process has read.
 fn values(point: &Point) -> Vec<f64> {
     let said = |param: &Param| param.is_built_in() || point.params.rgb(*param) != [param.info().corrected; 3];
     let params = Param::all().filter(said).flat_map(|param| point.params.rgb(param));

@@ -85,6 +85,10 @@ impl Statistics {
             let Some(variance) = variance else { continue };
             let noise = root(variance * matrix[(i, i)]) * slope[i];
             let apart = clustered.as_ref().map_or(0.0, |(c, _)| root(c[(i, i)]) * slope[i]);
+            // What overflows tells as little as what is not determined.
+            if !noise.max(apart).is_finite() {
+                continue;
+            }
             (noise_errors[i], std_errors[i]) = (Some(noise), Some(noise.max(apart)));
             for &j in &known {
                 let size = root(matrix[(i, i)]) * root(matrix[(j, j)]);

@@ -6,6 +6,8 @@
 pub struct Choices {
     /// The specular BRDF.
     pub specular_model: SpecularModel,
+    /// What of a constant environment the specular lobe gives back.
+    pub split_sum: SplitSum,
     /// How much of the specular lobe is open to the sky.
     pub specular_visibility: SpecularVisibility,
     /// Where the environment is looked up for the specular lobe.
@@ -16,8 +18,12 @@ pub struct Choices {
     pub visibility: Visibility,
     /// How light counts that the skin throws back.
     pub bounces: Bounces,
+    /// What the specular lobe sees where it does not see the sky.
+    pub skin_reflection: SkinReflection,
     /// Whether the specular map lowers the roughness, or will: `gloss` is not 0.
     pub glossy: bool,
+    /// Whether a fit turns the environment: what vertices found of it has to know how it moves.
+    pub turning: bool,
 }
 
 /// A specular BRDF (the scene's `specular_model`).
@@ -44,6 +50,31 @@ impl SpecularModel {
     }
 }
 
+/// By which Fresnel factor the environment is reflected (the scene's `split_sum`). With [`SpecularModel::Kelemen`]
+/// both are the same: its factor is Schlick's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SplitSum {
+    /// By Schlick's: linear in f0.
+    #[default]
+    Schlick,
+    /// By the model's own.
+    Exact,
+}
+
+impl SplitSum {
+    /// Both choices, in the order of documentation.
+    pub const ALL: [Self; 2] = [Self::Schlick, Self::Exact];
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Schlick => "schlick",
+            Self::Exact => "exact",
+        }
+    }
+}
+
 /// How much of the specular lobe is open to the sky (the scene's `specular_visibility`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum SpecularVisibility {
@@ -52,16 +83,18 @@ pub enum SpecularVisibility {
     /// By the open share of the hemisphere (Lagarde and de Rousiers 2014).
     #[default]
     Lagarde,
-    /// By the overlap of the lobe's cone and that of the open sky about the bent normal (Oat and Sander 2007, Jimenez et
-    /// al. 2016).
+    /// By the overlap of the lobe's cone and that of the open sky about the bent normal (Oat and Sander 2007, Jimenez
+    /// et al. 2016).
     Cone,
-    /// By rays into the lobe: the reference.
+    /// By rays into the lobe, which tell its open share.
     Lobe,
+    /// The light itself is that along rays into the lobe: the reference.
+    Rays,
 }
 
 impl SpecularVisibility {
     /// Every choice, in the order of documentation.
-    pub const ALL: [Self; 4] = [Self::None, Self::Lagarde, Self::Cone, Self::Lobe];
+    pub const ALL: [Self; 5] = [Self::None, Self::Lagarde, Self::Cone, Self::Lobe, Self::Rays];
 
     /// The name in scene files.
     #[must_use]
@@ -71,6 +104,7 @@ impl SpecularVisibility {
             Self::Lagarde => "lagarde",
             Self::Cone => "cone",
             Self::Lobe => "lobe",
+            Self::Rays => "rays",
         }
     }
 }
@@ -206,17 +240,43 @@ impl Bounces {
     }
 }
 
+/// What the specular lobe sees where it does not see the sky (the scene's `skin_reflection`).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum SkinReflection {
+    /// Nothing: it is black there.
+    None,
+    /// The skin that the point sees on average, lit by what [`Bounces::Gathered`] gathers.
+    #[default]
+    Gathered,
+}
+
+impl SkinReflection {
+    /// Both choices, in the order of documentation.
+    pub const ALL: [Self; 2] = [Self::None, Self::Gathered];
+
+    /// The name in scene files.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Gathered => "gathered",
+        }
+    }
+}
+
 impl Choices {
     /// Those that a scene file names, each by its key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 6] {
+    pub const fn named(&self) -> [(&'static str, &'static str); 8] {
         [
             ("specular_model", self.specular_model.name()),
+            ("split_sum", self.split_sum.name()),
             ("specular_visibility", self.specular_visibility.name()),
             ("lobe_lookup", self.lobe_lookup.name()),
             ("specular_map", self.specular_map.name()),
             ("visibility", self.visibility.name()),
             ("bounces", self.bounces.name()),
+            ("skin_reflection", self.skin_reflection.name()),
         ]
     }
 
@@ -227,10 +287,12 @@ impl Choices {
         Some(match condition {
             "kelemen" => self.specular_model == SpecularModel::Kelemen,
             "ggx" => self.specular_model == SpecularModel::Ggx,
+            "exact_split_sum" => self.split_sum == SplitSum::Exact,
             "unoccluded_lobe" => visibility(SpecularVisibility::None),
             "lagarde_visibility" => visibility(SpecularVisibility::Lagarde),
             "cone_visibility" => visibility(SpecularVisibility::Cone),
-            "lobe_visibility" => visibility(SpecularVisibility::Lobe),
+            // With light by rays too a rasteriser wants the share, which has no rays for either.
+            "lobe_visibility" => visibility(SpecularVisibility::Lobe) || visibility(SpecularVisibility::Rays),
             "off_peak" => self.lobe_lookup == LobeLookup::OffPeak,
             "f0_map" => self.specular_map == SpecularMap::F0,
             "polynomial_bounces" => self.bounces == Bounces::Polynomial,
@@ -241,9 +303,10 @@ impl Choices {
     }
 
     /// The conditions that [`Self::holds`] knows.
-    pub const CONDITIONS: [&'static str; 11] = [
+    pub const CONDITIONS: [&'static str; 12] = [
         "kelemen",
         "ggx",
+        "exact_split_sum",
         "unoccluded_lobe",
         "lagarde_visibility",
         "cone_visibility",

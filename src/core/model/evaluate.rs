@@ -1,7 +1,8 @@
 //! What is evaluated.
 
 use super::choices::{
-    Bounces, Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility, Visibility,
+    Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
+    Visibility,
 };
 use super::dapple::Dapple;
 use super::effects::{Effect, Effects, Form, Lookups, Silhouette};
@@ -40,12 +41,15 @@ impl Setup {
             interpolated_rim: false,
             choices: Choices {
                 specular_model: SpecularModel::Kelemen,
+                split_sum: SplitSum::Schlick,
                 specular_visibility: SpecularVisibility::Lagarde,
                 lobe_lookup: LobeLookup::Mirror,
                 specular_map: SpecularMap::Weight,
                 visibility: Visibility::Sh4,
                 bounces: Bounces::Gathered,
+                skin_reflection: SkinReflection::Gathered,
                 glossy: false,
+                turning: false,
             },
         }
     }

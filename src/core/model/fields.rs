@@ -1,7 +1,7 @@
 //! Fields: numbers beside position, frame and maps that rules read by name.
 //!
-//! Those of vertices are interpolated where a fragment, a stored sample or a texel reads them; those of samples are found at
-//! each stored sample or texel by itself, as what reaches it of a light. Rows are added by files of rules.
+//! Those of vertices are interpolated where a fragment, a stored sample or a texel reads them; those of samples are
+//! found at each stored sample or texel by itself, as what reaches it of a light. Rows are added by files of rules.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -146,6 +146,12 @@ impl Fields {
     /// Each of them.
     pub fn iter(self) -> impl Iterator<Item = Field> {
         self.0.iter().copied()
+    }
+
+    /// The field of that name, where it is one of them.
+    #[must_use]
+    pub fn named(self, name: &str) -> Option<Field> {
+        Field::from_name(name).filter(|field| self.0.contains(field))
     }
 
     /// How many numbers they have altogether.

@@ -1,14 +1,15 @@
 //! What the rules of the skin model are about: parameters, effects, terms, the numbers of a fragment and of a vertex, and
 //! the kinds of numbers that they are computed in. The formulas themselves are the rules' (`shader/rules`).
 //!
-//! - [`params`]: the one table of parameters
-//! - [`readings`]: how the paper is read; [`effects`]: what can be switched on, and what each effect asks for; [`terms`]: parts of the sum
+//! - [`params`]: the one table of parameters; `columns`: which of their channels are free together
+//! - [`readings`]: how the paper is read; [`effects`]: what can be switched on, and what each effect asks for;
+//!   [`terms`]: parts of the sum
 //! - [`choices`]: which way is taken where there are several
 //! - [`fields`]: numbers of vertices that rules read by name
 //! - [`registry`]: how tables of parameters, effects, terms and fields grow
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands;
 //!   [`bearing`]: directions as angles; [`mod@turn`]: how the environment is turned
-//! - [`shadow_filter`]: how a renderer finds shadows
+//! - [`shadow_filter`]: how a renderer finds shadows; [`texture_filter`]: how texture maps are filtered
 //! - [`fragment`]: a fragment as samples hold it
 //! - [`vertex`]: morphing, skinning and the frame of a vertex, of which meshes are posed
 //! - [`cube`]: cube maps and their seamless bilinear lookup
@@ -18,6 +19,7 @@
 pub mod batch;
 pub mod bearing;
 pub mod choices;
+mod columns;
 pub mod cube;
 pub mod dapple;
 pub mod effects;
@@ -32,6 +34,7 @@ pub mod real;
 pub mod registry;
 pub mod shadow_filter;
 pub mod terms;
+pub mod texture_filter;
 pub mod turn;
 pub mod vector;
 pub mod vertex;

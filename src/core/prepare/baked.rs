@@ -76,7 +76,8 @@ impl Baked {
     /// What is baked of the surface, for samples of it.
     #[must_use]
     pub fn surface_bakes(&self) -> SurfaceBakes<'_> {
-        SurfaceBakes { occlusion: self.occlusion.as_deref(), sky: self.sky.as_deref(), gather: None }
+        let (occlusion, sky) = (self.occlusion.as_deref(), self.sky.as_deref());
+        SurfaceBakes { occlusion, sky, ..SurfaceBakes::default() }
     }
 
     /// Trace the visible surface of each view.

@@ -14,9 +14,10 @@ fn is_of_scene(effect: Effect) -> bool {
     OF_SCENE.contains(&effect) || effect.info().within.is_some_and(is_of_scene)
 }
 
-/// Have `scenes` share one skin: form, silhouette, lookups, named choices, loss, the skin's effects and what is free of its parameters
-/// have to be the same in all of them. Free parameters of the skin then start everywhere as in the first scene; those that
-/// are held have to stand at one value. Meshes, maps, views, poses, lights and their parameters are each scene's own.
+/// Have `scenes` share one skin: form, silhouette, lookups, named choices, loss, the skin's effects and what is free
+/// of its parameters have to be the same in all of them. Free parameters of the skin then start everywhere as in the
+/// first scene; those that are held have to stand at one value. Meshes, maps, views, poses, lights and their
+/// parameters are each scene's own.
 ///
 /// # Errors
 /// [`PrepareError::NotOneSkin`], with the first thing that differs.

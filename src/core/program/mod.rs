@@ -13,7 +13,7 @@
 //! - [`levels`]: passes over stored texels, as graphs
 //! - [`cut`]: what stays from pass to pass
 //! - [`steps`]: a graph evaluated node by node, in any kind of number
-//! - [`tape`]: instructions over registers, which `writer` finds
+//! - [`tape`]: instructions over registers, which `writer` finds; `order`: so that few of them are in use at once
 //! - [`evaluate`]: a tape run for one sample; [`mod@print`]: a tape as Rust
 
 pub mod cut;
@@ -23,6 +23,7 @@ pub mod graph;
 pub mod levels;
 pub mod lower;
 pub mod native;
+mod order;
 pub mod print;
 pub mod shading;
 pub mod steps;

@@ -251,6 +251,7 @@ fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
     let _ = writeln!(wgsl, "}}\n\nfn {ENTRY}(at: Sample) -> Shaded {{");
     wgsl.push_str(&stored(&plan.levels));
     wgsl.push_str(&plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
+    wgsl.push_str(&chain.shared);
     chain.lines.iter().for_each(|lines| wgsl.push_str(lines));
     let values: Vec<&str> = members.iter().map(|(_, _, value)| value.as_str()).collect();
     let _ = write!(wgsl, "    return Shaded({});\n}}\n", values.join(", "));

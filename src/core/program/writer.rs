@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 
 use super::graph::{Binary, Call, Graph, Id, Native, Node, Unary};
+use super::order::Dependencies;
 use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
 
 /// Instructions over nodes, whose registers are not yet known.
@@ -59,7 +60,19 @@ impl Tape {
     /// The instructions that compute `outputs`.
     #[must_use]
     pub fn new(graph: &Graph, outputs: &[Id]) -> Self {
-        Writer::new(graph, outputs).tape(outputs)
+        let mut writer = Writer::new(graph, outputs);
+        writer.write(outputs);
+        writer.finish(outputs)
+    }
+
+    /// The same in an order in which few numbers wait at once, where many would: so that a compiler finds registers for
+    /// most of them. A machine with an accumulator has none to find, and prefers the order of [`Self::new`].
+    #[must_use]
+    pub fn with_few_registers(graph: &Graph, outputs: &[Id]) -> Self {
+        let mut writer = Writer::new(graph, outputs);
+        writer.write(outputs);
+        writer.drafts = in_order(writer.drafts, outputs);
+        writer.finish(outputs)
     }
 }
 
@@ -97,7 +110,7 @@ impl<'a> Writer<'a> {
         }
     }
 
-    fn tape(mut self, outputs: &[Id]) -> Tape {
+    fn write(&mut self, outputs: &[Id]) {
         // Where lookups fall comes first, and powers: what they wait for hides behind the texels.
         let hot: Vec<Id> = (0..self.graph.len()).filter(|&at| self.hot[at]).map(|at| Id(at as u32)).collect();
         for &id in &hot {
@@ -114,7 +127,6 @@ impl<'a> Writer<'a> {
             }
         }
         outputs.iter().for_each(|&id| self.want(id));
-        self.finish(outputs)
     }
 
     /// A product that nothing else needs.
@@ -332,6 +344,62 @@ impl<'a> Writer<'a> {
             self.uniforms.len() - 1
         }))
     }
+}
+
+/// Numbers that may wait in the order of outputs: twice as many as processors have registers of 512 bits.
+const FEW: usize = 64;
+
+/// Instructions in an order in which few registers are in use, where many would be.
+fn in_order(drafts: Vec<Draft>, outputs: &[Id]) -> Vec<Draft> {
+    // A unit vector and what stands in for it stay together.
+    let mut blocks: Vec<Vec<Draft>> = Vec::new();
+    let mut drafts = drafts.into_iter();
+    while let Some(draft) = drafts.next() {
+        let more = if let Kind::Call { skip, .. } = draft.kind { skip.unwrap_or(0) } else { 0 };
+        blocks.push(std::iter::once(draft).chain(drafts.by_ref().take(more)).collect());
+    }
+    let steps = steps(&blocks, outputs);
+    let as_they_stand: Vec<usize> = (0..blocks.len()).collect();
+    let order = if steps.pressure(&as_they_stand) > FEW { steps.ordered() } else { as_they_stand };
+    let mut blocks: Vec<Option<Vec<Draft>>> = blocks.into_iter().map(Some).collect();
+    order.into_iter().filter_map(|block| blocks[block].take()).flatten().collect()
+}
+
+/// What blocks of instructions read and write for others.
+fn steps(blocks: &[Vec<Draft>], outputs: &[Id]) -> Dependencies {
+    let written =
+        blocks.iter().enumerate().flat_map(|(at, block)| block[0].writes.iter().map(move |&o| (o, at)));
+    let writer: HashMap<Operand, usize> = written.collect();
+    let mut numbers: HashMap<Operand, usize> = HashMap::new();
+    let mut steps = Dependencies { after: vec![Vec::new(); blocks.len()], ..Dependencies::default() };
+    for (at, block) in blocks.iter().enumerate() {
+        let own: Vec<Operand> = block.iter().flat_map(|draft| &draft.writes).copied().collect();
+        let mut reads: Vec<usize> = Vec::new();
+        for operand in block.iter().flat_map(|draft| &draft.reads).filter(|operand| !own.contains(operand)) {
+            // What is the same for all samples has no register.
+            if writer.contains_key(operand) {
+                let next = numbers.len();
+                reads.push(*numbers.entry(*operand).or_insert(next));
+            }
+        }
+        reads.sort_unstable();
+        reads.dedup();
+        steps.reads.push(reads);
+        // What is written where it stands in, too, is written for all afterwards.
+        for operand in &own[block[0].writes.len()..] {
+            if let Some(&later) = writer.get(operand).filter(|&&later| later != at) {
+                steps.after[later].push(at);
+            }
+        }
+    }
+    let wanted = outputs.iter().map(|&id| Operand::Of(id)).filter(|operand| writer.contains_key(operand));
+    for operand in wanted {
+        let next = numbers.len();
+        steps.outputs.push(*numbers.entry(operand).or_insert(next));
+    }
+    let known = |operand: &Operand| numbers.get(operand).copied();
+    steps.writes = blocks.iter().map(|block| block[0].writes.iter().filter_map(known).collect()).collect();
+    steps
 }
 
 /// The nodes that every sample needs: fallbacks are not, nor what only they are made of.

@@ -170,7 +170,7 @@ pub fn encode_png(width: usize, height: usize, bytes: &[u8]) -> Result<Vec<u8>, 
         return Err(format!("{width} x {height} pixels cannot be made of {} bytes", bytes.len()));
     }
     let mut png = Vec::new();
-    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive)
+    PngEncoder::new_with_quality(&mut png, CompressionType::Fast, FilterType::Adaptive)
         .write_image(bytes, side(width)?, side(height)?, image::ExtendedColorType::Rgb8)
         .map_err(|e| e.to_string())?;
     Ok(png)

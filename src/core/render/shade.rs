@@ -73,7 +73,8 @@ impl Shader {
         })
     }
 
-    /// The image of a view, times `gain`; what is computed in texels is black where the samples have none. All cores; the same for any number of threads.
+    /// The image of a view, times `gain`; what is computed in texels is black where the samples have none. All cores;
+    /// the same for any number of threads.
     #[must_use]
     pub fn shade(&self, samples: &ViewSamples, camera: &Camera, gain: f64) -> Shaded {
         let (width, height) = (camera.width as usize, camera.height as usize);

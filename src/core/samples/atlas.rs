@@ -10,6 +10,7 @@ use glam::{DVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::LANES;
+use super::footprint::{Footprint, filtered};
 use super::posed::PosedSurface;
 use super::rows::Rows;
 use super::trace::Hit;
@@ -19,8 +20,9 @@ use crate::program::graph::Input;
 use crate::program::levels::texel_inputs;
 use crate::program::lower::{STEP_ALONG_U, STEP_ALONG_V};
 use crate::program::shading::ShadingError;
-use crate::scene::maps::Maps;
+use crate::scene::maps::{Map, Maps};
 use crate::scene::mesh::{PosedMesh, tile_outside_atlas};
+use crate::scene::mip_maps::MipMaps;
 use crate::shader::Facts;
 use crate::shader::facts::FaceSizes;
 
@@ -72,7 +74,8 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// The texels of a mesh as it is posed, `size` a side, with what the effects of `setup` read. All cores; the same for any number of threads.
+    /// The texels of a mesh as it is posed, `size` a side, with what the effects of `setup` read. All cores; the same
+    /// for any number of threads.
     ///
     /// # Errors
     /// When the mesh has no texture coordinates, or does not lie in the unit square; or the effects cannot be computed.
@@ -83,7 +86,8 @@ impl Atlas {
         let inputs = texel_inputs(&Facts::of_samples(*setup, any, true))?;
         let find = |field, hit, numbers: &mut [f32]| posed.field(field, hit, numbers);
         let (mesh, occlusion) = (posed.mesh, posed.open.as_deref());
-        let mesh = Textured { posed: mesh, occlusion, maps, find: &find, size: f64::from(size) };
+        let mip_maps = posed.mip_maps.as_deref();
+        let mesh = Textured { posed: mesh, occlusion, maps, mip_maps, find: &find, size: f64::from(size) };
         let fields = inputs.iter().map(Field::of).collect::<Result<Vec<_>, _>>()?;
         let triangles = cover(&mesh, size);
         let texels: Vec<u32> = (0..size * size).filter(|&texel| triangles[texel as usize] != EMPTY).collect();
@@ -171,6 +175,8 @@ struct Textured<'a> {
     posed: &'a PosedMesh,
     occlusion: Option<&'a [f32]>,
     maps: &'a Maps,
+    /// Their coarser levels, where they are filtered over a texel.
+    mip_maps: Option<&'a MipMaps>,
     /// What finds a field of samples at a point of the mesh.
     find: &'a (dyn Fn(fields::Field, Hit, &mut [f32]) + Sync),
     size: f64,
@@ -186,6 +192,21 @@ struct Triangle {
 }
 
 impl Textured<'_> {
+    /// A map at texture coordinates, over a texel of the atlas; `neutral` where there is none.
+    fn map<const C: usize>(
+        &self,
+        pick: impl Fn(&Maps) -> Option<&Map<C>>,
+        neutral: [f32; C],
+        uv: Vec2,
+    ) -> [f32; C] {
+        let Some(map) = pick(self.maps) else { return neutral };
+        let step = 1.0 / self.size;
+        match self.mip_maps {
+            Some(mip_maps) => filtered(map, mip_maps, pick, uv, &Footprint::new([step, 0.0], [0.0, step])),
+            None => map.sample(uv.x, uv.y),
+        }
+    }
+
     fn triangle(&self, index: u32) -> Triangle {
         let mut vertices = self.posed.triangles[index as usize].map(|i| i as usize);
         let corner = |i: usize| self.size * self.posed.uvs[i].as_dvec2();
@@ -317,22 +338,16 @@ impl Field {
     }
 
     fn value(&self, mesh: &Textured<'_>, triangle: &Triangle, weights: [f64; 3]) -> f32 {
-        let map = |sampled: &dyn Fn(Vec2) -> f32| {
-            let uv: DVec2 =
-                (0..3).map(|i| weights[i] * mesh.posed.uvs[triangle.vertices[i]].as_dvec2()).sum();
-            sampled(uv.as_vec2())
+        let uv = || {
+            let corner = |i: usize| weights[i] * mesh.posed.uvs[triangle.vertices[i]].as_dvec2();
+            (0..3).map(corner).sum::<DVec2>().as_vec2()
         };
-        let Maps { color, normal, specular, attenuator } = mesh.maps;
         let c = self.component;
         match self.of {
-            Quantity::Color => map(&|uv| color.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[c])),
-            Quantity::Specular => map(&|uv| specular.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0])),
-            Quantity::Attenuator => {
-                map(&|uv| attenuator.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]))
-            }
-            Quantity::NormalMap => {
-                map(&|uv| normal.as_ref().map_or([0.5, 0.5, 1.0], |map| map.sample(uv.x, uv.y))[c])
-            }
+            Quantity::Color => mesh.map(|maps| maps.color.as_ref(), [1.0; 3], uv())[c],
+            Quantity::Specular => mesh.map(|maps| maps.specular.as_ref(), [1.0], uv())[0],
+            Quantity::Attenuator => mesh.map(|maps| maps.attenuator.as_ref(), [1.0], uv())[0],
+            Quantity::NormalMap => mesh.map(|maps| maps.normal.as_ref(), [0.5, 0.5, 1.0], uv())[c],
             Quantity::Found(field) => {
                 let mut numbers = [0.0; fields::MOST_NUMBERS];
                 (mesh.find)(field, triangle.hit(weights), &mut numbers[..field.info().numbers]);
@@ -371,6 +386,7 @@ impl Field {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::texture_filter::TextureFilter;
 
     fn mesh(uvs: &[[f32; 2]], triangles: &[[u32; 3]]) -> Textured<'static> {
         let posed = PosedMesh {
@@ -381,7 +397,7 @@ mod tests {
         };
         let maps = Box::leak(Box::<Maps>::default());
         let find = &|field: fields::Field, _, numbers: &mut [f32]| numbers.fill(field.info().neutral);
-        Textured { posed: Box::leak(Box::new(posed)), occlusion: None, maps, find, size: 8.0 }
+        Textured { posed: Box::leak(Box::new(posed)), occlusion: None, maps, mip_maps: None, find, size: 8.0 }
     }
 
     #[test]
@@ -417,6 +433,26 @@ mod tests {
         assert_eq!(value("vertex_occlusion", 0), 1.0);
         let error = Field::of(&input("dpdx_albedo", 0)).err().unwrap();
         assert_eq!(error, AtlasError::NotStored { quantity: "albedo".to_owned() });
+    }
+
+    #[test]
+    fn maps_are_read_over_a_texel_where_they_are_filtered() {
+        // Checks of a texel, 64 texels a side, of which one of the atlas covers eight.
+        let check = |i: usize| [((i % 64 + i / 64) % 2) as f32];
+        let specular = Some(Map { width: 64, height: 64, texels: (0..64 * 64).map(check).collect() });
+        let maps = Maps { specular, ..Maps::default() };
+        let value = |mip_maps: Option<&MipMaps>| {
+            let bare = mesh(&[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]], &[[0, 1, 2]]);
+            let mesh = Textured { maps: &maps, mip_maps, ..bare };
+            let field = Field::of(&Input { name: "specular".to_owned(), component: 0 }).unwrap();
+            let triangle = mesh.triangle(0);
+            // At the centre of a texel of the map.
+            field.value(&mesh, &triangle, triangle.weights(DVec2::splat(2.5 + 1.0 / 16.0)))
+        };
+        assert_eq!(value(None), 0.0);
+        for filter in [TextureFilter::Trilinear, TextureFilter::Anisotropic] {
+            assert_eq!(value(MipMaps::new(&maps, filter).as_ref()), 0.5);
+        }
     }
 
     #[test]

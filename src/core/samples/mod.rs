@@ -9,7 +9,9 @@
 //! - `trace`: primary rays, and what they hit
 //! - `posed`: the mesh in a pose with what is baked of it; `supply`: what finds fields of samples, `lit`: what reaches
 //!   them of lights, `bounced`: what the skin throws back of these, `sky`: what they see of the sky, `sky_rays`: by
-//!   rays; `surface`: frames, silhouette and maps at a hit; `lobe`: how much of a specular lobe is open there
+//!   rays; `lit_mesh`: the mesh as a source of light, `skin`: what it sees of itself; `surface`: frames, silhouette and
+//!   maps at a hit; `footprint`: how much of a map a sample covers; `lobe`: rays into a specular lobe there,
+//!   `lobe_light`: the light that they bring
 //! - `group`: samples packed into groups
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
@@ -21,11 +23,15 @@
 pub mod atlas;
 mod bounced;
 pub mod covered;
+mod footprint;
 mod group;
 mod lit;
+mod lit_mesh;
 mod lobe;
+mod lobe_light;
 mod posed;
 pub mod rows;
+mod skin;
 mod sky;
 mod sky_rays;
 mod supply;
@@ -285,7 +291,7 @@ pub fn atlas_of(scene: &Scene, posed: &PosedSurface<'_>) -> Result<Option<Arc<At
 pub fn sample_view(scene: &Scene, posed: &PosedSurface<'_>, camera: &Camera) -> ViewSamples {
     let n = scene.quality.samples_per_axis.max(1);
     let hits = trace::trace(posed.rays, posed.mesh, camera, n);
-    let surface = surface::Surface::new(scene, posed, camera.eye());
+    let surface = surface::Surface::new(scene, posed, camera);
     group::pack(&hits, &surface, camera.width, n * n)
 }
 

@@ -1,16 +1,25 @@
 //! A scene's mesh in one pose with all that its samples and texels are made of.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
+use super::lobe::Lobes;
+use super::lobe_light::LobeLight;
+use super::skin::Skin;
+use super::sky::Sky;
 use super::supply::Supplies;
 use super::trace::Hit;
 use super::{SampleError, bounced, lit, posed_occlusion, sky};
 use crate::bake::interreflection::VertexGather;
+use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
+use crate::bake::sky::{SKIN_SEEN, sees_skin, traces_lobes};
 use crate::bake::{Bake, SkyBake, VertexOcclusion};
 use crate::model::fields::{Field, FieldInfo, Fields};
 use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
+use crate::scene::mip_maps::MipMaps;
 
 /// What is baked of a scene's surface.
 #[derive(Clone, Copy, Debug, Default)]
@@ -21,11 +30,15 @@ pub struct SurfaceBakes<'a> {
     pub sky: Option<&'a SkyBake>,
     /// What its vertices gather of one another ([`super::gather_of`]), where it is known already.
     pub gather: Option<&'a VertexGather>,
+    /// The environment as specular lobes see it by rays, where it is known already.
+    pub lobe_sky: Option<&'a Arc<LobeSky>>,
+    /// The coarser levels of the scene's maps, where they are known already.
+    pub mip_maps: Option<&'a Arc<MipMaps>>,
 }
 
 impl<'a> From<&'a Bake> for SurfaceBakes<'a> {
     fn from(bake: &'a Bake) -> Self {
-        Self { occlusion: bake.occlusion.as_ref(), sky: bake.sky.as_ref(), gather: None }
+        Self { occlusion: bake.occlusion.as_ref(), sky: bake.sky.as_ref(), ..Self::default() }
     }
 }
 
@@ -35,7 +48,11 @@ pub struct PosedSurface<'a> {
     pub(super) rays: &'a RayMesh,
     /// Open share of each vertex' hemisphere.
     pub(super) open: Option<Vec<f32>>,
+    /// The coarser levels of the scene's maps, where its filter reads them.
+    pub(super) mip_maps: Option<Arc<MipMaps>>,
     supplies: Supplies<'a>,
+    /// What rays into specular lobes find, where that is asked for.
+    pub(super) lobes: Option<Lobes<'a>>,
 }
 
 /// Each vertex as a point of a triangle; none of one that is of no triangle.
@@ -62,7 +79,10 @@ impl<'a> PosedSurface<'a> {
         bakes: SurfaceBakes<'a>,
     ) -> Result<Self, SampleError> {
         let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
-        Ok(Self { open, ..Self::with_fields(scene, mesh, rays, morphs, bakes, scene.needs().fields)? })
+        let made = || MipMaps::new(&scene.maps, scene.quality.texture_filter).map(Arc::new);
+        let mip_maps = bakes.mip_maps.cloned().or_else(made);
+        let fields = scene.needs().fields;
+        Ok(Self { open, mip_maps, ..Self::with_fields(scene, mesh, rays, morphs, bakes, fields)? })
     }
 
     /// The mesh of `scene` as it is posed with what finds `fields` at its points, and no open shares.
@@ -78,17 +98,29 @@ impl<'a> PosedSurface<'a> {
         fields: Fields,
     ) -> Result<Self, SampleError> {
         let mut supplies = lit::supplies(scene, mesh, rays);
-        supplies.extend(bounced::supplies(scene, mesh, rays, bakes.gather, fields));
-        if let Some(sky) = bakes.sky {
-            supplies.extend(sky::supplies(scene, mesh, rays, morphs, (sky, bakes.gather), fields)?);
+        let own = if bakes.gather.is_none() { bounced::gather_for(scene, mesh, fields) } else { None };
+        let gather = bakes.gather.or(own.as_ref());
+        supplies.extend(bounced::supplies(scene, mesh, rays, gather, fields));
+        let mut lit = None;
+        if let Some(bake) = bakes.sky {
+            let sky = Sky::new(scene, mesh, morphs, bake)?;
+            supplies.extend(sky::supplies(scene, rays, &sky, (bake, gather), fields));
+            let gather = gather.filter(|_| sees_skin(scene, fields));
+            let skin = gather.map(|gather| Skin::new(scene, mesh, rays, &sky, gather));
+            let seen = fields.named(SKIN_SEEN).zip(skin.as_ref());
+            supplies.extend(seen.map(|(field, skin)| (field, skin.seen())));
+            lit = skin.filter(|_| traces_lobes(scene, fields) && scene.reflects_skin()).map(|s| s.lit());
         }
-        Ok(Self { supplies, ..Self::bare(mesh, rays, None) })
+        let sky = || bakes.lobe_sky.cloned().or_else(|| LobeSky::of_scene(scene).map(Arc::new));
+        let light = LobeLight::new(scene, fields, sky, lit);
+        let lobes = Lobes::new(scene, mesh, rays, light, fields);
+        Ok(Self { supplies, lobes, ..Self::bare(mesh, rays, None) })
     }
 
     /// A mesh with the open share of each vertex' hemisphere, and nothing else.
     #[must_use]
     pub const fn bare(mesh: &'a PosedMesh, rays: &'a RayMesh, open: Option<Vec<f32>>) -> Self {
-        Self { mesh, rays, open, supplies: Vec::new() }
+        Self { mesh, rays, open, mip_maps: None, supplies: Vec::new(), lobes: None }
     }
 
     /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what

@@ -5,7 +5,7 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::SampleError;
-use super::bounced::new_gather;
+use super::lit_mesh::LitMesh;
 use super::sky_rays::ByRays;
 use super::supply::{Supplies, Supply};
 use super::trace::Hit;
@@ -15,12 +15,12 @@ use crate::bake::harmonics::{CONSTANT, Order, basis, open_transfer_at};
 use crate::bake::interreflection::{Albedo, VertexGather};
 use crate::bake::panorama::Radiance;
 use crate::bake::rays::RayMesh;
-use crate::bake::shadowed::{arriving, share_of_open};
-use crate::bake::sky::{BENT_NORMAL, SKY_RATIO};
+use crate::bake::shadowed::{Turning, arriving, shadow_ratio, share_of_open, thrown_ratio, thrown_share};
+use crate::bake::sky::{BENT_NORMAL, SKY_RATIO, SKY_TURNS};
 use crate::bake::transfer::TransferSet;
 use crate::bake::{SkyBake, SkyLight};
 use crate::model::choices::{Bounces, Visibility};
-use crate::model::fields::{Field, Fields};
+use crate::model::fields::Fields;
 use crate::model::params::Param;
 use crate::scene::Scene;
 use crate::scene::maps::Environment;
@@ -51,46 +51,51 @@ pub(super) struct Sky<'a> {
     set: TransferSet,
     rest: Coefficients,
     whole: Coefficients,
+    /// How far both are turned about +Y, radians.
+    turn: f64,
 }
 
-/// What finds those of `fields` that are of the sky; `morphs` are the targets of `scene` at their weights.
-///
-/// # Errors
-/// When the transfer is that of another mesh.
+/// What finds those of `fields` that are of the sky.
 pub(super) fn supplies<'a>(
     scene: &'a Scene,
-    mesh: &'a PosedMesh,
     rays: &'a RayMesh,
-    morphs: &[Morph],
+    sky: &Sky<'a>,
     (bake, gather): (&'a SkyBake, Option<&VertexGather>),
     fields: Fields,
-) -> Result<Supplies<'a>, SampleError> {
-    let asked = |name| Field::from_name(name).filter(|field| fields.iter().any(|of| of == *field));
+) -> Supplies<'a> {
+    let asked = |name| fields.named(name);
     let [ratio, bent] = [SKY_RATIO, BENT_NORMAL].map(asked);
-    if ratio.is_none() && bent.is_none() {
-        return Ok(Vec::new());
-    }
-    let sky = Sky::new(scene, mesh, morphs, bake)?;
     let of_vertices = |numbers: Vec<[f32; 3]>| -> Box<dyn Supply + 'a> {
-        Box::new(OfVertices { triangles: &mesh.triangles, numbers })
+        Box::new(OfVertices { triangles: &sky.mesh.triangles, numbers })
     };
     let mut supplies: Supplies<'a> = Vec::new();
     if let Some(field) = bent {
         supplies.push((field, of_vertices(sky.each(|vertex| sky.bent_normal(vertex).to_array()))));
     }
+    let [cosine, sine] = SKY_TURNS.map(asked);
+    let (sin, cos) = sky.turn.sin_cos();
+    for (field, factor) in [(cosine, -sin), (sine, cos)] {
+        let turning =
+            |vertex| sky.slope(scene.choices.visibility, vertex).map(|slope| (factor * slope) as f32);
+        supplies.extend(field.map(|field| (field, of_vertices(sky.each(turning)))));
+    }
     if let (Some(field), Some(light)) = (ratio, &bake.light) {
-        let by_rays = light.panorama.as_ref().map(|panorama| sky.by_rays(scene, rays, gather, panorama));
         let visibility = scene.choices.visibility;
+        let by_rays = light.panorama.as_ref().map(|panorama| sky.by_rays(scene, rays, gather, panorama));
         supplies.push(match by_rays {
             Some(by_rays) => (field, Box::new(by_rays)),
             None => (field, of_vertices(sky.each(|vertex| sky.ratio(visibility, vertex)))),
         });
     }
-    Ok(supplies)
+    supplies
 }
 
 impl<'a> Sky<'a> {
-    fn new(
+    /// As a scene's mesh is posed; `morphs` are its targets at their weights.
+    ///
+    /// # Errors
+    /// When the transfer is that of another mesh.
+    pub(super) fn new(
         scene: &Scene,
         mesh: &'a PosedMesh,
         morphs: &[Morph],
@@ -112,17 +117,30 @@ impl<'a> Sky<'a> {
         let light = |of: fn(&SkyLight) -> &Coefficients| {
             bake.light.as_ref().map_or_else(dark, |l| of(l).turned(turn))
         };
-        Ok(Self { mesh, order, set, rest: light(|light| &light.rest), whole: light(|light| &light.whole) })
+        Ok(Self {
+            mesh,
+            order,
+            set,
+            rest: light(|light| &light.rest),
+            whole: light(|light| &light.whole),
+            turn,
+        })
     }
 
     /// What `of` finds at each vertex. All cores.
-    fn each(&self, of: impl Fn(usize) -> [f32; 3] + Send + Sync) -> Vec<[f32; 3]> {
+    pub(super) fn each(&self, of: impl Fn(usize) -> [f32; 3] + Send + Sync) -> Vec<[f32; 3]> {
         (0..self.mesh.positions.len()).into_par_iter().map(of).collect()
     }
 
     fn direct(&self, vertex: usize) -> &[f32] {
         let functions = self.order.functions();
         &self.set.direct[vertex * functions..][..functions]
+    }
+
+    /// What arrives at a vertex straight from the environment without its lights, over pi, rgb; below 0 where its
+    /// harmonics ring.
+    pub(super) fn light(&self, vertex: usize) -> [f64; 3] {
+        arriving(self.direct(vertex), &self.rest)
     }
 
     /// The mean direction of the open sky, as long as its share of the hemisphere; 0 where nothing is open.
@@ -150,7 +168,7 @@ impl<'a> Sky<'a> {
         if visibility == Visibility::Scalar {
             // Whatever light comes from there, and so also where its harmonics ring.
             let open = f64::from(transfer[0]) / CONSTANT;
-            let thrown = share_of_open(thrown, lit, mean);
+            let thrown = thrown_share(thrown, lit, mean);
             return [0, 1, 2].map(|c| if mean[c] > 0.0 { (open + thrown[c]) as f32 } else { 0.0 });
         }
         let shadowed = match visibility {
@@ -159,6 +177,25 @@ impl<'a> Sky<'a> {
         };
         let arrived = [0, 1, 2].map(|c| shadowed[c] + thrown[c]);
         share_of_open(arrived, lit, mean).map(|share| share as f32)
+    }
+
+    /// How fast that moves as the environment turns, a radian; 0 where it is at 0.
+    fn slope(&self, visibility: Visibility, vertex: usize) -> [f64; 3] {
+        let functions = self.order.functions();
+        let bounced = self.set.bounced.get(vertex * functions..(vertex + 1) * functions);
+        let thrown = bounced.map(|bounced| Turning::of(bounced, &self.whole)).unwrap_or_default();
+        let order = if visibility.bands().is_some() { self.order } else { Order::MOST };
+        let open = Turning::of(&open_transfer_at(order, self.mesh.normals[vertex]), &self.rest);
+        let mean = self.rest.mean();
+        let arriving = match visibility {
+            // The open share itself stays.
+            Visibility::Scalar => return thrown_ratio(&thrown, &open, mean, 0.0).slope,
+            Visibility::Cone => {
+                thrown.with(&self.cone(vertex).map_or(open, |cone| Turning::of(&cone, &self.rest)))
+            }
+            _ => thrown.with(&Turning::of(self.direct(vertex), &self.rest)),
+        };
+        shadow_ratio(&arriving, &open, mean, 0.0).slope
     }
 
     /// The same by rays from each sample; `panorama` is the environment without its lights.
@@ -170,29 +207,29 @@ impl<'a> Sky<'a> {
         panorama: &'a Environment,
     ) -> ByRays<'a> {
         let (mesh, albedo) = (self.mesh, Albedo { map: scene.maps.color.as_ref() });
-        let light = if scene.choices.bounces == Bounces::Gathered {
-            let lit = |vertex| arriving(self.direct(vertex), &self.whole).map(|light| light.max(0.0) as f32);
-            gather.map_or_else(|| new_gather(scene, mesh).lit(lit), |gather| gather.lit(lit))
-        } else {
-            Vec::new()
-        };
+        let lit = |vertex| arriving(self.direct(vertex), &self.whole).map(|light| light.max(0.0) as f32);
+        let light = gather.filter(|_| scene.choices.bounces == Bounces::Gathered);
+        let light = light.map_or_else(Vec::new, |gather| gather.lit(lit));
         let turn = panorama.rotation_degrees + scene.params.scalar(Param::EnvironmentRotation);
         ByRays {
-            mesh,
             rays,
             shadows: Shadows::new(mesh, rays, scene.quality.sky_rays),
             radiance: Radiance::turned(panorama, turn),
             mean: self.rest.mean(),
-            albedo,
-            light,
+            skin: LitMesh { mesh, albedo, light },
         }
     }
 
     /// What arrives through a cone about the bent normal that is as open as the vertex; `lit` where it is open.
     fn through_cone(&self, vertex: usize, lit: [f64; 3]) -> [f64; 3] {
+        self.cone(vertex).map_or(lit, |cone| arriving(&cone, &self.rest))
+    }
+
+    /// What each function of the environment brings through that cone; none where the vertex is open.
+    fn cone(&self, vertex: usize) -> Option<Vec<f64>> {
         let share = self.direct(vertex)[0];
         if share >= CONSTANT as f32 {
-            return lit;
+            return None;
         }
         let bent = self.bent_normal(vertex);
         let along =
@@ -200,7 +237,7 @@ impl<'a> Sky<'a> {
         let cap = cap(1.0 - f64::from(share) / CONSTANT);
         let mut through = basis(Order::MOST, along.to_array().map(f64::from));
         through.iter_mut().zip(Order::MOST.of_each()).for_each(|(value, (l, _))| *value *= cap[l]);
-        arriving(&through, &self.rest)
+        Some(through)
     }
 }
 

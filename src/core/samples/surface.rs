@@ -3,7 +3,7 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::lobe::Lobes;
+use super::footprint::{Footprint, Footprints, filtered};
 use super::posed::PosedSurface;
 use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
@@ -14,8 +14,9 @@ use crate::model::fragment::{Fragment, decode_normal, guarded};
 use crate::model::params::Param;
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
-use crate::scene::maps::Maps;
+use crate::scene::maps::{Map, Maps};
 use crate::scene::mesh::PosedMesh;
+use crate::scene::view::Camera;
 
 /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads its neutral
 /// value, which it does not decode.
@@ -64,12 +65,13 @@ pub(super) struct Surface<'a> {
     bitangents: Vec<Vec3>,
     /// Unit vectors from the eye to each vertex; empty where no one asks.
     views: Vec<Vec3>,
-    /// How much of specular lobes is open, where that is asked for.
-    lobes: Option<Lobes<'a>>,
+    /// How much of the maps samples cover, where these are filtered over it.
+    footprints: Option<Footprints<'a>>,
 }
 
 impl<'a> Surface<'a> {
-    pub(super) fn new(scene: &'a Scene, posed: &'a PosedSurface<'a>, eye: DVec3) -> Self {
+    pub(super) fn new(scene: &'a Scene, posed: &'a PosedSurface<'a>, camera: &Camera) -> Self {
+        let eye = camera.eye();
         let (mesh, occlusion) = (posed.mesh, posed.open.as_deref());
         let setup = scene.setup();
         let dapple = setup.dapple.turned(scene.params.scalar(Param::EnvironmentRotation)).into();
@@ -84,8 +86,9 @@ impl<'a> Surface<'a> {
         let view = |p: &Vec3| (p.as_dvec3() - eye).normalize_or_zero().as_vec3();
         let views = if per_vertex { mesh.positions.par_iter().map(view).collect() } else { Vec::new() };
         let (form, maps) = (scene.form, &scene.maps);
-        let lobes = Lobes::new(scene, mesh, posed.rays);
-        Self { posed, mesh, maps, occlusion, form, setup, dapple, eye, bitangents, views, lobes }
+        let axis = scene.quality.samples_per_axis.max(1);
+        let footprints = posed.mip_maps.is_some().then(|| Footprints::new(mesh, camera, axis));
+        Self { posed, mesh, maps, occlusion, form, setup, dapple, eye, bitangents, views, footprints }
     }
 
     /// What the effects read of each sample.
@@ -109,11 +112,13 @@ impl<'a> Surface<'a> {
         let (normal, _) = normalize_or(interpolated.to_array(), (-exact_view).to_array());
         let normal = Vec3::from(normal);
         let uv = hit.uv(self.mesh);
+        let footprint = self.footprints.as_ref().map(|footprints| footprints.at(hit));
+        let at = (uv, footprint);
         let (base, bump) = if self.bitangents.is_empty() {
             (if self.form == Form::Listing { interpolated } else { normal }, Vec3::ZERO)
         } else {
             let tangent = (0..3).map(|i| weights[i] * self.mesh.tangents[corners[i]].truncate()).sum();
-            self.bumped(uv, interpolated, tangent, vector(&self.bitangents))
+            self.bumped(at, interpolated, tangent, vector(&self.bitangents))
         };
         let corner_silhouettes = self.corner_silhouettes(corners);
         let silhouette = match self.setup.silhouette {
@@ -133,9 +138,9 @@ impl<'a> Surface<'a> {
                 Form::Corrected => dapple.max(0.0),
                 Form::Listing => dapple,
             },
-            albedo: self.maps.color.as_ref().map_or([1.0; 3], |map| map.sample(uv.x, uv.y)),
-            specular: self.maps.specular.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]),
-            attenuator: self.maps.attenuator.as_ref().map_or(1.0, |map| map.sample(uv.x, uv.y)[0]),
+            albedo: self.map(|maps| maps.color.as_ref(), [1.0; 3], at),
+            specular: self.map(|maps| maps.specular.as_ref(), [1.0], at)[0],
+            attenuator: self.map(|maps| maps.attenuator.as_ref(), [1.0], at)[0],
         };
         let dapple_normal = interpolated.to_array();
         (fragment, Unmade { dapple_normal, corner_silhouettes, corner_shares: weights, uv: uv.to_array() })
@@ -147,8 +152,8 @@ impl<'a> Surface<'a> {
 
     /// What there is of a field at `hit`.
     pub(super) fn field(&self, field: Field, hit: Hit, numbers: &mut [f32]) {
-        match self.lobes.as_ref().filter(|lobes| lobes.field == field) {
-            Some(lobes) => numbers.fill(lobes.open(hit.triangle, hit.weights(), &self.at(hit).0)),
+        match self.posed.lobes.as_ref().filter(|lobes| lobes.finds(field)) {
+            Some(lobes) => lobes.find(field, (hit.triangle, hit.weights()), &self.at(hit).0, numbers),
             None => self.posed.field(field, hit, numbers),
         }
     }
@@ -160,9 +165,23 @@ impl<'a> Surface<'a> {
         corners.map(|i| view(i).map_or(0.0, |view| silhouette(view, i)))
     }
 
+    /// A map at texture coordinates, over what a sample covers there; `neutral` where the scene has none.
+    fn map<const C: usize>(
+        &self,
+        pick: impl Fn(&Maps) -> Option<&Map<C>>,
+        neutral: [f32; C],
+        (uv, footprint): (Vec2, Option<Footprint>),
+    ) -> [f32; C] {
+        let Some(map) = pick(self.maps) else { return neutral };
+        match (&self.posed.mip_maps, footprint) {
+            (Some(mip_maps), Some(footprint)) => filtered(map, mip_maps, pick, uv, &footprint),
+            _ => map.sample(uv.x, uv.y),
+        }
+    }
+
     /// The normal map's part along N, and its part along T and B.
-    fn bumped(&self, uv: Vec2, n: Vec3, t: Vec3, b: Vec3) -> (Vec3, Vec3) {
-        let texel = self.maps.normal.as_ref().map_or([0.5, 0.5, 1.0], |map| map.sample(uv.x, uv.y));
+    fn bumped(&self, at: (Vec2, Option<Footprint>), n: Vec3, t: Vec3, b: Vec3) -> (Vec3, Vec3) {
+        let texel = self.map(|maps| maps.normal.as_ref(), [0.5, 0.5, 1.0], at);
         let [t, b, n] = [t, b, n].map(|v| v.to_array());
         let (base, bump) = decode_normal(self.form, texel, t, b, n);
         (base.into(), bump.into())

@@ -74,16 +74,18 @@ impl Seen {
 }
 
 /// Rays of a camera, as `Camera::direction` but for their length.
-struct Lens {
-    eye: DVec3,
+pub(super) struct Lens {
+    pub(super) eye: DVec3,
+    /// Unit vector along which depth is measured; every direction goes one unit along it.
+    pub(super) forward: DVec3,
     /// Direction through the image's top left corner, and its steps for a pixel right and down.
     corner: DVec3,
-    right: DVec3,
-    down: DVec3,
+    pub(super) right: DVec3,
+    pub(super) down: DVec3,
 }
 
 impl Lens {
-    fn new(camera: &Camera) -> Self {
+    pub(super) fn new(camera: &Camera) -> Self {
         let to_world = camera.world_to_camera.inverse();
         let tangent = (0.5 * camera.fov_y).tan();
         // Pixels are square: the field of view is the image's height.
@@ -92,13 +94,14 @@ impl Lens {
         let local = |x: f64, y: f64, z: f64| to_world.transform_vector3(DVec3::new(x, y, z));
         Self {
             eye: to_world.w_axis.truncate(),
+            forward: local(0.0, 0.0, -1.0),
             corner: local(-half, tangent, -1.0),
             right: local(pixel, 0.0, 0.0),
             down: local(0.0, -pixel, 0.0),
         }
     }
 
-    fn direction(&self, x: f64, y: f64) -> DVec3 {
+    pub(super) fn direction(&self, x: f64, y: f64) -> DVec3 {
         self.corner + x * self.right + y * self.down
     }
 }

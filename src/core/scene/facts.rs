@@ -29,6 +29,7 @@ impl Facts {
                 attenuator: attenuator.is_some(),
                 color_specular: same(color, specular),
                 normal_attenuator: same(normal, attenuator),
+                filter: scene.quality.texture_filter,
             },
             faces: FaceSizes::default(),
             morphs: mesh.morphs.iter().filter(|morph| morph.weight != 0.0).count() as u32,

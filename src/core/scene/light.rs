@@ -103,7 +103,7 @@ impl Light {
     }
 
     /// The light of the panorama with that number, before it is known where it stands.
-    pub(super) fn of_sky(number: u32) -> Self {
+    pub(crate) fn of_sky(number: u32) -> Self {
         let beam = Beam { direction: DVec3::NEG_Y, irradiance: [0.0; 3], angular_diameter_degrees: 0.0 };
         Self { name: format!("sky_{number}"), kind: LightKind::Directional(beam) }
     }

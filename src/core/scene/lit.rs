@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::Scene;
 use super::animation::Pose;
 use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
@@ -9,6 +10,7 @@ use super::gltf::Document;
 use super::light::{Light, LightKind};
 use super::lights;
 use super::settings::spots;
+use super::sky_lights::sky_lights;
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Param, Params};
 use crate::model::registry::leaked;
@@ -34,7 +36,7 @@ const SHADOW: &str = include_str!("../shader/rules/family/shadow.wgsl");
 ///
 /// # Errors
 /// When a file of rules has taken its names.
-fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> {
+pub(crate) fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> {
     let text = match (&light.kind, from_sky) {
         (LightKind::Directional(_), true) => [BEAM, IN_SKY, UNBOUNCED, LIT, SHADOW].concat(),
         (LightKind::Directional(_), false) => [&bounced(BEAM), IN_WORLD, LIT, SHADOW].concat(),
@@ -43,6 +45,16 @@ fn effect_of(light: &Light, from_sky: bool) -> Result<&'static Term, TermError> 
     let member = light.member();
     let stamped = stamped(&text, &member).unwrap_or(text);
     term::register_from(Origin::Library, leaked(&member), &stamped)
+}
+
+impl Light {
+    /// The effect that it is as a light of a scene's own, known to this process from then on.
+    ///
+    /// # Errors
+    /// When a file of rules, or a light of another kind, has taken its names.
+    pub fn effect(&self) -> Result<Effect, TermError> {
+        effect_of(self, false).map(|term| term.effect)
+    }
 }
 
 /// A light's rules with those of what the skin throws back of it: declarations stand before all rules.
@@ -137,6 +149,27 @@ impl Lights {
     /// Whether some of them come out of the panorama.
     pub(super) const fn are_of_sky(&self) -> bool {
         self.spots > 0
+    }
+}
+
+impl Scene {
+    /// The same scene with so many of its panorama's brightest spots as lights; fewer, where it has no more.
+    ///
+    /// # Errors
+    /// When a file of rules has taken the name of one.
+    pub fn with_spots(mut self, count: u32) -> Result<Self, TermError> {
+        let named = |light: &Light| effect_of(light, true).map(|term| term.effect);
+        for light in &self.sky_lights {
+            self.effects = self.effects.without(named(light)?);
+        }
+        let Some(environment) = &mut self.environment else { return Ok(self) };
+        environment.spots.count = count;
+        self.sky_lights = sky_lights(environment).lights_in_world(environment);
+        for light in &self.sky_lights {
+            self.effects = self.effects.with(named(light)?);
+            set(light, &mut self.params, |_| false);
+        }
+        Ok(self)
     }
 }
 

@@ -19,6 +19,7 @@ use super::sky_lights::sky_lights;
 use super::terms::terms;
 use super::view::{Background, View};
 use super::{FitSettings, Scene, images};
+use crate::model::choices::SpecularVisibility;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Needs};
 use crate::model::evaluate::Setup;
@@ -51,8 +52,8 @@ impl Scene {
     /// Read a scene file and what its effects ask for; paths in it are relative to it.
     ///
     /// Effects are those of `options`, else the file's, else [`Effects::SURFACE`] with `morph` and
-    /// `skin` where the mesh carries them, and the effects of the terms that the file names. The keys `morph_weights` and `time` ask for `morph` and
-    /// `skin` by themselves.
+    /// `skin` where the mesh carries them, and the effects of the terms that the file names. The keys `morph_weights`
+    /// and `time` ask for `morph` and `skin` by themselves.
     ///
     /// # Errors
     /// When a file is missing, damaged or does not fit the others, or a value makes no sense; what
@@ -106,6 +107,7 @@ impl Scene {
                            `normal_map` does nothing without `key_light`";
             warn(&mut warnings, &source.path, message);
         }
+        check_lobe(&source, &file, &setup, &mut warnings);
         let maps = read_maps(&source, &file, folder, needs, &mut warnings)?;
         bar.inc(1);
         let ask = Ask { clip: options.clip, ..ask(&maps, form, effects, needs, &pose) };
@@ -183,6 +185,23 @@ fn check_haze(
     let free = fit.free.iter().any(|column| column.param == Param::HazeWeight);
     if free && needs.haze && !compared {
         let message = "haze_weight is free, but no view that has a target names a `haze` to compare with";
+        warn(warnings, &source.path, message);
+    }
+}
+
+/// What the user should know where the specular lobe is to be occluded by an open share that no effect finds.
+fn check_lobe(source: &Source, file: &SceneFile, setup: &Setup, warnings: &mut Warnings) {
+    let on = |name: &str| Effect::from_name(name).is_some_and(|effect| setup.effects.has(effect));
+    let visibility = setup.choices.specular_visibility;
+    let by_share = matches!(visibility, SpecularVisibility::Lagarde | SpecularVisibility::Cone);
+    let wanted = file.model.specular_visibility.is_some() || on("directional_occlusion");
+    if on("fresnel") && by_share && wanted && !setup.effects.has(Effect::Occlusion) {
+        let message = format!(
+            "specular_visibility = \"{}\" in [model] goes by the open share that the effect `occlusion` finds, which \
+             is off: the effect `fresnel` shows all of the environment. Add \"occlusion\" to the effects, or choose \
+             specular_visibility = \"none\" or, by rays, \"lobe\"",
+            visibility.name()
+        );
         warn(warnings, &source.path, message);
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! - [`mesh`]: the mesh as loaded, and posed
 //! - [`view`]: cameras and targets
-//! - [`maps`]: texture maps and the panorama
+//! - [`maps`]: texture maps and the panorama; [`mip_maps`]: their coarser levels
 //! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
 //!   `settings`, `cameras`, `lights` and `dapple`, within the bounds of `numbers`
@@ -30,11 +30,12 @@ mod gltf;
 pub mod images;
 pub mod light;
 mod lights;
-mod lit;
+pub(crate) mod lit;
 pub mod load;
 pub mod map_fit;
 pub mod maps;
 pub mod mesh;
+pub mod mip_maps;
 pub mod names;
 mod normals;
 mod numbers;
@@ -67,6 +68,8 @@ use crate::model::dapple::Dapple;
 use crate::model::effects::{Effects, Form, Lookups, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param, Params};
+use crate::model::texture_filter::TextureFilter;
+use crate::shader::facts::reflects_skin;
 
 /// A scene that was read and checked.
 #[derive(Clone, Debug)]
@@ -116,6 +119,12 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// Whether the skin shows in its own specular lobe.
+    #[must_use]
+    pub fn reflects_skin(&self) -> bool {
+        reflects_skin(&self.setup())
+    }
+
     /// The switches of the model.
     #[must_use]
     pub fn setup(&self) -> Setup {
@@ -123,7 +132,7 @@ impl Scene {
         let rotation = Param::EnvironmentRotation;
         let turns = self.fit.free.iter().any(|column| column.param == rotation);
         let interpolated_rim = form == Form::Listing;
-        let choices = Choices { glossy: self.is_glossy(), ..self.choices };
+        let choices = Choices { glossy: self.is_glossy(), turning: turns, ..self.choices };
         Setup { form, silhouette, effects, lookups, dapple: dapple.turning(turns), interpolated_rim, choices }
     }
 
@@ -241,6 +250,8 @@ pub struct Quality {
     pub sky_rays: u32,
     /// Rays a sample into the specular lobe, where its visibility is found by rays.
     pub lobe_rays: u32,
+    /// How samples and fragments look texture maps up.
+    pub texture_filter: TextureFilter,
 }
 
 impl Default for Quality {
@@ -255,6 +266,7 @@ impl Default for Quality {
             shadow_rays: 1,
             sky_rays: 256,
             lobe_rays: 64,
+            texture_filter: TextureFilter::Bilinear,
         }
     }
 }

@@ -10,10 +10,12 @@ use super::maps::Spots;
 use super::numbers::{interval, number, short, whole};
 use super::{Bloom, Diffusion, FitSettings, Loss, Quality, map_fit};
 use crate::model::choices::{
-    Bounces, Choices, LobeLookup, SpecularMap, SpecularModel, SpecularVisibility, Visibility,
+    Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
+    Visibility,
 };
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
+use crate::model::texture_filter::TextureFilter;
 
 /// The `[model]` table's form and silhouette.
 pub(super) fn form(source: &Source, model: &ModelTable) -> Result<(Form, Silhouette), SceneError> {
@@ -30,68 +32,68 @@ pub(super) fn form(source: &Source, model: &ModelTable) -> Result<(Form, Silhoue
 
 /// The `[model]` table's `lookups`.
 pub(super) fn lookups(source: &Source, model: &ModelTable) -> Result<Lookups, SceneError> {
-    let known = Lookups::ALL.map(|lookups| (lookups.name(), lookups));
-    model.lookups.as_ref().map_or(Ok(Lookups::default()), |name| source.choose("lookups", name, &known))
+    choice(source, "lookups", model.lookups.as_ref(), Lookups::ALL.map(|c| (c.name(), c)))
 }
 
-/// The `[model]` table's named choices.
+/// The `[model]` table's named choices; what is glossy and what turns follows from what is free.
 pub(super) fn choices(source: &Source, model: &ModelTable) -> Result<Choices, SceneError> {
-    let default = Choices::default();
     Ok(Choices {
         specular_model: choice(
             source,
             "specular_model",
             model.specular_model.as_ref(),
-            SpecularModel::ALL.map(|choice| (choice.name(), choice)),
-        )?
-        .unwrap_or(default.specular_model),
+            SpecularModel::ALL.map(|c| (c.name(), c)),
+        )?,
+        split_sum: choice(
+            source,
+            "split_sum",
+            model.split_sum.as_ref(),
+            SplitSum::ALL.map(|c| (c.name(), c)),
+        )?,
         specular_visibility: choice(
             source,
             "specular_visibility",
             model.specular_visibility.as_ref(),
-            SpecularVisibility::ALL.map(|choice| (choice.name(), choice)),
-        )?
-        .unwrap_or(default.specular_visibility),
+            SpecularVisibility::ALL.map(|c| (c.name(), c)),
+        )?,
         lobe_lookup: choice(
             source,
             "lobe_lookup",
             model.lobe_lookup.as_ref(),
-            LobeLookup::ALL.map(|choice| (choice.name(), choice)),
-        )?
-        .unwrap_or(default.lobe_lookup),
+            LobeLookup::ALL.map(|c| (c.name(), c)),
+        )?,
         specular_map: choice(
             source,
             "specular_map",
             model.specular_map.as_ref(),
-            SpecularMap::ALL.map(|choice| (choice.name(), choice)),
-        )?
-        .unwrap_or(default.specular_map),
+            SpecularMap::ALL.map(|c| (c.name(), c)),
+        )?,
         visibility: choice(
             source,
             "visibility",
             model.visibility.as_ref(),
-            Visibility::ALL.map(|choice| (choice.name(), choice)),
-        )?
-        .unwrap_or(default.visibility),
-        bounces: choice(
+            Visibility::ALL.map(|c| (c.name(), c)),
+        )?,
+        bounces: choice(source, "bounces", model.bounces.as_ref(), Bounces::ALL.map(|c| (c.name(), c)))?,
+        skin_reflection: choice(
             source,
-            "bounces",
-            model.bounces.as_ref(),
-            Bounces::ALL.map(|choice| (choice.name(), choice)),
-        )?
-        .unwrap_or(default.bounces),
+            "skin_reflection",
+            model.skin_reflection.as_ref(),
+            SkinReflection::ALL.map(|c| (c.name(), c)),
+        )?,
         glossy: false,
+        turning: false,
     })
 }
 
-/// The choice that a key names, where there is one.
-fn choice<T: Copy, const N: usize>(
+/// The choice that a key names; without it the default.
+fn choice<T: Copy + Default, const N: usize>(
     source: &Source,
     key: &str,
     given: Option<&Spanned<String>>,
     known: [(&'static str, T); N],
-) -> Result<Option<T>, SceneError> {
-    given.map(|name| source.choose(key, name, &known)).transpose()
+) -> Result<T, SceneError> {
+    given.map_or_else(|| Ok(T::default()), |name| source.choose(key, name, &known))
 }
 
 /// The `effects` key, where there is one.
@@ -288,6 +290,12 @@ pub(super) fn quality(source: &Source, table: &QualityTable) -> Result<Quality, 
         shadow_rays: pick(&table.shadow_rays, "shadow_rays", 1, 1 << 12, default.shadow_rays)?,
         sky_rays: pick(&table.sky_rays, "sky_rays", 1, 1 << 16, default.sky_rays)?,
         lobe_rays: pick(&table.lobe_rays, "lobe_rays", 1, 1 << 12, default.lobe_rays)?,
+        texture_filter: choice(
+            source,
+            "texture_filter",
+            table.texture_filter.as_ref(),
+            TextureFilter::ALL.map(|c| (c.name(), c)),
+        )?,
     })
 }
 

@@ -1,11 +1,12 @@
 //! What a scene calls for: the input of the planner.
 
-use crate::model::choices::Bounces;
+use crate::model::choices::{Bounces, Choices, SkinReflection, SpecularVisibility, Visibility};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::shadow_filter::ShadowFilter;
 use crate::model::terms::TermName;
+use crate::model::texture_filter::TextureFilter;
 use crate::shader::domain::Work;
 use crate::shader::quantity::Resource;
 use crate::shader::term::library;
@@ -35,7 +36,7 @@ pub enum Source {
     Terms,
 }
 
-/// Which maps a scene has, and which are of one size.
+/// Which maps a scene has, which are of one size, and how they are filtered.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub struct MapFacts {
     /// There is a colour map.
@@ -50,6 +51,8 @@ pub struct MapFacts {
     pub color_specular: bool,
     /// Normal and attenuator map are of one size.
     pub normal_attenuator: bool,
+    /// How they are filtered.
+    pub filter: TextureFilter,
 }
 
 /// Texels along a side of the cubes' faces, where they are known when the shader is written: they stand in its text
@@ -83,9 +86,16 @@ impl FaceSizes {
     }
 }
 
-/// Whether the skin throws back what its lamps bring.
-fn lights_bounce(setup: &Setup) -> bool {
+/// Whether the skin throws light back at itself.
+fn gathers(setup: &Setup) -> bool {
     library::sees_sky(setup.effects) && setup.choices.bounces == Bounces::Gathered
+}
+
+/// Whether the skin shows in its own specular lobe.
+#[must_use]
+pub fn reflects_skin(setup: &Setup) -> bool {
+    let reflects = || Effect::from_name("fresnel").is_some_and(|effect| setup.effects.has(effect));
+    gathers(setup) && setup.choices.skin_reflection == SkinReflection::Gathered && reflects()
 }
 
 /// Shadow maps that fragments compare themselves with.
@@ -144,6 +154,7 @@ impl Default for Facts {
             attenuator: true,
             color_specular: true,
             normal_attenuator: true,
+            filter: TextureFilter::Bilinear,
         };
         Self {
             setup: Setup::new(Form::Corrected, Silhouette::Fragment, Effects::SURFACE),
@@ -193,9 +204,12 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 28] = [
+    pub const CONDITIONS: [&'static str; 34] = [
         "layered",
         "lights_bounce",
+        "traced_lobe",
+        "turning_sky",
+        "skin_reflected",
         "vertex_silhouette",
         "fragment_silhouette",
         "bumped_silhouette",
@@ -212,6 +226,9 @@ impl Facts {
         "has_attenuator_map",
         "color_specular_one_size",
         "normal_attenuator_one_size",
+        "bilinear",
+        "trilinear",
+        "anisotropic",
         "morphs",
         "bones",
         "turned",
@@ -243,8 +260,11 @@ impl Facts {
         }
         Some(match condition {
             "layered" => library::layers(setup.effects),
-            "lights_bounce" => lights_bounce(&setup),
+            "lights_bounce" => gathers(&setup),
             "raster" => self.source == Source::Raster,
+            "traced_lobe" => self.traces_lobes(),
+            "turning_sky" => self.turns_sky(),
+            "skin_reflected" => reflects_skin(&setup) && !self.traces_lobes(),
             "terms" => self.source == Source::Terms,
             "bumped" => self.bumped(),
             "smooth_lookups" => self.setup.smooth_lookups(),
@@ -256,6 +276,9 @@ impl Facts {
             "has_attenuator_map" => self.maps.attenuator,
             "color_specular_one_size" => self.maps.color_specular,
             "normal_attenuator_one_size" => self.maps.normal_attenuator,
+            "bilinear" => self.maps.filter == TextureFilter::Bilinear,
+            "trilinear" => self.maps.filter == TextureFilter::Trilinear,
+            "anisotropic" => self.maps.filter == TextureFilter::Anisotropic,
             "morphs" => self.morphs > 0,
             "bones" => self.bones,
             "dapple_turned" => self.turned && !self.setup.dapple.is_in_world(),
@@ -276,6 +299,17 @@ impl Facts {
     fn shadow_filter(&self) -> Option<ShadowFilter> {
         let mapped = |shadows: &ShadowFacts| shadows.filter != ShadowFilter::Vertices;
         self.shadows.filter(mapped).map(|shadows| shadows.filter)
+    }
+
+    /// Whether what vertices found of the sky moves as a fit turns it. A rasteriser has it found anew.
+    fn turns_sky(&self) -> bool {
+        let Choices { turning, visibility, .. } = self.setup.choices;
+        turning && visibility != Visibility::Rays && self.source != Source::Raster
+    }
+
+    /// Whether light of the specular lobe is that along rays into it: a rasteriser has none.
+    fn traces_lobes(&self) -> bool {
+        self.setup.choices.specular_visibility == SpecularVisibility::Rays && self.source != Source::Raster
     }
 
     /// Whether the shading normal has a part along T and B. Of a missing map, the listing still reads

@@ -66,6 +66,15 @@ impl Plan {
     /// what a frame costs at the least.
     #[must_use]
     pub fn fetches_alone(&self) -> Self {
+        let filter = self.facts.maps.filter;
+        let (map, texels) = if filter.reads_levels() {
+            let steps = "vec4f(dpdx(at.vertex_uv), dpdy(at.vertex_uv))";
+            let texels = format!("sample_mip_texels({{t}}, at.vertex_uv, {steps}, {}.0)", filter.most_taps());
+            ("textureSample({t}, map_sampler, at.vertex_uv)", texels)
+        } else {
+            let map = "textureSampleLevel({t}, map_sampler, at.vertex_uv, 0.0)";
+            (map, "sample_texels({t}, at.vertex_uv)".to_owned())
+        };
         let fetches: Vec<String> = self
             .steps
             .iter()
@@ -82,14 +91,14 @@ impl Plan {
                 };
                 let fetch = |kind, lookup: &str| Some(lookup.replace("{t}", read(kind)?));
                 fetch(Kind::Cube, &format!("textureSampleLevel({{t}}, cube_sampler, {direction}, 0.0)"))
-                    .or_else(|| fetch(Kind::Map, "textureSampleLevel({t}, map_sampler, at.vertex_uv, 0.0)"))
+                    .or_else(|| fetch(Kind::Map, map))
                     .or_else(|| {
                         fetch(
                             Kind::Faces,
                             &format!("sample_faces({{t}}, {{t}}_size(), cube_place({direction}))"),
                         )
                     })
-                    .or_else(|| fetch(Kind::Texels, "sample_texels({t}, at.vertex_uv)"))
+                    .or_else(|| fetch(Kind::Texels, &texels))
             })
             .collect();
         let whole = self.raster_module(&[]);

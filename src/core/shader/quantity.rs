@@ -147,7 +147,7 @@ pub enum Resource {
     ColorSpecularMap,
     /// Normal map with the attenuator map in alpha (8-bit RGBA).
     NormalAttenuatorMap,
-    /// Bilinear and repeating, for maps.
+    /// Repeating, for maps: bilinear, or between their levels as the scene's `texture_filter` says.
     MapSampler,
     /// Bilinear, for cubes.
     CubeSampler,

@@ -20,9 +20,10 @@
 //! and constants that the body names), `uses` (files of `rules/lib`), `error` (relative to white; a number or
 //! `tessellation`), `paper: yes` (the paper's own programs made this approximation), `named: yes`
 //! (the scene file itself names this approximation, and no budget refuses it), `adds` (the quantity is a part of
-//! the sum that the radiance is, and holds these terms), `shows` (it is that term alone), `fallback` (quantities that it
-//! takes where others fail, and for which nothing needs to be stored), `sampled` (fragments may look a texel's quantity
-//! up, which is off by so much), `pass` (a blur of a texel's quantity; the function is its kernel, see [`Blur`]).
+//! the sum that the radiance is, and holds these terms), `shows` (it is that term alone), `fallback` (quantities that
+//! it takes where others fail, and for which nothing needs to be stored), `sampled` (fragments may look a texel's
+//! quantity up, which is off by so much), `pass` (a blur of a texel's quantity; the function is its kernel, see
+//! [`Blur`]).
 
 use std::sync::LazyLock;
 
@@ -254,15 +255,17 @@ impl Rule {
 const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
-pub const LIBRARY: [(&str, &str); 9] = [
+pub const LIBRARY: [(&str, &str); 11] = [
     ("vector", include_str!("rules/lib/vector.wgsl")),
     ("frame", include_str!("rules/lib/frame.wgsl")),
     ("cube", include_str!("rules/lib/cube.wgsl")),
     ("texels", include_str!("rules/lib/texels.wgsl")),
+    ("mip_texels", include_str!("rules/lib/mip_texels.wgsl")),
     ("rim", include_str!("rules/lib/rim.wgsl")),
     ("specular", include_str!("rules/lib/specular.wgsl")),
     ("split_sum_kelemen", include_str!("rules/lib/split_sum_kelemen.wgsl")),
     ("split_sum_ggx", include_str!("rules/lib/split_sum_ggx.wgsl")),
+    ("dielectric_sum_ggx", include_str!("rules/lib/dielectric_sum_ggx.wgsl")),
     ("shadow", include_str!("rules/lib/shadow.wgsl")),
 ];
 

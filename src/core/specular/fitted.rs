@@ -7,20 +7,18 @@
 //! mean   (b / (a + b))^(1/5)         1 - H.V' in the mean of Schlick's factor: so a and b are never negative
 //! ```
 //!
-//! Each as the quotient of two polynomials in x and y, terms x^i y^j with i + j up to a degree. y goes with the roughness
-//! and x with the square root of mu (1 + l) / (mu + l), mu = N.V': at grazing views the integrals turn over within some l,
-//! which grows as the lobe's width does, like mu log mu. Both variables lie in [-1, 1], so that f32 holds the sums.
+//! Each as the quotient of two polynomials in x and y, terms x^i y^j with i + j up to a degree. y goes with the
+//! roughness and x with the square root of mu (1 + l) / (mu + l), mu = N.V': at grazing views the integrals turn over
+//! within some l, which grows as the lobe's width does, like mu log mu. Both variables lie in [-1, 1], so that f32
+//! holds the sums.
 //!
-//! The coefficients are those of least squares with the denominator of the step before as weight (Sanathanan and Koerner,
-//! *Transfer function synthesis as a ratio of two complex polynomials*, IEEE Transactions on Automatic Control 8, 1963),
-//! weighted towards the largest error (Lawson's iteration). No exact text is asked of a fit: its last digits are the
-//! machine's.
+//! `rational` finds the coefficients. No exact text is asked of a fit: its last digits are the machine's.
 
 use std::fmt::Write as _;
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
+use super::rational::{Point, Shape, terms};
 use super::split_sum::{Quadrature, split_sum};
 use super::{SMOOTHEST, SpecularModel};
 
@@ -29,11 +27,11 @@ pub(super) const LARGEST_ERROR: f64 = 2e-4;
 
 /// A fit.
 #[derive(Clone, Copy)]
-struct Fit {
+pub(super) struct Fit {
     model: SpecularModel,
     name: &'static str,
     /// l = `layer` m^`power`.
-    layer: f64,
+    pub(super) layer: f64,
     power: i32,
     degree: usize,
 }
@@ -42,7 +40,7 @@ struct Fit {
 const LOST: &str = "lost";
 
 /// Of each model what is lost, and the mean.
-const FITS: [[Fit; 2]; 2] = [
+pub(super) const FITS: [[Fit; 2]; 2] = [
     [
         Fit { model: SpecularModel::Kelemen, name: LOST, layer: 2.0, power: 1, degree: 6 },
         Fit { model: SpecularModel::Kelemen, name: "mean", layer: 2.0, power: 1, degree: 5 },
@@ -52,9 +50,6 @@ const FITS: [[Fit; 2]; 2] = [
         Fit { model: SpecularModel::Ggx, name: "mean", layer: 2.0, power: 2, degree: 6 },
     ],
 ];
-
-/// Steps of a fit; the largest error no longer falls.
-const STEPS: usize = 26;
 
 /// The integrals at one view and roughness.
 #[derive(Clone, Copy)]
@@ -71,6 +66,9 @@ fn node(model: SpecularModel, view: f64, m: f64, quadrature: Quadrature) -> Node
     Node { view, m, total: a + b, share: b / (a + b) }
 }
 
+/// What stands for a roughness in the quotients: in [-1, 1], as printed.
+pub(super) const ROUGHNESS: [f64; 2] = [2.0 / (1.0 - SMOOTHEST), (1.0 + SMOOTHEST) / (1.0 - SMOOTHEST)];
+
 /// Views that lie densely towards both ends, and roughnesses in equal ratios.
 fn nodes(model: SpecularModel, views: usize, roughnesses: usize) -> Vec<Node> {
     let at = |i: usize| {
@@ -83,10 +81,10 @@ fn nodes(model: SpecularModel, views: usize, roughnesses: usize) -> Vec<Node> {
 }
 
 impl Fit {
-    fn variables(&self, node: &Node) -> (f64, f64) {
+    fn variables(&self, node: &Node) -> [f64; 3] {
         let l = self.layer * node.m.powi(self.power);
         let x = (node.view * (1.0 + l) / (node.view + l)).sqrt();
-        (2.0 * x - 1.0, (2.0 * node.m - (1.0 + SMOOTHEST)) / (1.0 - SMOOTHEST))
+        [2.0 * x - 1.0, ROUGHNESS[0] * node.m - ROUGHNESS[1], 0.0]
     }
 
     /// What is fitted, and how the integrals move with it.
@@ -101,137 +99,21 @@ impl Fit {
         }
     }
 
-    /// Powers of x and y.
-    fn terms(&self) -> Vec<(usize, usize)> {
-        let degree = self.degree;
-        (0..=degree).flat_map(|i| (0..=degree - i).map(move |j| (i, j))).collect()
+    fn shape(&self) -> Shape {
+        Shape { numerator: terms(self.degree, 0), denominator: terms(self.degree, 0) }
     }
 
-    /// Coefficients of the numerator's and the denominator's terms.
     fn solve(&self, nodes: &[Node]) -> [Vec<f64>; 2] {
-        let terms = self.terms();
-        let count = terms.len();
-        let basis: Vec<Vec<f64>> = nodes
-            .iter()
-            .map(|node| {
-                let (x, y) = self.variables(node);
-                terms.iter().map(|&(i, j)| chebyshev(i, x) * chebyshev(j, y)).collect()
-            })
-            .collect();
-        let targets: Vec<(f64, f64)> = nodes.iter().map(|node| self.target(node)).collect();
-        let mut denominators = vec![1.0_f64; nodes.len()];
-        let mut emphasis = vec![1.0_f64; nodes.len()];
-        let mut best = (f64::INFINITY, Vec::new());
-        for step in 0..STEPS {
-            let row_scale = |k: usize| emphasis[k].sqrt() * targets[k].1 / denominators[k];
-            let matrix = DMatrix::from_fn(nodes.len(), 2 * count - 1, |k, term| {
-                let value =
-                    if term < count { basis[k][term] } else { -targets[k].0 * basis[k][term - count + 1] };
-                row_scale(k) * value
-            });
-            let right = DVector::from_fn(nodes.len(), |k, _| row_scale(k) * targets[k].0);
-            let qr = matrix.qr();
-            let Some(found) = qr.r().solve_upper_triangular(&(qr.q().transpose() * right)) else { break };
-            let mut errors = Vec::new();
-            let mut least = f64::INFINITY;
-            for (k, row) in basis.iter().enumerate() {
-                let numerator: f64 = row.iter().zip(found.iter()).map(|(b, c)| b * c).sum();
-                let denominator =
-                    1.0 + row[1..].iter().zip(found.iter().skip(count)).map(|(b, c)| b * c).sum::<f64>();
-                least = least.min(denominator);
-                denominators[k] = denominator.abs().max(1e-3);
-                errors.push((numerator / denominator - targets[k].0).abs() * targets[k].1);
-            }
-            let largest = errors.iter().fold(0.0, |a: f64, &b| a.max(b));
-            if largest < best.0 && least > 0.0 {
-                best = (largest, found.iter().copied().collect());
-            }
-            // The denominator settles first.
-            if step > 4 {
-                emphasis.iter_mut().zip(&errors).for_each(|(e, error)| *e *= error / largest + 1e-2);
-                let mean = emphasis.iter().sum::<f64>() / emphasis.len() as f64;
-                emphasis.iter_mut().for_each(|e| *e /= mean);
-            }
-        }
-        assert!(best.0.is_finite(), "no step left a denominator without zeros");
-        let (numerator, denominator) = best.1.split_at(count);
-        [numerator.to_vec(), [&[1.0], denominator].concat()].map(|series| self.powers(&series))
-    }
-
-    /// A series of products of Chebyshev polynomials by its powers of x and y, in the terms' order.
-    fn powers(&self, series: &[f64]) -> Vec<f64> {
-        let terms = self.terms();
-        let mut powers = vec![0.0; terms.len()];
-        for (&(i, j), c) in terms.iter().zip(series) {
-            let (of_x, of_y) = (chebyshev_powers(i), chebyshev_powers(j));
-            for (k, &(p, q)) in terms.iter().enumerate() {
-                powers[k] += c * of_x.get(p).unwrap_or(&0.0) * of_y.get(q).unwrap_or(&0.0);
-            }
-        }
-        powers
-    }
-
-    /// WGSL of the function.
-    fn print(&self, [numerator, denominator]: &[Vec<f64>; 2]) -> String {
-        let scale = denominator[0];
-        let mut text = format!("fn {}_{}(x: f32, y: f32) -> f32 {{\n", self.model.name(), self.name);
-        for (letter, series) in [("n", numerator), ("d", denominator)] {
-            for i in 0..=self.degree {
-                let own: Vec<f64> = self
-                    .terms()
-                    .iter()
-                    .zip(series)
-                    .filter(|(t, _)| t.0 == i)
-                    .map(|(_, c)| c / scale)
-                    .collect();
-                let _ = writeln!(text, "    let {letter}{i}: f32 = {};", horner(&own, "y"));
-            }
-        }
-        let series = |letter: &str| {
-            (0..self.degree).rev().fold(format!("{letter}{}", self.degree), |inner, i| {
-                let inner = if i + 1 == self.degree { inner } else { format!("({inner})") };
-                format!("{letter}{i} + x * {inner}")
-            })
+        let point = |node: &Node| {
+            let (target, counts) = self.target(node);
+            Point { at: self.variables(node), target, counts }
         };
-        let _ = write!(text, "    return ({}) / ({});\n}}\n", series("n"), series("d"));
-        text
+        self.shape().solve(&nodes.iter().map(point).collect::<Vec<_>>())
     }
-}
 
-/// c0 + y (c1 + y (...)), in f32.
-fn horner(coefficients: &[f64], variable: &str) -> String {
-    let mut text = String::new();
-    for (k, &c) in coefficients.iter().enumerate() {
-        let size = format!("{:?}", c.abs() as f32);
-        match (k, c < 0.0) {
-            (0, true) => text.push_str(&format!("-{size}")),
-            (0, false) => text.push_str(&size),
-            (_, negative) => {
-                // A sum's negative term, within the product's brackets.
-                let last = k + 1 == coefficients.len();
-                let sign = if negative { "-" } else { "" };
-                text.push_str(&format!(" + {variable} * {}{sign}{size}", if last { "" } else { "(" }));
-            }
-        }
+    fn print(&self, found: &[Vec<f64>; 2]) -> String {
+        self.shape().print(&format!("{}_{}", self.model.name(), self.name), found)
     }
-    text.push_str(&")".repeat(coefficients.len().saturating_sub(2)));
-    text
-}
-
-fn chebyshev(degree: usize, x: f64) -> f64 {
-    chebyshev_powers(degree).iter().rev().fold(0.0, |sum, c| sum * x + c)
-}
-
-/// The coefficients of a Chebyshev polynomial, by powers.
-fn chebyshev_powers(degree: usize) -> Vec<f64> {
-    let (mut own, mut next) = (vec![1.0], vec![0.0, 1.0]);
-    for _ in 0..degree {
-        let mut after = vec![0.0; next.len() + 1];
-        next.iter().enumerate().for_each(|(k, c)| after[k + 1] += 2.0 * c);
-        own.iter().enumerate().for_each(|(k, c)| after[k] -= c);
-        (own, next) = (next, after);
-    }
-    own
 }
 
 /// The whole file of a model.
@@ -251,8 +133,8 @@ fn file(model: usize) -> String {
     let _ = write!(
         text,
         "\n// The split sum of {name} (MODEL 9): a and b, with which a constant environment of 1 is reflected as f0 a + b, at
-// N.V' and a roughness of [{SMOOTHEST}, 1], to {LARGEST_ERROR:e}. At views that graze more than 1e-6 it stays: there its slope is
-// infinite. Fitted to the exact integrals and printed by specular/fitted.rs; nobody writes here.
+// N.V' and a roughness of [{SMOOTHEST}, 1], to {LARGEST_ERROR:e}. At views that graze more than 1e-6 it stays: there
+// its slope is infinite. Fitted to the exact integrals and printed by specular/fitted.rs; nobody writes here.
 fn split_sum_{name}(view_cosine: f32, roughness: f32) -> vec2f {{
     let view: f32 = max(view_cosine, 1e-6);
     let y: f32 = {:?} * roughness - {:?};
@@ -266,8 +148,8 @@ fn split_sum_{name}(view_cosine: f32, roughness: f32) -> vec2f {{
     return vec2f(all - grazing, grazing);
 }}
 ",
-        (2.0 / (1.0 - SMOOTHEST)) as f32,
-        ((1.0 + SMOOTHEST) / (1.0 - SMOOTHEST)) as f32,
+        ROUGHNESS[0] as f32,
+        ROUGHNESS[1] as f32,
         x(&lost),
         x(&mean),
     );
@@ -331,15 +213,12 @@ mod tests {
             let function = Function::new(&fit.print(&found), &name, 2);
             let mut most = 0.0_f64;
             for node in &nodes {
-                let (x, y) = fit.variables(node);
-                let sum = |series: &[f64]| -> f64 {
-                    let of = |(&(i, j), c): (&(usize, usize), &f64)| c * x.powi(i as i32) * y.powi(j as i32);
-                    fit.terms().iter().zip(series).map(of).sum()
-                };
+                let at = fit.variables(node);
                 let (target, counts) = fit.target(node);
-                let value = sum(&found[0]) / sum(&found[1]);
-                // Coefficients are printed in f32.
-                assert!((function.of(&[x, y])[0] - value).abs() < 2e-5, "{name}");
+                let value = fit.shape().of(&found, at);
+                // Coefficients are printed in f32, and quotients of few terms come near a denominator of 0.
+                let off = (function.of(&at[..2])[0] - value).abs();
+                assert!(off < 1e-4, "{name}: {off:e}");
                 most = most.max((value - target).abs() * counts);
             }
             // What 19 coefficients reach.

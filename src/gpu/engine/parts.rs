@@ -351,8 +351,8 @@ impl Parts {
     }
 }
 
-/// Ranges of groups, whole blocks each, whose records of so many rows stay within the limit. A block that is beyond it on its
-/// own is left to the adapter to refuse.
+/// Ranges of groups, whole blocks each, whose records of so many rows stay within the limit. A block that is beyond
+/// it on its own is left to the adapter to refuse.
 fn cut(view: &ObservedView, rows: usize, limit: u64) -> Vec<Range<usize>> {
     let groups = view.samples.groups();
     let bytes = |range: &Range<usize>| (size_of::<Row>() * rows * records(view, range).len()) as u64;

@@ -21,7 +21,8 @@ pub(super) struct Arguments {
     /// Leave two parts out at a time, too.
     #[arg(long)]
     pairs: bool,
-    /// Fit the constants that are left again in each case, from four starts (the whole model from three of them): what can the others make up for?
+    /// Fit the constants that are left again in each case, from four starts (the whole model from three of them):
+    /// what can the others make up for?
     #[arg(long)]
     refit: bool,
     /// Constants of an earlier fit [default: the whole model is fitted to the targets first; without targets, the
@@ -35,14 +36,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    let gpu = match arguments.gpu.as_str() {
-        "always" => GpuTiming::Always,
-        "never" => GpuTiming::Never,
-        _ => GpuTiming::Auto,
-    };
-    if gpu != GpuTiming::Never {
-        quieten_graphics();
-    }
+    let gpu = timing(&arguments.gpu);
     unfinished::install();
     let mut folder = RunFolder::of_study(&arguments.output, Work::Ablation)?;
     let (path, _scratch) = arguments.scene.path()?;
@@ -71,4 +65,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         return Ok(Exit::Failed);
     }
     Ok(Exit::Done)
+}
+
+/// When the renderer is timed, by the word of `--gpu`.
+pub(super) fn timing(when: &str) -> GpuTiming {
+    let gpu = match when {
+        "always" => GpuTiming::Always,
+        "never" => GpuTiming::Never,
+        _ => GpuTiming::Auto,
+    };
+    if gpu != GpuTiming::Never {
+        quieten_graphics();
+    }
+    gpu
 }

@@ -20,7 +20,10 @@ pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
         .with("form", scene.form.name())
         .with("silhouette", scene.silhouette.name())
         .with("lookups", scene.lookups.name());
+    // What shows nothing is the same with either choice.
+    let shows = |key: &str| key != "skin_reflection" || scene.reflects_skin();
     let all = (scene.choices.named().into_iter())
+        .filter(|(key, _)| shows(key))
         .fold(read, |all, (key, name)| all.with(key, name))
         .with("dapple", format!("{:?}", scene.dapple))
         .with("list of effects", effects.join(" "))
@@ -35,6 +38,9 @@ pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
     let lit = scene.effects.has(Effect::Lights);
     let lights = lit.then(|| Hash::default().words(&scene.lights).words(&scene.sky_lights).done());
     let all = lights.into_iter().fold(all, |all, lights| all.with("lights", lights));
+    // Of states that were kept before there was a choice, none has another filter.
+    let filter = Some(scene.quality.texture_filter).filter(|filter| filter.reads_levels());
+    let all = filter.into_iter().fold(all, |all, filter| all.with("texture filter", filter.name()));
     // Nothing else knows of the atlas' texels.
     let texels = scene.needs().atlas.then_some(scene.diffusion.light_map_size);
     let all = texels.into_iter().fold(all, |all, size| all.with("light map", size.to_string()));
@@ -129,6 +135,7 @@ fn quality(quality: Quality) -> String {
         shadow_rays,
         sky_rays,
         lobe_rays,
+        texture_filter: _,
     } = quality;
     format!(
         "samples_per_axis {samples_per_axis}, irradiance_size {irradiance_size}, lobe_size {lobe_size}, hilite_size \

@@ -21,7 +21,7 @@ use crate::study::stability::{Study, evaluators, kept};
 /// Try hard cases on every evaluator, and search for new ones
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("Each evaluator (the model in f64 and f32, the CPU engine, the renderer's shader rules where there is a graphics adapter) is given every hard case of docs/model.md, samples of the scene with each parameter at its bounds and each effect on and off, and random numbers made to break it. Each result must be finite, and as near to f64 as roundings explain. Cases that fail are made as simple as they stay failing and written to DIR/new_cases.toml; DIR/stability.json has every figure.\n\nExamples:\n  skinfit stability                                    the built-in scene\n  skinfit stability scene.toml -o stable --cases 50000 --seed 7\n  skinfit stability --replay stable/new_cases.toml     try again what failed", "a case failed on an evaluator, or the command was interrupted")
+    after_help = super::with_failure("Each evaluator (the model in f64 and f32, the CPU engine, the renderer's shader rules where there is a graphics adapter) is given every hard case of docs/model.md, samples of the scene with each parameter at its bounds and each effect on and off, and random numbers made to break it; engines also random lights, specular lobes and skies under random named choices. Each result must be finite, and as near to f64 as roundings explain. Cases that fail are made as simple as they stay failing and written to DIR/new_cases.toml; DIR/stability.json has every figure.\n\nExamples:\n  skinfit stability                                    the built-in scene\n  skinfit stability scene.toml -o stable --cases 50000 --seed 7\n  skinfit stability --replay stable/new_cases.toml     try again what failed", "a case failed on an evaluator, or the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -30,7 +30,8 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
     /// Random cases. Ten thousand take less than a second; on a graphics adapter that is a program on the CPU, a
-    /// thousand take some twenty seconds.
+    /// thousand take some twenty seconds. For each 250 there are 64 fragments of lights, which take a second, up to 64
+    /// times that.
     #[arg(long, value_name = "N", default_value_t = 1_000, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
     cases: u64,
     /// What the random cases are drawn from.

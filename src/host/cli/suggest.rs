@@ -2,11 +2,11 @@
 
 use std::path::PathBuf;
 
+use super::ablate::timing;
 use super::fitted_scene::{Changes, Start};
 use super::run_folder::{RunFolder, Work};
 use super::scene::SceneArguments;
-use super::{Exit, Refusal, quieten_graphics, say, tell_warnings, unfinished};
-use crate::study::ablation::GpuTiming;
+use super::{Exit, Refusal, say, tell_warnings, unfinished};
 use crate::study::suggest::{SuggestOptions, files, names, suggest};
 
 /// Find the effects that a scene calls for: sets of them, judged on views that their fit did not see
@@ -33,14 +33,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    let gpu = match arguments.gpu.as_str() {
-        "always" => GpuTiming::Always,
-        "never" => GpuTiming::Never,
-        _ => GpuTiming::Auto,
-    };
-    if gpu != GpuTiming::Never {
-        quieten_graphics();
-    }
+    let gpu = timing(&arguments.gpu);
     unfinished::install();
     let mut folder = RunFolder::of_study(&arguments.output, Work::Suggestion)?;
     let path = arguments.scene.kept_path(folder.path())?;

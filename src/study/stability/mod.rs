@@ -2,7 +2,8 @@
 //!
 //! - [`case`]: the numbers that evaluators are given; [`lights`]: what they look up
 //! - [`hard`]: the hard cases of MODEL 7, a declaration each; [`demands`]: those of engines and fits
-//! - [`random`]: random cases; [`scene`]: a scene's own samples; [`kept`]: cases kept in files
+//! - [`random`]: random cases; [`lit`]: those of lights, their mirror images and the sky; [`scene`]: a scene's own
+//!   samples; [`kept`]: cases kept in files
 //! - [`evaluate`]: what an evaluator is; [`plain`]: the model as one, by the [`rules`]; [`objectives`]: engines;
 //!   `shader`: the renderer's rules on an adapter
 //! - [`mod@reference`]: the model in f64, and how far rounding may move it
@@ -19,6 +20,8 @@ pub mod evaluate;
 pub mod hard;
 pub mod kept;
 pub mod lights;
+pub mod lit;
+mod lit_case;
 pub mod objectives;
 pub mod plain;
 pub mod random;
@@ -76,6 +79,7 @@ impl Study {
             + self.kept.len()
             + self.swept.len()
             + self.cases
+            + lit::batches(self.cases)
     }
 
     /// Every case on every evaluator; `progress` is told after each, by whichever thread, how many more are done.
@@ -113,6 +117,7 @@ impl Study {
         }
         let mut hunt = Hunt::new(evaluators, &self.lights);
         hunt.random(self.seed, self.cases, progress);
+        report.lit = lit::search(evaluators, &self.lights, (self.seed, self.cases), progress);
         report.swept = swept.tallies;
         report.random = hunt.tallies;
         report.found = swept.found.into_iter().chain(hunt.found).collect();

@@ -126,7 +126,6 @@ pub fn view(setup: Setup, fragments: &[FragmentInputs], target: [f32; 4]) -> Obs
         surface: SurfaceRecords::new(Asked::EVERYTHING, groups),
         ..ViewSamples::default()
     };
-    let mut weight = vec![Row::ZERO; groups];
     for slot in 0..groups * LANES {
         // Padding repeats a fragment, as `samples` does.
         let real = slot < fragments.len();
@@ -135,9 +134,14 @@ pub fn view(setup: Setup, fragments: &[FragmentInputs], target: [f32; 4]) -> Obs
         samples.surface.set(slot, &inputs.fragment(setup, 0.0_f32), share);
         samples.pixel.push(if real { slot as u32 } else { u32::MAX });
         samples.coverage.push(share);
-        weight[slot / LANES][slot % LANES] = share;
     }
+    let weight = weights(&samples.coverage);
     ObservedView { samples, target: targets(&target, groups), weight, clip: None }
+}
+
+/// Each pixel counts as much as it is covered.
+pub(super) fn weights(coverage: &[f32]) -> Vec<Row> {
+    coverage.chunks(LANES).map(|group| Row::of(std::array::from_fn(|lane| group[lane]))).collect()
 }
 
 /// The same target for each pixel of so many groups: three or four channels.

@@ -29,7 +29,7 @@ pub fn batch(seed: u64, index: u64, count: usize) -> Batch {
     Batch { setting, fragments }
 }
 
-fn one_of<T: Copy>(rng: &mut StdRng, all: &[T]) -> T {
+pub(super) fn one_of<T: Copy>(rng: &mut StdRng, all: &[T]) -> T {
     all[rng.random_range(0..all.len())]
 }
 
@@ -59,7 +59,7 @@ fn setting(rng: &mut StdRng) -> Setting {
     }
 }
 
-fn parameter(param: Param, form: Form, rng: &mut StdRng) -> f64 {
+pub(super) fn parameter(param: Param, form: Form, rng: &mut StdRng) -> f64 {
     let info = param.info();
     let (lower, upper) = (info.lower.max(-LARGEST), info.upper.min(LARGEST.max(info.corrected)));
     let value = match rng.random_range(0..6) {
@@ -84,7 +84,7 @@ fn single(x: f64) -> f64 {
 }
 
 /// In [0, 1], with an inclination to both ends.
-fn share(rng: &mut StdRng) -> f64 {
+pub(super) fn share(rng: &mut StdRng) -> f64 {
     match rng.random_range(0..8) {
         0 => 0.0,
         1 => 1.0,
@@ -95,7 +95,7 @@ fn share(rng: &mut StdRng) -> f64 {
     }
 }
 
-fn unit(rng: &mut StdRng) -> [f64; 3] {
+pub(super) fn unit(rng: &mut StdRng) -> [f64; 3] {
     let v: [f64; 3] = std::array::from_fn(|_| rng.random_range(-1.0..=1.0));
     let length = v.iter().map(|x| x * x).sum::<f64>().sqrt().max(1e-3);
     v.map(|x| single(x / length))
@@ -147,7 +147,7 @@ fn texel(rng: &mut StdRng) -> [f64; 3] {
     }
 }
 
-fn fragment(rng: &mut StdRng) -> FragmentInputs {
+pub(super) fn fragment(rng: &mut StdRng) -> FragmentInputs {
     let normal = vector(rng, [0.0, 0.0, 1.0]);
     let tangent = vector(rng, normal);
     let bitangent = vector(rng, tangent);

@@ -34,11 +34,11 @@ const ROUNDED: f64 = 1.0 / (1 << 23) as f64;
 const FLUSHED: f64 = 1.2e-38;
 /// What the greatest change among random moves is multiplied with: the worst roundings are rarely among them,
 /// and those of several steps add up.
-const SPREAD: f64 = 4.0;
+pub(super) const SPREAD: f64 = 4.0;
 /// What roundings of sums add, as a share of the summands: some fifty of 2^-24, of either sign.
-const SUMMED: f64 = 5e-6;
+pub(super) const SUMMED: f64 = 5e-6;
 /// Nothing below is told apart from 0: products of two factors above it do not vanish in an f32.
-const TINY: f64 = 1e-18;
+pub(super) const TINY: f64 = 1e-18;
 /// How often each fragment is moved: first, and again where that was too few to be sure.
 pub const FEW: usize = 6;
 /// See [`FEW`]: near a corner of the function there are many sides to fall on.
@@ -306,7 +306,7 @@ fn round_shading(
     }
 }
 
-fn moved(inputs: &FragmentInputs, moves: &mut Moves<'_>) -> FragmentInputs {
+pub(super) fn moved(inputs: &FragmentInputs, moves: &mut Moves<'_>) -> FragmentInputs {
     let mut moved = *inputs;
     for vector in
         [&mut moved.texel, &mut moved.tangent, &mut moved.bitangent, &mut moved.normal, &mut moved.view]
@@ -326,7 +326,7 @@ fn moved(inputs: &FragmentInputs, moves: &mut Moves<'_>) -> FragmentInputs {
 }
 
 /// The parameters that evaluators round to f32; angles they turn into sines and cosines in f64.
-fn moved_params(params: &Params, moves: &mut Moves<'_>) -> Params {
+pub(super) fn moved_params(params: &Params, moves: &mut Moves<'_>) -> Params {
     let mut moved = params.clone();
     for param in Param::built_in() {
         let fixed = [Param::SpecularLobe, Param::EnvironmentRotation, Param::KeyAzimuth, Param::KeyElevation];
@@ -339,7 +339,7 @@ fn moved_params(params: &Params, moves: &mut Moves<'_>) -> Params {
 }
 
 /// How numbers are moved, and how far at most, as a share of what is allowed.
-struct Moves<'a> {
+pub(super) struct Moves<'a> {
     rng: &'a mut StdRng,
     reach: f64,
 }
@@ -347,9 +347,20 @@ struct Moves<'a> {
 impl<'a> Moves<'a> {
     /// Move `number`: the first few on the edge of what is allowed, as most is moved there; then every other one
     /// somewhere inside, where a sum that cancels on the edge may not.
-    fn new(rng: &'a mut StdRng, number: usize) -> Self {
+    pub(super) fn new(rng: &'a mut StdRng, number: usize) -> Self {
         let reach = if number < FEW || number.is_multiple_of(2) { 1.0 } else { rng.random_range(0.0..1.0) };
         Self { rng, reach }
+    }
+
+    /// A number moved by what f32 rounds.
+    pub(super) fn number(&mut self, x: f64) -> f64 {
+        x * (1.0 + RADIUS * self.step())
+    }
+
+    /// A vector's numbers moved by what f32 rounds of the largest; of nothing but zeros none.
+    pub(super) fn vector(&mut self, v: [f32; 3]) -> [f32; 3] {
+        let size = v.iter().fold(0.0_f64, |most, x| most.max(f64::from(x.abs())));
+        v.map(|x| (f64::from(x) + RADIUS * size * self.step()) as f32)
     }
 
     /// Down, not at all, or up.

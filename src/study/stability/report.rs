@@ -29,6 +29,8 @@ pub struct Report {
     pub hard: Vec<usize>,
     /// For each evaluator, the random search.
     pub random: Vec<Tally>,
+    /// For each evaluator that is an engine, the random search of lights.
+    pub lit: Vec<Tally>,
     /// For each evaluator, the scene's samples.
     pub swept: Vec<Tally>,
     /// New hard cases.
@@ -49,6 +51,7 @@ impl Report {
             evaluators,
             hard: vec![0; count],
             random: tallies.clone(),
+            lit: tallies.clone(),
             swept: tallies,
             seed,
             ..Self::default()
@@ -84,7 +87,9 @@ impl Report {
                 }
             }
         }
-        for (what, tallies) in [("random search", &self.random), ("scene", &self.swept)] {
+        for (what, tallies) in
+            [("random search", &self.random), ("random lights", &self.lit), ("scene", &self.swept)]
+        {
             for (tally, evaluator) in tallies.iter().zip(&self.evaluators) {
                 if let Some(failure) = &tally.worst.failure {
                     let Tally { failed, tried, .. } = tally;
@@ -120,18 +125,24 @@ impl Report {
         for case in &self.rows {
             row(&case.name, case.verdicts.iter().map(|v| v.as_ref().map_or("-".into(), cell)).collect());
         }
-        for (name, tallies) in [("random search", &self.random), ("the scene's samples", &self.swept)] {
+        let searches = [
+            ("random search", &self.random),
+            ("random lights", &self.lit),
+            ("the scene's samples", &self.swept),
+        ];
+        for (name, tallies) in searches {
             let cell = |tally: &Tally| if tally.tried == 0 { "-".to_owned() } else { cell(&tally.worst) };
             row(name, tallies.iter().map(cell).collect());
         }
         text.push('\n');
         for (index, name) in self.evaluators.iter().enumerate() {
-            let (random, swept) = (&self.random[index], &self.swept[index]);
+            let [random, lit, swept] = [&self.random, &self.lit, &self.swept].map(|tallies| &tallies[index]);
             let _ = writeln!(
                 text,
-                "{name}: {} hard cases, {} random ones, {} samples of the scene; {} failed",
+                "{name}: {} hard cases, {} random ones, {} of lights, {} samples of the scene; {} failed",
                 self.hard[index],
                 random.tried,
+                lit.tried,
                 swept.tried,
                 self.failed(index)
             );
@@ -142,7 +153,10 @@ impl Report {
     /// How many cases an evaluator failed.
     fn failed(&self, index: usize) -> usize {
         let failed = |row: &&CaseRow| row.verdicts[index].as_ref().is_some_and(|v| v.failure.is_some());
-        self.rows.iter().filter(failed).count() + self.random[index].failed + self.swept[index].failed
+        self.rows.iter().filter(failed).count()
+            + self.random[index].failed
+            + self.lit[index].failed
+            + self.swept[index].failed
     }
 
     /// Everything as JSON.
@@ -164,6 +178,7 @@ impl Report {
             name,
             hard: self.hard[i],
             random: tally(&self.random[i]),
+            lights: tally(&self.lit[i]),
             scene: tally(&self.swept[i]),
             cases: self
                 .rows
@@ -210,6 +225,7 @@ struct OutEngine<'a> {
     name: &'a str,
     hard: usize,
     random: OutTally,
+    lights: OutTally,
     scene: OutTally,
     cases: Vec<OutCase<'a>>,
 }

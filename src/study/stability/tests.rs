@@ -4,9 +4,11 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::case::{FragmentInputs, Setting, VertexInputs};
 use super::check::check;
+use super::engine_factory::EngineFactory;
 use super::evaluate::{Answer, Frame, Sums};
 use super::hard::cases;
 use super::*;
+use crate::engine::{Objective, Point, Task};
 use crate::model::params::Param;
 
 fn study(seed: u64, cases: usize) -> Study {
@@ -44,8 +46,49 @@ fn sound_evaluators_pass_every_case() {
     assert!(report.failures().is_empty(), "{:#?}\n{:#?}", report.failures(), report.found);
     assert!(report.hard.iter().all(|&count| count > 100), "{:?}", report.hard);
     assert!(report.random.iter().all(|tally| tally.tried == 600));
+    // Of lights, three batches of 64, for engines alone.
+    assert_eq!(report.lit.iter().map(|tally| tally.tried).collect::<Vec<_>>(), [0, 0, 192]);
+    assert!(report.lit[2].worst.deviation > 0.0);
     // f32 is not f64: a deviation of exactly 0 would mean that nothing was compared.
     assert!(report.random[1].worst.deviation > 0.0 && report.random[2].worst.deviation > 0.0);
+}
+
+/// The CPU engine with a hundredth less light.
+struct Dim;
+
+impl EngineFactory for Dim {
+    fn name(&self) -> String {
+        "dim".to_owned()
+    }
+    fn with(&self, task: &Task, point: &Point, then: &mut dyn FnMut(&dyn Objective)) -> Result<(), String> {
+        Cpu.with(task, point, then)
+    }
+    fn image(&self, task: &Task, point: &Point) -> Result<Vec<Vec<f32>>, String> {
+        let mut planes = Cpu.image(task, point)?;
+        planes.iter_mut().flatten().for_each(|x| *x *= 0.99);
+        Ok(planes)
+    }
+}
+
+#[test]
+fn an_engine_whose_lights_are_dim_is_told_and_the_same_seed_tells_the_same() {
+    let search = |seed| {
+        let tallies =
+            lit::search(&only(EngineEvaluator(Dim)), &LightBox::new(None), (seed, 8 * lit::CASES), &|_| {});
+        assert_eq!(tallies[0].tried, 8 * 64);
+        // Of batches that hardly any light reaches, rounding explains the rest.
+        assert!(tallies[0].failed >= 2, "{}", tallies[0].failed);
+        tallies[0].worst.failure.clone().unwrap()
+    };
+    let failure = search(5);
+    assert!(
+        failure.starts_with("batch ")
+            && failure.contains(" of lights, ")
+            && failure.contains("rounding explains"),
+        "{failure}"
+    );
+    assert_eq!(search(5), failure);
+    assert_ne!(search(6), failure);
 }
 
 /// What of an answer is tampered with.

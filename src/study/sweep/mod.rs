@@ -3,7 +3,8 @@
 //! - [`plan`]: the plan file: what each job runs, and with which settings
 //! - [`command`]: what can be run, and which settings that takes
 //! - [`scene_text`]: a scene file's text with some of its keys set
-//! - [`job`]: what a job is; [`inputs`]: what it reads; [`run`]: from its scene to its figures; `studies`: those of ablations and tradeoffs
+//! - [`job`]: what a job is; [`inputs`]: what it reads; [`run`]: from its scene to its figures; `studies`: those of
+//!   ablations and tradeoffs
 //! - [`result`]: the one file that a job leaves
 //! - [`collect`]: every job's figures in one table
 //!

@@ -15,6 +15,7 @@ use crate::engine::{Objective, Point, Task};
 use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
 use crate::model::params::Params;
+use crate::model::texture_filter::TextureFilter;
 use crate::prepare::{Baked, PrepareError, PrepareOptions, Sampled};
 use crate::reference::Difference;
 use crate::render::format::FormatShader;
@@ -42,12 +43,13 @@ struct Traced {
     silhouette: Silhouette,
     samples_per_axis: u32,
     occlusion_rays: u32,
+    texture_filter: TextureFilter,
 }
 
 impl From<Settings> for Traced {
     fn from(Settings { silhouette, quality }: Settings) -> Self {
-        let Quality { samples_per_axis, occlusion_rays, .. } = quality;
-        Self { silhouette, samples_per_axis, occlusion_rays }
+        let Quality { samples_per_axis, occlusion_rays, texture_filter, .. } = quality;
+        Self { silhouette, samples_per_axis, occlusion_rays, texture_filter }
     }
 }
 

@@ -54,6 +54,7 @@ impl Adjoint {
         wgsl.push_str(&text.record());
         wgsl.push_str("        let adjoint = share * pixel;\n");
         wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
+        wgsl.push_str(&chain.shared);
         chain.lines.iter().for_each(|lines| wgsl.push_str(lines));
         for (k, gains) in gains.iter().enumerate() {
             for gain in gains {

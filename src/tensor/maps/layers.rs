@@ -11,6 +11,7 @@ use crate::engine::Point;
 use crate::engine::view::ObservedView;
 use crate::footprint::{cube_border, cube_pairs, edges, texel_pairs, texels, vertices};
 use crate::model::cube::Cube;
+use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::samples::{Hit, sample_hits};
 use crate::scene::MapKind;
@@ -22,7 +23,8 @@ const MADE_SIZE: usize = 512;
 /// The layers of a task: those of its maps that the enabled effects read.
 ///
 /// # Errors
-/// When no effect reads a map, the mesh has no texture coordinates for it, or the device does not take it.
+/// When no effect reads a map, or one sees it by other means, the mesh has no texture coordinates for it, or the
+/// device does not take it.
 pub fn layers(
     shared: &SharedDevice,
     task: &MapTask<'_>,
@@ -35,6 +37,13 @@ pub fn layers(
     let hits: Vec<Hit> =
         scene.views.iter().flat_map(|view| sample_hits(scene, task.posed, &rays, &view.camera)).collect();
     let mut layers = Vec::new();
+    // Both see the environment by bakes that are no layers.
+    let beside = ["fresnel", "directional_occlusion"]
+        .into_iter()
+        .find(|name| Effect::from_name(name).is_some_and(|effect| scene.effects.has(effect)));
+    if let Some(effect) = beside.filter(|_| task.kinds.contains(&MapKind::Environment)) {
+        return Err(MapError::Beside { map: MapKind::Environment.name(), effect });
+    }
     for &kind in &task.kinds {
         let parts = parts(task, kind, &hits, lobe);
         let read: Vec<LayerParts> = parts.into_iter().filter(|parts| reads(parts.input)).collect();
@@ -42,8 +51,14 @@ pub fn layers(
             return Err(MapError::Unread { map: kind.name(), effects: kind.effects() });
         }
         for parts in read {
-            if matches!(parts.grid, Grid::Texels { .. }) && !task.posed.is_unwrapped() {
-                return Err(MapError::NotUnwrapped { map: kind.name() });
+            if matches!(parts.grid, Grid::Texels { .. }) {
+                if !task.posed.is_unwrapped() {
+                    return Err(MapError::NotUnwrapped { map: kind.name() });
+                }
+                let filter = scene.quality.texture_filter;
+                if filter.reads_levels() {
+                    return Err(MapError::Filtered { map: kind.name(), filter: filter.name() });
+                }
             }
             layers.push(Layer::new(shared, parts, cuts)?);
         }

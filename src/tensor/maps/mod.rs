@@ -65,6 +65,27 @@ pub enum MapError {
     /// The rules cannot be computed on the processor.
     #[error(transparent)]
     Shading(#[from] ShadingError),
+    /// Light that reaches the image by more than the fitted cubes.
+    #[error(
+        "{map} cannot be fitted beside the effect {effect}, which sees the environment by other bakes than its cubes. Leave one of them out."
+    )]
+    Beside {
+        /// The map's name.
+        map: &'static str,
+        /// The effect.
+        effect: &'static str,
+    },
+    /// A texture that samples see by other weights than those that the fit moves it by.
+    #[error(
+        "{map} cannot be fitted with texture_filter = \"{filter}\": a fit reads textures between the four nearest texels. Set \
+         texture_filter = \"bilinear\" in [quality]."
+    )]
+    Filtered {
+        /// The map's name.
+        map: &'static str,
+        /// The filter's name.
+        filter: &'static str,
+    },
     /// A map that no enabled effect reads.
     #[error("no enabled effect reads {map}: it cannot be fitted. Leave it out, or enable {effects}.")]
     Unread {

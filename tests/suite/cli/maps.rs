@@ -102,6 +102,8 @@ fn what_cannot_be_held_out_or_fitted_is_refused_and_leaves_nothing() {
     refused(&format!("{one}[fit]{fit}"), &[&maps[..], &["front"]].concat(), &["nothing is left to fit"]);
     let without = SCENE.replace("\"side_specular\", ", "");
     refused(&without, &["--maps", "specular"], &["specular", "side_specular"]);
+    let glossy = SCENE.replace("\"reflection\"]", "\"reflection\", \"fresnel\"]");
+    refused(&glossy, &["--maps", "environment"], &["environment cannot be fitted beside the effect fresnel"]);
 }
 
 /// Ended well, with a warning that holds all of `words`.

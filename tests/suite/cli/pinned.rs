@@ -18,7 +18,8 @@ struct Pin {
     losses: [f64; 2],
     /// Surface samples.
     samples: u64,
-    /// Value and noise error (the standard error if residuals were independent) of each constant that the images determine and no bound holds.
+    /// Value and noise error (the standard error if residuals were independent) of each constant that the images
+    /// determine and no bound holds.
     constants: &'static [(&'static str, f64, f64)],
 }
 

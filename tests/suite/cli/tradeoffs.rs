@@ -5,7 +5,7 @@ use serde_json::Value;
 use super::sandbox::{Ran, Sandbox};
 
 /// Every axis that the scene asks for, in the order of documentation.
-pub(super) const AXES: [&str; 11] = [
+pub(super) const AXES: [&str; 12] = [
     "format",
     "silhouette",
     "irradiance",
@@ -15,6 +15,7 @@ pub(super) const AXES: [&str; 11] = [
     "lobes",
     "rays",
     "samples",
+    "texture_filter",
     "pixels",
     "solver",
 ];
@@ -293,7 +294,7 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
     let axes = ["--axis", "visibility", "--axis", "specular_visibility"];
     done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &axes].concat()));
     for (axis, reference, present) in
-        [("visibility", "rays", "sh4"), ("specular_visibility", "lobe", "lagarde")]
+        [("visibility", "rays", "sh4"), ("specular_visibility", "rays", "lagarde")]
     {
         let settings = settings(&sandbox, "cost", axis);
         let of = |key: &str| -> Vec<&str> {
@@ -309,4 +310,25 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
     sandbox.write("plain.toml", super::sandbox::SCENE.as_bytes());
     let idle = ["tradeoff", "plain.toml", "-o", "none", "--axis", "visibility"];
     sandbox.run(&idle).refused(&["visibility", "directional_occlusion is off"]);
+}
+
+#[test]
+fn the_most_lights_of_a_panorama_are_what_fewer_are_measured_against() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"lights\", \"shadows\"]");
+    sandbox.edit("file = \"env.exr\"", "file = \"env.exr\"\nlights = 2");
+    done(sandbox.run(&["tradeoff", "scene.toml", "-o", "cost", "--axis", "sky_lights"]));
+    let settings = settings(&sandbox, "cost", "sky_lights");
+    let names: Vec<&str> = settings.iter().map(|setting| setting["name"].as_str().unwrap()).collect();
+    assert_eq!(names, ["0", "1", "2", "4", "8", "16", "32"]);
+    let of = |key: &str| -> Vec<&str> {
+        settings.iter().filter(|s| s[key] == true).map(|s| s["name"].as_str().unwrap()).collect()
+    };
+    assert_eq!((of("reference"), of("present")), (vec!["32"], vec!["2"]), "{settings:?}");
+    assert_eq!(error(named(&settings, "32")), 0.0);
+    // What is taken out has a shadow, so that the image changes.
+    assert!(error(named(&settings, "0")) > error(named(&settings, "8")), "{settings:?}");
+    sandbox.write("plain.toml", super::sandbox::SCENE.as_bytes());
+    let idle = ["tradeoff", "plain.toml", "-o", "none", "--axis", "sky_lights"];
+    sandbox.run(&idle).refused(&["sky_lights", "no light is taken out of a panorama"]);
 }

@@ -3,8 +3,10 @@
 use std::process::Command;
 
 use skinfit::export::{self, Target};
-use skinfit::gpu::{RenderOptions, Renderer};
+use skinfit::gpu::{Gpu, RenderOptions, Renderer};
 use skinfit::model::params::Params;
+use skinfit::model::texture_filter::TextureFilter;
+use skinfit::prepare::Baked;
 use skinfit::render::antialias::Antialias;
 use skinfit::shader::quantity::Kind;
 use skinfit::shader::{Budget, Facts, Plan, plan};
@@ -78,12 +80,20 @@ fn as_wgsl(glsl: &str) -> String {
 #[test]
 fn exported_glsl_draws_the_pixels_of_the_renderers_own_shader() {
     let Some(gpu) = gpu() else { return };
-    let baked = baked(&built_in(), SURFACE, 128);
+    for filter in TextureFilter::ALL {
+        compare(
+            gpu,
+            &baked(&built_in(), SURFACE, 128).with_scene(|scene| scene.quality.texture_filter = filter),
+        );
+    }
+}
+
+fn compare(gpu: &Gpu, baked: &Baked) {
     let params = baked.scene.params.clone();
     let camera = baked.scene.views[0].camera;
     let options = RenderOptions { antialias: Antialias::Grid(1), budget: Budget::Paper, ..EXACT };
     let draw = |change: &dyn Fn(&Plan) -> Plan| {
-        let mut renderer = Renderer::with_shader(gpu, Content::of(&baked), options, change).unwrap();
+        let mut renderer = Renderer::with_shader(gpu, Content::of(baked), options, change).unwrap();
         renderer.render(&camera, 1.0).unwrap().image
     };
     // Exports have no 16-bit arithmetic.

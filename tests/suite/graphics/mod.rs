@@ -10,6 +10,7 @@
 //! - `fused`: the fit engine on the adapter against the plain f64 model
 //! - `samples`: samples that the adapter makes, beside the CPU's
 //! - `shadow_maps`: what the renderer has in the place of rays to lights
+//! - `textures`: maps filtered to the fragment, beside the CPU's samples and many of them
 //! - `exported`: exported GLSL in place of the renderer's own
 
 mod accuracy;
@@ -23,4 +24,5 @@ mod pictures;
 mod samples;
 mod shadow_maps;
 mod stability;
+mod textures;
 mod vectors;

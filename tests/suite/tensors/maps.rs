@@ -15,6 +15,7 @@ use skinfit::maps::{FittedMaps, Grid, MapError, MapTask, fit_maps};
 use skinfit::model::cube::Cube;
 use skinfit::model::effects::Effect;
 use skinfit::model::params::{Column, Param};
+use skinfit::model::texture_filter::TextureFilter;
 use skinfit::prepare::{Baked, Loaded, PrepareOptions};
 use skinfit::render::shade::Shader;
 use skinfit::samples::{LANES, TargetRows, ViewSamples};
@@ -180,6 +181,22 @@ fn a_changed_colour_map_is_found_again() {
     let unseen = then.iter().zip(&now).filter(|(a, b)| a == b).count();
     assert!(unseen > then.len() / 4, "{unseen} of {}", then.len());
     assert!(now.iter().all(|x| (0.0..=1.0).contains(x)));
+}
+
+#[test]
+fn textures_that_samples_see_filtered_are_refused() {
+    if shared().is_none() {
+        return;
+    }
+    for filter in [TextureFilter::Trilinear, TextureFilter::Anisotropic] {
+        let filtered = || small().with_scene(|scene| scene.quality.texture_filter = filter);
+        let error = fit(&filtered(), &filtered(), MapKind::Color, None).err().unwrap();
+        assert!(matches!(error, MapError::Filtered { map: "color", .. }), "{error}");
+        assert!(error.to_string().contains(filter.name()), "{error}");
+        // What is no texture is read as ever.
+        let occlusion = fit(&filtered(), &filtered(), MapKind::Occlusion, None);
+        assert!(occlusion.is_ok(), "{:?}", occlusion.err());
+    }
 }
 
 #[test]

@@ -16,6 +16,7 @@ use fearless_simd::SimdBase;
 
 use super::block::Block;
 use super::fitted::Fitted;
+use crate::model::choices::{Choices, SpecularMap, SpecularModel, SpecularVisibility};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
@@ -25,7 +26,8 @@ use crate::shader::facts::{FaceSizes, Facts};
 use crate::simd::{Level, Simd};
 use crate::with_simd;
 
-/// Parameters that move what is looked up. The others cost a product or two, and are free in every plan.
+/// Parameters that move what is looked up. The others cost a product or two, and are free in every plan; roughness and
+/// gloss, which move lookups too, are free where there is a lobe. Lights' own numbers are held.
 const MOVING: [Param; 3] = [Param::NormalStrength, Param::SpecularLobe, Param::EnvironmentRotation];
 
 /// A plan that is compiled ahead.
@@ -36,6 +38,9 @@ pub(super) struct Plan {
     form: Form,
     silhouette: Silhouette,
     effects: Effects,
+    /// Effects that became known later, by their names.
+    added: &'static [&'static str],
+    choices: Choices,
     /// Those of [`MOVING`] that are free.
     moving: &'static [Param],
     /// Whether what does not move is kept from pass to pass.
@@ -49,7 +54,8 @@ const fn plan(
     effects: Effects,
     moving: &'static [Param],
 ) -> Plan {
-    Plan { name, form, silhouette, effects, moving, keeps: true }
+    let choices = Setup::new(form, silhouette, effects).choices;
+    Plan { name, form, silhouette, effects, added: &[], choices, moving, keeps: true }
 }
 
 /// The paper's effects and its haze, as scenes and the race beside other programs have them.
@@ -64,6 +70,32 @@ const SMOOTH: Effects = Effects::of(&[
     Effect::Reflection,
 ]);
 
+/// Of a scene whose panorama's four brightest spots are lights.
+const LIT: Effects = Effects::of(&[
+    Effect::Diffuse,
+    Effect::NormalMap,
+    Effect::Occlusion,
+    Effect::Rim,
+    Effect::Lights,
+    Effect::Shadows,
+]);
+const LIT_TOO: [&str; 7] = [
+    "light_specular",
+    "fresnel",
+    "directional_occlusion",
+    "light_sky_1",
+    "light_sky_2",
+    "light_sky_3",
+    "light_sky_4",
+];
+const LIT_BY: Choices = Choices {
+    specular_model: SpecularModel::Ggx,
+    specular_visibility: SpecularVisibility::Cone,
+    specular_map: SpecularMap::F0,
+    glossy: true,
+    ..Setup::new(Corrected, Fragment, LIT).choices
+};
+
 /// What moves a mesh or comes after shading, and is nothing that a sample's radiance knows of.
 const ELSEWHERE: [Effect; 3] = [Effect::Morph, Effect::Skin, Effect::Bloom];
 
@@ -74,7 +106,7 @@ const STRENGTH_AND_LOBE: &[Param] = &[P::NormalStrength, P::SpecularLobe];
 const ALL_MOVE: &[Param] = &[P::NormalStrength, P::SpecularLobe, P::EnvironmentRotation];
 
 /// The plans, of those with the same effects the ones with less that moves first.
-static PLANS: [Plan; 25] = [
+static PLANS: [Plan; 26] = [
     plan("surface", Corrected, Fragment, Effects::SURFACE, &[]),
     plan("surface_lobe", Corrected, Fragment, Effects::SURFACE, &[P::SpecularLobe]),
     plan("surface_strength", Corrected, Fragment, Effects::SURFACE, &[P::NormalStrength]),
@@ -101,6 +133,7 @@ static PLANS: [Plan; 25] = [
     plan("listing_lobe", Listing, Vertex, Effects::SURFACE, &[P::SpecularLobe]),
     plan("listing_strength", Listing, Vertex, Effects::SURFACE, &[P::NormalStrength]),
     plan("listing_strength_lobe", Listing, Vertex, Effects::SURFACE, STRENGTH_AND_LOBE),
+    plan("lit_strength", Corrected, Fragment, LIT, &[P::NormalStrength]).with(&LIT_TOO, LIT_BY),
 ];
 
 impl Plan {
@@ -108,14 +141,27 @@ impl Plan {
         Self { keeps: false, ..self }
     }
 
-    fn setup(&self) -> Setup {
-        Setup::new(self.form, self.silhouette, self.effects)
+    const fn with(self, added: &'static [&'static str], choices: Choices) -> Self {
+        Self { added, choices, ..self }
+    }
+
+    /// `None` where this process does not know all of its effects.
+    fn setup(&self) -> Option<Setup> {
+        let mut effects = self.effects;
+        for name in self.added {
+            effects = effects.with(Effect::from_name(name)?);
+        }
+        let setup = Setup::new(self.form, self.silhouette, effects);
+        Some(Setup { choices: self.choices, ..setup })
     }
 
     /// What its tapes yield the movement of.
     pub(super) fn free(&self) -> Vec<Param> {
-        let free = |param: &Param| !MOVING.contains(param) || self.moving.contains(param);
-        Param::all().filter(|param| param.asked_for(self.effects)).filter(free).collect()
+        let effects = self.setup().map_or(self.effects, |setup| setup.effects);
+        let free = |param: &Param| {
+            (!MOVING.contains(param) || self.moving.contains(param)) && !param.name().starts_with("light.")
+        };
+        Param::all().filter(|param| param.asked_for(effects)).filter(free).collect()
     }
 
     fn turned(&self) -> bool {
@@ -130,10 +176,11 @@ impl Plan {
         if self.effects.has(Effect::Haze) { 4 } else { 3 }
     }
 
-    pub(super) fn facts(&self) -> Facts {
+    /// `None` where this process does not know all of its effects.
+    pub(super) fn facts(&self) -> Option<Facts> {
         // Lookups take the size from the cube; the rules' text wants some number.
         let any = FaceSizes { irradiance: Some(1), specular: Some(1), hilite: Some(1), reflected: Some(1) };
-        Facts::of_samples(self.setup(), any, self.turned())
+        Some(Facts::of_samples(self.setup()?, any, self.turned()))
     }
 }
 
@@ -142,10 +189,11 @@ pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<
     let effects = ELSEWHERE.into_iter().fold(fitted.setup.effects, Effects::without);
     let setup = Setup { effects, ..fitted.setup };
     let yields = |plan: &&Plan| {
+        if plan.setup() != Some(setup) {
+            return false;
+        }
         let yielded = plan.free();
-        plan.setup() == setup
-            && plan.keeps == fitted.keep
-            && plan.channels() >= fitted.channels
+        plan.keeps == fitted.keep && plan.channels() >= fitted.channels
             && plan.turned() == turned
             // Else lookups would be made anew that could be kept.
             && plan.moving.iter().all(|param| free.contains(param))
@@ -213,8 +261,11 @@ mod tests {
     use crate::program::cut::KEPT;
     use crate::program::evaluate::Shared;
     use crate::program::graph::Input;
+    use crate::program::shading::ShadingError;
     use crate::samples::LANES;
     use crate::samples::rows::Row;
+    use crate::scene::light::Light;
+    use crate::scene::lit::effect_of;
     use crate::simd::{levels, name};
 
     const HEAD: &str = "\
@@ -304,12 +355,56 @@ use crate::simd::Simd;
 
     /// The tapes of all plans.
     fn every_tape() -> impl Iterator<Item = (String, Tape)> {
-        PLANS.iter().flat_map(|plan| {
-            let tapes =
-                Tapes::new(&plan.facts(), &plan.free(), plan.channels(), |_| true, plan.keeps).unwrap();
+        every_tape_by(Tapes::printed)
+    }
+
+    fn every_tape_by(
+        make: fn(&Plan, &Facts) -> Result<Tapes, ShadingError>,
+    ) -> impl Iterator<Item = (String, Tape)> {
+        crate::shader::term::library::register_all();
+        for number in 1..=4 {
+            effect_of(&Light::of_sky(number), true).unwrap();
+        }
+        PLANS.iter().flat_map(move |plan| {
+            let facts = plan.facts().unwrap();
+            let tapes = make(plan, &facts).unwrap();
             [("keep", tapes.keep), ("value", tapes.value), ("moved", tapes.moved)]
                 .map(|(part, tape)| (format!("{}_{part}", plan.name), tape))
         })
+    }
+
+    #[test]
+    fn the_order_of_few_registers_changes_no_number() {
+        let mut rng = StdRng::seed_from_u64(5);
+        for ((name, printed), (_, plain)) in every_tape().zip(every_tape_by(Tapes::in_order_of_outputs)) {
+            assert_eq!(printed.instructions.len(), plain.instructions.len(), "{name}");
+            assert!(
+                printed.registers <= plain.registers,
+                "{name}: {} {}",
+                printed.registers,
+                plain.registers
+            );
+            let cube: Cube<f64> =
+                Cube::from_fn(2, |_, _, _| std::array::from_fn(|_| rng.random_range(0.1..1.0)));
+            // Now and then a sample has no normal, and what stands in for unit vectors is asked for.
+            for zeros in [0.0, 0.3, 1.0] {
+                let fields: Vec<f64> = plain
+                    .fields
+                    .iter()
+                    .map(|_| if rng.random_bool(zeros) { 0.0 } else { rng.random_range(-0.9..0.9) })
+                    .collect();
+                let place = |input: &Input| plain.fields.iter().position(|field| field == input).unwrap();
+                let run = |tape: &Tape| {
+                    let shared = Shared {
+                        uniforms: tape.uniform_values(|_| 0.6),
+                        cubes: vec![&cube; tape.resources.len()],
+                    };
+                    let numbers = tape.run(&shared, 0.0_f64, |input| fields[place(input)]);
+                    numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>()
+                };
+                assert_eq!(run(&printed), run(&plain), "{name} {zeros}");
+            }
+        }
     }
 
     #[test]
@@ -332,6 +427,15 @@ use crate::simd::Simd;
         assert_eq!(name(Effects::SURFACE, &weights, true), None);
         assert_eq!(name(Effects::SURFACE, &with(ALL_MOVE), true), Some("surface_all"));
         assert_eq!(name(Effects::SURFACE.with(Effect::KeyLight), &weights, false), None);
+        assert!(every_tape().count() > 0);
+        let lit = PLANS.iter().find(|plan| plan.name == "lit_strength").unwrap();
+        let mut fitted = Fitted::new(lit.setup().unwrap(), Vec::new(), &[]);
+        fitted.keep = true;
+        let named = |name| Param::from_name(name).unwrap();
+        let of_lobe = [named("roughness"), named("gloss"), named("f0"), P::NormalStrength, P::BaseWeight];
+        assert_eq!(plan_for(&fitted, &of_lobe, false).map(|plan| plan.name), Some("lit_strength"));
+        // What moves with a lamp's colour is not yielded.
+        assert!(plan_for(&fitted, &[P::NormalStrength, named("light.sky_1.color")], false).is_none());
     }
 
     #[test]
@@ -340,7 +444,7 @@ use crate::simd::Simd;
         // A block that is not full, behind some records that are not asked for.
         let (first, count) = (3, BATCH - 3);
         for (of, tape) in every_tape() {
-            let (fields, kept) = (tape.fields.len(), 24);
+            let (fields, kept) = (tape.fields.len(), 64);
             let mut drawn = |rows: usize| -> Vec<Row> {
                 (0..rows).map(|_| Row::of(std::array::from_fn(|_| rng.random_range(0.05..0.95)))).collect()
             };
@@ -384,7 +488,7 @@ use crate::simd::Simd;
                         };
                         for (k, want) in tape.run(&shared, 0.0_f64, number).into_iter().enumerate() {
                             let got = f64::from(file.columns()[k][i].get()[lane]);
-                            // Roundings of f32 over some two hundred operations; slopes between texels of up to 4 times
+                            // Roundings of f32 over hundreds of operations on the longest way; slopes between texels of up to 4 times
                             // their difference.
                             let close = (got - want).abs() <= 2e-4 * (1.0 + want.abs());
                             assert!(close, "{} {of}, output {k}: {got} {want}", name(level));

@@ -19,6 +19,7 @@ use crate::samples::surface_records::{Places, neutral};
 use crate::shader::Constant;
 use crate::shader::facts::Facts;
 use crate::shader::tangent::chain::Seed;
+use crate::simd::Level;
 
 /// A tape, and where it reads each of its fields.
 #[derive(Debug)]
@@ -68,6 +69,26 @@ pub(super) struct Tapes {
 }
 
 impl Tapes {
+    /// Of a plan that is compiled ahead, with all fields. Where its functions are not compiled the machine runs it, which
+    /// prefers the order of outputs.
+    fn of(plan: &ahead::Plan, facts: &Facts) -> Result<Self, ShadingError> {
+        if ahead::compiled_for(Level::new()) {
+            return Self::printed(plan, facts);
+        }
+        Self::in_order_of_outputs(plan, facts)
+    }
+
+    /// As the machine prefers them.
+    pub(super) fn in_order_of_outputs(plan: &ahead::Plan, facts: &Facts) -> Result<Self, ShadingError> {
+        Self::new(facts, &plan.free(), plan.channels(), |_| true, plan.keeps())
+    }
+
+    /// As they are printed: in an order in which the compiler finds registers for most numbers.
+    pub(super) fn printed(plan: &ahead::Plan, facts: &Facts) -> Result<Self, ShadingError> {
+        let held = |_: &str| true;
+        Self::made(facts, &plan.free(), plan.channels(), held, plan.keeps(), Tape::with_few_registers)
+    }
+
     /// Of the plan that `facts` call for, along `free`, for its first `channels` channels; `held` says which fields
     /// samples hold.
     pub(super) fn new(
@@ -76,6 +97,17 @@ impl Tapes {
         channels: usize,
         held: impl Fn(&str) -> bool,
         keep: bool,
+    ) -> Result<Self, ShadingError> {
+        Self::made(facts, free, channels, held, keep, Tape::new)
+    }
+
+    fn made(
+        facts: &Facts,
+        free: &[Param],
+        channels: usize,
+        held: impl Fn(&str) -> bool,
+        keep: bool,
+        tape: fn(&Graph, &[Id]) -> Tape,
     ) -> Result<Self, ShadingError> {
         let seeds: Vec<Seed> = free.iter().map(|&param| Seed::of_param(param)).collect();
         let stand_in = |field: &str| if held(field) { None } else { neutral(field) };
@@ -109,9 +141,9 @@ impl Tapes {
             columns.push(tangent.iter().map(&mut column).collect());
         }
         Ok(Self {
-            keep: Tape::new(&shading.graph, &cut.kept),
-            value: Tape::new(&cut.graph, &moved[..channels]),
-            moved: Tape::new(&cut.graph, &moved),
+            keep: tape(&shading.graph, &cut.kept),
+            value: tape(&cut.graph, &moved[..channels]),
+            moved: tape(&cut.graph, &moved),
             columns,
             levels: shading.levels,
         })
@@ -125,9 +157,9 @@ impl Pass {
         let free = fitted.free();
         let held = |field: &str| fitted.places.fields().any(|(name, ..)| name == field);
         let ahead = ahead::plan_for(fitted, &free, turned);
-        let tapes = match ahead {
+        let tapes = match ahead.and_then(|plan| Some((plan, plan.facts()?))) {
             // It reads every field; what samples lack stands in a stream of its own.
-            Some(plan) => Tapes::new(&plan.facts(), &plan.free(), plan.channels(), |_| true, plan.keeps())?,
+            Some((plan, facts)) => Tapes::of(plan, &facts)?,
             None => Tapes::new(
                 &Facts::of_samples(fitted.setup, fitted.faces, turned),
                 &free,

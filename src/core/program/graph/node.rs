@@ -41,8 +41,8 @@ pub enum Binary {
     GreaterEqual,
 }
 
-/// A function of several numbers that runs as one instruction ([`crate::program::native`]). It has parts, and for each vector
-/// that its arguments move along more of them.
+/// A function of several numbers that runs as one instruction ([`crate::program::native`]). It has parts, and for
+/// each vector that its arguments move along more of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Native {
     /// `normalize_or` of a vector; after it the fallback, which is seldom asked for.

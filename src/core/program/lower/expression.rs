@@ -9,7 +9,8 @@ use crate::program::graph::{Graph, Id, Unary};
 /// What a literal stands for: a constant of mathematics whose nearest f32 it is; else what was written, as the shortest
 /// decimal of an f32 is. 0.1 is meant, not the f32 next to it.
 fn meant(x: f32) -> f64 {
-    let known = [std::f64::consts::LN_2, std::f64::consts::PI, std::f64::consts::PI / 180.0];
+    use std::f64::consts::{FRAC_1_PI, LN_2, PI};
+    let known = [LN_2, PI, FRAC_1_PI, PI / 180.0];
     let exact = known.into_iter().find(|known| *known as f32 == x);
     exact.unwrap_or_else(|| format!("{x:e}").parse().unwrap_or_else(|_| f64::from(x)))
 }

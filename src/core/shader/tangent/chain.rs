@@ -42,6 +42,9 @@ pub struct Looked {
     pub pace: String,
 }
 
+/// Quantities that move, and how (WGSL of their types).
+pub type Moved = BTreeMap<&'static str, String>;
+
 /// How a plan's output moves along seeds.
 #[derive(Clone, Debug, Default)]
 pub struct Chain {
@@ -51,14 +54,16 @@ pub struct Chain {
     pub resources: Vec<Resource>,
     /// Constants that they read beside the plan's.
     pub constants: Vec<Constant>,
-    /// For each seed its lines, to stand after the plan's calls; they name what those do.
+    /// Lines to stand after the plan's calls, before those of any seed: slopes that several of them share.
+    pub shared: String,
+    /// For each seed its lines, to stand after those; they name what the calls do.
     pub lines: Vec<String>,
     /// For each seed, how the radiance moves (WGSL of a `vec3f`); `None` where it stays.
     pub radiance: Vec<Option<String>>,
     /// For each seed, how the haze moves (an `f32`).
     pub haze: Vec<Option<String>>,
     /// For each seed, the quantities that move with it, and how (WGSL of their types).
-    pub moved: Vec<BTreeMap<&'static str, String>>,
+    pub moved: Vec<Moved>,
     /// For each seed, how levels of the atlas move; empty where the plan looks none up.
     pub along: Vec<Along>,
 }
@@ -71,13 +76,14 @@ impl Chain {
     pub fn new(plan: &Plan, seeds: &[Seed]) -> Result<Self, TangentError> {
         let mut tangents = Tangents::new(&plan.declarations(true))?;
         let mut chain = Self::default();
+        let mut read = Vec::new();
         for (k, seed) in seeds.iter().enumerate() {
-            chain.lines.push(String::new());
             if !plan.passes.is_empty() {
                 chain.along.push(Along::new(plan, seed)?);
             }
-            let read = chain.read(plan, k);
-            let moved = chain.follow(plan, Domain::Fragment, k, seed, read, &mut tangents)?;
+            read.push(chain.read(plan, k));
+        }
+        for moved in chain.follow(plan, Domain::Fragment, seeds, read, &mut tangents)? {
             let along: Vec<&str> = parts(&plan.facts)
                 .into_iter()
                 .filter_map(|part| moved.get(part).map(String::as_str))
@@ -91,7 +97,7 @@ impl Chain {
     }
 
     /// What was looked up of levels that move with the `k`-th seed, and the field of a sample that holds how.
-    fn read(&self, plan: &Plan, k: usize) -> BTreeMap<&'static str, String> {
+    fn read(&self, plan: &Plan, k: usize) -> Moved {
         let Some(along) = self.along.get(k) else { return BTreeMap::new() };
         let moves =
             |name: &str| along.moved.contains_key(name) && plan.levels.iter().any(|level| level.name == name);
@@ -111,49 +117,90 @@ impl Chain {
 
     /// Of the texels of a draw into the atlas along one seed; `moved` are quantities whose tangents stand there. The
     /// quantities that move are `moved[0]`.
-    pub(in crate::shader) fn of_texels(
-        plan: &Plan,
-        seed: &Seed,
-        moved: BTreeMap<&'static str, String>,
-    ) -> Result<Self, TangentError> {
+    pub(in crate::shader) fn of_texels(plan: &Plan, seed: &Seed, moved: Moved) -> Result<Self, TangentError> {
         let mut tangents = Tangents::new(&plan.declarations(true))?;
-        let mut chain = Self { lines: vec![String::new()], ..Self::default() };
-        let moved = chain.follow(plan, Domain::Texel, 0, seed, moved, &mut tangents)?;
-        chain.moved.push(moved);
+        let mut chain = Self::default();
+        chain.moved =
+            chain.follow(plan, Domain::Texel, std::slice::from_ref(seed), vec![moved], &mut tangents)?;
         chain.functions.push_str(tangents.text());
         Ok(chain)
     }
 
-    /// The lines of one seed; returns the quantities that move with it, and how.
+    /// The lines of all seeds, `moved` being what moves with each before any rule; returns the quantities that move with
+    /// each, and how.
     fn follow(
         &mut self,
         plan: &Plan,
         domain: Domain,
-        k: usize,
-        seed: &Seed,
-        mut moved: BTreeMap<&'static str, String>,
+        seeds: &[Seed],
+        mut moved: Vec<Moved>,
         tangents: &mut Tangents,
-    ) -> Result<BTreeMap<&'static str, String>, TangentError> {
-        if let Some(Named { name, tangent }) = &seed.named {
-            let typed = plan.rules(domain).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
-            if let Some((_, kind)) = typed {
-                let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
-                moved.insert(name, format!("d{k}_{name}"));
-                self.reads(plan, tangent);
-            }
+    ) -> Result<Vec<Moved>, TangentError> {
+        self.lines = vec![String::new(); seeds.len()];
+        for (k, seed) in seeds.iter().enumerate() {
+            self.begin(plan, domain, k, seed, &mut moved[k]);
         }
         for rule in plan.rules(domain) {
-            let content = seed.resources.iter().filter(|looked| rule.reads.contains(&looked.resource.name()));
-            let content: Vec<String> = content.map(|looked| self.slope_call(plan, rule, looked)).collect();
-            let calls = content.into_iter().chain(tangent_call(plan, rule, &moved, tangents)?);
-            let call = calls.reduce(|all, call| format!("{all} + {call}"));
-            // A seed's own quantity moves as it was told to.
-            let held = |quantity: &str| seed.named.as_ref().is_some_and(|named| named.name == quantity);
-            if let Some(call) = call {
-                self.lines_of(k, rule, &call, &mut moved, held);
+            let slopes = self.slopes(plan, rule, &moved, tangents)?;
+            for (k, seed) in seeds.iter().enumerate() {
+                let content =
+                    seed.resources.iter().filter(|looked| rule.reads.contains(&looked.resource.name()));
+                let content: Vec<String> =
+                    content.map(|looked| self.slope_call(plan, rule, looked)).collect();
+                let along =
+                    match lone(rule, &moved[k]).and_then(|need| slopes.get(need).zip(moved[k].get(need))) {
+                        Some((slope, moved)) => Some(format!("{moved} * {slope}")),
+                        None => tangent_call(plan, rule, &moved[k], tangents)?,
+                    };
+                let call = content.into_iter().chain(along).reduce(|all, call| format!("{all} + {call}"));
+                // A seed's own quantity moves as it was told to.
+                let held = |quantity: &str| seed.named.as_ref().is_some_and(|named| named.name == quantity);
+                if let Some(call) = call {
+                    self.lines_of(k, rule, &call, &mut moved[k], held);
+                }
             }
         }
         Ok(moved)
+    }
+
+    /// A seed's own tangent.
+    fn begin(&mut self, plan: &Plan, domain: Domain, k: usize, seed: &Seed, moved: &mut Moved) {
+        let Some(Named { name, tangent }) = &seed.named else { return };
+        let typed = plan.rules(domain).flat_map(|rule| &rule.needs).find(|need| need.0 == *name);
+        if let Some((_, kind)) = typed {
+            let _ = writeln!(self.lines[k], "    let d{k}_{name}: {kind} = {tangent};");
+            moved.insert(name, format!("d{k}_{name}"));
+            self.reads(plan, tangent);
+        }
+    }
+
+    /// A rule's slopes along numbers that more than one seed moves, and nothing else of what it needs: what all of these
+    /// move through (roughness and gloss a lobe's width) is then followed once, and each costs a product a rule.
+    fn slopes(
+        &mut self,
+        plan: &Plan,
+        rule: &Rule,
+        moved: &[Moved],
+        tangents: &mut Tangents,
+    ) -> Result<BTreeMap<&'static str, String>, TangentError> {
+        let mut slopes = BTreeMap::new();
+        if rule.plain_value().is_some() {
+            return Ok(slopes);
+        }
+        let lone: Vec<&'static str> = moved.iter().filter_map(|moved| lone(rule, moved)).collect();
+        for &need in &lone {
+            let several = lone.iter().filter(|other| **other == need).count() > 1;
+            if !several || slopes.contains_key(need) {
+                continue;
+            }
+            let along = BTreeMap::from([(need, "1.0".to_owned())]);
+            if let Some(call) = tangent_call(plan, rule, &along, tangents)? {
+                let name = format!("{}_by_{need}", rule.function);
+                let _ = writeln!(self.shared, "    let {name}: {} = {call};", rule.returns);
+                slopes.insert(need, name);
+            }
+        }
+        Ok(slopes)
     }
 
     fn lines_of(
@@ -161,7 +208,7 @@ impl Chain {
         k: usize,
         rule: &Rule,
         call: &str,
-        moved: &mut BTreeMap<&'static str, String>,
+        moved: &mut Moved,
         held: impl Fn(&str) -> bool,
     ) {
         if let [(quantity, "")] = rule.gives.as_slice() {
@@ -205,11 +252,18 @@ impl Chain {
     }
 }
 
+/// The one number that a rule needs and that moves; `None` where more moves than that, or nothing.
+fn lone(rule: &Rule, moved: &Moved) -> Option<&'static str> {
+    let mut moving = rule.needs.iter().filter(|(name, _)| moved.contains_key(name));
+    let (name, kind) = moving.next()?;
+    (*kind == "f32" && moving.next().is_none()).then_some(*name)
+}
+
 /// The call that yields how a rule's value moves; `None` where nothing that it needs does.
 fn tangent_call(
     plan: &Plan,
     rule: &Rule,
-    moved: &BTreeMap<&'static str, String>,
+    moved: &Moved,
     tangents: &mut Tangents,
 ) -> Result<Option<String>, TangentError> {
     let moving: Vec<bool> = rule.needs.iter().map(|(name, _)| moved.contains_key(name)).collect();

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
+use crate::model::choices::SpecularVisibility;
 use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::{Field, Fields};
@@ -36,7 +37,13 @@ pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
         goals.extend(parts(&Facts { setup: *setup, source: Source::Samples, ..Facts::default() }));
     }
     goals.dedup();
-    let needs = of_goals(&goals, setup);
+    let mut needs = of_goals(&goals, setup);
+    if setup.choices.specular_visibility == SpecularVisibility::Rays {
+        // A rasteriser, which has no rays, looks cubes up instead. What it reads of vertices is found when it is made.
+        let mut of_raster = *setup;
+        of_raster.choices.specular_visibility = SpecularVisibility::Lagarde;
+        needs.reflected |= of_goals(&goals, &of_raster).reflected;
+    }
     known().insert(key, needs);
     needs
 }

@@ -99,6 +99,9 @@ impl Fused {
         wgsl.push_str(&self.each_sample(compares));
         wgsl.push_str(&stored(&self.plan.levels));
         wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
+        if !seeds.is_empty() {
+            wgsl.push_str(&self.chain.shared);
+        }
         seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
         let parts = parts(&self.plan.facts);
         let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };

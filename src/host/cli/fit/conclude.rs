@@ -166,6 +166,8 @@ fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec
         let names: Vec<&str> = part.baked.scene.effects.iter().map(Effect::name).collect();
         names.join(", ")
     };
+    let filter = |part: &Part| part.baked.scene.quality.texture_filter.name().to_owned();
+    let filtered = scenes.parts.iter().any(|part| part.baked.scene.quality.texture_filter.reads_levels());
     let mut engine_facts: Vec<(String, String)> = Vec::new();
     for fact in scenes.joint.engines().flat_map(Engine::provenance) {
         if !engine_facts.contains(&fact) {
@@ -199,6 +201,7 @@ fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec
             ("effects".to_owned(), each(&effects)),
             ("starts".to_owned(), format!("{}, seed {}", solving.starts, solving.seed)),
         ])
+        .chain(filtered.then(|| ("texture_filter".to_owned(), each(&filter))))
         .chain((!set.is_empty()).then(|| ("set".to_owned(), set.join(", "))))
         .chain((!held.is_empty()).then(|| ("held out".to_owned(), held.join(", "))))
         .chain(engine_facts)

@@ -93,10 +93,12 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
     // The library's advice ends its words; the option that follows it comes after.
     let option = match error {
         MapError::TooLarge { .. } | MapError::OutOfMemory { .. } => Some("--adapter"),
-        MapError::Unread { .. } | MapError::NotUnwrapped { .. } => Some("--maps"),
-        MapError::Tensor(_) | MapError::NotFinite { .. } | MapError::Constants(_) | MapError::Shading(_) => {
-            None
-        }
+        MapError::Unread { .. } | MapError::Beside { .. } | MapError::NotUnwrapped { .. } => Some("--maps"),
+        MapError::Tensor(_)
+        | MapError::Filtered { .. }
+        | MapError::NotFinite { .. }
+        | MapError::Constants(_)
+        | MapError::Shading(_) => None,
     };
     let option = option.map(|option| format!(" ({option})")).unwrap_or_default();
     let words = format!("{}: {}{option}.", scene.display(), what.trim_end_matches('.'));
@@ -108,6 +110,8 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         | MapError::Shading(_)
         | MapError::TooLarge { .. }
         | MapError::Unread { .. }
+        | MapError::Beside { .. }
+        | MapError::Filtered { .. }
         | MapError::NotUnwrapped { .. } => Refusal::new(words),
     }
 }

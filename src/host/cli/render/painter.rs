@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use super::Refusal;
 use crate::bake::interreflection::VertexGather;
+use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
+use crate::bake::sky::traces_lobes;
 use crate::bake::{PoseBake, SkyBake, VertexOcclusion};
 use crate::model::effects::Effect;
 use crate::prepare::Baked;
@@ -15,6 +17,7 @@ use crate::render::shade::Shader;
 use crate::samples::{Atlas, PosedSurface, SurfaceBakes, atlas_of, gather_of, sample_view};
 use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, Morph, PosedMesh};
+use crate::scene::mip_maps::MipMaps;
 use crate::scene::view::Camera;
 
 /// What a frame shows.
@@ -57,6 +60,8 @@ pub(super) struct CpuPainter {
     scene: Arc<Scene>,
     occlusion: Option<Arc<VertexOcclusion>>,
     sky: Option<Arc<SkyBake>>,
+    lobe_sky: Option<Arc<LobeSky>>,
+    mip_maps: Option<Arc<MipMaps>>,
     shader: Shader,
     pose: Pose,
     atlas: Option<Arc<Atlas>>,
@@ -69,7 +74,11 @@ impl CpuPainter {
         let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
         let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
         let (pose, sky) = (Pose::of(&scene, &scene.mesh, None), baked.sky.clone());
-        let mut painter = Self { scene, occlusion, sky, shader, pose, atlas: None, seconds: 0.0 };
+        let mip_maps = MipMaps::new(&scene.maps, scene.quality.texture_filter).map(Arc::new);
+        let traced = traces_lobes(&scene, scene.needs().fields);
+        let lobe_sky = if traced { LobeSky::of_scene(&scene).map(Arc::new) } else { None };
+        let mut painter =
+            Self { scene, occlusion, sky, lobe_sky, mip_maps, shader, pose, atlas: None, seconds: 0.0 };
         let atlas = atlas_of(&painter.scene, &painter.surface()?)?;
         painter.atlas = atlas;
         Ok(painter)
@@ -82,6 +91,8 @@ impl CpuPainter {
             occlusion: own.occlusion.as_ref().or(self.occlusion.as_deref()),
             sky: own.sky.as_ref().or(self.sky.as_deref()),
             gather: gather.as_ref(),
+            lobe_sky: self.lobe_sky.as_ref(),
+            mip_maps: self.mip_maps.as_ref(),
         };
         Ok(PosedSurface::new(&self.scene, mesh, rays, morphs, bakes)?)
     }

@@ -12,7 +12,9 @@ mod remeshed;
 mod samples;
 mod shadows;
 mod silhouette;
+mod sky_lights;
 mod solver;
+mod textures;
 mod ways;
 
 use super::axis::Axis;
@@ -29,9 +31,12 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &filter::Filters,
         &lobes::Density,
         &rays::Rays,
+        &sky_lights::SkyLights,
         &ways::SKY,
         &ways::LOBE,
+        &ways::SPLIT_SUM,
         &samples::Samples,
+        &textures::Textures,
         &shadows::Shadows,
         &pixels::Pixels,
         &solver::Solvers,

@@ -1,10 +1,10 @@
-//! Named choices of the model: several ways to one quantity, each beside the reference by rays.
+//! Named choices of the model: several ways to one quantity, each beside the reference.
 
 use std::time::Instant;
 
 use crate::StudyError;
 use crate::engine::Objective;
-use crate::model::choices::{SpecularVisibility, Visibility};
+use crate::model::choices::{SpecularVisibility, SplitSum, Visibility};
 use crate::model::effects::Effect;
 use crate::reference::Difference;
 use crate::render::image::Image;
@@ -45,12 +45,12 @@ pub(super) const SKY: Ways = Ways {
     ],
 };
 
-/// How much of the specular lobe is open.
+/// What the specular lobe shows of the environment.
 pub(super) const LOBE: Ways = Ways {
     axis: "specular_visibility",
-    title: "The open share of the specular lobe",
-    method: "Images with the open share of the lobe found by each way; rays into the lobe are the reference. Seconds are those \
-             of baking, tracing and one pass, nothing cached.",
+    title: "What the specular lobe shows of the environment",
+    method: "Images with the share of the lobe that the sky fills found by each way; the reference has the lobe's light itself, by \
+             rays, the skin's where these meet it. Seconds are those of baking, tracing and one pass, nothing cached.",
     effect: "fresnel",
     idle: "the effect fresnel is off",
     ways: &[
@@ -58,6 +58,21 @@ pub(super) const LOBE: Ways = Ways {
         ("lagarde", |scene| scene.choices.specular_visibility = SpecularVisibility::Lagarde),
         ("cone", |scene| scene.choices.specular_visibility = SpecularVisibility::Cone),
         ("lobe", |scene| scene.choices.specular_visibility = SpecularVisibility::Lobe),
+        ("rays", |scene| scene.choices.specular_visibility = SpecularVisibility::Rays),
+    ],
+};
+
+/// By which Fresnel factor the environment is reflected.
+pub(super) const SPLIT_SUM: Ways = Ways {
+    axis: "split_sum",
+    title: "What the specular lobe gives back of the environment",
+    method: "Images with the split sum of Schlick's Fresnel factor, and with that of the BRDF's own, which is the reference; \
+             with kelemen they are the same. Seconds are those of baking, tracing and one pass, nothing cached.",
+    effect: "fresnel",
+    idle: "the effect fresnel is off",
+    ways: &[
+        ("schlick", |scene| scene.choices.split_sum = SplitSum::Schlick),
+        ("exact", |scene| scene.choices.split_sum = SplitSum::Exact),
     ],
 };
 
@@ -75,7 +90,7 @@ impl Axis for Ways {
     fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
         // Rays a sample take about as long as tracing it that often, and bakes are made anew.
         let each = rates.trace + rates.images + rates.pass + bench.baked.seconds.bake;
-        Ok(each * self.ways.len() as f64 + 30.0 * rates.trace)
+        Ok(each * self.ways.len() as f64 + 80.0 * rates.trace)
     }
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {

@@ -21,7 +21,7 @@ fn light_NAME_shown(light_NAME_term: vec3f, diffuse_weight: vec3f, light_NAME_co
 // The BRDF of Kelemen and Szirmay-Kalos for the light NAME, over weight and s.
 //
 // gives: light_NAME_brdf
-// when: light_specular, kelemen
+// when: light_specular, kelemen, corrected
 // cost: 60
 // uses: specular
 fn light_NAME_kelemen(n: vec3f, view: vec3f, light_NAME_toward: vec3f, lobe_roughness: f32, lobe_f0: f32) -> f32 {
@@ -31,11 +31,43 @@ fn light_NAME_kelemen(n: vec3f, view: vec3f, light_NAME_toward: vec3f, lobe_roug
 // GGX for the light NAME, over weight and s.
 //
 // gives: light_NAME_brdf
-// when: light_specular, ggx
+// when: light_specular, ggx, corrected
 // cost: 80
 // uses: specular
 fn light_NAME_ggx(n: vec3f, view: vec3f, light_NAME_toward: vec3f, lobe_roughness: f32, lobe_f0: f32) -> f32 {
     return ggx_brdf(n, view, light_NAME_toward, lobe_roughness, lobe_f0);
+}
+
+// The listing's normal and view are of any length: a BRDF is of directions.
+//
+// gives: light_NAME_brdf
+// when: light_specular, kelemen, listing
+// cost: 80
+// uses: vector, specular
+fn light_NAME_kelemen_as_listed(
+    n: vec3f,
+    view: vec3f,
+    light_NAME_toward: vec3f,
+    lobe_roughness: f32,
+    lobe_f0: f32,
+) -> f32 {
+    let none: vec3f = vec3f(0.0);
+    return kelemen_brdf(normalize_or(n, none), normalize_or(view, none), light_NAME_toward, lobe_roughness, lobe_f0);
+}
+
+// gives: light_NAME_brdf
+// when: light_specular, ggx, listing
+// cost: 100
+// uses: vector, specular
+fn light_NAME_ggx_as_listed(
+    n: vec3f,
+    view: vec3f,
+    light_NAME_toward: vec3f,
+    lobe_roughness: f32,
+    lobe_f0: f32,
+) -> f32 {
+    let none: vec3f = vec3f(0.0);
+    return ggx_brdf(normalize_or(n, none), normalize_or(view, none), light_NAME_toward, lobe_roughness, lobe_f0);
 }
 
 // s f E_l, before its colour and the specular weight; `facing` has E_l over pi.

@@ -1,7 +1,7 @@
 // The hilite attenuator a, filtered by the hardware; stored in 8 bits.
 //
 // gives: attenuator
-// when: has_attenuator_map
+// when: has_attenuator_map, bilinear
 // cost: 8
 // error: 0.004
 // paper: yes

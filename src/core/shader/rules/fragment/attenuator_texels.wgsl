@@ -1,7 +1,7 @@
 // The hilite attenuator a, filtered in the shader.
 //
 // gives: attenuator
-// when: has_attenuator_map
+// when: has_attenuator_map, bilinear
 // cost: 34
 // uses: texels
 // reads: attenuator_texels

@@ -2,7 +2,7 @@
 //
 // gives: albedo
 // domain: texel, fragment
-// when: has_color_map
+// when: has_color_map, bilinear
 // cost: 8
 // error: 0.004
 // paper: yes

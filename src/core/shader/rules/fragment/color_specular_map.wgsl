@@ -2,7 +2,7 @@
 //
 // gives: albedo.xyz, specular.w
 // domain: texel, fragment
-// when: color_specular_one_size
+// when: color_specular_one_size, bilinear
 // cost: 9
 // error: 0.004
 // paper: yes

@@ -2,7 +2,7 @@
 //
 // gives: albedo.xyz, specular.w
 // domain: texel, fragment
-// when: color_specular_one_size
+// when: color_specular_one_size, bilinear
 // cost: 36
 // uses: texels
 // reads: color_specular_texels

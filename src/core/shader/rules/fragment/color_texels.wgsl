@@ -2,7 +2,7 @@
 //
 // gives: albedo
 // domain: texel, fragment
-// when: has_color_map
+// when: has_color_map, bilinear
 // cost: 34
 // uses: texels
 // reads: color_texels

@@ -2,7 +2,7 @@
 //
 // gives: normal_texel.xyz, attenuator.w
 // domain: texel, fragment
-// when: normal_attenuator_one_size
+// when: normal_attenuator_one_size, bilinear
 // cost: 9
 // error: 0.004
 // paper: yes

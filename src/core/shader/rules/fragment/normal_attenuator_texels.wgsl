@@ -2,7 +2,7 @@
 //
 // gives: normal_texel.xyz, attenuator.w
 // domain: texel, fragment
-// when: normal_attenuator_one_size
+// when: normal_attenuator_one_size, bilinear
 // cost: 36
 // uses: texels
 // reads: normal_attenuator_texels

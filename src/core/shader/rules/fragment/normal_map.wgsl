@@ -2,7 +2,7 @@
 //
 // gives: normal_texel
 // domain: texel, fragment
-// when: has_normal_map
+// when: has_normal_map, bilinear
 // cost: 8
 // error: 0.004
 // paper: yes

@@ -2,7 +2,7 @@
 //
 // gives: normal_texel
 // domain: texel, fragment
-// when: has_normal_map
+// when: has_normal_map, bilinear
 // cost: 34
 // uses: texels
 // reads: normal_texels

@@ -2,7 +2,7 @@
 //
 // gives: specular
 // domain: texel, fragment
-// when: has_specular_map
+// when: has_specular_map, bilinear
 // cost: 8
 // error: 0.004
 // paper: yes

@@ -2,7 +2,7 @@
 //
 // gives: specular
 // domain: texel, fragment
-// when: has_specular_map
+// when: has_specular_map, bilinear
 // cost: 34
 // uses: texels
 // reads: specular_texels

@@ -99,7 +99,8 @@ fn arc_cosine(cosine: f32) -> f32 {
 
 // How much of the specular lobe is open, by cones: the share of the lobe's that lies in the visible one, of cos^2 = 1 - occ
 // about the bent normal, which lies at `bent_cosine` from the mirrored view. The lobe's is of the cosine 10^(-alpha^2)
-// (Jimenez et al. 2016), the overlap Oat and Sander's (Ambient aperture lighting, 2007). alpha is m for kelemen, m^2 for ggx.
+// (Jimenez et al. 2016), the overlap Oat and Sander's (Ambient aperture lighting, 2007). alpha is m for kelemen, m^2
+// for ggx.
 fn cone_visibility(bent_cosine: f32, occ: f32, alpha: f32) -> f32 {
     let open_cosine: f32 = sqrt(min(max(1.0 - occ, 1e-12), 1.0));
     let lobe_cosine: f32 = exp2(-3.3219281 * alpha * alpha);

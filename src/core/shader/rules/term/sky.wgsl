@@ -2,14 +2,35 @@
 //
 // effect: directional_occlusion, light of the part of the sky that a point sees, and what the skin throws back
 // sample_field: sky_ratio: vec3f = 1; light that arrives of the environment, as a share of what an open point receives
+// sample_field: sky_cosine: vec3f = 0; how that moves with the cosine of the environment's turn
+// sample_field: sky_sine: vec3f = 0; how it moves with the sine
+
+// The ratio as it was found.
+//
+// gives: sky_share
+// when: directional_occlusion, !turning_sky
+// cost: 0
+fn share_of_sky(sky_ratio: vec3f) -> vec3f {
+    return sky_ratio;
+}
+
+// The ratio as the environment turns by r from where it was found, at r0: ratio + ratio' sin(r - r0), ratio' from the
+// harmonics' own turn.
+//
+// gives: sky_share
+// when: directional_occlusion, turning_sky
+// cost: 12
+fn share_of_turning_sky(sky_ratio: vec3f, sky_cosine: vec3f, sky_sine: vec3f, turn: vec2f) -> vec3f {
+    return max(sky_ratio + (turn.x * sky_cosine + turn.y * sky_sine), vec3f(0.0));
+}
 
 // occ = 1 - occlusion (1 - ratio), a channel (MODEL 10).
 //
 // gives: sky_seen
 // when: directional_occlusion, occlusion
 // cost: 6
-fn seen_of_sky(sky_ratio: vec3f, occlusion: f32) -> vec3f {
-    return 1.0 - occlusion * (1.0 - sky_ratio);
+fn seen_of_sky(sky_share: vec3f, occlusion: f32) -> vec3f {
+    return 1.0 - occlusion * (1.0 - sky_share);
 }
 
 // Where the effect `occlusion` is off its parameter counts as 1.
@@ -17,8 +38,8 @@ fn seen_of_sky(sky_ratio: vec3f, occlusion: f32) -> vec3f {
 // gives: sky_seen
 // when: directional_occlusion, !occlusion
 // cost: 0
-fn all_seen_of_sky(sky_ratio: vec3f) -> vec3f {
-    return sky_ratio;
+fn all_seen_of_sky(sky_share: vec3f) -> vec3f {
+    return sky_share;
 }
 
 // What the skin throws back is none, or in the ratio.

@@ -1,7 +1,7 @@
-// Specular light with a Fresnel term, of lamps and of the environment, and what it leaves for the diffuse light (MODEL 9
-// and 12).
+// Specular light with a Fresnel term, of lamps and of the environment, and what it leaves for the diffuse light
+// (MODEL 9 and 12).
 //
-// effect: fresnel, the environment in the skin's specular lobe; what it reflects the diffuse light lacks
+// effect: fresnel, the environment and the skin itself in the skin's specular lobe; what it reflects the diffuse light lacks
 // effect: light_specular, the lights in the skin's specular lobe
 // parameter: specular_weight = 1 in [0, inf), rgb, linear; weight of specular light; Kelemen and Szirmay-Kalos 2001
 // parameter: roughness = 0.35 in [0.05, 1]; root mean square slope of the surface; Beckmann and Spizzichino 1963
@@ -10,6 +10,11 @@
 // parameter: f0_floor = 0.3 in [0, 1]; share of f0 where the specular map is black, if it scales f0; MODEL 9
 // parameter: fresnel_loss = 1 in [0, 1], of fresnel; how much of what is reflected the diffuse light lacks; MODEL 9
 // sample_field: lobe_seen: f32 = 1; open share of the specular lobe, by rays
+// sample_field: lobe_sharp: vec3f = 0; light of the specular lobe by rays, over what its share is, at a roughness
+// sample_field: lobe_middle: vec3f = 0; the same at a greater one
+// sample_field: lobe_wide: vec3f = 0; the same at the greatest
+// sample_field: lobe_nodes: vec3f = 0; these roughnesses
+// sample_field: skin_seen: vec3f = 0; mean radiance of the skin that a point sees, before the diffuse weights
 // sample_field: bent_normal: vec3f = 0; mean direction of the open sky, as long as its share of the hemisphere
 
 // m, the roughness that every formula takes.
@@ -56,9 +61,21 @@ fn weight_everywhere() -> f32 {
 }
 
 // gives: view_cosine
+// when: corrected
 // cost: 6
 fn cosine_of_view(n: vec3f, view: vec3f) -> f32 {
     return max(-dot(n, view), 0.0);
+}
+
+// The listing's normal and view are of any length.
+//
+// gives: view_cosine
+// when: listing
+// cost: 26
+// uses: vector
+fn cosine_of_view_as_listed(n: vec3f, view: vec3f) -> f32 {
+    let none: vec3f = vec3f(0.0);
+    return max(-dot(normalize_or(n, none), normalize_or(view, none)), 0.0);
 }
 
 // es = f0 a + b, what of a constant environment is reflected: the split sum of kelemen.
@@ -72,15 +89,25 @@ fn share_of_kelemen(view_cosine: f32, lobe_roughness: f32, lobe_f0: f32) -> f32 
     return lobe_f0 * sums.x + sums.y;
 }
 
-// es = f0 a + b with Schlick's Fresnel factor, the split sum of ggx.
+// es = f0 a + b with Schlick's Fresnel factor in the place of a dielectric's, the split sum of ggx.
 //
 // gives: environment_share
-// when: ggx
+// when: ggx, !exact_split_sum
 // cost: 122
 // uses: split_sum_ggx
 fn share_of_ggx(view_cosine: f32, lobe_roughness: f32, lobe_f0: f32) -> f32 {
     let sums: vec2f = split_sum_ggx(view_cosine, lobe_roughness);
     return lobe_f0 * sums.x + sums.y;
+}
+
+// es with a dielectric's Fresnel factor, which ggx has; it is not linear in f0.
+//
+// gives: environment_share
+// when: ggx, exact_split_sum
+// cost: 330
+// uses: specular, split_sum_ggx, dielectric_sum_ggx
+fn dielectric_share_of_ggx(view_cosine: f32, lobe_roughness: f32, lobe_f0: f32) -> f32 {
+    return dielectric_sum_ggx(view_cosine, lobe_roughness, lobe_f0);
 }
 
 // What the lobe's width is told by: m of kelemen.
@@ -120,7 +147,8 @@ fn lobe_by_occlusion(view_cosine: f32, occ: f32, lobe_roughness: f32) -> f32 {
     return lagarde_visibility(view_cosine, occ, lobe_roughness);
 }
 
-// How much of the lobe is open: what its cone shares with that of the open sky (Oat and Sander 2007, Jimenez et al. 2016).
+// How much of the lobe is open: what its cone shares with that of the open sky (Oat and Sander 2007, Jimenez et al.
+// 2016).
 //
 // gives: lobe_open
 // when: cone_visibility
@@ -250,22 +278,80 @@ fn place_of_lobe(lobe_direction: vec3f) -> vec3f {
     return cube_place(lobe_direction);
 }
 
+// Light of the lobe by rays, between the roughnesses that were traced by the parabola through them; what is sharper
+// or wider has that of the last.
+//
+// gives: lobe_traced
+// when: traced_lobe
+// cost: 36
+fn light_by_rays(
+    lobe_sharp: vec3f,
+    lobe_middle: vec3f,
+    lobe_wide: vec3f,
+    lobe_nodes: vec3f,
+    lobe_roughness: f32,
+) -> vec3f {
+    // Samples that stand for nothing have no roughnesses.
+    let a: f32 = max(lobe_nodes.y - lobe_nodes.x, 0.001);
+    let b: f32 = max(lobe_nodes.z - lobe_nodes.y, 0.001);
+    let m: f32 = clamp(lobe_roughness, lobe_nodes.x, lobe_nodes.z) - lobe_nodes.y;
+    let sharp: vec3f = (m * (m - b) / (a * (a + b))) * lobe_sharp;
+    let middle: vec3f = ((m + a) * (b - m) / (a * b)) * lobe_middle;
+    let wide: vec3f = (m * (m + a) / (b * (a + b))) * lobe_wide;
+    return max(sharp + middle + wide, vec3f(0.0));
+}
+
+// The same before its weight: s E es.
+//
+// gives: lobe_term
+// when: traced_lobe
+// cost: 4
+fn light_in_traced_lobe(lobe_traced: vec3f, lobe_weight: f32, environment_share: f32) -> vec3f {
+    return (lobe_weight * environment_share) * lobe_traced;
+}
+
 // What the lobe shows of the environment before its weight: s SO E_r(R) es.
 //
 // gives: lobe_term
+// when: !traced_lobe
 // cost: 5
 fn light_in_lobe(lobe_light: vec3f, lobe_weight: f32, lobe_open: f32, environment_share: f32) -> vec3f {
     return (lobe_weight * lobe_open * environment_share) * lobe_light;
 }
 
-// specular_weight s SO E_r(R) es.
+// Where the lobe does not see the sky it is black, or rays have brought the skin's light.
+//
+// gives: lobe_shown
+// when: !skin_reflected
+// cost: 0
+fn lobe_without_skin(lobe_term: vec3f) -> vec3f {
+    return lobe_term;
+}
+
+// What the lobe does not see of the sky it sees of the skin: s es (1 - SO) L more, L what the point sees of it on
+// average.
+//
+// gives: lobe_shown
+// when: skin_reflected
+// cost: 9
+fn lobe_with_skin(
+    lobe_term: vec3f,
+    skin_seen: vec3f,
+    lobe_weight: f32,
+    lobe_open: f32,
+    environment_share: f32,
+) -> vec3f {
+    return lobe_term + (lobe_weight * environment_share * (1.0 - lobe_open)) * skin_seen;
+}
+
+// specular_weight s es (SO E_r(R) + (1 - SO) L).
 //
 // gives: fresnel_environment
 // adds: fresnel
 // when: fresnel
 // cost: 3
-fn environment_in_lobe(lobe_term: vec3f, specular_weight: vec3f) -> vec3f {
-    return specular_weight * lobe_term;
+fn environment_in_lobe(lobe_shown: vec3f, specular_weight: vec3f) -> vec3f {
+    return specular_weight * lobe_shown;
 }
 
 // rho = specular_weight s es, what is reflected of a constant environment; never all.

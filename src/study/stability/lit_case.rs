@@ -1,0 +1,256 @@
+//! What the search of lights draws: fragments with the fields that samples hold of lights and sky, named choices, and
+//! parameters.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use rand::RngExt;
+use rand::rngs::StdRng;
+
+use super::case::{EVERYTHING, FragmentInputs};
+use super::lights::{LightBox, LightKind};
+use super::random::{fragment, one_of, parameter, share, unit};
+use super::reference::{Moves, moved, moved_params};
+use crate::bake::Illumination;
+use crate::bake::reflected::ReflectedStack;
+use crate::model::choices::{
+    Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
+};
+use crate::model::effects::{Effect, Effects, Form, Silhouette};
+use crate::model::evaluate::Setup;
+use crate::model::fields::Field;
+use crate::model::params::{Param, Params};
+use crate::model::vector::dot;
+use crate::samples::surface_records::Asked;
+use crate::samples::{LANES, SurfaceRecords};
+use crate::scene::light::{Beam, Cone, Lamp};
+use crate::scene::{Light, LightKind as SceneLight, Loss};
+use crate::shader::term::{TermError, library};
+
+/// The effects of two lights that only this study has: one from a direction, one that stands somewhere.
+pub(super) struct Probes(Effects);
+
+impl Probes {
+    /// The two, known from then on.
+    ///
+    /// # Errors
+    /// When a scene's lights have taken their names.
+    pub(super) fn new() -> Result<Self, TermError> {
+        library::register_all();
+        let beam = Beam { direction: DVec3::NEG_Z, irradiance: [1.0; 3], angular_diameter_degrees: 0.0 };
+        let lamp = Lamp { position: DVec3::Z, intensity: [1.0; 3], range: None, radius: 0.0 };
+        let cone = Cone { direction: DVec3::NEG_Z, inner_degrees: 10.0, outer_degrees: 20.0 };
+        let lights = [
+            ("stability_beam", SceneLight::Directional(beam)),
+            ("stability_lamp", SceneLight::Spot(lamp, cone)),
+        ];
+        let mut effects = Effects::default();
+        for (name, kind) in lights {
+            effects = effects.with(Light { name: name.to_owned(), kind }.effect()?);
+        }
+        Ok(Self(effects))
+    }
+}
+
+/// A fragment, and the numbers of each of the batch's fields.
+#[derive(Clone, Debug)]
+pub(super) struct LitFragment {
+    inputs: FragmentInputs,
+    fields: Vec<[f32; 3]>,
+}
+
+/// Fragments under one setting.
+pub(super) struct LitBatch {
+    /// The switches of the model.
+    pub(super) setup: Setup,
+    /// Its parameters.
+    pub(super) params: Params,
+    /// Cubes.
+    pub(super) light: Arc<Illumination>,
+    /// What engines minimise.
+    pub(super) loss: Loss,
+    /// The fragments.
+    pub(super) fragments: Vec<LitFragment>,
+}
+
+impl LitBatch {
+    /// A random one.
+    #[must_use]
+    pub(super) fn random(probes: &Probes, lights: &LightBox, rng: &mut StdRng, count: usize) -> Self {
+        let setup = setup(probes, rng);
+        let mut params = Params::defaults(setup.form);
+        for param in Param::all().filter(|param| param.asked_for(setup.effects)) {
+            let mut draw = || number(param, setup.form, rng);
+            let rgb = if param.info().rgb { [draw(), draw(), draw()] } else { [draw(); 3] };
+            params.set_rgb(param, rgb);
+        }
+        let light = light(lights, setup.choices.specular_model, rng);
+        let fields: Vec<Field> = setup.needs().fields.iter().collect();
+        let draw = |rng: &mut StdRng| {
+            let inputs = fragment(rng);
+            LitFragment {
+                inputs,
+                fields: fields.iter().map(|field| found(field.name(), &inputs, rng)).collect(),
+            }
+        };
+        let fragments = (0..count).map(|_| draw(rng)).collect();
+        Self { setup, params, light, loss: one_of(rng, &Loss::ALL), fragments }
+    }
+
+    /// One of its fragments alone.
+    #[must_use]
+    pub(super) fn alone(&self, slot: usize) -> Self {
+        let (params, light) = (self.params.clone(), Arc::clone(&self.light));
+        Self { params, light, fragments: vec![self.fragments[slot].clone()], ..*self }
+    }
+
+    /// Its switches in words.
+    #[must_use]
+    pub(super) fn words(&self) -> String {
+        let named = self.setup.choices.named().map(|(key, value)| format!("{key} = {value}"));
+        format!("{:?}, {:?}, {}", self.setup.form, self.setup.effects, named.join(", "))
+    }
+
+    /// Every number moved as roundings may move it.
+    pub(super) fn moved(&self, moves: &mut Moves<'_>) -> (Vec<LitFragment>, Params) {
+        let each = |fragment: &LitFragment, moves: &mut Moves<'_>| LitFragment {
+            inputs: moved(&fragment.inputs, moves),
+            fields: fragment.fields.iter().map(|numbers| moves.vector(*numbers)).collect(),
+        };
+        let fragments = self.fragments.iter().map(|fragment| each(fragment, moves)).collect();
+        let mut params = moved_params(&self.params, moves);
+        for param in Param::all().filter(|param| !param.is_built_in() && param.asked_for(self.setup.effects))
+        {
+            params.set_rgb(param, self.params.rgb(param).map(|x| moves.number(x)));
+        }
+        (fragments, params)
+    }
+
+    /// The records of so many groups, the pixel of each slot, and its coverage; what fills the last group has none.
+    #[must_use]
+    pub(super) fn records(
+        &self,
+        fragments: &[LitFragment],
+        groups: usize,
+    ) -> (SurfaceRecords, Vec<u32>, Vec<f32>) {
+        let fields = self.setup.needs().fields;
+        let mut surface = SurfaceRecords::new(Asked { fields, ..Asked::EVERYTHING }, groups);
+        let of_slot = |slot: usize| match fragments.get(slot) {
+            Some(fragment) => (fragment, slot as u32, 1.0),
+            None => (&fragments[slot / LANES * LANES], u32::MAX, 0.0),
+        };
+        let (mut pixel, mut coverage) = (Vec::new(), Vec::new());
+        for slot in 0..groups * LANES {
+            let (fragment, number, share) = of_slot(slot);
+            surface.set(slot, &fragment.inputs.fragment(self.setup, 0.0_f32), share);
+            pixel.push(number);
+            coverage.push(share);
+        }
+        let places: Vec<_> = surface.places().fields().map(|(name, at, _)| (name, at)).collect();
+        for (k, field) in fields.iter().enumerate() {
+            let Some((_, at)) = places.iter().find(|(name, _)| *name == field.name()) else { continue };
+            for component in 0..field.info().numbers {
+                for (slot, number) in surface.rows_mut().plane_mut(at + component).enumerate() {
+                    *number = of_slot(slot).0.fields[k][component];
+                }
+            }
+        }
+        (surface, pixel, coverage)
+    }
+}
+
+/// Most effects of light, under any of the named choices.
+fn setup(probes: &Probes, rng: &mut StdRng) -> Setup {
+    let form = if rng.random_range(0..4) == 0 { Form::Listing } else { Form::Corrected };
+    // The key light is a difference of two terms, and haze and reflection have their own search.
+    let mut effects = EVERYTHING.without(Effect::KeyLight);
+    for effect in EVERYTHING.iter() {
+        if effect != Effect::Diffuse && rng.random_range(0..3) == 0 {
+            effects = effects.without(effect);
+        }
+    }
+    let drawn = |rng: &mut StdRng| rng.random_range(0..4) > 0;
+    if drawn(rng) {
+        effects = probes.0.iter().fold(effects.with(Effect::Lights), Effects::with);
+        for name in [Effect::Shadows.name(), "light_specular"] {
+            effects = Effect::from_name(name).filter(|_| drawn(rng)).into_iter().fold(effects, Effects::with);
+        }
+    }
+    for name in ["fresnel", "directional_occlusion"] {
+        effects = Effect::from_name(name).filter(|_| drawn(rng)).into_iter().fold(effects, Effects::with);
+    }
+    let setup = Setup::new(form, one_of(rng, &Silhouette::ALL), effects);
+    let choices = Choices {
+        specular_model: one_of(rng, &SpecularModel::ALL),
+        split_sum: one_of(rng, &SplitSum::ALL),
+        specular_visibility: one_of(rng, &SpecularVisibility::ALL),
+        lobe_lookup: one_of(rng, &LobeLookup::ALL),
+        specular_map: one_of(rng, &SpecularMap::ALL),
+        bounces: one_of(rng, &Bounces::ALL),
+        skin_reflection: one_of(rng, &SkinReflection::ALL),
+        // What may be free is.
+        glossy: true,
+        turning: rng.random(),
+        ..setup.choices
+    };
+    Setup { choices, ..setup }
+}
+
+/// Products of four of these, squared, stay below f32's 3.4e38.
+const BRIGHTEST: f64 = 100.0;
+
+fn number(param: Param, form: Form, rng: &mut StdRng) -> f64 {
+    parameter(param, form, rng).clamp(-BRIGHTEST, BRIGHTEST.max(param.info().corrected))
+}
+
+/// An ordinary light or darkness, with cubes of the specular lobe.
+fn light(lights: &LightBox, model: SpecularModel, rng: &mut StdRng) -> Arc<Illumination> {
+    let own = lights.of(one_of(rng, &[LightKind::Wavy, LightKind::Wavy, LightKind::Dark]));
+    let mut light = Illumination::clone(own);
+    let of = light.lobes.as_ref().map(|lobes| lobes.cubes[1].clone());
+    // Brighter as it is sharper, so that the stack has a slope.
+    let cube =
+        |cube: &crate::model::cube::Cube<f32>, m: f64| cube.map(|texel| texel.map(|x| x * (1.5 - m) as f32));
+    light.reflected = of.map(|of| ReflectedStack::new(model, &(0.25..=1.0), 1, |m| cube(&of, m)));
+    Arc::new(light)
+}
+
+/// What a sample may hold of a field, by its name.
+fn found(name: &str, at: &FragmentInputs, rng: &mut StdRng) -> [f32; 3] {
+    let bright = |rng: &mut StdRng| match rng.random_range(0..6) {
+        0 => 0.0,
+        1 => 10_f64.powf(rng.random_range(-30.0..=2.0)),
+        _ => 4.0 * share(rng).abs(),
+    };
+    let three = |x: f64| [x; 3];
+    let numbers = match name {
+        name if name.ends_with("_toward") => direction(at, rng),
+        "bent_normal" => direction(at, rng).map(|x| share(rng).abs() * x),
+        name if name.ends_with("_open") || name == "lobe_seen" => three(share(rng).abs()),
+        "sky_cosine" | "sky_sine" => std::array::from_fn(|_| rng.random_range(-2.0..=2.0)),
+        // None where a sample stands for nothing.
+        "lobe_nodes" if rng.random_range(0..6) == 0 => [0.0; 3],
+        "lobe_nodes" => [0.2, 0.4, 0.8],
+        // Distances, radiance, shares of light.
+        _ => std::array::from_fn(|_| bright(rng)),
+    };
+    numbers.map(|x| x as f32)
+}
+
+/// A unit vector, or none: anywhere, along the normal, level with the surface, along the view or mirrored.
+fn direction(at: &FragmentInputs, rng: &mut StdRng) -> [f64; 3] {
+    let (n, view) = (at.normal, at.view);
+    let along = dot(n, view);
+    let d = match rng.random_range(0..12) {
+        0 => [0.0; 3],
+        1 => n,
+        2 => view,
+        3 => view.map(|x| -x),
+        4 => std::array::from_fn(|i| view[i] - 2.0 * along * n[i]),
+        5 => at.tangent,
+        6 => n.map(|x| -x),
+        _ => unit(rng),
+    };
+    let length = dot(d, d).sqrt();
+    if length > 1e-6 { d.map(|x| x / length) } else { [0.0; 3] }
+}
