@@ -7,9 +7,14 @@ use glam::{Vec3A, vec3a};
 pub(crate) struct Sobol(Vec<[u32; 2]>);
 
 impl Sobol {
-    /// The first `count` points.
+    /// The first `count` points, cell by cell of the square: scrambling moves whole cells, so that points which follow
+    /// one another are near one another with any seed.
     pub(crate) fn new(count: u32) -> Self {
-        Self((0..count).map(|i| [i, second_dimension(i).reverse_bits()]).collect())
+        let mut points: Vec<[u32; 2]> = (0..count).map(|i| [i, second_dimension(i).reverse_bits()]).collect();
+        // The lowest bits are the highest of the coordinates: Morton's order.
+        let cell = |[x, y]: &[u32; 2]| (0..8).fold(0, |cell, k| cell << 2 | (x >> k & 1) << 1 | y >> k & 1);
+        points.sort_by_key(cell);
+        Self(points)
     }
 
     /// How many points there are.

@@ -35,7 +35,7 @@ pub mod sky;
 pub mod stacks;
 pub mod transfer;
 pub(crate) mod vertex_rays;
-mod wide_bvh;
+pub(crate) mod wide_bvh;
 
 use std::ops::RangeInclusive;
 use std::path::Path;

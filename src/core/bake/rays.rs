@@ -1,6 +1,7 @@
 //! A mesh as rays see it: a wide BVH (`obvhs`) and a watertight intersection.
 
 use std::collections::HashSet;
+use std::sync::OnceLock;
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
@@ -8,6 +9,8 @@ use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh_from_tris;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
+
+use super::wide_bvh::WideBvh;
 
 /// Positions beyond this have boxes whose area has no place in f32.
 const FARTHEST: f32 = 1e18;
@@ -25,6 +28,8 @@ pub struct RayMesh {
     triangles: Vec<Triangle>,
     /// For each triangle, which one it is in the mesh.
     index: Vec<u32>,
+    /// The same for packets of rays, made when the first of them comes.
+    wide: OnceLock<WideBvh>,
 }
 
 /// Whether a ray can hit the triangle: its area is a number above 0 to f32, as the intersection computes it.
@@ -56,13 +61,13 @@ fn kept(positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<u32> {
     kept
 }
 
-/// A ray from `least` on. For a component near 0, `Ray::new` takes that of a slope of 1e-7, which
+/// A ray. For a component near 0, `Ray::new` takes that of a slope of 1e-7, which
 /// leaves a box whose face the ray runs in: where a mirror-symmetric mesh is seen from its plane.
-fn ray(origin: Vec3A, direction: Vec3A, least: f32) -> Ray {
+fn ray(origin: Vec3A, direction: Vec3A) -> Ray {
     // The traversal takes -0 for a positive number: its inverse must be one, too.
     let inverse = |x: f32| if x.abs() < 1e-20 { 1e20_f32.copysign(x + 0.0) } else { 1.0 / x };
     let inv_direction = Vec3A::from(direction.to_array().map(inverse));
-    Ray { origin, direction, inv_direction, tmin: least, tmax: f32::INFINITY }
+    Ray { origin, direction, inv_direction, tmin: 0.0, tmax: f32::INFINITY }
 }
 
 impl RayMesh {
@@ -81,45 +86,20 @@ impl RayMesh {
             build_cwbvh_from_tris(&triangles, parameters, &mut std::time::Duration::default())
         };
         let bvh = (!triangles.is_empty()).then(build);
-        Self { bvh, triangles, index }
+        Self { bvh, triangles, index, wide: OnceLock::new() }
     }
 
-    /// Whether the ray meets any triangle, from either side, beyond `least` times its direction.
-    #[must_use]
-    pub fn hits(&self, origin: Vec3A, direction: Vec3A, least: f32) -> bool {
-        let Some(bvh) = &self.bvh else { return false };
-        let ray = ray(origin, direction, least);
-        !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
+    /// The hierarchy for packets of rays.
+    pub(crate) fn wide(&self) -> &WideBvh {
+        self.wide.get_or_init(|| WideBvh::new(self.bvh.as_ref(), &self.triangles, &self.index))
     }
 
-    /// The hierarchy; none without triangles.
-    pub(super) fn bvh(&self) -> Option<&CwBvh> {
-        self.bvh.as_ref()
-    }
-
-    /// A triangle by its place among those that can be hit: its corners, and which one it is in the mesh.
-    pub(super) fn triangle(&self, place: u32) -> ([Vec3A; 3], u32) {
-        let Triangle { v0, v1, v2 } = self.triangles[place as usize];
-        ([v0, v1, v2], self.index[place as usize])
-    }
-
-    /// Whether a triangle stands between two points, seen from either side.
-    #[must_use]
-    pub fn between(&self, from: Vec3A, to: Vec3A) -> bool {
-        let distance = (to - from).length();
-        let (Some(bvh), Some(direction)) = (&self.bvh, (to - from).try_normalize()) else { return false };
-        let ray = Ray { tmax: distance, ..ray(from, direction, 0.0) };
-        !bvh.ray_traverse_miss(ray, |ray, slot| self.intersect(ray, bvh.primitive_indices[slot]))
-    }
-
-    /// The nearest triangle along the ray, by its index in the mesh, from either side.
-    #[must_use]
-    pub fn first(&self, origin: Vec3A, direction: Vec3A) -> Option<u32> {
-        let bvh = self.bvh.as_ref()?;
-        let (mut hit, ray) = (RayHit::none(), ray(origin, direction, 0.0));
-        let intersect = |ray: &Ray, slot: usize| self.intersect(ray, bvh.primitive_indices[slot]);
-        let found = bvh.ray_traverse(ray, &mut hit, intersect);
-        found.then(|| self.index[bvh.primitive_indices[hit.primitive_id as usize] as usize])
+    /// The same with the instructions of `level`.
+    #[cfg(test)]
+    pub(crate) fn wide_at(&self, level: fearless_simd::Level) -> WideBvh {
+        let mut wide = WideBvh::new(self.bvh.as_ref(), &self.triangles, &self.index);
+        wide.level = level;
+        wide
     }
 
     /// The nearest triangle along the ray, by `intersect`: the distance at which the ray meets a
@@ -131,27 +111,10 @@ impl RayMesh {
         mut intersect: impl FnMut(u32) -> f32,
     ) -> Option<u32> {
         let bvh = self.bvh.as_ref()?;
-        let (mut hit, ray) = (RayHit::none(), ray(origin, direction, 0.0));
+        let (mut hit, ray) = (RayHit::none(), ray(origin, direction));
         let triangle = |slot: usize| self.index[bvh.primitive_indices[slot] as usize];
         bvh.ray_traverse(ray, &mut hit, |_, slot| intersect(triangle(slot)))
             .then(|| triangle(hit.primitive_id as usize))
-    }
-
-    /// The distance to a triangle, or infinity. An edge's test is the exact negative of its
-    /// neighbour's, so no ray slips between two triangles.
-    #[inline(always)]
-    fn intersect(&self, ray: &Ray, triangle: u32) -> f32 {
-        let triangle = &self.triangles[triangle as usize];
-        let (a, b, c) = (triangle.v0 - ray.origin, triangle.v1 - ray.origin, triangle.v2 - ray.origin);
-        let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
-        let (u, v, w) = (ray.direction.dot(bc), ray.direction.dot(ca), ray.direction.dot(ab));
-        let inside = (u >= 0.0 && v >= 0.0 && w >= 0.0) || (u <= 0.0 && v <= 0.0 && w <= 0.0);
-        let determinant = u + v + w;
-        if !inside || determinant == 0.0 {
-            return f32::INFINITY;
-        }
-        let t = (b - a).cross(c - a).dot(a) / determinant;
-        if t >= ray.tmin && t <= ray.tmax { t } else { f32::INFINITY }
     }
 }
 
@@ -189,7 +152,7 @@ mod tests {
         ] {
             let (positions, triangles) = before_the_last(hidden, MANY);
             let mesh = RayMesh::new(&positions, &triangles);
-            assert!(mesh.hits(Vec3A::ZERO, Vec3A::Z, 0.0) && !mesh.hits(Vec3A::ZERO, Vec3A::X, 0.0));
+            assert_eq!(mesh.wide().hits(Vec3A::ZERO, &[Vec3A::Z, Vec3A::X]), [true, false]);
             let found =
                 mesh.nearest(
                     Vec3A::ZERO,
@@ -208,17 +171,11 @@ mod tests {
         let mesh = RayMesh::new(&positions, &triangles);
         for (x, y) in [(0.0, 0.0), (-0.0, 0.0), (0.0, -0.0), (-0.0, -0.0)] {
             let direction = Vec3A::new(x, y, 1.0);
-            assert!(mesh.hits(Vec3A::new(0.01, -0.02, 0.0), direction, 0.0), "{direction}");
-            assert!(mesh.hits(Vec3A::new(0.01, -0.02, 3.0), -direction, 0.0), "{direction}");
-        }
-    }
-
-    #[test]
-    fn what_stands_behind_the_further_point_is_not_between() {
-        let mesh = RayMesh::new(&across(2.0), &[[0, 1, 2]]);
-        // The hierarchy's boxes are a little larger than what is in them, the triangle is not.
-        for (to, want) in [(1.999, false), (2.001, true), (1e9, true), (-1e9, false), (0.0, false)] {
-            assert_eq!(mesh.between(Vec3A::ZERO, to * Vec3A::Z), want, "{to}");
+            for (depth, direction) in [(0.0, direction), (3.0, -direction)] {
+                let origin = Vec3A::new(0.01, -0.02, depth);
+                assert_eq!(mesh.nearest(origin, direction, |_| 1.0), Some(0), "{direction}");
+                assert_eq!(mesh.wide().hits(origin, &[direction]), [true], "{direction}");
+            }
         }
     }
 
@@ -227,7 +184,7 @@ mod tests {
         let collapsed = [Vec3::ONE; 3];
         for (positions, triangles) in [(&collapsed[..], &[[0, 1, 2]][..]), (&[], &[])] {
             let mesh = RayMesh::new(positions, triangles);
-            assert!(!mesh.hits(Vec3A::ZERO, Vec3A::ONE.normalize(), 0.0));
+            assert_eq!(mesh.wide().hits(Vec3A::ZERO, &[Vec3A::ONE.normalize()]), [false]);
             assert_eq!(mesh.nearest(Vec3A::ZERO, Vec3A::ONE.normalize(), |_| 1.0), None);
             assert!(!any_can_be_hit(positions, triangles));
         }

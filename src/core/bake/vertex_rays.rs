@@ -101,10 +101,10 @@ impl VertexRays {
 
     /// What `of` makes of each one's rays at rest, with what they found. All cores.
     pub(super) fn at_rest<F: Found, R: Send>(&self, of: impl Fn(usize, &Rays, Vec<F>) -> R + Sync) -> Vec<R> {
-        let mesh = wide(&self.rest.positions, &self.rest.triangles);
+        let mesh = RayMesh::new(&self.rest.positions, &self.rest.triangles);
         let found = |i: usize| {
             let rays = self.rays(i, &self.rest);
-            let found = F::along(&mesh, &rays);
+            let found = F::along(mesh.wide(), &rays);
             of(i, &rays, found)
         };
         (0..self.len()).into_par_iter().map(found).collect()
@@ -118,15 +118,17 @@ impl VertexRays {
         at_rest: &[Vec<F>],
         of: impl Fn(usize, &Rays, Vec<F>) -> R + Sync,
     ) -> Vec<R> {
-        let mesh = wide(&target.positions, &target.triangles);
+        let mesh = RayMesh::new(&target.positions, &target.triangles);
         let moved = moved_triangles(&self.rest, target);
         let found = |i: usize| {
             let rays = self.rays(i, target);
             let vertex = self.vertex(i);
             let still = self.rest.positions[vertex] == target.positions[vertex]
                 && self.rest.normals[vertex] == target.normals[vertex];
-            let found =
-                if still { kept(&at_rest[i], moved.as_ref(), &mesh, &rays) } else { F::along(&mesh, &rays) };
+            let found = match still {
+                true => kept(&at_rest[i], moved.as_ref().map(RayMesh::wide), mesh.wide(), &rays),
+                false => F::along(mesh.wide(), &rays),
+            };
             of(i, &rays, found)
         };
         (0..self.len()).into_par_iter().map(found).collect()
@@ -136,10 +138,6 @@ impl VertexRays {
     pub(super) fn spread<T: Copy>(&self, distinct: &[T], width: usize) -> Vec<T> {
         self.slot.iter().flat_map(|&slot| &distinct[slot as usize * width..][..width]).copied().collect()
     }
-}
-
-fn wide(positions: &[Vec3], triangles: &[[u32; 3]]) -> WideBvh {
-    WideBvh::new(&RayMesh::new(positions, triangles))
 }
 
 /// What rays from where nothing moved find, given what they found `before`.
@@ -179,14 +177,15 @@ fn distinct(rest: &PosedMesh, targets: &[PosedMesh]) -> (Vec<u32>, Vec<u32>) {
 }
 
 /// The triangles that differ between two poses, as they stand in both.
-fn moved_triangles(rest: &PosedMesh, target: &PosedMesh) -> Option<WideBvh> {
+fn moved_triangles(rest: &PosedMesh, target: &PosedMesh) -> Option<RayMesh> {
     let moved: Vec<[u32; 3]> = (rest.triangles.iter().copied())
         .filter(|t| t.iter().any(|&v| rest.positions[v as usize] != target.positions[v as usize]))
         .collect();
     let count = rest.positions.len() as u32;
     let shifted = moved.iter().map(|t| t.map(|v| v + count));
     let triangles: Vec<[u32; 3]> = moved.iter().copied().chain(shifted).collect();
-    (!triangles.is_empty()).then(|| wide(&[&rest.positions[..], &target.positions].concat(), &triangles))
+    (!triangles.is_empty())
+        .then(|| RayMesh::new(&[&rest.positions[..], &target.positions].concat(), &triangles))
 }
 
 /// Position bits in which 0 and -0 are one.

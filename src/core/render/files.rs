@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use exr::prelude::{
-    AnyChannel, AnyChannels, Encoding, FlatSamples, Layer, LayerAttributes, SmallVec, Text, WritableImage,
-    f16,
+    AnyChannel, AnyChannels, Compression, Encoding, FlatSamples, Layer, LayerAttributes, SmallVec, Text,
+    WritableImage, f16,
 };
 
 pub use super::error::ImageFileError;
@@ -48,7 +48,7 @@ pub fn write_image(path: &Path, image: &Image, options: &ImageOptions) -> Result
     }
 }
 
-/// Write `image` as an EXR (RGBA, ZIP-compressed, premultiplied linear Rec.709).
+/// Write `image` as an EXR (RGBA, compressed without loss, premultiplied linear Rec.709).
 ///
 /// # Errors
 /// [`ImageFileError`]; the old file, if any, then stays.
@@ -98,11 +98,18 @@ pub fn write_exr_layers(
     let layer = Layer::new(
         (whole.width, whole.height),
         layer_attributes(&options.attributes),
-        Encoding::SMALL_LOSSLESS,
+        encoding(options.half),
         AnyChannels::sort(SmallVec::from_vec(channels)),
     );
     let exr = exr::image::Image::from_layer(layer);
     Ok(output::write_with(path, |file| exr.write().to_buffered(file))?)
+}
+
+/// Numbers of 32 bits hold so much noise that deflating them takes twenty times as long as run lengths and saves no more
+/// than a twentieth; of halves it saves more.
+fn encoding(half: bool) -> Encoding {
+    let compression = if half { Compression::ZIP16 } else { Compression::RLE };
+    Encoding { compression, ..Encoding::SMALL_LOSSLESS }
 }
 
 /// Refuse a plane that does not hold a finite number for each of the image's pixels.

@@ -55,7 +55,8 @@ pub(super) fn supplies<'a>(
     let Some(gather) = gather.filter(|_| !lights.is_empty()) else { return Vec::new() };
     let lamps = VertexLamps::new(scene, mesh, rays);
     let found = |(field, light): (Field, Light)| {
-        let numbers = gather.bounced(|vertex| [lamps.direct(&light, vertex); 3]);
+        let direct = lamps.direct(&light);
+        let numbers = gather.bounced(|vertex| [direct[vertex]; 3]);
         (field, Box::new(OfVertices { triangles: &mesh.triangles, numbers }) as Box<dyn Supply + 'a>)
     };
     lights.into_iter().map(found).collect()

@@ -82,6 +82,7 @@ pub(super) fn hit(pixels: &Pixels, group: &[u32], lane: usize, record: usize) ->
 /// Fill each group's records.
 fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], into: &mut SurfaceRecords) {
     let (places, stride) = (*into.places(), into.rows().stride());
+    let declared = places.declared();
     let mut rest = into.rows_mut().all_mut();
     let mut parts = Vec::with_capacity(group_start.len());
     for ends in group_start.windows(2) {
@@ -91,11 +92,14 @@ fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], 
     }
     let parts = parts.into_par_iter().with_min_len(CHUNK);
     parts.zip(order.par_chunks(LANES)).for_each(|(rows, group)| {
-        for lane in 0..LANES {
-            for (record, rows) in rows.chunks_exact_mut(stride).enumerate() {
-                let Slot { hit, share, .. } = hit(&hits.pixels, group, lane, record);
-                places.put(rows, lane, &surface.at(hits.hits[hit]), share);
-                places.put_fields(rows, lane, |field, numbers| surface.field(field, hits.hits[hit], numbers));
+        for (record, rows) in rows.chunks_exact_mut(stride).enumerate() {
+            let slots: [Slot; LANES] = std::array::from_fn(|lane| hit(&hits.pixels, group, lane, record));
+            let points = slots.each_ref().map(|slot| hits.hits[slot.hit]);
+            for (lane, slot) in slots.iter().enumerate() {
+                places.put(rows, lane, &surface.at(points[lane]), slot.share);
+            }
+            for (field, at) in &declared {
+                surface.field(*field, &points, &mut rows[at.clone()]);
             }
         }
     });

@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::supply::{Supplies, Supply};
+use super::LANES;
+use super::rows::Row;
+use super::supply::{Supplies, Supply, one_by_one};
 use super::trace::Hit;
 use super::visibility::Shadows;
 use crate::bake::rays::RayMesh;
@@ -33,16 +35,26 @@ enum What {
 
 impl Supply for Reaching<'_> {
     fn find(&self, hit: Hit, numbers: &mut [f32]) {
-        let place = || self.shadows.place(hit.triangle, hit.weights().map(f64::from));
-        let [first, ..] = numbers else { return };
+        let place = self.shadows.place(hit.triangle, hit.weights().map(f64::from));
         match self.what {
-            What::Open => *first = self.shadows.visible(&place(), &self.light),
-            What::Arriving { shadows: true } => *first = self.shadows.arriving(&place(), &self.light),
-            What::Arriving { shadows: false } => *first = self.light.attenuation(place().position) as f32,
+            What::Open => numbers[0] = self.shadows.visible(&[place], &self.light)[0],
+            What::Arriving { shadows: true } => numbers[0] = self.shadows.arriving(&[place], &self.light)[0],
+            What::Arriving { shadows: false } => numbers[0] = self.light.attenuation(place.position) as f32,
             What::Toward => {
-                let toward: DVec3 = self.light.towards(place().position);
+                let toward: DVec3 = self.light.towards(place.position);
                 numbers.copy_from_slice(&toward.as_vec3().to_array()[..numbers.len()]);
             }
+        }
+    }
+
+    fn find_each(&self, hits: &[Hit; LANES], rows: &mut [Row]) {
+        let places = || hits.map(|hit| self.shadows.place(hit.triangle, hit.weights().map(f64::from)));
+        match self.what {
+            What::Open => rows[0] = Row::of(self.shadows.visible(&places(), &self.light)),
+            What::Arriving { shadows: true } => {
+                rows[0] = Row::of(self.shadows.arriving(&places(), &self.light));
+            }
+            What::Arriving { shadows: false } | What::Toward => one_by_one(self, hits, rows),
         }
     }
 }

@@ -4,7 +4,9 @@
 use std::f64::consts::PI;
 
 use glam::{Vec3, Vec3A};
+use rayon::prelude::*;
 
+use super::LANES;
 use super::posed::hits_of_vertices;
 use super::trace::Hit;
 use super::visibility::Shadows;
@@ -49,43 +51,51 @@ impl<'a> VertexLamps<'a> {
         Self { mesh, shadows, shadowed: scene.effects.has(Effect::Shadows), hits: hits_of_vertices(mesh) }
     }
 
-    /// Irradiance over pi of a light of strength 1.
-    pub(super) fn direct(&self, light: &Light, vertex: usize) -> f32 {
-        let Some(hit) = self.hits[vertex] else { return 0.0 };
-        let place = self.shadows.place(hit.triangle, hit.weights().map(f64::from));
-        let normal = self.mesh.normals.get(vertex).map_or(Vec3::ZERO, |normal| normal.normalize_or_zero());
-        let facing = normal.as_dvec3().dot(light.towards(place.position)).max(0.0);
-        if facing == 0.0 {
-            return 0.0;
+    /// Irradiance over pi of a light of strength 1 at each vertex. All cores.
+    pub(super) fn direct(&self, light: &Light) -> Vec<f32> {
+        let mut direct = vec![0.0; self.hits.len()];
+        let lanes = direct.par_chunks_mut(LANES).enumerate();
+        lanes.for_each(|(chunk, direct)| self.direct_at(light, chunk * LANES, direct));
+        direct
+    }
+
+    /// That of the vertices from `first` on, at most [`LANES`].
+    fn direct_at(&self, light: &Light, first: usize, direct: &mut [f32]) {
+        let (mut lanes, mut places, mut facing) = (Vec::new(), Vec::new(), Vec::new());
+        for lane in 0..direct.len() {
+            let Some(hit) = self.hits[first + lane] else { continue };
+            let place = self.shadows.place(hit.triangle, hit.weights().map(f64::from));
+            let normal = self.mesh.normals.get(first + lane).map_or(Vec3::ZERO, |n| n.normalize_or_zero());
+            let faces = normal.as_dvec3().dot(light.towards(place.position));
+            if faces > 0.0 {
+                lanes.push(lane);
+                places.push(place);
+                facing.push(faces);
+            }
         }
         let arriving = match self.shadowed {
-            true => f64::from(self.shadows.arriving(&place, light)),
-            false => light.attenuation(place.position),
+            true => self.shadows.arriving(&places, light).map(f64::from),
+            false => std::array::from_fn(|k| places.get(k).map_or(0.0, |p| light.attenuation(p.position))),
         };
-        (facing * arriving / PI) as f32
+        for (k, lane) in lanes.into_iter().enumerate() {
+            direct[lane] = (facing[k] * arriving[k] / PI) as f32;
+        }
     }
 
     /// That of all of a scene's lights in their colours, rgb.
-    pub(super) fn of_scene(&self, scene: &Scene) -> impl Fn(usize) -> [f32; 3] + Sync {
+    pub(super) fn of_scene(&self, scene: &Scene) -> Vec<[f32; 3]> {
         let shining = scene.effects.has(Effect::Lights);
         let lights = if shining { scene.lights_at(&scene.params) } else { Vec::new() };
-        let colored: Vec<(Light, [f32; 3])> = lights
-            .into_iter()
-            .map(|light| {
-                let color = Param::from_name(&format!("light.{}.color", light.member()));
-                let color = color.map_or([1.0; 3], |color| scene.params.rgb(color));
-                let strength = light.strength();
-                let color = [0, 1, 2].map(|c| (strength[c] * color[c]) as f32);
-                (light, color)
-            })
-            .collect();
-        move |vertex| {
-            let mut sum = [0.0; 3];
-            for (light, color) in &colored {
-                let direct = self.direct(light, vertex);
+        let mut sum = vec![[0.0; 3]; self.hits.len()];
+        for light in lights {
+            let color = Param::from_name(&format!("light.{}.color", light.member()));
+            let color = color.map_or([1.0; 3], |color| scene.params.rgb(color));
+            let strength = light.strength();
+            let color = [0, 1, 2].map(|c| (strength[c] * color[c]) as f32);
+            for (sum, direct) in sum.iter_mut().zip(self.direct(&light)) {
                 (0..3).for_each(|c| sum[c] += direct * color[c]);
             }
-            sum
         }
+        sum
     }
 }

@@ -106,17 +106,20 @@ impl<'a> Lobes<'a> {
         // Past the horizon the view is drawn back to it.
         let along = n.dot(eye);
         let n = if along < LEAST_VIEW { (n + (LEAST_VIEW - along) * eye).normalize_or(eye) } else { n };
-        let rays = self.lobe_rays(&place, n, eye, m);
-        let found = light.mean(self.rays, place.origin, rays, f64::from(at.specular));
+        let rays: Vec<LobeRay> = self.lobe_rays(&place, n, eye, m).collect();
+        let found = light.mean(self.rays, place.origin, &rays, f64::from(at.specular));
         numbers.copy_from_slice(&found[..numbers.len()]);
     }
 
     /// The open share of the lobe, in \[0, 1\]; 1 where there is no lobe.
     fn open_share(&self, place: &Place, n: Vec3A, eye: Vec3A, m: f64) -> f32 {
+        let rays: Vec<LobeRay> = self.lobe_rays(place, n, eye, m).collect();
+        let directions: Vec<Vec3A> = rays.iter().map(|ray| ray.along).collect();
+        let hits = self.rays.wide().hits(place.origin, &directions);
         let (mut open, mut all) = (0.0_f64, 0.0_f64);
-        for ray in self.lobe_rays(place, n, eye, m) {
+        for (ray, hit) in rays.iter().zip(hits) {
             all += ray.weight;
-            if !self.rays.hits(place.origin, ray.along, 0.0) {
+            if !hit {
                 open += ray.weight;
             }
         }

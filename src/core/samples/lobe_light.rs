@@ -14,6 +14,7 @@ use super::lobe::LobeRay;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::{LOBE_NODES, LOBES, traces_lobes};
+use crate::bake::wide_bvh::NOTHING;
 use crate::model::choices::{SpecularMap, SpecularModel, SplitSum};
 use crate::model::fields::{Field, Fields};
 use crate::scene::Scene;
@@ -81,19 +82,14 @@ impl<'a> LobeLight<'a> {
     }
 
     /// The mean light along `lobe`, rays from `origin`, where the specular map has `s`.
-    pub(super) fn mean(
-        &self,
-        rays: &RayMesh,
-        origin: Vec3A,
-        lobe: impl Iterator<Item = LobeRay>,
-        s: f64,
-    ) -> [f32; 3] {
+    pub(super) fn mean(&self, rays: &RayMesh, origin: Vec3A, lobe: &[LobeRay], s: f64) -> [f32; 3] {
+        let directions: Vec<Vec3A> = lobe.iter().map(|ray| ray.along).collect();
         let f0 = self.f0 * (self.f0_floor + (1.0 - self.f0_floor) * s);
         let (mut sum, mut share) = ([0.0_f64; 3], 0.0_f64);
-        for ray in lobe {
-            let light = match rays.first(origin, ray.along) {
-                None => self.sky.as_ref().map_or([0.0; 3], |sky| sky.along(ray.along, ray.solid_angle)),
-                Some(triangle) => {
+        for (ray, met) in lobe.iter().zip(rays.wide().first(origin, &directions)) {
+            let light = match met {
+                NOTHING => self.sky.as_ref().map_or([0.0; 3], |sky| sky.along(ray.along, ray.solid_angle)),
+                triangle => {
                     self.skin.as_ref().map_or([0.0; 3], |skin| skin.radiance(triangle, origin, ray.along))
                 }
             };

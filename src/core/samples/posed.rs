@@ -6,11 +6,12 @@ use rayon::prelude::*;
 
 use super::lobe::Lobes;
 use super::lobe_light::LobeLight;
+use super::rows::Row;
 use super::skin::Skin;
 use super::sky::Sky;
-use super::supply::Supplies;
+use super::supply::{Supplies, put_each};
 use super::trace::Hit;
-use super::{SampleError, bounced, lit, posed_occlusion, sky};
+use super::{LANES, SampleError, bounced, lit, posed_occlusion, sky};
 use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
@@ -137,6 +138,14 @@ impl<'a> PosedSurface<'a> {
             }
         });
         numbers
+    }
+
+    /// What there is of a field at each of a record's points, a row for each of its numbers.
+    pub(super) fn field_of_record(&self, field: Field, hits: &[Hit; LANES], rows: &mut [Row]) {
+        match self.supplies.iter().find(|(of, _)| *of == field) {
+            Some((_, supply)) => supply.find_each(hits, rows),
+            None => put_each(hits, rows, |hit, numbers| self.field(field, hit, numbers)),
+        }
     }
 
     /// What there is of a field at a point; what stands in for it where nothing has it.

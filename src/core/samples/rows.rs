@@ -7,6 +7,7 @@ use std::ops::{Deref, DerefMut, Range};
 
 use bytemuck::{Pod, Zeroable};
 use prefetch_index::prefetch_index;
+use rayon::prelude::*;
 
 use super::LANES;
 
@@ -41,6 +42,12 @@ impl DerefMut for Row {
     }
 }
 
+/// So many rows, all zero. All cores: fresh memory is handed out page by page.
+#[must_use]
+pub fn zeros(count: usize) -> Vec<Row> {
+    (0..count).into_par_iter().with_min_len(1 << 12).map(|_| Row::ZERO).collect()
+}
+
 /// Records of `stride` rows each, one after the other.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rows {
@@ -52,7 +59,7 @@ impl Rows {
     /// `count` records of `stride` rows, all zero.
     #[must_use]
     pub fn new(stride: usize, count: usize) -> Self {
-        Self { stride, rows: vec![Row::ZERO; stride * count] }
+        Self { stride, rows: zeros(stride * count) }
     }
 
     /// Rows a record.

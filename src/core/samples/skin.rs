@@ -37,7 +37,7 @@ impl<'s, 'a> Skin<'s, 'a> {
         let lamps = scene.effects.has(Effect::Lights).then(|| VertexLamps::new(scene, mesh, rays));
         let lit = lamps.as_ref().map(|lamps| lamps.of_scene(scene));
         let direct = sky.each(|vertex| {
-            let (sky, lamps) = (sky.light(vertex), lit.as_ref().map_or([0.0; 3], |lit| lit(vertex)));
+            let (sky, lamps) = (sky.light(vertex), lit.as_ref().map_or([0.0; 3], |lit| lit[vertex]));
             [0, 1, 2].map(|c| sky[c].max(0.0) as f32 + lamps[c])
         });
         Self { scene, mesh, gather, direct }

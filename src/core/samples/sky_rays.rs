@@ -9,6 +9,7 @@ use super::visibility::Shadows;
 use crate::bake::panorama::Radiance;
 use crate::bake::rays::RayMesh;
 use crate::bake::shadowed::share_of_open;
+use crate::bake::wide_bvh::NOTHING;
 
 /// Rays over the hemisphere of the smooth normal, distributed as the cosine. Those that meet nothing bring the
 /// panorama's light, the others the albedo where they end times the light there. Open light is that along all of them, so
@@ -34,20 +35,20 @@ impl Supply for ByRays<'_> {
         if normal == Vec3A::ZERO {
             return numbers.fill(1.0);
         }
-        let (mut arrived, mut open, mut count) = ([0.0; 3], [0.0; 3], 0_u32);
-        for d in self.shadows.hemisphere(&place, normal) {
+        let directions: Vec<Vec3A> = self.shadows.hemisphere(&place, normal).collect();
+        let (mut arrived, mut open) = ([0.0; 3], [0.0; 3]);
+        for (&d, met) in directions.iter().zip(self.rays.wide().first(place.origin, &directions)) {
             let sky = self.radiance.along(d.to_array().map(f64::from));
-            let seen = match self.rays.first(place.origin, d) {
-                None => sky,
-                Some(triangle) => self.skin.radiance(triangle, place.origin, d),
+            let seen = match met {
+                NOTHING => sky,
+                triangle => self.skin.radiance(triangle, place.origin, d),
             };
             for c in 0..3 {
                 open[c] += sky[c];
                 arrived[c] += seen[c];
             }
-            count += 1;
         }
-        let mean = self.mean.map(|mean| mean * f64::from(count));
+        let mean = self.mean.map(|mean| mean * directions.len() as f64);
         let share = share_of_open(arrived, open, mean).map(|share| share as f32);
         numbers.copy_from_slice(&share[..numbers.len()]);
     }

@@ -3,8 +3,11 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
+use super::LANES;
 use super::footprint::{Footprint, Footprints, filtered};
 use super::posed::PosedSurface;
+use super::rows::Row;
+use super::supply::put_each;
 use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
 use crate::model::effects::{Form, Silhouette};
@@ -150,11 +153,13 @@ impl<'a> Surface<'a> {
         self.mesh.triangles[hit.triangle as usize].map(|i| i as usize)
     }
 
-    /// What there is of a field at `hit`.
-    pub(super) fn field(&self, field: Field, hit: Hit, numbers: &mut [f32]) {
+    /// What there is of a field at each of a record's points, a row for each of its numbers.
+    pub(super) fn field(&self, field: Field, hits: &[Hit; LANES], rows: &mut [Row]) {
         match self.posed.lobes.as_ref().filter(|lobes| lobes.finds(field)) {
-            Some(lobes) => lobes.find(field, (hit.triangle, hit.weights()), &self.at(hit).0, numbers),
-            None => self.posed.field(field, hit, numbers),
+            Some(lobes) => put_each(hits, rows, |hit, numbers| {
+                lobes.find(field, (hit.triangle, hit.weights()), &self.at(hit).0, numbers);
+            }),
+            None => self.posed.field_of_record(field, hits, rows),
         }
     }
 

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::LANES;
 use super::rows::{Row, Rows};
-use crate::model::fields::{Field, Fields, MOST_NUMBERS};
+use crate::model::fields::{Field, Fields};
 use crate::model::fragment::Fragment;
 
 /// What stands in for a number that no enabled effect asks for. The smooth normal's stand-in is the
@@ -170,13 +170,19 @@ impl Places {
             ("attenuator", self.attenuator, 1),
             ("vertex_uv", self.uv, 2),
         ];
-        let mut next = self.fields_at;
-        let declared = self.fields.iter().map(move |field| {
-            let numbers = field.info().numbers;
-            next += numbers;
-            (field.name(), next - numbers, numbers)
-        });
+        let declared = self.declared().into_iter().map(|(field, at)| (field.name(), at.start, at.len()));
         fields.into_iter().filter_map(|(name, place, rows)| Some((name, place?, rows))).chain(declared)
+    }
+
+    /// Those that files of rules declare, and the rows of each.
+    pub(super) fn declared(&self) -> Vec<(Field, Range<usize>)> {
+        let mut next = self.fields_at;
+        let rows = |field: Field| {
+            let first = next;
+            next += field.info().numbers;
+            (field, first..next)
+        };
+        self.fields.iter().map(rows).collect()
     }
 
     fn vectors(&self, f: &Fragment<f32>) -> [(Option<usize>, [f32; 3]); 5] {
@@ -205,20 +211,6 @@ impl Places {
             (self.specular, f.specular),
             (self.attenuator, f.attenuator),
         ]
-    }
-
-    /// Write what files of rules declare into one lane of a record; `find` fills in a field's numbers.
-    pub(super) fn put_fields(&self, record: &mut [Row], lane: usize, find: impl Fn(Field, &mut [f32])) {
-        let mut at = self.fields_at;
-        for field in self.fields.iter() {
-            let mut numbers = [0.0; MOST_NUMBERS];
-            let numbers = &mut numbers[..field.info().numbers];
-            find(field, numbers);
-            for number in numbers {
-                record[at][lane] = *number;
-                at += 1;
-            }
-        }
     }
 
     /// Write one lane of a record.

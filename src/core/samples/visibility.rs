@@ -10,9 +10,11 @@
 
 use glam::{DVec3, Vec3, Vec3A};
 
+use super::LANES;
 use crate::bake::low_discrepancy::{Sobol, mix};
 use crate::bake::rays::RayMesh;
 use crate::bake::vertex_rays::{frame, offset};
+use crate::bake::wide_bvh::Segment;
 use crate::scene::light::{Beam, Lamp, Light, LightKind};
 use crate::scene::mesh::PosedMesh;
 
@@ -23,6 +25,14 @@ pub struct Place {
     pub position: DVec3,
     /// Where rays to lights start.
     pub origin: Vec3A,
+}
+
+/// What is found of a light from a place.
+enum Found {
+    /// The share that is visible.
+    Known(f32),
+    /// Rays towards it, as many from every place.
+    Along(Vec<Segment>),
 }
 
 /// The shadows of a mesh as it is posed.
@@ -63,22 +73,55 @@ impl<'a> Shadows<'a> {
         Place { position, origin: origin.as_vec3a() }
     }
 
-    /// What of a light's strength arrives at a place: attenuation by distance, range and cone, times the share of the
-    /// light that is visible from there. Times strength and max(0, n.L) it is the irradiance.
+    /// What of a light's strength arrives at each place, of at most [`LANES`]: attenuation by distance, range and cone,
+    /// times the share of the light that is visible from there. Times strength and max(0, n.L) it is the irradiance.
     #[must_use]
-    pub fn arriving(&self, place: &Place, light: &Light) -> f32 {
-        let attenuation = light.attenuation(place.position) as f32;
+    pub fn arriving(&self, places: &[Place], light: &Light) -> [f32; LANES] {
+        let mut arriving = [0.0; LANES];
+        for (arriving, place) in arriving.iter_mut().zip(places) {
+            *arriving = light.attenuation(place.position) as f32;
+        }
         // No ray has to be traced for what is out of reach.
-        if attenuation > 0.0 { attenuation * self.visible(place, light) } else { 0.0 }
+        if arriving.iter().any(|&attenuation| attenuation > 0.0) {
+            let visible = self.visible(places, light);
+            arriving.iter_mut().zip(visible).for_each(|(arriving, visible)| *arriving *= visible);
+        }
+        arriving
     }
 
-    /// The share of a light that is visible from a place, in [0, 1].
+    /// The share of a light that is visible from each place, of at most [`LANES`], in [0, 1].
+    ///
+    /// Places that are near one another take less time.
     #[must_use]
-    pub fn visible(&self, place: &Place, light: &Light) -> f32 {
-        match &light.kind {
-            LightKind::Directional(beam) => self.beam(place, beam, light.towards(place.position)),
-            LightKind::Point(lamp) | LightKind::Spot(lamp, _) => self.lamp(place, lamp),
+    pub fn visible(&self, places: &[Place], light: &Light) -> [f32; LANES] {
+        let (mut shares, mut traced) = ([0.0; LANES], [0_usize; LANES]);
+        let (mut rays, mut count) = (Vec::new(), 0);
+        for (lane, place) in places.iter().enumerate().take(LANES) {
+            let found = match &light.kind {
+                LightKind::Directional(beam) => self.beam(place, beam, light.towards(place.position)),
+                LightKind::Point(lamp) | LightKind::Spot(lamp, _) => self.lamp(place, lamp),
+            };
+            match found {
+                Found::Known(share) => shares[lane] = share,
+                Found::Along(own) => {
+                    traced[count] = lane;
+                    count += 1;
+                    rays.push(own);
+                }
+            }
         }
+        // One ray of each place at a time.
+        let each = rays.first().map_or(0, Vec::len);
+        for i in 0..each {
+            let mut packet = [Segment { origin: Vec3A::ZERO, direction: Vec3A::Z, length: -1.0 }; LANES];
+            packet.iter_mut().zip(&rays).for_each(|(ray, own)| *ray = own[i]);
+            let blocked = self.rays.wide().blocked(&packet[..count]);
+            for k in 0..count {
+                shares[traced[k]] += f32::from(u8::from(!blocked[k]));
+            }
+        }
+        traced[..count].iter().for_each(|&lane| shares[lane] /= each as f32);
+        shares
     }
 
     /// Unit vectors distributed as the cosine over the hemisphere about the unit vector `normal`, as many as there are
@@ -88,28 +131,28 @@ impl<'a> Shadows<'a> {
         self.spread.hemisphere(seed(place)).map(move |d| frame * d)
     }
 
-    fn beam(&self, place: &Place, beam: &Beam, towards: DVec3) -> f32 {
+    fn beam(&self, place: &Place, beam: &Beam, towards: DVec3) -> Found {
         if towards == DVec3::ZERO {
-            return 0.0;
+            return Found::Known(0.0);
         }
-        let open = |along: Vec3A| !self.rays.hits(place.origin, along, 0.0);
+        let ray = |direction| Segment { origin: place.origin, direction, length: f32::INFINITY };
         if beam.angular_diameter_degrees <= 0.0 {
-            return share([open(towards.as_vec3a())].into_iter());
+            return Found::Along(vec![ray(towards.as_vec3a())]);
         }
         let sine = (0.5 * beam.angular_diameter_degrees.to_radians()).sin();
-        share(self.cap(place, towards, sine).map(|(along, _)| open(along)))
+        Found::Along(self.cap(place, towards, sine).map(|(along, _)| ray(along)).collect())
     }
 
-    fn lamp(&self, place: &Place, lamp: &Lamp) -> f32 {
+    fn lamp(&self, place: &Place, lamp: &Lamp) -> Found {
         let to = lamp.position - place.origin.as_dvec3();
         let distance = to.length();
         // Within the lamp nothing is between.
         if distance <= lamp.radius {
-            return 1.0;
+            return Found::Known(1.0);
         }
-        let open = |end: Vec3A| !self.rays.between(place.origin, end);
+        let ray = |direction, length| Segment { origin: place.origin, direction, length };
         if lamp.radius <= 0.0 {
-            return share([open(lamp.position.as_vec3a())].into_iter());
+            return Found::Along(vec![ray((to / distance).as_vec3a(), distance as f32)]);
         }
         let sine = lamp.radius / distance;
         let nearest = |off: f32| {
@@ -118,10 +161,8 @@ impl<'a> Shadows<'a> {
             let inside = (lamp.radius.powi(2) - (distance * off).powi(2)).max(0.0).sqrt();
             (distance * (1.0 - off * off).sqrt() - inside) as f32
         };
-        share(
-            self.cap(place, to / distance, sine)
-                .map(|(along, off)| open(place.origin + nearest(off) * along)),
-        )
+        let cap = self.cap(place, to / distance, sine);
+        Found::Along(cap.map(|(along, off)| ray(along, nearest(off))).collect())
     }
 
     /// Unit vectors spread evenly over the solid angle within an angle of that sine about `middle`, and the sine of each
@@ -145,16 +186,6 @@ pub(super) fn seed(place: &Place) -> u32 {
     // 0 and -0 are one place.
     let [x, y, z] = place.position.as_vec3().to_array().map(|x| (x + 0.0).to_bits());
     mix(x ^ mix(y ^ mix(z)))
-}
-
-/// The share of rays that are open.
-fn share(open: impl Iterator<Item = bool>) -> f32 {
-    let (mut count, mut through) = (0_u32, 0_u32);
-    for open in open {
-        count += 1;
-        through += u32::from(open);
-    }
-    through as f32 / count.max(1) as f32
 }
 
 #[cfg(test)]

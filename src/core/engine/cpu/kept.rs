@@ -12,7 +12,7 @@ use super::sums::CHUNK;
 use super::view_pass::{Beside, streams};
 use super::{CpuEngine, machine};
 use crate::engine::{BLOCK, Point};
-use crate::samples::rows::Row;
+use crate::samples::rows::{Row, zeros};
 use crate::with_simd;
 
 /// Kept numbers, and what they were made with.
@@ -44,7 +44,7 @@ impl CpuEngine {
     fn make_kept(&self, pass: &Pass, point: &Point, view: usize, lobes: &Lobes) -> Vec<Row> {
         let (stride, observed) = (pass.kept, &self.views[view]);
         let records = observed.samples.records();
-        let mut kept = vec![Row::ZERO; records * stride];
+        let mut kept = zeros(records * stride);
         if stride == 0 {
             return kept;
         }
