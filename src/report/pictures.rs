@@ -49,7 +49,7 @@ impl Picture {
     #[must_use]
     pub fn of_image(image: &Image) -> Self {
         let tone = ToneMap::default();
-        let bytes = image.over(BACKGROUND).flat_map(|rgb| tone.encode_bytes(rgb)).collect();
+        let bytes = image.encoded(tone, BACKGROUND);
         Self { width: image.width, height: image.height, bytes }
     }
 

@@ -119,7 +119,7 @@ impl Prefilter {
     }
 
     /// `near` yields the blocks that lobes about the directions of a tile reach.
-    fn filtered<B: Borrow<Block>>(
+    fn filtered<B: Borrow<[Cells; BLOCK]>>(
         &self,
         level: Level,
         size: usize,
@@ -134,7 +134,7 @@ impl Prefilter {
                 let directions = tile_directions(tile, tiles, size);
                 let near = near(&directions);
                 let texel = |&r: &[f64; 3]| {
-                    let cells = || near.iter().map(|block| &block.borrow().cells);
+                    let cells = || near.iter().map(B::borrow);
                     let sums = with_simd!(level, simd => gather(simd, cells(), r, lobe));
                     self.finish(sums)
                 };
@@ -175,13 +175,13 @@ impl Prefilter {
     /// 1 / (1 + (t / 2 alpha)^2)^2 of the angle t, reaches to the horizon, but falls the more slowly the further out:
     /// over a quarter of the angle. So cells are the wider, and may be the more unevenly lit, the further they are off. At the
     /// horizon masking takes over, which falls to 0 within about alpha.
-    fn blocks_about(&self, alpha: f64, directions: &[[f64; 3]]) -> Vec<Block> {
+    fn blocks_about(&self, alpha: f64, directions: &[[f64; 3]]) -> Vec<[Cells; BLOCK]> {
         let (axis, radius) = cone(directions);
         let peak = (alpha.powi(-2) + 1.0) / TAU;
         let unseen = CELL_TOLERANCE * self.pyramid.brightness();
         let visit = |cell: &Cell| {
             let side = cell.solid_angle.sqrt();
-            let off = (angle(axis, unit(cell.moment)) - radius - side).max(0.0);
+            let off = (about_angle(axis, cell.moment) - radius - side).max(0.0);
             if off >= FRAC_PI_2 {
                 return Visit::Skip;
             }
@@ -194,7 +194,7 @@ impl Prefilter {
             if side > widest || moved > unseen { Visit::Split } else { Visit::Take }
         };
         let cells = self.pyramid.cells(visit);
-        cells.chunks(WIDE * BLOCK).map(|cells| Block::new(cells, self.pyramid.mean, FRAC_PI_2)).collect()
+        cells.chunks(WIDE * BLOCK).map(|cells| packed(cells, self.pyramid.mean)).collect()
     }
 }
 
@@ -210,9 +210,13 @@ impl Block {
             angle(axis, unit(cell.moment)) + cell.solid_angle.sqrt()
         };
         let radius = cells.iter().map(radius).fold(0.0, f64::max);
-        let packed = std::array::from_fn(|i| Cells::pack(cells.get(i * WIDE..).unwrap_or(&[]), mean));
-        Self { cells: packed, axis, reach: radius + cut }
+        Self { cells: packed(cells, mean), axis, reach: radius + cut }
     }
+}
+
+/// At most [`WIDE`] times [`BLOCK`] cells.
+fn packed(cells: &[Cell], mean: [f32; 3]) -> [Cells; BLOCK] {
+    std::array::from_fn(|i| Cells::pack(cells.get(i * WIDE..).unwrap_or(&[]), mean))
 }
 
 fn unit(v: [f64; 3]) -> [f64; 3] {
@@ -222,6 +226,16 @@ fn unit(v: [f64; 3]) -> [f64; 3] {
 
 fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum::<f64>().clamp(-1.0, 1.0).acos()
+}
+
+/// The angle between a unit vector and another one to 1e-4, which is a small part of any cell (Abramowitz and Stegun 1964,
+/// 4.4.45): every tile asks for that of thousands of cells.
+fn about_angle(axis: [f64; 3], v: [f64; 3]) -> f64 {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let cosine = dot(axis, v) / dot(v, v).sqrt().max(f64::MIN_POSITIVE);
+    let x = cosine.abs().min(1.0);
+    let below = (1.0 - x).sqrt() * (1.570_728_8 + x * (-0.212_114_4 + x * (0.074_261 - x * 0.018_729_3)));
+    if cosine < 0.0 { std::f64::consts::PI - below } else { below }
 }
 
 /// The directions of a tile's texels, row by row.
@@ -242,10 +256,11 @@ fn cone(directions: &[[f64; 3]]) -> ([f64; 3], f64) {
     (axis, directions.iter().map(|&d| angle(axis, d)).fold(0.0, f64::max))
 }
 
-/// The blocks that a lobe about any of `directions` reaches.
-fn blocks_near<'a>(blocks: &'a [Block], directions: &[[f64; 3]]) -> Vec<&'a Block> {
+/// The cells of the blocks that a lobe about any of `directions` reaches.
+fn blocks_near<'a>(blocks: &'a [Block], directions: &[[f64; 3]]) -> Vec<&'a [Cells; BLOCK]> {
     let (axis, radius) = cone(directions);
-    blocks.iter().filter(|block| angle(axis, block.axis) <= block.reach + radius).collect()
+    let near = blocks.iter().filter(|block| angle(axis, block.axis) <= block.reach + radius);
+    near.map(|block| &block.cells).collect()
 }
 
 /// The filter by brute force in f64: the piecewise constant `cube` along the unit direction `r`,

@@ -152,8 +152,7 @@ fn latin1(text: &str) -> Text {
 /// [`ImageFileError`]; the old file, if any, then stays.
 pub fn write_png(path: &Path, image: &Image, tone: ToneMap, background: f32) -> Result<(), ImageFileError> {
     image.check(path)?;
-    let bytes: Vec<u8> = image.over(background).flat_map(|rgb| tone.encode_bytes(rgb)).collect();
-    write_png_bytes(path, image.width, image.height, &bytes)
+    write_png_bytes(path, image.width, image.height, &image.encoded(tone, background))
 }
 
 /// Write sRGB bytes (`height x width x 3`) as a PNG.

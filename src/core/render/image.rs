@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use rayon::prelude::*;
+
 use super::error::ImageFileError;
 pub use super::error::{MAX_PIXELS, MAX_SIDE};
+use super::tonemap::ToneMap;
 
 /// An image in linear Rec.709, row by row from the top.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,9 +28,13 @@ impl Image {
         Self { width, height, rgb: vec![[0.0; 3]; width * height], alpha: vec![0.0; width * height] }
     }
 
-    /// The colour of each pixel in front of a grey background of linear radiance `background`.
-    pub fn over(&self, background: f32) -> impl Iterator<Item = [f32; 3]> + '_ {
-        self.rgb.iter().zip(&self.alpha).map(move |(rgb, alpha)| rgb.map(|c| c + (1.0 - alpha) * background))
+    /// The image in front of a grey of linear radiance `background` as sRGB bytes, three a pixel, row by row. All cores.
+    #[must_use]
+    pub fn encoded(&self, tone: ToneMap, background: f32) -> Vec<u8> {
+        let shown =
+            |(rgb, alpha): (&[f32; 3], &f32)| tone.encode_bytes(rgb.map(|c| c + (1.0 - alpha) * background));
+        let pixels: Vec<[u8; 3]> = self.rgb.par_iter().zip(&self.alpha).map(shown).collect();
+        pixels.into_flattened()
     }
 
     /// This image shrunk by a whole factor (means of squares of pixels) to at most `longest` a side.

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::supply::Points;
 use super::surface::Surface;
 use super::trace::{Hit, Hits};
 use super::{LANES, SurfaceRecords, ViewSamples};
@@ -94,9 +95,9 @@ fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], 
     parts.zip(order.par_chunks(LANES)).for_each(|(rows, group)| {
         for (record, rows) in rows.chunks_exact_mut(stride).enumerate() {
             let slots: [Slot; LANES] = std::array::from_fn(|lane| hit(&hits.pixels, group, lane, record));
-            let points = slots.each_ref().map(|slot| hits.hits[slot.hit]);
+            let points = Points::from(slots.each_ref().map(|slot| hits.hits[slot.hit]));
             for (lane, slot) in slots.iter().enumerate() {
-                places.put(rows, lane, &surface.at(points[lane]), slot.share);
+                places.put(rows, lane, &surface.at(points.hits[lane]), slot.share);
             }
             for (field, at) in &declared {
                 surface.field(*field, &points, &mut rows[at.clone()]);

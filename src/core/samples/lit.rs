@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::LANES;
 use super::rows::Row;
-use super::supply::{Supplies, Supply, one_by_one};
+use super::supply::{Points, Supplies, Supply, one_by_one};
 use super::trace::Hit;
-use super::visibility::Shadows;
+use super::visibility::{Place, Places, Shadows};
 use crate::bake::rays::RayMesh;
 use crate::model::effects::Effect;
 use crate::model::fields::Field;
@@ -35,10 +34,11 @@ enum What {
 
 impl Supply for Reaching<'_> {
     fn find(&self, hit: Hit, numbers: &mut [f32]) {
-        let place = self.shadows.place(hit.triangle, hit.weights().map(f64::from));
+        let place = self.place(hit);
+        let places = || Places::new(&[place]);
         match self.what {
-            What::Open => numbers[0] = self.shadows.visible(&[place], &self.light)[0],
-            What::Arriving { shadows: true } => numbers[0] = self.shadows.arriving(&[place], &self.light)[0],
+            What::Open => numbers[0] = self.shadows.visible(&places(), &self.light)[0],
+            What::Arriving { shadows: true } => numbers[0] = self.shadows.arriving(&places(), &self.light)[0],
             What::Arriving { shadows: false } => numbers[0] = self.light.attenuation(place.position) as f32,
             What::Toward => {
                 let toward: DVec3 = self.light.towards(place.position);
@@ -47,15 +47,22 @@ impl Supply for Reaching<'_> {
         }
     }
 
-    fn find_each(&self, hits: &[Hit; LANES], rows: &mut [Row]) {
-        let places = || hits.map(|hit| self.shadows.place(hit.triangle, hit.weights().map(f64::from)));
+    fn find_each(&self, points: &Points, rows: &mut [Row]) {
+        // All lights are looked at from the same places.
+        let places = || points.places.get_or_init(|| Places::new(&points.hits.map(|hit| self.place(hit))));
         match self.what {
-            What::Open => rows[0] = Row::of(self.shadows.visible(&places(), &self.light)),
+            What::Open => rows[0] = Row::of(self.shadows.visible(places(), &self.light)),
             What::Arriving { shadows: true } => {
-                rows[0] = Row::of(self.shadows.arriving(&places(), &self.light));
+                rows[0] = Row::of(self.shadows.arriving(places(), &self.light));
             }
-            What::Arriving { shadows: false } | What::Toward => one_by_one(self, hits, rows),
+            What::Arriving { shadows: false } | What::Toward => one_by_one(self, points, rows),
         }
+    }
+}
+
+impl Reaching<'_> {
+    fn place(&self, hit: Hit) -> Place {
+        self.shadows.place(hit.triangle, hit.weights().map(f64::from))
     }
 }
 

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::LANES;
 use super::posed::hits_of_vertices;
 use super::trace::Hit;
-use super::visibility::Shadows;
+use super::visibility::{Places, Shadows};
 use crate::bake::interreflection::{Albedo, Met};
 use crate::bake::rays::RayMesh;
 use crate::model::effects::Effect;
@@ -74,7 +74,7 @@ impl<'a> VertexLamps<'a> {
             }
         }
         let arriving = match self.shadowed {
-            true => self.shadows.arriving(&places, light).map(f64::from),
+            true => self.shadows.arriving(&Places::new(&places), light).map(f64::from),
             false => std::array::from_fn(|k| places.get(k).map_or(0.0, |p| light.attenuation(p.position))),
         };
         for (k, lane) in lanes.into_iter().enumerate() {

@@ -9,9 +9,9 @@ use super::lobe_light::LobeLight;
 use super::rows::Row;
 use super::skin::Skin;
 use super::sky::Sky;
-use super::supply::{Supplies, put_each};
+use super::supply::{Points, Supplies, put_each};
 use super::trace::Hit;
-use super::{LANES, SampleError, bounced, lit, posed_occlusion, sky};
+use super::{SampleError, bounced, lit, posed_occlusion, sky};
 use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
@@ -140,11 +140,11 @@ impl<'a> PosedSurface<'a> {
         numbers
     }
 
-    /// What there is of a field at each of a record's points, a row for each of its numbers.
-    pub(super) fn field_of_record(&self, field: Field, hits: &[Hit; LANES], rows: &mut [Row]) {
+    /// What there is of a field at each of the points, a row for each of its numbers.
+    pub(super) fn field_of_each(&self, field: Field, points: &Points, rows: &mut [Row]) {
         match self.supplies.iter().find(|(of, _)| *of == field) {
-            Some((_, supply)) => supply.find_each(hits, rows),
-            None => put_each(hits, rows, |hit, numbers| self.field(field, hit, numbers)),
+            Some((_, supply)) => supply.find_each(points, rows),
+            None => put_each(points, rows, |hit, numbers| self.field(field, hit, numbers)),
         }
     }
 

@@ -3,11 +3,10 @@
 use glam::{DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 
-use super::LANES;
 use super::footprint::{Footprint, Footprints, filtered};
 use super::posed::PosedSurface;
 use super::rows::Row;
-use super::supply::put_each;
+use super::supply::{Points, put_each};
 use super::surface_records::{Asked, Unmade};
 use super::trace::Hit;
 use crate::model::effects::{Form, Silhouette};
@@ -153,13 +152,13 @@ impl<'a> Surface<'a> {
         self.mesh.triangles[hit.triangle as usize].map(|i| i as usize)
     }
 
-    /// What there is of a field at each of a record's points, a row for each of its numbers.
-    pub(super) fn field(&self, field: Field, hits: &[Hit; LANES], rows: &mut [Row]) {
+    /// What there is of a field at each of the points, a row for each of its numbers.
+    pub(super) fn field(&self, field: Field, points: &Points, rows: &mut [Row]) {
         match self.posed.lobes.as_ref().filter(|lobes| lobes.finds(field)) {
-            Some(lobes) => put_each(hits, rows, |hit, numbers| {
+            Some(lobes) => put_each(points, rows, |hit, numbers| {
                 lobes.find(field, (hit.triangle, hit.weights()), &self.at(hit).0, numbers);
             }),
-            None => self.posed.field_of_record(field, hits, rows),
+            None => self.posed.field_of_each(field, points, rows),
         }
     }
 

@@ -8,7 +8,9 @@
 //! whole triangles dark there (the shadow terminator). They start where the vertices' tangent planes put the surface
 //! instead: Hanika, *Hacking the Shadow Terminator*, Ray Tracing Gems II (2021), chapter 4.
 
-use glam::{DVec3, Vec3, Vec3A};
+use std::cell::OnceCell;
+
+use glam::{DVec3, Mat3A, Vec3, Vec3A};
 
 use super::LANES;
 use crate::bake::low_discrepancy::{Sobol, mix};
@@ -19,7 +21,7 @@ use crate::scene::light::{Beam, Lamp, Light, LightKind};
 use crate::scene::mesh::PosedMesh;
 
 /// A place of a mesh that light may reach.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Place {
     /// Where it lies on its triangle.
     pub position: DVec3,
@@ -27,12 +29,38 @@ pub struct Place {
     pub origin: Vec3A,
 }
 
-/// What is found of a light from a place.
-enum Found {
+/// A point of the unit disc: radius, which may be negative, then sine and cosine of the angle.
+type Disc = (f32, [f32; 2]);
+
+/// Places from which lights are looked at together.
+#[derive(Debug)]
+pub struct Places {
+    all: [Place; LANES],
+    count: usize,
+    /// Where rays to lights that have a size go, once one asks.
+    discs: OnceCell<Vec<[Disc; LANES]>>,
+}
+
+/// What there is of a light from a place.
+#[derive(Clone, Copy)]
+enum Aim {
     /// The share that is visible.
     Known(f32),
-    /// Rays towards it, as many from every place.
-    Along(Vec<Segment>),
+    /// A ray to it.
+    Ray { direction: Vec3A, length: f32 },
+    /// Rays spread evenly over its solid angle.
+    Cap(Cap),
+}
+
+/// A circular cone of directions, which ends at infinity or at a sphere.
+#[derive(Clone, Copy)]
+struct Cap {
+    /// Its axis is Z's image.
+    frame: Mat3A,
+    /// 1 - cos of its half angle.
+    height: f32,
+    /// Distance and radius of the sphere.
+    sphere: Option<(f64, f64)>,
 }
 
 /// The shadows of a mesh as it is posed.
@@ -73,55 +101,84 @@ impl<'a> Shadows<'a> {
         Place { position, origin: origin.as_vec3a() }
     }
 
-    /// What of a light's strength arrives at each place, of at most [`LANES`]: attenuation by distance, range and cone,
-    /// times the share of the light that is visible from there. Times strength and max(0, n.L) it is the irradiance.
+    /// What of a light's strength arrives at each place: attenuation by distance, range and cone, times the share of the
+    /// light that is visible from there. Times strength and max(0, n.L) it is the irradiance.
     #[must_use]
-    pub fn arriving(&self, places: &[Place], light: &Light) -> [f32; LANES] {
+    pub fn arriving(&self, from: &Places, light: &Light) -> [f32; LANES] {
         let mut arriving = [0.0; LANES];
-        for (arriving, place) in arriving.iter_mut().zip(places) {
+        for (arriving, place) in arriving.iter_mut().zip(from.places()) {
             *arriving = light.attenuation(place.position) as f32;
         }
         // No ray has to be traced for what is out of reach.
         if arriving.iter().any(|&attenuation| attenuation > 0.0) {
-            let visible = self.visible(places, light);
+            let visible = self.visible(from, light);
             arriving.iter_mut().zip(visible).for_each(|(arriving, visible)| *arriving *= visible);
         }
         arriving
     }
 
-    /// The share of a light that is visible from each place, of at most [`LANES`], in [0, 1].
-    ///
-    /// Places that are near one another take less time.
+    /// The share of a light that is visible from each place, in [0, 1].
     #[must_use]
-    pub fn visible(&self, places: &[Place], light: &Light) -> [f32; LANES] {
-        let (mut shares, mut traced) = ([0.0; LANES], [0_usize; LANES]);
-        let (mut rays, mut count) = (Vec::new(), 0);
-        for (lane, place) in places.iter().enumerate().take(LANES) {
-            let found = match &light.kind {
-                LightKind::Directional(beam) => self.beam(place, beam, light.towards(place.position)),
-                LightKind::Point(lamp) | LightKind::Spot(lamp, _) => self.lamp(place, lamp),
+    pub fn visible(&self, from: &Places, light: &Light) -> [f32; LANES] {
+        let mut aims = [Aim::Known(0.0); LANES];
+        for (aim, place) in aims.iter_mut().zip(from.places()) {
+            *aim = match &light.kind {
+                LightKind::Directional(beam) => beam_from(beam, light.towards(place.position)),
+                LightKind::Point(lamp) | LightKind::Spot(lamp, _) => lamp_from(lamp, place),
             };
-            match found {
-                Found::Known(share) => shares[lane] = share,
-                Found::Along(own) => {
-                    traced[count] = lane;
-                    count += 1;
-                    rays.push(own);
-                }
-            }
         }
-        // One ray of each place at a time.
-        let each = rays.first().map_or(0, Vec::len);
-        for i in 0..each {
-            let mut packet = [Segment { origin: Vec3A::ZERO, direction: Vec3A::Z, length: -1.0 }; LANES];
-            packet.iter_mut().zip(&rays).for_each(|(ray, own)| *ray = own[i]);
-            let blocked = self.rays.wide().blocked(&packet[..count]);
-            for k in 0..count {
-                shares[traced[k]] += f32::from(u8::from(!blocked[k]));
-            }
+        let mut shares = aims.map(|aim| if let Aim::Known(share) = aim { share } else { 0.0 });
+        if aims.iter().any(|aim| matches!(aim, Aim::Ray { .. })) {
+            let packet = self.packet(from, |k| match aims[k] {
+                Aim::Ray { direction, length } => Some((direction, length)),
+                _ => None,
+            });
+            shares.iter_mut().zip(packet).for_each(|(share, open)| *share += f32::from(u8::from(open)));
         }
-        traced[..count].iter().for_each(|&lane| shares[lane] /= each as f32);
+        if aims.iter().any(|aim| matches!(aim, Aim::Cap(_))) {
+            let discs = from.discs.get_or_init(|| self.discs(from));
+            let each = 1.0 / discs.len() as f32;
+            let mut open = [0_u32; LANES];
+            for disc in discs {
+                let packet = self.packet(from, |k| match aims[k] {
+                    Aim::Cap(cap) => Some(cap.ray(disc[k])),
+                    _ => None,
+                });
+                open.iter_mut().zip(packet).for_each(|(sum, open)| *sum += u32::from(open));
+            }
+            shares.iter_mut().zip(open).for_each(|(share, open)| *share += open as f32 * each);
+        }
         shares
+    }
+
+    /// Which of the rays that are given for places nothing stands in the way of: unit directions and lengths.
+    fn packet(&self, from: &Places, ray: impl Fn(usize) -> Option<(Vec3A, f32)>) -> [bool; LANES] {
+        let mut open = [false; LANES];
+        // What is not asked for has no length.
+        let mut rays = [Segment { origin: Vec3A::ZERO, direction: Vec3A::Z, length: -1.0 }; LANES];
+        for (k, place) in from.places().iter().enumerate() {
+            rays[k].origin = place.origin;
+            if let Some((direction, length)) = ray(k) {
+                (rays[k].direction, rays[k].length) = (direction, length);
+                open[k] = true;
+            } else if k > 0 {
+                // A direction of a neighbour's keeps the packet narrow.
+                rays[k].direction = rays[k - 1].direction;
+            }
+        }
+        let blocked = self.rays.wide().blocked(&rays[..from.places().len()]);
+        std::array::from_fn(|k| open[k] && !blocked[k])
+    }
+
+    /// A point of the unit disc for each ray of each place.
+    fn discs(&self, from: &Places) -> Vec<[Disc; LANES]> {
+        let mut discs = vec![[(0.0, [0.0, 1.0]); LANES]; self.spread.count() as usize];
+        for (k, place) in from.places().iter().enumerate() {
+            for (disc, point) in discs.iter_mut().zip(self.spread.disc(seed(place))) {
+                disc[k] = point;
+            }
+        }
+        discs
     }
 
     /// Unit vectors distributed as the cosine over the hemisphere about the unit vector `normal`, as many as there are
@@ -130,55 +187,66 @@ impl<'a> Shadows<'a> {
         let frame = frame(normal);
         self.spread.hemisphere(seed(place)).map(move |d| frame * d)
     }
+}
 
-    fn beam(&self, place: &Place, beam: &Beam, towards: DVec3) -> Found {
-        if towards == DVec3::ZERO {
-            return Found::Known(0.0);
-        }
-        let ray = |direction| Segment { origin: place.origin, direction, length: f32::INFINITY };
-        if beam.angular_diameter_degrees <= 0.0 {
-            return Found::Along(vec![ray(towards.as_vec3a())]);
-        }
-        let sine = (0.5 * beam.angular_diameter_degrees.to_radians()).sin();
-        Found::Along(self.cap(place, towards, sine).map(|(along, _)| ray(along)).collect())
+impl Places {
+    /// Of at most [`LANES`], which had best be near one another.
+    #[must_use]
+    pub fn new(places: &[Place]) -> Self {
+        let count = places.len().min(LANES);
+        let all = std::array::from_fn(|k| places.get(k).copied().unwrap_or_default());
+        Self { all, count, discs: OnceCell::new() }
     }
 
-    fn lamp(&self, place: &Place, lamp: &Lamp) -> Found {
-        let to = lamp.position - place.origin.as_dvec3();
-        let distance = to.length();
-        // Within the lamp nothing is between.
-        if distance <= lamp.radius {
-            return Found::Known(1.0);
-        }
-        let ray = |direction, length| Segment { origin: place.origin, direction, length };
-        if lamp.radius <= 0.0 {
-            return Found::Along(vec![ray((to / distance).as_vec3a(), distance as f32)]);
-        }
-        let sine = lamp.radius / distance;
-        let nearest = |off: f32| {
-            // Where a ray that leaves the middle by an angle of sine `off` meets the sphere.
-            let off = f64::from(off);
-            let inside = (lamp.radius.powi(2) - (distance * off).powi(2)).max(0.0).sqrt();
-            (distance * (1.0 - off * off).sqrt() - inside) as f32
-        };
-        let cap = self.cap(place, to / distance, sine);
-        Found::Along(cap.map(|(along, off)| ray(along, nearest(off))).collect())
+    fn places(&self) -> &[Place] {
+        &self.all[..self.count]
     }
+}
 
-    /// Unit vectors spread evenly over the solid angle within an angle of that sine about `middle`, and the sine of each
-    /// one's angle from the middle.
-    fn cap(&self, place: &Place, middle: DVec3, sine: f64) -> impl Iterator<Item = (Vec3A, f32)> {
-        let frame = frame(middle.as_vec3a());
-        // 1 - cos of the cap, without its cancellation.
-        let height = (sine * sine / (1.0 + (1.0 - sine * sine).max(0.0).sqrt())) as f32;
-        self.spread.disc(seed(place)).map(move |(radius, [sin, cos])| {
-            // 1 - cos, and the sine, of a ray's angle: even in the cap where `radius` is even in the disc.
-            let below = radius * radius * height;
-            let off = (below * (2.0 - below)).max(0.0).sqrt();
-            let side = off.copysign(radius);
-            (frame * Vec3A::new(side * cos, side * sin, 1.0 - below), off)
-        })
+impl Cap {
+    /// Unit direction and length of the ray through a point of the disc; even in the cap where that is even in the disc.
+    fn ray(&self, (radius, [sin, cos]): Disc) -> (Vec3A, f32) {
+        // 1 - cos, and the sine, of a ray's angle.
+        let below = radius * radius * self.height;
+        let off = (below * (2.0 - below)).max(0.0).sqrt();
+        let side = off.copysign(radius);
+        let along = self.frame * Vec3A::new(side * cos, side * sin, 1.0 - below);
+        let Some((distance, radius)) = self.sphere else { return (along, f32::INFINITY) };
+        // Where a ray that leaves the middle by that angle meets the sphere.
+        let off = f64::from(off);
+        let inside = (radius.powi(2) - (distance * off).powi(2)).max(0.0).sqrt();
+        (along, (distance * (1.0 - off * off).sqrt() - inside) as f32)
     }
+}
+
+/// The cap about the unit vector `middle` within an angle of that sine.
+fn cap(middle: DVec3, sine: f64, sphere: Option<(f64, f64)>) -> Aim {
+    // 1 - cos of the cap, without its cancellation.
+    let height = (sine * sine / (1.0 + (1.0 - sine * sine).max(0.0).sqrt())) as f32;
+    Aim::Cap(Cap { frame: frame(middle.as_vec3a()), height, sphere })
+}
+
+fn beam_from(beam: &Beam, towards: DVec3) -> Aim {
+    if towards == DVec3::ZERO {
+        return Aim::Known(0.0);
+    }
+    if beam.angular_diameter_degrees <= 0.0 {
+        return Aim::Ray { direction: towards.as_vec3a(), length: f32::INFINITY };
+    }
+    cap(towards, (0.5 * beam.angular_diameter_degrees.to_radians()).sin(), None)
+}
+
+fn lamp_from(lamp: &Lamp, place: &Place) -> Aim {
+    let to = lamp.position - place.origin.as_dvec3();
+    let distance = to.length();
+    // Within the lamp nothing is between.
+    if distance <= lamp.radius {
+        return Aim::Known(1.0);
+    }
+    if lamp.radius <= 0.0 {
+        return Aim::Ray { direction: (to / distance).as_vec3a(), length: distance as f32 };
+    }
+    cap(to / distance, lamp.radius / distance, Some((distance, lamp.radius)))
 }
 
 /// A place's own number.

@@ -201,3 +201,29 @@ pub(super) fn set(light: &Light, params: &mut Params, given: impl Fn(&str) -> bo
         set("elevation", [bearing.elevation; 3]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::light::{Beam, Lamp};
+
+    #[test]
+    fn the_rules_of_every_light_are_valid_and_have_derivatives() {
+        let beam = LightKind::Directional(Beam {
+            direction: DVec3::NEG_Y,
+            irradiance: [1.0; 3],
+            angular_diameter_degrees: 0.0,
+        });
+        let lamp =
+            LightKind::Point(Lamp { position: DVec3::Y, intensity: [1.0; 3], range: None, radius: 0.0 });
+        for (name, kind, from_sky) in
+            [("checked_sky", beam.clone(), true), ("checked_beam", beam, false), ("checked_lamp", lamp, false)]
+        {
+            let light = Light::new(name, kind).unwrap();
+            // Registering checks rules of the library in these tests alone.
+            assert!(effect_of(&light, from_sky).is_ok(), "{name}");
+        }
+    }
+}

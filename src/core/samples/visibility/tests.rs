@@ -71,7 +71,7 @@ fn a_coarse_sphere_is_lit_wherever_its_smooth_normal_faces_the_light() {
             if flat.length() < 1e-6 {
                 continue;
             }
-            let visible = shadows.visible(&[place], &light)[0];
+            let visible = shadows.visible(&Places::new(&[place]), &light)[0];
             if normal.dot(towards) > 0.0 {
                 facing += 1;
                 turned_away += u32::from(flat.dot(towards) < 0.0);
@@ -96,19 +96,19 @@ fn a_lamp_is_hidden_by_what_stands_before_it_and_not_by_what_stands_behind() {
         |height: f64, radius| Light::new("lamp", LightKind::Point(lamp(height * DVec3::Y, radius))).unwrap();
     let below = at(DVec3::ZERO);
     for radius in [0.0, 0.05] {
-        assert_eq!(shadows.visible(&[below], &point(2.0, radius))[0], 0.0);
-        assert_eq!(shadows.visible(&[below], &point(0.5, radius))[0], 1.0);
-        assert_eq!(shadows.arriving(&[below], &point(0.5, radius))[0], 4.0);
+        assert_eq!(shadows.visible(&Places::new(&[below]), &point(2.0, radius))[0], 0.0);
+        assert_eq!(shadows.visible(&Places::new(&[below]), &point(0.5, radius))[0], 1.0);
+        assert_eq!(shadows.arriving(&Places::new(&[below]), &point(0.5, radius))[0], 4.0);
     }
     // Surface within the lamp, and at a punctual one.
-    assert_eq!(shadows.visible(&[below], &point(0.01, 0.05))[0], 1.0);
-    assert_eq!(shadows.arriving(&[below], &point(0.0, 0.0))[0], 0.0);
+    assert_eq!(shadows.visible(&Places::new(&[below]), &point(0.01, 0.05))[0], 1.0);
+    assert_eq!(shadows.arriving(&Places::new(&[below]), &point(0.0, 0.0))[0], 0.0);
     let spot = |direction| {
         let cone = Cone { direction, inner_degrees: 10.0, outer_degrees: 20.0 };
         Light::new("spot", LightKind::Spot(lamp(0.5 * DVec3::Y, 0.0), cone)).unwrap()
     };
-    assert_eq!(shadows.arriving(&[below], &spot(DVec3::NEG_Y))[0], 4.0);
-    assert_eq!(shadows.arriving(&[below], &spot(DVec3::X))[0], 0.0);
+    assert_eq!(shadows.arriving(&Places::new(&[below]), &spot(DVec3::NEG_Y))[0], 4.0);
+    assert_eq!(shadows.arriving(&Places::new(&[below]), &spot(DVec3::X))[0], 0.0);
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn soft_lights_are_seen_in_proportion() {
     let shadows = Shadows::new(&mesh, &rays, 4096);
     let place = at(DVec3::ZERO);
     for degrees in [0.5, 10.0, 90.0] {
-        let half = shadows.visible(&[place], &beam(DVec3::NEG_Y, degrees))[0];
+        let half = shadows.visible(&Places::new(&[place]), &beam(DVec3::NEG_Y, degrees))[0];
         // A straight edge through a net of 4096 points crosses about 64 of its boxes, in which it errs by chance.
         assert!((half - 0.5).abs() < 0.004, "{degrees}: {half}");
     }
@@ -129,14 +129,17 @@ fn soft_lights_are_seen_in_proportion() {
     let light = beam(DVec3::new(-e.sin(), -e.cos(), 0.0), 10.0);
     let x = e / a;
     let segment = (x.acos() - x * (1.0 - x * x).sqrt()) / PI;
-    let visible = f64::from(shadows.visible(&[place], &light)[0]);
+    let visible = f64::from(shadows.visible(&Places::new(&[place]), &light)[0]);
     // As above; the disc is flat to a^2 / 3, 0.0025.
     assert!((visible - segment).abs() < 0.006, "{visible} {segment}");
     // A sphere is seen as a disc of that sine.
     let centre = 100.0 * DVec3::new(e.sin(), e.cos(), 0.0);
     let sphere = Light::new("lamp", LightKind::Point(lamp(centre, 100.0 * a.sin()))).unwrap();
-    assert!((f64::from(shadows.visible(&[place], &sphere)[0]) - segment).abs() < 0.006);
-    assert_eq!(shadows.visible(&[place], &sphere)[0], shadows.visible(&[place], &sphere)[0]);
+    assert!((f64::from(shadows.visible(&Places::new(&[place]), &sphere)[0]) - segment).abs() < 0.006);
+    assert_eq!(
+        shadows.visible(&Places::new(&[place]), &sphere)[0],
+        shadows.visible(&Places::new(&[place]), &sphere)[0]
+    );
 }
 
 #[test]
@@ -156,7 +159,8 @@ fn degenerate_triangles_and_missing_normals_give_finite_places() {
         if mesh.normals.first() == Some(&Vec3::Y) {
             assert!(shadows.place(3, [0.25, 0.25, 0.5]).origin.y > 0.0);
             assert_eq!(
-                shadows.visible(&[shadows.place(0, [0.2, 0.3, 0.5])], &beam(DVec3::NEG_Y, 0.5))[0],
+                shadows.visible(&Places::new(&[shadows.place(0, [0.2, 0.3, 0.5])]), &beam(DVec3::NEG_Y, 0.5))
+                    [0],
                 1.0
             );
         }
