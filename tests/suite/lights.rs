@@ -10,7 +10,7 @@ use skinfit::bake::rays::RayMesh;
 use skinfit::model::bearing::Bearing;
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::samples::PosedSurface;
-use skinfit::samples::visibility::Shadows;
+use skinfit::samples::visibility::{Places, Shadows};
 use skinfit::samples::{Hit, sample_hits, sample_view};
 use skinfit::scene::light::{Beam, Cone, Lamp, NEAREST, THINNEST_EDGE};
 use skinfit::scene::maps::Spots;
@@ -156,7 +156,7 @@ fn predict(scene: &Scene) -> Predicted {
         let (mut radiance, mut lit) = ([0.0; 3], 0.0);
         for light in &scene.lights {
             let cosine = normal.dot(light.towards(place.position)).max(0.0);
-            let arriving = f64::from(shadows.arriving(&place, light)) * cosine;
+            let arriving = f64::from(shadows.arriving(&Places::new(&[place]), light)[0]) * cosine;
             (0..3).for_each(|c| radiance[c] += ALBEDO / PI * light.strength()[c] * arriving);
             let all = light.attenuation(place.position) * cosine;
             lit += if all > 0.0 { arriving / all } else { 0.0 };

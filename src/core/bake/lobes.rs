@@ -2,6 +2,8 @@
 
 use std::ops::RangeInclusive;
 
+use rayon::prelude::*;
+
 use crate::model::cube::Cube;
 
 /// Specular cubes for exponents that grow geometrically; alpha is the luminance.
@@ -60,30 +62,37 @@ impl LobeStack {
         let i = (position as usize).min(count - 2);
         let t = position - i as f64;
         let s = 1.0 - t;
-        let value = self.combine(i, |[a, b, c, d]| {
-            s * s * s * a + 3.0 * s * s * t * b + 3.0 * s * t * t * c + t * t * t * d
-        });
         // d position / d exponent.
         let rate = if inside { 1.0 / (step * exponent * std::f64::consts::LN_2) } else { 0.0 };
-        let slope = self.combine(i, |[a, b, c, d]| {
-            3.0 * rate * (s * s * (b - a) + 2.0 * s * t * (c - b) + t * t * (d - c))
-        });
-        (value, slope)
+        self.combined(i, |[a, b, c, d]| {
+            let value = s * s * s * a + 3.0 * s * s * t * b + 3.0 * s * t * t * c + t * t * t * d;
+            [value, 3.0 * rate * (s * s * (b - a) + 2.0 * s * t * (c - b) + t * t * (d - c))]
+        })
     }
 
-    /// A cube of what `combine` makes of the Bezier points of interval i, texel by texel.
-    fn combine(&self, i: usize, combine: impl Fn([f64; 4]) -> f64) -> Cube<f32> {
+    /// Cubes of the two numbers that `combine` makes of the Bezier points of interval i, texel by texel. All cores.
+    fn combined(&self, i: usize, combine: impl Fn([f64; 4]) -> [f64; 2] + Sync) -> (Cube<f32>, Cube<f32>) {
         let (before, after) = (i.checked_sub(1), (i + 2 < self.cubes.len()).then_some(i + 2));
         let (own, next) = (&self.cubes[i], &self.cubes[i + 1]);
-        Cube::from_fn(own.size(), |face, column, row| {
+        let size = own.size();
+        let both = |at: usize| {
+            let (face, row, column) = (at / (size * size), at / size % size, at % size);
             let texel = |cube: &Cube<f32>| cube.texel(face, column, row).map(f64::from);
             let (low, high) = (texel(own), texel(next));
             let outer = [before, after].map(|k| k.map(|k| texel(&self.cubes[k])));
-            std::array::from_fn(|c| {
+            let numbers: [[f64; 2]; 4] = std::array::from_fn(|c| {
                 let [start, end] = slopes(outer.map(|texel| texel.map(|t| t[c])), [low[c], high[c]]);
-                combine([low[c], low[c] + start / 3.0, high[c] - end / 3.0, high[c]]) as f32
-            })
-        })
+                combine([low[c], low[c] + start / 3.0, high[c] - end / 3.0, high[c]])
+            });
+            [0, 1].map(|k| numbers.map(|of| of[k] as f32))
+        };
+        let texels: Vec<[[f32; 4]; 2]> =
+            (0..6 * size * size).into_par_iter().with_min_len(1 << 10).map(both).collect();
+        let cube = |k: usize| {
+            let faces: Vec<[f32; 4]> = texels.iter().map(|texel| texel[k]).collect();
+            Cube::of_texels(size, &faces)
+        };
+        rayon::join(|| cube(0), || cube(1))
     }
 }
 

@@ -270,6 +270,11 @@ impl<T: Channel> Cube<T> {
                 }
             }
         }
+        Self::of_texels(size, &faces)
+    }
+
+    /// A cube of the texels of each face, row by row, as [`Self::from_fn`] asks for them.
+    pub(crate) fn of_texels(size: usize, faces: &[[T; 4]]) -> Self {
         let texel = |sources: Sources| match sources {
             Sources::One(a) => faces[a],
             Sources::Corner([a, b, c]) => {
@@ -295,10 +300,12 @@ pub fn padding(size: usize) -> impl Iterator<Item = Sources> {
     let inner = move |i: usize| i.clamp(1, size);
     (0..6 * side * side).map(move |i| {
         let (face, row, column) = (i / (side * side), i / side % side, i % side);
-        if row == inner(row) || column == inner(column) {
-            return Sources::One(neighbour(face, column, row, size));
-        }
         let (inner_row, inner_column) = (inner(row), inner(column));
+        match (row == inner_row, column == inner_column) {
+            (true, true) => return Sources::One((face * size + row - 1) * size + column - 1),
+            (false, false) => {}
+            _ => return Sources::One(neighbour(face, column, row, size)),
+        }
         Sources::Corner([
             neighbour(face, inner_column, inner_row, size),
             neighbour(face, column, inner_row, size),

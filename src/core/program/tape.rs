@@ -112,6 +112,22 @@ impl Tape {
         self.uniform_values_by(|at| value(&self.graph.uniforms[at]))
     }
 
+    /// The faces that its own instructions look up; [`Self::resources`] are those of all tapes of a graph.
+    #[must_use]
+    pub fn looked_up(&self) -> Vec<String> {
+        let of = |instruction: &Instruction| match instruction {
+            Instruction::Call(call) | Instruction::Unit(call, ..) => match call.native {
+                Native::Lookup(resource) => self.resources.get(resource as usize).cloned(),
+                _ => None,
+            },
+            _ => None,
+        };
+        let mut names: Vec<String> = self.instructions.iter().filter_map(of).collect();
+        names.sort();
+        names.dedup();
+        names
+    }
+
     /// What [`Self::uniform_values`] are made of.
     #[must_use]
     pub fn inputs(&self) -> &[Input] {

@@ -218,9 +218,11 @@ mod tests {
         });
         let lamp =
             LightKind::Point(Lamp { position: DVec3::Y, intensity: [1.0; 3], range: None, radius: 0.0 });
-        for (name, kind, from_sky) in
-            [("checked_sky", beam.clone(), true), ("checked_beam", beam, false), ("checked_lamp", lamp, false)]
-        {
+        for (name, kind, from_sky) in [
+            ("checked_sky", beam.clone(), true),
+            ("checked_beam", beam, false),
+            ("checked_lamp", lamp, false),
+        ] {
             let light = Light::new(name, kind).unwrap();
             // Registering checks rules of the library in these tests alone.
             assert!(effect_of(&light, from_sky).is_ok(), "{name}");

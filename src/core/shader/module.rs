@@ -7,10 +7,13 @@ use super::atlas::stored;
 use super::atlas::text::{SAMPLE_LEVEL, sampled};
 use super::domain::Domain;
 use super::emit::{Plan, hazy, parts, sample_fields};
+use super::facts::ShadowFacts;
 use super::quantity::{Constant, Kind, Resource};
+use super::rule::Rule;
 use super::tangent::chain::Chain;
 use crate::model::key_light::KeyLight;
 use crate::model::params::Params;
+use crate::model::shadow_filter::ShadowFilter;
 use crate::model::turn::turn;
 
 impl Plan {
@@ -100,6 +103,7 @@ impl Plan {
                     })
                     .or_else(|| fetch(Kind::Texels, &texels))
             })
+            .chain(self.shadow_fetches())
             .collect();
         let whole = self.raster_module(&[]);
         let end = whole.find("\n@fragment\n").unwrap_or(whole.len());
@@ -110,10 +114,43 @@ impl Plan {
             ("@location(0) vec4f", sum)
         };
         let wgsl = format!(
-            "{}\n@fragment\nfn fs_main(at: Varyings) -> {output} {{\n    return {value};\n}}\n",
-            &whole[..end]
+            "{}{}\n@fragment\nfn fs_main(at: Varyings) -> {output} {{\n    return {value};\n}}\n",
+            &whole[..end],
+            self.shadow_fetch()
         );
         Self { wgsl, ..self.clone() }
+    }
+
+    /// As many fetches as the filter of shadow maps makes for a light, around where its map shows a place.
+    fn shadow_fetch(&self) -> String {
+        let Some(ShadowFacts { filter, taps }) = self.facts.shadows else { return String::new() };
+        if self.shadow_fetches().next().is_none() {
+            return String::new();
+        }
+        let taps = if filter == ShadowFilter::Hardware { 1 } else { taps };
+        let blockers = match filter {
+            ShadowFilter::Pcss => {
+                "        let texel = vec2i(clamp(at, vec2f(0.0), vec2f(0.999)) * shadow_row(layer, 6u).w);\n        \
+                 sum += textureLoad(shadow_maps, texel, layer, 0);\n"
+            }
+            _ => "",
+        };
+        format!(
+            "\nfn shadow_fetch(light: u32, place: vec3f) -> f32 {{\n    \
+             let layer = min(light, textureNumLayers(shadow_maps) - 1u);\n    \
+             let seen = shadow_seen(layer, place);\n    var sum = 0.0;\n    \
+             for (var i = 0u; i < {taps}u; i++) {{\n        \
+             let at = seen.xy + vec2f(f32(i % 4u), f32(i / 4u)) / shadow_row(layer, 6u).w;\n        \
+             sum += textureSampleCompareLevel(shadow_maps, shadow_sampler, at, layer, seen.z);\n{blockers}    \
+             }}\n    return sum;\n}}\n"
+        )
+    }
+
+    /// Calls of that for each light that fragments compare with its map.
+    fn shadow_fetches(&self) -> impl Iterator<Item = String> {
+        let compares = |rule: &&Rule| rule.reads.contains(&Resource::ShadowMaps.name());
+        let lights = self.rules(Domain::Fragment).filter(compares).count();
+        (0..lights).map(|light| format!("vec4f(shadow_fetch({light}u, at.vertex_position))"))
     }
 
     pub(super) fn sample_module(&self, parts: &[&str]) -> String {

@@ -161,10 +161,9 @@ pub(crate) fn quantile(sorted: &[f32], share: f64) -> f32 {
 pub(crate) fn keep(name: &str, reference: &Image, test: &Image) -> String {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("../parity");
     let seen = |image: &Image| -> Vec<[f64; 3]> {
-        image
-            .over(0.05)
-            .map(|rgb| rgb.map(|x| skinfit::render::tonemap::srgb_encode(x.clamp(0.0, 1.0)).into()))
-            .collect()
+        let encoded = |x: f32| skinfit::render::tonemap::srgb_encode(x.clamp(0.0, 1.0)).into();
+        let over = |(rgb, alpha): (&[f32; 3], &f32)| rgb.map(|x| encoded(x + (1.0 - alpha) * 0.05));
+        image.rgb.iter().zip(&image.alpha).map(over).collect()
     };
     let map = skinfit::report::flip::flip(&seen(reference), &seen(test), reference.width);
     let map = Image {

@@ -1,6 +1,7 @@
 //! Shadow maps beside the CPU's rays: how far they are off, what is drawn and when, and hard cases.
 
 use glam::{DVec3, Vec3};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
 use skinfit::export::{self, Target};
 use skinfit::gpu::upload::Content;
 use skinfit::gpu::{Gpu, RenderOptions, Renderer};
@@ -237,6 +238,13 @@ fn a_filter_is_the_scenes_choice_within_any_budget_and_no_exports() {
             let (count, error) = steps.fold((0, 0.0), |(count, sum), step| (count + 1, sum + step.error));
             // One for each light, told with what it is off by.
             assert!(count == 2 && error > 0.01 && chosen.error >= error, "{budget:?} {filter:?}: {error}");
+            // What is fetched alone is fetched for each light, too, and where that reads depths those as well.
+            let alone = chosen.fetches_alone().wgsl;
+            assert_eq!(alone.matches("vec4f(shadow_fetch(").count(), 2, "{alone}");
+            assert_eq!(alone.contains("sum += textureLoad(shadow_maps"), filter == ShadowFilter::Pcss);
+            let module = naga::front::wgsl::parse_str(&alone).unwrap();
+            let mut validator = Validator::new(ValidationFlags::all(), Capabilities::all());
+            validator.validate(&module).unwrap_or_else(|error| panic!("{error:?}\n{alone}"));
         }
     }
     let text = |filter| {

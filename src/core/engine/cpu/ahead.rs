@@ -252,6 +252,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     use super::*;
+    use crate::bake::stacks::Stack;
     use crate::engine::cpu::file::File;
     use crate::engine::cpu::machine;
     use crate::engine::cpu::pass::Tapes;
@@ -403,6 +404,20 @@ use crate::simd::Simd;
                     numbers.into_iter().map(f64::to_bits).collect::<Vec<_>>()
                 };
                 assert_eq!(run(&printed), run(&plain), "{name} {zeros}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_kept_looks_no_stack_up_that_a_free_parameter_moves() {
+        for (name, tape) in every_tape() {
+            let stacks = Stack::read(&tape.looked_up());
+            // The lobe moves in some plans, the roughness in the lit one.
+            let moves = name.starts_with("lit") || name.contains("lobe") || name.contains("all");
+            if name.ends_with("_keep") && moves {
+                assert!(stacks.is_empty(), "{name}: {stacks:?}");
+            } else if name.ends_with("_value") && moves {
+                assert!(!stacks.is_empty(), "{name}");
             }
         }
     }

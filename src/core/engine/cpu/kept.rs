@@ -28,7 +28,7 @@ pub(super) struct Kept {
 impl CpuEngine {
     /// What no free parameter changes, made on the first pass, and again should a held parameter differ.
     pub(super) fn kept(&self, pass: &Pass, turned: bool, point: &Point, lobes: &Lobes) -> Arc<Kept> {
-        let places = Lobes::places(&pass.keep.program.tape.resources, &point.params);
+        let places = Lobes::places(&pass.keep.program.tape.looked_up(), &point.params);
         let made_with = (pass.keep.uniforms(&point.params), places);
         let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(kept) = slot.as_ref().filter(|kept| kept.turned == turned && kept.made_with == made_with)

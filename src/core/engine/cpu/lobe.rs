@@ -22,14 +22,17 @@ pub(super) struct Lobes([Option<Arc<Lobe>>; Stack::ALL.len()]);
 impl Lobes {
     /// Those at `params`; the last ones in `slot` where they stand there, else new ones, left there.
     pub(super) fn at(light: &Illumination, params: &Params, slot: &Mutex<Self>) -> Self {
-        let mut slot = slot.lock().unwrap_or_else(PoisonError::into_inner);
-        for (stack, last) in Stack::ALL.into_iter().zip(&mut slot.0) {
+        let lock = || slot.lock().unwrap_or_else(PoisonError::into_inner);
+        // Not while the lock is held: all cores make a cube.
+        let mut own = lock().clone();
+        for (stack, last) in Stack::ALL.into_iter().zip(&mut own.0) {
             let place = stack.place(params);
             if last.as_ref().is_none_or(|lobe| lobe.place != place) {
                 *last = stack.at(light, place).map(|(cube, slope)| Arc::new(Lobe { place, cube, slope }));
             }
         }
-        slot.clone()
+        lock().clone_from(&own);
+        own
     }
 
     /// The cube that rules read by that name.

@@ -25,11 +25,20 @@ fn shadow_layer(map: f32, place: vec3f) -> u32 {
     return first + select(4u, 5u, way.z < 0.0);
 }
 
+// A place (with 1) or a direction (with 0) in a layer's clip space.
+fn shadow_clip(layer: u32, v: vec4f) -> vec4f {
+    let a = shadow_row(layer, 0u) * v.x + shadow_row(layer, 1u) * v.y;
+    return a + shadow_row(layer, 2u) * v.z + shadow_row(layer, 3u) * v.w;
+}
+
+// Where a place of clip space lies in the map, how deep, and w.
+fn shadow_projected(clip: vec4f) -> vec4f {
+    return vec4f(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w, clip.z / clip.w, clip.w);
+}
+
 // Where a layer shows a place, how deep it lies there, and w.
 fn shadow_seen(layer: u32, place: vec3f) -> vec4f {
-    let a = shadow_row(layer, 0u) * place.x + shadow_row(layer, 1u) * place.y;
-    let clip = a + shadow_row(layer, 2u) * place.z + shadow_row(layer, 3u);
-    return vec4f(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w, clip.z / clip.w, clip.w);
+    return shadow_projected(shadow_clip(layer, vec4f(place, 1.0)));
 }
 
 // Whether a layer shows what was seen; behind a lamp and beside its map there is nothing.
@@ -37,15 +46,18 @@ fn shadow_holds(seen: vec4f) -> bool {
     return seen.w > 0.0 && all(abs(seen.xy - 0.5) <= vec2f(0.5));
 }
 
-// The share of four texels around a place that hold nothing nearer to the light, by how near they are.
-fn shadow_compare(map: f32, place: vec3f) -> f32 {
-    let layer = shadow_layer(map, place);
-    let seen = shadow_seen(layer, place);
+// The share of the four texels around what was seen that hold nothing nearer to the light, by how near they are.
+fn shadow_open(layer: u32, seen: vec4f) -> f32 {
     if (!shadow_holds(seen)) {
         return 1.0;
     }
     // A tap may lie below all that is drawn, where there is nothing either.
     return textureSampleCompareLevel(shadow_maps, shadow_sampler, seen.xy, layer, max(seen.z, 0.0));
+}
+
+fn shadow_compare(map: f32, place: vec3f) -> f32 {
+    let layer = shadow_layer(map, place);
+    return shadow_open(layer, shadow_seen(layer, place));
 }
 
 // A place moved towards the light, off all that the four texels around it show of its own plane, and a texel's width
@@ -62,21 +74,38 @@ fn shadow_raised(map: f32, place: vec3f, n: vec3f, toward: vec3f) -> vec4f {
     return vec4f(place + lift * toward, texel);
 }
 
-// The tap with number i of a disc of unit radius that faces the light, slid along the light to the plane of the surface:
-// points of a spiral that are evenly spread (Vogel 1979).
-fn shadow_tap(i: u32, n: vec3f, toward: vec3f) -> vec3f {
-    let across = normalize_or(vec3f(toward.z, 0.0, -toward.x), vec3f(1.0, 0.0, 0.0));
+// The tap with number i of the unit disc: points of a spiral that are evenly spread (Vogel 1979).
+fn shadow_tap(i: u32) -> vec2f {
     let angle = 2.399963229728653 * f32(i);
-    let off = cos(angle) * across + sin(angle) * cross(toward, across);
-    let slide = dot(n, off) / max(dot(n, toward), 0.1);
-    return sqrt((f32(i) + 0.5) / f32(shadow_taps())) * (off - slide * toward);
+    return sqrt((f32(i) + 0.5) / f32(shadow_taps())) * vec2f(cos(angle), sin(angle));
+}
+
+// The axes of a disc that faces the light, slid along the light to the plane of the surface.
+fn shadow_axes(n: vec3f, toward: vec3f) -> mat2x3f {
+    let across = normalize_or(vec3f(toward.z, 0.0, -toward.x), vec3f(1.0, 0.0, 0.0));
+    let beside = cross(toward, across);
+    let slide = toward / max(dot(n, toward), 0.1);
+    return mat2x3f(across - dot(n, across) * slide, beside - dot(n, beside) * slide);
 }
 
 // The mean over a disc around a place.
 fn shadow_disc(map: f32, place: vec3f, n: vec3f, toward: vec3f, radius: f32) -> f32 {
+    let axes = shadow_axes(n, toward);
+    let layer = u32(map);
     var sum = 0.0;
-    for (var i = 0u; i < shadow_taps(); i++) {
-        sum += shadow_compare(map, place + radius * shadow_tap(i, n, toward));
+    if (shadow_row(layer, 5u).w < 6.0) {
+        // One layer holds all taps, and its clip space is linear in them.
+        let middle = shadow_clip(layer, vec4f(place, 1.0));
+        let across = radius * shadow_clip(layer, vec4f(axes[0], 0.0));
+        let beside = radius * shadow_clip(layer, vec4f(axes[1], 0.0));
+        for (var i = 0u; i < shadow_taps(); i++) {
+            let tap = shadow_tap(i);
+            sum += shadow_open(layer, shadow_projected(middle + tap.x * across + tap.y * beside));
+        }
+    } else {
+        for (var i = 0u; i < shadow_taps(); i++) {
+            sum += shadow_compare(map, place + radius * (axes * shadow_tap(i)));
+        }
     }
     return sum / f32(shadow_taps());
 }
@@ -110,8 +139,9 @@ fn shadow_blockers(map: f32, place: vec3f, n: vec3f, toward: vec3f, radius: f32)
     let parallel = shadow_row(u32(map), 4u).w == 0.0;
     var sum = 0.0;
     var count = 0.0;
+    let axes = shadow_axes(n, toward);
     for (var i = 0u; i < shadow_taps(); i++) {
-        let tap = place + radius * shadow_tap(i, n, toward);
+        let tap = place + radius * (axes * shadow_tap(i));
         let layer = shadow_layer(map, tap);
         let seen = shadow_seen(layer, tap);
         if (shadow_holds(seen)) {
