@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 25] = [
+const SOURCES: [&str; 26] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
     include_str!("coefficients.rs"),
@@ -22,6 +22,7 @@ const SOURCES: [&str; 25] = [
     include_str!("low_discrepancy.rs"),
     include_str!("mod.rs"),
     include_str!("occlusion.rs"),
+    include_str!("packet.rs"),
     include_str!("panorama.rs"),
     include_str!("prefilter.rs"),
     include_str!("pyramid.rs"),

@@ -107,6 +107,22 @@ mod tests {
     }
 
     #[test]
+    fn the_order_takes_every_point_once_and_sixteen_in_a_row_are_of_one_cell() {
+        for seed in [3, 77] {
+            let sobol = Sobol::new(256);
+            let mut indices: Vec<u32> = sobol.0.iter().map(|[first, _]| *first).collect();
+            indices.sort_unstable();
+            assert!(indices.into_iter().eq(0..256));
+            let square: Vec<[f32; 2]> =
+                sobol.0.iter().map(|&[a, b]| [scramble(a, mix(seed)), scramble(b, mix(!seed))]).collect();
+            for sixteen in square.chunks(16) {
+                let cell = |p: &[f32; 2]| p.map(|x| (4.0 * x) as u32);
+                assert!(sixteen.iter().all(|p| cell(p) == cell(&sixteen[0])), "{sixteen:?}");
+            }
+        }
+    }
+
+    #[test]
     fn directions_have_the_moments_of_a_cosine_lobe() {
         let directions: Vec<Vec3A> = Sobol::new(4096).hemisphere(7).collect();
         let mean = directions.iter().copied().sum::<Vec3A>() / 4096.0;

@@ -24,6 +24,7 @@ pub mod lobe_sky;
 pub mod lobes;
 pub(crate) mod low_discrepancy;
 pub mod occlusion;
+pub(crate) mod packet;
 pub mod panorama;
 pub mod prefilter;
 mod pyramid;

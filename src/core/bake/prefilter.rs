@@ -228,7 +228,7 @@ fn angle(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|i| a[i] * b[i]).sum::<f64>().clamp(-1.0, 1.0).acos()
 }
 
-/// The angle between a unit vector and another one to 1e-4, which is a small part of any cell (Abramowitz and Stegun 1964,
+/// The angle between a unit vector and any other vector to 1e-4, which is a small part of any cell (Abramowitz and Stegun 1964,
 /// 4.4.45): every tile asks for that of thousands of cells.
 fn about_angle(axis: [f64; 3], v: [f64; 3]) -> f64 {
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -292,4 +292,20 @@ pub fn radial_by_brute_force(cube: &Cube<f64>, r: [f64; 3], radial: Radial, spli
         }
     }
     sum.map(|s| s / weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_are_about_those_of_the_arc_cosine() {
+        for i in 0..=2000 {
+            let want = std::f64::consts::PI * f64::from(i) / 2000.0;
+            let found = about_angle([0.0, 0.0, 1.0], [3.0 * want.sin(), 0.0, 3.0 * want.cos()]);
+            // The formula's own error is 6.7e-5.
+            assert!((found - want).abs() < 1e-4, "{want} {found}");
+        }
+        assert!(about_angle([0.0, 0.0, 1.0], [0.0; 3]).is_finite());
+    }
 }

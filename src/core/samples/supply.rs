@@ -39,8 +39,8 @@ pub(super) fn one_by_one<S: Supply + ?Sized>(supply: &S, points: &Points, rows: 
 
 /// What `find` gives at each of the points, a row for each number.
 pub(super) fn put_each(points: &Points, rows: &mut [Row], find: impl Fn(Hit, &mut [f32])) {
-    let mut numbers = [0.0; MOST_NUMBERS];
     for (lane, &hit) in points.hits.iter().enumerate() {
+        let mut numbers = [0.0; MOST_NUMBERS];
         let numbers = &mut numbers[..rows.len()];
         find(hit, numbers);
         rows.iter_mut().zip(&*numbers).for_each(|(row, number)| row[lane] = *number);

@@ -14,9 +14,10 @@ use glam::{DVec3, Mat3A, Vec3, Vec3A};
 
 use super::LANES;
 use crate::bake::low_discrepancy::{Sobol, mix};
+use crate::bake::packet::Segment;
 use crate::bake::rays::RayMesh;
 use crate::bake::vertex_rays::{frame, offset};
-use crate::bake::wide_bvh::Segment;
+
 use crate::scene::light::{Beam, Lamp, Light, LightKind};
 use crate::scene::mesh::PosedMesh;
 
@@ -110,19 +111,21 @@ impl<'a> Shadows<'a> {
             *arriving = light.attenuation(place.position) as f32;
         }
         // No ray has to be traced for what is out of reach.
-        if arriving.iter().any(|&attenuation| attenuation > 0.0) {
-            let visible = self.visible(from, light);
-            arriving.iter_mut().zip(visible).for_each(|(arriving, visible)| *arriving *= visible);
-        }
-        arriving
+        let visible = self.visible_where(from, light, |k| arriving[k] > 0.0);
+        std::array::from_fn(|k| arriving[k] * visible[k])
     }
 
     /// The share of a light that is visible from each place, in [0, 1].
     #[must_use]
     pub fn visible(&self, from: &Places, light: &Light) -> [f32; LANES] {
+        self.visible_where(from, light, |_| true)
+    }
+
+    /// The same of those places that are `asked` for, 0 of the others.
+    fn visible_where(&self, from: &Places, light: &Light, asked: impl Fn(usize) -> bool) -> [f32; LANES] {
         let mut aims = [Aim::Known(0.0); LANES];
-        for (aim, place) in aims.iter_mut().zip(from.places()) {
-            *aim = match &light.kind {
+        for (k, place) in from.places().iter().enumerate().filter(|&(k, _)| asked(k)) {
+            aims[k] = match &light.kind {
                 LightKind::Directional(beam) => beam_from(beam, light.towards(place.position)),
                 LightKind::Point(lamp) | LightKind::Spot(lamp, _) => lamp_from(lamp, place),
             };
@@ -137,7 +140,7 @@ impl<'a> Shadows<'a> {
         }
         if aims.iter().any(|aim| matches!(aim, Aim::Cap(_))) {
             let discs = from.discs.get_or_init(|| self.discs(from));
-            let each = 1.0 / discs.len() as f32;
+            let each = discs.len() as f32;
             let mut open = [0_u32; LANES];
             for disc in discs {
                 let packet = self.packet(from, |k| match aims[k] {
@@ -146,7 +149,7 @@ impl<'a> Shadows<'a> {
                 });
                 open.iter_mut().zip(packet).for_each(|(sum, open)| *sum += u32::from(open));
             }
-            shares.iter_mut().zip(open).for_each(|(share, open)| *share += open as f32 * each);
+            shares.iter_mut().zip(open).for_each(|(share, open)| *share += open as f32 / each);
         }
         shares
     }
@@ -155,19 +158,19 @@ impl<'a> Shadows<'a> {
     fn packet(&self, from: &Places, ray: impl Fn(usize) -> Option<(Vec3A, f32)>) -> [bool; LANES] {
         let mut open = [false; LANES];
         // What is not asked for has no length.
-        let mut rays = [Segment { origin: Vec3A::ZERO, direction: Vec3A::Z, length: -1.0 }; LANES];
+        let mut rays = [Segment { origin: Vec3A::ZERO, direction: Vec3A::Z, t_max: -1.0 }; LANES];
         for (k, place) in from.places().iter().enumerate() {
             rays[k].origin = place.origin;
             if let Some((direction, length)) = ray(k) {
-                (rays[k].direction, rays[k].length) = (direction, length);
+                (rays[k].direction, rays[k].t_max) = (direction, length);
                 open[k] = true;
             } else if k > 0 {
                 // A direction of a neighbour's keeps the packet narrow.
                 rays[k].direction = rays[k - 1].direction;
             }
         }
-        let blocked = self.rays.wide().blocked(&rays[..from.places().len()]);
-        std::array::from_fn(|k| open[k] && !blocked[k])
+        let occluded = self.rays.wide().occluded(&rays[..from.places().len()]);
+        std::array::from_fn(|k| open[k] && !occluded[k])
     }
 
     /// A point of the unit disc for each ray of each place.

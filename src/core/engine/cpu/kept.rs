@@ -30,14 +30,16 @@ impl CpuEngine {
     pub(super) fn kept(&self, pass: &Pass, turned: bool, point: &Point, lobes: &Lobes) -> Arc<Kept> {
         let places = Lobes::places(&pass.keep.program.tape.looked_up(), &point.params);
         let made_with = (pass.keep.uniforms(&point.params), places);
-        let mut slot = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(kept) = slot.as_ref().filter(|kept| kept.turned == turned && kept.made_with == made_with)
-        {
+        let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |kept: &&Arc<Kept>| kept.turned == turned && kept.made_with == made_with;
+        if let Some(kept) = lock().as_ref().filter(same) {
             return Arc::clone(kept);
         }
+        // Memory that nothing reads any more goes first; all cores work while no lock is held.
+        drop(lock().take());
         let views = (0..self.views.len()).map(|view| self.make_kept(pass, point, view, lobes)).collect();
         let kept = Arc::new(Kept { turned, made_with, views });
-        *slot = Some(Arc::clone(&kept));
+        *lock() = Some(Arc::clone(&kept));
         kept
     }
 

@@ -25,16 +25,16 @@ impl CpuEngine {
             return None;
         }
         let made_with = pass.levels.made_with(&point.params);
-        let mut slot = self.looked_up.lock().unwrap_or_else(PoisonError::into_inner);
+        let lock = || self.looked_up.lock().unwrap_or_else(PoisonError::into_inner);
         let same = |found: &&Arc<LookedUp>| found.turned == turned && found.made_with == made_with;
-        if let Some(found) = slot.as_ref().filter(same) {
+        if let Some(found) = lock().as_ref().filter(same) {
             return Some(Arc::clone(found));
         }
         let params = &point.params;
         let cubes = || CubesAt::new(&self.illumination, params, |x| x);
         let views = self.views.iter().map(|view| pass.levels.look_up(&view.samples, params, cubes, Row::of));
         let found = Arc::new(LookedUp { turned, views: views.collect(), made_with });
-        *slot = Some(Arc::clone(&found));
+        *lock() = Some(Arc::clone(&found));
         Some(found)
     }
 

@@ -166,3 +166,42 @@ fn degenerate_triangles_and_missing_normals_give_finite_places() {
         }
     }
 }
+
+#[test]
+fn sixteen_places_see_together_what_each_sees_alone() {
+    let mesh = lid(1.0, 0.5);
+    let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+    let shadows = Shadows::new(&mesh, &rays, 7);
+    // Below the lid, beside it, above it, and within the lamps.
+    let places: Vec<Place> = (0..16)
+        .map(|i| {
+            let i = f64::from(i);
+            at(DVec3::new(0.17 * i - 1.2, [0.0, 1.5, 1.9, 0.5][i as usize % 4], 0.03 * i))
+        })
+        .collect();
+    let cone = Cone { direction: DVec3::NEG_Y, inner_degrees: 10.0, outer_degrees: 35.0 };
+    for radius in [0.0, 0.4] {
+        let of = |kind| Light::new("light", kind).unwrap();
+        let near = Lamp { range: Some(1.8), ..lamp(DVec3::new(0.1, 2.0, 0.2), radius) };
+        let lights = [
+            beam(DVec3::new(0.3, -1.0, 0.1), 20.0 * radius),
+            of(LightKind::Point(near.clone())),
+            of(LightKind::Spot(near, cone.clone())),
+        ];
+        for light in lights {
+            for count in [1, 7, 15, 16] {
+                let together = Places::new(&places[..count]);
+                let (visible, arriving) =
+                    (shadows.visible(&together, &light), shadows.arriving(&together, &light));
+                for (k, place) in places[..count].iter().enumerate() {
+                    let alone = Places::new(&[*place]);
+                    assert_eq!(visible[k], shadows.visible(&alone, &light)[0], "{light:?} {k} of {count}");
+                    assert_eq!(arriving[k], shadows.arriving(&alone, &light)[0], "{light:?} {k} of {count}");
+                }
+                assert!(visible[count..].iter().chain(&arriving[count..]).all(|&x| x == 0.0));
+                let some = |of: &[f32]| of.contains(&0.0) && of.iter().any(|&x| x > 0.0);
+                assert!(count < 15 || some(&visible) && some(&arriving), "{visible:?} {arriving:?}");
+            }
+        }
+    }
+}
