@@ -146,7 +146,8 @@ impl<const ONE: bool, S: Simd> Packet<ONE, S> {
     }
 
     /// Take note of the block's triangles that rays meet before anything else, and say whether there are any. An edge's
-    /// test is the exact negative of its neighbour's, so no ray slips between two triangles.
+    /// test is the exact negative of its neighbour's, so no ray slips between two triangles. What a ray starts on it does
+    /// not meet.
     #[inline(always)]
     pub(super) fn triangles<const FIRST: bool>(&mut self, block: &Block) -> bool {
         let all = |x: f32| f32x16::splat(self.simd, x);
@@ -185,7 +186,7 @@ impl<const ONE: bool, S: Simd> Packet<ONE, S> {
                 continue;
             }
             let distance = height / determinant;
-            let met = inside & distance.simd_ge(all(0.0)) & distance.simd_lt(self.farthest);
+            let met = inside & distance.simd_gt(all(0.0)) & distance.simd_lt(self.farthest);
             self.farthest = met.select(if FIRST { distance } else { all(-1.0) }, self.farthest);
             let mut met = met.to_bitmask();
             any |= met != 0;
