@@ -216,11 +216,12 @@ mod tests {
             .collect();
         let text = to_toml(&found).unwrap();
         let cases = parse(&Source::of(Path::new("a.toml"), text)).unwrap();
+        // Other tests' lights bring some.
+        let all: Vec<Param> = Param::all().collect();
         for (case, found) in cases.iter().zip(&found) {
             let told = |Batch { setting, fragments }: &Batch| {
                 let Setting { setup, params, lights, loss } = setting;
-                // Of all parameters that there are by now: other tests' lights bring some.
-                let params: Vec<[f64; 3]> = Param::all().map(|param| params.rgb(param)).collect();
+                let params: Vec<[f64; 3]> = all.iter().map(|&param| params.rgb(param)).collect();
                 format!("{setup:?} {params:?} {lights:?} {loss:?} {fragments:?}")
             };
             assert_eq!(told(&case.batch), told(&found.batch));
