@@ -220,12 +220,9 @@ fn without_light_nothing_arrives() {
         let bakes = bakes(&scene);
         let found = ratios(&scene, &bakes);
         assert!(
-            found.iter().all(|ratio| ratio[0] == 0.0 && ratio[1] >= 0.0 && ratio[2] == 0.0),
+            found.iter().all(|ratio| ratio[0] == 0.0 && ratio[1] > 0.0 && ratio[2] == 0.0),
             "{visibility:?}"
         );
-        // All rays of a vertex may end where nothing is thrown back: of these thousands, at one.
-        let dark = found.iter().filter(|ratio| ratio[1] == 0.0).count();
-        assert!(dark <= usize::from(visibility == Visibility::Rays), "{visibility:?}: {dark}");
         assert!(image(&scene, &bakes).rgb.iter().flatten().all(|x| x.is_finite()));
     }
 }

@@ -91,9 +91,7 @@ impl<'a> Shadows<'a> {
         let normals = vertices.map(|i| self.mesh.normals.get(i).copied().unwrap_or(Vec3::ZERO).as_dvec3());
         let sum = |of: [DVec3; 3]| -> DVec3 { (0..3).map(|i| weights[i] * of[i]).sum() };
         let (position, smooth) = (sum(corners), sum(normals));
-        let [a, b, c] = corners;
-        let flat = (b - a).cross(c - a).try_normalize();
-        let flat = flat.or(smooth.try_normalize()).unwrap_or(DVec3::ZERO);
+        let flat = plane(corners).or(smooth.try_normalize()).unwrap_or(DVec3::ZERO);
         let up = if flat.dot(smooth) < 0.0 { -flat } else { flat };
         // To each vertex' tangent plane where that lies above; a hollow stays as it is.
         let raised: DVec3 =
@@ -250,6 +248,16 @@ fn lamp_from(lamp: &Lamp, place: &Place) -> Aim {
         return Aim::Ray { direction: (to / distance).as_vec3a(), length: distance as f32 };
     }
     cap(to / distance, lamp.radius / distance, Some((distance, lamp.radius)))
+}
+
+/// The unit normal of a triangle; none of one that is so thin that rounding its corners to f32 turns it.
+fn plane([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
+    let normal = (b - a).cross(c - a);
+    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let farthest = [a, b, c].into_iter().map(DVec3::length).fold(0.0, f64::max);
+    // Its height is the normal's length over the longest edge; 16 roundings of a corner.
+    let told = normal.length() > 16.0 * f64::from(f32::EPSILON) * farthest * longest;
+    told.then(|| normal.try_normalize()).flatten()
 }
 
 /// A place's own number.

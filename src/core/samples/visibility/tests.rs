@@ -205,3 +205,20 @@ fn sixteen_places_see_together_what_each_sees_alone() {
         }
     }
 }
+
+#[test]
+fn rays_from_a_triangle_that_is_thinner_than_rounding_start_above_its_smooth_normal() {
+    // Two corners that f32 can hardly tell apart: the plane through all three stands upright.
+    let mut mesh = lid(0.0, 1.0);
+    mesh.positions[0] = Vec3::new(1e-17, -1.0, 0.0);
+    mesh.positions[1] = Vec3::new(0.0, -1.0, 0.0);
+    mesh.positions[2] = Vec3::new(0.16, -0.99, 0.0);
+    mesh.triangles = vec![[0, 2, 1], [0, 1, 3]];
+    let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+    let shadows = Shadows::new(&mesh, &rays, 1);
+    for weights in [[1.0, 0.0, 0.0], [0.2, 0.3, 0.5]] {
+        let place = shadows.place(0, weights);
+        let off = place.origin.as_dvec3() - place.position;
+        assert!(off.y > 0.5 * f64::from(shadows.lift), "{off}");
+    }
+}
