@@ -17,6 +17,7 @@
 //! - [`evaluate`]: a tape run for one sample; [`mod@print`]: a tape as Rust
 
 pub mod cut;
+mod draft;
 mod error;
 pub mod evaluate;
 pub mod graph;

@@ -90,12 +90,16 @@ fn the_time_that_a_fit_tells_is_the_clocks() {
     let told = line.rsplit("; ").next().unwrap();
     let mut seconds = told.split(" s").filter_map(|part| part.trim_start_matches(", ").parse::<f64>().ok());
     let (whole, fit) = (seconds.next().unwrap(), seconds.next().unwrap());
-    // The program's start and end, and the rounding to hundredths; the report alone is half of such a run.
-    assert!(whole <= clock + 0.005 && whole > 0.85 * clock - 0.05, "{whole} s of {clock} s: {line}");
+    // Rounded to hundredths, beside the program's start and end, which other programs may hold up.
+    assert!(whole <= clock + 0.005, "{whole} s of {clock} s: {line}");
     let report: Value =
         serde_json::from_slice(&std::fs::read(folder.path().join("runs/builtin/report.json")).unwrap())
             .unwrap();
-    assert!((report["seconds"]["fit"].as_f64().unwrap() - fit).abs() <= 0.006, "{line}");
+    let of = |stage: &str| report["seconds"][stage].as_f64().unwrap();
+    assert!((of("fit") - fit).abs() <= 0.006, "{line}");
+    // All that is done is in it, up to the page that is written last.
+    let stages: f64 = report["seconds"].as_object().unwrap().keys().map(|stage| of(stage)).sum();
+    assert!(whole >= stages - 0.006, "{whole} s of {stages} s: {line}");
 }
 
 /// Two independent normal deviates (Box and Muller 1958).

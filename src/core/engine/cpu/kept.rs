@@ -28,7 +28,7 @@ pub(super) struct Kept {
 impl CpuEngine {
     /// What no free parameter changes, made on the first pass, and again should a held parameter differ.
     pub(super) fn kept(&self, pass: &Pass, turned: bool, point: &Point, lobes: &Lobes) -> Arc<Kept> {
-        let places = Lobes::places(&pass.keep.program.tape.looked_up(), &point.params);
+        let places = pass.kept_of.iter().map(|stack| stack.place(&point.params)).collect();
         let made_with = (pass.keep.uniforms(&point.params), places);
         let lock = || self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let same = |kept: &&Arc<Kept>| kept.turned == turned && kept.made_with == made_with;

@@ -41,9 +41,4 @@ impl Lobes {
         let lobe = self.0[stack as usize].as_ref()?;
         Some(if content == Content::Light { &lobe.cube } else { &lobe.slope })
     }
-
-    /// The places of the stacks that a tape reads.
-    pub(super) fn places(resources: &[String], params: &Params) -> Vec<f64> {
-        Stack::read(resources).into_iter().map(|stack| stack.place(params)).collect()
-    }
 }

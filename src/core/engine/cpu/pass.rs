@@ -6,6 +6,7 @@ use super::ahead;
 use super::fitted::Fitted;
 use super::program::Program;
 use super::streams::{NEUTRALS, StreamOf};
+use crate::bake::stacks::Stack;
 use crate::engine::Unknown;
 use crate::engine::levels::LevelMaker;
 use crate::model::params::{Channels, Param, Params};
@@ -47,6 +48,8 @@ pub(super) struct Pass {
     pub(super) keep: Reading,
     /// Kept numbers a sample.
     pub(super) kept: usize,
+    /// The stacks of cubes that these are looked up in.
+    pub(super) kept_of: Vec<Stack>,
     /// Yields the channels' values.
     pub(super) value: Reading,
     /// Yields the channels' values, then how they move.
@@ -179,6 +182,7 @@ impl Pass {
         let reading = |tape| Reading::new(&fitted.places, &levels, tape, ahead.is_some());
         Ok(Self {
             kept: tapes.keep.outputs.len(),
+            kept_of: Stack::read(&tapes.keep.looked_up()),
             keep: reading(tapes.keep),
             value: reading(tapes.value),
             moved: reading(tapes.moved),

@@ -29,6 +29,15 @@ pub(super) struct Swept<'a> {
 /// The work whose seconds are the cost of a setting.
 pub(super) type Work<'a> = &'a dyn Fn(Settings) -> Result<f64, StudyError>;
 
+/// What the work took at one value.
+#[derive(Clone, Copy)]
+struct Probe {
+    /// All of it, seconds.
+    whole: f64,
+    /// Of these, the seconds that are the cost.
+    counted: f64,
+}
+
 impl Swept<'_> {
     fn settings(&self, bench: &Bench<'_>, value: u32) -> Settings {
         let mut settings = bench.settings();
@@ -60,16 +69,20 @@ impl Swept<'_> {
     ) -> Result<f64, StudyError> {
         let mut counted = Ok(0.0);
         let whole = seconds_of(|| counted = work(self.settings(bench, self.probe)));
-        let counted = counted?;
-        let values = self.values(bench);
+        Ok(self.expected(&self.values(bench), Probe { whole, counted: counted? }, rates.images, trace))
+    }
+
+    /// The seconds of [`Self::sweep`] over `values`, from those of one of them: what is counted grows with the count,
+    /// the rest of the work is the same for all. Images, and the samples for them, are made once of each.
+    fn expected(&self, values: &[u32], probe: Probe, images: f64, trace: &dyn Fn(u32) -> f64) -> f64 {
         let of = |value: u32| {
             let share = (self.count.1)(value) / (self.count.1)(self.probe);
-            (whole - counted).max(0.0) + counted * share
+            (probe.whole - probe.counted).max(0.0) + probe.counted * share
         };
         let jobs: Vec<f64> = values.iter().map(|&value| of(value)).collect();
         // What is not in the cache yet is baked once more.
-        let evaluated: f64 = values.iter().map(|&value| rates.images + trace(value) + of(value)).sum();
-        Ok(evaluated + ROUNDS.expected(&jobs))
+        let evaluated: f64 = values.iter().map(|&value| images + trace(value) + of(value)).sum();
+        evaluated + ROUNDS.expected(&jobs)
     }
 
     /// The images at each value against the last one's, and the seconds of `work` there.
@@ -117,4 +130,30 @@ impl Swept<'_> {
 pub(super) fn bake_seconds(bench: &Bench<'_>, scene: &Scene, name: &str) -> Result<f64, StudyError> {
     let (_, stats) = baked(scene, &bench.baked.scene, None)?;
     Ok(stats.rows.iter().filter(|row| row.name.starts_with(name)).map(|row| row.seconds).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Four values of 1, 2, 4 and 8 units; at 2 units the work counts 0.5 s and spends 0.1 s on what is not counted.
+    #[test]
+    fn the_seconds_of_a_sweep_are_foretold_from_one_of_its_values() {
+        let swept = Swept {
+            axis: "rays",
+            title: "",
+            method: String::new(),
+            knob: Knob::OcclusionRays,
+            values: &[1, 2, 4, 8],
+            count: ("units", &f64::from),
+            probe: 2,
+        };
+        let foretold = swept
+            .expected(&[1, 2, 4, 8], Probe { whole: 0.6, counted: 0.5 }, 0.25, &|value| f64::from(value));
+        // Works of 0.35, 0.6, 1.1 and 2.1 s: once for the images with 0.25 s and so many seconds of samples each, once
+        // to warm up, and three rounds, the least, as all are short and one round takes more than a second.
+        let works = 0.35 + 0.6 + 1.1 + 2.1;
+        // Sums of a few numbers, in another order.
+        assert!((foretold - ((4.0 * 0.25 + 15.0 + works) + works + 3.0 * works)).abs() < 1e-9, "{foretold}");
+    }
 }
