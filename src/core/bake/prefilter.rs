@@ -29,6 +29,8 @@ const CELL_TOLERANCE: f64 = 3e-5;
 /// Texels along the face of the finest source: 0.35 degrees, a quarter of the standard deviation of
 /// the sharpest lobe (exponent 2048).
 const FINEST: usize = 256;
+/// The exponent from which on a Phong lobe is so narrow that each tile of the output has cells of its own.
+const NARROW: f64 = 16.0;
 /// Texels along the side of a tile of the output, whose texels share a list of blocks.
 const TILE: usize = 8;
 
@@ -101,21 +103,33 @@ impl Prefilter {
         progress: impl Fn(u64) + Sync,
     ) -> Cube<f32> {
         match radial {
-            Radial::Phong(exponent) => {
-                let blocks = self.blocks(radial);
-                let near = |directions: &[[f64; 3]]| blocks_near(&blocks, directions);
-                self.filtered(level, size, near, Lobe::new(exponent), progress)
-            }
+            Radial::Phong(exponent) => self.bell(level, size, radial, Lobe::new(exponent), progress),
             Radial::Brdf(SpecularModel::Kelemen, m) => {
-                let blocks = self.blocks(radial);
-                let near = |directions: &[[f64; 3]]| blocks_near(&blocks, directions);
-                self.filtered(level, size, near, Kelemen::new(m), progress)
+                self.bell(level, size, radial, Kelemen::new(m), progress)
             }
             Radial::Brdf(SpecularModel::Ggx, m) => {
-                let about = |directions: &[[f64; 3]]| self.blocks_about(m * m, directions);
+                let about = |directions: &[[f64; 3]]| self.blocks_of_tail(m * m, directions);
                 self.filtered(level, size, about, Ggx::new(m), progress)
             }
         }
+    }
+
+    /// Lobes that fall as a Gaussian does. Wide ones reach nearly all cells, which then are found once for all tiles.
+    fn bell(
+        &self,
+        level: Level,
+        size: usize,
+        radial: Radial,
+        lobe: impl Weigh,
+        progress: impl Fn(u64) + Sync,
+    ) -> Cube<f32> {
+        if radial.exponent() < NARROW {
+            let blocks = self.blocks(radial);
+            let near = |directions: &[[f64; 3]]| blocks_near(&blocks, directions);
+            return self.filtered(level, size, near, lobe, progress);
+        }
+        let about = |directions: &[[f64; 3]]| self.blocks_of_bell(radial, directions);
+        self.filtered(level, size, about, lobe, progress)
     }
 
     /// `near` yields the blocks that lobes about the directions of a tile reach.
@@ -175,7 +189,7 @@ impl Prefilter {
     /// 1 / (1 + (t / 2 alpha)^2)^2 of the angle t, reaches to the horizon, but falls the more slowly the further out:
     /// over a quarter of the angle. So cells are the wider, and may be the more unevenly lit, the further they are off. At the
     /// horizon masking takes over, which falls to 0 within about alpha.
-    fn blocks_about(&self, alpha: f64, directions: &[[f64; 3]]) -> Vec<[Cells; BLOCK]> {
+    fn blocks_of_tail(&self, alpha: f64, directions: &[[f64; 3]]) -> Vec<[Cells; BLOCK]> {
         let (axis, radius) = cone(directions);
         let peak = (alpha.powi(-2) + 1.0) / TAU;
         let unseen = CELL_TOLERANCE * self.pyramid.brightness();
@@ -193,6 +207,37 @@ impl Prefilter {
             let moved = 0.3 * side * height / falls_over.min(masked_over) * cell.unevenness;
             if side > widest || moved > unseen { Visit::Split } else { Visit::Take }
         };
+        self.packed_cells(visit)
+    }
+
+    /// Blocks of cells for lobes about directions that are near one another, which fall as a Gaussian of deviation s does.
+    /// At t deviations from the peak a cell is as wide as the fourth derivative, which the kernel's mean leaves out, allows:
+    /// that of a Gaussian is at most (1 + t^2)^2 exp(-t^2 / 2) / s^4, 3 at the peak. Its slope there is t exp(-t^2 / 2) / s.
+    fn blocks_of_bell(&self, radial: Radial, directions: &[[f64; 3]]) -> Vec<[Cells; BLOCK]> {
+        let (axis, radius) = cone(directions);
+        let (exponent, reach) = (radial.exponent(), radial.reach());
+        let deviation = 1.0 / exponent.sqrt();
+        let peak = (exponent + 1.0) / TAU;
+        let unseen = CELL_TOLERANCE * self.pyramid.brightness();
+        let visit = |cell: &Cell| {
+            let side = cell.solid_angle.sqrt();
+            let off = (about_angle(axis, cell.moment) - radius - side).max(0.0);
+            if off > reach {
+                return Visit::Skip;
+            }
+            let t = off / deviation;
+            let height = (-0.5 * t * t).exp();
+            let fourth = (height * (1.0 + t * t).powi(2) / 3.0).min(1.0);
+            let widest = (CELL_WIDTH * deviation / fourth.sqrt().sqrt()).min(WIDEST_CELL);
+            // The flux of a cell lies 0.3 of its width beside its centre.
+            let slope = if t < 1.0 { 0.6 } else { t * height };
+            let moved = 0.3 * side * peak * slope / deviation * cell.unevenness;
+            if side > widest || moved > unseen { Visit::Split } else { Visit::Take }
+        };
+        self.packed_cells(visit)
+    }
+
+    fn packed_cells(&self, visit: impl Fn(&Cell) -> Visit) -> Vec<[Cells; BLOCK]> {
         let cells = self.pyramid.cells(visit);
         cells.chunks(WIDE * BLOCK).map(|cells| packed(cells, self.pyramid.mean)).collect()
     }
