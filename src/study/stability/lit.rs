@@ -70,9 +70,9 @@ pub fn search(
     for (tried, verdicts) in tried {
         let own = evaluators.own.iter().map(|own| own.engine().map(|engine| tried.verdict(engine)));
         for (tally, verdict) in tallies.iter_mut().zip(verdicts.into_iter().chain(own)) {
-            let Some(verdict) = verdict else { continue };
+            let Some((verdict, failed)) = verdict else { continue };
             tally.tried += BATCH;
-            tally.failed += usize::from(verdict.failure.is_some());
+            tally.failed += failed;
             tally.worst.merge(verdict);
         }
     }
@@ -93,18 +93,22 @@ impl Tried {
         Self { index, batch, wanted }
     }
 
-    /// How an engine does.
-    fn verdict(&self, engine: &dyn EngineFactory) -> Verdict {
-        let verdict = self.compared(engine).unwrap_or_else(Verdict::failed);
+    /// How an engine does, and of how many fragments it fails: of all where it answers for none, and of one where only
+    /// their sum is wrong.
+    fn verdict(&self, engine: &dyn EngineFactory) -> (Verdict, usize) {
+        let (verdict, failed) = self
+            .compared(engine)
+            .unwrap_or_else(|words| (Verdict::failed(words), self.batch.fragments.len()));
         let told = |words| format!("batch {} of lights, {}: {words}", self.index, self.batch.words());
-        Verdict { failure: verdict.failure.map(told), ..verdict }
+        let failed = failed.max(usize::from(verdict.failure.is_some()));
+        (Verdict { failure: verdict.failure.map(told), ..verdict }, failed)
     }
 
-    fn compared(&self, engine: &dyn EngineFactory) -> Result<Verdict, String> {
+    fn compared(&self, engine: &dyn EngineFactory) -> Result<(Verdict, usize), String> {
         let wanted = self.wanted.as_ref().map_err(Clone::clone)?;
         let (task, point) = task(&self.batch, None);
         let planes = engine.image(&task, &point)?;
-        let mut verdict = Verdict::default();
+        let (mut verdict, mut failed) = (Verdict::default(), 0);
         for (slot, wanted) in wanted.iter().enumerate() {
             let got = [0, 1, 2, 3].map(|c: usize| f64::from(planes[c][slot]));
             let mut own = one(&got, wanted, engine.slack(), slot);
@@ -113,6 +117,7 @@ impl Tried {
                 let alone = self.batch.alone(slot);
                 own = one(&got, &self::wanted(&alone, MANY)?[0], engine.slack(), slot);
             }
+            failed += usize::from(own.failure.is_some());
             verdict.merge(own);
         }
         engine.with(&task, &point, &mut |engine| {
@@ -124,7 +129,7 @@ impl Tried {
                 }
             }
         })?;
-        Ok(verdict)
+        Ok((verdict, failed))
     }
 }
 

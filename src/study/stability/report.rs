@@ -93,7 +93,9 @@ impl Report {
             for (tally, evaluator) in tallies.iter().zip(&self.evaluators) {
                 if let Some(failure) = &tally.worst.failure {
                     let Tally { failed, tried, .. } = tally;
-                    lines.push(format!("{what}: {evaluator}: {failed} of {tried} failed: {failure}"));
+                    lines.push(format!(
+                        "{what}: {evaluator}: at least {failed} of {tried} fragments failed: {failure}"
+                    ));
                 }
             }
         }
@@ -139,18 +141,21 @@ impl Report {
             let [random, lit, swept] = [&self.random, &self.lit, &self.swept].map(|tallies| &tallies[index]);
             let _ = writeln!(
                 text,
-                "{name}: {} hard cases, {} random ones, {} of lights, {} samples of the scene; {} failed",
+                "{name}: {} hard cases, {} random ones, {} of lights, {} samples of the scene; {}",
                 self.hard[index],
                 random.tried,
                 lit.tried,
                 swept.tried,
-                self.failed(index)
+                match self.failed(index) {
+                    0 => "none failed".to_owned(),
+                    failed => format!("at least {failed} failed"),
+                }
             );
         }
         text
     }
 
-    /// How many cases an evaluator failed.
+    /// How many cases an evaluator failed at the least.
     fn failed(&self, index: usize) -> usize {
         let failed = |row: &&CaseRow| row.verdicts[index].as_ref().is_some_and(|v| v.failure.is_some());
         self.rows.iter().filter(failed).count()

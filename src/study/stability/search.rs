@@ -29,7 +29,8 @@ pub struct Found {
 pub struct Tally {
     /// Fragments tried.
     pub tried: usize,
-    /// Fragments (or batches, where only their sum is wrong) that failed.
+    /// At least so many of them failed: a batch counts as one where only its sum is wrong, and where enough is known of
+    /// an evaluator already.
     pub failed: usize,
     /// The worst of all.
     pub worst: Verdict,
