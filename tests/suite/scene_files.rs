@@ -103,6 +103,22 @@ fn the_dapple_is_the_third_row_of_its_matrix_and_turns_with_the_environment() {
 }
 
 #[test]
+fn a_specular_visibility_that_no_effect_finds_is_told() {
+    let scene_folder = SceneFolder::new();
+    let told = |visibility: &str, effects: &str| {
+        let keys = format!("[model]\nspecular_visibility = \"{visibility}\"\neffects = [{effects}]");
+        let (_, warnings) = scene_folder.edited("[model]", &keys).unwrap();
+        let words = warnings.iter().map(ToString::to_string);
+        words.filter(|words| words.contains("Add \"occlusion\" to the effects")).count()
+    };
+    let (without, with) = ("\"diffuse\", \"fresnel\"", "\"diffuse\", \"fresnel\", \"occlusion\"");
+    for (visibility, of_share) in [("none", 0), ("lagarde", 1), ("cone", 1), ("lobe", 0), ("rays", 0)] {
+        assert_eq!(told(visibility, without), of_share, "{visibility}");
+        assert_eq!(told(visibility, with), 0, "{visibility}");
+    }
+}
+
+#[test]
 fn a_normal_map_that_nothing_sees_is_not_read_and_a_warning_says_so() {
     let scene_folder = SceneFolder::new();
     let smooth = "[model]\nlookups = \"smooth\"";

@@ -1,9 +1,11 @@
 //! The sky that a point sees, and what the skin throws back, from the bakes through samples, engines and renderer.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec2, Vec3};
 use skinfit::bake::rays::RayMesh;
 use skinfit::bake::sky::{SKY_RATIO, SKY_TURNS, Wanted};
-use skinfit::bake::{Bake, Ranges, bake};
+use skinfit::bake::{Bake, Ranges, bake, bake_pose};
 use skinfit::engine::Unknown;
 use skinfit::engine::gpu::DeviceSamples;
 use skinfit::gpu::Renderer;
@@ -111,6 +113,15 @@ pub(crate) fn apart(a: &Image, b: &Image) -> f32 {
     assert!(a.alpha == b.alpha && a.alpha.contains(&1.0));
     let pairs = a.rgb.iter().flatten().zip(b.rgb.iter().flatten());
     pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn poses_share_the_panorama_that_rays_look_up() {
+    let scene = scene(&shape(0.5, false), gentle, chosen(Visibility::Rays, Bounces::None));
+    let light = |known| bake_pose(&scene, &scene.mesh.pose(), known, None).0.sky.unwrap().light.unwrap();
+    let first = light(None);
+    let second = light(Some(&first));
+    assert!(Arc::ptr_eq(&first.panorama.unwrap(), &second.panorama.unwrap()));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! What is baked for the sky that each vertex sees: transfer vectors, and the environment as coefficients (MODEL 10).
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use super::baker::Baker;
 use super::coefficients::Coefficients;
@@ -59,8 +60,8 @@ pub struct SkyLight {
     pub rest: Coefficients,
     /// All of it: what the skin throws back.
     pub whole: Coefficients,
-    /// The rest as a picture, where rays look it up.
-    pub panorama: Option<Environment>,
+    /// The rest as a picture, where rays look it up; shared, as each frame of an animation has it.
+    pub panorama: Option<Arc<Environment>>,
 }
 
 /// Which transfer vectors the fields of a scene's samples are found from.
@@ -113,7 +114,7 @@ impl SkyLight {
         Self {
             rest: Coefficients::of(&rest, Order::MOST),
             whole,
-            panorama: panorama.then(|| rest.into_owned()),
+            panorama: panorama.then(|| Arc::new(rest.into_owned())),
         }
     }
 

@@ -238,6 +238,8 @@ fn a_filter_is_the_scenes_choice_within_any_budget_and_no_exports() {
             let (count, error) = steps.fold((0, 0.0), |(count, sum), step| (count + 1, sum + step.error));
             // One for each light, told with what it is off by.
             assert!(count == 2 && error > 0.01 && chosen.error >= error, "{budget:?} {filter:?}: {error}");
+            // Rays look at no vertex for what the maps show.
+            assert!(chosen.attributes.iter().all(|attribute| !attribute.name().ends_with("_open")));
             // What is fetched alone is fetched for each light, too, and where that reads depths those as well.
             let alone = chosen.fetches_alone().wgsl;
             assert_eq!(alone.matches("vec4f(shadow_fetch(").count(), 2, "{alone}");
@@ -247,6 +249,9 @@ fn a_filter_is_the_scenes_choice_within_any_budget_and_no_exports() {
             validator.validate(&module).unwrap_or_else(|error| panic!("{error:?}\n{alone}"));
         }
     }
+    let vertices = with_maps(&baked, |maps| maps.filter = ShadowFilter::Vertices).scene;
+    let found = plan(&Facts::of_scene(&vertices, &vertices.params, Budget::Exact, false)).unwrap().attributes;
+    assert_eq!(found.iter().filter(|attribute| attribute.name().ends_with("_open")).count(), 2);
     let text = |filter| {
         let scene = with_maps(&baked, |maps| maps.filter = filter).scene;
         let facts = Facts::of_scene(&scene, &scene.params, Budget::Within(0.05), false);
