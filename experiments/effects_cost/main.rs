@@ -15,6 +15,7 @@ use skinfit::model::effects::{Effect, Effects};
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::{Baked, Loaded, PrepareOptions, Views};
 use skinfit::render::antialias::Antialias;
+use skinfit::render::shading::Shading;
 use skinfit::samples::ViewSamples;
 use skinfit::samples::rows::Rows;
 use skinfit::scene::view::Camera;
@@ -54,8 +55,10 @@ struct Row {
     uploaded: u64,
     instructions: usize,
     operations: f64,
-    /// Of the frame: median and spread.
-    milliseconds: Option<(f64, f64)>,
+    /// Of the frame with its fragments shaded where they are drawn: median and spread.
+    forward: Option<(f64, f64)>,
+    /// Likewise, by way of a visibility buffer.
+    buffered: Option<(f64, f64)>,
     /// Of a compute pass over the stored samples of the same image, likewise; none where nothing is shown, or what
     /// is drawn is not the effects' image.
     compute: Option<(f64, f64)>,
@@ -81,14 +84,14 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rows.push(measure(&arguments, &gpu, "the scene's effects", full, Plan::clone)?);
     rows.push(measure(&arguments, &gpu, "the same fetches alone", full, Plan::fetches_alone)?);
     let mut text = String::from(
-        "effects,rules,attributes,bindings,constants,uploaded bytes,SPIR-V instructions,planned operations,median ms,spread ms,compute median ms,compute spread ms\n",
+        "effects,rules,attributes,bindings,constants,uploaded bytes,SPIR-V instructions,planned operations,forward median ms,forward spread ms,median ms,spread ms,compute median ms,compute spread ms\n",
     );
     for row in &rows {
         let time = |times: Option<(f64, f64)>| {
             times.map_or(",".to_owned(), |(median, spread)| format!("{median:.4},{spread:.4}"))
         };
         text += &format!(
-            "{},{},{},{},{},{},{},{:.0},{},{}\n",
+            "{},{},{},{},{},{},{},{:.0},{},{},{}\n",
             row.name,
             row.rules,
             row.attributes,
@@ -97,7 +100,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             row.uploaded,
             row.instructions,
             row.operations,
-            time(row.milliseconds),
+            time(row.forward),
+            time(row.buffered),
             time(row.compute)
         );
     }
@@ -133,10 +137,18 @@ fn measure(
     let baked = loaded.bake()?;
     let content = Content::of(&baked);
     let budget = if arguments.exact { Budget::Exact } else { Budget::Paper };
-    let render = RenderOptions { antialias: Antialias::Grid(1), budget, timed: true, animated: false };
-    let mut renderer = Renderer::with_shader(gpu, content.clone(), render, change)?;
-    let whole = renderer.plan().wgsl != renderer.plan().fetches_alone().wgsl;
-    let engine = match DeviceSamples::new(gpu, content) {
+    let render = RenderOptions {
+        antialias: Antialias::Grid(1),
+        shading: Shading::Forward,
+        budget,
+        timed: true,
+        animated: false,
+    };
+    let renderer =
+        |shading| Renderer::with_shader(gpu, content.clone(), RenderOptions { shading, ..render }, change);
+    let (mut forward, mut buffered) = (renderer(Shading::Forward)?, renderer(Shading::VisibilityBuffer)?);
+    let whole = !forward.plan().only_fetches;
+    let engine = match DeviceSamples::new(gpu, content.clone()) {
         Ok(made) if whole => over_samples(made, &baked)?,
         // What is found by rays, samples made there have none of.
         Ok(_) | Err(DeviceSampleError::Gpu(GpuError::Plan(_))) => None,
@@ -144,32 +156,34 @@ fn measure(
     };
     let start = baked.start();
     // The first frames wake the adapter up.
-    renderer.frame_times(&camera, arguments.frames)?;
-    let (mut times, mut compute) = (Vec::new(), Vec::new());
+    forward.frame_times(&camera, arguments.frames)?;
+    let mut times = [Vec::new(), Vec::new(), Vec::new()];
     for round in 0..=ROUNDS {
         let frames = arguments.frames.div_ceil(ROUNDS);
-        let (drawn, computed) = (
-            renderer.frame_times(&camera, frames)?,
+        let taken = [
+            forward.frame_times(&camera, frames)?,
+            buffered.frame_times(&camera, frames)?,
             engine.as_ref().map_or(Ok(Vec::new()), |engine| engine.shade_times(&start, frames))?,
-        );
+        ];
         // Nor does the round count in which the compute pass is compiled.
         if round > 0 {
-            times.extend(drawn);
-            compute.extend(computed);
+            times.iter_mut().zip(taken).for_each(|(times, taken)| times.extend(taken));
         }
     }
-    let plan = renderer.plan();
+    let [drawn, shaded, computed] = times.map(median_and_spread);
+    let plan = forward.plan();
     Ok(Row {
         name: name.to_owned(),
         rules: plan.steps.len(),
         attributes: plan.attributes.len(),
         bindings: plan.resources.len() + usize::from(!plan.constants.is_empty()),
         constants: plan.constants.len(),
-        uploaded: renderer.uploaded_bytes(),
+        uploaded: forward.uploaded_bytes(),
         instructions: instructions(plan)?,
         operations: plan.cost,
-        milliseconds: median_and_spread(times),
-        compute: median_and_spread(compute),
+        forward: drawn,
+        buffered: shaded,
+        compute: computed,
     })
 }
 

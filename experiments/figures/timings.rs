@@ -41,8 +41,51 @@ pub(crate) fn effects_cost_on_a_card(lab: &Lab) -> Result<Value> {
         lab.example("effects_cost", &format!("effects' cost on a card, {name}"), &arguments)?;
         effects(&mut raw, name, csv(&std::fs::read_to_string(&table)?)?);
     }
+    let demo = lab.scratch.path().join("demo");
+    lab.skinfit("the built-in scene", &["demo", &demo.display().to_string()], false)?;
+    let mut lit = Vec::new();
+    for filter in ["hardware", "pcf", "pcss"] {
+        let settings = LIT.into_iter().map(|(key, value)| (key, value.to_owned()));
+        let settings: Vec<(&str, String)> =
+            settings.chain([("quality.shadow_filter", format!("\"{filter}\""))]).collect();
+        let settings: Vec<(&str, &str)> =
+            settings.iter().map(|(key, value)| (*key, value.as_str())).collect();
+        let scene = lab.scene(&format!("lit {filter}"), &demo.join("scene.toml"), &settings)?;
+        let arguments = [&scene.display().to_string(), "-o", &table, "--full"];
+        lab.example("effects_cost", &format!("four lights, {filter}"), &arguments)?;
+        let rows = csv(&std::fs::read_to_string(&table)?)?;
+        let [frame, alone] = rows.as_slice() else {
+            return Err("two rows: the frame, and its fetches".into());
+        };
+        lit.push(json!({
+            "filter": filter,
+            "planned operations": frame["planned operations"],
+            "frame ms": frame["median ms"],
+            "fetches ms": alone["median ms"],
+            "forward ms": frame["forward median ms"],
+            "forward fetches ms": alone["forward median ms"],
+            "to forward fetches": number(&frame["median ms"]) / number(&alone["forward median ms"]),
+        }));
+    }
+    raw["lit"] = lit.into();
     Ok(raw)
 }
+
+/// What is changed in the built-in scene: four lights with shadow maps, the sky that each point sees, and a specular with
+/// Fresnel.
+const LIT: [(&str, &str); 8] = [
+    ("environment.lights", "4"),
+    (
+        "model.effects",
+        r#"["diffuse", "normal_map", "occlusion", "rim", "morph", "skin", "lights", "shadows", "light_specular", "fresnel", "directional_occlusion"]"#,
+    ),
+    ("model.visibility", "\"sh4\""),
+    ("model.bounces", "\"gathered\""),
+    ("model.specular_model", "\"ggx\""),
+    ("model.specular_visibility", "\"cone\""),
+    ("model.specular_map", "\"f0\""),
+    ("quality.shadow_map_size", "2048"),
+];
 
 /// The graphics card that is here.
 ///
@@ -63,10 +106,13 @@ fn effects(raw: &mut Value, name: &str, mut rows: Vec<Value>) {
         row["name"] = row["effects"].take();
         row["kib"] = (number(&row["uploaded bytes"]) / 1024.0).into();
     }
-    let frame = |name: &str| {
-        rows.iter().find(|row| row["name"] == name).map_or(f64::NAN, |row| number(&row["median ms"]))
+    let frame = |name: &str, what: &str| {
+        rows.iter().find(|row| row["name"] == name).map_or(f64::NAN, |row| number(&row[what]))
     };
-    raw[format!("{name}_ratio")] = (frame("the scene's effects") / frame("the same fetches alone")).into();
+    let (whole, alone) = ("the scene's effects", "the same fetches alone");
+    let (forward, buffered) = ("forward median ms", "median ms");
+    raw[format!("{name}_ratio")] = (frame(whole, buffered) / frame(alone, buffered)).into();
+    raw[format!("{name}_forward_ratio")] = (frame(whole, forward) / frame(alone, forward)).into();
     raw[name] = rows.into();
 }
 

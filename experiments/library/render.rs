@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use skinfit::gpu::Choice;
 use skinfit::gpu::upload::Content;
 use skinfit::render::antialias::Antialias;
+use skinfit::render::shading::Shading;
 use skinfit::shader::Budget;
 use skinfit::{Gpu, PrepareOptions, RenderOptions, Renderer, Sampled, Shader, built_in_scene, write_exr};
 
@@ -32,7 +33,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     };
     let antialias = Antialias::Grid(sampled.scene.quality.samples_per_axis);
-    let options = RenderOptions { antialias, budget: Budget::Exact, timed: false, animated: false };
+    let options = RenderOptions {
+        antialias,
+        shading: Shading::default(),
+        budget: Budget::Exact,
+        timed: false,
+        animated: false,
+    };
     let on_gpu = Renderer::new(&gpu, Content::of(&sampled), options)?.render(&view.camera, 1.0)?.image;
     write_exr(Path::new("library_gpu.exr"), &on_gpu, &Default::default())?;
 

@@ -73,7 +73,7 @@ impl Atlas {
 
     /// Set the constants of what is drawn next.
     pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>) {
-        self.passes.iter().for_each(|(program, _)| program.set(gpu, values));
+        self.passes.iter().for_each(|(program, _)| program.inputs.set(gpu, values));
     }
 
     /// Draw every pass, in order.

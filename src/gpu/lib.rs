@@ -1,4 +1,5 @@
-//! The production renderer: the planned WGSL on a graphics adapter, in one vertex and fragment pass.
+//! The production renderer: the planned WGSL on a graphics adapter, in one vertex and fragment pass, or in compute
+//! shaders over the triangles that the rasteriser finds.
 //!
 //! - [`adapter`]: which adapters there are, and which one is taken
 //! - [`device`]: the device on it, and what went wrong there
@@ -7,6 +8,7 @@
 //! - `constants`: the uniform block
 //! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
 //! - `program`: a plan on the device: its `pipeline`, and before it its passes over the UV atlas ([`atlas`])
+//! - `visibility_buffer`: a plan that compute shaders evaluate
 //! - `shadow`: shadow maps: what each light sees first
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
 //! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
@@ -47,6 +49,7 @@ pub(crate) mod texels;
 pub mod timing;
 pub mod upload;
 mod vertices;
+mod visibility_buffer;
 
 pub use adapter::Choice;
 pub use device::Gpu;

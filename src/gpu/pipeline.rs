@@ -20,16 +20,29 @@ use crate::shader::{Attribute, Plan, Resource};
 
 /// A plan's pipeline, and what is bound to it.
 pub(super) struct Pipeline {
-    pub(super) plan: Plan,
+    pub(super) inputs: Inputs,
     pipeline: RenderPipeline,
-    bound: BindGroup,
-    /// The uniform block, where the plan has constants.
-    constants: Option<Buffer>,
-    attributes: Vec<Buffer>,
     /// The mesh's triangles and how many indices they have; without them three vertices cover the target.
     mesh: Option<(Buffer, u32)>,
     /// Targets that it draws into.
     targets: usize,
+}
+
+/// A plan with what it reads.
+pub(super) struct Inputs {
+    pub(super) plan: Plan,
+    pub(super) layout: BindGroupLayout,
+    pub(super) bound: BindGroup,
+    /// The uniform block, where the plan has constants.
+    constants: Option<Buffer>,
+    pub(super) attributes: Vec<Buffer>,
+}
+
+/// The stages that read it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stages {
+    Raster,
+    Compute,
 }
 
 /// What a pipeline draws into.
@@ -55,19 +68,18 @@ fn check_attributes(gpu: &Gpu, plan: &Plan) -> Result<(), GpuError> {
     Err(GpuError::Refused { adapter: gpu.name().to_owned(), reason })
 }
 
-impl Pipeline {
-    /// The plan's pipeline; `levels` are those that it reads.
+impl Inputs {
+    /// Upload what a plan reads; `levels` are those of the atlas.
     pub(super) fn new(
         gpu: &Gpu,
         plan: Plan,
         uploads: &mut Uploads,
         levels: Vec<Bound>,
-        outputs: Outputs<'_>,
+        stages: Stages,
     ) -> Result<Self, GpuError> {
         if plan.resources.contains(&Resource::ShadowMaps) {
             uploads.make_shadow_maps(gpu, &plan.facts)?;
         }
-        check_attributes(gpu, &plan)?;
         uploads.find_fields(gpu, &plan.attributes)?;
         let attributes =
             plan.attributes.iter().map(|&a| uploads.attribute(gpu, a)).collect::<Result<Vec<_>, _>>()?;
@@ -75,19 +87,9 @@ impl Pipeline {
             plan.resources.iter().map(|&r| uploads.resource(gpu, r)).collect::<Result<Vec<_>, _>>()?;
         resources.extend(levels);
         let constants = constant_buffer(gpu, &plan);
-        let layout = layout(gpu, &plan);
-        let pipeline = pipeline(gpu, &plan, &layout, outputs);
+        let layout = layout(gpu, &plan, stages);
         let bound = bind(gpu, &layout, constants.as_ref(), &resources);
-        gpu.check()?;
-        let index_count = 3 * uploads.content().scene.mesh.triangles.len() as u32;
-        let mesh = (!attributes.is_empty()).then(|| (uploads.indices().clone(), index_count));
-        let targets = outputs.formats.len();
-        Ok(Self { plan, pipeline, bound, constants, attributes, mesh, targets })
-    }
-
-    /// Targets that it draws into, depth aside.
-    pub(super) const fn targets(&self) -> usize {
-        self.targets
+        Ok(Self { plan, layout, bound, constants, attributes })
     }
 
     /// Set the constants of what is drawn next; they hold for all that is submitted at once.
@@ -97,12 +99,37 @@ impl Pipeline {
             gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&block));
         }
     }
+}
+
+impl Pipeline {
+    /// The plan's pipeline; `levels` are those that it reads.
+    pub(super) fn new(
+        gpu: &Gpu,
+        plan: Plan,
+        uploads: &mut Uploads,
+        levels: Vec<Bound>,
+        outputs: Outputs<'_>,
+    ) -> Result<Self, GpuError> {
+        check_attributes(gpu, &plan)?;
+        let inputs = Inputs::new(gpu, plan, uploads, levels, Stages::Raster)?;
+        let pipeline = pipeline(gpu, &inputs.plan, &inputs.layout, outputs);
+        gpu.check()?;
+        let mesh =
+            (!inputs.attributes.is_empty()).then(|| (uploads.indices().clone(), uploads.index_count()));
+        let targets = outputs.formats.len();
+        Ok(Self { inputs, pipeline, mesh, targets })
+    }
+
+    /// Targets that it draws into, depth aside.
+    pub(super) const fn targets(&self) -> usize {
+        self.targets
+    }
 
     /// Draw the mesh, or over the whole target.
     pub(super) fn draw(&self, pass: &mut RenderPass<'_>) {
         pass.set_pipeline(&self.pipeline);
-        pass.set_bind_group(0, &self.bound, &[]);
-        for (slot, buffer) in self.attributes.iter().enumerate() {
+        pass.set_bind_group(0, &self.inputs.bound, &[]);
+        for (slot, buffer) in self.inputs.attributes.iter().enumerate() {
             pass.set_vertex_buffer(slot as u32, buffer.slice(..));
         }
         match &self.mesh {
@@ -121,8 +148,11 @@ fn constant_buffer(gpu: &Gpu, plan: &Plan) -> Option<Buffer> {
     (size > 0).then(|| gpu.buffer("constants", &vec![0; size], BufferUsages::UNIFORM))
 }
 
-pub(super) fn layout(gpu: &Gpu, plan: &Plan) -> BindGroupLayout {
-    let entry = |binding, visibility, ty| BindGroupLayoutEntry { binding, visibility, ty, count: None };
+pub(super) fn layout(gpu: &Gpu, plan: &Plan, stages: Stages) -> BindGroupLayout {
+    let entry = |binding, visibility, ty| {
+        let visibility = if stages == Stages::Compute { ShaderStages::COMPUTE } else { visibility };
+        BindGroupLayoutEntry { binding, visibility, ty, count: None }
+    };
     let constants = (!plan.constants.is_empty()).then(|| {
         let ty = BindingType::Buffer {
             ty: BufferBindingType::Uniform,
@@ -202,6 +232,17 @@ fn vertex_format(attribute: Attribute) -> VertexFormat {
     }
 }
 
+/// What is nearer hides what is behind.
+pub(super) fn nearest() -> DepthStencilState {
+    DepthStencilState {
+        format: DEPTH,
+        depth_write_enabled: Some(true),
+        depth_compare: Some(CompareFunction::Greater),
+        stencil: StencilState::default(),
+        bias: DepthBiasState::default(),
+    }
+}
+
 pub(super) fn pipeline(
     gpu: &Gpu,
     plan: &Plan,
@@ -247,13 +288,7 @@ pub(super) fn pipeline(
         },
         // Both sides of a triangle are seen, as on the CPU.
         primitive: PrimitiveState { cull_mode: None, ..PrimitiveState::default() },
-        depth_stencil: depth.then(|| DepthStencilState {
-            format: DEPTH,
-            depth_write_enabled: Some(true),
-            depth_compare: Some(CompareFunction::Greater),
-            stencil: StencilState::default(),
-            bias: DepthBiasState::default(),
-        }),
+        depth_stencil: depth.then(nearest),
         multisample: MultisampleState { count: multisamples, ..MultisampleState::default() },
         fragment: (!targets.is_empty()).then(|| FragmentState {
             module: &module,

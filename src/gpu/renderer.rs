@@ -5,18 +5,20 @@ mod frames;
 use super::bloom::Finish;
 use super::device::Gpu;
 use super::error::GpuError;
-use super::program::Program;
+use super::program::{Program, Shaded};
 use super::resolve::Resolve;
 use super::stage::Stage;
 use super::targets::{Key, Precision, Targets};
 use super::timing::PassTime;
 use super::upload::{Content, Uploads};
+use super::visibility_buffer::fits;
 use crate::bake::PoseBake;
 use crate::model::effects::Effect;
 use crate::model::terms::TermName;
 use crate::render::antialias::Antialias;
 use crate::render::backdrop::Backdrop;
 use crate::render::image::Image;
+use crate::render::shading::Shading;
 use crate::scene::mesh::Mesh;
 use crate::scene::view::{Background, Camera};
 use crate::shader::{Budget, Facts, Plan, plan};
@@ -29,6 +31,8 @@ const HALF_ERROR: f64 = 1e-3;
 pub struct RenderOptions {
     /// Samples a pixel.
     pub antialias: Antialias,
+    /// Where they are shaded.
+    pub shading: Shading,
     /// The accuracy allowed.
     pub budget: Budget,
     /// Whether passes are timed.
@@ -58,7 +62,7 @@ pub struct Renderer {
     /// Weights of the kept morph targets.
     morph_weights: Vec<f32>,
     /// The whole, and terms that were asked for.
-    programs: Vec<Program>,
+    programs: Vec<Program<Shaded>>,
     stages: Vec<Stage>,
     background: Background,
     /// What stands behind the mesh, as the camera of the last frame sees it.
@@ -96,7 +100,7 @@ impl Renderer {
     }
 
     /// As [`Self::new`], with the whole image's plan changed: to measure what a part of a shader costs, or to
-    /// draw with another text of it.
+    /// draw with another text of it, which [`Shading::Forward`] alone reads.
     ///
     /// # Errors
     /// As of [`Self::new`].
@@ -108,9 +112,7 @@ impl Renderer {
     ) -> Result<Self, GpuError> {
         let mut renderer = Self::new(gpu, content, options)?;
         let plan = change(renderer.plan());
-        let formats = renderer.key(1, 1, hazy(&plan)).formats();
-        let multisamples = options.antialias.multisamples();
-        renderer.programs[0] = Program::new(gpu, plan, &mut renderer.uploads, &formats, multisamples)?;
+        renderer.programs[0] = renderer.compiled(plan)?;
         Ok(renderer)
     }
 
@@ -244,13 +246,23 @@ impl Renderer {
         }
         let plan =
             plan(&Facts { output, ..self.facts }).map_err(|error| GpuError::Plan(error.to_string()))?;
-        let formats = self.key(1, 1, hazy(&plan)).formats();
-        let multisamples = self.options.antialias.multisamples();
-        self.programs.push(Program::new(&self.gpu, plan, &mut self.uploads, &formats, multisamples)?);
+        let program = self.compiled(plan)?;
+        self.programs.push(program);
         Ok(self.programs.len() - 1)
     }
 
-    fn key(&self, width: u32, height: u32, hazy: bool) -> Key {
+    /// A plan on the device, where it is to be evaluated and can be.
+    fn compiled(&mut self, plan: Plan) -> Result<Program<Shaded>, GpuError> {
+        let wanted =
+            self.options.shading == Shading::VisibilityBuffer && self.options.antialias.multisamples() == 1;
+        let format = self.key(1, 1, hazy(&plan), true).precision.wgsl();
+        let modules = wanted.then(|| plan.visibility_buffer(format)).flatten();
+        let modules = modules.filter(|modules| fits(&self.gpu, &plan, modules, &self.uploads));
+        let key = self.key(1, 1, hazy(&plan), modules.is_some());
+        Program::shaded(&self.gpu, plan, modules.as_ref(), &mut self.uploads, &key)
+    }
+
+    fn key(&self, width: u32, height: u32, hazy: bool, computed: bool) -> Key {
         let antialias = self.options.antialias;
         // WebGPU multisamples no 32-bit targets.
         let half = antialias.multisamples() > 1
@@ -261,12 +273,13 @@ impl Renderer {
             };
         let precision = if half { Precision::Half } else { Precision::Full };
         let blooms = hazy && self.facts.setup.effects.has(Effect::Bloom);
-        Key { width, height, antialias, precision, hazy, blooms }
+        Key { width, height, antialias, precision, hazy, blooms, computed }
     }
 
     /// The place of the targets for such images; those of another size give way to them.
-    fn stage(&mut self, camera: &Camera, hazy: bool) -> Result<usize, GpuError> {
-        let key = self.key(camera.width, camera.height, hazy);
+    fn stage(&mut self, camera: &Camera, program: usize) -> Result<usize, GpuError> {
+        let program = &self.programs[program];
+        let key = self.key(camera.width, camera.height, hazy(program.plan()), program.is_computed());
         self.stages
             .retain(|stage| (stage.targets.key.width, stage.targets.key.height) == (key.width, key.height));
         if let Some(i) = self.stages.iter().position(|stage| stage.targets.key == key) {

@@ -7,7 +7,8 @@ use wgpu::{
 
 use super::bloom::Finish;
 use super::device::Gpu;
-use super::program::Program;
+use super::pipeline::Pipeline;
+use super::program::{Program, Shaded};
 use super::readback::Copy;
 use super::resolve::Resolve;
 use super::targets::{Planes, Targets, Tile};
@@ -32,7 +33,7 @@ impl Stage {
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
-        program: &Program,
+        program: &Program<Shaded>,
         tile: Tile,
         first: bool,
         mut timer: Option<&mut Timer>,
@@ -42,27 +43,13 @@ impl Stage {
         }
         let targets = &self.targets;
         let drawn = targets.samples.as_ref().unwrap_or(&targets.pixels);
-        let attachments = match &targets.multisampled {
-            Some(multisampled) => attached(multisampled, Some(drawn), true),
-            None => attached(drawn, None, true),
-        };
-        let depth = RenderPassDepthStencilAttachment {
-            view: &targets.depth,
-            depth_ops: Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard }),
-            stencil_ops: None,
-        };
-        {
-            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-                label: Some("raster"),
-                color_attachments: &attachments,
-                depth_stencil_attachment: Some(depth),
-                timestamp_writes: timer.as_mut().and_then(|timer| timer.around("raster")),
-                ..RenderPassDescriptor::default()
-            });
-            let n = targets.key.antialias.grid();
-            let (width, height) = ((n * tile.width) as f32, (n * tile.height) as f32);
-            pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
-            program.draw(&mut pass);
+        match &program.pipelines {
+            Shaded::Forward(pipeline) => {
+                self.encode_raster(encoder, pipeline, drawn, tile, timer.as_deref_mut());
+            }
+            Shaded::Computed(buffer) => {
+                buffer.encode(gpu, encoder, (targets, drawn), tile, timer.as_deref_mut());
+            }
         }
         if let Some(resolve) = &self.resolve {
             resolve.set(gpu, tile);
@@ -81,6 +68,33 @@ impl Stage {
             let load = if first { LoadOp::Clear(Color::TRANSPARENT) } else { LoadOp::Load };
             over(encoder, glow, load, times, |pass| resolve.draw_glow(pass, tile));
         }
+    }
+
+    /// Draw the mesh into a tile's samples, shaded by the fragment stage.
+    fn encode_raster(
+        &self,
+        encoder: &mut CommandEncoder,
+        pipeline: &Pipeline,
+        drawn: &Planes,
+        tile: Tile,
+        mut timer: Option<&mut Timer>,
+    ) {
+        let targets = &self.targets;
+        let attachments = match &targets.multisampled {
+            Some(multisampled) => attached(multisampled, Some(drawn), true),
+            None => attached(drawn, None, true),
+        };
+        let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
+            label: Some("raster"),
+            color_attachments: &attachments,
+            depth_stencil_attachment: Some(cleared(&targets.depth)),
+            timestamp_writes: timer.as_mut().and_then(|timer| timer.around("raster")),
+            ..RenderPassDescriptor::default()
+        });
+        let n = targets.key.antialias.grid();
+        let (width, height) = ((n * tile.width) as f32, (n * tile.height) as f32);
+        pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
+        pipeline.draw(&mut pass);
     }
 
     /// After the last tile: what stands behind the mesh and the bloom, where it is to be `finished`, and copies of what
@@ -123,6 +137,12 @@ impl Stage {
         }
         (image, clipped)
     }
+}
+
+/// Depth that nobody reads after the pass.
+pub(super) fn cleared(view: &TextureView) -> RenderPassDepthStencilAttachment<'_> {
+    let depth_ops = Some(Operations { load: LoadOp::Clear(0.0), store: StoreOp::Discard });
+    RenderPassDepthStencilAttachment { view, depth_ops, stencil_ops: None }
 }
 
 /// Planes as a pass's attachments, resolved into others where those are given.

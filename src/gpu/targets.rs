@@ -15,6 +15,9 @@ const MOST_SAMPLES: u64 = 1 << 24;
 /// Depth's format; see `constants` for what it holds.
 pub(super) const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 
+/// The format of a visibility buffer: each sample's triangle.
+pub(super) const TRIANGLES: TextureFormat = TextureFormat::R32Uint;
+
 /// A rectangle of an image, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Tile {
@@ -41,10 +44,11 @@ impl Precision {
         }
     }
 
-    pub(super) const fn coverage(self) -> TextureFormat {
+    /// The name of colour's format in WGSL.
+    pub(super) const fn wgsl(self) -> &'static str {
         match self {
-            Self::Full => TextureFormat::R32Float,
-            Self::Half => TextureFormat::R16Float,
+            Self::Full => "rgba32float",
+            Self::Half => "rgba16float",
         }
     }
 
@@ -67,6 +71,8 @@ pub(super) struct Targets {
     /// The multisampled targets, which are resolved into `samples` or `pixels`.
     pub(super) multisampled: Option<Planes>,
     pub(super) depth: TextureView,
+    /// Which triangle each sample shows, where a compute shader shades them.
+    pub(super) triangles: Option<TextureView>,
     /// Colour (and coverage) of the image's pixels.
     pub(super) pixels: Planes,
     /// The mean over each pixel's samples of radiance times haze; absent where a pixel is one sample.
@@ -84,6 +90,8 @@ pub(super) struct Key {
     pub(super) hazy: bool,
     /// Whether the image blooms.
     pub(super) blooms: bool,
+    /// Whether a compute shader shades.
+    pub(super) computed: bool,
 }
 
 /// Colour, and coverage where colour's alpha holds something else.
@@ -102,8 +110,13 @@ impl Planes {
 impl Key {
     /// The formats of the planes, colour first.
     pub(super) fn formats(&self) -> Vec<TextureFormat> {
-        let coverage = self.hazy.then_some(self.precision.coverage());
-        std::iter::once(self.precision.color()).chain(coverage).collect()
+        std::iter::once(self.precision.color()).chain(self.coverage()).collect()
+    }
+
+    /// The format of coverage, where it has a plane of its own. Compute shaders write no single 16 bits.
+    fn coverage(&self) -> Option<TextureFormat> {
+        let full = self.computed || self.precision == Precision::Full;
+        self.hazy.then_some(if full { TextureFormat::R32Float } else { TextureFormat::R16Float })
     }
 
     /// Whether samples have to be averaged, or carried from a tile, to pixels.
@@ -137,6 +150,7 @@ impl Targets {
             samples: key.resolves(tiles.len()).then(|| planes(width, height, 1)),
             multisampled: (multisamples > 1).then(|| planes(width, height, multisamples)),
             depth: texture(gpu, "depth", width, height, DEPTH, multisamples),
+            triangles: key.computed.then(|| texture(gpu, "triangles", width, height, TRIANGLES, 1)),
             pixels: planes(key.width, key.height, 1),
             tiles,
             key,
@@ -167,10 +181,11 @@ pub(super) fn tiles(width: u32, height: u32, [across, down]: [u32; 2]) -> Vec<Ti
 }
 
 fn planes(gpu: &Gpu, key: &Key, width: u32, height: u32, multisamples: u32) -> Planes {
-    let plane = |label, format| texture(gpu, label, width, height, format, multisamples);
+    let extra = if key.computed { TextureUsages::STORAGE_BINDING } else { TextureUsages::empty() };
+    let plane = |label, format| texture_for(gpu, label, [width, height], format, multisamples, extra);
     Planes {
         color: plane("color", key.precision.color()),
-        coverage: key.hazy.then(|| plane("coverage", key.precision.coverage())),
+        coverage: key.coverage().map(|format| plane("coverage", format)),
     }
 }
 
@@ -183,6 +198,18 @@ pub(super) fn texture(
     format: TextureFormat,
     multisamples: u32,
 ) -> TextureView {
+    texture_for(gpu, label, [width, height], format, multisamples, TextureUsages::empty())
+}
+
+/// As [`texture`], for `usage` beside.
+fn texture_for(
+    gpu: &Gpu,
+    label: &str,
+    [width, height]: [u32; 2],
+    format: TextureFormat,
+    multisamples: u32,
+    usage: TextureUsages,
+) -> TextureView {
     let read = TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC | TextureUsages::COPY_DST;
     let extra = if multisamples == 1 && format != DEPTH { read } else { TextureUsages::empty() };
     let texture = gpu.device.create_texture(&TextureDescriptor {
@@ -192,7 +219,7 @@ pub(super) fn texture(
         sample_count: multisamples,
         dimension: TextureDimension::D2,
         format,
-        usage: TextureUsages::RENDER_ATTACHMENT | extra,
+        usage: TextureUsages::RENDER_ATTACHMENT | extra | usage,
         view_formats: &[],
     });
     texture.create_view(&TextureViewDescriptor::default())

@@ -1,9 +1,11 @@
-//! GPU time by pass, from the adapter's timestamps.
+//! GPU time by pass, from the adapter's timestamps, or the host's clock where those say nothing.
 
 use wgpu::{
     Buffer, BufferDescriptor, BufferUsages, CommandEncoder, ComputePassTimestampWrites, QUERY_SIZE, QuerySet,
     QuerySetDescriptor, QueryType, RenderPassTimestampWrites,
 };
+
+use web_time::Instant;
 
 use super::device::Gpu;
 use super::error::GpuError;
@@ -27,6 +29,11 @@ pub(crate) struct Timer {
     /// Absent where the adapter has no timestamps.
     queries: Option<(QuerySet, Buffer, Buffer)>,
     passes: Vec<&'static str>,
+    /// Whether the adapter is a program on the CPU. It stamps a compute pass before its threads have run it: then the
+    /// host's clock counts, from the submission to its end.
+    software: bool,
+    computes: bool,
+    since: Option<Instant>,
     /// Sums over submissions.
     pub(crate) times: Vec<PassTime>,
 }
@@ -48,7 +55,8 @@ impl Timer {
             let read = buffer("times, readable", BufferUsages::MAP_READ | BufferUsages::COPY_DST);
             (set, resolved, read)
         });
-        Self { queries, passes: Vec::new(), times: Vec::new() }
+        let (passes, times) = (Vec::new(), Vec::new());
+        Self { queries, passes, software: gpu.is_software(), computes: false, since: None, times }
     }
 
     /// What a pass is to write; none where passes cannot be timed.
@@ -63,6 +71,7 @@ impl Timer {
 
     /// What a compute pass is to write, likewise.
     pub(crate) fn around_compute(&mut self, pass: &'static str) -> Option<ComputePassTimestampWrites<'_>> {
+        self.computes = true;
         let (query_set, first) = self.next(pass)?;
         Some(ComputePassTimestampWrites {
             query_set,
@@ -82,8 +91,9 @@ impl Timer {
         Some((set, first))
     }
 
-    /// After the last pass: have the times copied.
-    pub(crate) fn finish(&self, encoder: &mut CommandEncoder) {
+    /// After the last pass, before the submission: have the times copied.
+    pub(crate) fn finish(&mut self, encoder: &mut CommandEncoder) {
+        self.since = (self.software && self.computes).then(Instant::now);
         if let Some((set, resolved, read)) = &self.queries {
             let count = 2 * self.passes.len() as u32;
             encoder.resolve_query_set(set, 0..count, resolved, 0);
@@ -94,7 +104,13 @@ impl Timer {
     /// After the submission: wait for the times, and add them up.
     pub(crate) fn collect(&mut self, gpu: &Gpu) -> Result<(), GpuError> {
         let passes = std::mem::take(&mut self.passes);
+        if let Some(since) = self.since.take() {
+            gpu.wait()?;
+            self.add("all passes", 1e3 * since.elapsed().as_secs_f64());
+            return Ok(());
+        }
         let Some((_, _, read)) = &self.queries else { return Ok(()) };
+        let read = read.clone();
         let slice = read.slice(..u64::from(2 * passes.len() as u32 * QUERY_SIZE));
         map(gpu, &slice)?;
         {
@@ -105,13 +121,17 @@ impl Timer {
                     |bytes: &[u8]| bytes.iter().rev().fold(0_u64, |sum, &byte| sum << 8 | u64::from(byte));
                 let length = tick(&ticks[8..]).saturating_sub(tick(&ticks[..8]));
                 let milliseconds = length as f64 * period * 1e-6;
-                match self.times.iter_mut().find(|time| time.pass == pass) {
-                    Some(time) => time.milliseconds += milliseconds,
-                    None => self.times.push(PassTime { pass, milliseconds }),
-                }
+                self.add(pass, milliseconds);
             }
         }
         read.unmap();
         Ok(())
+    }
+
+    fn add(&mut self, pass: &'static str, milliseconds: f64) {
+        match self.times.iter_mut().find(|time| time.pass == pass) {
+            Some(time) => time.milliseconds += milliseconds,
+            None => self.times.push(PassTime { pass, milliseconds }),
+        }
     }
 }

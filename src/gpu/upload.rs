@@ -125,7 +125,7 @@ impl Uploads {
         content.params = shadow::with_layers(content.params, &mapped);
         let mesh = split.as_ref().map_or(&content.scene.mesh, |(mesh, _)| mesh);
         let triangles = bytemuck::cast_slice(&mesh.triangles);
-        let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX)?;
+        let indices = buffer(gpu, "triangles", triangles, BufferUsages::INDEX | BufferUsages::STORAGE)?;
         let looked_up = |stack: Stack| stack.at(&content.illumination, stack.place(&content.params));
         let stacks = Stack::ALL.map(|stack| looked_up(stack).map(|(cube, _)| cube));
         let bytes = triangles.len() as u64;
@@ -162,6 +162,15 @@ impl Uploads {
         &self.indices
     }
 
+    pub(super) fn vertex_count(&self) -> u64 {
+        self.mesh().0.positions.len() as u64
+    }
+
+    /// Three for each triangle.
+    pub(super) fn index_count(&self) -> u32 {
+        3 * self.content.scene.mesh.triangles.len() as u32
+    }
+
     pub(super) const fn bytes(&self) -> u64 {
         self.bytes
     }
@@ -189,7 +198,7 @@ impl Uploads {
         self.find_fields(gpu, &[attribute])?;
         let (mesh, occlusion) = self.mesh();
         let bytes = vertices::attribute(attribute, mesh, occlusion, &self.found);
-        let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX)?;
+        let made = buffer(gpu, attribute.name(), &bytes, BufferUsages::VERTEX | BufferUsages::COPY_SRC)?;
         self.bytes += bytes.len() as u64;
         self.attributes.insert(attribute, made.clone());
         Ok(made)

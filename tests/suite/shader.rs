@@ -11,6 +11,7 @@ use skinfit::model::terms::TermName;
 use skinfit::model::texture_filter::TextureFilter;
 use skinfit::shader::domain::Work;
 use skinfit::shader::facts::{FaceSizes, MapFacts};
+use skinfit::shader::visibility_buffer::VisibilityBuffer;
 use skinfit::shader::{Budget, Facts, Plan, Resource, Source, plan};
 
 /// The effects that the fragment stage knows; morphs and bones are facts of their own.
@@ -71,12 +72,23 @@ fn complain(plan: &Plan, error: &str) -> ! {
 
 /// Panics with the module's text where naga finds fault with it.
 fn validate(plan: &Plan) {
-    let module = naga::front::wgsl::parse_str(&plan.wgsl)
-        .unwrap_or_else(|error| complain(plan, &error.emit_to_string(&plan.wgsl)));
+    validate_text(plan, &plan.wgsl);
+}
+
+fn validate_text(plan: &Plan, wgsl: &str) {
+    let module = naga::front::wgsl::parse_str(wgsl)
+        .unwrap_or_else(|error| complain(plan, &error.emit_to_string(wgsl)));
     let capabilities = if plan.uses_f16() { Capabilities::SHADER_FLOAT16 } else { Capabilities::empty() };
     Validator::new(ValidationFlags::all(), capabilities)
         .validate(&module)
-        .unwrap_or_else(|error| complain(plan, &error.emit_to_string(&plan.wgsl)));
+        .unwrap_or_else(|error| complain(plan, &error.emit_to_string(wgsl)));
+}
+
+/// The modules of compute shaders, which the rules that are here all have.
+fn validate_visibility_buffer(plan: &Plan) {
+    let VisibilityBuffer { vertices, triangles, shading, .. } =
+        plan.visibility_buffer("rgba16float").unwrap();
+    [vertices, triangles, shading].iter().for_each(|wgsl| validate_text(plan, wgsl));
 }
 
 /// Ways in which a scene may differ beside its setup.
@@ -226,7 +238,10 @@ fn shaders_of_every_combination_of_facts_validate() {
     };
     (0..1_u32 << 9).into_par_iter().for_each(|bits| {
         for budget in [Budget::Exact, Budget::Paper, Budget::Within(0.01)] {
-            validate(&must_plan(&facts(bits, budget)));
+            let plan = must_plan(&facts(bits, budget));
+            validate(&plan);
+            validate_visibility_buffer(&plan);
+            validate_visibility_buffer(&plan.fetches_alone());
         }
     });
 }

@@ -6,6 +6,7 @@
 //! - [`bloom`]: the glow that the haze drives
 //! - [`mod@image`]: images in memory
 //! - [`files`]: images as EXR and PNG files; `error`: why one cannot be written
+//! - [`shading`]: where the renderer shades
 //! - [`places`]: where the surface behind each pixel lies
 //! - [`tonemap`]: from linear radiance to sRGB
 
@@ -18,4 +19,5 @@ pub mod format;
 pub mod image;
 pub mod places;
 pub mod shade;
+pub mod shading;
 pub mod tonemap;

@@ -12,6 +12,11 @@ impl Plan {
     /// Declarations that every module shares: extensions, constants, resources, functions. The block of
     /// uniform constants is left out where they stand in the text.
     pub fn declarations(&self, uniform: bool) -> String {
+        self.bindings(uniform) + &self.functions(&Domain::ALL)
+    }
+
+    /// Of these, extensions, constants and resources.
+    pub(super) fn bindings(&self, uniform: bool) -> String {
         let mut wgsl = String::new();
         if self.uses_f16() {
             wgsl.push_str("enable f16;\n\n");
@@ -40,7 +45,6 @@ impl Plan {
             let binding = 1 + self.resources.len() + i;
             let _ = writeln!(wgsl, "@group(0) @binding({binding}) var {}: texture_2d<f32>;", level.bound());
         }
-        wgsl.push_str(&self.functions(&Domain::ALL));
         wgsl
     }
 

@@ -37,6 +37,8 @@ pub struct Plan {
     pub cost: f64,
     /// How far the output may be off, relative to white.
     pub error: f64,
+    /// Whether fragments fetch what they read and do nothing else.
+    pub only_fetches: bool,
 }
 
 /// One chosen rule.
@@ -108,7 +110,7 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
     match facts.source {
         Source::Raster => {
             let plan = Plan::search(facts, &["clip"], &goals, &[])?;
-            let wgsl = plan.raster_module(&parts);
+            let wgsl = plan.raster_module();
             Ok(Plan { wgsl, ..plan })
         }
         Source::Samples | Source::Terms => {
@@ -254,6 +256,7 @@ impl Plan {
             levels,
             passes: Vec::new(),
             wgsl: String::new(),
+            only_fetches: false,
             cost: steps.iter().map(share).sum::<f64>()
                 + (interpolated + looked_up.map(|on| on.cost(facts)).sum::<f64>()),
             error: steps.iter().map(|step| step.error).sum(),

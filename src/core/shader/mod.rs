@@ -10,7 +10,8 @@
 //! - [`domain`]: where quantities are computed, and the edges between domains
 //! - [`search`]: the cheapest set of rules within the accuracy budget (A*); `graph`: what it searches
 //! - [`emit`]: the plan: the chosen rules, and what they read; `calls`: declarations, functions and calls; `module`: its
-//!   WGSL, for rasterised fragments, for stored samples, or as a function for other engines
+//!   WGSL, for rasterised fragments, for stored samples, or as a function for other engines; [`visibility_buffer`]: for
+//!   compute shaders that shade what the rasteriser found; `fetches`: what it costs at the least
 //! - [`atlas`]: passes over the UV atlas, their text and their tangents
 //! - [`kept`]: what of stored samples need not be computed anew in each pass
 //! - [`term`]: effects, parameters and rules that a file adds
@@ -25,6 +26,7 @@ mod calls;
 pub mod domain;
 pub mod emit;
 pub mod facts;
+mod fetches;
 mod graph;
 pub mod kept;
 pub mod module;
@@ -34,6 +36,7 @@ pub mod rule;
 pub mod search;
 pub mod tangent;
 pub mod term;
+pub mod visibility_buffer;
 
 pub use domain::{Domain, Work};
 pub use emit::{Plan, Step, plan};

@@ -7,13 +7,10 @@ use super::atlas::stored;
 use super::atlas::text::{SAMPLE_LEVEL, sampled};
 use super::domain::Domain;
 use super::emit::{Plan, hazy, parts, sample_fields};
-use super::facts::ShadowFacts;
-use super::quantity::{Constant, Kind, Resource};
-use super::rule::Rule;
+use super::quantity::Constant;
 use super::tangent::chain::Chain;
 use crate::model::key_light::KeyLight;
 use crate::model::params::Params;
-use crate::model::shadow_filter::ShadowFilter;
 use crate::model::turn::turn;
 
 impl Plan {
@@ -40,117 +37,42 @@ impl Plan {
         wgsl
     }
 
-    pub(super) fn raster_module(&self, parts: &[&str]) -> String {
+    pub(super) fn raster_module(&self) -> String {
+        let (location, coverage) = ("@location(0) ", "@location(1) ");
         let mut wgsl = self.vertex_module("");
-        if !self.levels.is_empty() {
-            let _ = write!(wgsl, "\n{SAMPLE_LEVEL}");
-        }
-        if hazy(&self.facts) {
-            wgsl.push_str(
-                "\nstruct Fragment {\n    @location(0) color: vec4f,\n    @location(1) coverage: f32,\n}\n",
-            );
-            wgsl.push_str("\n@fragment\nfn fs_main(at: Varyings) -> Fragment {\n");
-        } else {
-            wgsl.push_str("\n@fragment\nfn fs_main(at: Varyings) -> @location(0) vec4f {\n");
-        }
-        wgsl.push_str(&sampled(&self.levels));
-        wgsl.push_str(&self.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
-        let sum = sum(parts);
-        let returned = if hazy(&self.facts) {
-            format!("Fragment(vec4f({sum}, haze), 1.0)")
-        } else {
-            format!("vec4f({sum}, 1.0)")
-        };
-        let _ = write!(wgsl, "    return {returned};\n}}\n");
+        wgsl.push_str(&self.fragment_function("@fragment\nfn fs_main", [location, coverage]));
         wgsl
     }
 
-    /// This plan with a fragment stage that fetches the same textures, as often, and does nothing else:
-    /// what a frame costs at the least.
-    #[must_use]
-    pub fn fetches_alone(&self) -> Self {
-        let filter = self.facts.maps.filter;
-        let (map, texels) = if filter.reads_levels() {
-            let steps = "vec4f(dpdx(at.vertex_uv), dpdy(at.vertex_uv))";
-            let texels = format!("sample_mip_texels({{t}}, at.vertex_uv, {steps}, {}.0)", filter.most_taps());
-            ("textureSample({t}, map_sampler, at.vertex_uv)", texels)
-        } else {
-            let map = "textureSampleLevel({t}, map_sampler, at.vertex_uv, 0.0)";
-            (map, "sample_texels({t}, at.vertex_uv)".to_owned())
-        };
-        let fetches: Vec<String> = self
-            .steps
-            .iter()
-            .filter(|step| step.rule.domain == Domain::Fragment)
-            .filter_map(|step| {
-                let read = |kind| {
-                    let found = |r: &&Resource| step.rule.reads.contains(&r.name()) && r.kind() == kind;
-                    self.resources.iter().find(found).map(|r| r.name())
-                };
-                let direction = if step.rule.needs.iter().any(|(name, _)| name.starts_with("reflected")) {
-                    "at.vertex_normal.zxy"
-                } else {
-                    "at.vertex_normal"
-                };
-                let fetch = |kind, lookup: &str| Some(lookup.replace("{t}", read(kind)?));
-                fetch(Kind::Cube, &format!("textureSampleLevel({{t}}, cube_sampler, {direction}, 0.0)"))
-                    .or_else(|| fetch(Kind::Map, map))
-                    .or_else(|| {
-                        fetch(
-                            Kind::Faces,
-                            &format!("sample_faces({{t}}, {{t}}_size(), cube_place({direction}))"),
-                        )
-                    })
-                    .or_else(|| fetch(Kind::Texels, &texels))
-            })
-            .chain(self.shadow_fetches())
-            .collect();
-        let whole = self.raster_module(&[]);
-        let end = whole.find("\n@fragment\n").unwrap_or(whole.len());
-        let sum = if fetches.is_empty() { "vec4f(0.0)".to_owned() } else { fetches.join(" + ") };
-        let (output, value) = if hazy(&self.facts) {
-            ("Fragment", format!("Fragment({sum}, 1.0)"))
-        } else {
-            ("@location(0) vec4f", sum)
-        };
-        let wgsl = format!(
-            "{}{}\n@fragment\nfn fs_main(at: Varyings) -> {output} {{\n    return {value};\n}}\n",
-            &whole[..end],
-            self.shadow_fetch()
-        );
-        Self { wgsl, ..self.clone() }
-    }
-
-    /// As many fetches as the filter of shadow maps makes for a light, around where its map shows a place.
-    fn shadow_fetch(&self) -> String {
-        let Some(ShadowFacts { filter, taps }) = self.facts.shadows else { return String::new() };
-        if self.shadow_fetches().next().is_none() {
-            return String::new();
+    /// A function of what fragments are handed that returns their colour, or colour and coverage; `at` are the
+    /// attributes of these.
+    pub(super) fn fragment_function(&self, name: &str, at: [&str; 2]) -> String {
+        let (hazy, mut wgsl) = (hazy(&self.facts), String::new());
+        if !self.levels.is_empty() {
+            let _ = write!(wgsl, "\n{SAMPLE_LEVEL}");
         }
-        let taps = if filter == ShadowFilter::Hardware { 1 } else { taps };
-        let blockers = match filter {
-            ShadowFilter::Pcss => {
-                "        let texel = vec2i(clamp(at, vec2f(0.0), vec2f(0.999)) * shadow_row(layer, 6u).w);\n        \
-                 sum += textureLoad(shadow_maps, texel, layer, 0);\n"
-            }
-            _ => "",
+        if self.only_fetches {
+            wgsl.push_str(&self.shadow_fetch());
+        }
+        if hazy {
+            let [color, coverage] = at;
+            let _ = write!(
+                wgsl,
+                "\nstruct Fragment {{\n    {color}color: vec4f,\n    {coverage}coverage: f32,\n}}\n"
+            );
+        }
+        let returns = if hazy { "Fragment".to_owned() } else { format!("{}vec4f", at[0]) };
+        let _ = write!(wgsl, "\n{name}(at: Varyings) -> {returns} {{\n");
+        let color = if self.only_fetches {
+            self.fetches()
+        } else {
+            wgsl.push_str(&sampled(&self.levels));
+            wgsl.push_str(&self.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
+            format!("vec4f({}, {})", sum(&parts(&self.facts)), if hazy { "haze" } else { "1.0" })
         };
-        format!(
-            "\nfn shadow_fetch(light: u32, place: vec3f) -> f32 {{\n    \
-             let layer = min(light, textureNumLayers(shadow_maps) - 1u);\n    \
-             let seen = shadow_seen(layer, place);\n    var sum = 0.0;\n    \
-             for (var i = 0u; i < {taps}u; i++) {{\n        \
-             let at = seen.xy + vec2f(f32(i % 4u), f32(i / 4u)) / shadow_row(layer, 6u).w;\n        \
-             sum += textureSampleCompareLevel(shadow_maps, shadow_sampler, at, layer, seen.z);\n{blockers}    \
-             }}\n    return sum;\n}}\n"
-        )
-    }
-
-    /// Calls of that for each light that fragments compare with its map.
-    fn shadow_fetches(&self) -> impl Iterator<Item = String> {
-        let compares = |rule: &&Rule| rule.reads.contains(&Resource::ShadowMaps.name());
-        let lights = self.rules(Domain::Fragment).filter(compares).count();
-        (0..lights).map(|light| format!("vec4f(shadow_fetch({light}u, at.vertex_position))"))
+        let returned = if hazy { format!("Fragment({color}, 1.0)") } else { color };
+        let _ = write!(wgsl, "    return {returned};\n}}\n");
+        wgsl
     }
 
     pub(super) fn sample_module(&self, parts: &[&str]) -> String {

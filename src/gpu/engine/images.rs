@@ -72,7 +72,7 @@ impl Images {
                 pass.set_bind_group(1, bindings, &[]);
                 pass.dispatch_workgroups(Parts::image_workgroups(part), 1, 1);
             }
-            if let Some(timer) = &timer {
+            if let Some(timer) = &mut timer {
                 timer.finish(&mut commands);
             }
             gpu.queue.submit([commands.finish()]);

@@ -2,7 +2,7 @@
 
 use wgpu::CommandEncoderDescriptor;
 
-use super::{Renderer, hazy};
+use super::Renderer;
 use crate::GpuError;
 use crate::constants::Values;
 use crate::model::terms::TermName;
@@ -27,7 +27,7 @@ impl Renderer {
     /// As of [`Self::render`].
     pub fn frame_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
         let program = self.program(None)?;
-        let stage = self.stage(camera, hazy(self.programs[program].plan()))?;
+        let stage = self.stage(camera, program)?;
         let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
         let (program, stage, morph_weights) = (&programs[program], &stages[stage], morph_weights.as_slice());
         let mut timers = Vec::with_capacity(frames);
@@ -41,12 +41,18 @@ impl Renderer {
                 stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, Some(&mut timer));
                 timer.finish(&mut encoder);
                 gpu.queue.submit([encoder.finish()]);
+                if gpu.is_software() {
+                    // It may be timed by the host's clock.
+                    timer.collect(gpu)?;
+                }
                 timers.push((i, timer));
             }
         }
         let mut times = Vec::with_capacity(frames);
         for (tile, mut timer) in timers {
-            timer.collect(gpu)?;
+            if !gpu.is_software() {
+                timer.collect(gpu)?;
+            }
             let milliseconds: f64 = timer.times.iter().map(|time| time.milliseconds).sum();
             match times.last_mut() {
                 Some(last) if tile > 0 => *last += milliseconds,
@@ -81,7 +87,7 @@ impl Renderer {
         mut timer: Option<&mut Timer>,
     ) -> Result<(usize, Vec<Copy>), GpuError> {
         let program = self.program(output)?;
-        let place = self.stage(camera, hazy(self.programs[program].plan()))?;
+        let place = self.stage(camera, program)?;
         let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
         let (program, stage, morph_weights) = (&programs[program], &stages[place], morph_weights.as_slice());
         let mut copies = Vec::new();
@@ -96,7 +102,7 @@ impl Renderer {
             if i + 1 == tiles.len() {
                 copies = stage.encode_end(gpu, &mut encoder, gain, finished, timer.as_deref_mut());
             }
-            if let Some(timer) = &timer {
+            if let Some(timer) = &mut timer {
                 timer.finish(&mut encoder);
             }
             gpu.queue.submit([encoder.finish()]);

@@ -23,7 +23,7 @@ use super::constants;
 use super::device::Gpu;
 use super::error::{GpuError, Oversized};
 use super::geometry::outline;
-use super::pipeline::{self, Outputs};
+use super::pipeline::{self, Outputs, Stages};
 use super::targets::DEPTH;
 use super::timing::Timer;
 use super::upload::{Bound, Uploads};
@@ -75,7 +75,7 @@ impl Maps {
             plan.attributes.iter().map(|&a| uploads.attribute(gpu, a)).collect::<Result<Vec<_>, _>>()?;
         let resources =
             plan.resources.iter().map(|&r| uploads.resource(gpu, r)).collect::<Result<Vec<_>, _>>()?;
-        let layout = pipeline::layout(gpu, &plan);
+        let layout = pipeline::layout(gpu, &plan, Stages::Raster);
         let outputs = Outputs { formats: &[], multisamples: 1, depth: true };
         let pipeline = pipeline::pipeline(gpu, &plan, &layout, outputs);
         let block = vec![0; constants::block_bytes(&plan.constants, facts.morphs)];

@@ -55,6 +55,7 @@ mod gpu {
     use crate::gpu::upload::Content;
     use crate::gpu::{Choice, Gpu, RenderOptions, Renderer};
     use crate::render::antialias::Antialias;
+    use crate::render::shading::Shading;
     use crate::shader::Budget;
     use crate::subject::Subject;
     use crate::timing::{Rounds, Spread, Timed, interleaved};
@@ -123,7 +124,13 @@ mod gpu {
 
     fn renderer(gpu: &Gpu, content: Content) -> Result<Renderer, StudyError> {
         let antialias = Antialias::Grid(content.scene.quality.samples_per_axis);
-        let options = RenderOptions { antialias, budget: Budget::Exact, timed: true, animated: false };
+        let options = RenderOptions {
+            antialias,
+            shading: Shading::default(),
+            budget: Budget::Exact,
+            timed: true,
+            animated: false,
+        };
         Ok(Renderer::new(gpu, content, options)?)
     }
 }

@@ -14,6 +14,7 @@ use skinfit::render::bloom::add_bloom;
 use skinfit::render::files::{ImageOptions, write_exr};
 use skinfit::render::image::Image;
 use skinfit::render::shade::Shader;
+use skinfit::render::shading::Shading;
 use skinfit::shader::Budget;
 
 use crate::common::not_checked;
@@ -41,8 +42,13 @@ fn excused(error: &str) {
 }
 
 /// What both engines draw with, unless a test says otherwise.
-pub(crate) const EXACT: RenderOptions =
-    RenderOptions { antialias: Antialias::Grid(2), budget: Budget::Exact, timed: false, animated: false };
+pub(crate) const EXACT: RenderOptions = RenderOptions {
+    antialias: Antialias::Grid(2),
+    shading: Shading::VisibilityBuffer,
+    budget: Budget::Exact,
+    timed: false,
+    animated: false,
+};
 
 /// The paper's fragment program.
 pub(crate) const SURFACE: Effects = Effects::SURFACE;

@@ -8,6 +8,7 @@ use skinfit::model::params::Params;
 use skinfit::model::texture_filter::TextureFilter;
 use skinfit::prepare::Baked;
 use skinfit::render::antialias::Antialias;
+use skinfit::render::shading::Shading;
 use skinfit::shader::quantity::Kind;
 use skinfit::shader::{Budget, Facts, Plan, plan};
 
@@ -91,7 +92,12 @@ fn exported_glsl_draws_the_pixels_of_the_renderers_own_shader() {
 fn compare(gpu: &Gpu, baked: &Baked) {
     let params = baked.scene.params.clone();
     let camera = baked.scene.views[0].camera;
-    let options = RenderOptions { antialias: Antialias::Grid(1), budget: Budget::Paper, ..EXACT };
+    let options = RenderOptions {
+        antialias: Antialias::Grid(1),
+        shading: Shading::Forward,
+        budget: Budget::Paper,
+        ..EXACT
+    };
     let draw = |change: &dyn Fn(&Plan) -> Plan| {
         let mut renderer = Renderer::with_shader(gpu, Content::of(baked), options, change).unwrap();
         renderer.render(&camera, 1.0).unwrap().image

@@ -1,6 +1,8 @@
 //! What the renderer refuses, and lost devices.
 
+use skinfit::gpu::RenderOptions;
 use skinfit::gpu::{Choice, Gpu, GpuError, Renderer};
+use skinfit::render::shading::Shading;
 
 use super::bench::*;
 
@@ -58,7 +60,8 @@ fn a_shader_that_the_driver_refuses_is_an_error_and_no_panic() {
         plan.wgsl.push_str("\nfn broken() -> f32 { return vec3f(1.0); }\n");
         plan
     };
-    let made = Renderer::with_shader(&gpu, Content::of(&baked), EXACT, broken);
+    let options = RenderOptions { shading: Shading::Forward, ..EXACT };
+    let made = Renderer::with_shader(&gpu, Content::of(&baked), options, broken);
     let Err(error @ GpuError::Refused { .. }) = made.map(|_| ()) else { panic!("it was taken") };
     assert_eq!(error.to_string().lines().count(), 1, "{error}");
 }

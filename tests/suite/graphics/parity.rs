@@ -5,10 +5,13 @@
 
 use glam::{DMat4, Vec3};
 use skinfit::gpu::Gpu;
+use skinfit::gpu::RenderOptions;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Baked;
+use skinfit::render::image::Image;
+use skinfit::render::shading::Shading;
 use skinfit::scene::Scene;
 use std::path::Path;
 
@@ -46,9 +49,17 @@ const UNCOVERED: f64 = 0.03;
 
 /// Fail with both images and a FLIP map on disk where the engines disagree.
 fn compare(name: &str, gpu: &Gpu, baked: &Baked) {
-    let test = on_gpu(gpu, baked, EXACT);
     let reference = on_cpu(baked, 2);
-    let difference = Difference::new(&reference, &test, 4);
+    for shading in Shading::ALL {
+        let test = on_gpu(gpu, baked, RenderOptions { shading, ..EXACT });
+        let name =
+            if shading == EXACT.shading { name.to_owned() } else { format!("{name}_{}", shading.name()) };
+        agree(&name, gpu, &reference, &test);
+    }
+}
+
+fn agree(name: &str, gpu: &Gpu, reference: &Image, test: &Image) {
+    let difference = Difference::new(reference, test, 4);
     let Difference { interior, edge, uncovered, beyond_a_sample } = &difference;
     assert!(interior.len() > 500, "{name}: only {} pixels to compare", interior.len());
     let edges = edge.len() + uncovered;
@@ -68,7 +79,7 @@ fn compare(name: &str, gpu: &Gpu, baked: &Baked) {
     crate::figures::measured(&format!("parity {name} most"), quantile(interior, 0.99));
     crate::figures::measured(&format!("parity {name} greatest"), interior.last().copied().unwrap_or(0.0));
     for (what, found, most) in figures {
-        assert!(found <= most, "{name}: {what}: {found} > {most}; {}", keep(name, &reference, &test));
+        assert!(found <= most, "{name}: {what}: {found} > {most}; {}", keep(name, reference, test));
     }
 }
 

@@ -9,6 +9,8 @@ use crate::gpu::error::SOFTWARE_DRIVER;
 use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
 use crate::prepare::Baked;
 use crate::render::antialias::Antialias;
+use crate::render::shading::Shading;
+use crate::scene::suggestion;
 use crate::shader::Budget;
 
 /// How frames are drawn.
@@ -25,6 +27,10 @@ pub(super) struct EngineArguments {
     /// samples_per_axis].
     #[arg(long, value_name = "SAMPLES", value_parser = parse_antialias)]
     antialias: Option<Antialias>,
+    /// Where the GPU's renderer shades: `visibility_buffer`, in a compute shader once the rasteriser has found which
+    /// triangle each sample shows, or `forward`, in the fragment stage, as with msaa4 all the same.
+    #[arg(long, value_name = "SHADING", default_value = Shading::default().name(), value_parser = parse_shading)]
+    shading: Shading,
     /// How far the GPU's shader may be off: `exact`, `paper` (what the paper's programs did), or a number
     /// relative to white.
     #[arg(long, value_name = "BUDGET", default_value = "exact", value_parser = parse_budget)]
@@ -33,6 +39,11 @@ pub(super) struct EngineArguments {
 
 fn parse_antialias(name: &str) -> Result<Antialias, String> {
     Antialias::from_name(name).ok_or_else(|| "give none, msaa4, or 1x1 to 8x8".to_owned())
+}
+
+fn parse_shading(name: &str) -> Result<Shading, String> {
+    let known = Shading::ALL.map(Shading::name);
+    Shading::from_name(name).ok_or_else(|| format!("unknown shading. {}.", suggestion(name, &known)))
 }
 
 /// What an engine is to do with a scene; the CPU's does not ask.
@@ -65,7 +76,8 @@ impl EngineArguments {
             && let Some(gpu) = self.open()?
         {
             let Painting { animated, timed } = painting;
-            let options = RenderOptions { antialias, budget: self.accuracy, timed, animated };
+            let options =
+                RenderOptions { antialias, shading: self.shading, budget: self.accuracy, timed, animated };
             let painter = GpuPainter::new(gpu, baked, options);
             return Ok(Box::new(painter.map_err(|error| Task::Render.refusal(&error))?));
         }

@@ -11,6 +11,7 @@ use crate::model::shadow_filter::ShadowFilter;
 use crate::reference::Difference;
 use crate::render::antialias::Antialias;
 use crate::render::image::Image;
+use crate::render::shading::Shading;
 use crate::scene::{Scene, ShadowMaps};
 use crate::shader::Budget;
 use crate::timing::{Job, interleaved, seconds_of};
@@ -182,7 +183,8 @@ impl<'a> Drawn<'a> {
         };
         let n = scene.quality.samples_per_axis.min(MOST_SAMPLES);
         let (antialias, budget) = (Antialias::Grid(n), Budget::Exact);
-        let options = RenderOptions { antialias, budget, timed: true, animated: false };
+        let options =
+            RenderOptions { antialias, shading: Shading::default(), budget, timed: true, animated: false };
         Ok(Self { renderer: Renderer::new(gpu, content, options)?, scene, gains: &bench.baked.gains })
     }
 

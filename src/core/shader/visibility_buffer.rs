@@ -1,0 +1,249 @@
+//! A plan's modules where a compute shader shades: the rasteriser leaves which triangle each sample shows, and what its
+//! corners hand over is interpolated there (Burns and Hunt 2013, "The Visibility Buffer: A Cache-Friendly Approach to
+//! Deferred Shading"). A sample is shaded once, whatever was drawn behind it and however small its triangle is.
+
+use std::fmt::Write as _;
+
+use super::domain::{Domain, UV};
+use super::emit::{Plan, hazy};
+use super::module::uniform;
+use super::quantity::Attribute;
+
+/// Threads of a workgroup of `cs_vertices`.
+pub const VERTICES: u32 = 64;
+/// Samples along the sides of a workgroup of `cs_shade`; `place_in_tile` knows of eight.
+pub const TILE: u32 = 8;
+
+/// What takes steps between neighbouring fragments, of which a compute shader knows none.
+const BETWEEN_FRAGMENTS: [&str; 5] = ["dpdx", "dpdy", "fwidth", "textureSample(", "textureSampleCompare("];
+/// What fragments are handed of texture coordinates, in rules and out of them.
+const COORDINATES: [&str; 2] = ["vertex_uv", "at.vertex_uv"];
+
+/// The modules, in the order in which they run. Bindings of group 0 are the plan's.
+#[derive(Clone, Debug)]
+pub struct VisibilityBuffer {
+    /// `cs_vertices`, a thread for each vertex: group 1 holds the attributes, one after another in the plan's order, and
+    /// what is handed over of each vertex, [`stride`](Self::stride) numbers, its place in clip space first.
+    pub vertices: String,
+    /// `vs_main` and `fs_main`, over as many vertices as there are indices: group 0 holds what was handed over and the
+    /// indices; the target takes each sample's triangle, counted from 1.
+    pub triangles: String,
+    /// `cs_shade`, a thread for each sample: group 1 holds what was handed over, the indices, the triangles, the size of
+    /// what was drawn, and the targets: colour, and coverage where colour's alpha is the haze.
+    pub shading: String,
+    /// Numbers of a vertex.
+    pub stride: usize,
+}
+
+impl Plan {
+    /// The modules for a colour target of that format (`rgba16float`, say); `None` where a fragment takes other steps to
+    /// its neighbours than those of texture coordinates.
+    #[must_use]
+    pub fn visibility_buffer(&self, color: &str) -> Option<VisibilityBuffer> {
+        let fragments = without_neighbours(&self.functions(&[Domain::Fragment]));
+        if BETWEEN_FRAGMENTS.iter().any(|function| fragments.contains(function)) {
+            return None;
+        }
+        let stride = 4 + self.varyings.iter().map(|(_, kind)| numbers(kind)).sum::<usize>();
+        Some(VisibilityBuffer {
+            vertices: self.vertices_module(stride),
+            triangles: triangles_module(stride),
+            shading: self.shading_module(stride, color),
+            stride,
+        })
+    }
+
+    fn vertices_module(&self, stride: usize) -> String {
+        let mut wgsl = self.bindings(true) + &self.functions(&[Domain::Vertex]);
+        wgsl.push_str("\nstruct Vertex {\n    vertex_index: u32,\n");
+        for attribute in &self.attributes {
+            let _ = writeln!(wgsl, "    {}: {},", attribute.name(), attribute.wgsl());
+        }
+        let clip = Some(("clip", "vec4f"));
+        let varyings = self.varyings_struct();
+        let calls = self.calls(Domain::Vertex, uniform, |name| format!("vertex.{name}"));
+        let names = clip.iter().chain(&self.varyings).map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+        let _ = write!(
+            wgsl,
+            "}}\n\n{varyings}\nfn handed_over(vertex: Vertex) -> Varyings {{\n{calls}    return Varyings({names});\n}}\n\n\
+             @group(1) @binding(0) var<storage, read> attributes: array<u32>;\n\
+             @group(1) @binding(1) var<storage, read_write> varyings: array<f32>;\n\n\
+             @compute @workgroup_size({VERTICES})\n\
+             fn cs_vertices(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {{\n    \
+             let count = arrayLength(&varyings) / {stride}u;\n    \
+             let i = id.x + {VERTICES}u * groups.x * id.y;\n    if (i >= count) {{\n        return;\n    }}\n    \
+             let at = handed_over(Vertex(i"
+        );
+        let mut first = 0;
+        for attribute in &self.attributes {
+            let _ = write!(wgsl, ", {}", read(*attribute, first));
+            first += attribute.bytes() / 4;
+        }
+        let _ = write!(wgsl, "));\n    let first = {stride}u * i;\n");
+        let mut place = 0;
+        for (name, kind) in clip.into_iter().chain(self.varyings.iter().copied()) {
+            for k in 0..numbers(kind) {
+                let part = if numbers(kind) == 1 { String::new() } else { format!("[{k}]") };
+                let _ = writeln!(wgsl, "    varyings[first + {place}u] = at.{name}{part};");
+                place += 1;
+            }
+        }
+        wgsl.push_str("}\n");
+        wgsl
+    }
+
+    /// The structure of what is handed over.
+    fn varyings_struct(&self) -> String {
+        let member = |(name, kind): &(&str, &str)| format!("    {name}: {kind},\n");
+        let members: String = self.varyings.iter().map(member).collect();
+        format!("struct Varyings {{\n    clip: vec4f,\n{members}}}\n")
+    }
+
+    fn shading_module(&self, stride: usize, color: &str) -> String {
+        let mut wgsl = self.bindings(true) + &self.functions(&[Domain::Fragment]);
+        if self.takes_steps() {
+            wgsl.push_str(
+                "\n// How far the sample's texture coordinates go to the one on the right (xy) and to the one below (zw).\n\
+                 var<private> uv_steps_here: vec4f;\n",
+            );
+        }
+        let _ = write!(wgsl, "\n{}", self.varyings_struct());
+        wgsl.push_str(&self.fragment_function("fn shaded", ["", ""]));
+        let _ = write!(
+            wgsl,
+            "\nconst STRIDE = {stride}u;\n\
+             @group(1) @binding(0) var<storage, read> varyings: array<f32>;\n\
+             @group(1) @binding(1) var<storage, read> corners: array<u32>;\n\
+             @group(1) @binding(2) var triangles: texture_2d<u32>;\n\
+             // Samples across and down.\n\
+             @group(1) @binding(3) var<uniform> drawn: vec4u;\n\
+             @group(1) @binding(4) var colors: texture_storage_2d<{color}, write>;\n"
+        );
+        if hazy(&self.facts) {
+            wgsl.push_str("@group(1) @binding(5) var coverages: texture_storage_2d<r32float, write>;\n");
+        }
+        wgsl.push_str(include_str!("visibility_buffer.wgsl"));
+        wgsl.push_str(&self.interpolation());
+        let (empty, stores) = if hazy(&self.facts) {
+            (
+                "textureStore(coverages, place, vec4f(0.0));",
+                "    textureStore(colors, place, fragment.color);\n    \
+                 textureStore(coverages, place, vec4f(fragment.coverage));\n",
+            )
+        } else {
+            ("", "    textureStore(colors, place, fragment);\n")
+        };
+        let _ = write!(
+            wgsl,
+            "\n@compute @workgroup_size({})\n\
+             fn cs_shade(@builtin(workgroup_id) tile: vec3u, @builtin(local_invocation_index) i: u32) {{\n    \
+             let place = {TILE}u * tile.xy + place_in_tile(i);\n    \
+             if (any(place >= drawn.xy)) {{\n        return;\n    }}\n    \
+             let triangle = textureLoad(triangles, place, 0).r;\n    if (triangle == 0u) {{\n        \
+             textureStore(colors, place, vec4f(0.0));\n        {empty}\n        return;\n    }}\n    \
+             let fragment = shaded(interpolated(triangle - 1u, vec2f(place) + 0.5));\n{stores}}}\n",
+            TILE * TILE
+        );
+        without_neighbours(&wgsl)
+    }
+
+    /// `interpolated(triangle, at)`: what a sample is handed.
+    fn interpolation(&self) -> String {
+        let mut wgsl = String::from(
+            "\nfn interpolated(triangle: u32, at: vec2f) -> Varyings {\n    let first = first_numbers(triangle);\n    \
+             let areas = areas_of_corners(first, at);\n    let shares = shares_of(areas);\n",
+        );
+        let places = self.varyings.iter().scan(4, |next, (name, kind)| {
+            let place = *next;
+            *next += numbers(kind);
+            Some((*name, *kind, place))
+        });
+        let places: Vec<(&str, &str, usize)> = places.collect();
+        let uv = places.iter().find(|(name, ..)| *name == UV).filter(|_| self.takes_steps());
+        if let Some(&(_, kind, place)) = uv {
+            let of = |shares: &str| means(kind, place, shares);
+            let _ = write!(
+                wgsl,
+                "    let along = step_of(areas, areas_of_corners(first, at + vec2f(1.0, 0.0)));\n    \
+                 let down = step_of(areas, areas_of_corners(first, at + vec2f(0.0, 1.0)));\n    \
+                 uv_steps_here = vec4f({}, {});\n",
+                of("along"),
+                of("down")
+            );
+        }
+        wgsl.push_str("    return Varyings(\n        vec4f(at, 0.0, 1.0),\n");
+        for (_, kind, place) in places {
+            let _ = writeln!(wgsl, "        {},", means(kind, place, "shares"));
+        }
+        wgsl.push_str("    );\n}\n");
+        wgsl
+    }
+
+    /// Whether fragments take steps of their texture coordinates.
+    fn takes_steps(&self) -> bool {
+        let body = self.fragment_function("fn shaded", ["", ""]);
+        let fragments = self.functions(&[Domain::Fragment]) + &body;
+        without_neighbours(&fragments) != fragments
+    }
+}
+
+/// A value of the corners' numbers from that place on.
+fn means(kind: &str, place: usize, shares: &str) -> String {
+    let mean = |k| format!("mean_of_corners(first, {}u, {shares})", place + k);
+    let parts = (0..numbers(kind)).map(mean).collect::<Vec<_>>().join(", ");
+    if numbers(kind) == 1 { parts } else { format!("{kind}({parts})") }
+}
+
+/// A text of fragments that take the steps of texture coordinates from their triangle, not from their neighbours.
+fn without_neighbours(wgsl: &str) -> String {
+    let mut calls = wgsl.split("textureSample(");
+    let mut text = calls.next().unwrap_or_default().to_owned();
+    for call in calls {
+        let (arguments, rest) = call.split_at(call.find(')').unwrap_or(call.len()));
+        if COORDINATES.iter().any(|uv| arguments.ends_with(&format!(", map_sampler, {uv}"))) {
+            let _ = write!(text, "textureSampleGrad({arguments}, uv_steps_here.xy, uv_steps_here.zw{rest}");
+        } else {
+            let _ = write!(text, "textureSample({call}");
+        }
+    }
+    for uv in COORDINATES {
+        text = text.replace(&format!("dpdx({uv})"), "uv_steps_here.xy");
+        text = text.replace(&format!("dpdy({uv})"), "uv_steps_here.zw");
+    }
+    text
+}
+
+/// The rasteriser's module.
+fn triangles_module(stride: usize) -> String {
+    format!(
+        "@group(0) @binding(0) var<storage, read> varyings: array<f32>;\n\
+         @group(0) @binding(1) var<storage, read> corners: array<u32>;\n\n\
+         struct Corner {{\n    @builtin(position) clip: vec4f,\n    @location(0) @interpolate(flat) triangle: u32,\n}}\n\n\
+         @vertex\nfn vs_main(@builtin(vertex_index) i: u32) -> Corner {{\n    let first = {stride}u * corners[i];\n    \
+         let clip = vec4f(varyings[first], varyings[first + 1u], varyings[first + 2u], varyings[first + 3u]);\n    \
+         return Corner(clip, i / 3u + 1u);\n}}\n\n\
+         @fragment\nfn fs_main(at: Corner) -> @location(0) u32 {{\n    return at.triangle;\n}}\n"
+    )
+}
+
+/// An attribute of vertex `i`, where all vertices' numbers of those before it, `first` each, come first.
+fn read(attribute: Attribute, first: u64) -> String {
+    let kind = attribute.wgsl();
+    let count = attribute.bytes() / 4;
+    let number = |k| {
+        let word = format!("attributes[{first}u * count + {count}u * i + {k}u]");
+        if kind.ends_with('u') || kind == "u32" { word } else { format!("bitcast<f32>({word})") }
+    };
+    let parts = (0..count).map(number).collect::<Vec<_>>().join(", ");
+    if count == 1 { parts } else { format!("{kind}({parts})") }
+}
+
+/// Numbers of a WGSL type.
+fn numbers(kind: &str) -> usize {
+    match kind {
+        "f32" => 1,
+        "vec2f" => 2,
+        "vec3f" => 3,
+        _ => 4,
+    }
+}
