@@ -247,3 +247,25 @@ fn numbers(kind: &str) -> usize {
         _ => 4,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_of_texture_coordinates_are_the_triangles_and_others_are_left() {
+        for (fragments, computed) in [
+            ("dpdx(vertex_uv) + dpdy(at.vertex_uv)", "uv_steps_here.xy + uv_steps_here.zw"),
+            (
+                "textureSample(color_map, map_sampler, at.vertex_uv).rgb",
+                "textureSampleGrad(color_map, map_sampler, at.vertex_uv, uv_steps_here.xy, uv_steps_here.zw).rgb",
+            ),
+            ("textureSampleLevel(color_map, map_sampler, vertex_uv, 0.0)", ""),
+            ("textureSample(color_map, map_sampler, 2.0 * vertex_uv)", ""),
+            ("dpdx(vertex_normal)", ""),
+        ] {
+            let want = if computed.is_empty() { fragments } else { computed };
+            assert_eq!(without_neighbours(fragments), want);
+        }
+    }
+}
