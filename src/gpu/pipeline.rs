@@ -219,6 +219,7 @@ pub(super) fn bind(
 
 fn vertex_format(attribute: Attribute) -> VertexFormat {
     match attribute {
+        Attribute::Chart => VertexFormat::Float32,
         Attribute::Position | Attribute::Normal | Attribute::Corner => VertexFormat::Float32x3,
         Attribute::Tangent | Attribute::Weights => VertexFormat::Float32x4,
         Attribute::Uv => VertexFormat::Float32x2,

@@ -7,6 +7,7 @@ use glam::{Mat4, Vec2, Vec3, Vec4};
 use crate::bake::VertexOcclusion;
 use crate::model::fields::Field;
 use crate::model::vertex::Bone;
+use crate::scene::charts::charts;
 use crate::scene::mesh::{Mesh, Morph, VertexField};
 use crate::shader::Attribute;
 
@@ -32,6 +33,10 @@ pub(super) fn attribute(
         }
         Attribute::Weights => floats((0..count).flat_map(|i| influences(mesh, i).1).collect()),
         Attribute::Field(of) => floats(fields.get(&of).cloned().unwrap_or_default()),
+        Attribute::Chart => {
+            let charts = charts(&mesh.positions, &mesh.uvs, &mesh.triangles);
+            floats(charts.into_iter().map(|chart| chart as f32).collect())
+        }
         Attribute::Corner => floats(corner_marks(count).into_flattened()),
     };
     bytes.resize(count * attribute.bytes() as usize, 0);

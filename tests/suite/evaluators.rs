@@ -306,7 +306,16 @@ fn stored(f: &Surface) -> (Fragment<f32>, Unmade) {
         attenuator: f.attenuator as f32,
     };
     let [corner_silhouettes, corner_shares] = f.corners.map(three);
-    (fragment, Unmade { dapple_normal: fragment.normal, corner_silhouettes, corner_shares, uv: [0.0; 2] })
+    (
+        fragment,
+        Unmade {
+            dapple_normal: fragment.normal,
+            corner_silhouettes,
+            corner_shares,
+            uv: [0.0; 2],
+            chart: 0.0,
+        },
+    )
 }
 
 /// A view as engines read it: groups of sixteen pixels, with as many records as one of them has samples. Pixels that

@@ -11,10 +11,11 @@ use serde_json::Value;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::Params;
+use skinfit::scene::diffusion::Diffusion;
 use skinfit::scene::maps::{Environment, Map, Maps, Spots};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
 use skinfit::scene::view::{Background, Camera, View};
-use skinfit::scene::{Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene, ShadowMaps};
+use skinfit::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene, ShadowMaps};
 
 /// The named planes of an EXR file, and its width and height.
 pub(crate) struct Planes {

@@ -16,6 +16,7 @@ mod cli;
 mod common;
 mod composed;
 mod damage;
+mod diffusion;
 mod documents;
 mod engine;
 mod evaluators;

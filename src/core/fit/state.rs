@@ -15,6 +15,7 @@ use super::memory::Memory;
 use super::options::{FitOptions, SolverKind};
 use super::outcome::{Ending, Iteration};
 use crate::engine::{Point, Unknown};
+use crate::model::effects::Form;
 use crate::model::params::Param;
 use crate::output::{self, OutputError};
 
@@ -283,10 +284,11 @@ fn first_difference(was: &[f64], is: &[f64]) -> (String, String) {
 /// Every number of a point, in order: parameters, gains, and what scenes have of their own. Of added parameters those
 /// alone that are not at their defaults: which of them there are depends on what else the process has read.
 fn values(point: &Point) -> Vec<f64> {
-    let said = |param: &Param| param.is_built_in() || point.params.rgb(*param) != [param.info().corrected; 3];
+    let said =
+        |param: &Param| param.is_built_in() || point.params.rgb(*param) != param.default_rgb(Form::Corrected);
     let params = Param::all().filter(said).flat_map(|param| point.params.rgb(param));
     let own = point.params.own();
-    let own = own.filter(|(_, param, rgb)| param.is_built_in() || *rgb != [param.info().corrected; 3]);
+    let own = own.filter(|(_, param, rgb)| param.is_built_in() || *rgb != param.default_rgb(Form::Corrected));
     let own = own.flat_map(|(_, _, rgb)| rgb);
     params.chain(point.gains.iter().copied()).chain(own).collect()
 }

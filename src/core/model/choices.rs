@@ -1,6 +1,8 @@
 //! Named choices: of several ways to the same quantity, each an approximation with an error and a cost, the one that a
 //! scene takes.
 
+use super::diffusion::DiffusionChoices;
+
 /// The ways that a scene takes, the same for every fragment of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Choices {
@@ -20,6 +22,8 @@ pub struct Choices {
     pub bounces: Bounces,
     /// What the specular lobe sees where it does not see the sky.
     pub skin_reflection: SkinReflection,
+    /// Those of texture-space diffusion.
+    pub diffusion: DiffusionChoices,
     /// Whether the specular map lowers the roughness, or will: `gloss` is not 0.
     pub glossy: bool,
     /// Whether a fit turns the environment: what vertices found of it has to know how it moves.
@@ -267,7 +271,8 @@ impl SkinReflection {
 impl Choices {
     /// Those that a scene file names, each by its key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 8] {
+    pub const fn named(&self) -> [(&'static str, &'static str); 14] {
+        let [method, taps, ambient_normal, stretch, seams, lookup] = self.diffusion.named();
         [
             ("specular_model", self.specular_model.name()),
             ("split_sum", self.split_sum.name()),
@@ -277,6 +282,12 @@ impl Choices {
             ("visibility", self.visibility.name()),
             ("bounces", self.bounces.name()),
             ("skin_reflection", self.skin_reflection.name()),
+            method,
+            taps,
+            ambient_normal,
+            stretch,
+            seams,
+            lookup,
         ]
     }
 
@@ -298,12 +309,12 @@ impl Choices {
             "polynomial_bounces" => self.bounces == Bounces::Polynomial,
             "gathered_bounces" => self.bounces == Bounces::Gathered,
             "glossy" => self.glossy,
-            _ => return None,
+            other => return self.diffusion.holds(other),
         })
     }
 
     /// The conditions that [`Self::holds`] knows.
-    pub const CONDITIONS: [&'static str; 12] = [
+    pub const CONDITIONS: [&'static str; 14] = [
         "kelemen",
         "ggx",
         "exact_split_sum",
@@ -316,6 +327,8 @@ impl Choices {
         "polynomial_bounces",
         "gathered_bounces",
         "glossy",
+        "bumped_ambient",
+        "exact_stretch",
     ];
 }
 

@@ -5,6 +5,7 @@ use super::choices::{
     Visibility,
 };
 use super::dapple::Dapple;
+use super::diffusion::DiffusionChoices;
 use super::effects::{Effect, Effects, Form, Lookups, Silhouette};
 
 /// The switches that are the same for every fragment of a scene.
@@ -48,6 +49,7 @@ impl Setup {
                 visibility: Visibility::Sh4,
                 bounces: Bounces::Gathered,
                 skin_reflection: SkinReflection::Gathered,
+                diffusion: DiffusionChoices::DEFAULT,
                 glossy: false,
                 turning: false,
             },

@@ -22,6 +22,7 @@ pub mod choices;
 mod columns;
 pub mod cube;
 pub mod dapple;
+pub mod diffusion;
 pub mod effects;
 pub mod evaluate;
 pub mod fields;

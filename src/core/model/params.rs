@@ -81,6 +81,8 @@ pub struct ParamInfo {
     pub listing: f64,
     /// The default of the corrected form.
     pub corrected: f64,
+    /// The default of both forms in each channel, where channels differ; that of red stands above, too.
+    pub channels: Option<[f64; 3]>,
     /// Least allowed value (may be infinite).
     pub lower: f64,
     /// Greatest allowed value (may be infinite).
@@ -134,7 +136,7 @@ macro_rules! row {
     ($param:ident $name:literal, $listing:expr, $corrected:expr, [$lower:expr, $upper:expr], $unit:literal,
      $rgb:literal, $linear:literal, $scale:ident, [$($effect:ident),*], $source:literal, $meaning:literal) => {
         ParamInfo {
-            param: Param::$param, name: $name, identifier: $name, listing: $listing, corrected: $corrected, lower: $lower, upper: $upper,
+            param: Param::$param, name: $name, identifier: $name, listing: $listing, corrected: $corrected, channels: None, lower: $lower, upper: $upper,
             unit: $unit, rgb: $rgb, linear: $linear, scale: Scale::$scale, owner: Owner::Skin, held: false, found: false, effects: &[$(Effect::$effect),*],
             source: $source, meaning: $meaning,
         }
@@ -280,6 +282,12 @@ impl Param {
         }
     }
 
+    /// The default in `form`, in each channel.
+    #[must_use]
+    pub fn default_rgb(self, form: Form) -> [f64; 3] {
+        self.info().channels.unwrap_or([self.default(form); 3])
+    }
+
     /// Whether any enabled effect reads this parameter.
     #[must_use]
     pub fn asked_for(self, effects: Effects) -> bool {
@@ -309,7 +317,7 @@ impl Params {
     /// The defaults of `form`.
     #[must_use]
     pub fn defaults(form: Form) -> Self {
-        let values = Param::all().map(|param| [param.default(form); 3]).collect();
+        let values = Param::all().map(|param| param.default_rgb(form)).collect();
         Self { form, values, own: BTreeMap::new() }
     }
 
@@ -328,7 +336,7 @@ impl Params {
     /// The three channels' values.
     #[must_use]
     pub fn rgb(&self, param: Param) -> [f64; 3] {
-        self.values.get(param.index()).copied().unwrap_or_else(|| [param.default(self.form); 3])
+        self.values.get(param.index()).copied().unwrap_or_else(|| param.default_rgb(self.form))
     }
 
     /// Set all channels to `value`.
@@ -340,7 +348,7 @@ impl Params {
     pub fn set_rgb(&mut self, param: Param, value: [f64; 3]) {
         while self.values.len() <= param.index() {
             let next = Param(self.values.len() as u16);
-            self.values.push([next.default(self.form); 3]);
+            self.values.push(next.default_rgb(self.form));
         }
         self.values[param.index()] = value;
     }

@@ -17,6 +17,8 @@ pub struct TermInfo {
     pub name: &'static str,
     /// It is there when all of these effects are enabled.
     pub effects: &'static [Effect],
+    /// And none of these.
+    pub without: &'static [Effect],
 }
 
 /// The built-in terms, named as the effects that they belong to.
@@ -32,13 +34,23 @@ impl TermName {
 }
 
 static TABLE: [TermInfo; TermName::BUILT_IN.len()] = [
-    TermInfo { name: "diffuse", effects: &[Effect::Diffuse] },
-    TermInfo { name: "rim", effects: &[Effect::Diffuse, Effect::Rim] },
-    TermInfo { name: "side_specular", effects: &[Effect::SideSpecular] },
-    TermInfo { name: "hilite", effects: &[Effect::Hilite] },
-    TermInfo { name: "reflection", effects: &[Effect::Reflection] },
-    TermInfo { name: "key_light", effects: &[Effect::KeyLight] },
+    TermInfo { name: "diffuse", effects: &[Effect::Diffuse], without: &[] },
+    TermInfo { name: "rim", effects: &[Effect::Diffuse, Effect::Rim], without: &[] },
+    TermInfo { name: "side_specular", effects: &[Effect::SideSpecular], without: &[] },
+    TermInfo { name: "hilite", effects: &[Effect::Hilite], without: &[] },
+    TermInfo { name: "reflection", effects: &[Effect::Reflection], without: &[] },
+    TermInfo { name: "key_light", effects: &[Effect::KeyLight], without: &[] },
 ];
+
+/// A built-in term, and effects with which it is there, too.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Also {
+    name: &'static str,
+    effects: &'static [Effect],
+}
+
+/// What has been said of built-in terms.
+static ALSO: Added<Also> = Added::new();
 
 /// What was added to the table.
 static ADDED: Added<TermInfo> = Added::new();
@@ -63,6 +75,20 @@ impl TermName {
         Self::from_name(row.name).ok_or_else(taken)
     }
 
+    /// Have a term be there when all of `effects` are enabled, too.
+    pub fn also_with(self, effects: &'static [Effect]) {
+        let row = Also { name: self.name(), effects };
+        let same = |other: &Also| *other == row;
+        // No row is refused.
+        let added: Result<_, RegistryError> = ALSO.add(
+            same,
+            same,
+            |_| Ok(row),
+            || RegistryError::Taken { kind: "term", name: row.name.to_owned() },
+        );
+        debug_assert!(added.is_ok(), "{row:?}");
+    }
+
     /// Every term: the built-in ones, then what was added.
     pub fn all() -> impl Iterator<Item = Self> {
         (0..TABLE.len() + ADDED.len()).map(|place| Self(place as u16))
@@ -71,10 +97,13 @@ impl TermName {
     /// The terms that `effects` have.
     #[must_use]
     pub fn of(effects: Effects) -> Vec<Self> {
-        let on = |info: &TermInfo| info.effects.iter().all(|&effect| effects.has(effect));
+        let all = |of: &[Effect]| of.iter().all(|&effect| effects.has(effect));
+        let also = ALSO.rows();
+        let too = |name: &str| also.iter().any(|row| row.name == name && all(row.effects));
+        let on = |info: &TermInfo| all(info.effects) && !effects.has_any(info.without) || too(info.name);
         let added = ADDED.rows();
-        let all = TABLE.iter().chain(added);
-        (0..).map(Self).zip(all).filter(|(_, info)| on(info)).map(|(term, _)| term).collect()
+        let rows = TABLE.iter().chain(added);
+        (0..).map(Self).zip(rows).filter(|(_, info)| on(info)).map(|(term, _)| term).collect()
     }
 
     /// The term of that name.
@@ -83,6 +112,12 @@ impl TermName {
         let own = TABLE.iter().position(|row| row.name == name);
         let place = own.or_else(|| Some(TABLE.len() + ADDED.position(|row| row.name == name)?));
         place.map(|place| Self(place as u16))
+    }
+
+    /// Whether its row is built in.
+    #[must_use]
+    pub const fn is_built_in(self) -> bool {
+        self.index() < Self::BUILT_IN.len()
     }
 
     /// Its place in the table.

@@ -5,8 +5,9 @@ use super::graph::{Graph, Id, Input};
 use super::lower::{LowerError, Natives, STEP_ALONG_U, STEP_ALONG_V, Source, Value};
 use super::steps::{Rounding, Steps};
 use crate::model::terms::TermName;
-use crate::shader::atlas::{Axis, Level, Pass, PassKind, TAPS, TEXEL};
+use crate::shader::atlas::{APART, Axis, Level, Pass, PassKind, TAPS, TEXEL};
 use crate::shader::emit::Plan;
+use crate::shader::rule::Kernel;
 use crate::shader::search::components;
 use crate::shader::tangent::chain::Chain;
 use crate::shader::{Facts, plan};
@@ -29,6 +30,8 @@ pub struct LevelPass {
     pub leaves: Vec<(String, usize)>,
     /// Of a blur what is done with the taps that the steps yield.
     pub blur: Option<BlurOf>,
+    /// Of a pass over neighbours, the level whose steps from one to the other are the steps' field [`APART_FIELD`].
+    pub neighbours: Option<String>,
 }
 
 /// One direction of a blur.
@@ -36,12 +39,23 @@ pub struct LevelPass {
 pub struct BlurOf {
     /// Along which axis.
     pub axis: Axis,
-    /// Taps to either side.
-    pub reach: usize,
+    /// Which texels count.
+    pub kernel: Taps,
     /// The level that is blurred.
     pub source: String,
     /// Where the kernel moves: the level that holds how the source moves, if it does.
     pub moving: Option<Option<String>>,
+}
+
+/// Which texels a blur counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Taps {
+    /// Those of taps that the steps yield, so many to either side: where each lies, and what it weighs.
+    Given(usize),
+    /// Taps a standard deviation apart, so many to either side; the steps yield the deviation, in texels.
+    Gaussian(usize),
+    /// Every texel within six deviations.
+    WholeGaussian,
 }
 
 impl LevelProgram {
@@ -115,6 +129,7 @@ impl LevelPass {
         let (entry, blur) = match pass.kind {
             PassKind::Draw => (TEXEL, None),
             PassKind::Blur(axis) => (TAPS, Some(axis)),
+            PassKind::Neighbours => (APART, None),
         };
         let source = Source::new(&pass.plan.wgsl, Natives::Written)?;
         let mut graph = Graph::default();
@@ -122,7 +137,8 @@ impl LevelPass {
         let mut numbers: Vec<Id> = Vec::new();
         for (name, width) in sample {
             let held = pass.plan.varyings.iter().any(|(held, _)| *held == name);
-            let is_level = pass.plan.levels.iter().any(|level| level.name == name);
+            let is_level = pass.plan.levels.iter().any(|level| level.name == name)
+                || (pass.kind == PassKind::Neighbours && name == APART_FIELD);
             let name = if is_level { rename(&name) } else { name };
             // What is neither fills a structure that would be empty.
             let number = |component| match held || is_level {
@@ -136,7 +152,7 @@ impl LevelPass {
         let level = |level: &Level| (rename(&level.name), components(level.kind));
         let blur = blur.map(|axis| BlurOf {
             axis,
-            reach: pass.plan.steps[0].rule.blur.as_ref().map_or(0, |blur| blur.taps as usize / 2),
+            kernel: counted(pass),
             source: level(&pass.plan.levels[0]).0,
             moving: pass.moving.as_ref().map(|kernel| kernel.blurred.as_ref().map(|moved| level(moved).0)),
         });
@@ -144,7 +160,22 @@ impl LevelPass {
             steps: Steps::new(&graph, &outputs, |_| Rounding::Plain),
             leaves: pass.leaves.iter().map(level).collect(),
             blur,
+            neighbours: (pass.kind == PassKind::Neighbours).then(|| level(&pass.plan.levels[0]).0),
         })
+    }
+}
+
+/// What a texel's neighbours are apart, of a pass over them.
+pub const APART_FIELD: &str = "apart";
+
+/// Which texels the blur of a pass counts.
+fn counted(pass: &Pass) -> Taps {
+    let kernel = pass.plan.steps[0].rule.blur.as_ref().map_or(Kernel::Taps(1), |blur| blur.kernel);
+    let count = pass.plan.facts.setup.choices.diffusion.taps.count();
+    match (kernel, count) {
+        (Kernel::Taps(taps), _) => Taps::Given(taps as usize / 2),
+        (_, Some(taps)) => Taps::Gaussian(taps as usize / 2),
+        (_, None) => Taps::WholeGaussian,
     }
 }
 

@@ -4,7 +4,7 @@
 //! (Direct3D and Vulkan alike), both sides, without depth; where triangles overlap, the later one stays. Covered texels
 //! stand row by row, sixteen a record, each with what the effects' rules read of it and nothing else.
 
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 use glam::{DVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
@@ -49,6 +49,17 @@ pub enum AtlasError {
         /// The tile's row.
         v: f32,
     },
+    /// Texels that are of two places of the surface.
+    #[error(
+        "{:.1}% of the texels that the mesh covers of its UV atlas are of two or more places of the surface (mirrored or \
+         overlapping charts), and a texel cannot hold two lights. Unwrap the mesh so that its charts lie apart, name another \
+         set of texture coordinates by uv_set in [diffusion], or leave the effects out that are computed there.",
+        100.0 * share
+    )]
+    Overlap {
+        /// Their share of the covered texels.
+        share: f64,
+    },
     /// A quantity that texels do not hold, or whose step to the next texel is not known.
     #[error("`{quantity}` is not stored with texels: dpdx and dpdy are there for what vertices hold.")]
     NotStored {
@@ -68,6 +79,8 @@ pub struct Atlas {
     places: Vec<u32>,
     /// Which texel each covered one is.
     texels: Vec<u32>,
+    /// The chart of each covered texel, counted from 1.
+    charts: Vec<u32>,
     /// What records hold, row by row.
     inputs: Vec<Input>,
     rows: Rows,
@@ -89,10 +102,16 @@ impl Atlas {
         let mip_maps = posed.mip_maps.as_deref();
         let mesh = Textured { posed: mesh, occlusion, maps, mip_maps, find: &find, size: f64::from(size) };
         let fields = inputs.iter().map(Field::of).collect::<Result<Vec<_>, _>>()?;
-        let triangles = cover(&mesh, size);
-        let texels: Vec<u32> = (0..size * size).filter(|&texel| triangles[texel as usize] != EMPTY).collect();
-        let mut places = vec![EMPTY; triangles.len()];
-        texels.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
+        let (triangles, share) = cover(&mesh, size);
+        if share > OVERLAP {
+            return Err(AtlasError::Overlap { share });
+        }
+        let chart_of = |&texel: &u32| {
+            let corner = posed.mesh.triangles[triangles[texel as usize] as usize][0];
+            posed.charts.get(corner as usize).copied().unwrap_or(1)
+        };
+        let (texels, places) = covered(&triangles);
+        let charts: Vec<u32> = texels.iter().map(chart_of).collect();
         let mut rows = Rows::new(fields.len(), texels.len().div_ceil(LANES));
         if !fields.is_empty() {
             let records = rows.all_mut().par_chunks_mut(fields.len()).zip(texels.par_chunks(LANES));
@@ -108,7 +127,28 @@ impl Atlas {
                 }
             });
         }
-        Ok(Self { size, places, texels, inputs, rows })
+        Ok(Self { size, places, texels, charts, inputs, rows })
+    }
+
+    /// Texels of given `charts`, `size` a side and row by row, 0 where nothing is covered; `value` gives what each holds.
+    #[must_use]
+    pub fn of_charts(
+        size: u32,
+        charts: &[u32],
+        inputs: Vec<Input>,
+        value: impl Fn(&Input, usize) -> f32,
+    ) -> Self {
+        let shown: Vec<u32> = charts.iter().map(|&chart| if chart == 0 { EMPTY } else { chart }).collect();
+        let (texels, places) = covered(&shown);
+        let mut rows = Rows::new(inputs.len(), texels.len().div_ceil(LANES));
+        for slot in 0..texels.len().div_ceil(LANES) * LANES {
+            let texel = texels[slot.min(texels.len() - 1)] as usize;
+            for (row, input) in inputs.iter().enumerate() {
+                rows.record_mut(slot / LANES)[row][slot % LANES] = value(input, texel);
+            }
+        }
+        let charts = texels.iter().map(|&texel| charts[texel as usize]).collect();
+        Self { size, places, texels, charts, inputs, rows }
     }
 
     /// Texels along a side.
@@ -128,6 +168,38 @@ impl Atlas {
     #[must_use]
     pub fn texel(&self, place: usize) -> [u32; 2] {
         [self.texels[place] % self.size, self.texels[place] / self.size]
+    }
+
+    /// The chart of a covered texel, counted from 1.
+    #[inline(always)]
+    #[must_use]
+    pub fn chart(&self, place: usize) -> u32 {
+        self.charts[place]
+    }
+
+    /// Of a chart's texels the nearest to a place between texels' centres, in texels; of those as near the first one, row
+    /// by row. `None` where the chart has none.
+    #[must_use]
+    pub fn nearest(&self, chart: u32, [x, y]: [f64; 2]) -> Option<usize> {
+        let distance = |place: usize| {
+            let [column, row] = self.texel(place).map(f64::from);
+            (column - x).powi(2) + (row - y).powi(2)
+        };
+        let own = (0..self.texels.len()).filter(|&place| self.charts[place] == chart);
+        // Rings about the place hold it mostly: a fragment lies on its chart.
+        let [column, row] = [x, y].map(|at| at.round() as i64);
+        for ring in 1..=NEAR {
+            let around = (-ring..=ring).flat_map(|down| (-ring..=ring).map(move |along| (along, down)));
+            let around = around.filter_map(|(along, down)| self.place(column + along, row + down));
+            let nearest = around
+                .filter(|&place| self.charts[place] == chart)
+                .min_by(|&a, &b| distance(a).total_cmp(&distance(b)));
+            // Beyond the ring nothing is nearer than its half width.
+            if let Some(nearest) = nearest.filter(|&place| distance(place) <= (ring as f64).powi(2)) {
+                return Some(nearest);
+            }
+        }
+        own.min_by(|&a, &b| distance(a).total_cmp(&distance(b)))
     }
 
     /// The place of a texel among those that are covered; `None` for one that is not, or lies outside.
@@ -153,6 +225,20 @@ impl Atlas {
     pub const fn rows(&self) -> &Rows {
         &self.rows
     }
+}
+
+/// Rings about a place in which a chart's nearest texel is looked for before all of them are.
+const NEAR: i64 = 4;
+
+/// The share of covered texels that may be of two places: rounding at the borders of triangles makes a few.
+const OVERLAP: f64 = 1e-3;
+
+/// Which texels are not empty, and each texel's place among them.
+fn covered(shown: &[u32]) -> (Vec<u32>, Vec<u32>) {
+    let texels: Vec<u32> = (0..shown.len() as u32).filter(|&texel| shown[texel as usize] != EMPTY).collect();
+    let mut places = vec![EMPTY; shown.len()];
+    texels.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
+    (texels, places)
 }
 
 fn check(posed: &PosedMesh) -> Result<(), AtlasError> {
@@ -260,11 +346,12 @@ impl Triangle {
     }
 }
 
-/// For each texel the triangle that it shows.
-fn cover(mesh: &Textured<'_>, size: u32) -> Vec<u32> {
+/// For each texel the triangle that it shows, and the share of those that are of several.
+fn cover(mesh: &Textured<'_>, size: u32) -> (Vec<u32>, f64) {
     let texels = size as usize * size as usize;
     // The last triangle stays whatever thread comes last; 0 is none.
     let shown: Vec<AtomicU32> = (0..texels).map(|_| AtomicU32::new(0)).collect();
+    let again = AtomicUsize::new(0);
     (0..mesh.posed.triangles.len() as u32).into_par_iter().for_each(|index| {
         let triangle = mesh.triangle(index);
         let [a, b, c] = triangle.corners;
@@ -278,12 +365,17 @@ fn cover(mesh: &Textured<'_>, size: u32) -> Vec<u32> {
             for column in low.x as u32..high.x as u32 {
                 let texel = row * size + column;
                 if triangle.covers(centre(texel, size)) {
-                    shown[texel as usize].fetch_max(index + 1, Ordering::Relaxed);
+                    let before = shown[texel as usize].fetch_max(index + 1, Ordering::Relaxed);
+                    again.fetch_add(usize::from(before > 0), Ordering::Relaxed);
                 }
             }
         }
     });
-    shown.into_iter().map(|shown| shown.into_inner().checked_sub(1).unwrap_or(EMPTY)).collect()
+    let shown: Vec<u32> =
+        shown.into_iter().map(|shown| shown.into_inner().checked_sub(1).unwrap_or(EMPTY)).collect();
+    let once = shown.iter().filter(|&&shown| shown != EMPTY).count();
+    let share = again.into_inner().min(once) as f64 / once.max(1) as f64;
+    (shown, share)
 }
 
 /// One number of a texel.
@@ -406,7 +498,8 @@ mod tests {
         let [low, high] = [1.5 / 8.0, 4.5 / 8.0];
         let corners = [[low, low], [high, low], [high, high], [low, high]];
         for triangles in [[[0, 1, 2], [0, 2, 3]], [[2, 1, 0], [3, 2, 0]]] {
-            let shown = cover(&mesh(&corners, &triangles), 8);
+            let (shown, again) = cover(&mesh(&corners, &triangles), 8);
+            assert_eq!(again, 0.0);
             for (i, shown) in shown.iter().enumerate() {
                 let inside = (1..4).contains(&(i % 8)) && (1..4).contains(&(i / 8));
                 assert_eq!(*shown != EMPTY, inside, "{} {}", i % 8, i / 8);
@@ -418,7 +511,9 @@ mod tests {
     fn of_triangles_that_overlap_the_later_one_stays_and_steps_are_exact() {
         let corners = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]];
         let mesh = mesh(&corners, &[[0, 1, 2], [2, 1, 0], [0, 0, 1]]);
-        let shown = cover(&mesh, 8);
+        let (shown, again) = cover(&mesh, 8);
+        // Two lie on one another.
+        assert_eq!(again, 1.0);
         assert!(shown.iter().all(|&triangle| triangle == 1 || triangle == EMPTY));
         assert!((27..=36).contains(&shown.iter().filter(|&&triangle| triangle == 1).count()));
         let triangle = mesh.triangle(1);

@@ -19,7 +19,8 @@ use crate::bake::sky::{SKIN_SEEN, sees_skin, traces_lobes};
 use crate::bake::{Bake, SkyBake, VertexOcclusion};
 use crate::model::fields::{Field, FieldInfo, Fields};
 use crate::scene::Scene;
-use crate::scene::mesh::{Morph, PosedMesh};
+use crate::scene::charts::charts;
+use crate::scene::mesh::{Mesh, Morph, PosedMesh};
 use crate::scene::mip_maps::MipMaps;
 
 /// What is baked of a scene's surface.
@@ -51,6 +52,8 @@ pub struct PosedSurface<'a> {
     pub(super) open: Option<Vec<f32>>,
     /// The coarser levels of the scene's maps, where its filter reads them.
     pub(super) mip_maps: Option<Arc<MipMaps>>,
+    /// The chart of the UV atlas that each vertex is of, where effects are computed there.
+    pub(super) charts: Vec<u32>,
     supplies: Supplies<'a>,
     /// What rays into specular lobes find, where that is asked for.
     pub(super) lobes: Option<Lobes<'a>>,
@@ -82,8 +85,11 @@ impl<'a> PosedSurface<'a> {
         let open = posed_occlusion(scene, morphs, mesh.positions.len(), bakes.occlusion)?;
         let made = || MipMaps::new(&scene.maps, scene.quality.texture_filter).map(Arc::new);
         let mip_maps = bakes.mip_maps.cloned().or_else(made);
-        let fields = scene.needs().fields;
-        Ok(Self { open, mip_maps, ..Self::with_fields(scene, mesh, rays, morphs, bakes, fields)? })
+        let needs = scene.needs();
+        let Mesh { positions, uvs, triangles, .. } = &scene.mesh;
+        let charts = if needs.atlas { charts(positions, uvs, triangles) } else { Vec::new() };
+        let fields = needs.fields;
+        Ok(Self { open, mip_maps, charts, ..Self::with_fields(scene, mesh, rays, morphs, bakes, fields)? })
     }
 
     /// The mesh of `scene` as it is posed with what finds `fields` at its points, and no open shares.
@@ -121,7 +127,7 @@ impl<'a> PosedSurface<'a> {
     /// A mesh with the open share of each vertex' hemisphere, and nothing else.
     #[must_use]
     pub const fn bare(mesh: &'a PosedMesh, rays: &'a RayMesh, open: Option<Vec<f32>>) -> Self {
-        Self { mesh, rays, open, mip_maps: None, supplies: Vec::new(), lobes: None }
+        Self { mesh, rays, open, mip_maps: None, charts: Vec::new(), supplies: Vec::new(), lobes: None }
     }
 
     /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what

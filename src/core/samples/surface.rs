@@ -145,7 +145,11 @@ impl<'a> Surface<'a> {
             attenuator: self.map(|maps| maps.attenuator.as_ref(), [1.0], at)[0],
         };
         let dapple_normal = interpolated.to_array();
-        (fragment, Unmade { dapple_normal, corner_silhouettes, corner_shares: weights, uv: uv.to_array() })
+        let chart = self.posed.charts.get(corners[0]).map_or(1.0, |&chart| chart as f32);
+        (
+            fragment,
+            Unmade { dapple_normal, corner_silhouettes, corner_shares: weights, uv: uv.to_array(), chart },
+        )
     }
 
     fn corners(&self, hit: Hit) -> [usize; 3] {

@@ -48,6 +48,8 @@ pub struct Unmade {
     pub corner_shares: [f32; 3],
     /// Texture coordinates, by which levels of the UV atlas are looked up.
     pub uv: [f32; 2],
+    /// The chart of the atlas that they lie in.
+    pub chart: f32,
 }
 
 /// Which numbers are kept of each sample, beside its base and its view vector.
@@ -66,7 +68,7 @@ pub struct Asked {
     pub corners: bool,
     pub specular: bool,
     pub attenuator: bool,
-    /// Texture coordinates.
+    /// Texture coordinates, and their chart of the atlas.
     pub uv: bool,
     /// Numbers of vertices that files of rules declare.
     pub fields: Fields,
@@ -112,6 +114,7 @@ pub struct Places {
     pub specular: Option<usize>,
     pub attenuator: Option<usize>,
     pub uv: Option<usize>,
+    pub chart: Option<usize>,
     /// What files of rules declare, one after the other.
     pub fields: Fields,
     /// The first row of those.
@@ -145,6 +148,7 @@ impl Places {
             specular: place(asked.specular, 1),
             attenuator: place(asked.attenuator, 1),
             uv: place(asked.uv, 2),
+            chart: place(asked.uv, 1),
             fields: asked.fields,
             fields_at: place(true, asked.fields.numbers()).unwrap_or(0),
             weight: place(asked.weight, 1),
@@ -169,6 +173,7 @@ impl Places {
             ("specular", self.specular, 1),
             ("attenuator", self.attenuator, 1),
             ("vertex_uv", self.uv, 2),
+            ("vertex_chart", self.chart, 1),
         ];
         let declared = self.declared().into_iter().map(|(field, at)| (field.name(), at.start, at.len()));
         fields.into_iter().filter_map(|(name, place, rows)| Some((name, place?, rows))).chain(declared)
@@ -229,6 +234,9 @@ impl Places {
         }
         if let Some(at) = self.uv {
             (record[at][lane], record[at + 1][lane]) = (unmade.uv[0], unmade.uv[1]);
+        }
+        if let Some(at) = self.chart {
+            record[at][lane] = unmade.chart;
         }
         for (place, value) in self.scalars(fragment).into_iter().chain([(self.weight, weight)]) {
             if let Some(at) = place {
@@ -346,6 +354,7 @@ impl SurfaceRecords {
             corner_silhouettes: vector(self.places.corner_silhouettes),
             corner_shares: vector(self.places.corner_shares),
             uv: self.places.uv.map_or([0.0; 2], |at| [0, 1].map(|c| self.rows.number(at + c, slot))),
+            chart: self.places.chart.map_or(0.0, |at| self.rows.number(at, slot)),
         }
     }
 }

@@ -163,6 +163,21 @@ pub(super) struct BloomTable {
 #[serde(deny_unknown_fields)]
 pub(super) struct DiffusionTable {
     pub light_map_size: Option<Spanned<i64>>,
+    pub preset: Option<Spanned<String>>,
+    pub method: Option<Spanned<String>>,
+    pub taps: Option<Spanned<TapsValue>>,
+    pub ambient_normal: Option<Spanned<String>>,
+    pub stretch: Option<Spanned<String>>,
+    pub seams: Option<Spanned<String>>,
+    pub lookup: Option<Spanned<String>>,
+}
+
+/// `5`, or `"full"`.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(untagged, expecting = "invalid type: expected 5, 7, 9 or \"full\"")]
+pub(super) enum TapsValue {
+    Count(i64),
+    Name(String),
 }
 
 /// `[fit]`

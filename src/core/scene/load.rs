@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use super::animation::{Pose, ask, idle_effects};
 use super::cameras::{self, ViewPlan};
 use super::dapple::dapple;
+use super::diffusion;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, SceneFile, Source};
 use super::gltf::{Ask, Document};
@@ -19,7 +20,7 @@ use super::sky_lights::sky_lights;
 use super::terms::terms;
 use super::view::{Background, View};
 use super::{FitSettings, Scene, images};
-use crate::model::choices::SpecularVisibility;
+use crate::model::choices::{Choices, SpecularVisibility};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Needs};
 use crate::model::evaluate::Setup;
@@ -73,7 +74,8 @@ impl Scene {
         let quality = settings::quality(&source, &file.quality)?;
         let shadow_maps = shadow_maps(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
-        let diffusion = settings::diffusion(&source, &file.diffusion)?;
+        let (diffusion, by) = diffusion::read(&source, &file.diffusion)?;
+        let choices = Choices { diffusion: by, ..choices };
         let pose = Pose::check(&source, &file)?.at(options.time);
         let metres_per_unit = metres(&source, &file)?;
 
@@ -91,7 +93,7 @@ impl Scene {
         if listed.is_none() {
             effects = terms.iter().fold(effects, |effects, term| effects.with(term.effect));
         }
-        let effects = lights.switched(effects);
+        let effects = diffusion.switched(lights.switched(effects));
         lights.idle(&source.path, effects, &mut warnings);
         let setup = Setup { lookups, dapple, choices, ..Setup::new(form, silhouette, effects) };
         let needs = setup.needs();
@@ -134,8 +136,10 @@ impl Scene {
             let message = format!("has {found} bright spots, not {wanted}: the other lights are black");
             warn(&mut warnings, &source.path, message);
         }
+        let gives = |name: &str| file.model.params.keys().any(|key| key.get_ref() == name);
+        diffusion.set(&mut params, metres_per_unit, gives);
         for light in lights.own.iter().chain(&sky_lights) {
-            lit::set(light, &mut params, |name| file.model.params.keys().any(|key| key.get_ref() == name));
+            lit::set(light, &mut params, gives);
         }
         bar.inc(1);
         let views = read_views(plans, folder, options.targets, &bar, &mut warnings)?;
@@ -329,12 +333,13 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     settings::quality(&source, &file.quality)?;
     shadow_maps(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;
-    settings::diffusion(&source, &file.diffusion)?;
+    let (diffusion, _) = diffusion::read(&source, &file.diffusion)?;
     Pose::check(&source, &file)?;
     metres(&source, &file)?;
     // What the mesh adds to the effects concerns no value here.
     let every = || terms.iter().fold(Effects::SURFACE, |effects, term| effects.with(term.effect));
     let effects = lights.switched(settings::effects(&source, &file.model)?.unwrap_or_else(every));
+    let effects = diffusion.switched(effects);
     settings::fit(&source, &file.fit, &file.model.params, effects, &mut Warnings::new())?;
     normal_flip(&source, &file)?;
     read_dapple(&source, &file).map(drop)

@@ -22,7 +22,9 @@
 pub mod animation;
 pub mod assignment;
 mod cameras;
+pub mod charts;
 mod dapple;
+pub mod diffusion;
 pub mod error;
 pub mod facts;
 mod file;
@@ -63,6 +65,7 @@ pub use terms::register_terms;
 
 use std::path::PathBuf;
 
+use self::diffusion::Diffusion;
 use crate::model::choices::Choices;
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effects, Form, Lookups, Needs, Silhouette};
@@ -169,19 +172,6 @@ impl Default for Bloom {
     fn default() -> Self {
         // About the softness of the paper's pictures.
         Self { sigma: 0.02 }
-    }
-}
-
-/// The scene's `[diffusion]` table.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Diffusion {
-    /// Texels along a side of the UV atlas.
-    pub light_map_size: u32,
-}
-
-impl Default for Diffusion {
-    fn default() -> Self {
-        Self { light_map_size: 512 }
     }
 }
 

@@ -3,16 +3,15 @@
 use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
-use super::file::{
-    BloomTable, DiffusionTable, EnvironmentTable, FitTable, ModelTable, ParamsTable, QualityTable, Source,
-};
+use super::file::{BloomTable, EnvironmentTable, FitTable, ModelTable, ParamsTable, QualityTable, Source};
 use super::maps::Spots;
 use super::numbers::{interval, number, short, whole};
-use super::{Bloom, Diffusion, FitSettings, Loss, Quality, map_fit};
+use super::{Bloom, FitSettings, Loss, Quality, map_fit};
 use crate::model::choices::{
     Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
     Visibility,
 };
+use crate::model::diffusion::DiffusionChoices;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
 use crate::model::texture_filter::TextureFilter;
@@ -81,6 +80,7 @@ pub(super) fn choices(source: &Source, model: &ModelTable) -> Result<Choices, Sc
             model.skin_reflection.as_ref(),
             SkinReflection::ALL.map(|c| (c.name(), c)),
         )?,
+        diffusion: DiffusionChoices::DEFAULT,
         glossy: false,
         turning: false,
     })
@@ -308,13 +308,6 @@ pub(super) fn bloom(source: &Source, table: &BloomTable) -> Result<Bloom, SceneE
     let within = |sigma: f64| (0.0..=WIDEST_BLOOM).contains(&sigma);
     let sigma = number(source, table.sigma.as_ref(), Bloom::default().sigma, "sigma", &wanted, within)?;
     Ok(Bloom { sigma })
-}
-
-/// The `[diffusion]` table over the defaults.
-pub(super) fn diffusion(source: &Source, table: &DiffusionTable) -> Result<Diffusion, SceneError> {
-    let default = Diffusion::default().light_map_size;
-    let size = whole(source, table.light_map_size.as_ref(), "light_map_size", [64, 8192], default)?;
-    Ok(Diffusion { light_map_size: size })
 }
 
 /// Each light costs shadows of its own.

@@ -1,7 +1,7 @@
 //! A plan: the chosen rules, the passes that go before, and what they read.
 
 use super::atlas::{self, Level, Pass};
-use super::domain::{Domain, UV};
+use super::domain::{CHART, Domain, UV};
 use super::facts::{Facts, Source};
 use super::kept::kept_fields;
 use super::quantity::{Attribute, Constant, Resource};
@@ -116,7 +116,9 @@ pub fn plan(facts: &Facts) -> Result<Plan, PlanError> {
         Source::Samples | Source::Terms => {
             let mut given: Vec<&'static str> = sample_fields(facts).iter().map(|(name, _)| *name).collect();
             // By these are levels looked up, and what was found is handed to the shader.
-            given.extend(Some(UV).filter(|_| facts.holds("atlas") == Some(true)));
+            if facts.holds("atlas") == Some(true) {
+                given.extend([UV, CHART]);
+            }
             let plan = Plan::search(facts, &[], &goals, &given)?;
             let wgsl = plan.sample_module(&parts);
             Ok(Plan { wgsl, ..plan })
@@ -193,7 +195,7 @@ impl Plan {
         let fragments: Vec<&'static Rule> = found.rules.iter().filter(of_fragments).copied().collect();
         let sampled = found.carried.iter().filter(|on| on.edge.from == Domain::Texel);
         let levels = sampled.map(|on| Level { name: on.quantity.to_owned(), kind: level_type(on.numbers) });
-        let goals = [vertex_goals, &[UV]].concat();
+        let goals = [vertex_goals, &[UV, CHART]].concat();
         let rules = atlas::with_vertices(&found, Domain::Fragment, &goals, fragments);
         let mut plan = Self::of_rules(facts, &rules, &found.carried, levels.collect());
         plan.cost += passes.iter().map(|pass| pass.plan.cost).sum::<f64>();
@@ -220,7 +222,8 @@ impl Plan {
         let needs = shading().flat_map(|rule| rule.needs.iter().map(|need| (rule.domain, *need)));
         // Fragments look levels up by their texture coordinates.
         let looks_up = !levels.is_empty() && shading().all(|rule| rule.domain == Domain::Fragment);
-        let by = looks_up.then_some((Domain::Fragment, (UV, "vec2f")));
+        let by = [(Domain::Fragment, (UV, "vec2f")), (Domain::Fragment, (CHART, "f32"))];
+        let by = by.into_iter().filter(|_| looks_up);
         let stored = texel_fields(facts);
         for (domain, (quantity, kind)) in needs.chain(by) {
             if varyings.iter().any(|varying| varying.0 == quantity) {

@@ -26,13 +26,15 @@ pub enum Attribute {
     /// Which corner of its triangle it is, a unit vector for each of the three: `vec3f`. A mesh has it where triangles
     /// share no vertices.
     Corner,
+    /// The chart of the UV atlas that it is of, counted from 1: `f32`.
+    Chart,
     /// Numbers that a file of rules has declared, by the name that it gives them.
     Field(Field),
 }
 
 impl Attribute {
     /// The built-in attributes.
-    pub const BUILT_IN: [Self; 8] = [
+    pub const BUILT_IN: [Self; 9] = [
         Self::Position,
         Self::Normal,
         Self::Tangent,
@@ -41,6 +43,7 @@ impl Attribute {
         Self::Joints,
         Self::Weights,
         Self::Corner,
+        Self::Chart,
     ];
 
     /// The attributes that a vertex may have with these effects.
@@ -60,6 +63,7 @@ impl Attribute {
             Self::Joints => "joints",
             Self::Weights => "joint_weights",
             Self::Corner => "corner",
+            Self::Chart => "rest_chart",
             Self::Field(field) => field.info().attribute,
         }
     }
@@ -71,7 +75,7 @@ impl Attribute {
             Self::Position | Self::Normal | Self::Corner => "vec3f",
             Self::Tangent | Self::Weights => "vec4f",
             Self::Uv => "vec2f",
-            Self::Occlusion => "f32",
+            Self::Occlusion | Self::Chart => "f32",
             Self::Joints => "vec4u",
             Self::Field(field) => field.wgsl(),
         }
@@ -84,7 +88,7 @@ impl Attribute {
             Self::Position | Self::Normal | Self::Corner => 12,
             Self::Tangent | Self::Weights | Self::Joints => 16,
             Self::Uv => 8,
-            Self::Occlusion => 4,
+            Self::Occlusion | Self::Chart => 4,
             Self::Field(field) => 4 * field.info().numbers as u64,
         }
     }

@@ -23,7 +23,9 @@
 //! the sum that the radiance is, and holds these terms), `shows` (it is that term alone), `fallback` (quantities that
 //! it takes where others fail, and for which nothing needs to be stored), `sampled` (fragments may look a texel's
 //! quantity up, which is off by so much), `pass` (a blur of a texel's quantity; the function is its kernel, see
-//! [`Blur`]).
+//! [`Blur`]), `joins` (its quantity is a summand of another, which is the sum of all that the enabled effects' rules have).
+
+mod sums;
 
 use std::sync::LazyLock;
 
@@ -65,6 +67,8 @@ pub struct Rule {
     pub sampled: Option<f64>,
     /// The pass over the atlas whose kernel it is.
     pub blur: Option<Blur>,
+    /// The sum that its quantity is a part of.
+    pub joins: Option<&'static str>,
     /// Library files that it calls.
     pub uses: Vec<&'static str>,
     /// Resources and constants that the body names.
@@ -75,30 +79,78 @@ pub struct Rule {
     pub function: &'static str,
     /// The quantities that it needs, with their WGSL types: the function's parameters, and what a blur is of.
     pub needs: Vec<(&'static str, &'static str)>,
-    /// The WGSL type of the function's value; of a blur, that of what it is of.
+    /// The WGSL type of the function's value; of a blur, that of what is blurred.
     pub returns: &'static str,
     /// The function.
     pub body: &'static str,
 }
 
-/// A separable blur over the atlas, along u and then along v.
+/// A pass over the atlas in which texels read what others hold.
 ///
-/// In each direction a texel becomes the weighted mean of `taps` places along it. The rule's function is the kernel:
-/// of the quantities that it needs at that texel, `tap`, from -(taps - 1) / 2 to (taps - 1) / 2 in whole steps (`f32`),
-/// and `axis`, (1, 0) or (0, 1) (`vec2f`), it makes how many texels away the place is, and what it weighs (`vec2f`).
-/// Between two texels both count by their nearness. Texels that hold nothing, or are of another chart, weigh nothing.
+/// A blur goes along u and then along v: in each direction a texel becomes the weighted mean of places along it. Between
+/// two texels both count by their nearness. Texels that hold nothing, or are of another chart, weigh nothing. `axis` is
+/// (1, 0) or (0, 1) (`vec2f`).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Blur {
-    /// What is blurred.
+    /// What is read.
     pub of: &'static str,
-    /// Places that count, an odd number.
-    pub taps: u32,
+    /// Its WGSL type.
+    pub kind: &'static str,
+    /// Which texels are read, and what the rule's function is.
+    pub kernel: Kernel,
     /// The function's parameters, in their order, with their WGSL types.
     pub parameters: Vec<(&'static str, &'static str)>,
 }
 
-/// What a kernel is called with beside quantities, with WGSL types.
-pub const KERNEL: [(&str, &str); 2] = [("tap", "f32"), ("axis", "vec2f")];
+/// What a pass does with the texels around one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// A blur of so many places, an odd number. Of the quantities that it needs at the texel, `axis`, and `tap`, from
+    /// -(taps - 1) / 2 to (taps - 1) / 2 in whole steps (`f32`), the function makes how many texels away the place is, and
+    /// what it weighs (`vec2f`).
+    Taps(u32),
+    /// A blur by a Gaussian, with as many taps as the scene chooses. The function makes its standard deviation along
+    /// `axis`, in texels.
+    Gaussian,
+    /// Not a blur: of `apart` (`vec2f`), how far what is read lies from one of its neighbours to the next along u and
+    /// along v, half the distance of the two that are of the same chart, the distance to the one that is, or 0, the
+    /// function makes the pass' value.
+    Neighbours,
+}
+
+impl Kernel {
+    /// What the function is called with beside quantities, with WGSL types.
+    #[must_use]
+    pub const fn arguments(self) -> &'static [(&'static str, &'static str)] {
+        match self {
+            Self::Taps(_) => &[("tap", "f32"), ("axis", "vec2f")],
+            Self::Gaussian => &[("axis", "vec2f")],
+            Self::Neighbours => &[("apart", "vec2f")],
+        }
+    }
+
+    /// The WGSL type of the function's value; `None` where any will do.
+    #[must_use]
+    pub const fn returns(self) -> Option<&'static str> {
+        match self {
+            Self::Taps(_) => Some("vec2f"),
+            Self::Gaussian => Some("f32"),
+            Self::Neighbours => None,
+        }
+    }
+
+    /// Places that count along each axis, about, in a scene.
+    fn places(self, facts: &Facts) -> f64 {
+        match self {
+            Self::Taps(taps) => f64::from(taps),
+            Self::Gaussian => facts.setup.choices.diffusion.taps.count().map_or(USUAL_PLACES, f64::from),
+            Self::Neighbours => 1.0,
+        }
+    }
+}
+
+/// Texels that a Gaussian takes whose taps are whole texels: twelve deviations, of two texels each.
+const USUAL_PLACES: f64 = 25.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Error {
@@ -113,7 +165,7 @@ impl Rule {
         let taps = facts.shadows.map_or(0, |shadows| shadows.taps);
         let once =
             self.cost + self.cost_a_morph * f64::from(facts.morphs) + self.cost_a_tap * f64::from(taps);
-        self.blur.as_ref().map_or(once, |blur| DIRECTIONS * f64::from(blur.taps) * (once + TAP_COST))
+        self.blur.as_ref().map_or(once, |blur| DIRECTIONS * blur.kernel.places(facts) * (once + TAP_COST))
     }
 
     /// How far it is off in a scene, relative to white.
@@ -203,6 +255,7 @@ impl Rule {
             named: false,
             sampled: None,
             blur: None,
+            joins: None,
             uses: Vec::new(),
             reads: Vec::new(),
             fallback: Vec::new(),
@@ -255,12 +308,13 @@ impl Rule {
 const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
-pub const LIBRARY: [(&str, &str); 11] = [
+pub const LIBRARY: [(&str, &str); 12] = [
     ("vector", include_str!("rules/lib/vector.wgsl")),
     ("frame", include_str!("rules/lib/frame.wgsl")),
     ("cube", include_str!("rules/lib/cube.wgsl")),
     ("texels", include_str!("rules/lib/texels.wgsl")),
     ("mip_texels", include_str!("rules/lib/mip_texels.wgsl")),
+    ("power", include_str!("rules/lib/power.wgsl")),
     ("rim", include_str!("rules/lib/rim.wgsl")),
     ("specular", include_str!("rules/lib/specular.wgsl")),
     ("split_sum_kelemen", include_str!("rules/lib/split_sum_kelemen.wgsl")),
@@ -280,9 +334,12 @@ pub static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| {
 });
 
 /// The rules that a scene with these effects has: the built-in ones, and those of the terms that its effects are of.
+///
+/// What rules [join](Rule::joins) has a rule of its own, their sum.
 pub fn rules(effects: Effects) -> impl Iterator<Item = &'static Rule> {
     library::register_all();
-    RULES.iter().chain(term::enabled(effects).flat_map(|term| &term.rules))
+    let own = || RULES.iter().chain(term::enabled(effects).flat_map(|term| &term.rules));
+    own().chain(sums::of(own(), effects))
 }
 
 #[cfg(test)]

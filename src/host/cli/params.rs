@@ -46,13 +46,21 @@ fn kind(row: &ParamInfo) -> String {
     format!("{channels}, {shape}{owner}")
 }
 
+/// A default, a channel each where they differ.
+fn default(row: &ParamInfo, default: f64) -> String {
+    match row.channels {
+        None => default.to_string(),
+        Some(channels) => format!("({})", channels.map(|channel| channel.to_string()).join(", ")),
+    }
+}
+
 const HEAD: [&str; 8] = ["name", "corrected", "listing", "bounds", "unit", "kind", "source", "meaning"];
 
 fn cells(row: &ParamInfo) -> [String; 8] {
     [
         row.name.to_owned(),
-        row.corrected.to_string(),
-        row.listing.to_string(),
+        default(row, row.corrected),
+        default(row, row.listing),
         interval(row.lower, row.upper),
         row.unit.to_owned(),
         kind(row),
@@ -86,6 +94,10 @@ fn markdown(rows: &[&ParamInfo]) -> String {
     text
 }
 
+fn json_default(row: &ParamInfo, default: f64) -> serde_json::Value {
+    row.channels.map_or_else(|| default.into(), |channels| serde_json::json!(channels))
+}
+
 fn json(rows: &[&ParamInfo]) -> String {
     // JSON knows no infinity: null is "no bound".
     let finite = |x: f64| if x.is_finite() { serde_json::json!(x) } else { serde_json::Value::Null };
@@ -94,7 +106,7 @@ fn json(rows: &[&ParamInfo]) -> String {
         .map(|row| {
             let effects: Vec<&str> = row.effects.iter().map(|effect| effect.name()).collect();
             serde_json::json!({
-                "name": row.name, "default": {"corrected": row.corrected, "listing": row.listing},
+                "name": row.name, "default": {"corrected": json_default(row, row.corrected), "listing": json_default(row, row.listing)},
                 "bounds": [finite(row.lower), finite(row.upper)], "unit": row.unit,
                 "rgb": row.rgb, "linear": row.linear, "owner": row.owner.name(), "effects": effects,
                 "source": row.source, "meaning": row.meaning,

@@ -143,6 +143,7 @@ fn told(pass: &Pass) -> String {
     let leaves = list(pass.leaves.iter().map(|level| level.name.as_str()));
     match pass.kind {
         PassKind::Draw => format!("{leaves}, drawn"),
+        PassKind::Neighbours => format!("{leaves}, from neighbour to neighbour"),
         PassKind::Blur(Axis::U) => format!("{leaves}, blurred along u"),
         PassKind::Blur(Axis::V) => format!("{leaves}, blurred along v"),
     }

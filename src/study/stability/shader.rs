@@ -15,9 +15,8 @@ use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
-use crate::scene::{
-    Bloom, Diffusion, FitSettings, Loss, MapSettings, Quality, Scene, ShadowMaps, maps, mesh,
-};
+use crate::scene::diffusion::Diffusion;
+use crate::scene::{Bloom, FitSettings, Loss, MapSettings, Quality, Scene, ShadowMaps, maps, mesh};
 use crate::shader::Domain;
 use crate::shader::Facts;
 use crate::shader::facts::MapFacts;

@@ -96,8 +96,10 @@ fn the_parameter_table_is_whole_in_every_format() {
     assert_eq!(rows.len(), table.len());
     for (json, row) in rows.iter().zip(&table) {
         assert_eq!((json["name"].as_str(), json["unit"].as_str()), (Some(row.name), Some(row.unit)));
-        assert_eq!(json["default"]["corrected"].as_f64(), Some(row.corrected));
-        assert_eq!(json["default"]["listing"].as_f64(), Some(row.listing));
+        for (form, default) in [("corrected", row.corrected), ("listing", row.listing)] {
+            let want = row.channels.map_or_else(|| serde_json::json!(default), |rgb| serde_json::json!(rgb));
+            assert_eq!(json["default"][form], want, "{}", row.name);
+        }
         for (json, bound) in json["bounds"].as_array().unwrap().iter().zip([row.lower, row.upper]) {
             assert_eq!(json.as_f64(), Some(bound).filter(|bound| bound.is_finite()), "{}", row.name);
         }

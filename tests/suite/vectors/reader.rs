@@ -181,6 +181,10 @@ impl<'v> Node<'v> {
         self.value.is_null()
     }
 
+    pub(crate) fn is_text(&self) -> bool {
+        self.value.is_string()
+    }
+
     pub(crate) fn is_list(&self) -> bool {
         self.value.is_array()
     }

@@ -15,8 +15,9 @@ const CHUNK: usize = 256;
 /// The texels around a place that hold something, and what each counts.
 type Corners<R> = [(usize, R); 4];
 
-/// The four texels around texture coordinates; an empty one counts nothing. `None` where all are.
-fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2]) -> Option<Corners<R>> {
+/// The four texels around texture coordinates; one that is not of `chart` counts nothing, and where none is, the chart's
+/// nearest counts alone. `None` where the chart has none.
+fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2], chart: u32) -> Option<Corners<R>> {
     let one = R::from(1.0);
     let place = uv.map(|x| R::from(x) * one.lit(f64::from(atlas.size())) - one.lit(0.5));
     let low = place.map(R::floor);
@@ -31,11 +32,15 @@ fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2]) -> Option<Corners<R>> {
         let (right, below) = (k & 1, k >> 1);
         let share = |f: R, side: usize| if side == 1 { f } else { one - f };
         let at = atlas.place(first[0].saturating_add(right as i64), first[1].saturating_add(below as i64));
-        let Some(at) = at else { continue };
+        let Some(at) = at.filter(|&at| atlas.chart(at) == chart) else { continue };
         *corner = (at, share(f[0], right) * share(f[1], below));
         sum = sum + corner.1;
     }
-    R::from(0.0).lt(sum).then(|| corners.map(|(at, share)| (at, share / sum)))
+    if R::from(0.0).lt(sum) {
+        return Some(corners.map(|(at, share)| (at, share / sum)));
+    }
+    let nearest = atlas.nearest(chart, place.map(Into::into))?;
+    Some([(nearest, one), (nearest, R::from(0.0)), (nearest, R::from(0.0)), (nearest, R::from(0.0))])
 }
 
 impl<R: Number> LevelMaker<R> {
@@ -70,11 +75,12 @@ impl<R: Number> LevelMaker<R> {
         record: usize,
         put: &mut impl FnMut([R; LANES]),
     ) {
-        let uv = samples.surface.places().uv;
+        let places = samples.surface.places();
         let found: [Option<Corners<R>>; LANES] = std::array::from_fn(|lane| {
-            let ((atlas, _), at) = (levels?, uv?);
+            let ((atlas, _), at, of_chart) = (levels?, places.uv?, places.chart?);
             let rows = samples.surface.rows();
-            corners(atlas, [0, 1].map(|c| rows.number(at + c, record * LANES + lane)))
+            let number = |row: usize| rows.number(row, record * LANES + lane);
+            corners(atlas, [number(at), number(at + 1)], number(of_chart) as u32)
         });
         for (name, count) in &self.program.looked_up {
             let level = levels.and_then(|(_, levels)| levels.get(name));

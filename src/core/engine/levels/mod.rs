@@ -5,10 +5,11 @@
 //! `shader/atlas/blur.wgsl`, `blur_tangent.wgsl` and `level.wgsl`. Texel by texel, so nothing depends on threads.
 //!
 //! - this module: [`LevelMaker`], which makes levels anew when a number changes that they are made with
-//! - `blur`: one direction of a blur, and how it moves; `look_up`: what samples find
+//! - `blur`: one direction of a blur, and how it moves; `neighbours`: how far these lie apart; `look_up`: what samples find
 
 mod blur;
 mod look_up;
+mod neighbours;
 #[cfg(test)]
 mod tests;
 
@@ -20,6 +21,7 @@ use fearless_simd::Level as Instructions;
 use rayon::prelude::*;
 
 use self::blur::blurred;
+use self::neighbours::neighbours;
 use super::cubes_at::{CubesAt, Sixteen};
 use crate::bake::stacks::Stack;
 use crate::model::batch::Batch;
@@ -27,7 +29,7 @@ use crate::model::effects::Effects;
 use crate::model::params::Params;
 use crate::model::real::Real;
 use crate::program::graph::Input;
-use crate::program::levels::{LevelPass, LevelProgram};
+use crate::program::levels::{APART_FIELD, LevelPass, LevelProgram};
 use crate::program::shading::constant;
 use crate::program::steps::Setting;
 use crate::samples::{Atlas, LANES, ViewSamples};
@@ -177,7 +179,9 @@ impl<R: Number> LevelMaker<R> {
         for pass in &self.program.passes {
             let value = |input: &Input| constant(input, params).unwrap_or(0.0);
             let shared = pass.steps.setting(like, value, |name| cubes.named(name));
-            let run = Run { pass, atlas, shared, like, loads: loads(pass, atlas, &levels) };
+            let apart = pass.neighbours.as_ref().and_then(|source| levels.get(source));
+            let apart = apart.map_or_else(Vec::new, |source| neighbours(atlas, source));
+            let run = Run { pass, atlas, shared, like, loads: loads(pass, atlas, &levels, &apart) };
             let left = match &pass.blur {
                 None => run.each(|_, numbers, lane| run.leaves(numbers, lane)),
                 Some(blur) => {
@@ -205,8 +209,15 @@ enum Load<'a, R> {
     Nothing,
 }
 
-fn loads<'a, R: Number>(pass: &LevelPass, atlas: &Atlas, levels: &'a Levels<R>) -> Vec<Load<'a, R>> {
+/// Where a pass reads its fields; `apart` is how far each texel's neighbours lie apart, where the pass is over these.
+fn loads<'a, R: Number>(
+    pass: &LevelPass,
+    atlas: &Atlas,
+    levels: &'a Levels<R>,
+    apart: &'a [Texel<R>],
+) -> Vec<Load<'a, R>> {
     let load = |input: &Input| match (levels.get(&input.name), atlas.row(input)) {
+        _ if pass.neighbours.is_some() && input.name == APART_FIELD => Load::Level(apart, input.component),
         (Some(level), _) => Load::Level(level, input.component),
         (None, Some(row)) => Load::Row(row),
         (None, None) => Load::Nothing,

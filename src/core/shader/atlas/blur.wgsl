@@ -1,5 +1,5 @@
     // The weighted mean along one axis of the taps that fall on texels of the same chart (the same w); where none weighs
-    // anything, the texel as it is (MODEL 6).
+    // anything, the texel as it is (MODEL 6). Of differences to it: what is alike everywhere stays so to the bit.
     for (var i = -{reach}; i <= {reach}; i++) {
         let tap: vec2f = {kernel};
         let low = floor(tap.x);
@@ -9,9 +9,9 @@
             let inside = all(place >= vec2i(0)) && all(place < size);
             let texel = textureLoad({source}, clamp(place, vec2i(0), size - 1), 0);
             let share = select(1.0 - f, f, side == 1);
-            sum += select(0.0, tap.y * share, inside && texel.w == middle.w) * vec4f(texel.xyz, 1.0);
+            sum += select(0.0, tap.y * share, inside && texel.w == middle.w) * vec4f(texel.xyz - middle.xyz, 1.0);
         }
     }
     let weighs = sum.w > 0.0;
-    return vec4f(select(middle.xyz, sum.xyz / select(1.0, sum.w, weighs), weighs), middle.w);
+    return vec4f(middle.xyz + select(vec3f(0.0), sum.xyz / select(1.0, sum.w, weighs), weighs), middle.w);
 }

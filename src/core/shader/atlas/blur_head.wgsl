@@ -14,4 +14,4 @@ fn fs_main(@builtin(position) at: vec4f) -> @location(0) vec4f {
     if (middle.w == 0.0) {
         return vec4f(0.0);
     }
-{reads}    var sum = vec4f(0.0);
+{reads}{before}    var sum = vec4f(0.0);

@@ -2,6 +2,7 @@
     // weights.
     // How the sum moves, and the sum of weights in w.
     var change = vec4f(0.0);
+    let moved_here = {moved_here};
     for (var i = -{reach}; i <= {reach}; i++) {
         let tap: vec2f = {kernel};
         let slope: vec2f = {slope};
@@ -16,12 +17,12 @@
             let counts = inside && texel.w == middle.w;
             let weight = select(0.0, tap.y * share, counts);
             let moved = select(0.0, slope.y * share + tap.y * select(-slope.x, slope.x, side == 1), counts);
-            sum += weight * vec4f(texel.xyz, 1.0);
-            change += moved * vec4f(texel.xyz, 1.0) + weight * vec4f({moved}, 0.0);
+            sum += weight * vec4f(texel.xyz - middle.xyz, 1.0);
+            change += moved * vec4f(texel.xyz - middle.xyz, 1.0) + weight * vec4f({moved} - moved_here, 0.0);
         }
     }
     let weighs = sum.w > 0.0;
     let whole = select(1.0, sum.w, weighs);
     let slope = (change.xyz - change.w * sum.xyz / whole) / whole;
-    return vec4f(select({moved_here}, slope, weighs), middle.w);
+    return vec4f(moved_here + select(vec3f(0.0), slope, weighs), middle.w);
 }

@@ -1,18 +1,52 @@
-// The value of a level at texture coordinates, bilinearly of those of its four texels that hold something (w > 0); 0
-// where none does (MODEL 6).
-fn sample_level(level: texture_2d<f32>, uv: vec2f) -> vec4f {
+// Texels that a lookup counts: two rows of two, and what each weighs.
+struct LevelCorners {
+    low: vec2i,
+    weights: vec4f,
+}
+
+// The texels around texture coordinates that are of a chart (w), weighed bilinearly; where none of the four is, the nearest
+// one of the chart within four texels (MODEL 6). Without any, nothing.
+fn level_corners(level: texture_2d<f32>, uv: vec2f, chart: f32) -> LevelCorners {
     let size = vec2i(textureDimensions(level));
     let at = uv * vec2f(size) - 0.5;
-    let low = floor(at);
-    let f = at - low;
-    var sum = vec4f(0.0);
+    let low = vec2i(floor(at));
+    let f = at - floor(at);
+    var weights = vec4f(0.0);
     for (var corner = 0; corner < 4; corner++) {
         let step = vec2i(corner & 1, corner >> 1u);
-        let place = vec2i(low) + step;
+        let place = low + step;
         let inside = all(place >= vec2i(0)) && all(place < size);
-        let texel = textureLoad(level, clamp(place, vec2i(0), size - 1), 0);
+        let own = textureLoad(level, clamp(place, vec2i(0), size - 1), 0).w == chart;
         let share = select(1.0 - f, f, step == vec2i(1));
-        sum += select(0.0, share.x * share.y, inside && texel.w > 0.0) * vec4f(texel.xyz, 1.0);
+        weights[corner] = select(0.0, share.x * share.y, inside && own);
     }
-    return sum / select(1.0, sum.w, sum.w > 0.0);
+    let sum = weights.x + weights.y + weights.z + weights.w;
+    if (sum > 0.0) {
+        return LevelCorners(low, weights / sum);
+    }
+    var nearest = low;
+    var least = 1e30;
+    for (var down = -4; down <= 4; down++) {
+        for (var along = -4; along <= 4; along++) {
+            let place = vec2i(round(at)) + vec2i(along, down);
+            let inside = all(place >= vec2i(0)) && all(place < size);
+            let own = textureLoad(level, clamp(place, vec2i(0), size - 1), 0).w == chart;
+            let away = vec2f(place) - at;
+            if (inside && own && dot(away, away) < least) {
+                nearest = place;
+                least = dot(away, away);
+            }
+        }
+    }
+    return LevelCorners(nearest, vec4f(select(0.0, 1.0, least < 1e30), 0.0, 0.0, 0.0));
+}
+
+fn level_at(level: texture_2d<f32>, corners: LevelCorners) -> vec4f {
+    let most = vec2i(textureDimensions(level)) - 1;
+    var sum = vec4f(0.0);
+    for (var corner = 0; corner < 4; corner++) {
+        let place = corners.low + vec2i(corner & 1, corner >> 1u);
+        sum += corners.weights[corner] * textureLoad(level, clamp(place, vec2i(0), most), 0);
+    }
+    return sum;
 }

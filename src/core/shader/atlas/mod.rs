@@ -1,7 +1,7 @@
 //! Passes over the UV atlas: texels' quantities, and blurs of them, in the order in which they are made.
 //!
-//! A *level* is a texture of the atlas' size, four 32-bit floats a texel: a quantity, and in w the texel's chart, 0 where
-//! the mesh has no surface. (All of a mesh is one chart so far.) A *draw* draws the mesh with its texture coordinates as
+//! A *level* is a texture of the atlas' size, four 32-bit floats a texel: a quantity, and in w the texel's chart, counted
+//! from 1, 0 where the mesh has no surface. A *draw* draws the mesh with its texture coordinates as
 //! positions, and leaves the levels that a pass or a fragment reads. A *blur* reads a level and leaves another, along u
 //! or along v. Draws and blurs take turns where texels' rules need what was blurred; texels that need nothing of that are
 //! computed anew in each draw.
@@ -20,10 +20,10 @@ pub(super) mod text;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub use self::text::stored;
-use super::domain::{DIRECTIONS, Domain, UV};
+use super::domain::{CHART, DIRECTIONS, Domain, UV};
 use super::emit::Plan;
 use super::facts::{Facts, Source};
-use super::rule::Rule;
+use super::rule::{Kernel, Rule};
 use super::search::{Carried, Found, PlanError};
 
 /// Levels that a draw leaves: an adapter draws into 32 bytes a sample at once, by WebGPU's defaults.
@@ -85,6 +85,8 @@ pub enum PassKind {
     Draw,
     /// Three vertices without attributes, which cover the atlas: a blur along an axis.
     Blur(Axis),
+    /// The same vertices: how far what is read lies from one neighbour to the next.
+    Neighbours,
 }
 
 /// A pass over the atlas.
@@ -110,9 +112,12 @@ pub struct MovingKernel {
 
 /// Over stored texels: the function of a `Sample` that yields what a draw leaves, one value after another.
 pub const TEXEL: &str = "skinfit_texel";
-/// Over stored texels: the function of a `Sample` that yields, for each tap of a blur, where it lies and what it weighs;
-/// where the kernel moves, after each how that does.
+/// Over stored texels: the function of a `Sample` that yields what a blur's kernel is made of, and where that moves how:
+/// of [taps](Kernel::Taps), for each where it lies and what it weighs, after each how that moves; of a
+/// [Gaussian](Kernel::Gaussian) its deviation.
 pub const TAPS: &str = "skinfit_taps";
+/// Over stored texels: the function of a `Sample`, and of how far its neighbours are apart, that yields a pass' value.
+pub const APART: &str = "skinfit_apart";
 
 /// The passes that yield the texels' quantities which fragments look up; none where nothing is computed in texels.
 ///
@@ -217,8 +222,11 @@ fn draw(facts: &Facts, found: &Found, texels: &[&'static Rule], leaves: &[Level]
     };
     let levels =
         blurred.filter(|rule| read(rule)).map(|rule| Level::new(rule.gives[0].0, rule.returns)).collect();
-    let rules = with_vertices(found, Domain::Texel, &[UV], shading);
+    let rules = with_vertices(found, Domain::Texel, &[UV, CHART], shading);
     let mut plan = Plan::of_rules(facts, &rules, &found.carried, levels);
+    if facts.source == Source::Raster {
+        plan.varyings.push((CHART, "f32"));
+    }
     plan.wgsl = text::draw(&plan, leaves);
     Pass { kind: PassKind::Draw, leaves: leaves.to_vec(), plan, moving: None }
 }
@@ -231,7 +239,14 @@ fn halfway(rule: &Rule) -> String {
 /// A blur along u, then along v.
 fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
     let Some(blur) = &rule.blur else { return Vec::new() };
-    let kind = rule.returns;
+    let kind = blur.kind;
+    if blur.kernel == Kernel::Neighbours {
+        let source = Level::new(blur.of, kind);
+        let mut plan = blur_plan(facts, rule, &source);
+        plan.wgsl = text::neighbours(&plan, rule, &source);
+        let leaves = vec![Level::new(rule.gives[0].0, rule.returns)];
+        return vec![Pass { kind: PassKind::Neighbours, leaves, plan, moving: None }];
+    }
     let directions = [
         (Axis::U, Level::new(blur.of, kind), Level::new(halfway(rule), kind)),
         (Axis::V, Level::new(halfway(rule), kind), Level::new(rule.gives[0].0, kind)),

@@ -33,6 +33,7 @@ impl Along {
             let tangent = match pass.kind {
                 PassKind::Draw => along.draw(pass, seed)?,
                 PassKind::Blur(_) => along.blur(pass, seed)?,
+                PassKind::Neighbours => along.neighbours(pass)?,
             };
             along.passes.extend(tangent);
         }
@@ -91,6 +92,16 @@ impl Along {
         }
         let leaves = pass.leaves.iter().map(|level| self.leave(level)).collect();
         Ok(Some(Pass { kind: pass.kind, leaves, plan, moving }))
+    }
+
+    /// What is read of neighbours is where the surface lies: no seed moves that.
+    fn neighbours(&self, pass: &Pass) -> Result<Option<Pass>, TangentError> {
+        let source = &pass.plan.levels[0].name;
+        if !self.moved.contains_key(source) {
+            return Ok(None);
+        }
+        let function = pass.plan.steps[0].rule.function.to_owned();
+        Err(TangentError::Unsupported { function, what: format!("how neighbours of {source} lie apart") })
     }
 
     /// How a kernel's value moves; `None` where it stays.

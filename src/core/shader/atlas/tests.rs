@@ -131,7 +131,8 @@ fn passes_leave_what_later_ones_read_and_nothing_else() {
     assert_eq!(second.plan.resources, [Resource::ColorTexels]);
     // The image's own shader has none of the texels' functions.
     assert!(!plan.wgsl.contains("fn mist_light_map(") && !plan.wgsl.contains("fn mist_near_kernel("));
-    assert!(plan.wgsl.contains("sample_level(mist_near_level, at.vertex_uv).xyz"));
+    assert!(plan.wgsl.contains("level_corners(mist_near_level, at.vertex_uv, round(at.vertex_chart))"));
+    assert!(plan.wgsl.contains("level_at(mist_near_level, corners).xyz"));
 }
 
 #[test]

@@ -115,7 +115,11 @@ fn quantity_name(name: &str, line: usize) -> Result<(), TermError> {
     Ok(())
 }
 
-fn effect_name(line: usize, effect: &DeclaredEffect) -> Result<(), TermError> {
+fn effect_name(
+    line: usize,
+    effect: &DeclaredEffect,
+    before: &[(usize, DeclaredEffect)],
+) -> Result<(), TermError> {
     if !is_word(effect.name) || effect.meaning.is_empty() {
         return Err(Problem::Value {
             key: "effect",
@@ -124,7 +128,9 @@ fn effect_name(line: usize, effect: &DeclaredEffect) -> Result<(), TermError> {
         }
         .at(line));
     }
-    if let Some(within) = effect.within.filter(|within| Effect::from_name(within).is_none()) {
+    let own = |name: &str| before.iter().any(|(_, effect)| effect.name == name);
+    let known = |name: &str| own(name) || Effect::from_name(name).is_some();
+    if let Some(within) = effect.within.filter(|within| !known(within)) {
         let known = Effect::all().map(|effect| effect.name().to_owned()).collect();
         return Err(Problem::NotThere { key: "effect", name: within.to_owned(), known }.at(line));
     }
@@ -140,8 +146,8 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
     if declaration.effects.is_empty() {
         return Err(Problem::NoEffect.at(1));
     }
-    for (line, effect) in &declaration.effects {
-        effect_name(*line, effect)?;
+    for (place, (line, effect)) in declaration.effects.iter().enumerate() {
+        effect_name(*line, effect, &declaration.effects[..place])?;
     }
     let known: BTreeSet<&str> = RULES
         .iter()
@@ -222,7 +228,9 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
 fn adds(origin: Origin, rules: &[Rule]) -> Result<(), TermError> {
     for rule in rules {
         for name in rule.adds.iter().chain(&rule.shows) {
-            if TermName::from_name(name).is_some() {
+            // The library may show a built-in term in another way.
+            let allowed = |term: TermName| origin == Origin::Library && term.is_built_in();
+            if TermName::from_name(name).is_some_and(|term| !allowed(term)) {
                 return Err(Problem::Taken { kind: "term", name: (*name).to_owned() }.at(rule.line));
             }
             quantity_name(name, rule.line)?;

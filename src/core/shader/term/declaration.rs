@@ -30,7 +30,8 @@ pub(super) struct DeclaredEffect {
     pub(super) meaning: &'static str,
 }
 
-/// `parameter: NAME = 0.5 in [0, inf), rgb, linear; what it does; where it comes from`
+/// `parameter: NAME = 0.5 in [0, inf), rgb, linear; what it does; where it comes from`; the default may be one a channel,
+/// `(0.5, 0.2, 0.1)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredParameter {
     /// As users write it: `sheen_weight`, of a family's member `light.key.color`.
@@ -38,6 +39,8 @@ pub(super) struct DeclaredParameter {
     /// As rules write it: each `.` a `_`.
     pub(super) identifier: &'static str,
     pub(super) default: f64,
+    /// The default in each channel, where these differ.
+    pub(super) channels: Option<[f64; 3]>,
     pub(super) lower: f64,
     pub(super) upper: f64,
     pub(super) unit: &'static str,
@@ -64,7 +67,7 @@ pub(super) struct DeclaredField {
 }
 
 /// The keys that a header may have.
-const KEYS: [&str; 18] = [
+const KEYS: [&str; 19] = [
     "effect",
     "parameter",
     "field",
@@ -83,6 +86,7 @@ const KEYS: [&str; 18] = [
     "domain",
     "sampled",
     "pass",
+    "joins",
 ];
 
 /// Read a file of rules, which is called `name`. They are of `domain` but where they declare another.
@@ -239,6 +243,7 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
         "uses" => rule.uses = list(value).collect(),
         "reads" => rule.reads = list(value).collect(),
         "fallback" => rule.fallback = list(value).collect(),
+        "joins" => rule.joins = Some(value),
         "paper" => rule.paper = value == "yes",
         "named" => rule.named = value == "yes",
         "error" if value == "tessellation" => rule.error = Error::Tessellation,
@@ -247,9 +252,8 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
         }
         "pass" => {
             let wanted = "QUANTITY: TYPE, TAPS taps: what is blurred, an f32, vec2f or vec3f, and how many places count, \
-                          an odd number from 3 to 255";
-            let (blur, kind) = blur(value).ok_or_else(|| unread(wanted))?;
-            (rule.blur, rule.returns) = (Some(blur), kind);
+                          an odd number from 3 to 255; or `gaussian` or `neighbours` in the place of these";
+            rule.blur = Some(blur(value).ok_or_else(|| unread(wanted))?);
         }
         "error" => {
             rule.error = Error::Fixed(amount(value).ok_or_else(|| unread("a number, relative to white"))?);
@@ -282,6 +286,13 @@ fn field(of: Found, value: &'static str) -> Option<DeclaredField> {
     known.then_some(DeclaredField { name, of, wgsl, neutral, meaning })
 }
 
+/// A number, or one a channel: `(0.2, 0.1, 0)`.
+fn default_of(text: &str) -> Option<[f64; 3]> {
+    let Some(channels) = text.trim().strip_prefix('(') else { return number(text).map(|number| [number; 3]) };
+    let channels = channels.strip_suffix(')')?.split(',').map(number).collect::<Option<Vec<f64>>>()?;
+    channels.try_into().ok()
+}
+
 fn parameter(value: &'static str) -> Option<DeclaredParameter> {
     let mut parts = value.splitn(3, ';').map(str::trim);
     let (numbers, meaning) = (parts.next()?, parts.next()?);
@@ -296,10 +307,12 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         other => number(other),
     };
     let name = name.trim();
+    let channels = default_of(default)?;
     let mut parameter = DeclaredParameter {
         name,
         identifier: if name.contains('.') { leaked(&name.replace('.', "_")) } else { name },
-        default: number(default)?,
+        default: channels[0],
+        channels: Some(channels).filter(|channels| *channels != [channels[0]; 3]),
         lower: bound(lower)?,
         upper: bound(upper)?,
         unit: "",
@@ -327,11 +340,12 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
             },
         }
     }
-    let DeclaredParameter { default, lower, upper, linear, scale, .. } = parameter;
-    let within = (lower.max(-LARGEST)..=upper.min(LARGEST)).contains(&default);
+    let DeclaredParameter { lower, upper, linear, scale, rgb, .. } = parameter;
+    let within = channels.iter().all(|default| (lower.max(-LARGEST)..=upper.min(LARGEST)).contains(default));
+    let coloured = rgb || parameter.channels.is_none();
     // Logarithms are of positive numbers, and a linear parameter is solved for by its value.
     let steps = scale == Scale::Linear || (lower > 0.0 && !linear);
-    (within && lower < upper && steps && !meaning.is_empty()).then_some(parameter)
+    (within && coloured && lower < upper && steps && !meaning.is_empty()).then_some(parameter)
 }
 
 #[cfg(test)]

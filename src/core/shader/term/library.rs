@@ -8,14 +8,15 @@ use super::{Origin, Term, register_from};
 use crate::model::effects::{Effect, Effects};
 
 /// Files, by name, in the order of documentation.
-const FILES: [(&str, &str); 2] = [
+const FILES: [(&str, &str); 3] = [
     ("sky", include_str!("../rules/term/sky.wgsl")),
+    ("diffusion", include_str!("../rules/term/diffusion.wgsl")),
     ("specular", include_str!("../rules/term/specular.wgsl")),
 ];
 
 /// Effects that share light out before it is diffuse: the sky's by what a point sees of it, all by what is reflected above
-/// the skin.
-const LAYERED: [&str; 2] = [SKY, "fresnel"];
+/// the skin, or by how far it wanders within.
+const LAYERED: [&str; 3] = [SKY, "fresnel", "diffusion"];
 
 /// The effect of what a point sees of the sky.
 const SKY: &str = "directional_occlusion";

@@ -182,6 +182,7 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
             identifier: declared.identifier,
             listing: declared.default,
             corrected: declared.default,
+            channels: declared.channels,
             lower: declared.lower,
             upper: declared.upper,
             unit: declared.unit,
@@ -215,9 +216,19 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
         // A layer is there where the effects are on that its rule asks for.
         let asked = rule.when.iter().filter_map(|condition| Effect::from_name(condition));
         let asked: Vec<Effect> = asked.collect();
+        let refused =
+            rule.when.iter().filter_map(|condition| Effect::from_name(condition.strip_prefix('!')?));
+        let refused: Vec<Effect> = refused.collect();
         for &name in rule.adds.iter().chain(&rule.shows) {
-            let effects = asked.clone().leak();
-            let layer = TermName::register(TermInfo { name, effects })
+            // The library may show a built-in term in another way.
+            if let Some(term) = TermName::from_name(name).filter(|term| term.is_built_in()) {
+                if rule.shows.is_some() {
+                    term.also_with(asked.clone().leak());
+                }
+                continue;
+            }
+            let (effects, without) = (asked.clone().leak(), refused.clone().leak());
+            let layer = TermName::register(TermInfo { name, effects, without })
                 .map_err(|error| problem(error).at(rule.line))?;
             if !layers.contains(&layer) {
                 layers.push(layer);

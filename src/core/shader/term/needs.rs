@@ -7,7 +7,7 @@ use crate::model::choices::SpecularVisibility;
 use crate::model::effects::{Effect, Effects, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::{Field, Fields};
-use crate::shader::domain::{Domain, UV};
+use crate::shader::domain::{CHART, Domain, UV};
 use crate::shader::emit::{SAMPLE, UNMADE, parts};
 use crate::shader::facts::{Facts, Source};
 use crate::shader::quantity::Resource;
@@ -61,7 +61,7 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     let built_in = SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name).filter(|name| held(name));
     let given: Vec<&'static str> = built_in.chain(fields.iter().map(Field::name)).collect();
     // Texels are asked for where nothing can be planned without them. What cannot be planned at all is told when it is.
-    let looking_up = [&given[..], &[UV]].concat();
+    let looking_up = [&given[..], &[UV, CHART]].concat();
     let textured = Facts { atlas: Some(1), ..facts };
     let found = search(&facts, &[], goals, &given).or_else(|_| search(&textured, &[], goals, &looking_up));
     let chosen = found.unwrap_or_default().rules;

@@ -3,7 +3,7 @@
 use super::declaration::list;
 use super::error::Problem;
 use crate::shader::domain::Domain;
-use crate::shader::rule::{Blur, KERNEL, Rule};
+use crate::shader::rule::{Blur, Kernel, Rule};
 
 /// WGSL types of what a texel of the atlas can hold: beside it stands whether it holds anything.
 pub(super) const LEVEL_TYPES: [&str; 3] = ["f32", "vec2f", "vec3f"];
@@ -19,13 +19,21 @@ pub(super) fn domains_of(value: &'static str) -> Result<Vec<Domain>, Problem> {
     if domains.is_empty() { Err(unread()) } else { Ok(domains) }
 }
 
-/// `glow_light: vec3f, 7 taps`, and the type.
-pub(super) fn blur(value: &'static str) -> Option<(Blur, &'static str)> {
-    let (source, taps) = value.split_once(',')?;
+/// `glow_light: vec3f, 7 taps`, `glow_light: vec3f, gaussian`, or `glow_light: vec3f, neighbours`.
+pub(super) fn blur(value: &'static str) -> Option<Blur> {
+    let (source, kernel) = value.split_once(',')?;
     let (of, kind) = source.split_once(':').map(|(of, kind)| (of.trim(), kind.trim()))?;
-    let taps: u32 = taps.trim().strip_suffix(" taps")?.trim().parse().ok()?;
-    let fits = LEVEL_TYPES.contains(&kind) && taps % 2 == 1 && (3..=255).contains(&taps);
-    fits.then(|| (Blur { of, taps, parameters: Vec::new() }, kind))
+    let kernel = match kernel.trim() {
+        "gaussian" => Kernel::Gaussian,
+        "neighbours" => Kernel::Neighbours,
+        taps => Kernel::Taps(taps.strip_suffix(" taps")?.trim().parse().ok()?),
+    };
+    let counted = match kernel {
+        Kernel::Taps(taps) => taps % 2 == 1 && (3..=255).contains(&taps),
+        _ => true,
+    };
+    let fits = LEVEL_TYPES.contains(&kind) && counted;
+    fits.then(|| Blur { of, kind, kernel, parameters: Vec::new() })
 }
 
 /// Of a rule whose function is a kernel: what it is called with, and what it needs.
@@ -39,11 +47,16 @@ pub(super) fn kernel(rule: &mut Rule, domains: &[Domain]) -> Result<(), Problem>
     let [(_, "")] = rule.gives.as_slice() else { return Err(Problem::Kernel) };
     // Weights that depended on what they weigh would make no linear pass.
     let own = rule.needs.iter().any(|(need, _)| *need == blur.of);
-    if own || returns != "vec2f" || !rule.needs.contains(&KERNEL[0]) {
+    let arguments = blur.kernel.arguments();
+    if own || blur.kernel.returns().is_some_and(|kind| kind != returns) || !rule.needs.contains(&arguments[0])
+    {
         return Err(Problem::Kernel);
     }
+    if blur.kernel != Kernel::Neighbours {
+        rule.returns = blur.kind;
+    }
     blur.parameters.clone_from(&rule.needs);
-    rule.needs.retain(|need| !KERNEL.contains(need));
-    rule.needs.insert(0, (blur.of, rule.returns));
+    rule.needs.retain(|need| !arguments.contains(need));
+    rule.needs.insert(0, (blur.of, blur.kind));
     Ok(())
 }

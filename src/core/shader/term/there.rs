@@ -19,6 +19,9 @@ fn of_samples<'a>(
 ) -> BTreeSet<&'static str> {
     let mut there: BTreeSet<&'static str> = SAMPLE.iter().map(|(name, _)| *name).collect();
     there.extend(own);
+    // What fragments look up.
+    let looked_up = rules.clone().filter(|rule| rule.domain == Domain::Texel && rule.sampled.is_some());
+    there.extend(looked_up.flat_map(|rule| rule.gives.iter().map(|(quantity, _)| *quantity)));
     loop {
         let before = there.len();
         for rule in
@@ -88,10 +91,11 @@ pub(super) fn there(origin: Origin, declaration: &Declaration) -> Result<(), Ter
     let (samples, texels) = (of_samples(&all.iter().copied(), &own), of_texels());
     // The library's own may have rules for rasterised fragments beside those for samples.
     let for_both = |rule: &&Rule| origin == Origin::File || !rule.when.contains(&"raster");
+    let gives = |giver: &Rule, need: &str| giver.gives_quantity(need) || giver.joins == Some(need);
     for rule in declaration.rules.iter().filter(for_both) {
         let there = if rule.domain == Domain::Texel { &texels } else { &samples };
         for &(need, _) in &rule.needs {
-            let mut givers = declaration.rules.iter().filter(|giver| giver.gives_quantity(need)).peekable();
+            let mut givers = declaration.rules.iter().filter(|giver| gives(giver, need)).peekable();
             let ours = |param: Param| param.is_built_in() || origin == Origin::Library;
             let constant = Param::from_identifier(need).is_some_and(ours) || is_constant(need);
             let quantity = need.to_owned();

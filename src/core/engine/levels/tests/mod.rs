@@ -146,7 +146,7 @@ fn samples(atlas: Option<&Arc<Atlas>>) -> ViewSamples {
         let uv = if slot == 0 { [0.01, 0.01] } else { [at(slot % LANES), at(slot / LANES)] };
         let facing =
             crate::model::fragment::Fragment { base: [0.0, 0.0, 1.0], view: [0.0, 0.0, -1.0], ..NEUTRAL };
-        surface.set_all(slot, &(facing, Unmade { uv, ..Unmade::default() }), 1.0);
+        surface.set_all(slot, &(facing, Unmade { uv, chart: 1.0, ..Unmade::default() }), 1.0);
     }
     ViewSamples {
         group_start: (0..=groups as u32).collect(),

@@ -22,3 +22,34 @@ fn light_NAME_diffuse_and_bounced(
 fn light_NAME_diffuse(albedo: vec3f, light_NAME_facing: f32, light_NAME_irradiance: vec3f) -> vec3f {
     return albedo * (light_NAME_facing * light_NAME_irradiance);
 }
+
+// E_l / pi with what the skin throws back of it, in the light map.
+//
+// gives: light_NAME_lit
+// domain: texel
+// joins: diffusion_lit
+// when: lights, diffusion, lights_bounce
+// cost: 9
+fn light_NAME_in_light_map_and_bounced(
+    light_NAME_facing: f32,
+    light_NAME_bounced: vec3f,
+    light_NAME_irradiance: vec3f,
+    light_NAME_color: vec3f,
+) -> vec3f {
+    return light_NAME_color * ((vec3f(light_NAME_facing) + light_NAME_bounced) * light_NAME_irradiance);
+}
+
+// E_l / pi, in the light map.
+//
+// gives: light_NAME_lit
+// domain: texel
+// joins: diffusion_lit
+// when: lights, diffusion, !lights_bounce
+// cost: 6
+fn light_NAME_in_light_map(
+    light_NAME_facing: f32,
+    light_NAME_irradiance: vec3f,
+    light_NAME_color: vec3f,
+) -> vec3f {
+    return light_NAME_color * (light_NAME_facing * light_NAME_irradiance);
+}

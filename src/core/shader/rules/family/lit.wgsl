@@ -12,7 +12,7 @@ fn light_NAME_cosine(n: vec3f, light_NAME_toward: vec3f, light_NAME_arriving: f3
 //
 // gives: light_NAME_part
 // adds: light_NAME
-// when: lights
+// when: lights, !diffusion
 // cost: 6
 fn light_NAME_shown(light_NAME_term: vec3f, diffuse_weight: vec3f, light_NAME_color: vec3f) -> vec3f {
     return light_NAME_color * diffuse_weight * light_NAME_term;

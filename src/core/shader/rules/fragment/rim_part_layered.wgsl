@@ -2,7 +2,7 @@
 //
 // gives: rim_part
 // shows: rim
-// when: layered
+// when: layered, !diffusion
 // cost: 10
 fn rim_light_layered(
     diffuse_term: vec3f,

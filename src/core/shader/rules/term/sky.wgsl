@@ -8,6 +8,7 @@
 // The ratio as it was found.
 //
 // gives: sky_share
+// domain: texel, fragment
 // when: directional_occlusion, !turning_sky
 // cost: 0
 fn share_of_sky(sky_ratio: vec3f) -> vec3f {
@@ -18,6 +19,7 @@ fn share_of_sky(sky_ratio: vec3f) -> vec3f {
 // harmonics' own turn.
 //
 // gives: sky_share
+// domain: texel, fragment
 // when: directional_occlusion, turning_sky
 // cost: 12
 fn share_of_turning_sky(sky_ratio: vec3f, sky_cosine: vec3f, sky_sine: vec3f, turn: vec2f) -> vec3f {
@@ -27,6 +29,7 @@ fn share_of_turning_sky(sky_ratio: vec3f, sky_cosine: vec3f, sky_sine: vec3f, tu
 // occ = 1 - occlusion (1 - ratio), a channel (MODEL 10).
 //
 // gives: sky_seen
+// domain: texel, fragment
 // when: directional_occlusion, occlusion
 // cost: 6
 fn seen_of_sky(sky_share: vec3f, occlusion: f32) -> vec3f {
@@ -36,6 +39,7 @@ fn seen_of_sky(sky_share: vec3f, occlusion: f32) -> vec3f {
 // Where the effect `occlusion` is off its parameter counts as 1.
 //
 // gives: sky_seen
+// domain: texel, fragment
 // when: directional_occlusion, !occlusion
 // cost: 0
 fn all_seen_of_sky(sky_share: vec3f) -> vec3f {
@@ -45,6 +49,7 @@ fn all_seen_of_sky(sky_share: vec3f) -> vec3f {
 // What the skin throws back is none, or in the ratio.
 //
 // gives: ambient_open
+// domain: texel, fragment
 // when: directional_occlusion, !polynomial_bounces
 // cost: 0
 fn open_to_sky(sky_seen: vec3f) -> vec3f {
@@ -55,6 +60,7 @@ fn open_to_sky(sky_seen: vec3f) -> vec3f {
 // Indirect Occlusion).
 //
 // gives: ambient_open
+// domain: texel, fragment
 // when: directional_occlusion, polynomial_bounces
 // cost: 30
 fn open_to_sky_and_skin(sky_seen: vec3f, albedo: vec3f) -> vec3f {

@@ -332,7 +332,7 @@ fn lobe_without_skin(lobe_term: vec3f) -> vec3f {
 // average.
 //
 // gives: lobe_shown
-// when: skin_reflected
+// when: skin_reflected, !diffusion
 // cost: 9
 fn lobe_with_skin(
     lobe_term: vec3f,
@@ -342,6 +342,22 @@ fn lobe_with_skin(
     environment_share: f32,
 ) -> vec3f {
     return lobe_term + (lobe_weight * environment_share * (1.0 - lobe_open)) * skin_seen;
+}
+
+// The same of the light map: L is what its widest level shows here.
+//
+// gives: lobe_shown
+// when: skin_reflected, diffusion
+// cost: 12
+fn lobe_with_scattered_skin(
+    lobe_term: vec3f,
+    diffusion_widest: vec3f,
+    color_after: vec3f,
+    lobe_weight: f32,
+    lobe_open: f32,
+    environment_share: f32,
+) -> vec3f {
+    return lobe_term + (lobe_weight * environment_share * (1.0 - lobe_open)) * (color_after * diffusion_widest);
 }
 
 // specular_weight s es (SO E_r(R) + (1 - SO) L).

@@ -1,0 +1,436 @@
+//! Texture-space diffusion against the vectors of an independent float64 oracle: stretch, light map, levels, what fragments
+//! look up and how it moves, in f64 and in f32.
+
+use std::path::Path;
+use std::sync::{Arc, OnceLock};
+
+use skinfit::engine::cubes_at::CubesAt;
+use skinfit::engine::levels::{LevelMaker, Levels, Number};
+use skinfit::model::diffusion::{DiffusionChoices, Stretch, Taps};
+use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
+use skinfit::model::evaluate::Setup;
+use skinfit::model::params::{Param, Params};
+use skinfit::samples::surface_records::{Asked, NEUTRAL, Unmade};
+use skinfit::samples::{Atlas, LANES, SurfaceRecords, ViewSamples};
+use skinfit::shader::Facts;
+use skinfit::shader::facts::FaceSizes;
+use skinfit::shader::tangent::chain::Seed;
+use skinfit::shader::term::{Term, library, register};
+use skinfit_core::program::graph::Input;
+use skinfit_core::program::levels::texel_inputs;
+use skinfit_core::program::lower::Natives;
+use skinfit_core::program::shading::{Shading, constant};
+use skinfit_core::program::steps::{Rounding, Steps};
+
+use crate::vectors::reader::{Node, Tolerance, Vectors};
+
+/// Light that each texel holds, in the place of lamps and sky.
+const GIVEN: &str = "\
+// effect: given_light, light that texels hold
+// parameter: given_color = 1 in [0, inf), rgb, linear; scale of a part of it; a test
+// field: given_ambient: vec3f = 0; what the parameter does not scale
+// field: given_key: vec3f = 0; what it does
+//
+// gives: given_lit
+// domain: texel
+// joins: diffusion_lit
+// cost: 3
+fn light_that_is_given(given_ambient: vec3f, given_key: vec3f, given_color: vec3f) -> vec3f {
+    return given_ambient + given_color * given_key;
+}
+
+// gives: given_part
+// adds: given_light
+// cost: 1
+fn nothing_more(given_color: vec3f) -> vec3f {
+    return 0.0 * given_color;
+}
+";
+
+fn given() -> &'static Term {
+    static TERM: OnceLock<&'static Term> = OnceLock::new();
+    TERM.get_or_init(|| register("given", GIVEN).unwrap_or_else(|error| panic!("{error}")))
+}
+
+fn setup(choices: DiffusionChoices) -> Setup {
+    library::register_all();
+    let diffusion = Effect::from_name("diffusion").unwrap();
+    let mut setup =
+        Setup::new(Form::Corrected, Silhouette::Fragment, Effects::of(&[diffusion, given().effect]));
+    setup.choices.diffusion = choices;
+    setup
+}
+
+fn facts(setup: Setup) -> Facts {
+    Facts::of_samples(setup, FaceSizes::default(), false)
+}
+
+/// Inputs round to f32 where texels and samples hold them, which levels and lookups pass on some times.
+const HELD: f64 = 2e-6;
+
+/// What a kind of number may be off.
+fn near<R: Number>(file: &Node<'_>) -> Tolerance {
+    let tolerances = file.vector.tolerances();
+    if size_of::<R>() == 4 { tolerances.single } else { Tolerance { abs: HELD, rel: HELD } }
+}
+
+fn param(name: &str) -> Param {
+    Param::from_name(name).unwrap_or_else(|| panic!("there is no {name}"))
+}
+
+/// Rows of texels, one after another.
+struct Texels {
+    size: usize,
+    charts: Vec<u32>,
+    /// Of each texel of the square: by the field's name.
+    fields: Vec<(&'static str, Vec<[f64; 3]>)>,
+}
+
+impl Texels {
+    fn atlas(&self, setup: &Setup) -> Arc<Atlas> {
+        let inputs = texel_inputs(&facts(*setup)).unwrap();
+        let value = |input: &Input, texel: usize| {
+            let of = |name: &str| {
+                self.fields.iter().find(|(known, _)| *known == name).map(|(_, texels)| texels[texel])
+            };
+            let neutral = if input.name == "albedo" { 1.0 } else { 0.0 };
+            of(&input.name).map_or(neutral, |number| number[input.component]) as f32
+        };
+        Arc::new(Atlas::of_charts(self.size as u32, &self.charts, inputs, value))
+    }
+
+    /// A list of the file over its atlas' texels, `columns` a row, in the square.
+    fn list(&self, rows: &[Vec<[f64; 3]>]) -> Vec<[f64; 3]> {
+        let at = |i: usize| rows.get(i / self.size).and_then(|row| row.get(i % self.size));
+        (0..self.size * self.size).map(|i| at(i).copied().unwrap_or([0.0; 3])).collect()
+    }
+}
+
+/// The texels' numbers, row by row; fewer than three are followed by 0.
+fn rows(node: &Node<'_>) -> Vec<Vec<[f64; 3]>> {
+    let three = |item: Node<'_>| {
+        let mut numbers = item.numbers();
+        numbers.resize(3, 0.0);
+        [numbers[0], numbers[1], numbers[2]]
+    };
+    node.items().iter().map(|row| row.items().into_iter().map(three).collect()).collect()
+}
+
+/// The atlas of the vectors, in a square, its light scaled as `diffusion2_atlas` says.
+struct Case<'v> {
+    file: Node<'v>,
+    texels: Texels,
+    params: Params,
+}
+
+impl<'v> Case<'v> {
+    fn new(vectors: &'v Vectors) -> Self {
+        let file = vectors.files["diffusion2_atlas.json"].root();
+        let inputs = file.at("inputs");
+        let [width, height] = ["width", "height"].map(|name| inputs.at(name).number() as usize);
+        let size = width.max(height);
+        let mut texels = Texels { size, charts: Vec::new(), fields: Vec::new() };
+        texels.charts =
+            texels.list(&rows_of_numbers(&inputs.at("chart"))).iter().map(|c| c[0] as u32).collect();
+        let list = |name: &str| texels.list(&rows(&inputs.at(name)));
+        let sum = |a: &[[f64; 3]], b: &[[f64; 3]], by: f64| -> Vec<[f64; 3]> {
+            a.iter().zip(b).map(|(a, b)| [0, 1, 2].map(|c| a[c] + by * b[c])).collect()
+        };
+        let over_pi = 1.0 / std::f64::consts::PI;
+        let none = vec![[0.0; 3]; size * size];
+        let ambient = sum(&list("ambient"), &list("irradiance_2"), over_pi);
+        let key = sum(&none, &list("irradiance_1"), over_pi);
+        let stretch = list("stretch");
+        let fields = vec![
+            ("albedo", list("colour")),
+            ("given_ambient", ambient),
+            ("given_key", key),
+            ("dpdx_vertex_position", stretch.iter().map(|s| [s[0], 0.0, 0.0]).collect()),
+            ("dpdy_vertex_position", stretch.iter().map(|s| [0.0, s[1], 0.0]).collect()),
+        ];
+        texels.fields = fields;
+        let mut params = Params::defaults(Form::Corrected);
+        params.set_rgb(given().params[0], inputs.at("light_color").three());
+        params.set(param("diffusion_unit"), 1.0);
+        for (k, weight) in (1..).zip(inputs.at("weights_1_to_3").items()) {
+            params.set_rgb(param(&format!("diffusion_weight_{k}")), weight.three());
+        }
+        for (k, radius) in (1..).zip(inputs.at("radii").items()) {
+            params.set(param(&format!("diffusion_radius_{k}")), radius.number());
+        }
+        Self { file, texels, params }
+    }
+
+    /// Samples at the file's lookups.
+    fn samples(&self, atlas: &Arc<Atlas>) -> ViewSamples {
+        let inputs = self.file.at("inputs");
+        let squeeze = inputs.at("height").number() / self.texels.size as f64;
+        let lookups = inputs.at("lookups").items();
+        let asked = Asked { uv: true, albedo: true, ..Asked::default() };
+        let mut surface = SurfaceRecords::new(asked, 1);
+        for slot in 0..LANES {
+            let lookup = &lookups[slot.min(lookups.len() - 1)];
+            lookup.at("case").text();
+            let [u, v] = [0, 1].map(|c| lookup.at("uv").item(c).number());
+            let albedo = lookup.at("albedo").three().map(|x| x as f32);
+            let fragment = skinfit::model::fragment::Fragment {
+                base: [0.0, 0.0, 1.0],
+                view: [0.0, 0.0, -1.0],
+                albedo,
+                ..NEUTRAL
+            };
+            let uv = [u as f32, (v * squeeze) as f32];
+            let chart = lookup.at("chart").number() as f32;
+            surface.set_all(slot, &(fragment, Unmade { uv, chart, ..Unmade::default() }), 1.0);
+        }
+        ViewSamples {
+            group_start: vec![0, 1],
+            pixel: (0..LANES as u32).collect(),
+            coverage: vec![1.0; LANES],
+            surface,
+            atlas: Some(Arc::clone(atlas)),
+        }
+    }
+
+    fn lookups(&self) -> usize {
+        self.file.at("inputs").at("lookups").items().len()
+    }
+}
+
+fn rows_of_numbers(node: &Node<'_>) -> Vec<Vec<[f64; 3]>> {
+    node.items().iter().map(|row| row.numbers().into_iter().map(|x| [x, 0.0, 0.0]).collect()).collect()
+}
+
+fn read() -> Vectors {
+    Vectors::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors_light"))
+}
+
+/// The levels of an atlas.
+fn levels<R: Number>(setup: &Setup, atlas: &Atlas, params: &Params) -> Levels<R> {
+    let shading = Shading::new(&facts(*setup), &[], |_| None, Natives::Written).unwrap();
+    LevelMaker::<R>::new(shading.levels).make(atlas, params, &CubesAt::dark(|x| R::from(x)))
+}
+
+fn numbers<R: Number>(texels: &[[R; 3]]) -> Vec<f64> {
+    texels.iter().flatten().map(|&x| x.into()).collect()
+}
+
+/// What samples look up and show: quantities by name, and how the sum moves along each seed.
+struct Shown {
+    quantities: Vec<(&'static str, Vec<[f64; 3]>)>,
+    slopes: Vec<Vec<[f64; 3]>>,
+}
+
+fn shown<R: Number>(
+    case: &Case<'_>,
+    setup: &Setup,
+    params: &Params,
+    seeds: &[Param],
+    names: &[&'static str],
+) -> Shown {
+    let samples = case.samples(&case.texels.atlas(setup));
+    let along: Vec<Seed> = seeds.iter().map(|&param| Seed::of_param(param)).collect();
+    let shading = Shading::new(&facts(*setup), &along, |_| None, Natives::Written).unwrap();
+    let mut outputs: Vec<_> = shading.tangents.iter().flat_map(|tangent| tangent[..3].to_vec()).collect();
+    let by_rules = names.iter().filter_map(|name| shading.quantities.get(name));
+    outputs.extend(by_rules.flatten());
+    let steps = Steps::new(&shading.graph, &outputs, |_| Rounding::Plain);
+    let maker = LevelMaker::<R>::new(shading.levels);
+    let found = maker.look_up(&samples, params, || CubesAt::dark(|x| R::from(x)), |row| row);
+    let mut shown = Shown {
+        quantities: names.iter().map(|&name| (name, Vec::new())).collect(),
+        slopes: seeds.iter().map(|_| Vec::new()).collect(),
+    };
+    let fragments = (0..case.lookups()).map(|slot| samples.surface.fragment(slot));
+    for (slot, fragment) in fragments.enumerate() {
+        let setting =
+            steps.setting(0.0_f64, |input| constant(input, params).unwrap(), |name| panic!("no cube {name}"));
+        let mut registers = Vec::new();
+        steps.run(&setting, 0.0, &mut registers, |place| {
+            let input = &steps.fields()[place];
+            match (maker.row(input), input.name.as_str()) {
+                (Some(row), _) => found[row][slot].into(),
+                (None, "albedo") => f64::from(fragment.albedo[input.component]),
+                (None, other) => panic!("a sample has no {other}"),
+            }
+        });
+        let mut given = steps.outputs(&setting, &registers);
+        let mut three = || [0; 3].map(|_| given.next().unwrap());
+        shown.slopes.iter_mut().for_each(|slopes| slopes.push(three()));
+        for (name, values) in &mut shown.quantities {
+            let looked_up = |component| maker.row(&Input { name: (*name).to_owned(), component });
+            values.push(match looked_up(0) {
+                Some(row) => [0, 1, 2].map(|c| found[row + c][slot].into()),
+                None => three(),
+            });
+        }
+    }
+    shown
+}
+
+impl Shown {
+    fn of(&self, name: &str) -> Vec<f64> {
+        let found = self.quantities.iter().find(|(known, _)| *known == name).unwrap();
+        found.1.iter().flatten().copied().collect()
+    }
+}
+
+const LEVELS: [&str; 4] =
+    ["diffusion_level_0", "diffusion_level_1", "diffusion_level_2", "diffusion_level_3"];
+
+/// Light map, levels, what fragments show of them and how it moves.
+fn mixed<R: Number>(vectors: &Vectors, file: &Node<'_>) {
+    let mut case = Case::new(vectors);
+    let (constants, expected) = (file.at("constants"), file.at("expected"));
+    file.at("atlas_file").assert_text("diffusion2_atlas.json");
+    let taps = match constants.at("taps") {
+        name if name.is_text() => Taps::Full,
+        count => *Taps::ALL.iter().find(|taps| taps.count() == Some(count.number() as u32)).unwrap(),
+    };
+    let setup = setup(DiffusionChoices { taps, ..DiffusionChoices::DEFAULT });
+    case.params.set(param("colour_mix"), constants.at("colour_mix").number());
+    let radii = constants.at("radii").numbers();
+    (1..).zip(&radii).for_each(|(k, &radius)| {
+        assert_eq!(case.params.scalar(param(&format!("diffusion_radius_{k}"))), radius);
+    });
+    let near = near::<R>(file);
+    let made = levels::<R>(&setup, &case.texels.atlas(&setup), &case.params);
+    if let Some(want) = expected.get("light_map") {
+        near.check("light map", &numbers(&made[LEVELS[0]]), &want);
+        for (k, want) in expected.at("levels").items().iter().enumerate() {
+            near.check("level", &numbers(&made[LEVELS[k + 1]]), want);
+        }
+        let weights = [1, 2, 3].map(|k| case.params.rgb(param(&format!("diffusion_weight_{k}"))));
+        let mixed = |i: usize| -> [f64; 3] {
+            let level = |k: usize, c: usize| -> f64 { made[LEVELS[k]][i][c].into() };
+            [0, 1, 2].map(|c| {
+                level(0, c) + (1..4).map(|k| weights[k - 1][c] * (level(k, c) - level(0, c))).sum::<f64>()
+            })
+        };
+        let all: Vec<f64> = (0..made[LEVELS[0]].len()).flat_map(mixed).collect();
+        near.check("scattered", &all, &expected.at("scattered"));
+    }
+    let jacobian = expected.at("jacobian");
+    let columns: Vec<Param> = jacobian
+        .at("columns")
+        .items()
+        .iter()
+        .map(|name| if name.text() == "light_color" { given().params[0] } else { param(name.text()) })
+        .collect();
+    let names = [&LEVELS[..], &["scattered_light", "diffuse_part"]].concat();
+    let shown = shown::<R>(&case, &setup, &case.params, &columns, &names);
+    let looked_up: Vec<Vec<f64>> = LEVELS.iter().map(|name| shown.of(name)).collect();
+    let order = (0..case.lookups())
+        .flat_map(|i| looked_up.iter().flat_map(move |level| level[3 * i..3 * i + 3].to_vec()));
+    near.check("levels looked up", &order.collect::<Vec<f64>>(), &expected.at("levels_at_lookups"));
+    near.check("scattered, looked up", &shown.of("scattered_light"), &expected.at("scattered_at_lookups"));
+    near.check("final", &shown.of("diffuse_part"), &expected.at("final"));
+    // Where a deviation is many texels, taps move by as many for a millimetre: what rounds counts tenfold.
+    let slopes = (0..case.lookups()).flat_map(|i| (0..3).map(move |c| (i, c)));
+    let slopes = slopes.flat_map(|(i, c)| shown.slopes.iter().map(move |slope| slope[i][c]));
+    near.times(10.0).check("Jacobian", &slopes.collect::<Vec<f64>>(), &jacobian.at("J"));
+}
+
+#[test]
+fn light_maps_levels_and_lookups_are_those_of_the_vectors_and_move_as_they_do() {
+    let vectors = read();
+    let mut files = 0;
+    for file in vectors.of_kind("diffusion2") {
+        if file.get("constants").and_then(|constants| constants.get("taps")).is_some() {
+            mixed::<f64>(&vectors, &file);
+            mixed::<f32>(&vectors, &file);
+            files += 1;
+        }
+    }
+    assert_eq!(files, 8);
+}
+
+#[test]
+fn lookups_weigh_the_texels_of_their_own_chart() {
+    let vectors = read();
+    let case = Case::new(&vectors);
+    let setup = setup(DiffusionChoices::DEFAULT);
+    let size = case.texels.size;
+    let covered: Vec<usize> = (0..size * size).filter(|&i| case.texels.charts[i] > 0).collect();
+    let mut weights = vec![Vec::new(); case.lookups()];
+    // A texel a channel is lit at a time: what a lookup finds is what it weighs.
+    for three in covered.chunks(3) {
+        let mut lit = vec![[0.0; 3]; size * size];
+        three.iter().enumerate().for_each(|(c, &texel)| lit[texel][c] = 1.0);
+        let mut one = Case::new(&vectors);
+        one.texels.fields.retain(|(name, _)| name.starts_with("dpd"));
+        one.texels.fields.push(("given_ambient", lit));
+        let found = shown::<f64>(&one, &setup, &one.params, &[], &LEVELS[..1]);
+        for (weights, level) in weights.iter_mut().zip(found.of(LEVELS[0]).chunks(3)) {
+            weights.extend(three.iter().zip(level).map(|(&texel, &weight)| (texel, weight)));
+        }
+    }
+    let near = near::<f64>(&case.file);
+    for (found, want) in weights.iter().zip(case.file.at("expected").at("lookup_weights").items()) {
+        let mut found: Vec<(usize, f64)> =
+            found.iter().copied().filter(|(_, weight)| *weight > 1e-6).collect();
+        found.sort_unstable_by_key(|(texel, _)| *texel);
+        let mut want = want.items();
+        // Texture coordinates round to f32: a texel may weigh 1e-7.
+        want.retain(|entry| entry.item(2).number() > 1e-6);
+        assert_eq!(found.len(), want.len(), "{found:?}");
+        for ((texel, weight), want) in found.iter().zip(want) {
+            let at = [(texel % size) as f64, (texel / size) as f64, *weight];
+            near.check("weight", &at, &want);
+        }
+    }
+}
+
+#[test]
+fn a_light_map_of_one_constant_has_levels_of_that_constant_to_the_bit() {
+    let vectors = read();
+    let mut case = Case::new(&vectors);
+    let constant = case.file.at("expected").at("constant");
+    let light = constant.at("light").number();
+    let every = constant.at("every_level").wanted()[0];
+    case.texels.fields.retain(|(name, _)| name.starts_with("dpd"));
+    case.texels.fields.push(("given_ambient", vec![[light; 3]; case.texels.size * case.texels.size]));
+    for &taps in Taps::ALL {
+        let setup = setup(DiffusionChoices { taps, ..DiffusionChoices::DEFAULT });
+        // Radius 0 is below the least that may be given, and that of a head beyond the greatest.
+        for radius in [0.0, 0.02, 1.0, 30.0, 150.0] {
+            (1..4).for_each(|k| case.params.set(param(&format!("diffusion_radius_{k}")), radius));
+            let atlas = case.texels.atlas(&setup);
+            for made in [levels::<f64>(&setup, &atlas, &case.params)] {
+                LEVELS.iter().for_each(|name| assert!(made[*name].iter().flatten().all(|&x| x == every)));
+            }
+            let made = levels::<f32>(&setup, &atlas, &case.params);
+            LEVELS
+                .iter()
+                .for_each(|name| assert!(made[*name].iter().flatten().all(|&x| f64::from(x) == every)));
+        }
+    }
+}
+
+#[test]
+fn stretch_from_neighbour_to_neighbour_is_that_of_the_vectors() {
+    let vectors = read();
+    let file = vectors.files["diffusion2_stretch.json"].root();
+    file.at("atlas_file").assert_text("diffusion2_atlas.json");
+    let mut case = Case::new(&vectors);
+    let position = case.texels.list(&rows(&file.at("inputs").at("position_mm")));
+    case.texels.fields.push(("vertex_position", position));
+    let setup = setup(DiffusionChoices { stretch: Stretch::Derivative, ..DiffusionChoices::DEFAULT });
+    let atlas = case.texels.atlas(&setup);
+    fn check<R: Number>(case: &Case<'_>, setup: &Setup, atlas: &Atlas, want: &Node<'_>) {
+        let made = levels::<R>(setup, atlas, &case.params);
+        let stretch = &made["diffusion_stretch"];
+        let size = case.texels.size;
+        for (row, want) in want.items().iter().enumerate() {
+            for (column, want) in want.items().iter().enumerate() {
+                let place = atlas.place(column as i64, row as i64);
+                let found = place.map_or([0.0; 2], |place| [0, 1].map(|c| stretch[place][c].into()));
+                assert_eq!(place.is_some(), case.texels.charts[row * size + column] > 0);
+                near::<R>(&case.file).check("stretch", &found, want);
+            }
+        }
+    }
+    let want = file.at("expected").at("stretch");
+    check::<f64>(&case, &setup, &atlas, &want);
+    check::<f32>(&case, &setup, &atlas, &want);
+}
