@@ -516,7 +516,7 @@ mod over_stored_texels {
         let facts = Facts::of_samples(scene.setup(), FaceSizes::default(), false);
         let shading = Shading::new(&facts, &[], |_| None, Natives::Written).unwrap();
         let levels =
-            LevelMaker::<f32>::new(shading.levels).make(&atlas, &scene.params, &CubesAt::dark(|x| x));
+            LevelMaker::<f32>::new(shading.levels).make(&atlas, &scene.params, &CubesAt::dark(|x| x)).all();
         for name in ["glow_soft", "veins_stretch", "veins_soft"] {
             let drawn: Vec<&[f32]> = drawn_levels[name].chunks_exact(4).collect();
             assert_eq!(drawn.len(), TEXELS * TEXELS);
@@ -560,7 +560,7 @@ mod over_stored_texels {
         let facts = Facts::of_samples(scene.setup(), faces, params.scalar(Param::EnvironmentRotation) != 0.0);
         let shading = Shading::new(&facts, &[], |_| None, Natives::Written).unwrap();
         let cubes = CubesAt::new(&head.illumination, params, f64::from);
-        let levels = LevelMaker::<f64>::new(shading.levels).make(&atlas, params, &cubes);
+        let levels = LevelMaker::<f64>::new(shading.levels).make(&atlas, params, &cubes).all();
         let drawn: Vec<&[f32]> = drawn_levels["lit_light"].chunks_exact(4).collect();
         let covered = drawn.iter().filter(|texel| texel[3] > 0.0).count();
         let mut off: Vec<f64> = Vec::new();

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use skinfit::engine::cubes_at::CubesAt;
-use skinfit::engine::levels::{LevelMaker, Levels, Number};
+use skinfit::engine::levels::{LevelMaker, Number};
 use skinfit::model::diffusion::{DiffusionChoices, Stretch, Taps};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
@@ -206,9 +206,13 @@ fn read() -> Vectors {
 }
 
 /// The levels of an atlas.
-fn levels<R: Number>(setup: &Setup, atlas: &Atlas, params: &Params) -> Levels<R> {
+fn levels<R: Number>(
+    setup: &Setup,
+    atlas: &Atlas,
+    params: &Params,
+) -> std::collections::BTreeMap<String, Vec<[R; 3]>> {
     let shading = Shading::new(&facts(*setup), &[], |_| None, Natives::Written).unwrap();
-    LevelMaker::<R>::new(shading.levels).make(atlas, params, &CubesAt::dark(|x| R::from(x)))
+    LevelMaker::<R>::new(shading.levels).make(atlas, params, &CubesAt::dark(|x| R::from(x))).all()
 }
 
 fn numbers<R: Number>(texels: &[[R; 3]]) -> Vec<f64> {

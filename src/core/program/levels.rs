@@ -19,6 +19,8 @@ pub struct LevelProgram {
     pub passes: Vec<LevelPass>,
     /// The levels that samples look up, each with how many numbers it has; what was found is a field of that name.
     pub looked_up: Vec<(String, usize)>,
+    /// Whether some of them move along a seed.
+    pub moves: bool,
 }
 
 /// One pass.
@@ -28,34 +30,56 @@ pub struct LevelPass {
     pub steps: Steps,
     /// What it leaves, each with how many numbers it has.
     pub leaves: Vec<(String, usize)>,
-    /// Of a blur what is done with the taps that the steps yield.
-    pub blur: Option<BlurOf>,
-    /// Of a pass over neighbours, the level whose steps from one to the other are the steps' field [`APART_FIELD`].
-    pub neighbours: Option<String>,
+    /// What is done with what the steps yield.
+    pub then: Then,
 }
 
-/// One direction of a blur.
+/// What a pass does with what its steps yield of a texel.
+#[derive(Clone, Debug)]
+pub enum Then {
+    /// It leaves that.
+    Leave,
+    /// One direction of a blur, whose taps the steps yield.
+    Blur(BlurOf),
+    /// One direction of a blur by a Gaussian, of several levels at once.
+    Gaussian(GaussianOf),
+    /// It leaves that; how far each texel's neighbours lie apart, by what a level holds, is the steps' field
+    /// [`APART_FIELD`].
+    Neighbours(String),
+}
+
+/// One direction of a blur by taps.
 #[derive(Clone, Debug)]
 pub struct BlurOf {
     /// Along which axis.
     pub axis: Axis,
-    /// Which texels count.
-    pub kernel: Taps,
+    /// Taps to either side, each a place and a weight that the steps yield.
+    pub reach: usize,
     /// The level that is blurred.
     pub source: String,
     /// Where the kernel moves: the level that holds how the source moves, if it does.
     pub moving: Option<Option<String>>,
 }
 
-/// Which texels a blur counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Taps {
-    /// Those of taps that the steps yield, so many to either side: where each lies, and what it weighs.
-    Given(usize),
-    /// Taps a standard deviation apart, so many to either side; the steps yield the deviation, in texels.
-    Gaussian(usize),
-    /// Every texel within six deviations.
-    WholeGaussian,
+/// One direction of a blur by a Gaussian: of a level, and of how that moves. The steps yield the deviation, in texels, and
+/// then how it moves along each seed that moves it.
+#[derive(Clone, Debug)]
+pub struct GaussianOf {
+    /// Along which axis.
+    pub axis: Axis,
+    /// Taps to either side, a deviation apart; `None` where every texel within six deviations counts.
+    pub reach: Option<usize>,
+    /// What each of the pass' leaves is of. The first is the level itself.
+    pub columns: Vec<GaussianColumn>,
+}
+
+/// A level that a Gaussian blurs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GaussianColumn {
+    /// The level; `None` of one that is 0 everywhere.
+    pub source: Option<String>,
+    /// Which of the steps' numbers after the deviation is how that moves along the leaf's seed.
+    pub moved: Option<usize>,
 }
 
 impl LevelProgram {
@@ -65,20 +89,56 @@ impl LevelProgram {
     /// When a pass cannot be computed on the processor.
     pub fn new(plan: &Plan, chain: &Chain) -> Result<Self, LowerError> {
         let mut program = Self::default();
-        let mut add = |pass: &Pass, rename: &dyn Fn(&str) -> String| -> Result<(), LowerError> {
-            program.passes.push(LevelPass::new(pass, rename)?);
-            Ok(())
-        };
-        plan.passes.iter().try_for_each(|pass| add(pass, &str::to_owned))?;
-        for (k, along) in chain.along.iter().enumerate() {
+        for (at, pass) in plan.passes.iter().enumerate() {
             // Each seed has tangents of its own; what does not move is the plan's.
-            let moved = |name: &str| along.moved.values().any(|level| level.name == name);
-            let rename = |name: &str| if moved(name) { tangent_of(k, name) } else { name.to_owned() };
-            along.passes.iter().try_for_each(|pass| add(pass, &rename))?;
+            let tangents = chain.along.iter().enumerate().flat_map(|(k, along)| {
+                let moved: Vec<String> = along.moved.values().map(|level| level.name.clone()).collect();
+                let own = along.passes.iter().zip(&along.derived).filter(move |(_, from)| **from == at);
+                own.map(move |(pass, _)| Named { pass, seed: Some((k, moved.clone())) })
+            });
+            let passes: Vec<Named<'_>> =
+                std::iter::once(Named { pass, seed: None }).chain(tangents).collect();
+            program.add(&passes)?;
         }
         let found = plan.looked_up(chain).into_iter();
+        program.moves = chain.along.iter().any(|along| !along.passes.is_empty());
         program.looked_up = found.map(|(name, kind)| (name, components(kind))).collect();
         Ok(program)
+    }
+
+    /// Add a pass with those that leave how its leaves move.
+    fn add(&mut self, passes: &[Named<'_>]) -> Result<(), LowerError> {
+        let alone = |pass: &Named<'_>, then| LevelPass::new(std::slice::from_ref(pass), then);
+        let together = match passes[0].pass.kind {
+            PassKind::Draw => Some(Then::Leave),
+            PassKind::Blur(axis) if kernel(passes[0].pass) == Kernel::Gaussian => {
+                Some(Then::Gaussian(gaussian(axis, passes)))
+            }
+            PassKind::Blur(_) | PassKind::Neighbours => None,
+        };
+        if let Some(then) = together {
+            self.passes.push(LevelPass::new(passes, then)?);
+            return Ok(());
+        }
+        for pass in passes {
+            let source = || pass.name(&pass.pass.plan.levels[0].name);
+            let then = match pass.pass.kind {
+                PassKind::Blur(axis) => {
+                    let moving = pass.pass.moving.as_ref();
+                    let moving =
+                        moving.map(|kernel| kernel.blurred.as_ref().map(|moved| pass.name(&moved.name)));
+                    let reach = match kernel(pass.pass) {
+                        Kernel::Taps(taps) => taps as usize / 2,
+                        Kernel::Gaussian | Kernel::Neighbours => 0,
+                    };
+                    Then::Blur(BlurOf { axis, reach, source: source(), moving })
+                }
+                PassKind::Neighbours => Then::Neighbours(source()),
+                PassKind::Draw => Then::Leave,
+            };
+            self.passes.push(alone(pass, then)?);
+        }
+        Ok(())
     }
 
     /// Whether nothing is computed in texels.
@@ -93,6 +153,7 @@ impl LevelProgram {
         let left = |passes: &[LevelPass], pass: &LevelPass| {
             pass.leaves.iter().all(|leaf| passes.iter().any(|known| known.leaves.contains(leaf)))
         };
+        self.moves |= other.moves;
         for pass in other.passes {
             if !left(&self.passes, &pass) {
                 self.passes.push(pass);
@@ -109,9 +170,14 @@ impl LevelProgram {
     #[must_use]
     pub fn fields(&self) -> Vec<Input> {
         let left = |name: &str| self.passes.iter().any(|pass| pass.leaves.iter().any(|leaf| leaf.0 == name));
+        let made = |pass: &LevelPass, name: &str| {
+            matches!(pass.then, Then::Neighbours(_)) && name == APART_FIELD || left(name)
+        };
         let mut fields: Vec<Input> = Vec::new();
-        for input in self.passes.iter().flat_map(|pass| pass.steps.fields()) {
-            if !left(&input.name) && !fields.contains(input) {
+        for (pass, input) in
+            self.passes.iter().flat_map(|pass| pass.steps.fields().iter().map(move |i| (pass, i)))
+        {
+            if !made(pass, &input.name) && !fields.contains(input) {
                 fields.push(input.clone());
             }
         }
@@ -124,22 +190,95 @@ fn tangent_of(k: usize, name: &str) -> String {
     format!("d{k}{}", name.strip_prefix('d').unwrap_or(name))
 }
 
+/// What a texel's neighbours are apart, of a pass over them.
+pub const APART_FIELD: &str = "apart";
+
+/// A pass, and of one that leaves how levels move, along which seed, and the names of those.
+struct Named<'a> {
+    pass: &'a Pass,
+    seed: Option<(usize, Vec<String>)>,
+}
+
+impl Named<'_> {
+    /// The name of a level in the program.
+    fn name(&self, name: &str) -> String {
+        match &self.seed {
+            Some((k, moved)) if moved.iter().any(|level| level == name) => tangent_of(*k, name),
+            _ => name.to_owned(),
+        }
+    }
+
+    fn level(&self, level: &Level) -> (String, usize) {
+        (self.name(&level.name), components(level.kind))
+    }
+}
+
+/// The kernel of a blur's pass.
+fn kernel(pass: &Pass) -> Kernel {
+    pass.plan.steps[0].rule.blur.as_ref().map_or(Kernel::Taps(1), |blur| blur.kernel)
+}
+
+/// What the passes of one direction of a Gaussian are of: the level's, and those of how it moves.
+fn gaussian(axis: Axis, passes: &[Named<'_>]) -> GaussianOf {
+    let mut movers = 0;
+    let column = |pass: &Named<'_>| match &pass.pass.moving {
+        None => GaussianColumn { source: Some(pass.level(&pass.pass.plan.levels[0]).0), moved: None },
+        Some(kernel) => {
+            movers += 1;
+            let source = kernel.blurred.as_ref().map(|moved| pass.level(moved).0);
+            GaussianColumn { source, moved: Some(movers - 1) }
+        }
+    };
+    let taps = passes[0].pass.plan.facts.setup.choices.diffusion.taps.count();
+    GaussianOf {
+        axis,
+        reach: taps.map(|taps| taps as usize / 2),
+        columns: passes.iter().map(column).collect(),
+    }
+}
+
 impl LevelPass {
-    fn new(pass: &Pass, rename: &dyn Fn(&str) -> String) -> Result<Self, LowerError> {
-        let (entry, blur) = match pass.kind {
-            PassKind::Draw => (TEXEL, None),
-            PassKind::Blur(axis) => (TAPS, Some(axis)),
-            PassKind::Neighbours => (APART, None),
+    /// Of passes whose steps are made together: what they have in common is computed once.
+    fn new(passes: &[Named<'_>], then: Then) -> Result<Self, LowerError> {
+        let mut graph = Graph::default();
+        let mut outputs: Vec<Id> = Vec::new();
+        let mut deviation = false;
+        for pass in passes {
+            let moves = pass.pass.moving.is_some();
+            let numbers = pass.lowered(&mut graph)?;
+            match then {
+                // The deviation once, and then how it moves.
+                Then::Gaussian(_) => {
+                    let own = usize::from(deviation);
+                    outputs.extend(&numbers[own..if moves { 2 } else { 1 }]);
+                    deviation = true;
+                }
+                _ => outputs.extend(numbers),
+            }
+        }
+        let leaves = passes.iter().flat_map(|pass| pass.pass.leaves.iter().map(|leaf| pass.level(leaf)));
+        let leaves = leaves.collect();
+        Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then })
+    }
+}
+
+impl Named<'_> {
+    /// The pass' function in a graph, and what it yields.
+    fn lowered(&self, graph: &mut Graph) -> Result<Vec<Id>, LowerError> {
+        let pass = self.pass;
+        let entry = match pass.kind {
+            PassKind::Draw => TEXEL,
+            PassKind::Blur(_) => TAPS,
+            PassKind::Neighbours => APART,
         };
         let source = Source::new(&pass.plan.wgsl, Natives::Written)?;
-        let mut graph = Graph::default();
         let sample = source.argument(entry)?;
         let mut numbers: Vec<Id> = Vec::new();
         for (name, width) in sample {
             let held = pass.plan.varyings.iter().any(|(held, _)| *held == name);
             let is_level = pass.plan.levels.iter().any(|level| level.name == name)
                 || (pass.kind == PassKind::Neighbours && name == APART_FIELD);
-            let name = if is_level { rename(&name) } else { name };
+            let name = if is_level { self.name(&name) } else { name };
             // What is neither fills a structure that would be empty.
             let number = |component| match held || is_level {
                 true => graph.field(&name, component),
@@ -147,35 +286,9 @@ impl LevelPass {
             };
             numbers.extend((0..width).map(number));
         }
-        let outputs = source.call(&mut graph, entry, vec![Value::Numbers(numbers)])?;
-        check_steps(pass, &graph)?;
-        let level = |level: &Level| (rename(&level.name), components(level.kind));
-        let blur = blur.map(|axis| BlurOf {
-            axis,
-            kernel: counted(pass),
-            source: level(&pass.plan.levels[0]).0,
-            moving: pass.moving.as_ref().map(|kernel| kernel.blurred.as_ref().map(|moved| level(moved).0)),
-        });
-        Ok(Self {
-            steps: Steps::new(&graph, &outputs, |_| Rounding::Plain),
-            leaves: pass.leaves.iter().map(level).collect(),
-            blur,
-            neighbours: (pass.kind == PassKind::Neighbours).then(|| level(&pass.plan.levels[0]).0),
-        })
-    }
-}
-
-/// What a texel's neighbours are apart, of a pass over them.
-pub const APART_FIELD: &str = "apart";
-
-/// Which texels the blur of a pass counts.
-fn counted(pass: &Pass) -> Taps {
-    let kernel = pass.plan.steps[0].rule.blur.as_ref().map_or(Kernel::Taps(1), |blur| blur.kernel);
-    let count = pass.plan.facts.setup.choices.diffusion.taps.count();
-    match (kernel, count) {
-        (Kernel::Taps(taps), _) => Taps::Given(taps as usize / 2),
-        (_, Some(taps)) => Taps::Gaussian(taps as usize / 2),
-        (_, None) => Taps::WholeGaussian,
+        let outputs = source.call(graph, entry, vec![Value::Numbers(numbers)])?;
+        check_steps(pass, graph)?;
+        Ok(outputs)
     }
 }
 

@@ -37,7 +37,7 @@ impl<'a> Block<'a> {
     /// The row of record `i` of the block among a field's. Asks for what its pixel is compared with.
     #[inline(always)]
     pub(super) fn begin(&self, i: usize) -> usize {
-        let Stream { rows, stride } = self.stream(StreamOf::Targets);
+        let Stream { rows, stride, .. } = self.stream(StreamOf::Targets);
         prefetch_rows(rows, (self.first + i) * stride, stride);
         i * self.stride()
     }
@@ -69,7 +69,7 @@ impl<'a> Block<'a> {
     /// The kept numbers of record `i` of the block. Asks for a later record's as well.
     #[inline(always)]
     pub(super) fn kept<const N: usize>(&self, i: usize) -> &'a [Row; N] {
-        let Stream { rows, stride } = self.stream(StreamOf::Kept);
+        let Stream { rows, stride, .. } = self.stream(StreamOf::Kept);
         prefetch_rows(rows, (self.first + i + AHEAD) * stride, N);
         rows[(self.first + i) * stride..].first_chunk().unwrap_or(&[Row::ZERO; N])
     }

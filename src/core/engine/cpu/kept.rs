@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::file::File;
 use super::lobe::Lobes;
 use super::pass::Pass;
-use super::streams::{BATCH, Stream};
+use super::streams::BATCH;
 use super::sums::CHUNK;
 use super::view_pass::{Beside, streams};
 use super::{CpuEngine, machine};
@@ -51,8 +51,7 @@ impl CpuEngine {
             return kept;
         }
         let bound = self.bound(&pass.keep, point, lobes);
-        let none = Stream { rows: &[], stride: 0 };
-        let streams = streams(observed, Beside { kept: none, levels: none }, &self.neutral);
+        let streams = streams(observed, Beside::default(), &self.neutral);
         let size = BLOCK * CHUNK;
         kept.par_chunks_mut(stride * size).enumerate().for_each_init(File::default, |file, (chunk, rows)| {
             file.prepare(&bound);

@@ -1,11 +1,13 @@
-//! Looked-up rows: what samples find of the UV atlas.
+//! What samples find of the UV atlas: rows of each record where that stays from pass to pass, levels where it moves.
 
 use std::sync::{Arc, PoisonError};
 
 use super::CpuEngine;
 use super::pass::Pass;
+use super::view_pass::Lookup;
 use crate::engine::Point;
 use crate::engine::cubes_at::CubesAt;
+use crate::engine::levels::{Corners, Finder, corners_of};
 use crate::samples::rows::Row;
 
 /// What samples look up of the UV atlas, and what that was made with.
@@ -13,8 +15,26 @@ use crate::samples::rows::Row;
 pub(super) struct LookedUp {
     turned: bool,
     made_with: Vec<f64>,
-    /// For each view, rows of each record.
-    pub(super) views: Vec<Vec<Row>>,
+    views: Vec<Found>,
+}
+
+/// What a view's samples find.
+#[derive(Debug)]
+enum Found {
+    /// Rows of each record.
+    Rows(Vec<Row>),
+    /// Levels, which every pass looks up anew: to write rows down and read them again takes longer.
+    Levels(Finder<f32>, Arc<Vec<Vec<Corners<f32>>>>),
+}
+
+impl LookedUp {
+    /// What a view's passes read: rows, or what they look up by.
+    pub(super) fn of(&self, view: usize) -> (&[Row], Option<Lookup<'_>>) {
+        match &self.views[view] {
+            Found::Rows(rows) => (rows, None),
+            Found::Levels(finder, corners) => (&[], Some(Lookup { finder, corners: &corners[view] })),
+        }
+    }
 }
 
 impl CpuEngine {
@@ -32,10 +52,22 @@ impl CpuEngine {
         }
         let params = &point.params;
         let cubes = || CubesAt::new(&self.illumination, params, |x| x);
-        let views = self.views.iter().map(|view| pass.levels.look_up(&view.samples, params, cubes, Row::of));
+        let views = self.views.iter().map(|view| match &view.samples.atlas {
+            Some(atlas) if pass.levels.moves() && view.samples.records() > 0 => {
+                let made = pass.levels.levels(atlas, params, cubes);
+                Found::Levels(Finder::new(&pass.levels, made), self.corners())
+            }
+            _ => Found::Rows(pass.levels.look_up(&view.samples, params, cubes, Row::of)),
+        });
         let found = Arc::new(LookedUp { turned, views: views.collect(), made_with });
         *lock() = Some(Arc::clone(&found));
         Some(found)
+    }
+
+    /// The texels that each view's samples look up.
+    fn corners(&self) -> Arc<Vec<Vec<Corners<f32>>>> {
+        let made = || Arc::new(self.views.iter().map(|view| corners_of(&view.samples)).collect());
+        Arc::clone(self.corners.get_or_init(made))
     }
 
     /// How often levels of the UV atlas were made: once for as long as nothing changes that moves them.

@@ -111,7 +111,8 @@ fn run_each<S: Simd>(
         match op {
             Op::Load(field, out) => {
                 let (stream, place) = bound.loads[*field];
-                let Stream { rows, stride } = streams[stream as usize];
+                let Stream { rows, stride, skipped } = streams[stream as usize];
+                let first = first - skipped;
                 let place = if stream == StreamOf::Neutral { first_neutral(rows, place) } else { place };
                 let out = &file.registers[*out];
                 if count == WIDTH {

@@ -53,6 +53,7 @@ use self::view_pass::{Beside, ViewPass, streams, with_scratch};
 use super::view::ObservedView;
 use super::{BLOCK, Point, Task, Unknown};
 use crate::bake::Illumination;
+use crate::engine::levels::Corners;
 use crate::model::cube::Cube;
 use crate::model::params::Param;
 use crate::program::shading::ShadingError;
@@ -80,6 +81,8 @@ pub struct CpuEngine {
     lobes: Mutex<Lobes>,
     kept: Mutex<Option<Arc<Kept>>>,
     looked_up: Mutex<Option<Arc<LookedUp>>>,
+    /// The texels that each view's samples look up.
+    corners: OnceLock<Arc<Vec<Vec<Corners<f32>>>>>,
     /// Why a pass could not be made.
     fault: OnceLock<String>,
 }
@@ -94,10 +97,11 @@ struct Ready {
 
 impl Ready {
     fn beside(&self, view: usize) -> Beside<'_> {
-        let looked_up = self.looked_up.as_ref().map_or(&[][..], |found| &found.views[view]);
+        let (rows, lookup) = self.looked_up.as_ref().map_or((&[][..], None), |found| found.of(view));
         Beside {
-            kept: Stream { rows: &self.kept.views[view], stride: self.pass.kept },
-            levels: Stream { rows: looked_up, stride: self.pass.levels.rows() },
+            kept: Stream { rows: &self.kept.views[view], stride: self.pass.kept, skipped: 0 },
+            levels: Stream { rows, stride: self.pass.levels.rows(), skipped: 0 },
+            lookup,
         }
     }
 }
@@ -135,6 +139,7 @@ impl CpuEngine {
             lobes: Mutex::default(),
             kept: Mutex::default(),
             looked_up: Mutex::default(),
+            corners: OnceLock::new(),
             fault: OnceLock::new(),
         };
         engine.set_stride(1);
@@ -263,9 +268,11 @@ impl CpuEngine {
         point: &Point,
         view: usize,
     ) -> ViewPass<'a> {
+        let beside = ready.beside(view);
         ViewPass {
             view: &self.views[view],
-            streams: streams(&self.views[view], ready.beside(view), &self.neutral),
+            streams: streams(&self.views[view], beside, &self.neutral),
+            lookup: beside.lookup,
             bound: self.bound(reading, point, &ready.lobes),
             read,
             loss: self.loss,

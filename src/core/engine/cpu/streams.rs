@@ -36,10 +36,12 @@ pub(super) enum StreamOf {
 pub(super) const NEUTRALS: [f32; 2] = [0.0, 1.0];
 
 /// Records of `stride` rows each, one for each record or group.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Stream<'a> {
     pub(super) rows: &'a [Row],
     pub(super) stride: usize,
+    /// Records that stand before the first one and are not there.
+    pub(super) skipped: usize,
 }
 
 /// Rows of what stands in for fields that samples of at most `stride` rows lack.

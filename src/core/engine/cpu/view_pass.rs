@@ -7,11 +7,12 @@ use super::file::File;
 use super::machine;
 use super::pass::ChannelColumns;
 use super::program::Bound;
-use super::streams::{BATCH, Column, FileColumns, Stream, load, store};
+use super::streams::{BATCH, Column, FileColumns, Stream, StreamOf, load, store};
 use super::sums::{Sums, Wish, fold};
 use crate::engine::BLOCK;
 use crate::engine::gram::add_gram;
 use crate::engine::lanes::Lanes;
+use crate::engine::levels::{Corners, Finder};
 use crate::engine::residual::Residuals;
 use crate::engine::view::ObservedView;
 use crate::model::real::Real;
@@ -24,6 +25,7 @@ use crate::simd::Simd;
 pub(super) struct ViewPass<'a> {
     pub(super) view: &'a ObservedView,
     pub(super) streams: Streams<'a>,
+    pub(super) lookup: Option<Lookup<'a>>,
     pub(super) bound: Bound<'a>,
     /// The tape's outputs that are wanted.
     pub(super) read: &'a [usize],
@@ -35,6 +37,8 @@ pub(super) struct ViewPass<'a> {
 #[derive(Default)]
 pub(super) struct Scratch {
     file: File,
+    /// What the records of a block look up of the UV atlas.
+    looked_up: RefCell<Vec<Row>>,
     /// Sums over the samples of a pixel, of each output.
     pixels: Vec<Column>,
     /// Whether a pixel has several samples.
@@ -57,26 +61,35 @@ struct Compared {
 pub(super) type Streams<'a> = [Stream<'a>; 5];
 
 /// What stands beside a view's samples.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Beside<'a> {
     pub(super) kept: Stream<'a>,
     pub(super) levels: Stream<'a>,
+    /// What levels are looked up by, where that is done anew in each pass.
+    pub(super) lookup: Option<Lookup<'a>>,
+}
+
+/// What the records of a view look up, block by block.
+#[derive(Clone, Copy)]
+pub(super) struct Lookup<'a> {
+    pub(super) finder: &'a Finder<f32>,
+    pub(super) corners: &'a [Corners<f32>],
 }
 
 /// The streams of a view.
 pub(super) fn streams<'a>(
     view: &'a ObservedView,
-    Beside { kept, levels }: Beside<'a>,
+    Beside { kept, levels, .. }: Beside<'a>,
     neutral: &'a [Row],
 ) -> Streams<'a> {
     let samples = view.samples.surface.rows();
     // Of several samples a pixel, records are not groups.
     let targets = if several(view) { &[] } else { view.target.all() };
     [
-        Stream { rows: samples.all(), stride: samples.stride() },
+        Stream { rows: samples.all(), stride: samples.stride(), skipped: 0 },
         kept,
-        Stream { rows: neutral, stride: 0 },
-        Stream { rows: targets, stride: view.target.stride() },
+        Stream { rows: neutral, ..Stream::default() },
+        Stream { rows: targets, stride: view.target.stride(), skipped: 0 },
         levels,
     ]
 }
@@ -131,9 +144,31 @@ impl ViewPass<'_> {
         if scratch.several {
             self.add_samples(simd, scratch, first, count);
         } else {
-            machine::run(simd, &self.bound, &scratch.file, &self.streams, first, count);
+            self.run(simd, scratch, first, count);
         }
         scratch.shown()
+    }
+
+    /// Run the tape for `count` records from `first` on.
+    #[inline(always)]
+    fn run<S: Simd>(&self, simd: S, scratch: &Scratch, first: usize, count: usize) {
+        let Some(Lookup { finder, corners }) = self.lookup else {
+            return machine::run(simd, &self.bound, &scratch.file, &self.streams, first, count);
+        };
+        let stride = finder.rows();
+        let mut rows = scratch.looked_up.borrow_mut();
+        rows.resize(stride * BATCH, Row::ZERO);
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                for (rows, corners) in rows.chunks_mut(stride).zip(&corners[first..first + count]) {
+                    finder.find(corners, |row, lane, number| rows[row][lane] = number);
+                }
+            },
+        );
+        let mut streams = self.streams;
+        streams[StreamOf::Levels as usize] = Stream { rows: &rows, stride, skipped: first };
+        machine::run(simd, &self.bound, &scratch.file, &streams, first, count);
     }
 
     /// The channels' values of some groups, times the gain, a plane each.
@@ -169,7 +204,7 @@ impl ViewPass<'_> {
         let mut group = first;
         while record < end {
             let block = BATCH.min(end - record);
-            machine::run(simd, &self.bound, file, &self.streams, record, block);
+            self.run(simd, scratch, record, block);
             for i in 0..block {
                 while starts[group + 1] as usize <= record + i {
                     group += 1;

@@ -1,14 +1,15 @@
 //! One direction of a blur at a texel, as `shader/atlas/blur.wgsl` and `blur_tangent.wgsl` have it.
 
-use std::f64::consts::LOG2_E;
-
 use super::{Number, Texel};
-use crate::program::levels::{BlurOf, Taps};
+use crate::program::levels::BlurOf;
 use crate::samples::Atlas;
 use crate::shader::atlas::Axis;
 
-/// A level that is blurred; where the kernel moves, how the level does, or that it stays.
-type Source<'a, R> = (&'a [Texel<R>], Option<Option<&'a [Texel<R>]>>);
+/// A level that is blurred, by a texel's place; where the kernel moves, how the level does, or that it stays.
+type Source<'a, R> = (At<'a, R>, Option<Option<At<'a, R>>>);
+
+/// A level, by a texel's place.
+pub(super) type At<'a, R> = &'a dyn Fn(usize) -> Texel<R>;
 
 /// The blurred value of the texel at a place, or how it moves where the kernel does. `number` gives what the kernel
 /// yields, tap by tap: where it lies and what it weighs, then (where it moves) how both do.
@@ -24,10 +25,12 @@ pub(super) fn blurred<R: Number>(
     let (mut sum, mut weights) = ([zero; 3], zero);
     // How both move.
     let (mut change, mut change_of_weights) = ([zero; 3], zero);
-    let chart = atlas.chart(here);
-    let kernel = Kernel::new(blur.kernel, moving.is_some(), atlas.size(), number);
-    for tap in -kernel.reach..=kernel.reach {
-        let Tap { at, weighs, slope, slope_of_weight } = kernel.tap(tap);
+    let (chart, own_value) = (atlas.chart(here), source(here));
+    let width = if moving.is_some() { 4 } else { 2 };
+    for tap in 0..=2 * blur.reach {
+        let [at, weighs] = [0, 1].map(|k| number(width * tap + k));
+        let [slope, slope_of_weight] =
+            [2, 3].map(|k| if moving.is_some() { number(width * tap + k) } else { zero });
         let low = at.floor();
         let f = at - low;
         let first: f64 = low.into();
@@ -39,23 +42,23 @@ pub(super) fn blurred<R: Number>(
             };
             let Some(near) = near.filter(|&near| atlas.chart(near) == chart) else { continue };
             let weight = weighs * share;
-            add(&mut sum, weight, &source[near], &source[here]);
+            add(&mut sum, weight, source(near), own_value);
             weights = weights + weight;
             if let Some(moved) = moving {
                 let along = if side == 1 { slope } else { -slope };
                 let moves = slope_of_weight * share + weighs * along;
-                add(&mut change, moves, &source[near], &source[here]);
+                add(&mut change, moves, source(near), own_value);
                 change_of_weights = change_of_weights + moves;
                 if let Some(moved) = moved {
-                    add(&mut change, weight, &moved[near], &moved[here]);
+                    add(&mut change, weight, moved(near), moved(here));
                 }
             }
         }
     }
     let weighs = zero.lt(weights);
     let own = match moving {
-        None => source[here],
-        Some(moved) => moved.map_or([zero; 3], |moved| moved[here]),
+        None => own_value,
+        Some(moved) => moved.map_or([zero; 3], |moved| moved(here)),
     };
     if !weighs {
         return own;
@@ -67,68 +70,7 @@ pub(super) fn blurred<R: Number>(
     std::array::from_fn(|c| own[c] + off(c))
 }
 
-/// One place that counts: how many texels away, and its weight; and how both move.
-struct Tap<R> {
-    at: R,
-    weighs: R,
-    slope: R,
-    slope_of_weight: R,
-}
-
-/// A kernel at a texel.
-struct Kernel<F> {
-    taps: Taps,
-    moves: bool,
-    /// Taps to either side.
-    reach: i64,
-    number: F,
-}
-
-impl<R: Number, F: Fn(usize) -> R> Kernel<F> {
-    fn new(taps: Taps, moves: bool, size: u32, number: F) -> Self {
-        let reach = match taps {
-            Taps::Given(reach) | Taps::Gaussian(reach) => reach as i64,
-            Taps::WholeGaussian => {
-                let deviation: f64 = number(0).into();
-                (6.0 * deviation).ceil().min(f64::from(size)) as i64
-            }
-        };
-        Self { taps, moves, reach, number }
-    }
-
-    fn tap(&self, tap: i64) -> Tap<R> {
-        let (zero, one) = (R::from(0.0), R::from(1.0));
-        let number = |k: usize| if self.moves || k < 2 { (self.number)(k) } else { zero };
-        let step = one.lit(tap as f64);
-        // exp(-d^2 / 2).
-        let weight = |deviations: R| (one.lit(-0.5 * LOG2_E) * deviations * deviations).exp2();
-        match self.taps {
-            Taps::Given(reach) => {
-                let first = if self.moves { 4 } else { 2 } * (tap + reach as i64) as usize;
-                let [at, weighs] = [0, 1].map(|k| (self.number)(first + k));
-                let [slope, slope_of_weight] =
-                    [2, 3].map(|k| if self.moves { (self.number)(first + k) } else { zero });
-                Tap { at, weighs, slope, slope_of_weight }
-            }
-            Taps::Gaussian(_) => {
-                let slope = if self.moves { step * number(1) } else { zero };
-                Tap { at: step * number(0), weighs: weight(step), slope, slope_of_weight: zero }
-            }
-            Taps::WholeGaussian => {
-                let deviation = number(0);
-                let narrow = one.lit(1e-10);
-                let narrow = if narrow.lt(deviation) { deviation } else { narrow };
-                let deviations = step / narrow;
-                let weighs = weight(deviations);
-                let moved = if self.moves { number(1) } else { zero };
-                let slope_of_weight = weighs * deviations * deviations * moved / narrow;
-                Tap { at: step, weighs, slope: zero, slope_of_weight }
-            }
-        }
-    }
-}
-
 /// Add how a texel differs from the one that is blurred: what is alike everywhere stays so to the bit.
-fn add<R: Number>(sum: &mut Texel<R>, weight: R, texel: &Texel<R>, own: &Texel<R>) {
+fn add<R: Number>(sum: &mut Texel<R>, weight: R, texel: Texel<R>, own: Texel<R>) {
     (0..3).for_each(|c| sum[c] = sum[c] + weight * (texel[c] - own[c]));
 }

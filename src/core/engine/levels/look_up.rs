@@ -2,22 +2,31 @@
 
 use std::sync::Arc;
 
+use fearless_simd::Level as Instructions;
 use rayon::prelude::*;
 
-use super::{LevelMaker, Levels, Number};
+use super::{LevelMaker, Made, Number};
 use crate::engine::cubes_at::CubesAt;
 use crate::model::params::Params;
 use crate::samples::{Atlas, LANES, ViewSamples};
+use crate::with_simd;
 
 /// Records of samples that a thread takes at once.
 const CHUNK: usize = 256;
+/// Numbers of a texel that are weighed at once.
+const WIDE: usize = 16;
 
-/// The texels around a place that hold something, and what each counts.
-type Corners<R> = [(usize, R); 4];
+/// The texels that a record of samples looks up, four each, and what these count; a sample that finds none has shares
+/// of 0.
+#[derive(Clone, Debug)]
+pub struct Corners<R> {
+    texels: [[u32; LANES]; 4],
+    shares: [[R; LANES]; 4],
+}
 
 /// The four texels around texture coordinates; one that is not of `chart` counts nothing, and where none is, the chart's
 /// nearest counts alone. `None` where the chart has none.
-fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2], chart: u32) -> Option<Corners<R>> {
+fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2], chart: u32) -> Option<[(usize, R); 4]> {
     let one = R::from(1.0);
     let place = uv.map(|x| R::from(x) * one.lit(f64::from(atlas.size())) - one.lit(0.5));
     let low = place.map(R::floor);
@@ -43,6 +52,110 @@ fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2], chart: u32) -> Option<Corners
     Some([(nearest, one), (nearest, R::from(0.0)), (nearest, R::from(0.0)), (nearest, R::from(0.0))])
 }
 
+/// What each record of a view looks up; none where it has neither texels nor texture coordinates. All cores.
+#[must_use]
+pub fn corners_of<R: Number>(samples: &ViewSamples) -> Vec<Corners<R>> {
+    let places = samples.surface.places();
+    let (Some(atlas), Some(at), Some(of_chart)) = (&samples.atlas, places.uv, places.chart) else {
+        return Vec::new();
+    };
+    let rows = samples.surface.rows();
+    let of_record = |record: usize| {
+        let mut found = Corners { texels: [[0; LANES]; 4], shares: [[R::from(0.0); LANES]; 4] };
+        for lane in 0..LANES {
+            let number = |row: usize| rows.number(row, record * LANES + lane);
+            let four = corners(atlas, [number(at), number(at + 1)], number(of_chart) as u32);
+            for (k, (texel, share)) in four.into_iter().flatten().enumerate() {
+                (found.texels[k][lane], found.shares[k][lane]) = (texel as u32, share);
+            }
+        }
+        found
+    };
+    (0..samples.records()).into_par_iter().with_min_len(CHUNK).map(of_record).collect()
+}
+
+/// Looks levels up: numbers that stand side by side together.
+#[derive(Debug)]
+pub struct Finder<R> {
+    made: Arc<Made<R>>,
+    blocks: Vec<Block>,
+    rows: usize,
+}
+
+/// Numbers of a record of levels that are weighed at once.
+#[derive(Debug)]
+struct Block {
+    record: usize,
+    first: usize,
+    /// Whether they are [`WIDE`], and not four.
+    wide: bool,
+    /// Which of them are looked up, and the row of each.
+    rows: Vec<(usize, usize)>,
+}
+
+impl<R: Number> Finder<R> {
+    /// Of the levels that a maker has made.
+    #[must_use]
+    pub fn new(maker: &LevelMaker<R>, made: Arc<Made<R>>) -> Self {
+        let mut numbers = Vec::new();
+        let mut row = 0;
+        for (name, count) in &maker.program.looked_up {
+            if let Some((record, offset)) = made.place(name) {
+                numbers.extend((0..*count).map(|c| (record, offset + c, row + c)));
+            }
+            row += count;
+        }
+        numbers.sort_unstable();
+        let mut blocks: Vec<Block> = Vec::new();
+        for (record, offset, row) in numbers {
+            let stride = made.record(record).stride;
+            let there = |block: &&mut Block| {
+                let width = if block.wide { WIDE } else { 4 };
+                block.record == record && (block.first..block.first + width).contains(&offset)
+            };
+            if let Some(block) = blocks.last_mut().filter(there) {
+                block.rows.push((offset - block.first, row));
+                continue;
+            }
+            let first = offset - offset % 4;
+            let wide = first + WIDE <= stride;
+            blocks.push(Block { record, first, wide, rows: vec![(offset - first, row)] });
+        }
+        Self { made, blocks, rows: row }
+    }
+
+    /// What a record of samples finds, a row a number; rows that nothing leaves stay as they are.
+    #[inline(always)]
+    pub fn find(&self, corners: &Corners<R>, mut put: impl FnMut(usize, usize, R)) {
+        for lane in 0..LANES {
+            let texels = corners.texels.map(|texels| texels[lane] as usize);
+            let shares = corners.shares.map(|shares| shares[lane]);
+            for block in &self.blocks {
+                if block.wide {
+                    let found = self.mean::<WIDE>(block, texels, shares);
+                    block.rows.iter().for_each(|&(k, row)| put(row, lane, found[k]));
+                } else {
+                    let found = self.mean::<4>(block, texels, shares);
+                    block.rows.iter().for_each(|&(k, row)| put(row, lane, found[k]));
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn mean<const N: usize>(&self, block: &Block, texels: [usize; 4], shares: [R; 4]) -> [R; N] {
+        let record = self.made.record(block.record);
+        let mut sum = [R::from(0.0); N];
+        for (texel, share) in texels.into_iter().zip(shares) {
+            let numbers = &record.numbers[texel * record.stride + block.first..][..N];
+            for k in 0..N {
+                sum[k] = sum[k] + share * numbers[k];
+            }
+        }
+        sum
+    }
+}
+
 impl<R: Number> LevelMaker<R> {
     /// What the samples of a view look up at `params`, [`Self::rows`] rows a record; 0 where they find nothing, or have
     /// neither texels nor texture coordinates.
@@ -57,40 +170,30 @@ impl<R: Number> LevelMaker<R> {
         if stride == 0 {
             return Vec::new();
         }
-        let levels = samples.atlas.as_ref().map(|atlas| (atlas, self.levels(atlas, params, cubes)));
+        let finder = samples.atlas.as_ref().map(|atlas| Finder::new(self, self.levels(atlas, params, cubes)));
+        let corners = corners_of(samples);
+        let instructions = Instructions::new();
         let chunks = (0..records.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
-            let mut rows = Vec::with_capacity(stride * CHUNK);
-            for record in chunk * CHUNK..records.min((chunk + 1) * CHUNK) {
-                self.record(samples, levels.as_ref(), record, &mut |numbers| rows.push(row(numbers)));
+            let own = chunk * CHUNK..records.min((chunk + 1) * CHUNK);
+            let mut found = vec![[R::from(0.0); LANES]; stride * own.len()];
+            if let Some(finder) = finder.as_ref().filter(|_| !corners.is_empty()) {
+                with_simd!(instructions, simd => {
+                    let _ = simd;
+                    for (rows, corners) in found.chunks_mut(stride).zip(&corners[own]) {
+                        finder.find(corners, |row, lane, number| rows[row][lane] = number);
+                    }
+                });
             }
-            rows
+            found.into_iter().map(&row).collect::<Vec<T>>()
         });
         chunks.collect::<Vec<_>>().into_iter().flatten().collect()
     }
+}
 
-    fn record(
-        &self,
-        samples: &ViewSamples,
-        levels: Option<&(&Arc<Atlas>, Arc<Levels<R>>)>,
-        record: usize,
-        put: &mut impl FnMut([R; LANES]),
-    ) {
-        let places = samples.surface.places();
-        let found: [Option<Corners<R>>; LANES] = std::array::from_fn(|lane| {
-            let ((atlas, _), at, of_chart) = (levels?, places.uv?, places.chart?);
-            let rows = samples.surface.rows();
-            let number = |row: usize| rows.number(row, record * LANES + lane);
-            corners(atlas, [number(at), number(at + 1)], number(of_chart) as u32)
-        });
-        for (name, count) in &self.program.looked_up {
-            let level = levels.and_then(|(_, levels)| levels.get(name));
-            for component in 0..*count {
-                put(std::array::from_fn(|lane| {
-                    let zero = R::from(0.0);
-                    let (Some(level), Some(corners)) = (level, &found[lane]) else { return zero };
-                    corners.iter().fold(zero, |sum, &(at, share)| sum + share * level[at][component])
-                }));
-            }
-        }
+impl<R> Finder<R> {
+    /// Rows of a record.
+    #[must_use]
+    pub const fn rows(&self) -> usize {
+        self.rows
     }
 }

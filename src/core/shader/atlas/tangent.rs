@@ -18,6 +18,8 @@ use crate::shader::tangent::{TangentError, Tangents};
 pub struct Along {
     /// Passes to be drawn after the plan's own, whose levels they read.
     pub passes: Vec<Pass>,
+    /// Of each the place of the plan's pass whose leaves' tangents it leaves.
+    pub derived: Vec<usize>,
     /// The levels that move, by their names, and the level that holds how.
     pub moved: BTreeMap<String, Level>,
 }
@@ -29,12 +31,13 @@ impl Along {
     /// When a rule does what the chain rule is not written for.
     pub fn new(plan: &Plan, seed: &Seed) -> Result<Self, TangentError> {
         let mut along = Self::default();
-        for pass in &plan.passes {
+        for (at, pass) in plan.passes.iter().enumerate() {
             let tangent = match pass.kind {
                 PassKind::Draw => along.draw(pass, seed)?,
                 PassKind::Blur(_) => along.blur(pass, seed)?,
                 PassKind::Neighbours => along.neighbours(pass)?,
             };
+            along.derived.extend(tangent.as_ref().map(|_| at));
             along.passes.extend(tangent);
         }
         Ok(along)

@@ -225,7 +225,7 @@ fn what_is_compiled_computes_what_the_tape_says() {
         let program = Program::new(tape.clone(), true);
         let uniforms: Vec<f32> = uniforms.into_iter().map(|x| x as f32).collect();
         let streams = [(&samples[..], fields), (&keeps[..], kept), (&[], 0), (&[], 0)]
-            .map(|(rows, stride)| Stream { rows, stride });
+            .map(|(rows, stride)| Stream { rows, stride, skipped: 0 });
         for level in levels() {
             let compiled = program.is_compiled(level) || tape.outputs.is_empty();
             assert_eq!(compiled, compiled_for(level) || tape.outputs.is_empty(), "{of}");
@@ -238,7 +238,7 @@ fn what_is_compiled_computes_what_the_tape_says() {
                 for lane in [0, LANES - 1] {
                     let number = |input: &Input| {
                         let (stream, place) = loads[place(input)];
-                        let Stream { rows, stride } = streams[stream as usize];
+                        let Stream { rows, stride, .. } = streams[stream as usize];
                         f64::from(rows[(first + i) * stride + place][lane])
                     };
                     for (k, want) in tape.run(&shared, 0.0_f64, number).into_iter().enumerate() {

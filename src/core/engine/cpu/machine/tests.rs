@@ -110,7 +110,7 @@ fn the_machine_computes_what_the_tape_says_of_graphs_drawn_at_random() {
             file.prepare(&bound);
             for first in (0..RECORDS).step_by(BATCH) {
                 let count = BATCH.min(RECORDS - first);
-                let streams = [Stream { rows: &rows, stride: FIELDS }];
+                let streams = [Stream { rows: &rows, stride: FIELDS, skipped: 0 }];
                 with_simd!(level, simd => run(simd, &bound, &file, &streams, first, count));
                 for i in 0..count {
                     for lane in 0..LANES {

@@ -52,7 +52,7 @@ fn levels_are_what_their_definition_says() {
     let (atlas, maker) = (atlas(&setup), maker::<f64>(&setup, &[]));
     let radius = 1.7;
     let params = start(&[(hills().params[1], radius)]).params;
-    let levels = maker.make(&atlas, &params, &CubesAt::dark(f64::from));
+    let levels = maker.make(&atlas, &params, &CubesAt::dark(f64::from)).all();
     let light: Dense = (0..SIZE * SIZE)
         .map(|i| {
             let uv = (DVec2::new(f64::from(i % SIZE), f64::from(i / SIZE)) + 0.5) / f64::from(SIZE);
@@ -71,7 +71,7 @@ fn levels_are_what_their_definition_says() {
         assert!(off < 3e-6, "texel ({x}, {y}): {off}");
     }
     // In f32: some tens of roundings beside.
-    let single = self::maker::<f32>(&setup, &[]).make(&atlas, &params, &CubesAt::dark(|x| x));
+    let single = self::maker::<f32>(&setup, &[]).make(&atlas, &params, &CubesAt::dark(|x| x)).all();
     for (a, b) in single["hills_soft"].iter().flatten().zip(levels["hills_soft"].iter().flatten()) {
         assert!((f64::from(*a) - b).abs() < 3e-6, "{a} {b}");
     }
@@ -83,7 +83,7 @@ fn levels_move_as_their_differences_do() {
     let free = &furrows().params[..2];
     let (atlas, maker) = (atlas(&setup), maker::<f64>(&setup, free));
     let (base, step) = (Params::defaults(Form::Corrected), 1e-6);
-    let make = |params: &Params| maker.make(&atlas, params, &CubesAt::dark(f64::from));
+    let make = |params: &Params| maker.make(&atlas, params, &CubesAt::dark(f64::from)).all();
     let levels = make(&base);
     // The square's side over the texels that it covers.
     let side = 2.0 / (f64::from(SIZE) * f64::from(HIGH - LOW));
