@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 
 use skinfit::engine::cubes_at::CubesAt;
 use skinfit::engine::levels::{LevelMaker, Number};
-use skinfit::model::diffusion::{DiffusionChoices, Stretch, Taps};
+use skinfit::model::diffusion::{DiffusionChoices, Lookup, Method, Stretch, Taps};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
@@ -14,6 +14,7 @@ use skinfit::samples::surface_records::{Asked, NEUTRAL, Unmade};
 use skinfit::samples::{Atlas, LANES, SurfaceRecords, ViewSamples};
 use skinfit::shader::Facts;
 use skinfit::shader::facts::FaceSizes;
+use skinfit::shader::rule::rules;
 use skinfit::shader::tangent::chain::Seed;
 use skinfit::shader::term::{Term, library, register};
 use skinfit_core::program::graph::Input;
@@ -22,6 +23,7 @@ use skinfit_core::program::lower::Natives;
 use skinfit_core::program::shading::{Shading, constant};
 use skinfit_core::program::steps::{Rounding, Steps};
 
+use crate::by_rules::Function;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
 /// Light that each texel holds, in the place of lamps and sky.
@@ -201,6 +203,20 @@ fn rows_of_numbers(node: &Node<'_>) -> Vec<Vec<[f64; 3]>> {
     node.items().iter().map(|row| row.numbers().into_iter().map(|x| [x, 0.0, 0.0]).collect()).collect()
 }
 
+/// What of the files is compared with nothing, and why.
+const LEFT_OUT: [(&str, &str); 1] = [("note", "a sentence for people")];
+
+/// Nothing of a file is left unread but what [`LEFT_OUT`] lists.
+fn all_read(vectors: &Vectors, name: &str) {
+    let root = vectors.files[name].root();
+    root.at("name").assert_text(&root.vector.name);
+    root.at("kind").assert_text("diffusion2");
+    root.vector.tolerances();
+    let mut left = root.vector.left();
+    left.retain(|path| !LEFT_OUT.iter().any(|(known, _)| path.starts_with(known)));
+    assert!(left.is_empty(), "{name}: {left:?}");
+}
+
 fn read() -> Vectors {
     Vectors::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors_light"))
 }
@@ -288,7 +304,10 @@ fn mixed<R: Number>(vectors: &Vectors, file: &Node<'_>) {
     let (constants, expected) = (file.at("constants"), file.at("expected"));
     file.at("atlas_file").assert_text("diffusion2_atlas.json");
     let taps = match constants.at("taps") {
-        name if name.is_text() => Taps::Full,
+        name if name.is_text() => {
+            name.assert_text(Taps::Full.name());
+            Taps::Full
+        }
         count => *Taps::ALL.iter().find(|taps| taps.count() == Some(count.number() as u32)).unwrap(),
     };
     let setup = setup(DiffusionChoices { taps, ..DiffusionChoices::DEFAULT });
@@ -313,13 +332,21 @@ fn mixed<R: Number>(vectors: &Vectors, file: &Node<'_>) {
         };
         let all: Vec<f64> = (0..made[LEVELS[0]].len()).flat_map(mixed).collect();
         near.check("scattered", &all, &expected.at("scattered"));
+        if size_of::<R>() == size_of::<f64>() {
+            adjoint(&case, &setup, file);
+        }
     }
     let jacobian = expected.at("jacobian");
     let columns: Vec<Param> = jacobian
         .at("columns")
         .items()
         .iter()
-        .map(|name| if name.text() == "light_color" { given().params[0] } else { param(name.text()) })
+        .map(|name| {
+            let column = name.text();
+            let param = if column == "light_color" { given().params[0] } else { param(column) };
+            name.assert_text(if param == given().params[0] { "light_color" } else { param.name() });
+            param
+        })
         .collect();
     let names = [&LEVELS[..], &["scattered_light", "diffuse_part"]].concat();
     let shown = shown::<R>(&case, &setup, &case.params, &columns, &names);
@@ -329,10 +356,47 @@ fn mixed<R: Number>(vectors: &Vectors, file: &Node<'_>) {
     near.check("levels looked up", &order.collect::<Vec<f64>>(), &expected.at("levels_at_lookups"));
     near.check("scattered, looked up", &shown.of("scattered_light"), &expected.at("scattered_at_lookups"));
     near.check("final", &shown.of("diffuse_part"), &expected.at("final"));
+    let choices = DiffusionChoices { lookup: Lookup::Dilated, ..setup.choices.diffusion };
+    let mut by_one_fetch = setup;
+    by_one_fetch.choices.diffusion = choices;
+    let found = self::shown::<R>(&case, &by_one_fetch, &case.params, &[], &["scattered_light"]);
+    let want = expected.at("dilated").at("scattered_at_lookups");
+    near.check("scattered, looked up by one fetch", &found.of("scattered_light"), &want);
     // Where a deviation is many texels, taps move by as many for a millimetre: what rounds counts tenfold.
     let slopes = (0..case.lookups()).flat_map(|i| (0..3).map(move |c| (i, c)));
     let slopes = slopes.flat_map(|(i, c)| shown.slopes.iter().map(move |slope| slope[i][c]));
     near.times(10.0).check("Jacobian", &slopes.collect::<Vec<f64>>(), &jacobian.at("J"));
+}
+
+/// The adjoint of the blurs, made of their forward passes: what the scattered light weighed by the cotangent is of a light map
+/// of one texel alone is the gradient by that texel.
+fn adjoint(case: &Case<'_>, setup: &Setup, file: &Node<'_>) {
+    let expected = file.at("expected").at("adjoint");
+    let cotangent = expected.at("cotangent").wanted();
+    let shading = Shading::new(&facts(*setup), &[], |_| None, Natives::Written).unwrap();
+    let maker = LevelMaker::<f64>::new(shading.levels);
+    let weights = [1, 2, 3].map(|k| case.params.rgb(param(&format!("diffusion_weight_{k}"))));
+    let size = case.texels.size;
+    let covered = (0..size * size).filter(|&i| case.texels.charts[i] > 0);
+    let mut gradient = Vec::new();
+    for texel in covered {
+        let mut lit = vec![[0.0; 3]; size * size];
+        lit[texel] = [1.0; 3];
+        let mut fields = case.texels.fields.clone();
+        fields.retain(|(name, _)| name.starts_with("dpd"));
+        fields.push(("given_ambient", lit));
+        let texels = Texels { size, charts: case.texels.charts.clone(), fields };
+        let made = maker.make(&texels.atlas(setup), &case.params, &CubesAt::dark(f64::from)).all();
+        let [light, levels @ ..] = LEVELS.map(|name| &made[name]);
+        gradient.extend([0, 1, 2].map(|c| {
+            let scattered = |i: usize| {
+                let scatters = |k: usize| weights[k][c] * (levels[k][i][c] - light[i][c]);
+                light[i][c] + (0..3).map(scatters).sum::<f64>()
+            };
+            (0..light.len()).map(|i| cotangent[3 * i + c] * scattered(i)).sum::<f64>()
+        }));
+    }
+    near::<f64>(file).check("gradient by the light map", &gradient, &expected.at("light_map_gradient"));
 }
 
 #[test]
@@ -343,25 +407,25 @@ fn light_maps_levels_and_lookups_are_those_of_the_vectors_and_move_as_they_do() 
         if file.get("constants").and_then(|constants| constants.get("taps")).is_some() {
             mixed::<f64>(&vectors, &file);
             mixed::<f32>(&vectors, &file);
+            all_read(&vectors, &format!("{}.json", file.vector.name));
             files += 1;
         }
     }
     assert_eq!(files, 8);
 }
 
-#[test]
-fn lookups_weigh_the_texels_of_their_own_chart() {
-    let vectors = read();
-    let case = Case::new(&vectors);
-    let setup = setup(DiffusionChoices::DEFAULT);
+/// What each lookup weighs of the light map, texel by texel.
+fn lookup_weights(vectors: &Vectors, lookup: Lookup, want: &Node<'_>) {
+    let case = Case::new(vectors);
+    let setup = setup(DiffusionChoices { lookup, ..DiffusionChoices::DEFAULT });
     let size = case.texels.size;
     let covered: Vec<usize> = (0..size * size).filter(|&i| case.texels.charts[i] > 0).collect();
     let mut weights = vec![Vec::new(); case.lookups()];
+    let mut one = Case::new(vectors);
     // A texel a channel is lit at a time: what a lookup finds is what it weighs.
     for three in covered.chunks(3) {
         let mut lit = vec![[0.0; 3]; size * size];
         three.iter().enumerate().for_each(|(c, &texel)| lit[texel][c] = 1.0);
-        let mut one = Case::new(&vectors);
         one.texels.fields.retain(|(name, _)| name.starts_with("dpd"));
         one.texels.fields.push(("given_ambient", lit));
         let found = shown::<f64>(&one, &setup, &one.params, &[], &LEVELS[..1]);
@@ -370,13 +434,13 @@ fn lookups_weigh_the_texels_of_their_own_chart() {
         }
     }
     let near = near::<f64>(&case.file);
-    for (found, want) in weights.iter().zip(case.file.at("expected").at("lookup_weights").items()) {
+    for (found, want) in weights.iter().zip(want.items()) {
         let mut found: Vec<(usize, f64)> =
             found.iter().copied().filter(|(_, weight)| *weight > 1e-6).collect();
         found.sort_unstable_by_key(|(texel, _)| *texel);
         let mut want = want.items();
         // Texture coordinates round to f32: a texel may weigh 1e-7.
-        want.retain(|entry| entry.item(2).number() > 1e-6);
+        want.retain(|entry| entry.item(2).wanted()[0] > 1e-6);
         assert_eq!(found.len(), want.len(), "{found:?}");
         for ((texel, weight), want) in found.iter().zip(want) {
             let at = [(texel % size) as f64, (texel / size) as f64, *weight];
@@ -386,11 +450,20 @@ fn lookups_weigh_the_texels_of_their_own_chart() {
 }
 
 #[test]
-fn a_light_map_of_one_constant_has_levels_of_that_constant_to_the_bit() {
+fn lookups_weigh_the_texels_of_their_own_chart_or_those_that_one_fetch_finds() {
     let vectors = read();
-    let mut case = Case::new(&vectors);
+    let expected = vectors.files["diffusion2_atlas.json"].root().at("expected");
+    lookup_weights(&vectors, Lookup::Chart, &expected.at("lookup_weights"));
+    lookup_weights(&vectors, Lookup::Dilated, &expected.at("dilated_weights"));
+    constant_levels(&vectors);
+    all_read(&vectors, "diffusion2_atlas.json");
+}
+
+/// A light map of one constant has levels of that constant, to the bit.
+fn constant_levels(vectors: &Vectors) {
+    let mut case = Case::new(vectors);
     let constant = case.file.at("expected").at("constant");
-    let light = constant.at("light").number();
+    let light = constant.at("light").wanted()[0];
     let every = constant.at("every_level").wanted()[0];
     case.texels.fields.retain(|(name, _)| name.starts_with("dpd"));
     case.texels.fields.push(("given_ambient", vec![[light; 3]; case.texels.size * case.texels.size]));
@@ -437,4 +510,139 @@ fn stretch_from_neighbour_to_neighbour_is_that_of_the_vectors() {
     let want = file.at("expected").at("stretch");
     check::<f64>(&case, &setup, &atlas, &want);
     check::<f32>(&case, &setup, &atlas, &want);
+    all_read(&vectors, "diffusion2_stretch.json");
+}
+
+/// Levels by distance over the surface, and how they move along the radii and through the light map.
+fn over_the_surface<R: Number>(file: &Node<'_>) {
+    let (inputs, expected, near) = (file.at("inputs"), file.at("expected"), near::<R>(file));
+    let list = |name: &str| -> Vec<[f64; 3]> { inputs.at(name).items().iter().map(Node::three).collect() };
+    let (places, light, areas) = (list("position_mm"), list("light_map"), inputs.at("area").numbers());
+    // In a square, as they come: nothing depends on where in the atlas a texel is.
+    let size = (1..).find(|size| size * size >= places.len()).unwrap();
+    let padded = |list: &[[f64; 3]]| -> Vec<[f64; 3]> {
+        (0..size * size).map(|i| list.get(i).copied().unwrap_or_default()).collect()
+    };
+    let along = |axis: usize, of: &dyn Fn(f64) -> f64| -> Vec<[f64; 3]> {
+        let step = |&area: &f64| [0, 1, 2].map(|c| if c == axis { of(area) } else { 0.0 });
+        padded(&areas.iter().map(step).collect::<Vec<_>>())
+    };
+    let fields = vec![
+        ("vertex_position", padded(&places)),
+        ("vertex_normal", padded(&list("normal"))),
+        // The part that the parameter scales, by 1: so a level is also how it moves along that.
+        ("given_key", padded(&light)),
+        ("dpdx_vertex_position", along(0, &|area| area)),
+        ("dpdy_vertex_position", along(1, &|_| 1.0)),
+    ];
+    let charts = (0..size * size).map(|i| u32::from(i < places.len())).collect();
+    let texels = Texels { size, charts, fields };
+    let setup = setup(DiffusionChoices { method: Method::Surface, ..DiffusionChoices::DEFAULT });
+    let mut params = Params::defaults(Form::Corrected);
+    params.set(param("diffusion_unit"), 1.0);
+    for (k, radius) in (1..).zip(inputs.at("radii").numbers()) {
+        params.set(param(&format!("diffusion_radius_{k}")), radius);
+    }
+    let radii = [1, 2, 3].map(|k| param(&format!("diffusion_radius_{k}")));
+    let seeds: Vec<Seed> = radii.into_iter().chain([given().params[0]]).map(Seed::of_param).collect();
+    let shading = Shading::new(&facts(setup), &seeds, |_| None, Natives::Written).unwrap();
+    let maker = LevelMaker::<R>::new(shading.levels);
+    let made = maker.make(&texels.atlas(&setup), &params, &CubesAt::dark(|x| R::from(x))).all();
+    let at: Vec<usize> = inputs.at("at").numbers().into_iter().map(|i| i as usize).collect();
+    for (k, name) in LEVELS[1..].iter().enumerate() {
+        // Six deviations leave out 1.5e-8 of the weight over a plane.
+        near.check("level", &numbers(&made[*name]), &expected.at("levels").item(k));
+        near.check(
+            "through the light map",
+            &numbers(&made[&format!("d3_{name}")]),
+            &expected.at("levels").item(k),
+        );
+        let moved = |r: usize, i: usize, c: usize| {
+            made.get(&format!("d{r}_{name}")).map_or(0.0, |level| level[i][c].into())
+        };
+        let slopes = at.iter().flat_map(|&i| (0..3).flat_map(move |c| (0..3).map(move |r| moved(r, i, c))));
+        near.check("by the radii", &slopes.collect::<Vec<f64>>(), &expected.at("d_levels").item(k));
+    }
+    // A constant stays that constant, to the bit.
+    let mut constant = texels;
+    constant.fields.retain(|(name, _)| *name != "given_key");
+    constant.fields.push(("given_key", vec![[2.5; 3]; size * size]));
+    let made = maker.make(&constant.atlas(&setup), &params, &CubesAt::dark(|x| R::from(x))).all();
+    LEVELS.iter().for_each(|name| assert!(numbers(&made[*name]).iter().all(|&x| x == 2.5), "{name}"));
+}
+
+#[test]
+fn levels_by_distance_over_the_surface_are_those_of_the_vectors_and_move_as_they_do() {
+    let vectors = read();
+    let file = vectors.files["diffusion2_surface.json"].root();
+    over_the_surface::<f64>(&file);
+    over_the_surface::<f32>(&file);
+    all_read(&vectors, "diffusion2_surface.json");
+}
+
+/// Levels by blurs that clamp at the border of a map: of a chart that goes on beyond it with the border's own texels, as far
+/// as a blur reaches. Each of the level before as the file has it, so that errors do not add up.
+pub(crate) fn clamped_vector<R: Number>(file: &Node<'_>) {
+    let inputs = file.at("inputs");
+    let (light, stretch) = (rows(&inputs.at("light")), rows(&inputs.at("stretch")));
+    let (sigmas, weights) = (inputs.at("sigmas").numbers(), rows_of_weights(&inputs.at("weights")));
+    let least = stretch.iter().flatten().flat_map(|step| step[..2].to_vec()).fold(f64::INFINITY, f64::min);
+    let widest = sigmas.iter().copied().fold(0.0, f64::max);
+    // Six deviations, and the second texel of a fetch.
+    let margin = (6.0 * widest / least).ceil() as usize + 1;
+    let (side, near) = (light.len(), near::<R>(file));
+    let size = side + 2 * margin;
+    let within = |at: usize| at.saturating_sub(margin).min(side - 1);
+    let spread = |rows: &[Vec<[f64; 3]>]| -> Vec<[f64; 3]> {
+        (0..size * size).map(|i| rows[within(i / size)][within(i % size)]).collect()
+    };
+    for (taps, name) in [(Taps::Five, "5"), (Taps::Full, "full")] {
+        let expected = file.at("expected").at(name);
+        let levels = expected.at("levels").items();
+        let known: Vec<Vec<Vec<[f64; 3]>>> = levels.iter().map(rows).collect();
+        let setup = setup(DiffusionChoices { taps, ..DiffusionChoices::DEFAULT });
+        let mut params = Params::defaults(Form::Corrected);
+        params.set(param("diffusion_unit"), 1.0);
+        for (k, &sigma) in sigmas.iter().enumerate() {
+            params.set(param("diffusion_radius_1"), sigma);
+            let steps = spread(&stretch);
+            let fields = vec![
+                ("given_ambient", spread(if k == 0 { &light } else { &known[k] })),
+                ("dpdx_vertex_position", steps.iter().map(|s| [s[0], 0.0, 0.0]).collect()),
+                ("dpdy_vertex_position", steps.iter().map(|s| [0.0, s[1], 0.0]).collect()),
+            ];
+            let texels = Texels { size, charts: vec![1; size * size], fields };
+            let made = self::levels::<R>(&setup, &texels.atlas(&setup), &params);
+            let inner = |level: &[[R; 3]]| -> Vec<f64> {
+                let places = (0..side * side).map(|i| (i / side + margin) * size + i % side + margin);
+                places.flat_map(|i| level[i].map(Into::into)).collect()
+            };
+            if k == 0 {
+                near.check("light map", &inner(&made[LEVELS[0]]), &levels[0]);
+            }
+            near.check("level", &inner(&made[LEVELS[1]]), &levels[k + 1]);
+        }
+        near.check("result", &mixed_by_rule(&known, &weights), &expected.at("result"));
+    }
+}
+
+/// The levels as the rules mix them, which have the first one's weight as what the others leave.
+fn mixed_by_rule(levels: &[Vec<Vec<[f64; 3]>>], weights: &[[f64; 3]]) -> Vec<f64> {
+    let effects = setup(DiffusionChoices::DEFAULT).effects;
+    let rule = rules(effects).find(|rule| rule.function == "scattered_of_three").unwrap();
+    let mixing = Function::new(&[rule.body], rule.function, &[3; 7]);
+    for c in 0..3 {
+        assert!((weights.iter().map(|weight| weight[c]).sum::<f64>() - 1.0).abs() < 1e-12);
+    }
+    let texels = levels[0].iter().enumerate().flat_map(|(y, row)| (0..row.len()).map(move |x| (y, x)));
+    let mixed = |(y, x): (usize, usize)| {
+        let found = levels.iter().map(|level| &level[y][x][..]);
+        let arguments: Vec<&[f64]> = found.chain(weights[1..].iter().map(|weight| &weight[..])).collect();
+        mixing.of(0.0, &arguments)
+    };
+    texels.flat_map(mixed).collect()
+}
+
+fn rows_of_weights(node: &Node<'_>) -> Vec<[f64; 3]> {
+    node.items().iter().map(Node::three).collect()
 }

@@ -20,7 +20,7 @@ use skinfit_core::program::graph::Input;
 
 use self::reader::{Node, Tolerance, Vectors};
 use crate::by_rules::{Cubes, Fragments, Function, Number, Shaded, Wanted};
-use crate::{bakes, common, evaluators, harmonics, lights, meshes, witness};
+use crate::{bakes, common, diffusion, evaluators, harmonics, lights, meshes, witness};
 
 /// Numbers as the vectors are compared with: how each evaluator makes them, and the files' tolerance for it.
 #[track_caller]
@@ -428,9 +428,6 @@ const LEFT_OUT: [(&str, &str, &str); 13] = [
     ("vertex", "inputs.dapple", "S.w is the z of (DappleXf N): of the matrix a row of three"),
 ];
 
-/// Kinds that another folder of the oracle's may hold, of what is not built.
-const NOT_BUILT: [&str; 1] = ["diffusion"];
-
 /// The vectors of a kind that the oracle keeps in a folder of its own, for which another folder may have none.
 pub(crate) fn of_light<'v>(vectors: &'v Vectors, kind: &str) -> Vec<Node<'v>> {
     let folder = common::vectors();
@@ -454,6 +451,10 @@ fn every_number_of_every_vector_is_compared() {
     vectors.of_kind("prefilter").iter().for_each(|file| bakes::prefilter_vector(&vectors, file));
     vectors.of_kind("vertex").iter().for_each(meshes::vertex_vector);
     lights::light_vector(&vectors.one("light"));
+    for file in of_light(&vectors, "diffusion") {
+        diffusion::clamped_vector::<f64>(&file);
+        diffusion::clamped_vector::<f32>(&file);
+    }
     of_light(&vectors, "sh").iter().for_each(|file| harmonics::sh_vector(&vectors, file));
     witness::bench_on(&vectors, &evaluators::on_cpu()[..2]);
     witness::fit_of_the_bench(&vectors);
@@ -465,10 +466,6 @@ fn every_number_of_every_vector_is_compared() {
         let root = vector.root();
         root.at("name").assert_text(&vector.name);
         let kind = root.at("kind").text();
-        if NOT_BUILT.contains(&kind) && folder != common::own_vectors() {
-            common::not_checked(&format!("{} is of {kind}, which is not built", vector.name));
-            continue;
-        }
         for path in vector.left() {
             let reason = LEFT_OUT.iter().position(|(of, beginning, _)| {
                 (of.is_empty() || *of == kind || *of == vector.name) && path.starts_with(beginning)

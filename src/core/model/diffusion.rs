@@ -154,6 +154,7 @@ impl DiffusionChoices {
     pub fn holds(&self, condition: &str) -> Option<bool> {
         Some(match condition {
             "bumped_ambient" => self.ambient_normal == AmbientNormal::Bumped,
+            "surface_levels" => self.method == Method::Surface,
             "exact_stretch" => self.stretch == Stretch::Exact,
             _ => return None,
         })

@@ -4,6 +4,7 @@ use super::error::ShadingError;
 use super::graph::{Graph, Id, Input};
 use super::lower::{LowerError, Natives, STEP_ALONG_U, STEP_ALONG_V, Source, Value};
 use super::steps::{Rounding, Steps};
+use crate::model::diffusion::Lookup;
 use crate::model::terms::TermName;
 use crate::shader::atlas::{APART, Axis, Level, Pass, PassKind, TAPS, TEXEL};
 use crate::shader::emit::Plan;
@@ -21,6 +22,8 @@ pub struct LevelProgram {
     pub looked_up: Vec<(String, usize)>,
     /// Whether some of them move along a seed.
     pub moves: bool,
+    /// Whether samples look them up by one fetch, whatever the chart, empty texels being filled.
+    pub dilated: bool,
 }
 
 /// One pass.
@@ -43,6 +46,8 @@ pub enum Then {
     Blur(BlurOf),
     /// One direction of a blur by a Gaussian, of several levels at once.
     Gaussian(GaussianOf),
+    /// A sum over the surface; the steps yield the variance, and how that moves.
+    Surface(SurfaceOf),
     /// It leaves that; how far each texel's neighbours lie apart, by what a level holds, is the steps' field
     /// [`APART_FIELD`].
     Neighbours(String),
@@ -58,6 +63,17 @@ pub struct BlurOf {
     /// The level that is blurred.
     pub source: String,
     /// Where the kernel moves: the level that holds how the source moves, if it does.
+    pub moving: Option<Option<String>>,
+}
+
+/// A sum over the surface: levels by their names.
+#[derive(Clone, Debug)]
+pub struct SurfaceOf {
+    /// What is summed up.
+    pub source: String,
+    /// Where texels lie, which way they face, and what area they have.
+    pub texels: [String; 3],
+    /// Where the variance moves: the level that holds how the source moves, if it does.
     pub moving: Option<Option<String>>,
 }
 
@@ -88,7 +104,8 @@ impl LevelProgram {
     /// # Errors
     /// When a pass cannot be computed on the processor.
     pub fn new(plan: &Plan, chain: &Chain) -> Result<Self, LowerError> {
-        let mut program = Self::default();
+        let dilated = plan.facts.setup.choices.diffusion.lookup == Lookup::Dilated;
+        let mut program = Self { dilated, ..Self::default() };
         for (at, pass) in plan.passes.iter().enumerate() {
             // Each seed has tangents of its own; what does not move is the plan's.
             let tangents = chain.along.iter().enumerate().flat_map(|(k, along)| {
@@ -114,27 +131,32 @@ impl LevelProgram {
             PassKind::Blur(axis) if kernel(passes[0].pass) == Kernel::Gaussian => {
                 Some(Then::Gaussian(gaussian(axis, passes)))
             }
-            PassKind::Blur(_) | PassKind::Neighbours => None,
+            PassKind::Blur(_) | PassKind::Surface | PassKind::Neighbours | PassKind::Dilate => None,
         };
         if let Some(then) = together {
             self.passes.push(LevelPass::new(passes, then)?);
             return Ok(());
         }
         for pass in passes {
-            let source = || pass.name(&pass.pass.plan.levels[0].name);
+            let read = |i: usize| pass.name(&pass.pass.plan.levels[i].name);
+            let source = || read(0);
+            let moving = pass.pass.moving.as_ref();
+            let moving = moving.map(|kernel| kernel.blurred.as_ref().map(|moved| pass.name(&moved.name)));
             let then = match pass.pass.kind {
+                // Where texels lie stands behind what is summed up.
+                PassKind::Surface => {
+                    Then::Surface(SurfaceOf { source: source(), texels: [1, 2, 3].map(read), moving })
+                }
                 PassKind::Blur(axis) => {
-                    let moving = pass.pass.moving.as_ref();
-                    let moving =
-                        moving.map(|kernel| kernel.blurred.as_ref().map(|moved| pass.name(&moved.name)));
                     let reach = match kernel(pass.pass) {
                         Kernel::Taps(taps) => taps as usize / 2,
-                        Kernel::Gaussian | Kernel::Neighbours => 0,
+                        _ => 0,
                     };
                     Then::Blur(BlurOf { axis, reach, source: source(), moving })
                 }
                 PassKind::Neighbours => Then::Neighbours(source()),
-                PassKind::Draw => Then::Leave,
+                // The processor fills empty texels itself: no plan over samples has a pass that does.
+                PassKind::Draw | PassKind::Dilate => Then::Leave,
             };
             self.passes.push(alone(pass, then)?);
         }
@@ -154,6 +176,7 @@ impl LevelProgram {
             pass.leaves.iter().all(|leaf| passes.iter().any(|known| known.leaves.contains(leaf)))
         };
         self.moves |= other.moves;
+        self.dilated |= other.dilated;
         for pass in other.passes {
             if !left(&self.passes, &pass) {
                 self.passes.push(pass);
@@ -268,8 +291,8 @@ impl Named<'_> {
         let pass = self.pass;
         let entry = match pass.kind {
             PassKind::Draw => TEXEL,
-            PassKind::Blur(_) => TAPS,
-            PassKind::Neighbours => APART,
+            PassKind::Blur(_) | PassKind::Surface => TAPS,
+            PassKind::Neighbours | PassKind::Dilate => APART,
         };
         let source = Source::new(&pass.plan.wgsl, Natives::Written)?;
         let sample = source.argument(entry)?;

@@ -4,16 +4,20 @@
 //! (Direct3D and Vulkan alike), both sides, without depth; where triangles overlap, the later one stays. Covered texels
 //! stand row by row, sixteen a record, each with what the effects' rules read of it and nothing else.
 
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 
 use glam::{DVec2, Vec2, Vec3, Vec4};
 use rayon::prelude::*;
 
 use super::LANES;
+use super::dilation::Dilation;
 use super::footprint::{Footprint, filtered};
 use super::posed::PosedSurface;
 use super::rows::Rows;
+use super::seams::{Margins, Texels};
 use super::trace::Hit;
+use crate::model::diffusion::Seams;
 use crate::model::evaluate::Setup;
 use crate::model::fields;
 use crate::program::graph::Input;
@@ -84,6 +88,9 @@ pub struct Atlas {
     /// What records hold, row by row.
     inputs: Vec<Input>,
     rows: Rows,
+    /// Made where it is asked for.
+    dilation: OnceLock<Dilation>,
+    margins: Margins,
 }
 
 impl Atlas {
@@ -127,7 +134,21 @@ impl Atlas {
                 }
             });
         }
-        Ok(Self { size, places, texels, charts, inputs, rows })
+        let covered = texels.len();
+        let mut atlas = Self {
+            size,
+            places,
+            texels,
+            charts,
+            inputs,
+            rows,
+            dilation: OnceLock::new(),
+            margins: Margins::default(),
+        };
+        if setup.choices.diffusion.seams == Seams::Joined {
+            atlas.margins = Margins::new(posed.mesh, &posed.charts, &atlas, covered);
+        }
+        Ok(atlas)
     }
 
     /// Texels of given `charts`, `size` a side and row by row, 0 where nothing is covered; `value` gives what each holds.
@@ -148,7 +169,8 @@ impl Atlas {
             }
         }
         let charts = texels.iter().map(|&texel| charts[texel as usize]).collect();
-        Self { size, places, texels, charts, inputs, rows }
+        let dilation = OnceLock::new();
+        Self { size, places, texels, charts, inputs, rows, dilation, margins: Margins::default() }
     }
 
     /// Texels along a side.
@@ -214,6 +236,32 @@ impl Atlas {
         (place != EMPTY).then_some(place as usize)
     }
 
+    /// The texels that are filled beyond those that are covered, for lookups by one fetch.
+    #[must_use]
+    pub fn dilation(&self) -> &Dilation {
+        let number = |texel: u32| Some(self.places[texel as usize]).filter(|&place| place != EMPTY);
+        self.dilation.get_or_init(|| Dilation::new(self.size, self.covered(), number))
+    }
+
+    /// What stands beyond the charts' borders; nothing where these are cut.
+    #[must_use]
+    pub const fn margins(&self) -> &Margins {
+        &self.margins
+    }
+
+    /// The texel of a chart at a place, of its [margin](Self::margins) beyond its border; `None` where there is neither.
+    #[inline(always)]
+    #[must_use]
+    pub fn place_of_chart(&self, chart: u32, column: i64, row: i64) -> Option<usize> {
+        let own = self.place(column, row).filter(|&place| self.charts[place] == chart);
+        if own.is_some() || self.margins.is_empty() {
+            return own;
+        }
+        let inside = |at: i64| (0..i64::from(self.size)).contains(&at);
+        let texel = (inside(column) && inside(row)).then(|| row as u32 * self.size + column as u32)?;
+        self.margins.number(chart, texel)
+    }
+
     /// The row of a record that holds a number; `None` where it was not asked for.
     #[must_use]
     pub fn row(&self, input: &Input) -> Option<usize> {
@@ -224,6 +272,16 @@ impl Atlas {
     #[must_use]
     pub const fn rows(&self) -> &Rows {
         &self.rows
+    }
+}
+
+impl Texels for Atlas {
+    fn size(&self) -> u32 {
+        self.size
+    }
+
+    fn at(&self, column: i64, row: i64) -> Option<(u32, u32)> {
+        self.place(column, row).map(|place| (place as u32, self.charts[place]))
     }
 }
 

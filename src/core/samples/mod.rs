@@ -18,11 +18,13 @@
 //! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
 //! - [`visibility`]: how much of a light reaches a place of the mesh
-//! - [`atlas`]: texels of the UV atlas, samples of the mesh as well
+//! - [`atlas`]: texels of the UV atlas, samples of the mesh as well; `dilation`: empty ones that are filled;
+//!   `seams`: what lies beyond the borders of its charts
 
 pub mod atlas;
 mod bounced;
 pub mod covered;
+mod dilation;
 mod footprint;
 mod group;
 mod lit;
@@ -31,6 +33,7 @@ mod lobe;
 mod lobe_light;
 mod posed;
 pub mod rows;
+mod seams;
 mod skin;
 mod sky;
 mod sky_rays;
@@ -54,6 +57,7 @@ use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
 pub use atlas::Atlas;
 pub use bounced::gather_of;
+pub use dilation::Dilation;
 pub use group::z_order;
 pub use posed::{PosedSurface, SurfaceBakes};
 pub use surface_records::SurfaceRecords;

@@ -130,6 +130,12 @@ impl<'a> PosedSurface<'a> {
         Self { mesh, rays, open, mip_maps: None, charts: Vec::new(), supplies: Vec::new(), lobes: None }
     }
 
+    /// The same, each vertex being of a chart of the UV atlas.
+    #[must_use]
+    pub fn in_charts(self, charts: Vec<u32>) -> Self {
+        Self { charts, ..self }
+    }
+
     /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what
     /// stands in for them. All cores.
     #[must_use]

@@ -2,6 +2,7 @@
 
 use toml::Spanned;
 
+use super::Scene;
 use super::error::SceneError;
 use super::file::{DiffusionTable, Source, TapsValue};
 use super::numbers::whole;
@@ -44,6 +45,29 @@ impl Preset {
             Self::Article => "article",
             Self::HumanHead => "human_head",
         }
+    }
+}
+
+impl Preset {
+    /// Put a preset's levels and constants into a scene, in the place of another's; those of the scene's own stay.
+    pub fn put(self, scene: &mut Scene) {
+        let of_radii =
+            |name: &str| name.starts_with("diffusion_weight_") || name.starts_with("diffusion_radius_");
+        if scene.diffusion.preset == self {
+            return;
+        }
+        scene.diffusion.preset = self;
+        let defaults = Params::defaults(scene.form);
+        for param in Param::all().filter(|param| of_radii(param.name())) {
+            scene.params.set_rgb(param, defaults.rgb(param));
+        }
+        if let Some(five) = Effect::from_name(FIVE) {
+            scene.effects = scene.effects.without(five);
+        }
+        scene.effects = scene.diffusion.switched(scene.effects);
+        // The unit is the scene's.
+        let unit = |name: &str| name == "diffusion_unit";
+        scene.diffusion.set(&mut scene.params, 1.0, unit);
     }
 }
 

@@ -121,7 +121,7 @@ impl Plan {
         leaf: &impl Fn(&'static str) -> String,
     ) -> Vec<String> {
         let level =
-            |q: &str| rule.domain != Domain::Vertex && self.levels.iter().any(|level| level.name == q);
+            |q: &str| rule.domain != Domain::Vertex && self.levels.iter().any(|level| level.quantity() == q);
         let local = |q: &str| self.rules(rule.domain).any(|r| r.gives_quantity(q)) || level(q);
         let argument = |&(name, kind): &(&'static str, &'static str)| match Constant::from_name(name) {
             Some(known) => constant(known, kind),

@@ -193,11 +193,10 @@ impl Plan {
         }
         let of_fragments = |rule: &&&'static Rule| rule.domain == Domain::Fragment;
         let fragments: Vec<&'static Rule> = found.rules.iter().filter(of_fragments).copied().collect();
-        let sampled = found.carried.iter().filter(|on| on.edge.from == Domain::Texel);
-        let levels = sampled.map(|on| Level { name: on.quantity.to_owned(), kind: level_type(on.numbers) });
         let goals = [vertex_goals, &[UV, CHART]].concat();
         let rules = atlas::with_vertices(&found, Domain::Fragment, &goals, fragments);
-        let mut plan = Self::of_rules(facts, &rules, &found.carried, levels.collect());
+        let levels = atlas::looked_up(facts, &found.carried);
+        let mut plan = Self::of_rules(facts, &rules, &found.carried, levels);
         plan.cost += passes.iter().map(|pass| pass.plan.cost).sum::<f64>();
         plan.error = found.rules.iter().map(|rule| rule.error(facts)).sum::<f64>()
             + found.carried.iter().map(|on| on.error).sum::<f64>();
@@ -304,14 +303,5 @@ impl Plan {
         };
         let left = rules(self.facts.setup.effects).filter(choice).filter(|rule| !chosen(rule));
         left.map(|rule| (rule, why(rule))).collect()
-    }
-}
-
-/// The WGSL type of that many numbers of a level.
-const fn level_type(numbers: usize) -> &'static str {
-    match numbers {
-        1 => "f32",
-        2 => "vec2f",
-        _ => "vec3f",
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::model::choices::{Bounces, Choices, SkinReflection, SpecularVisibility, Visibility};
 use crate::model::dapple::Dapple;
+use crate::model::diffusion::Lookup;
 use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::shadow_filter::ShadowFilter;
@@ -299,6 +300,13 @@ impl Facts {
     fn shadow_filter(&self) -> Option<ShadowFilter> {
         let mapped = |shadows: &ShadowFacts| shadows.filter != ShadowFilter::Vertices;
         self.shadows.filter(mapped).map(|shadows| shadows.filter)
+    }
+
+    /// Whether fragments look levels of the atlas up by one fetch, for which passes fill empty texels. Of stored samples the
+    /// processor looks them up, and fills what it finds empty.
+    #[must_use]
+    pub fn dilates(&self) -> bool {
+        self.source == Source::Raster && self.setup.choices.diffusion.lookup == Lookup::Dilated
     }
 
     /// Whether what vertices found of the sky moves as a fit turns it. A rasteriser has it found anew.

@@ -4,7 +4,7 @@
 use std::fmt::Write as _;
 
 use super::atlas::stored;
-use super::atlas::text::{SAMPLE_LEVEL, sampled};
+use super::atlas::text::{sample_level, sampled};
 use super::domain::Domain;
 use super::emit::{Plan, hazy, parts, sample_fields};
 use super::quantity::Constant;
@@ -49,7 +49,7 @@ impl Plan {
     pub(super) fn fragment_function(&self, name: &str, at: [&str; 2]) -> String {
         let (hazy, mut wgsl) = (hazy(&self.facts), String::new());
         if !self.levels.is_empty() {
-            let _ = write!(wgsl, "\n{SAMPLE_LEVEL}");
+            let _ = write!(wgsl, "\n{}", sample_level(&self.facts));
         }
         if self.only_fetches {
             wgsl.push_str(&self.shadow_fetch());
@@ -66,7 +66,7 @@ impl Plan {
         let color = if self.only_fetches {
             self.fetches()
         } else {
-            wgsl.push_str(&sampled(&self.levels));
+            wgsl.push_str(&sampled(&self.facts, &self.levels));
             wgsl.push_str(&self.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
             format!("vec4f({}, {})", sum(&parts(&self.facts)), if hazy { "haze" } else { "1.0" })
         };

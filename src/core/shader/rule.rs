@@ -98,6 +98,9 @@ pub struct Blur {
     pub kind: &'static str,
     /// Which texels are read, and what the rule's function is.
     pub kernel: Kernel,
+    /// What is read of each texel beside, with WGSL types: of a sum [over the surface](Kernel::Surface) where texels lie
+    /// (`vec3f`), which way they face (`vec3f`) and what area they have (`f32`).
+    pub beside: Vec<(&'static str, &'static str)>,
     /// The function's parameters, in their order, with their WGSL types.
     pub parameters: Vec<(&'static str, &'static str)>,
 }
@@ -116,6 +119,10 @@ pub enum Kernel {
     /// along v, half the distance of the two that are of the same chart, the distance to the one that is, or 0, the
     /// function makes the pass' value.
     Neighbours,
+    /// A blur by distance in space, of all texels at once that face the same way, whatever the chart, each weighed by its
+    /// area and a Gaussian. The function makes the Gaussian's variance, in the square of the unit that places have. On the
+    /// processor alone.
+    Surface,
 }
 
 impl Kernel {
@@ -126,6 +133,7 @@ impl Kernel {
             Self::Taps(_) => &[("tap", "f32"), ("axis", "vec2f")],
             Self::Gaussian => &[("axis", "vec2f")],
             Self::Neighbours => &[("apart", "vec2f")],
+            Self::Surface => &[],
         }
     }
 
@@ -134,9 +142,15 @@ impl Kernel {
     pub const fn returns(self) -> Option<&'static str> {
         match self {
             Self::Taps(_) => Some("vec2f"),
-            Self::Gaussian => Some("f32"),
+            Self::Gaussian | Self::Surface => Some("f32"),
             Self::Neighbours => None,
         }
+    }
+
+    /// Whether it is a blur along the atlas' axes.
+    #[must_use]
+    pub const fn is_along_axes(self) -> bool {
+        matches!(self, Self::Taps(_) | Self::Gaussian)
     }
 
     /// Places that count along each axis, about, in a scene.
@@ -145,6 +159,7 @@ impl Kernel {
             Self::Taps(taps) => f64::from(taps),
             Self::Gaussian => facts.setup.choices.diffusion.taps.count().map_or(USUAL_PLACES, f64::from),
             Self::Neighbours => 1.0,
+            Self::Surface => USUAL_PLACES * USUAL_PLACES,
         }
     }
 }

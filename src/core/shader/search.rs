@@ -54,6 +54,22 @@ pub enum PlanError {
         /// The effect.
         effect: &'static str,
     },
+    /// Levels that the processor alone makes.
+    #[error(
+        "{level} is made by distance over the surface, which graphics adapters do not do. Say method = \"separable\" in [diffusion], or have the CPU draw."
+    )]
+    OverSurface {
+        /// The level.
+        level: &'static str,
+    },
+    /// Blurs across the seams of an atlas.
+    #[error(
+        "{level} is blurred across the seams of the UV atlas, which graphics adapters do not do. Say seams = \"cut\" in [diffusion], or have the CPU draw."
+    )]
+    Joined {
+        /// The level.
+        level: &'static str,
+    },
     /// Quantities that the processor alone finds.
     #[error(
         "{field} is found at each sample by rays, which samples made on an adapter have none of. Have the CPU make the samples."

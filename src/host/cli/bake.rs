@@ -1,9 +1,12 @@
 //! `skinfit bake`: what a scene's effects ask to be baked, as files to look at.
 
+mod stages;
+
 use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
+use self::stages::Stages;
 use super::run_folder::RunFolder;
 use super::scene::{SceneArguments, parse_effects};
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
@@ -19,7 +22,7 @@ use crate::render::image::Image;
 /// Bake a scene's cube maps and ambient occlusion into files
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at) and occlusion.csv (a row a vertex: the open share of its hemisphere); beside them an empty .lock, which keeps two commands from writing there at once.\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
+    after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at) and occlusion.csv (a row a vertex: the open share of its hemisphere). With --stages also charts, stretch, light_map, level_1 and on, and how light map and levels move along each free parameter, light_map_by_<parameter> and so on, each as .exr and .png: texels of the UV atlas, stretch in the scene's unit a texel. Beside them an empty .lock, which keeps two commands from writing there at once.\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -30,6 +33,9 @@ pub(super) struct Arguments {
     /// Effects to switch on, comma-separated, instead of the scene's.
     #[arg(long, value_name = "LIST", value_parser = parse_effects)]
     effects: Option<Effects>,
+    /// Also the stages of texture-space diffusion in the UV atlas, which the effect `diffusion` makes.
+    #[arg(long)]
+    stages: bool,
     /// Parameters of an earlier fit: the specular cube is that of its lobe.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
@@ -49,7 +55,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     tell_warnings(&baked.warnings);
     let cubes = cubes(&baked.illumination, &baked.scene.params);
     let written = cubes.len() + usize::from(baked.occlusion.is_some());
-    if written > 0 {
+    // Before anything is written: it may be refused.
+    let stages = if arguments.stages { Some(Stages::new(&baked)?) } else { None };
+    if written > 0 || stages.is_some() {
         folder.keep_results();
     }
     let folder = folder.path();
@@ -63,7 +71,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         let from = if row.cached { "kept from an earlier run" } else { "baked" };
         say(&format!("{:>14}  {from}, {:.3} s", row.name, row.seconds))?;
     }
+    if let Some(stages) = stages {
+        let count = stages.write(folder)?;
+        say(&format!("wrote {count} stages of diffusion to {}", folder.display()))?;
+    }
     match written {
+        0 if arguments.stages => {}
         0 => tell("the enabled effects ask for no bake; nothing was written."),
         1 => say(&format!("wrote 1 bake to {}", folder.display()))?,
         _ => say(&format!("wrote {written} bakes to {}", folder.display()))?,

@@ -144,6 +144,8 @@ fn told(pass: &Pass) -> String {
     match pass.kind {
         PassKind::Draw => format!("{leaves}, drawn"),
         PassKind::Neighbours => format!("{leaves}, from neighbour to neighbour"),
+        PassKind::Surface => format!("{leaves}, summed up over the surface"),
+        PassKind::Dilate => format!("{leaves}, its empty texels filled"),
         PassKind::Blur(Axis::U) => format!("{leaves}, blurred along u"),
         PassKind::Blur(Axis::V) => format!("{leaves}, blurred along v"),
     }

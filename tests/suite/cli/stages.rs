@@ -97,6 +97,36 @@ fn an_effect_that_is_off_is_not_baked() {
 }
 
 #[test]
+fn the_stages_of_diffusion_are_pictures_of_the_atlas() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("[quality]", "[diffusion]\nlight_map_size = 64\n[quality]");
+    let bake = |effects: &str, to: &str| {
+        sandbox.run(&["bake", "scene.toml", "--stages", "--effects", effects, "-o", to])
+    };
+    bake("diffuse,occlusion", "refused").refused(&["scene.toml: --stages", "Enable the effect `diffusion`"]);
+    assert!(!sandbox.path("refused").exists());
+    bake("diffuse,occlusion,diffusion", "baked").done();
+    let levels = ["light_map", "level_1", "level_2", "level_3"];
+    // Of what the scene's fit has free, the occlusion alone moves the light map.
+    let moved = levels.map(|name| format!("{name}_by_occlusion"));
+    let names =
+        levels.into_iter().map(str::to_owned).chain(moved).chain(["charts", "stretch"].map(str::to_owned));
+    let covered = read_exr(&sandbox.path("baked/charts.exr")).planes["A"].clone();
+    // The ball's chart fills the atlas but for a triangle a column at each pole.
+    assert_eq!(covered.len(), 64 * 64);
+    assert!(covered.iter().filter(|&&alpha| alpha == 1.0).count() > 64 * 48);
+    for name in names {
+        let image = read_exr(&sandbox.path(&format!("baked/{name}.exr")));
+        assert_eq!(image.planes["A"], covered, "{name}");
+        assert!(image.planes["R"].iter().any(|&red| red != 0.0), "{name}");
+        assert!(sandbox.path(&format!("baked/{name}.png")).is_file(), "{name}");
+    }
+    let made = std::fs::read_dir(sandbox.path("baked")).unwrap().count();
+    // Beside these the irradiance (two files), the occlusion and the lock.
+    assert_eq!(made, 2 * 10 + 2 + 1 + 1);
+}
+
+#[test]
 fn an_effect_that_is_off_does_not_ask_for_its_files() {
     let render = |sandbox: &Sandbox, effects: &str| {
         sandbox.run(&["render", "--engine", "cpu", "scene.toml", "--effects", effects, "-o", "a.exr"])

@@ -324,3 +324,37 @@ fn the_most_lights_of_a_panorama_are_what_fewer_are_measured_against() {
     let idle = ["tradeoff", "plain.toml", "-o", "none", "--axis", "sky_lights"];
     sandbox.run(&idle).refused(&["sky_lights", "no light is taken out of a panorama"]);
 }
+
+#[test]
+fn diffusion_is_measured_against_light_by_distance_over_the_surface() {
+    let sandbox = Sandbox::new();
+    let idle = ["tradeoff", "scene.toml", "-o", "none", "--axis", "taps"];
+    sandbox.run(&idle).refused(&["taps", "the effect diffusion is off"]);
+    sandbox.edit("\"diffuse\", ", "\"diffuse\", \"diffusion\", ");
+    // A ball as wide as a fist in few texels: the widest blur is of some of them.
+    sandbox.edit("[mesh]\n", "[mesh]\nmetres_per_unit = 0.05\n");
+    sandbox.edit("[quality]", "[diffusion]\nlight_map_size = 64\n[quality]");
+    let axes: [(&str, &[&str], &str); 4] = [
+        ("taps", &["5", "7", "9", "full", "surface"], "5"),
+        ("seams", &["cut", "joined", "surface"], "cut"),
+        ("stretch", &["derivative", "exact", "surface"], "exact"),
+        ("levels", &["3", "5", "surface"], "3"),
+    ];
+    let options = axes.iter().flat_map(|(axis, ..)| ["--axis", axis]).collect::<Vec<_>>();
+    done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()));
+    for (axis, names, own) in axes {
+        let settings = settings(&sandbox, "cost", axis);
+        let found: Vec<&str> = settings.iter().map(|setting| setting["name"].as_str().unwrap()).collect();
+        assert_eq!(found, names, "{axis}");
+        let [others @ .., surface] = &settings[..] else { panic!("{axis}") };
+        assert!(surface["reference"] == true && error(surface) == 0.0);
+        // Near the reference and not on it: a tenth would be another picture.
+        assert!(others.iter().all(|setting| (1e-6..0.1).contains(&error(setting))), "{axis}: {others:?}");
+        let present: Vec<&str> = settings
+            .iter()
+            .filter(|setting| setting["present"] == true)
+            .map(|setting| setting["name"].as_str().unwrap())
+            .collect();
+        assert_eq!(present, [own], "{axis}");
+    }
+}

@@ -55,7 +55,7 @@ impl CpuEngine {
         let views = self.views.iter().map(|view| match &view.samples.atlas {
             Some(atlas) if pass.levels.moves() && view.samples.records() > 0 => {
                 let made = pass.levels.levels(atlas, params, cubes);
-                Found::Levels(Finder::new(&pass.levels, made), self.corners())
+                Found::Levels(Finder::new(&pass.levels, made), self.corners(pass.levels.program().dilated))
             }
             _ => Found::Rows(pass.levels.look_up(&view.samples, params, cubes, Row::of)),
         });
@@ -65,8 +65,8 @@ impl CpuEngine {
     }
 
     /// The texels that each view's samples look up.
-    fn corners(&self) -> Arc<Vec<Vec<Corners<f32>>>> {
-        let made = || Arc::new(self.views.iter().map(|view| corners_of(&view.samples)).collect());
+    fn corners(&self, dilated: bool) -> Arc<Vec<Vec<Corners<f32>>>> {
+        let made = || Arc::new(self.views.iter().map(|view| corners_of(&view.samples, dilated)).collect());
         Arc::clone(self.corners.get_or_init(made))
     }
 

@@ -5,14 +5,12 @@ use crate::program::levels::BlurOf;
 use crate::samples::Atlas;
 use crate::shader::atlas::Axis;
 
-/// A level that is blurred, by a texel's place; where the kernel moves, how the level does, or that it stays.
-type Source<'a, R> = (At<'a, R>, Option<Option<At<'a, R>>>);
-
-/// A level, by a texel's place.
-pub(super) type At<'a, R> = &'a dyn Fn(usize) -> Texel<R>;
+/// A level that is blurred; where the kernel moves, how the level does, or that it stays.
+type Source<'a, R> = (&'a [Texel<R>], Option<Option<&'a [Texel<R>]>>);
 
 /// The blurred value of the texel at a place, or how it moves where the kernel does. `number` gives what the kernel
-/// yields, tap by tap: where it lies and what it weighs, then (where it moves) how both do.
+/// yields, tap by tap: where it lies and what it weighs, then (where it moves) how both do. Levels go on beyond the covered
+/// texels with the atlas' [margins](Atlas::margins).
 pub(super) fn blurred<R: Number>(
     blur: &BlurOf,
     atlas: &Atlas,
@@ -25,7 +23,7 @@ pub(super) fn blurred<R: Number>(
     let (mut sum, mut weights) = ([zero; 3], zero);
     // How both move.
     let (mut change, mut change_of_weights) = ([zero; 3], zero);
-    let (chart, own_value) = (atlas.chart(here), source(here));
+    let (chart, own_value) = (atlas.chart(here), source[here]);
     let width = if moving.is_some() { 4 } else { 2 };
     for tap in 0..=2 * blur.reach {
         let [at, weighs] = [0, 1].map(|k| number(width * tap + k));
@@ -37,20 +35,20 @@ pub(super) fn blurred<R: Number>(
         for (side, share) in [(0, one - f), (1, f)] {
             let step = (first as i64).saturating_add(side);
             let near = match blur.axis {
-                Axis::U => atlas.place(column.saturating_add(step), row),
-                Axis::V => atlas.place(column, row.saturating_add(step)),
+                Axis::U => atlas.place_of_chart(chart, column.saturating_add(step), row),
+                Axis::V => atlas.place_of_chart(chart, column, row.saturating_add(step)),
             };
-            let Some(near) = near.filter(|&near| atlas.chart(near) == chart) else { continue };
+            let Some(near) = near else { continue };
             let weight = weighs * share;
-            add(&mut sum, weight, source(near), own_value);
+            add(&mut sum, weight, source[near], own_value);
             weights = weights + weight;
             if let Some(moved) = moving {
                 let along = if side == 1 { slope } else { -slope };
                 let moves = slope_of_weight * share + weighs * along;
-                add(&mut change, moves, source(near), own_value);
+                add(&mut change, moves, source[near], own_value);
                 change_of_weights = change_of_weights + moves;
                 if let Some(moved) = moved {
-                    add(&mut change, weight, moved(near), moved(here));
+                    add(&mut change, weight, moved[near], moved[here]);
                 }
             }
         }
@@ -58,7 +56,7 @@ pub(super) fn blurred<R: Number>(
     let weighs = zero.lt(weights);
     let own = match moving {
         None => own_value,
-        Some(moved) => moved.map_or([zero; 3], |moved| moved(here)),
+        Some(moved) => moved.map_or([zero; 3], |moved| moved[here]),
     };
     if !weighs {
         return own;

@@ -37,7 +37,7 @@ pub(super) fn ordered(of: &GaussianOf, place: impl Fn(&str) -> Option<(usize, us
 
 impl<'a, R: Number> Sources<'a, R> {
     /// Of the columns in their order.
-    pub(super) fn new(of: &GaussianOf, order: &[usize], made: &'a Made<R>, texels: usize) -> Self {
+    pub(super) fn new(of: &GaussianOf, order: &[usize], made: &'a Made<R>, atlas: &Atlas) -> Self {
         let places: Vec<(usize, usize)> =
             order.iter().map_while(|&column| made.place(of.columns[column].source.as_deref()?)).collect();
         let count = places.len();
@@ -47,15 +47,16 @@ impl<'a, R: Number> Sources<'a, R> {
         let record = made.record(first);
         let in_order = places.iter().enumerate().all(|(k, &place)| place == (first, 3 * k));
         // As they stand, where nothing stands between them.
-        if in_order {
+        if in_order && atlas.margins().is_empty() {
             return Self { record: record.numbers.as_slice().into(), stride: record.stride, count };
         }
-        let mut copied = Record::new(count, texels);
+        let mut copied = Record::new(count, atlas.covered());
         for (texel, numbers) in copied.numbers.chunks_mut(copied.stride).enumerate() {
             for (k, &(record, offset)) in places.iter().enumerate() {
                 numbers[3 * k..3 * k + 3].copy_from_slice(&made.record(record).at(texel, offset));
             }
         }
+        copied.extend(atlas.margins().shares());
         Self { stride: copied.stride, record: copied.numbers.into(), count }
     }
 
@@ -173,10 +174,10 @@ impl<R: Number> Gaussian<'_, R> {
         let chart = self.atlas.chart(here);
         let mut add = |step: i64, weight: R, slope: R| {
             let place = match self.of.axis {
-                Axis::U => self.atlas.place(column.saturating_add(step), row),
-                Axis::V => self.atlas.place(column, row.saturating_add(step)),
+                Axis::U => self.atlas.place_of_chart(chart, column.saturating_add(step), row),
+                Axis::V => self.atlas.place_of_chart(chart, column, row.saturating_add(step)),
             };
-            if let Some(place) = place.filter(|&place| self.atlas.chart(place) == chart) {
+            if let Some(place) = place {
                 near.push(Weighed { place: place as u32, weight, slope });
             }
         };

@@ -52,9 +52,39 @@ fn corners<R: Number>(atlas: &Atlas, uv: [f32; 2], chart: u32) -> Option<[(usize
     Some([(nearest, one), (nearest, R::from(0.0)), (nearest, R::from(0.0)), (nearest, R::from(0.0))])
 }
 
-/// What each record of a view looks up; none where it has neither texels nor texture coordinates. All cores.
+/// The four texels around texture coordinates, clamped at the atlas' edge, whatever they are of: covered ones, and those that
+/// were [filled](crate::samples::Atlas::dilation). One that is neither counts as darkness. As
+/// `shader/atlas/level_dilated.wgsl` has it.
+fn dilated_corners<R: Number>(atlas: &Atlas, uv: [f32; 2]) -> Option<[(usize, R); 4]> {
+    let one = R::from(1.0);
+    let most = one.lit(f64::from(atlas.size() - 1));
+    let place = uv.map(|x| R::from(x) * one.lit(f64::from(atlas.size())) - one.lit(0.5));
+    let place = place.map(|x| x.max(R::from(0.0)).min(most));
+    let low = place.map(R::floor);
+    let f = [place[0] - low[0], place[1] - low[1]];
+    let first = low.map(|x| {
+        let x: f64 = x.into();
+        x as i64
+    });
+    let last = i64::from(atlas.size() - 1);
+    (atlas.covered() > 0).then(|| {
+        std::array::from_fn(|k| {
+            let (right, below) = (k & 1, k >> 1);
+            let share = |f: R, side: usize| if side == 1 { f } else { one - f };
+            let [column, row] = [(first[0] + right as i64).min(last), (first[1] + below as i64).min(last)];
+            let filled = || atlas.dilation().number(row as u32 * atlas.size() + column as u32);
+            match atlas.place(column, row).or_else(filled) {
+                Some(at) => (at, share(f[0], right) * share(f[1], below)),
+                None => (0, R::from(0.0)),
+            }
+        })
+    })
+}
+
+/// What each record of a view looks up, `dilated`: by one fetch; none where it has neither texels nor texture coordinates.
+/// All cores.
 #[must_use]
-pub fn corners_of<R: Number>(samples: &ViewSamples) -> Vec<Corners<R>> {
+pub fn corners_of<R: Number>(samples: &ViewSamples, dilated: bool) -> Vec<Corners<R>> {
     let places = samples.surface.places();
     let (Some(atlas), Some(at), Some(of_chart)) = (&samples.atlas, places.uv, places.chart) else {
         return Vec::new();
@@ -64,7 +94,12 @@ pub fn corners_of<R: Number>(samples: &ViewSamples) -> Vec<Corners<R>> {
         let mut found = Corners { texels: [[0; LANES]; 4], shares: [[R::from(0.0); LANES]; 4] };
         for lane in 0..LANES {
             let number = |row: usize| rows.number(row, record * LANES + lane);
-            let four = corners(atlas, [number(at), number(at + 1)], number(of_chart) as u32);
+            let uv = [number(at), number(at + 1)];
+            let four = if dilated {
+                dilated_corners(atlas, uv)
+            } else {
+                corners(atlas, uv, number(of_chart) as u32)
+            };
             for (k, (texel, share)) in four.into_iter().flatten().enumerate() {
                 (found.texels[k][lane], found.shares[k][lane]) = (texel as u32, share);
             }
@@ -171,7 +206,7 @@ impl<R: Number> LevelMaker<R> {
             return Vec::new();
         }
         let finder = samples.atlas.as_ref().map(|atlas| Finder::new(self, self.levels(atlas, params, cubes)));
-        let corners = corners_of(samples);
+        let corners = corners_of(samples, self.program.dilated);
         let instructions = Instructions::new();
         let chunks = (0..records.div_ceil(CHUNK)).into_par_iter().map(|chunk| {
             let own = chunk * CHUNK..records.min((chunk + 1) * CHUNK);

@@ -7,7 +7,7 @@
 //! - this module: [`LevelMaker`], which makes levels anew when a number changes that they are made with
 //! - `records`: levels in memory; `run`: a pass over them
 //! - `gaussian`: one direction of a Gaussian, of a level and of how it moves; `blur`: likewise by a rule's own taps;
-//!   `neighbours`: how far these lie apart; `look_up`: what samples find
+//!   `neighbours`: how far these lie apart; `surface`: sums by distance in space; `look_up`: what samples find
 
 mod blur;
 mod gaussian;
@@ -15,6 +15,7 @@ mod look_up;
 mod neighbours;
 mod records;
 mod run;
+mod surface;
 #[cfg(test)]
 mod tests;
 
@@ -137,7 +138,8 @@ impl<R: Number> LevelMaker<R> {
         Err(PlanError::no_atlas(effects))
     }
 
-    /// The levels of an atlas that samples look up, at `params`: the last ones, where nothing has changed that they are
+    /// The levels of an atlas that samples look up, at `params`, those texels with them that a lookup by one fetch has
+    /// filled: the last ones, where nothing has changed that they are
     /// made with. `cubes` gives the cubes at `params`.
     pub fn levels(
         &self,
@@ -155,6 +157,9 @@ impl<R: Number> LevelMaker<R> {
         let cubes = if reads { cubes() } else { CubesAt::dark(|x| R::from(x)) };
         let mut levels = self.make(atlas, params, &cubes);
         levels.retain(|name| self.program.looked_up.iter().any(|(found, _)| found == name));
+        if self.program.dilated {
+            levels.fill(atlas.dilation());
+        }
         let levels = Arc::new(levels);
         let made = Last { atlas: Arc::clone(atlas), with, levels: Arc::clone(&levels) };
         self.last.lock().unwrap_or_else(PoisonError::into_inner).push(made);

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{Number, Texel};
+use crate::samples::Dilation;
 
 /// Numbers that a record is a multiple of: what one instruction loads.
 const WIDE: usize = 4;
@@ -20,6 +21,35 @@ impl<R: Number> Record<R> {
     pub(super) fn new(leaves: usize, texels: usize) -> Self {
         let stride = (3 * leaves).next_multiple_of(WIDE);
         Self { stride, numbers: vec![R::from(0.0); stride * texels] }
+    }
+
+    /// Add texels that are made of others, each of its four by shares. Of differences to one of them: what is alike everywhere
+    /// stays so to the bit.
+    pub(super) fn extend(&mut self, made_of: &[[(u32, f32); 4]]) {
+        for shares in made_of {
+            let number = |texel: u32, k: usize| self.numbers[texel as usize * self.stride + k];
+            let mixed = |k: usize| {
+                let first = number(shares[0].0, k);
+                shares.iter().fold(first, |sum, &(at, share)| sum + R::from(share) * (number(at, k) - first))
+            };
+            let mixed: Vec<R> = (0..self.stride).map(mixed).collect();
+            self.numbers.extend(mixed);
+        }
+    }
+
+    /// Add the texels that a dilation fills beyond the covered ones.
+    fn fill(&mut self, dilation: &Dilation) {
+        for near in dilation.filled() {
+            let number = |texel: u32, k: usize| self.numbers[texel as usize * self.stride + k];
+            let mean = |k: usize| {
+                let first = number(near[0], k);
+                let count = first.lit(near.len() as f64);
+                let zero = R::from(0.0);
+                first + near.iter().fold(zero, |sum, &at| sum + (number(at, k) - first)) / count
+            };
+            let mean: Vec<R> = (0..self.stride).map(mean).collect();
+            self.numbers.extend(mean);
+        }
     }
 
     /// What stands from `offset` on of a texel.
@@ -58,6 +88,14 @@ impl<R: Number> Made<R> {
 
     pub(super) fn record(&self, at: usize) -> &Record<R> {
         &self.records[at]
+    }
+
+    /// Add the texels that a dilation fills to all that lookups read.
+    pub(super) fn fill(&mut self, dilation: &Dilation) {
+        self.records
+            .iter_mut()
+            .filter(|record| !record.numbers.is_empty())
+            .for_each(|record| record.fill(dilation));
     }
 
     /// Forget what no lookup reads.

@@ -1,18 +1,21 @@
 //! A pass over an atlas: its steps, sixteen texels at a time, and what is done with what they yield.
 
+use std::borrow::Cow;
+
 use fearless_simd::Level as Instructions;
 use rayon::prelude::*;
 
-use super::blur::{At, blurred};
+use super::blur::blurred;
 use super::gaussian::{Gaussian, Sources, ordered};
 use super::neighbours::neighbours;
 use super::records::{Made, Record};
+use super::surface::means;
 use super::{Number, Texel};
 use crate::engine::cubes_at::{CubesAt, Sixteen};
 use crate::model::batch::Batch;
 use crate::model::params::Params;
 use crate::program::graph::Input;
-use crate::program::levels::{APART_FIELD, BlurOf, GaussianOf, LevelPass, Then};
+use crate::program::levels::{APART_FIELD, BlurOf, GaussianOf, LevelPass, SurfaceOf, Then};
 use crate::program::shading::constant;
 use crate::program::steps::Setting;
 use crate::samples::{Atlas, LANES};
@@ -83,28 +86,56 @@ impl<'a, R: Number> Run<'a, R> {
             }),
             Then::Blur(blur) => self.blur(blur),
             Then::Gaussian(of) => self.gaussian(of),
+            Then::Surface(of) => self.surface(of),
         }
     }
 
+    /// A level with the atlas' margins.
+    fn level(&self, name: &str) -> Option<Vec<Texel<R>>> {
+        let level = self.made.texels(name)?;
+        Some(match self.atlas.margins().added(&level) {
+            Cow::Borrowed(_) => level,
+            Cow::Owned(added) => added,
+        })
+    }
+
     fn blur(&self, blur: &BlurOf) -> Record<R> {
-        let level = |name: &str| {
-            let place = self.made.place(name);
-            move |texel: usize| {
-                place.map_or([R::from(0.0); 3], |(record, offset)| self.made.record(record).at(texel, offset))
-            }
+        let Some(source) = self.level(&blur.source) else {
+            return Record::new(self.pass.leaves.len(), self.atlas.covered());
         };
-        let source = level(&blur.source);
-        let moved = blur.moving.as_ref().map(|moved| moved.as_deref().map(level));
+        let moved = blur.moving.as_ref().map(|moved| moved.as_ref().and_then(|moved| self.level(moved)));
+        let moved = moved.as_ref().map(Option::as_deref);
         self.each(|at, numbers, lane, _, leaves| {
-            let moved = moved.as_ref().map(|moved| moved.as_ref().map(|moved| moved as At<'_, R>));
             let blurred = blurred(blur, self.atlas, at, (&source, moved), |i| numbers[i].0[lane]);
             leaves[..3].copy_from_slice(&blurred);
         })
     }
 
+    fn surface(&self, of: &SurfaceOf) -> Record<R> {
+        let mut record = Record::new(self.pass.leaves.len(), self.atlas.covered());
+        let texels = of.texels.each_ref().map(|name| self.made.texels(name));
+        let ([Some(places), Some(facing), Some(areas)], Some(source)) =
+            (texels, self.made.texels(&of.source))
+        else {
+            return record;
+        };
+        let moved = of.moving.as_ref().map(|moved| moved.as_ref().and_then(|moved| self.made.texels(moved)));
+        // The variance, and how it moves, or 0.
+        let kernel = self.each(|_, numbers, lane, _, leaves| {
+            leaves.iter_mut().zip(numbers.iter().take(2)).for_each(|(x, number)| *x = number.0[lane]);
+        });
+        let kernel: Vec<Texel<R>> = (0..self.atlas.covered()).map(|texel| kernel.at(texel, 0)).collect();
+        let source = (source.as_slice(), moved.as_ref().map(Option::as_deref));
+        let means = means([&places, &facing, &areas], &kernel, source);
+        for (leaves, mean) in record.numbers.chunks_mut(record.stride).zip(means) {
+            leaves[..3].copy_from_slice(&mean);
+        }
+        record
+    }
+
     fn gaussian(&self, of: &GaussianOf) -> Record<R> {
         let order = ordered(of, |name| self.made.place(name));
-        let sources = Sources::new(of, &order, self.made, self.atlas.covered());
+        let sources = Sources::new(of, &order, self.made, self.atlas);
         let gaussian = Gaussian { of, atlas: self.atlas, sources: &sources, order: &order };
         self.each(|at, numbers, lane, near, leaves| {
             gaussian.blur(at, |i| numbers[i].0[lane], near, leaves);

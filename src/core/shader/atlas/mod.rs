@@ -20,14 +20,18 @@ pub(super) mod text;
 use std::collections::{BTreeMap, BTreeSet};
 
 pub use self::text::stored;
-use super::domain::{CHART, DIRECTIONS, Domain, UV};
+use super::domain::{CHART, DIRECTIONS, Domain, TAP_COST, UV};
 use super::emit::Plan;
 use super::facts::{Facts, Source};
 use super::rule::{Kernel, Rule};
 use super::search::{Carried, Found, PlanError};
+use crate::model::diffusion::Seams;
 
 /// Levels that a draw leaves: an adapter draws into 32 bytes a sample at once, by WebGPU's defaults.
 const LEVELS_A_DRAW: usize = 2;
+
+/// The ending of levels whose empty texels were filled.
+const DILATED: &str = "_dilated";
 
 /// A texture of the atlas: a quantity of its texels, or one that is blurred along u alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -47,6 +51,16 @@ impl Level {
     #[must_use]
     pub fn bound(&self) -> String {
         format!("{}_level", self.name)
+    }
+
+    /// The same, its empty texels filled for lookups by one fetch.
+    pub(super) fn dilated(&self) -> Self {
+        Self::new(format!("{}{DILATED}", self.name), self.kind)
+    }
+
+    /// The quantity that a fragment finds there.
+    pub(super) fn quantity(&self) -> &str {
+        self.name.strip_suffix(DILATED).unwrap_or(&self.name)
     }
 
     /// The components of a texel that hold it.
@@ -87,6 +101,10 @@ pub enum PassKind {
     Blur(Axis),
     /// The same vertices: how far what is read lies from one neighbour to the next.
     Neighbours,
+    /// Nothing: the processor alone sums up over the surface.
+    Surface,
+    /// The same vertices: what is read, its empty texels filled two rings deep.
+    Dilate,
 }
 
 /// A pass over the atlas.
@@ -114,7 +132,7 @@ pub struct MovingKernel {
 pub const TEXEL: &str = "skinfit_texel";
 /// Over stored texels: the function of a `Sample` that yields what a blur's kernel is made of, and where that moves how:
 /// of [taps](Kernel::Taps), for each where it lies and what it weighs, after each how that moves; of a
-/// [Gaussian](Kernel::Gaussian) its deviation.
+/// [Gaussian](Kernel::Gaussian) its deviation, of one [over the surface](Kernel::Surface) its variance.
 pub const TAPS: &str = "skinfit_taps";
 /// Over stored texels: the function of a `Sample`, and of how far its neighbours are apart, that yields a pass' value.
 pub const APART: &str = "skinfit_apart";
@@ -122,7 +140,7 @@ pub const APART: &str = "skinfit_apart";
 /// The passes that yield the texels' quantities which fragments look up; none where nothing is computed in texels.
 ///
 /// # Errors
-/// When a mesh has no texture coordinates to be drawn with.
+/// When a mesh has no texture coordinates to be drawn with, or an adapter does not do what a pass takes.
 pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanError> {
     let texels: Vec<&'static Rule> =
         found.rules.iter().copied().filter(|rule| rule.domain == Domain::Texel).collect();
@@ -130,6 +148,14 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
         return Ok(Vec::new());
     }
     let drawn = facts.source == Source::Raster;
+    let by_distance = |rule: &&&Rule| rule.blur.as_ref().is_some_and(|blur| blur.kernel == Kernel::Surface);
+    if let Some(rule) = texels.iter().find(by_distance).filter(|_| drawn) {
+        return Err(PlanError::OverSurface { level: rule.gives[0].0 });
+    }
+    let blurs = texels.iter().find(|rule| rule.blur.as_ref().is_some_and(|blur| blur.kernel.is_along_axes()));
+    if let Some(rule) = blurs.filter(|_| drawn && facts.setup.choices.diffusion.seams == Seams::Joined) {
+        return Err(PlanError::Joined { level: rule.gives[0].0 });
+    }
     if drawn && !found.rules.iter().any(|rule| rule.domain == Domain::Vertex && rule.gives_quantity(UV)) {
         return Err(PlanError::NoPlan { goals: UV.to_owned() });
     }
@@ -147,8 +173,41 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
         let blurs = texels.iter().filter(|rule| rule.blur.is_some() && depth(rule) == Some(layer + 1));
         passes.extend(blurs.flat_map(|rule| blurs_of(facts, rule)));
     }
+    if facts.dilates() {
+        let sampled = found.carried.iter().filter(|on| on.edge.from == Domain::Texel);
+        let level = |on: &Carried| Level::new(on.quantity, level_type(on.numbers));
+        passes.extend(sampled.map(|on| dilate(facts, &level(on))));
+    }
     Ok(passes)
 }
+
+/// The levels that fragments look up.
+pub(super) fn looked_up(facts: &Facts, carried: &[Carried]) -> Vec<Level> {
+    let sampled = carried.iter().filter(|on| on.edge.from == Domain::Texel);
+    let levels = sampled.map(|on| Level::new(on.quantity, level_type(on.numbers)));
+    levels.map(|level| if facts.dilates() { level.dilated() } else { level }).collect()
+}
+
+/// The WGSL type of that many numbers of a level.
+const fn level_type(numbers: usize) -> &'static str {
+    match numbers {
+        1 => "f32",
+        2 => "vec2f",
+        _ => "vec3f",
+    }
+}
+
+/// A level, its empty texels filled.
+fn dilate(facts: &Facts, source: &Level) -> Pass {
+    let mut plan = Plan::of_rules(facts, &[], &[], vec![source.clone()]);
+    // Few texels are empty and look further than their neighbours.
+    plan.cost = facts.work.share(Domain::Texel) * NEIGHBOURS * TAP_COST;
+    plan.wgsl = text::dilate(&plan, source);
+    Pass { kind: PassKind::Dilate, leaves: vec![source.dilated()], plan, moving: None }
+}
+
+/// Texels around one.
+const NEIGHBOURS: f64 = 8.0;
 
 /// How many blurs lie before each of the texels' quantities, itself with them.
 fn depths(texels: &[&'static Rule]) -> BTreeMap<&'static str, usize> {
@@ -236,7 +295,7 @@ fn halfway(rule: &Rule) -> String {
     format!("{}_along_u", rule.gives[0].0)
 }
 
-/// A blur along u, then along v.
+/// The passes of a rule that reads texels' neighbours: of a blur along the axes one along u, then one along v.
 fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
     let Some(blur) = &rule.blur else { return Vec::new() };
     let kind = blur.kind;
@@ -246,6 +305,13 @@ fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
         plan.wgsl = text::neighbours(&plan, rule, &source);
         let leaves = vec![Level::new(rule.gives[0].0, rule.returns)];
         return vec![Pass { kind: PassKind::Neighbours, leaves, plan, moving: None }];
+    }
+    if blur.kernel == Kernel::Surface {
+        let source = Level::new(blur.of, kind);
+        let mut plan = blur_plan(facts, rule, &source);
+        plan.wgsl = text::blur(&plan, rule, Axis::U, &source);
+        let leaves = vec![Level::new(rule.gives[0].0, kind)];
+        return vec![Pass { kind: PassKind::Surface, leaves, plan, moving: None }];
     }
     let directions = [
         (Axis::U, Level::new(blur.of, kind), Level::new(halfway(rule), kind)),

@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use super::text::{self, Slope};
-use super::{Level, MovingKernel, Pass, PassKind};
+use super::{Axis, Level, MovingKernel, Pass, PassKind};
 use crate::shader::emit::Plan;
 use crate::shader::rule::Rule;
 use crate::shader::tangent::chain::{Chain, Seed};
@@ -34,8 +34,14 @@ impl Along {
         for (at, pass) in plan.passes.iter().enumerate() {
             let tangent = match pass.kind {
                 PassKind::Draw => along.draw(pass, seed)?,
-                PassKind::Blur(_) => along.blur(pass, seed)?,
+                PassKind::Blur(axis) => along.blur(pass, axis, seed)?,
+                PassKind::Surface => {
+                    along.check_places(pass)?;
+                    // It has no axis, and its kernel asks for none.
+                    along.blur(pass, Axis::U, seed)?
+                }
                 PassKind::Neighbours => along.neighbours(pass)?,
+                PassKind::Dilate => along.dilate(pass),
             };
             along.derived.extend(tangent.as_ref().map(|_| at));
             along.passes.extend(tangent);
@@ -74,8 +80,7 @@ impl Along {
         Ok(Some(Pass { kind: pass.kind, leaves, plan, moving: None }))
     }
 
-    fn blur(&mut self, pass: &Pass, seed: &Seed) -> Result<Option<Pass>, TangentError> {
-        let PassKind::Blur(axis) = pass.kind else { return Ok(None) };
+    fn blur(&mut self, pass: &Pass, axis: Axis, seed: &Seed) -> Result<Option<Pass>, TangentError> {
         let (rule, source) = (pass.plan.steps[0].rule, pass.plan.levels[0].clone());
         let moved = self.moved.get(&source.name).cloned();
         let slope = self.kernel_slope(pass, rule, seed)?;
@@ -95,6 +100,30 @@ impl Along {
         }
         let leaves = pass.leaves.iter().map(|level| self.leave(level)).collect();
         Ok(Some(Pass { kind: pass.kind, leaves, plan, moving }))
+    }
+
+    /// Where texels lie is what a sum over the surface reads of them: no seed moves that.
+    fn check_places(&self, pass: &Pass) -> Result<(), TangentError> {
+        let rule = pass.plan.steps[0].rule;
+        let mut beside = rule.blur.iter().flat_map(|blur| &blur.beside);
+        match beside.find(|(name, _)| self.moved.contains_key(*name)) {
+            None => Ok(()),
+            Some((name, _)) => {
+                let (function, what) =
+                    (rule.function.to_owned(), format!("sums over a surface whose {name} moves"));
+                Err(TangentError::Unsupported { function, what })
+            }
+        }
+    }
+
+    /// Empty texels are means of others: how they move is that of how these do.
+    fn dilate(&mut self, pass: &Pass) -> Option<Pass> {
+        let moved = self.moved.get(&pass.plan.levels[0].name).cloned()?;
+        let leaves = pass.leaves.iter().map(|level| self.leave(level)).collect();
+        let mut plan = pass.plan.clone();
+        plan.levels[0] = moved.clone();
+        plan.wgsl = text::dilate(&plan, &moved);
+        Some(Pass { leaves, plan, ..pass.clone() })
     }
 
     /// What is read of neighbours is where the surface lies: no seed moves that.

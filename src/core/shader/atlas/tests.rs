@@ -6,13 +6,14 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 
 use super::tangent::Along;
 use super::*;
+use crate::model::diffusion::{DiffusionChoices, Lookup, Method, Seams};
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::params::Param;
 use crate::shader::domain::Work;
 use crate::shader::facts::{Budget, MapFacts, Source};
 use crate::shader::tangent::chain::Seed;
-use crate::shader::term::{Problem, Term, register};
+use crate::shader::term::{Problem, Term, library, register};
 use crate::shader::{Resource, plan};
 
 /// Two blurs, one after the other, of a light map; how far they reach depends on how the map is stretched.
@@ -319,4 +320,56 @@ fn what_texels_cannot_have_is_told_with_its_line_and_a_remedy() {
         .replacen("dot(haar_stretch, axis)", "dot(haar_stretch.xy, axis)", 1);
     let error = register("haar", &held).unwrap_err();
     assert!(matches!(error.problem, Problem::NoLevel { .. }), "{error}");
+}
+
+#[test]
+fn what_one_fetch_looks_up_is_filled_by_passes_of_its_own() {
+    let mut facts = facts(Effects::of(&[Effect::Occlusion]));
+    facts.setup.choices.diffusion.lookup = Lookup::Dilated;
+    let plan = plan(&facts).unwrap();
+    validate(&plan);
+    let last: Vec<(PassKind, Vec<&str>, Vec<&str>)> = plan.passes[6..]
+        .iter()
+        .map(|pass| (pass.kind, names(&pass.plan.levels), names(&pass.leaves)))
+        .collect();
+    let filled = |from, to| (PassKind::Dilate, vec![from], vec![to]);
+    assert_eq!(last, [filled("mist_near", "mist_near_dilated"), filled("mist_far", "mist_far_dilated")]);
+    plan.passes.iter().for_each(|pass| validate(&pass.plan));
+    assert_eq!(names(&plan.levels), ["mist_near_dilated", "mist_far_dilated"]);
+    assert!(plan.wgsl.contains("let mist_far: vec3f = level_at(mist_far_dilated_level, at.vertex_uv).xyz;"));
+    let along = Along::new(&plan, &Seed::of_param(Param::Occlusion)).unwrap();
+    along.passes.iter().for_each(|pass| validate(&pass.plan));
+    let [.., last] = along.passes.as_slice() else { panic!("nothing moves") };
+    assert_eq!(
+        (names(&last.plan.levels), names(&last.leaves)),
+        (vec!["d_mist_far"], vec!["d_mist_far_dilated"])
+    );
+    // Of stored samples the processor fills what it finds empty.
+    let stored = crate::shader::plan(&Facts { source: Source::Samples, ..facts }).unwrap();
+    assert_eq!((stored.passes.len(), names(&stored.levels)), (6, vec!["mist_near", "mist_far"]));
+}
+
+#[test]
+fn adapters_refuse_what_the_processor_alone_does() {
+    library::register_all();
+    let diffusion = Effect::from_name("diffusion").unwrap();
+    let mut facts = facts(Effects::of(&[diffusion, Effect::Diffuse]));
+    assert!(plan(&facts).is_ok());
+    let refused = |facts: &Facts| plan(facts).unwrap_err();
+    facts.setup.choices.diffusion.seams = Seams::Joined;
+    let joined = refused(&facts);
+    assert!(matches!(joined, PlanError::Joined { .. }) && joined.to_string().contains("seams = \"cut\""));
+    assert!(plan(&Facts { source: Source::Samples, ..facts }).is_ok());
+    facts.setup.choices.diffusion = DiffusionChoices { method: Method::Surface, ..DiffusionChoices::DEFAULT };
+    let over = refused(&facts);
+    assert_eq!(over, PlanError::OverSurface { level: "diffusion_level_1" });
+    assert!(over.to_string().contains("method = \"separable\""));
+    let stored = plan(&Facts { source: Source::Samples, ..facts }).unwrap();
+    let sums: Vec<&Pass> = stored.passes.iter().filter(|pass| pass.kind == PassKind::Surface).collect();
+    assert_eq!(sums.len(), 3);
+    for pass in sums {
+        validate(&pass.plan);
+        let read = ["diffusion_level_0", "diffusion_place", "diffusion_facing", "diffusion_area"];
+        assert_eq!(names(&pass.plan.levels), read);
+    }
 }

@@ -10,14 +10,19 @@ use crate::shader::module::{sample_struct, uniform};
 use crate::shader::quantity::Constant;
 use crate::shader::rule::{Kernel, Rule};
 
-/// The function by which fragments look levels up.
-pub(crate) const SAMPLE_LEVEL: &str = include_str!("level.wgsl");
+/// The functions by which fragments look levels up.
+pub(crate) fn sample_level(facts: &Facts) -> &'static str {
+    if facts.dilates() { include_str!("level_dilated.wgsl") } else { include_str!("level.wgsl") }
+}
 
 /// One direction of a blur, and how it moves: one head, and what differs.
 const BLUR: &str = concat!(include_str!("blur_head.wgsl"), include_str!("blur.wgsl"));
 const BLUR_TANGENT: &str = concat!(include_str!("blur_head.wgsl"), include_str!("blur_tangent.wgsl"));
 /// How far neighbours lie apart.
 const NEIGHBOURS: &str = concat!(include_str!("blur_head.wgsl"), include_str!("neighbours.wgsl"));
+
+/// Empty texels that are filled.
+const DILATE: &str = include_str!("dilate.wgsl");
 
 /// Where the mesh lies in the atlas: v runs downwards.
 const IN_ATLAS: &str = "vec4f(2.0 * vertex_uv.x - 1.0, 1.0 - 2.0 * vertex_uv.y, 0.0, 1.0)";
@@ -88,15 +93,24 @@ fn reads(levels: &[Level], place: &str) -> String {
 }
 
 /// What fragments look up: which texels count is the same of all levels.
-pub(crate) fn sampled(levels: &[Level]) -> String {
+pub(crate) fn sampled(facts: &Facts, levels: &[Level]) -> String {
     let Some(first) = levels.first() else { return String::new() };
-    let corners =
-        format!("    let corners = level_corners({}, at.{UV}, round(at.{CHART}));\n", first.bound());
-    let read = |level: &Level| {
-        let (bound, swizzle) = (level.bound(), level.swizzle());
-        format!("    let {}: {} = level_at({bound}, corners).{swizzle};\n", level.name, level.kind)
+    let (before, by) = if facts.dilates() {
+        (String::new(), format!("at.{UV}"))
+    } else {
+        let corners = format!("level_corners({}, at.{UV}, round(at.{CHART}))", first.bound());
+        (format!("    let corners = {corners};\n"), "corners".to_owned())
     };
-    std::iter::once(corners).chain(levels.iter().map(read)).collect()
+    let read = |level: &Level| {
+        let (bound, swizzle, name) = (level.bound(), level.swizzle(), level.quantity());
+        format!("    let {name}: {} = level_at({bound}, {by}).{swizzle};\n", level.kind)
+    };
+    std::iter::once(before).chain(levels.iter().map(read)).collect()
+}
+
+/// A level, its empty texels filled.
+pub(super) fn dilate(plan: &Plan, source: &Level) -> String {
+    format!("{}{}", plan.declarations(true), DILATE.replace("{source}", &source.bound()))
 }
 
 /// The lines that read levels' quantities of the fields of a stored sample or texel, `at`.
@@ -177,7 +191,8 @@ fn taps(facts: &Facts, rule: &Rule, axis: Axis, slope: Option<&Slope>) -> Loop {
             return Loop { before: String::new(), reach, tap: value(TAP), slope: moved(TAP) };
         }
         Kernel::Gaussian => facts.setup.choices.diffusion.taps.count(),
-        Kernel::Neighbours => Some(1),
+        // No loop of these: a texel's two neighbours, or what the processor finds.
+        Kernel::Neighbours | Kernel::Surface => Some(1),
     };
     let mut before = format!("    let deviation: f32 = {};\n", value(TAP));
     if slope.is_some() {

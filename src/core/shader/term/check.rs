@@ -73,9 +73,9 @@ const TAKEN: [&str; 48] = [
 const FUNCTIONS: [&str; 4] = ["sample_level", "vs_main", "fs_main", "cs_main"];
 
 /// Whether a name is one of those that the passes over the atlas make of others': `NAME_level` is a level as it is bound,
-/// `NAME_along_u` what the first direction of a blur leaves, `d_NAME` how a level moves.
+/// `NAME_along_u` what the first direction of a blur leaves, `NAME_dilated` what fills empty texels, `d_NAME` how a level moves.
 fn is_made(name: &str) -> bool {
-    name.starts_with("d_") || name.ends_with("_level") || name.ends_with("_along_u")
+    name.starts_with("d_") || ["_level", "_along_u", "_dilated"].iter().any(|ending| name.ends_with(ending))
 }
 
 /// The declaration, where it fits.

@@ -252,7 +252,8 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
         }
         "pass" => {
             let wanted = "QUANTITY: TYPE, TAPS taps: what is blurred, an f32, vec2f or vec3f, and how many places count, \
-                          an odd number from 3 to 255; or `gaussian` or `neighbours` in the place of these";
+                          an odd number from 3 to 255; or `gaussian`, `neighbours` or `surface of PLACE, FACING, AREA` in the \
+                          place of these";
             rule.blur = Some(blur(value).ok_or_else(|| unread(wanted))?);
         }
         "error" => {

@@ -93,8 +93,8 @@ impl Problem {
                     .to_owned()
             }
             Self::Reserved(_) => {
-                "Give it another name: those that begin with `d_` or end in `_level` or `_along_u` are of levels of the \
-                 atlas, and sample_level, vs_main, fs_main and cs_main are functions"
+                "Give it another name: those that begin with `d_` or end in `_level`, `_along_u` or `_dilated` are of \
+                 levels of the atlas, and sample_level, vs_main, fs_main and cs_main are functions"
                     .to_owned()
             }
             Self::Taken { .. } => "Give it another name".to_owned(),

@@ -19,21 +19,33 @@ pub(super) fn domains_of(value: &'static str) -> Result<Vec<Domain>, Problem> {
     if domains.is_empty() { Err(unread()) } else { Ok(domains) }
 }
 
-/// `glow_light: vec3f, 7 taps`, `glow_light: vec3f, gaussian`, or `glow_light: vec3f, neighbours`.
+/// What a sum over the surface reads of texels: where they lie, which way they face, what area they have.
+const SURFACE: [&str; 3] = ["vec3f", "vec3f", "f32"];
+
+/// `glow_light: vec3f, 7 taps`, `glow_light: vec3f, gaussian`, `glow_light: vec3f, neighbours`, or
+/// `glow_light: vec3f, surface of glow_place, glow_facing, glow_area`.
 pub(super) fn blur(value: &'static str) -> Option<Blur> {
     let (source, kernel) = value.split_once(',')?;
     let (of, kind) = source.split_once(':').map(|(of, kind)| (of.trim(), kind.trim()))?;
-    let kernel = match kernel.trim() {
-        "gaussian" => Kernel::Gaussian,
-        "neighbours" => Kernel::Neighbours,
-        taps => Kernel::Taps(taps.strip_suffix(" taps")?.trim().parse().ok()?),
+    let mut beside = Vec::new();
+    let kernel = match (kernel.trim(), kernel.trim().strip_prefix("surface of ")) {
+        (_, Some(read)) => {
+            beside.extend(list(read).zip(SURFACE));
+            if list(read).count() != SURFACE.len() {
+                return None;
+            }
+            Kernel::Surface
+        }
+        ("gaussian", None) => Kernel::Gaussian,
+        ("neighbours", None) => Kernel::Neighbours,
+        (taps, None) => Kernel::Taps(taps.strip_suffix(" taps")?.trim().parse().ok()?),
     };
     let counted = match kernel {
         Kernel::Taps(taps) => taps % 2 == 1 && (3..=255).contains(&taps),
         _ => true,
     };
     let fits = LEVEL_TYPES.contains(&kind) && counted;
-    fits.then(|| Blur { of, kind, kernel, parameters: Vec::new() })
+    fits.then(|| Blur { of, kind, kernel, beside, parameters: Vec::new() })
 }
 
 /// Of a rule whose function is a kernel: what it is called with, and what it needs.
@@ -48,8 +60,8 @@ pub(super) fn kernel(rule: &mut Rule, domains: &[Domain]) -> Result<(), Problem>
     // Weights that depended on what they weigh would make no linear pass.
     let own = rule.needs.iter().any(|(need, _)| *need == blur.of);
     let arguments = blur.kernel.arguments();
-    if own || blur.kernel.returns().is_some_and(|kind| kind != returns) || !rule.needs.contains(&arguments[0])
-    {
+    let called = arguments.first().is_none_or(|first| rule.needs.contains(first));
+    if own || blur.kernel.returns().is_some_and(|kind| kind != returns) || !called {
         return Err(Problem::Kernel);
     }
     if blur.kernel != Kernel::Neighbours {
@@ -57,6 +69,7 @@ pub(super) fn kernel(rule: &mut Rule, domains: &[Domain]) -> Result<(), Problem>
     }
     blur.parameters.clone_from(&rule.needs);
     rule.needs.retain(|need| !arguments.contains(need));
-    rule.needs.insert(0, (blur.of, blur.kind));
+    rule.needs.retain(|need| !blur.beside.contains(need));
+    rule.needs.splice(0..0, std::iter::once((blur.of, blur.kind)).chain(blur.beside.iter().copied()));
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The axes, in the order of documentation.
 
 mod cubes;
+mod diffusion;
 mod filter;
 mod fits;
 mod format;
@@ -35,6 +36,12 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &ways::SKY,
         &ways::LOBE,
         &ways::SPLIT_SUM,
+        &diffusion::TAPS,
+        &diffusion::LIGHT_MAP_SIZE,
+        &diffusion::SEAMS,
+        &diffusion::AMBIENT_NORMAL,
+        &diffusion::STRETCH,
+        &diffusion::LEVELS,
         &samples::Samples,
         &textures::Textures,
         &shadows::Shadows,

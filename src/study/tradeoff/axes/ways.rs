@@ -13,16 +13,16 @@ use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, Evaluated};
 
 /// A way, by its name in scene files, and what it changes of a scene.
-type Way = (&'static str, fn(&mut Scene));
+pub(super) type Way = (&'static str, fn(&mut Scene));
 
 /// The ways to a quantity. The last one is the reference.
 pub(super) struct Ways {
-    axis: &'static str,
-    title: &'static str,
-    method: &'static str,
-    effect: &'static str,
-    idle: &'static str,
-    ways: &'static [Way],
+    pub(super) axis: &'static str,
+    pub(super) title: &'static str,
+    pub(super) method: &'static str,
+    pub(super) effect: &'static str,
+    pub(super) idle: &'static str,
+    pub(super) ways: &'static [Way],
 }
 
 /// How a point sees the sky.
@@ -99,7 +99,8 @@ impl Axis for Ways {
         for &(name, way) in self.ways {
             let mut scene = Scene::clone(own);
             way(&mut scene);
-            let present = scene.choices == own.choices;
+            let kept = (scene.choices, scene.diffusion, scene.effects);
+            let present = kept == (own.choices, own.diffusion, own.effects);
             let since = Instant::now();
             let evaluated = Evaluated::anew(scene)?;
             evaluated.live_engine()?.loss(&bench.point());

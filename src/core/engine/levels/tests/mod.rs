@@ -3,6 +3,7 @@
 mod engine;
 mod fits;
 mod made;
+mod seams;
 
 use std::sync::OnceLock;
 

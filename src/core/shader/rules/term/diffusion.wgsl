@@ -142,7 +142,7 @@ fn stretch_of_triangle(vertex_position: vec3f) -> vec2f {
 // gives: diffusion_level_1
 // domain: texel
 // sampled: 0
-// when: diffusion
+// when: diffusion, !surface_levels
 // pass: diffusion_level_0: vec3f, gaussian
 // cost: 8
 fn deviation_1(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_1: f32, diffusion_unit: f32) -> f32 {
@@ -155,7 +155,7 @@ fn deviation_1(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_1: f32, d
 // gives: diffusion_level_2
 // domain: texel
 // sampled: 0
-// when: diffusion
+// when: diffusion, !surface_levels
 // pass: diffusion_level_1: vec3f, gaussian
 // cost: 8
 fn deviation_2(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_2: f32, diffusion_unit: f32) -> f32 {
@@ -168,7 +168,7 @@ fn deviation_2(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_2: f32, d
 // gives: diffusion_level_3
 // domain: texel
 // sampled: 0
-// when: diffusion
+// when: diffusion, !surface_levels
 // pass: diffusion_level_2: vec3f, gaussian
 // cost: 8
 fn deviation_3(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_3: f32, diffusion_unit: f32) -> f32 {
@@ -181,7 +181,7 @@ fn deviation_3(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_3: f32, d
 // gives: diffusion_level_4
 // domain: texel
 // sampled: 0
-// when: diffusion_five
+// when: diffusion_five, !surface_levels
 // pass: diffusion_level_3: vec3f, gaussian
 // cost: 8
 fn deviation_4(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_4: f32, diffusion_unit: f32) -> f32 {
@@ -194,12 +194,125 @@ fn deviation_4(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_4: f32, d
 // gives: diffusion_level_5
 // domain: texel
 // sampled: 0
-// when: diffusion_five
+// when: diffusion_five, !surface_levels
 // pass: diffusion_level_4: vec3f, gaussian
 // cost: 8
 fn deviation_5(axis: vec2f, diffusion_stretch: vec2f, diffusion_radius_5: f32, diffusion_unit: f32) -> f32 {
     let step: f32 = diffusion_unit * dot(diffusion_stretch, axis);
     return select(0.0, min(diffusion_radius_5 / max(step, 1e-20), 1e6), step > 0.0);
+}
+
+// Where texels lie, in millimetres.
+//
+// gives: diffusion_place
+// domain: texel
+// when: diffusion, surface_levels
+// cost: 3
+fn place_in_millimetres(vertex_position: vec3f, diffusion_unit: f32) -> vec3f {
+    return diffusion_unit * vertex_position;
+}
+
+// Which way texels face: the smooth N.
+//
+// gives: diffusion_facing
+// domain: texel
+// when: diffusion, surface_levels
+// cost: 0
+fn facing_of_texel(normal: vec3f) -> vec3f {
+    return normal;
+}
+
+// The area of texels on the surface in square millimetres, by the triangle's Jacobian.
+//
+// gives: diffusion_area
+// domain: texel
+// when: diffusion, surface_levels
+// cost: 20
+fn area_of_texel(vertex_position: vec3f, diffusion_unit: f32) -> f32 {
+    let along: vec3f = diffusion_unit * dpdx(vertex_position);
+    let down: vec3f = diffusion_unit * dpdy(vertex_position);
+    let across: vec3f = cross(along, down);
+    return sqrt(dot(across, across));
+}
+
+// L_1 over the surface: of L_0 at once, its variance that of all blurs so far, in mm^2 (MODEL 6, "Truth").
+//
+// gives: diffusion_level_1
+// domain: texel
+// sampled: 0
+// when: diffusion, surface_levels
+// pass: diffusion_level_0: vec3f, surface of diffusion_place, diffusion_facing, diffusion_area
+// cost: 2
+fn variance_1(diffusion_radius_1: f32) -> f32 {
+    return diffusion_radius_1 * diffusion_radius_1;
+}
+
+// L_2 over the surface: of L_0 at once, its variance that of all blurs so far, in mm^2 (MODEL 6, "Truth").
+//
+// gives: diffusion_level_2
+// domain: texel
+// sampled: 0
+// when: diffusion, surface_levels
+// pass: diffusion_level_0: vec3f, surface of diffusion_place, diffusion_facing, diffusion_area
+// cost: 4
+fn variance_2(diffusion_radius_1: f32, diffusion_radius_2: f32) -> f32 {
+    return diffusion_radius_1 * diffusion_radius_1 + diffusion_radius_2 * diffusion_radius_2;
+}
+
+// L_3 over the surface: of L_0 at once, its variance that of all blurs so far, in mm^2 (MODEL 6, "Truth").
+//
+// gives: diffusion_level_3
+// domain: texel
+// sampled: 0
+// when: diffusion, surface_levels
+// pass: diffusion_level_0: vec3f, surface of diffusion_place, diffusion_facing, diffusion_area
+// cost: 6
+fn variance_3(diffusion_radius_1: f32, diffusion_radius_2: f32, diffusion_radius_3: f32) -> f32 {
+    return diffusion_radius_1 * diffusion_radius_1
+        + diffusion_radius_2 * diffusion_radius_2
+        + diffusion_radius_3 * diffusion_radius_3;
+}
+
+// L_4 over the surface: of L_0 at once, its variance that of all blurs so far, in mm^2 (MODEL 6, "Truth").
+//
+// gives: diffusion_level_4
+// domain: texel
+// sampled: 0
+// when: diffusion_five, surface_levels
+// pass: diffusion_level_0: vec3f, surface of diffusion_place, diffusion_facing, diffusion_area
+// cost: 8
+fn variance_4(
+    diffusion_radius_1: f32,
+    diffusion_radius_2: f32,
+    diffusion_radius_3: f32,
+    diffusion_radius_4: f32,
+) -> f32 {
+    return diffusion_radius_1 * diffusion_radius_1
+        + diffusion_radius_2 * diffusion_radius_2
+        + diffusion_radius_3 * diffusion_radius_3
+        + diffusion_radius_4 * diffusion_radius_4;
+}
+
+// L_5 over the surface: of L_0 at once, its variance that of all blurs so far, in mm^2 (MODEL 6, "Truth").
+//
+// gives: diffusion_level_5
+// domain: texel
+// sampled: 0
+// when: diffusion_five, surface_levels
+// pass: diffusion_level_0: vec3f, surface of diffusion_place, diffusion_facing, diffusion_area
+// cost: 10
+fn variance_5(
+    diffusion_radius_1: f32,
+    diffusion_radius_2: f32,
+    diffusion_radius_3: f32,
+    diffusion_radius_4: f32,
+    diffusion_radius_5: f32,
+) -> f32 {
+    return diffusion_radius_1 * diffusion_radius_1
+        + diffusion_radius_2 * diffusion_radius_2
+        + diffusion_radius_3 * diffusion_radius_3
+        + diffusion_radius_4 * diffusion_radius_4
+        + diffusion_radius_5 * diffusion_radius_5;
 }
 
 // sum of w_k L_k, where w_0 is 1 less the others.
