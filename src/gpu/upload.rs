@@ -18,7 +18,7 @@ use super::timing::Timer;
 use super::vertices;
 use crate::bake::rays::RayMesh;
 use crate::bake::stacks::Stack;
-use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion};
+use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion, VertexThickness};
 use crate::model::cube::Cube;
 use crate::model::fields::{Field, Fields};
 use crate::model::params::Params;
@@ -42,6 +42,8 @@ pub struct Content {
     pub occlusion: Option<Arc<VertexOcclusion>>,
     /// The sky that each vertex sees, when asked for.
     pub sky: Option<Arc<SkyBake>>,
+    /// How thick the mesh is below each vertex, when asked for.
+    pub thickness: Option<Arc<VertexThickness>>,
     /// The constants of the model.
     pub params: Params,
 }
@@ -55,6 +57,7 @@ impl Content {
             illumination: Arc::clone(&baked.illumination),
             occlusion: baked.occlusion.clone(),
             sky: baked.sky.clone(),
+            thickness: baked.thickness.clone(),
             params: baked.scene.params.clone(),
         }
     }
@@ -204,12 +207,12 @@ impl Uploads {
         Ok(made)
     }
 
-    /// What is found of fields at each vertex of the mesh in its pose, whose own sky is `sky`.
+    /// What is found of fields at each vertex of the mesh in its pose, of which `own` is baked.
     fn fields(
         &self,
         gpu: &Gpu,
         mesh: &Mesh,
-        sky: Option<&SkyBake>,
+        own: Option<&PoseBake>,
         fields: Fields,
     ) -> Result<HashMap<Field, Vec<f32>>, GpuError> {
         if fields.is_empty() {
@@ -218,8 +221,11 @@ impl Uploads {
         let posed = mesh.pose();
         let rays = RayMesh::new(&posed.positions, &posed.triangles);
         // Where triangles share no vertices, the fields are the mesh file's own.
-        let sky = sky.or(self.content.sky.as_deref()).filter(|_| self.split.is_none());
-        let bakes = SurfaceBakes { sky, ..SurfaceBakes::default() };
+        let whole = self.split.is_none();
+        let sky = own.and_then(|own| own.sky.as_ref()).or(self.content.sky.as_deref());
+        let thickness = own.and_then(|own| own.thickness.as_ref()).or(self.content.thickness.as_deref());
+        let (sky, thickness) = (sky.filter(|_| whole), thickness.filter(|_| whole));
+        let bakes = SurfaceBakes { sky, thickness, ..SurfaceBakes::default() };
         let surface =
             PosedSurface::with_fields(&self.content.scene, &posed, &rays, &mesh.morphs, bakes, fields)
                 .map_err(|error| GpuError::Refused {
@@ -346,7 +352,7 @@ impl Uploads {
         if let Some(maps) = &mut self.shadow_maps {
             maps.set_pose(gpu, &mesh.pose().positions);
         }
-        let (occlusion, sky) = own.map_or((None, None), |own| (own.occlusion.as_ref(), own.sky.as_ref()));
+        let occlusion = own.and_then(|own| own.occlusion.as_ref());
         let occluded = occlusion.is_some();
         let occlusion = occlusion.or(self.content.occlusion.as_deref());
         // What is found at vertices is found anew in this pose.
@@ -354,7 +360,7 @@ impl Uploads {
             Attribute::Field(field) => Some(*field),
             _ => None,
         });
-        let fields = self.fields(gpu, mesh, sky, Fields::of(finds))?;
+        let fields = self.fields(gpu, mesh, own, Fields::of(finds))?;
         for (&attribute, buffer) in &self.attributes {
             let moves = matches!(
                 attribute,

@@ -84,5 +84,9 @@ fn bakes(baked: &Baked) -> (Vec<String>, usize) {
         // A renderer's vertices have the ratio alone.
         floats += 3 * sky.transfer.occlusion().base.len();
     }
+    if let Some(thickness) = &baked.thickness {
+        names.push("thickness".to_owned());
+        floats += thickness.base.len() + thickness.morphs.iter().map(Vec::len).sum::<usize>();
+    }
     (names, floats * size_of::<f32>())
 }

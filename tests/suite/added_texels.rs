@@ -297,7 +297,7 @@ fn levels_move_as_their_differences_do() {
 /// The scene without any light.
 fn content(scene: &Scene) -> Content {
     let (scene, params) = (Arc::new(scene.clone()), scene.params.clone());
-    Content { scene, illumination: Arc::default(), occlusion: None, sky: None, params }
+    Content { scene, illumination: Arc::default(), occlusion: None, sky: None, thickness: None, params }
 }
 
 fn drawn(scene: &Scene, options: RenderOptions) -> Option<(Image, Plan)> {

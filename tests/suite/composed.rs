@@ -1,12 +1,10 @@
 //! Everything at once (MODEL 12) against the vectors of an independent float64 oracle: each term, their sum, and how
 //! it moves with every parameter that there is; the planned rules in f64, in f32 and in SIMD lanes.
 //!
-//! The oracle's fragments also have transmission and texture-space diffusion. The one is a term that the rules lack
-//! and is added here, by hand, to what they give; the other replaces the diffuse light, so that its sums are left out
-//! ([`LEFT_OUT`]). E_r and the split sum are tables of the oracle's own there, coarser than what the rules fit: the
+//! The oracle's fragments also have texture-space diffusion, which replaces the diffuse light, so that its sums are left
+//! out ([`LEFT_OUT`]). E_r and the split sum are tables of the oracle's own there, coarser than what the rules fit: the
 //! environment's lobe is put together here of the rules' directions, roughness and shares with those tables.
 
-use std::f64::consts::PI;
 use std::path::Path;
 
 use glam::DVec3;
@@ -38,10 +36,8 @@ use crate::vectors;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
 const EFFECTS: &str = "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"side_specular\", \"hilite\", \"reflection\", \
-                       \"haze\", \"key_light\", \"lights\", \"shadows\", \"light_specular\", \"directional_occlusion\"";
-
-/// The parameters of light that comes through the skin.
-const TRANSMISSION: [&str; 2] = ["transmission_weight", "transmission_length"];
+                       \"haze\", \"key_light\", \"lights\", \"shadows\", \"light_specular\", \"directional_occlusion\", \
+                       \"transmission\"";
 
 /// What is compared with nothing, by what its path begins with.
 const LEFT_OUT: [&str; 17] = [
@@ -68,12 +64,13 @@ const LEFT_OUT: [&str; 17] = [
 ];
 
 /// The terms of the rules that each of the oracle's is.
-const TERMS: [(&str, &[&str]); 5] = [
+const TERMS: [(&str, &[&str]); 6] = [
     ("side_specular", &["side_part"]),
     ("hilite", &["hilite_part"]),
     ("reflection", &["mirror_part"]),
     ("key_light", &["key_part"]),
     ("light_specular", &LAMPS_MIRRORED),
+    ("transmission", &["transmission_part"]),
 ];
 const LAMPS_MIRRORED: [&str; 3] =
     ["light_sun_specular_part", "light_lamp_specular_part", "light_spot_specular_part"];
@@ -172,6 +169,7 @@ impl<'v> Composed<'v> {
             "dapple" => one("dapple").max(0.0),
             "specular" => one("s"),
             "attenuator" => one("a"),
+            "thickness" => one("thickness"),
             name if name.starts_with("sky_") => self.sky(i, name)[*component],
             name => self.of_light(i, name)[*component],
         }
@@ -198,11 +196,15 @@ impl<'v> Composed<'v> {
         let own = |light: &&(usize, Light)| name.starts_with(&format!("light_{}_", light.1.member()));
         let lights: Vec<(usize, Light)> = lights.into_iter().enumerate().collect();
         let (number, light) = lights.iter().find(own).unwrap_or_else(|| panic!("a sample has no {name}"));
-        let open = self.fragments().at("visibility").item(i).item(*number).number();
+        let each = |key: &str| self.fragments().at(key).item(i).item(*number).number();
+        let (open, far) = (each("visibility"), each("far_visibility"));
         match name.rsplit('_').next() {
             Some("open") => [open; 3],
+            Some("far") => [far; 3],
+            Some("depth") => [each("light_thickness"); 3],
             Some("toward") => light.towards(x).to_array(),
             Some("arriving") => [open * light.attenuation(x); 3],
+            Some("beyond") => [far * light.attenuation(x); 3],
             _ => panic!("a sample has no {name}"),
         }
     }
@@ -225,34 +227,6 @@ impl<'v> Composed<'v> {
         let (i, u) = between(&places, m);
         let [one, two] = [i, i + 1].map(|i| self.lobes[i].1.sample(along));
         [0, 1, 2].map(|c| one[c] * (1.0 - u) + two[c] * u)
-    }
-
-    /// Light that comes through the skin (MODEL 11).
-    fn transmission(&self, i: usize, params: &Params) -> [f64; 3] {
-        let given = self.root.at("inputs").at("params");
-        let [weight, length] = TRANSMISSION.map(|name| given.at(name).three());
-        self.transmission_by(i, params, [weight, length])
-    }
-
-    /// The same by a weight and a length.
-    fn transmission_by(&self, i: usize, params: &Params, [weight, length]: [[f64; 3]; 2]) -> [f64; 3] {
-        let at = self.fragments();
-        let through =
-            |depth: f64, c: usize| if depth < 80.0 * length[c] { (-depth / length[c]).exp() } else { 0.0 };
-        let [x, n] = ["x", "N"].map(|key| DVec3::from_array(at.at(key).item(i).three()));
-        let (sine, cosine) = params.scalar(Param::EnvironmentRotation).to_radians().sin_cos();
-        let in_sky = [-cosine * n.x + sine * n.z, -n.y, -sine * n.x - cosine * n.z];
-        let behind = self.cubes[0].sample(in_sky);
-        let albedo = at.at("c").item(i).three();
-        let thickness = at.at("thickness").item(i).number();
-        let [depths, far] = ["light_thickness", "far_visibility"].map(|key| at.at(key).item(i).numbers());
-        let mut light = [0, 1, 2].map(|c| through(thickness, c) * behind[c]);
-        for (k, lamp) in self.lights(params).iter().enumerate() {
-            let color = Param::from_name(&format!("light.{}.color", lamp.member())).unwrap();
-            let (color, irradiance) = (params.rgb(color), lamp.irradiance(x, -n));
-            (0..3).for_each(|c| light[c] += through(depths[k], c) * color[c] * irradiance[c] / PI * far[k]);
-        }
-        [0, 1, 2].map(|c| weight[c] * albedo[c] * light[c])
     }
 }
 
@@ -411,8 +385,7 @@ fn run<R: Number>(vectors: &Vectors, like: R) {
     // In f64: what the rules lack is not theirs to round.
     let rest = |params: &Params, i: usize| {
         let at = lobe.shade(&own, params, [1.0; 3], i, 0.0_f64);
-        let (mirrored, through) = (in_lobe(&own, &at, params), own.transmission(i, params));
-        (mirrored, through, [0, 1, 2].map(|c| mirrored[c] + through[c]))
+        in_lobe(&own, &at, params)
     };
     for i in 0..own.count() {
         let shaded = plain.shade(&own, &own.params, [0.0; 3], i, like);
@@ -424,13 +397,12 @@ fn run<R: Number>(vectors: &Vectors, like: R) {
         for set in ["plain", "diffusion"] {
             near.check("haze", &shaded.rgba[0][3..], &expected.at(set).at("haze").item(i));
         }
-        let (mirrored, through, all) = rest(&own.params, i);
+        let mirrored = rest(&own.params, i);
         let double = tolerance::<f64>(&root);
         double.check("fresnel", &mirrored, &terms.at("fresnel").item(i));
-        double.check("transmission", &through, &terms.at("transmission").item(i));
-        let result = [0, 1, 2].map(|c| shaded.rgba[0][c] + all[c]);
+        let result = [0, 1, 2].map(|c| shaded.rgba[0][c] + mirrored[c]);
         near.check("result", &result, &expected.at("plain").at("result").item(i));
-        jacobian(&own, &columns, &shaded, (i, near), |params| rest(params, i).2);
+        jacobian(&own, &columns, &shaded, (i, near), |params| rest(params, i));
     }
 }
 
@@ -457,29 +429,11 @@ fn jacobian(
             near.check(param.name(), &[slopes[c] + lacking], &want.item(c).item(k));
         }
     }
-    // Parameters of what is not built: diffusion's move nothing here, transmission's own what is put beside.
+    // Those of diffusion move nothing here.
     let lacking = |name: &str| name.starts_with("diffusion_") || name == "colour_mix";
-    let given = own.root.at("inputs").at("params");
-    let through = |which: usize, c: usize| {
-        let moved = |by: f64| {
-            let mut numbers = TRANSMISSION.map(|name| given.at(name).three());
-            numbers[which] = numbers[which].map(|x| x + by);
-            own.transmission_by(i, &own.params, numbers)[c]
-        };
-        (moved(1e-4) - moved(-1e-4)) / 2e-4
-    };
-    for (k, name) in own.root.at("constants").at("columns").items().iter().enumerate() {
-        for c in 0..4 {
-            let entry = want.item(c).item(k);
-            match name.text() {
-                name if lacking(name) => near.check(name, &[0.0], &entry),
-                name => {
-                    if let Some(which) = TRANSMISSION.iter().position(|own| *own == name) {
-                        near.check(name, &[if c < 3 { through(which, c) } else { 0.0 }], &entry);
-                    }
-                }
-            }
-        }
+    let names = own.root.at("constants").at("columns").items();
+    for (k, name) in names.iter().enumerate().filter(|(_, name)| lacking(name.text())) {
+        (0..4).for_each(|c| near.check(name.text(), &[0.0], &want.item(c).item(k)));
     }
 }
 

@@ -16,7 +16,7 @@ use crate::lit::{baked, image, quad};
 use crate::scene_folder::{SceneFolder, exr, glb, png, tampered};
 
 const EFFECTS: &str = "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"lights\", \"shadows\", \"light_specular\", \
-                       \"fresnel\", \"directional_occlusion\"";
+                       \"fresnel\", \"directional_occlusion\", \"transmission\"";
 
 /// Lines of `[model]` and start values.
 const WAYS: [(&str, &str); 4] = [
@@ -36,7 +36,7 @@ const WAYS: [(&str, &str); 4] = [
 ];
 
 /// What a fit may move of any scene here.
-const FREE: [&str; 20] = [
+const FREE: [&str; 22] = [
     "roughness",
     "gloss",
     "f0",
@@ -57,6 +57,8 @@ const FREE: [&str; 20] = [
     "light.sky_1.azimuth",
     "light.sky_1.elevation",
     "light.sky_8.color",
+    "transmission_weight",
+    "transmission_length",
 ];
 
 /// The quad of the lights' tests under a way, its file edited.
@@ -65,7 +67,9 @@ fn scene((choices, params): (&str, &str), edits: &[(&str, &str)]) -> SceneFolder
     let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
     let text = text
         .replace("[model]\n", &format!("[model]\n{choices}\n"))
-        .replace("[model.params]\n", &format!("[model.params]\n{params}\n"));
+        .replace("[model.params]\n", &format!("[model.params]\ntransmission_weight = 0.5\n{params}\n"))
+        // Closed meshes are some millimetres thick.
+        .replace("[mesh]\n", "[mesh]\nmetres_per_unit = 0.005\n");
     let edit = |text: String, (from, to): &(&str, &str)| {
         assert!(text.contains(from), "{from}");
         text.replace(from, to)

@@ -52,5 +52,6 @@ mod specular;
 #[cfg(feature = "burn")]
 mod tensors;
 mod transfer;
+mod transmission;
 mod vectors;
 mod witness;

@@ -9,6 +9,7 @@ use super::interreflection::Albedo;
 use super::panorama::Radiance;
 use super::prefilter::Prefilter;
 use super::radial::Radial;
+use super::thickness::{VertexThickness, bake_thickness};
 use super::transfer::{TransferSet, VertexTransfer, bake_transfer};
 use super::{BakeStats, VertexOcclusion, occlusion};
 use crate::model::cube::Cube;
@@ -72,6 +73,22 @@ impl Baker<'_> {
         });
         let mut sets = floats.chunks_exact(vertices.max(1)).map(<[f32]>::to_vec);
         VertexOcclusion { base: sets.next().unwrap_or_default(), morphs: sets.collect() }
+    }
+
+    /// Thickness, with a set for each of `morphs` targets.
+    pub(super) fn thickness(
+        &mut self,
+        pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+        morphs: usize,
+    ) -> VertexThickness {
+        let (key, vertices) = posed_key(Key::new("thickness"), pose, morphs);
+        let count = (1 + morphs) * vertices;
+        let floats = self.through_cache("thickness".to_owned(), "thickness", &key, count, |_| {
+            let baked = bake_thickness(pose, morphs);
+            std::iter::once(baked.base).chain(baked.morphs).flatten().collect()
+        });
+        let mut sets = floats.chunks_exact(vertices.max(1)).map(<[f32]>::to_vec);
+        VertexThickness { base: sets.next().unwrap_or_default(), morphs: sets.collect() }
     }
 
     /// Transfer vectors, with a set for each of `morphs` targets; with an `albedo` those of bounces too.

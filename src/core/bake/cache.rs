@@ -10,7 +10,7 @@ use std::sync::LazyLock;
 use crate::output;
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
-const SOURCES: [&str; 26] = [
+const SOURCES: [&str; 27] = [
     include_str!("baker.rs"),
     include_str!("cache.rs"),
     include_str!("coefficients.rs"),
@@ -32,6 +32,7 @@ const SOURCES: [&str; 26] = [
     include_str!("shadowed.rs"),
     include_str!("sky.rs"),
     include_str!("stacks.rs"),
+    include_str!("thickness.rs"),
     include_str!("transfer.rs"),
     include_str!("vertex_rays.rs"),
     include_str!("wide_bvh.rs"),

@@ -30,7 +30,13 @@ impl Sobol {
 
     /// Cosine-distributed unit directions about +Z, scrambled by `seed`: the disc lifted (Malley).
     pub(crate) fn hemisphere(&self, seed: u32) -> impl Iterator<Item = Vec3A> {
-        self.disc(seed).map(|(radius, [sine, cosine])| {
+        self.cone(seed, 1.0)
+    }
+
+    /// The same within the cone whose half angle has that sine.
+    pub(crate) fn cone(&self, seed: u32, widest: f32) -> impl Iterator<Item = Vec3A> {
+        self.disc(seed).map(move |(radius, [sine, cosine])| {
+            let radius = widest * radius;
             vec3a(radius * cosine, radius * sine, (1.0 - radius * radius).max(0.0).sqrt())
         })
     }

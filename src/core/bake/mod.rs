@@ -11,6 +11,7 @@
 //! - [`harmonics`]: spherical harmonics; [`coefficients`]: the environment's light by them
 //! - [`transfer`]: which of that light arrives at each vertex, past the mesh ([`interreflection`]: and by way of it);
 //!   [`shadowed`]: how much; [`sky`]: which of both a scene asks for
+//! - [`thickness`]: how far below each vertex the mesh's far side lies
 //! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
@@ -34,6 +35,7 @@ pub mod reflected;
 pub mod shadowed;
 pub mod sky;
 pub mod stacks;
+pub mod thickness;
 pub mod transfer;
 pub(crate) mod vertex_rays;
 pub(crate) mod wide_bvh;
@@ -54,6 +56,8 @@ pub use lobes::LobeStack;
 pub use reflected::ReflectedStack;
 pub use sky::{SkyBake, SkyLight};
 use stacks::Stack;
+use thickness::THICKNESS;
+pub use thickness::VertexThickness;
 use transfer::VertexTransfer;
 
 /// Everything that was baked for a scene.
@@ -65,6 +69,8 @@ pub struct Bake {
     pub occlusion: Option<VertexOcclusion>,
     /// The sky that each vertex sees.
     pub sky: Option<SkyBake>,
+    /// How thick the mesh is below each vertex.
+    pub thickness: Option<VertexThickness>,
 }
 
 /// What is baked of one pose of a mesh, for that pose alone.
@@ -74,6 +80,8 @@ pub struct PoseBake {
     pub occlusion: Option<VertexOcclusion>,
     /// The sky that each vertex sees.
     pub sky: Option<SkyBake>,
+    /// How thick the mesh is below each vertex.
+    pub thickness: Option<VertexThickness>,
 }
 
 /// The environment's light: the cubes that the enabled effects ask for.
@@ -124,7 +132,7 @@ pub struct BakeStats {
 /// One bake.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BakeRow {
-    /// `irradiance`, `lobe 32`, `kelemen 0.3536`, `hilite`, `occlusion`, `transfer`; `environment` for what these share.
+    /// `irradiance`, `lobe 32`, `kelemen 0.3536`, `hilite`, `occlusion`, `transfer`, `thickness`; `environment` for what these share.
     pub name: String,
     /// Whether it came from the cache.
     pub cached: bool,
@@ -277,9 +285,10 @@ pub fn bake(
     let (illumination, stats) = bake_light(scene, ranges, cache)?;
     let mut baker = Baker { cache, stats };
     let used = used_morphs(scene);
-    let (sky, occlusion) = surface(scene, pose, &used, SkyLight::of_scene, &mut baker);
+    let surface = surface(scene, pose, &used, SkyLight::of_scene, &mut baker);
+    let PoseBake { occlusion, sky, thickness } = surface;
     baker.stats.warnings.extend(sky.as_ref().and_then(|sky| sky::ringing(scene, sky)));
-    Ok((Bake { illumination, occlusion, sky }, baker.stats))
+    Ok((Bake { illumination, occlusion, sky, thickness }, baker.stats))
 }
 
 /// What is baked of a scene's mesh, with a set for each of the morph targets `used`; `light` gives the environment's,
@@ -290,7 +299,7 @@ fn surface(
     used: &[usize],
     light: impl FnOnce(&Scene) -> Option<SkyLight>,
     baker: &mut Baker<'_>,
-) -> (Option<SkyBake>, Option<VertexOcclusion>) {
+) -> PoseBake {
     let sky = sky::Wanted::of(scene).map(|wanted| SkyBake {
         transfer: sky::transfer_of_used(scene, pose, used, wanted.order, wanted.bounces, baker),
         light: wanted.light.then(|| light(scene)).flatten(),
@@ -300,7 +309,13 @@ fn surface(
         Some(sky) => sky.transfer.occlusion(),
         None => occlusion_of_used(scene, pose, used, baker),
     });
-    (sky, occlusion)
+    let thick = scene.needs().fields.named(THICKNESS).is_some();
+    let thickness = thick.then(|| {
+        let pose_used = |weights: &[f32]| pose(&all_weights(scene, used, weights));
+        let baked = baker.thickness(&pose_used, used.len());
+        VertexThickness { base: baked.base, morphs: all_sets(scene, used, baked.morphs) }
+    });
+    PoseBake { occlusion, sky, thickness }
 }
 
 /// The environment's part of [`bake`].
@@ -358,11 +373,11 @@ pub fn bake_pose(
     let mut baker = Baker { cache, stats: BakeStats::default() };
     // Of a pose no target is used: it is the mesh.
     let known = |scene: &Scene| light.cloned().or_else(|| SkyLight::of_scene(scene));
-    let (sky, occlusion) = surface(scene, &|_| posed.clone(), &[], known, &mut baker);
+    let baked = surface(scene, &|_| posed.clone(), &[], known, &mut baker);
     // Whoever knows the light was told before.
-    let told = sky.as_ref().filter(|_| light.is_none());
+    let told = baked.sky.as_ref().filter(|_| light.is_none());
     baker.stats.warnings.extend(told.and_then(|sky| sky::ringing(scene, sky)));
-    (PoseBake { occlusion, sky }, baker.stats)
+    (baked, baker.stats)
 }
 
 fn checked_environment(scene: &Scene) -> Result<&Environment, BakeError> {

@@ -1,4 +1,5 @@
-//! Rays from vertices over their hemispheres, cosine-distributed: what occlusion and transfer vectors are sums over.
+//! Rays from vertices over their hemispheres, cosine-distributed: what occlusion and transfer vectors are sums over; and
+//! into the mesh, within a cone about -N, as thickness is.
 //!
 //! Vertices that coincide in every pose and share a normal are one. The directions depend on the rest position alone,
 //! so that the noise of a morph target's difference cancels where the target changes nothing.
@@ -31,6 +32,16 @@ pub(super) struct VertexRays {
     /// A seed for each of `distinct`.
     seeds: Vec<u32>,
     offset: f32,
+    way: Way,
+}
+
+/// Where rays go.
+#[derive(Clone, Copy)]
+enum Way {
+    /// Over the hemisphere of the normal.
+    Outward,
+    /// Within a cone about -N, whose half angle has that sine.
+    Inward(f32),
 }
 
 /// The rays of one vertex.
@@ -68,7 +79,18 @@ impl VertexRays {
         };
         let seeds = distinct.iter().map(seed).collect();
         let offset = offset(&rest.positions);
-        Self { rest, targets, sobol: Sobol::new(count.max(1)), distinct, slot, seeds, offset }
+        let sobol = Sobol::new(count.max(1));
+        Self { rest, targets, sobol, distinct, slot, seeds, offset, way: Way::Outward }
+    }
+
+    /// The same of rays into the mesh, within a cone about -N whose half angle has the sine `widest`.
+    pub(super) fn inward(
+        pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync),
+        morphs: usize,
+        count: u32,
+        widest: f32,
+    ) -> Self {
+        Self { way: Way::Inward(widest), ..Self::new(pose, morphs, count) }
     }
 
     /// How many vertices there are that rays start from.
@@ -91,12 +113,16 @@ impl VertexRays {
         let vertex = self.vertex(i);
         let normal = Vec3A::from(pose.normals[vertex]).normalize_or_zero();
         let position = Vec3A::from(pose.positions[vertex]);
-        let origin = position + self.offset * normal;
+        let (axis, widest) = match self.way {
+            Way::Outward => (normal, 1.0),
+            Way::Inward(widest) => (-normal, widest),
+        };
+        let origin = position + self.offset * axis;
         if normal == Vec3A::ZERO || !position.is_finite() {
             return Rays { origin, directions: Vec::new() };
         }
-        let frame = frame(normal);
-        Rays { origin, directions: self.sobol.hemisphere(self.seeds[i]).map(|d| frame * d).collect() }
+        let frame = frame(axis);
+        Rays { origin, directions: self.sobol.cone(self.seeds[i], widest).map(|d| frame * d).collect() }
     }
 
     /// What `of` makes of each one's rays at rest, with what they found. All cores.

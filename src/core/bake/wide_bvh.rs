@@ -90,6 +90,15 @@ impl WideBvh {
         found.map(|found| found != NOTHING)
     }
 
+    /// The first triangle that each of at most [`LANES`] rays meets, by its index in the mesh, or [`NOTHING`].
+    pub(crate) fn first_of_each(&self, rays: &[Segment]) -> [u32; LANES] {
+        with_simd!(self.level, simd => {
+            let mut packet = Packet::<false, _>::new(simd, rays);
+            self.trace::<true, false, _>(&mut packet, &mut Vec::new());
+            packet.found
+        })
+    }
+
     // Loops instead of iterators here and below: what is not inlined has no vector instructions.
     #[inline(always)]
     fn trace_all<const FIRST: bool, S: Simd>(

@@ -16,7 +16,7 @@ pub(super) fn idle(effects: Effects, params: &Params) -> Effects {
         Effect::Hilite => zero(Param::Hilite),
         Effect::Reflection => zero(Param::Reflection),
         Effect::KeyLight => zero(Param::KeyColor),
-        _ => false,
+        added => added.name() == "transmission" && Param::from_name("transmission_weight").is_some_and(zero),
     };
     let idle: Effects = effects.iter().filter(|&effect| weightless(effect)).collect();
     // A shader of nothing at all reads nothing, which no language has a struct for.

@@ -2,6 +2,7 @@
 //! scene takes.
 
 use super::diffusion::DiffusionChoices;
+use super::transmission::TransmissionChoices;
 
 /// The ways that a scene takes, the same for every fragment of it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -24,6 +25,8 @@ pub struct Choices {
     pub skin_reflection: SkinReflection,
     /// Those of texture-space diffusion.
     pub diffusion: DiffusionChoices,
+    /// Those of light that comes through the skin.
+    pub transmission: TransmissionChoices,
     /// Whether the specular map lowers the roughness, or will: `gloss` is not 0.
     pub glossy: bool,
     /// Whether a fit turns the environment: what vertices found of it has to know how it moves.
@@ -271,8 +274,9 @@ impl SkinReflection {
 impl Choices {
     /// Those that a scene file names, each by its key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 14] {
+    pub const fn named(&self) -> [(&'static str, &'static str); 15] {
         let [method, taps, ambient_normal, stretch, seams, lookup] = self.diffusion.named();
+        let [through] = self.transmission.named();
         [
             ("specular_model", self.specular_model.name()),
             ("split_sum", self.split_sum.name()),
@@ -288,6 +292,7 @@ impl Choices {
             stretch,
             seams,
             lookup,
+            through,
         ]
     }
 

@@ -7,6 +7,7 @@ use super::choices::{
 use super::dapple::Dapple;
 use super::diffusion::DiffusionChoices;
 use super::effects::{Effect, Effects, Form, Lookups, Silhouette};
+use super::transmission::{Method, TransmissionChoices};
 
 /// The switches that are the same for every fragment of a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -50,6 +51,7 @@ impl Setup {
                 bounces: Bounces::Gathered,
                 skin_reflection: SkinReflection::Gathered,
                 diffusion: DiffusionChoices::DEFAULT,
+                transmission: TransmissionChoices { method: Method::Thickness },
                 glossy: false,
                 turning: false,
             },

@@ -36,6 +36,7 @@ pub mod registry;
 pub mod shadow_filter;
 pub mod terms;
 pub mod texture_filter;
+pub mod transmission;
 pub mod turn;
 pub mod vector;
 pub mod vertex;

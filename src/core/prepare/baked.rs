@@ -5,7 +5,7 @@ use std::sync::Arc;
 use web_time::Instant;
 
 use super::{Loaded, Observed, PrepareError, PrepareOptions, Sampled, StageSeconds};
-use crate::bake::{self, BakeStats, Illumination, Ranges, SkyBake, VertexOcclusion};
+use crate::bake::{self, Bake, BakeStats, Illumination, Ranges, SkyBake, VertexOcclusion, VertexThickness};
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::Effects;
@@ -29,6 +29,8 @@ pub struct Baked {
     pub occlusion: Option<Arc<VertexOcclusion>>,
     /// The sky that each vertex sees, when asked for.
     pub sky: Option<Arc<SkyBake>>,
+    /// How thick the mesh is below each vertex, when asked for.
+    pub thickness: Option<Arc<VertexThickness>>,
     /// What was baked, and what came from the cache.
     pub stats: BakeStats,
     /// Seconds by stage so far.
@@ -51,18 +53,19 @@ impl Baked {
         let Loaded { scene, fitted, gains, seconds, mut warnings, asked } = loaded;
         let ranges = Ranges::of(&scene, asked.fit);
         let cache = asked.cache.as_deref();
-        let (illumination, occlusion, sky, stats) = if asked.light_alone {
+        let (baked, stats) = if asked.light_alone {
             let (illumination, stats) = bake::bake_light(&scene, &ranges, cache)?;
-            (illumination, None, None, stats)
+            (Bake { illumination, ..Bake::default() }, stats)
         } else {
             let pose = |weights: &[f32]| scene.mesh.pose_with_weights(weights);
-            let (baked, stats) = bake::bake(&scene, &pose, &ranges, cache)?;
-            (baked.illumination, baked.occlusion.map(Arc::new), baked.sky.map(Arc::new), stats)
+            bake::bake(&scene, &pose, &ranges, cache)?
         };
+        let (occlusion, sky) = (baked.occlusion.map(Arc::new), baked.sky.map(Arc::new));
+        let thickness = baked.thickness.map(Arc::new);
         warnings.extend(stats.warnings.iter().cloned());
         let seconds = StageSeconds { bake: start.elapsed().as_secs_f64(), ..seconds };
-        let (scene, illumination) = (Arc::new(scene), Arc::new(illumination));
-        Ok(Self { scene, fitted, gains, illumination, occlusion, sky, stats, seconds, warnings })
+        let (scene, illumination) = (Arc::new(scene), Arc::new(baked.illumination));
+        Ok(Self { scene, fitted, gains, illumination, occlusion, sky, thickness, stats, seconds, warnings })
     }
 
     /// The same bakes of a scene that differs in what they do not depend on, such as constants (a lobe's exponent within
@@ -77,7 +80,8 @@ impl Baked {
     #[must_use]
     pub fn surface_bakes(&self) -> SurfaceBakes<'_> {
         let (occlusion, sky) = (self.occlusion.as_deref(), self.sky.as_deref());
-        SurfaceBakes { occlusion, sky, ..SurfaceBakes::default() }
+        let thickness = self.thickness.as_deref();
+        SurfaceBakes { occlusion, sky, thickness, ..SurfaceBakes::default() }
     }
 
     /// Trace the visible surface of each view.

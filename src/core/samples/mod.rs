@@ -11,7 +11,7 @@
 //!   them of lights, `bounced`: what the skin throws back of these, `sky`: what they see of the sky, `sky_rays`: by
 //!   rays; `lit_mesh`: the mesh as a source of light, `skin`: what it sees of itself; `surface`: frames, silhouette and
 //!   maps at a hit; `footprint`: how much of a map a sample covers; `lobe`: rays into a specular lobe there,
-//!   `lobe_light`: the light that they bring
+//!   `lobe_light`: the light that they bring; `through`: what comes through the mesh
 //! - `group`: samples packed into groups
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
@@ -41,6 +41,7 @@ mod supply;
 mod surface;
 pub mod surface_records;
 pub mod targets;
+mod through;
 mod trace;
 pub mod visibility;
 
@@ -159,6 +160,18 @@ pub enum SampleError {
         "{scene}: the sky was baked for {found} vertices, but the mesh has {vertices}. Bake the scene anew."
     )]
     TransferLength {
+        /// The scene file.
+        scene: String,
+        /// Vertices that were baked.
+        found: usize,
+        /// Vertices of the mesh.
+        vertices: usize,
+    },
+    /// Thickness of another mesh.
+    #[error(
+        "{scene}: the thickness was baked for {found} vertices, but the mesh has {vertices}. Bake the scene anew."
+    )]
+    ThicknessLength {
         /// The scene file.
         scene: String,
         /// Vertices that were baked.

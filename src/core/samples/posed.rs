@@ -11,12 +11,12 @@ use super::skin::Skin;
 use super::sky::Sky;
 use super::supply::{Points, Supplies, put_each};
 use super::trace::Hit;
-use super::{SampleError, bounced, lit, posed_occlusion, sky};
+use super::{SampleError, bounced, lit, posed_occlusion, sky, through};
 use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::{SKIN_SEEN, sees_skin, traces_lobes};
-use crate::bake::{Bake, SkyBake, VertexOcclusion};
+use crate::bake::{Bake, SkyBake, VertexOcclusion, VertexThickness};
 use crate::model::fields::{Field, FieldInfo, Fields};
 use crate::scene::Scene;
 use crate::scene::charts::charts;
@@ -30,6 +30,8 @@ pub struct SurfaceBakes<'a> {
     pub occlusion: Option<&'a VertexOcclusion>,
     /// The sky that each vertex sees, when asked for.
     pub sky: Option<&'a SkyBake>,
+    /// How thick the mesh is below each vertex, where it is known already.
+    pub thickness: Option<&'a VertexThickness>,
     /// What its vertices gather of one another ([`super::gather_of`]), where it is known already.
     pub gather: Option<&'a VertexGather>,
     /// The environment as specular lobes see it by rays, where it is known already.
@@ -40,7 +42,9 @@ pub struct SurfaceBakes<'a> {
 
 impl<'a> From<&'a Bake> for SurfaceBakes<'a> {
     fn from(bake: &'a Bake) -> Self {
-        Self { occlusion: bake.occlusion.as_ref(), sky: bake.sky.as_ref(), ..Self::default() }
+        let (occlusion, sky, thickness) =
+            (bake.occlusion.as_ref(), bake.sky.as_ref(), bake.thickness.as_ref());
+        Self { occlusion, sky, thickness, ..Self::default() }
     }
 }
 
@@ -95,7 +99,7 @@ impl<'a> PosedSurface<'a> {
     /// The mesh of `scene` as it is posed with what finds `fields` at its points, and no open shares.
     ///
     /// # Errors
-    /// When the sky was baked for another mesh.
+    /// When the sky or the thickness was baked for another mesh.
     pub fn with_fields(
         scene: &'a Scene,
         mesh: &'a PosedMesh,
@@ -108,6 +112,7 @@ impl<'a> PosedSurface<'a> {
         let own = if bakes.gather.is_none() { bounced::gather_for(scene, mesh, fields) } else { None };
         let gather = bakes.gather.or(own.as_ref());
         supplies.extend(bounced::supplies(scene, mesh, rays, gather, fields));
+        supplies.extend(through::supplies(scene, mesh, rays, morphs, (bakes.thickness, fields))?);
         let mut lit = None;
         if let Some(bake) = bakes.sky {
             let sky = Sky::new(scene, mesh, morphs, bake)?;

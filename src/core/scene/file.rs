@@ -32,6 +32,8 @@ pub(super) struct SceneFile {
     pub bloom: BloomTable,
     #[serde(default)]
     pub diffusion: DiffusionTable,
+    #[serde(default)]
+    pub transmission: TransmissionTable,
 }
 
 /// `[mesh]`
@@ -170,6 +172,13 @@ pub(super) struct DiffusionTable {
     pub stretch: Option<Spanned<String>>,
     pub seams: Option<Spanned<String>>,
     pub lookup: Option<Spanned<String>>,
+}
+
+/// `[transmission]`
+#[derive(Clone, Debug, Default, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct TransmissionTable {
+    pub method: Option<Spanned<String>>,
 }
 
 /// `5`, or `"full"`.

@@ -19,7 +19,7 @@ use super::shadow_maps::shadow_maps;
 use super::sky_lights::sky_lights;
 use super::terms::terms;
 use super::view::{Background, View};
-use super::{FitSettings, Scene, images};
+use super::{FitSettings, Scene, images, transmission};
 use crate::model::choices::{Choices, SpecularVisibility};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects, Needs};
@@ -75,7 +75,8 @@ impl Scene {
         let shadow_maps = shadow_maps(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
         let (diffusion, by) = diffusion::read(&source, &file.diffusion)?;
-        let choices = Choices { diffusion: by, ..choices };
+        let through = transmission::read(&source, &file.transmission)?;
+        let choices = Choices { diffusion: by, transmission: through, ..choices };
         let pose = Pose::check(&source, &file)?.at(options.time);
         let metres_per_unit = metres(&source, &file)?;
 
@@ -95,6 +96,7 @@ impl Scene {
         }
         let effects = diffusion.switched(lights.switched(effects));
         lights.idle(&source.path, effects, &mut warnings);
+        transmission::idle(&source, effects, (through, &shadow_maps), &mut warnings);
         let setup = Setup { lookups, dapple, choices, ..Setup::new(form, silhouette, effects) };
         let needs = setup.needs();
         let mut idle = Warnings::new();
@@ -138,6 +140,7 @@ impl Scene {
         }
         let gives = |name: &str| file.model.params.keys().any(|key| key.get_ref() == name);
         diffusion.set(&mut params, metres_per_unit, gives);
+        transmission::set(&mut params, metres_per_unit);
         for light in lights.own.iter().chain(&sky_lights) {
             lit::set(light, &mut params, gives);
         }
@@ -334,6 +337,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     shadow_maps(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;
     let (diffusion, _) = diffusion::read(&source, &file.diffusion)?;
+    transmission::read(&source, &file.transmission)?;
     Pose::check(&source, &file)?;
     metres(&source, &file)?;
     // What the mesh adds to the effects concerns no value here.

@@ -8,6 +8,7 @@
 //!   `settings`, `cameras`, `lights` and `dapple`, within the bounds of `numbers`
 //! - [`shadow_maps`]: how the renderer finds shadows
 //! - [`sky_lights`]: the panorama's brightest spots as lights; `lit`: the effect that each light is
+//! - [`diffusion`], `transmission`: how light is found that wanders within the skin, and that comes through it
 //! - `terms`: files of shader rules that a scene brings with it
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`names`]: what a scene is called among several; `offers`: what it has for effects that may be off
@@ -48,6 +49,7 @@ pub mod shadow_maps;
 pub mod sky_lights;
 mod tangents;
 mod terms;
+mod transmission;
 pub mod view;
 
 pub use assignment::Assignment;

@@ -15,6 +15,7 @@ use crate::model::diffusion::DiffusionChoices;
 use crate::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use crate::model::params::{Column, Param, Params};
 use crate::model::texture_filter::TextureFilter;
+use crate::model::transmission::TransmissionChoices;
 
 /// The `[model]` table's form and silhouette.
 pub(super) fn form(source: &Source, model: &ModelTable) -> Result<(Form, Silhouette), SceneError> {
@@ -81,6 +82,7 @@ pub(super) fn choices(source: &Source, model: &ModelTable) -> Result<Choices, Sc
             SkinReflection::ALL.map(|c| (c.name(), c)),
         )?,
         diffusion: DiffusionChoices::DEFAULT,
+        transmission: TransmissionChoices::default(),
         glossy: false,
         turning: false,
     })

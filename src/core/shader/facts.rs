@@ -8,6 +8,7 @@ use crate::model::evaluate::Setup;
 use crate::model::shadow_filter::ShadowFilter;
 use crate::model::terms::TermName;
 use crate::model::texture_filter::TextureFilter;
+use crate::model::transmission;
 use crate::shader::domain::Work;
 use crate::shader::quantity::Resource;
 use crate::shader::term::library;
@@ -205,7 +206,7 @@ impl Facts {
     }
 
     /// Conditions of a rule's `when` line that are neither effects nor forms.
-    pub const CONDITIONS: [&'static str; 34] = [
+    pub const CONDITIONS: [&'static str; 35] = [
         "layered",
         "lights_bounce",
         "traced_lobe",
@@ -240,6 +241,7 @@ impl Facts {
         "shadow_hardware",
         "shadow_pcf",
         "shadow_pcss",
+        "translucent_maps",
     ];
 
     /// Whether a condition of a rule's `when` line holds; `None` for one that is not known.
@@ -290,6 +292,7 @@ impl Facts {
             "shadow_hardware" => self.shadow_filter() == Some(ShadowFilter::Hardware),
             "shadow_pcf" => self.shadow_filter() == Some(ShadowFilter::Pcf),
             "shadow_pcss" => self.shadow_filter() == Some(ShadowFilter::Pcss),
+            "translucent_maps" => self.maps_depth(),
             "atlas" => self.source != Source::Terms && self.atlas.is_some_and(|size| size > 0),
             // Last, as many may have been added.
             effect => return Effect::from_name(effect).map(|effect| setup.effects.has(effect)),
@@ -307,6 +310,12 @@ impl Facts {
     #[must_use]
     pub fn dilates(&self) -> bool {
         self.source == Source::Raster && self.setup.choices.diffusion.lookup == Lookup::Dilated
+    }
+
+    /// Whether shadow maps tell how far light travels inside.
+    fn maps_depth(&self) -> bool {
+        let wanted = self.setup.choices.transmission.method == transmission::Method::ShadowMaps;
+        wanted && self.source == Source::Raster && self.shadow_filter().is_some()
     }
 
     /// Whether what vertices found of the sky moves as a fit turns it. A rasteriser has it found anew.

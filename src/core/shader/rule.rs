@@ -323,7 +323,7 @@ impl Rule {
 const FILES: &[(&str, &str, &str)] = &include!(concat!(env!("OUT_DIR"), "/rules.rs"));
 
 /// Functions that several rules call, in the order of their dependence.
-pub const LIBRARY: [(&str, &str); 12] = [
+pub const LIBRARY: [(&str, &str); 13] = [
     ("vector", include_str!("rules/lib/vector.wgsl")),
     ("frame", include_str!("rules/lib/frame.wgsl")),
     ("cube", include_str!("rules/lib/cube.wgsl")),
@@ -336,6 +336,7 @@ pub const LIBRARY: [(&str, &str); 12] = [
     ("split_sum_ggx", include_str!("rules/lib/split_sum_ggx.wgsl")),
     ("dielectric_sum_ggx", include_str!("rules/lib/dielectric_sum_ggx.wgsl")),
     ("shadow", include_str!("rules/lib/shadow.wgsl")),
+    ("transmission", include_str!("rules/lib/transmission.wgsl")),
 ];
 
 /// The built-in rules.

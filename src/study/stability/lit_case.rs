@@ -20,6 +20,7 @@ use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::Field;
 use crate::model::params::{Param, Params};
+use crate::model::transmission::FARTHEST;
 use crate::model::vector::dot;
 use crate::samples::surface_records::Asked;
 use crate::samples::{LANES, SurfaceRecords};
@@ -176,7 +177,7 @@ fn setup(probes: &Probes, rng: &mut StdRng) -> Setup {
             effects = Effect::from_name(name).filter(|_| drawn(rng)).into_iter().fold(effects, Effects::with);
         }
     }
-    for name in ["fresnel", "directional_occlusion"] {
+    for name in ["fresnel", "directional_occlusion", "transmission"] {
         effects = Effect::from_name(name).filter(|_| drawn(rng)).into_iter().fold(effects, Effects::with);
     }
     let setup = Setup::new(form, one_of(rng, &Silhouette::ALL), effects);
@@ -226,15 +227,31 @@ fn found(name: &str, at: &FragmentInputs, rng: &mut StdRng) -> [f32; 3] {
     let numbers = match name {
         name if name.ends_with("_toward") => direction(at, rng),
         "bent_normal" => direction(at, rng).map(|x| share(rng).abs() * x),
-        name if name.ends_with("_open") || name == "lobe_seen" => three(share(rng).abs()),
+        name if ["_open", "_far"].iter().any(|end| name.ends_with(end)) || name == "lobe_seen" => {
+            three(share(rng).abs())
+        }
         "sky_cosine" | "sky_sine" => std::array::from_fn(|_| rng.random_range(-2.0..=2.0)),
         // None where a sample stands for nothing.
         "lobe_nodes" if rng.random_range(0..6) == 0 => [0.0; 3],
         "lobe_nodes" => [0.2, 0.4, 0.8],
+        name if name == "thickness" || name.ends_with("_depth") => three(depth(rng)),
         // Distances, radiance, shares of light.
         _ => std::array::from_fn(|_| bright(rng)),
     };
     numbers.map(|x| x as f32)
+}
+
+/// How far light travels inside, in millimetres: not at all, without end, or any way between.
+fn depth(rng: &mut StdRng) -> f64 {
+    match rng.random_range(0..8) {
+        0 => 0.0,
+        1 => f64::INFINITY,
+        2 => 1e30,
+        // What samples hold of no end.
+        3 => FARTHEST,
+        4 => 10_f64.powf(rng.random_range(-30.0..=3.0)),
+        _ => 10.0 * share(rng).abs(),
+    }
 }
 
 /// A unit vector, or none: anywhere, along the normal, level with the surface, along the view or mirrored.

@@ -103,6 +103,7 @@ impl Rules {
             illumination: Arc::clone(lights),
             occlusion: None,
             sky: None,
+            thickness: None,
             params: params.clone(),
         };
         let block = constants(probe, params);

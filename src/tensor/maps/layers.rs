@@ -37,8 +37,8 @@ pub fn layers(
     let hits: Vec<Hit> =
         scene.views.iter().flat_map(|view| sample_hits(scene, task.posed, &rays, &view.camera)).collect();
     let mut layers = Vec::new();
-    // Both see the environment by bakes that are no layers.
-    let beside = ["fresnel", "directional_occlusion"]
+    // They see the environment by bakes that are no layers, or along another direction than layers are looked up.
+    let beside = ["fresnel", "directional_occlusion", "transmission"]
         .into_iter()
         .find(|name| Effect::from_name(name).is_some_and(|effect| scene.effects.has(effect)));
     if let Some(effect) = beside.filter(|_| task.kinds.contains(&MapKind::Environment)) {

@@ -67,7 +67,14 @@ fn illumination(vectors: &Vectors, file: &Node<'_>) -> Arc<Illumination> {
 
 fn run(gpu: &Gpu, probe: &Probe, light: Arc<Illumination>, params: &Params, given: &[f64]) -> Vec<f32> {
     let scene = Arc::new(bare_scene(EFFECTS));
-    let content = Content { scene, illumination: light, occlusion: None, sky: None, params: params.clone() };
+    let content = Content {
+        scene,
+        illumination: light,
+        occlusion: None,
+        sky: None,
+        thickness: None,
+        params: params.clone(),
+    };
     let given: Vec<f32> = given.iter().map(|&x| x as f32).collect();
     evaluate(gpu, probe, content, &block(probe, params, [0.0; 3], &[]), &given).unwrap()
 }
@@ -247,6 +254,7 @@ fn vertex(gpu: &Gpu, file: &Node<'_>) {
         illumination: Arc::default(),
         occlusion: Some(Arc::new(occlusion)),
         sky: None,
+        thickness: None,
         params: params.clone(),
     };
     let mut given = Vec::new();

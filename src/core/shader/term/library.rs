@@ -8,10 +8,11 @@ use super::{Origin, Term, register_from};
 use crate::model::effects::{Effect, Effects};
 
 /// Files, by name, in the order of documentation.
-const FILES: [(&str, &str); 3] = [
+const FILES: [(&str, &str); 4] = [
     ("sky", include_str!("../rules/term/sky.wgsl")),
     ("diffusion", include_str!("../rules/term/diffusion.wgsl")),
     ("specular", include_str!("../rules/term/specular.wgsl")),
+    ("transmission", include_str!("../rules/term/transmission.wgsl")),
 ];
 
 /// Effects that share light out before it is diffuse: the sky's by what a point sees of it, all by what is reflected above
@@ -58,6 +59,12 @@ pub fn layers(effects: Effects) -> bool {
 pub fn sees_sky(effects: Effects) -> bool {
     static SET: OnceLock<Effects> = OnceLock::new();
     any(effects, &SET, &[SKY])
+}
+
+/// Whether light comes through the skin by one of a set.
+pub fn transmits(effects: Effects) -> bool {
+    static SET: OnceLock<Effects> = OnceLock::new();
+    any(effects, &SET, &["transmission"])
 }
 
 /// Whether an effect of these names is in a set; before they are known, none is.

@@ -53,7 +53,8 @@ pub(super) fn of_goals(goals: &[&'static str], setup: &Setup) -> Needs {
     let facts = Facts { setup: *setup, source: Source::Samples, ..Facts::default() };
     // What a sample can hold. The smooth normal is left to the rule that puts the base in its place, so that it is
     // wanted by those alone that cannot do with that.
-    let stand_in = !setup.effects.has(Effect::KeyLight) && !setup.smooth_lookups();
+    let stand_in =
+        !setup.effects.has(Effect::KeyLight) && !setup.smooth_lookups() && !library::transmits(setup.effects);
     let bumped = setup.silhouette == Silhouette::Bumped;
     let held = |name: &str| !(name == "normal" && stand_in || name == "silhouette" && bumped);
     let held = |name: &str| held(name) && !(name == "silhouette" && setup.rim_of_corners());

@@ -7,7 +7,7 @@ use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::traces_lobes;
-use crate::bake::{PoseBake, SkyBake, VertexOcclusion};
+use crate::bake::{PoseBake, SkyBake, VertexOcclusion, VertexThickness};
 use crate::model::effects::Effect;
 use crate::prepare::Baked;
 use crate::render::backdrop::Backdrop;
@@ -60,6 +60,7 @@ pub(super) struct CpuPainter {
     scene: Arc<Scene>,
     occlusion: Option<Arc<VertexOcclusion>>,
     sky: Option<Arc<SkyBake>>,
+    thickness: Option<Arc<VertexThickness>>,
     lobe_sky: Option<Arc<LobeSky>>,
     mip_maps: Option<Arc<MipMaps>>,
     shader: Shader,
@@ -73,12 +74,23 @@ impl CpuPainter {
     pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
         let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
         let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
-        let (pose, sky) = (Pose::of(&scene, &scene.mesh, None), baked.sky.clone());
+        let (pose, sky, thickness) =
+            (Pose::of(&scene, &scene.mesh, None), baked.sky.clone(), baked.thickness.clone());
         let mip_maps = MipMaps::new(&scene.maps, scene.quality.texture_filter).map(Arc::new);
         let traced = traces_lobes(&scene, scene.needs().fields);
         let lobe_sky = if traced { LobeSky::of_scene(&scene).map(Arc::new) } else { None };
-        let mut painter =
-            Self { scene, occlusion, sky, lobe_sky, mip_maps, shader, pose, atlas: None, seconds: 0.0 };
+        let mut painter = Self {
+            scene,
+            occlusion,
+            sky,
+            thickness,
+            lobe_sky,
+            mip_maps,
+            shader,
+            pose,
+            atlas: None,
+            seconds: 0.0,
+        };
         let atlas = atlas_of(&painter.scene, &painter.surface()?)?;
         painter.atlas = atlas;
         Ok(painter)
@@ -90,6 +102,7 @@ impl CpuPainter {
         let bakes = SurfaceBakes {
             occlusion: own.occlusion.as_ref().or(self.occlusion.as_deref()),
             sky: own.sky.as_ref().or(self.sky.as_deref()),
+            thickness: own.thickness.as_ref().or(self.thickness.as_deref()),
             gather: gather.as_ref(),
             lobe_sky: self.lobe_sky.as_ref(),
             mip_maps: self.mip_maps.as_ref(),

@@ -179,6 +179,7 @@ impl<'a> Drawn<'a> {
             illumination: Arc::clone(&evaluated.illumination),
             occlusion: bench.baked.occlusion.clone(),
             sky: bench.baked.sky.clone(),
+            thickness: bench.baked.thickness.clone(),
             params: scene.params.clone(),
         };
         let n = scene.quality.samples_per_axis.min(MOST_SAMPLES);

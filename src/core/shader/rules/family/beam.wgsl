@@ -7,6 +7,8 @@
 // parameter: light.NAME.elevation = 45 in [-90, 90], unit degrees, found; where it comes from, above the horizon; KHR_lights_punctual
 // parameter: light.NAME.shadow_map = -1 in [-1, inf], held; first layer of its shadow map, -1 where it has none; Williams 1978
 // sample_field: light_NAME_open: f32 = 1; share of the light NAME that nothing stops
+// sample_field: light_NAME_depth: f32 = 4000; millimetres to the surface that faces the light NAME
+// sample_field: light_NAME_far: f32 = 1; share of the light NAME that arrives at that surface
 
 // Unit vector towards the light.
 //
@@ -46,5 +48,32 @@ fn light_NAME_mapped(light_NAME_seen: f32) -> f32 {
 // when: !shadows
 // cost: 0
 fn light_NAME_all() -> f32 {
+    return 1.0;
+}
+
+// What arrives of it at the far side.
+//
+// gives: light_NAME_beyond
+// when: transmission, shadows, !translucent_maps
+// cost: 0
+fn light_NAME_unstopped_beyond(light_NAME_far: f32) -> f32 {
+    return light_NAME_far;
+}
+
+// Where a shadow map tells how far that is, nothing stands before it.
+//
+// gives: light_NAME_beyond
+// when: transmission, shadows, translucent_maps
+// cost: 0
+fn light_NAME_mapped_beyond() -> f32 {
+    return 1.0;
+}
+
+// What arrives of it at the far side where nothing has a shadow.
+//
+// gives: light_NAME_beyond
+// when: transmission, !shadows
+// cost: 0
+fn light_NAME_all_beyond() -> f32 {
     return 1.0;
 }

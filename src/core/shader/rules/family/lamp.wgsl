@@ -11,6 +11,9 @@
 // sample_field: light_NAME_found_toward: vec3f = 0; unit vector towards the light NAME
 // sample_field: light_NAME_found_arriving: f32 = 0; what distance, cone and shadow leave of the light NAME
 // sample_field: light_NAME_open: f32 = 1; share of the light NAME that nothing stops
+// sample_field: light_NAME_depth: f32 = 4000; millimetres to the surface that faces the light NAME
+// sample_field: light_NAME_far: f32 = 1; share of the light NAME that arrives at that surface
+// sample_field: light_NAME_found_beyond: f32 = 0; what distance, cone and, at that surface, shadow leave of the light NAME
 
 // The unit vector towards it, as stored samples hold it.
 //
@@ -91,5 +94,41 @@ fn light_NAME_mapped(light_NAME_reach: f32, light_NAME_seen: f32) -> f32 {
 // when: raster, !shadows
 // cost: 0
 fn light_NAME_all(light_NAME_reach: f32) -> f32 {
+    return light_NAME_reach;
+}
+
+// What arrives of it at the far side, as stored samples hold it.
+//
+// gives: light_NAME_beyond
+// when: transmission, !raster
+// cost: 0
+fn light_NAME_found_far(light_NAME_found_beyond: f32) -> f32 {
+    return light_NAME_found_beyond;
+}
+
+// What arrives of it at the far side, shadows as vertices have them.
+//
+// gives: light_NAME_beyond
+// when: transmission, raster, shadows, !translucent_maps
+// cost: 1
+fn light_NAME_unstopped_beyond(light_NAME_reach: f32, light_NAME_far: f32) -> f32 {
+    return light_NAME_reach * light_NAME_far;
+}
+
+// Where a shadow map tells how far that is, nothing stands before it.
+//
+// gives: light_NAME_beyond
+// when: transmission, raster, shadows, translucent_maps
+// cost: 0
+fn light_NAME_mapped_beyond(light_NAME_reach: f32) -> f32 {
+    return light_NAME_reach;
+}
+
+// What arrives of it at the far side where nothing has a shadow.
+//
+// gives: light_NAME_beyond
+// when: transmission, raster, !shadows
+// cost: 0
+fn light_NAME_all_beyond(light_NAME_reach: f32) -> f32 {
     return light_NAME_reach;
 }

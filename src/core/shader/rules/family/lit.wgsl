@@ -93,3 +93,32 @@ fn light_NAME_in_lobe(
 fn light_NAME_mirrored(light_NAME_glint: vec3f, specular_weight: vec3f, light_NAME_color: vec3f) -> vec3f {
     return light_NAME_color * specular_weight * light_NAME_glint;
 }
+
+// How far the light NAME travels inside, in millimetres, as rays find it.
+//
+// gives: light_NAME_inside
+// when: lights, transmission, !translucent_maps
+// cost: 0
+fn light_NAME_found_inside(light_NAME_depth: f32) -> f32 {
+    return light_NAME_depth;
+}
+
+// What of the light NAME comes through the skin: E_l(-N) / pi at the far side, weakened by its own way (MODEL 11).
+//
+// gives: light_NAME_through
+// joins: transmission_lit
+// when: lights, transmission
+// uses: transmission
+// cost: 36
+fn light_NAME_through_skin(
+    into_skin: vec3f,
+    light_NAME_toward: vec3f,
+    light_NAME_beyond: f32,
+    light_NAME_inside: f32,
+    light_NAME_irradiance: vec3f,
+    light_NAME_color: vec3f,
+    transmission_length: vec3f,
+) -> vec3f {
+    let facing: f32 = 0.3183098861837907 * (max(dot(into_skin, light_NAME_toward), 0.0) * light_NAME_beyond);
+    return light_NAME_color * (transmitted(light_NAME_inside, transmission_length) * (facing * light_NAME_irradiance));
+}

@@ -56,3 +56,22 @@ fn light_NAME_softened(
 ) -> f32 {
     return shadow_softened(light_NAME_shadow_map, vertex_position, vertex_normal, light_NAME_toward);
 }
+
+// How far the light NAME travels inside, in millimetres: how much further from it than what its shadow map shows (a
+// translucent shadow map; Dachsbacher and Stamminger 2003).
+//
+// gives: light_NAME_inside
+// when: raster, lights, transmission, translucent_maps
+// named: yes
+// error: 0.01
+// uses: vector, shadow
+// reads: shadow_maps, shadow_sampler, shadow_views
+// cost: 60
+fn light_NAME_mapped_inside(
+    vertex_position: vec3f,
+    vertex_normal: vec3f,
+    light_NAME_shadow_map: f32,
+    millimetres: f32,
+) -> f32 {
+    return millimetres * shadow_depth(light_NAME_shadow_map, vertex_position, vertex_normal);
+}

@@ -183,3 +183,42 @@ fn shadow_softened(map: f32, place: vec3f, normal: vec3f, toward: vec3f) -> f32 
     let penumbra = about.x * select(gap / max(blocker, 1e-30), gap, parallel);
     return shadow_disc(map, raised.xyz, n, toward, clamp(penumbra, least, search));
 }
+
+// How much further from the light a place lies than what its map shows first, along the light's way: the blend of the four
+// texels around it, without those that show nothing. The place is moved into the skin by a texel's
+// width, so that where the surface turns away from the light it does not show itself as its own far side.
+fn shadow_depth(map: f32, place: vec3f, normal: vec3f) -> f32 {
+    if (map < 0.0) {
+        return 0.0;
+    }
+    let own = shadow_layer(map, place);
+    let n = normalize_or(normal, vec3f(0.0));
+    let sunk = place - shadow_row(own, 5u).x * shadow_seen(own, place).w * n;
+    let layer = shadow_layer(map, sunk);
+    let seen = shadow_seen(layer, sunk);
+    if (!shadow_holds(seen)) {
+        return 0.0;
+    }
+    let about = shadow_row(layer, 6u);
+    let light = shadow_row(layer, 4u);
+    let parallel = light.w == 0.0;
+    let far = shadow_distance(about, parallel, seen.z);
+    let at = seen.xy * about.w - 0.5;
+    let low = floor(at);
+    let share = at - low;
+    var sum = 0.0;
+    var all = 0.0;
+    for (var i = 0u; i < 4u; i++) {
+        let corner = vec2f(f32(i & 1u), f32(i >> 1u));
+        let texel = clamp(vec2i(low + corner), vec2i(0), vec2i(i32(about.w) - 1));
+        let depth = textureLoad(shadow_maps, texel, layer, 0);
+        if (depth > 0.0) {
+            let weight = abs(1.0 - corner.x - share.x) * abs(1.0 - corner.y - share.y);
+            sum += weight * max(far - shadow_distance(about, parallel, depth), 0.0);
+            all += weight;
+        }
+    }
+    // A lamp's depth is along its axis: the way is longer, as the place is further than it is deep.
+    let slant = select(distance(light.xyz, sunk) / max(far, 1e-30), 1.0, parallel);
+    return slant * sum / max(all, 1e-6);
+}

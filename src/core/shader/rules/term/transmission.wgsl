@@ -1,0 +1,89 @@
+// Light that comes through thin parts: what arrives at the far side, weakened by how far it travels inside (MODEL 11; Barré-
+// Brisebois and Bouchard 2011, Approximating Translucency for a Fast, Cheap and Convincing Subsurface Scattering Look).
+//
+// effect: transmission, light that comes through thin parts of the skin
+// parameter: transmission_weight = 0 in [0, inf), rgb, linear; weight of light that comes through; MODEL 11
+// parameter: transmission_length = (3.7, 1.4, 0.7) in [0.05, 50], rgb, log, unit mm; how far light comes through skin before an e-th is left; Jensen et al. 2001
+// parameter: transmission_unit = 1000 in [0, inf), held; millimetres in a unit of the scene; [mesh] metres_per_unit
+// sample_field: thickness: f32 = 4000; millimetres from the surface to the far side, along -N
+
+// Into the skin: -N, the smooth normal, as bumps of the near side say nothing of the far one.
+//
+// gives: into_skin
+// when: transmission
+// cost: 3
+fn inward_normal(normal: vec3f) -> vec3f {
+    return -normal;
+}
+
+// The same in the environment's frame: Ry(r)^-1 d (MODEL 1).
+//
+// gives: into_environment
+// when: transmission, turned
+// cost: 5
+fn turned_inward_normal(into_skin: vec3f, turn: vec2f) -> vec3f {
+    let n: vec3f = into_skin;
+    return vec3f(turn.x * n.x - turn.y * n.z, n.y, turn.y * n.x + turn.x * n.z);
+}
+
+// gives: into_environment
+// when: transmission, !turned
+// cost: 0
+fn unturned_inward_normal(into_skin: vec3f) -> vec3f {
+    return into_skin;
+}
+
+// E_d(-N), filtered in the shader.
+//
+// gives: far_irradiance
+// when: transmission
+// cost: 44
+// uses: cube, vector
+// reads: irradiance_faces
+fn far_from_faces(into_environment: vec3f) -> vec3f {
+    let place: vec3f = cube_place(into_environment);
+    return sample_faces(irradiance_faces, irradiance_faces_size(), place).rgb;
+}
+
+// The same, filtered by the hardware.
+//
+// gives: far_irradiance
+// when: transmission
+// cost: 12
+// error: 0.004
+// paper: yes
+// reads: irradiance_cube, cube_sampler
+fn far_from_cube(into_environment: vec3f) -> vec3f {
+    return textureSampleLevel(irradiance_cube, cube_sampler, into_environment, 0.0).rgb;
+}
+
+// What of the environment comes through, where the environment lights the skin at all.
+//
+// gives: ambient_through
+// joins: transmission_lit
+// when: transmission, diffuse
+// uses: transmission
+// cost: 21
+fn ambient_through_skin(far_irradiance: vec3f, thickness: f32, transmission_length: vec3f) -> vec3f {
+    return transmitted(thickness, transmission_length) * far_irradiance;
+}
+
+// Millimetres in a unit of the scene, of which shadow maps tell distances.
+//
+// gives: millimetres
+// when: transmission
+// cost: 0
+fn millimetres_in_unit(transmission_unit: f32) -> f32 {
+    return transmission_unit;
+}
+
+// All that comes through, of environment and lights, by the skin's colour. It enters at the far side: nothing that is
+// reflected here is taken from it (MODEL 12).
+//
+// gives: transmission_part
+// adds: transmission
+// when: transmission
+// cost: 6
+fn light_through_skin(transmission_lit: vec3f, albedo: vec3f, transmission_weight: vec3f) -> vec3f {
+    return transmission_weight * (albedo * transmission_lit);
+}
