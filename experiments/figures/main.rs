@@ -10,6 +10,7 @@
 //! how pages quote it. `tests/suite/documents.rs` reads every page against its raw files.
 
 mod accuracy;
+mod diffusion;
 mod lab;
 mod light;
 mod pages;
@@ -33,6 +34,7 @@ type Measure = fn(&Lab) -> Result<Value>;
 const FILES: &[(&str, Measure)] = &[
     ("docs/results.json", results::measure),
     ("docs/light.json", light::measure),
+    ("docs/diffusion.json", diffusion::measure),
     ("docs/accuracy.json", accuracy::tests),
     ("docs/noise.json", accuracy::noise),
     ("experiments/ablation/results.json", studies::ablation),

@@ -15,7 +15,8 @@ use super::readback::Copy;
 use super::targets::{Tile, texture};
 use super::timing::Timer;
 use super::upload::{Bound, Content, Uploads};
-use crate::scene::mesh::tile_outside_atlas;
+use crate::samples::atlas::overlap;
+use crate::scene::mesh::{Mesh, tile_outside_atlas};
 use crate::scene::view::Camera;
 use crate::shader::Plan;
 use crate::shader::atlas::{Level, Pass};
@@ -128,10 +129,11 @@ fn check(gpu: &Gpu, size: u32, uploads: &Uploads) -> Result<(), GpuError> {
         let of = Oversized::Map;
         return Err(GpuError::TextureSize { adapter, what, width: side, height: side, limit, of });
     }
-    match tile_outside_atlas(&uploads.content().scene.mesh.uvs) {
-        Some([u, v]) => Err(GpuError::OutsideAtlas { u, v }),
-        None => Ok(()),
+    let Mesh { uvs, triangles, .. } = &uploads.content().scene.mesh;
+    if let Some([u, v]) = tile_outside_atlas(uvs) {
+        return Err(GpuError::OutsideAtlas { u, v });
     }
+    overlap(uvs, triangles, size).map_err(|error| GpuError::Plan(error.to_string()))
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::StudyError;
 use super::subject::Subject;
+use crate::model::diffusion::{Method, Seams};
 use crate::model::effects::Effect;
 use crate::model::params::Params;
 use crate::prepare::Baked;
@@ -34,7 +35,11 @@ impl Counts {
     /// When the renderer has no shader for it.
     pub fn new(subject: &Subject, params: &Params) -> Result<Self, StudyError> {
         let scene = &subject.observed.scene;
-        let planned = plan(&Facts::of_scene(scene, params, Budget::Exact, false))?;
+        let mut facts = Facts::of_scene(scene, params, Budget::Exact, false);
+        // Told of what an adapter can draw, which the others are measured against.
+        let diffusion = &mut facts.setup.choices.diffusion;
+        (diffusion.method, diffusion.seams) = (Method::Separable, Seams::Cut);
+        let planned = plan(&facts)?;
         let attributes =
             subject.engine.views().first().map_or(0, |view| view.samples.surface.rows().stride());
         let needs = scene.needs();

@@ -19,6 +19,7 @@ fn the_page_of_parameters_holds_the_programs_table() {
     assert!(table.lines().count() > 10, "{table}");
     let page = std::fs::read_to_string(root().join("docs/parameters.md")).unwrap();
     // To mend it: replace the page's table by what `skinfit params --format markdown` prints.
+    assert!(page.starts_with("# Parameters\n"), "the page says nothing before its table");
     assert!(
         page.ends_with(&table),
         "docs/parameters.md has drifted from the table in src/core/model/params.rs"

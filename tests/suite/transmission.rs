@@ -377,13 +377,20 @@ fn slopes_are_finite_differences_on_every_engine() {
         mask: None,
         clipped_at: None,
     };
-    let observed =
-        baked.with_scene(|scene| scene.views[0].target = Some(target)).sample().unwrap().observe().unwrap();
+    let baked = baked.with_scene(|scene| scene.views[0].target = Some(target));
     let mut columns = vec!["base_weight", "light.side.color", "environment_rotation"];
     columns.extend(["transmission_weight", "transmission_length"]);
     let tied = columns.into_iter().map(|name| Column::tied(param(name)));
     let each = Column::per_channel(param("transmission_length"));
-    for columns in [tied.collect::<Vec<_>>(), each.to_vec()] {
+    for (columns, alike) in [(tied.collect::<Vec<_>>(), true), (each.to_vec(), false)] {
+        // A tied column moves all channels together from where red stands.
+        let baked = baked.clone().with_scene(|scene| {
+            if alike {
+                scene.params.set(param("transmission_weight"), 0.7);
+                scene.params.set(param("transmission_length"), 2.0);
+            }
+        });
+        let observed = baked.sample().unwrap().observe().unwrap();
         let unknowns: Vec<Unknown> = columns.into_iter().map(Unknown::Param).collect();
         slopes::assert_slopes(&observed, &unknowns, &slopes::EXACT, "transmission");
     }

@@ -26,6 +26,8 @@ const CELL_WIDTH: f64 = 0.5;
 const WIDEST_CELL: f64 = 0.05;
 /// An unevenly lit cell is split when it may move the result by this share of the mean radiance.
 const CELL_TOLERANCE: f64 = 3e-5;
+/// Deviations from a bell's peak beyond which (1 + t^2)^2 exp(-t^2 / 2) is below its 3 at the peak, and falls.
+const TAIL: f64 = 2.26;
 /// Texels along the face of the finest source: 0.35 degrees, a quarter of the standard deviation of
 /// the sharpest lobe (exponent 2048).
 const FINEST: usize = 256;
@@ -212,7 +214,8 @@ impl Prefilter {
 
     /// Blocks of cells for lobes about directions that are near one another, which fall as a Gaussian of deviation s does.
     /// At t deviations from the peak a cell is as wide as the fourth derivative, which the kernel's mean leaves out, allows:
-    /// that of a Gaussian is at most (1 + t^2)^2 exp(-t^2 / 2) / s^4, 3 at the peak. Its slope there is t exp(-t^2 / 2) / s.
+    /// that of a Gaussian is (t^4 - 6 t^2 + 3) exp(-t^2 / 2) / s^4, 3 at the peak and from [`TAIL`] on at most
+    /// (1 + t^2)^2 exp(-t^2 / 2) / s^4, which falls. Its slope there is t exp(-t^2 / 2) / s.
     fn blocks_of_bell(&self, radial: Radial, directions: &[[f64; 3]]) -> Vec<[Cells; BLOCK]> {
         let (axis, radius) = cone(directions);
         let (exponent, reach) = (radial.exponent(), radial.reach());
@@ -227,7 +230,8 @@ impl Prefilter {
             }
             let t = off / deviation;
             let height = (-0.5 * t * t).exp();
-            let fourth = (height * (1.0 + t * t).powi(2) / 3.0).min(1.0);
+            // The directions are of a cone: nearer to the peak any of them may be at it.
+            let fourth = if t < TAIL { 1.0 } else { (height * (1.0 + t * t).powi(2) / 3.0).min(1.0) };
             let widest = (CELL_WIDTH * deviation / fourth.sqrt().sqrt()).min(WIDEST_CELL);
             // The flux of a cell lies 0.3 of its width beside its centre.
             let slope = if t < 1.0 { 0.6 } else { t * height };

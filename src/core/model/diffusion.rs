@@ -18,7 +18,7 @@ pub struct DiffusionChoices {
 }
 
 impl DiffusionChoices {
-    /// The article's.
+    /// The article's, but for the stretch, which is exact.
     pub const DEFAULT: Self = Self {
         method: Method::Separable,
         taps: Taps::Five,

@@ -122,7 +122,7 @@ fn check_area(scene: &Scene) -> Result<(), PrepareError> {
 
 /// The free columns, with one a channel for each parameter whose start has three different values (a tied column would
 /// begin by throwing two of them away), or that was set to three.
-fn untied(free: &[Column], start: &Params, set: &[Assignment]) -> Vec<Column> {
+pub fn untied(free: &[Column], start: &Params, set: &[Assignment]) -> Vec<Column> {
     let coloured = |param: Param| {
         let [r, g, b] = start.rgb(param);
         r != g || g != b || set.iter().any(|assignment| assignment.param == param && assignment.coloured)

@@ -24,7 +24,7 @@ mod sampled;
 pub use self::baked::Baked;
 pub use self::error::{NotOneSkin, PrepareError};
 pub use self::held_out::HeldOut;
-pub use self::loaded::Loaded;
+pub use self::loaded::{Loaded, untied};
 pub use self::observed::Observed;
 pub use self::one_skin::share_skin;
 pub use self::options::{ClipOcclusion, PrepareOptions, Views};

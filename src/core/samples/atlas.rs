@@ -56,8 +56,7 @@ pub enum AtlasError {
     /// Texels that are of two places of the surface.
     #[error(
         "{:.1}% of the texels that the mesh covers of its UV atlas are of two or more places of the surface (mirrored or \
-         overlapping charts), and a texel cannot hold two lights. Unwrap the mesh so that its charts lie apart, name another \
-         set of texture coordinates by uv_set in [diffusion], or leave the effects out that are computed there.",
+         overlapping charts), and a texel cannot hold two lights. Unwrap the mesh so that its charts lie apart, or leave the effects out that are computed there.",
         100.0 * share
     )]
     Overlap {
@@ -297,6 +296,26 @@ fn covered(shown: &[u32]) -> (Vec<u32>, Vec<u32>) {
     let mut places = vec![EMPTY; shown.len()];
     texels.iter().enumerate().for_each(|(place, &texel)| places[texel as usize] = place as u32);
     (texels, places)
+}
+
+/// Whether light can stand in an atlas of `size` texels a side, laid out by these texture coordinates.
+///
+/// # Errors
+/// When there are none, they do not lie in the unit square, or too many texels are of two places.
+pub fn overlap(uvs: &[Vec2], triangles: &[[u32; 3]], size: u32) -> Result<(), AtlasError> {
+    let posed = PosedMesh { uvs: uvs.to_vec(), triangles: triangles.to_vec(), ..PosedMesh::default() };
+    check(&posed)?;
+    let (maps, find) = (Maps::default(), |_: fields::Field, _: Hit, _: &mut [f32]| {});
+    let mesh = Textured {
+        posed: &posed,
+        occlusion: None,
+        maps: &maps,
+        mip_maps: None,
+        find: &find,
+        size: f64::from(size),
+    };
+    let (_, share) = cover(&mesh, size);
+    if share > OVERLAP { Err(AtlasError::Overlap { share }) } else { Ok(()) }
 }
 
 fn check(posed: &PosedMesh) -> Result<(), AtlasError> {

@@ -49,7 +49,7 @@ impl Preset {
 }
 
 impl Preset {
-    /// Put a preset's levels and constants into a scene, in the place of another's; those of the scene's own stay.
+    /// Put a preset's levels and constants into a scene, in the place of all of another's.
     pub fn put(self, scene: &mut Scene) {
         let of_radii =
             |name: &str| name.starts_with("diffusion_weight_") || name.starts_with("diffusion_radius_");

@@ -39,6 +39,7 @@ impl Facts {
             f16,
             tessellation: tessellation_error(scene),
             atlas: atlas.then_some(scene.diffusion.light_map_size),
+            stored_texels: false,
             shadows: shadows(scene),
             work: if atlas { work(scene) } else { Work::default() },
             budget,

@@ -136,6 +136,8 @@ pub struct Facts {
     /// Texels along a side of the UV atlas; without one nothing is computed in texels. Of stored samples it only counts
     /// whether there is one.
     pub atlas: Option<u32>,
+    /// Whether texels are stored beside samples: what was found there stays while a fit moves what it was found with.
+    pub stored_texels: bool,
     /// Shadow maps, where lights have them.
     pub shadows: Option<ShadowFacts>,
     /// How often each domain is evaluated.
@@ -170,6 +172,7 @@ impl Default for Facts {
             f16: false,
             tessellation: 0.0,
             atlas: None,
+            stored_texels: false,
             shadows: None,
             work: Work::default(),
             budget: Budget::Exact,
@@ -194,7 +197,7 @@ impl Facts {
         match self.source {
             Source::Raster => *self,
             Source::Samples | Source::Terms => {
-                Self { source: Source::Raster, maps: Self::default().maps, ..*self }
+                Self { source: Source::Raster, stored_texels: true, maps: Self::default().maps, ..*self }
             }
         }
     }
@@ -321,7 +324,8 @@ impl Facts {
     /// Whether what vertices found of the sky moves as a fit turns it. A rasteriser has it found anew.
     fn turns_sky(&self) -> bool {
         let Choices { turning, visibility, .. } = self.setup.choices;
-        turning && visibility != Visibility::Rays && self.source != Source::Raster
+        let stored = self.source != Source::Raster || self.stored_texels;
+        turning && visibility != Visibility::Rays && stored
     }
 
     /// Whether light of the specular lobe is that along rays into it: a rasteriser has none.

@@ -14,8 +14,9 @@ pub const VERTICES: u32 = 64;
 /// Samples along the sides of a workgroup of `cs_shade`; `place_in_tile` knows of eight.
 pub const TILE: u32 = 8;
 
-/// What takes steps between neighbouring fragments, of which a compute shader knows none.
-const BETWEEN_FRAGMENTS: [&str; 5] = ["dpdx", "dpdy", "fwidth", "textureSample(", "textureSampleCompare("];
+/// What takes steps between neighbouring fragments, or leaves one out: a compute shader knows none.
+const BETWEEN_FRAGMENTS: [&str; 7] =
+    ["dpdx", "dpdy", "fwidth", "textureSample(", "textureSampleBias(", "textureSampleCompare(", "discard"];
 /// What fragments are handed of texture coordinates, in rules and out of them.
 const COORDINATES: [&str; 2] = ["vertex_uv", "at.vertex_uv"];
 

@@ -1,6 +1,9 @@
 //! What may be added to a set of effects at once.
 
+use crate::model::diffusion::{DiffusionChoices, Method, Seams};
 use crate::model::effects::{Effect, Effects};
+use crate::samples::atlas::overlap;
+use crate::scene::mesh::Mesh;
 use crate::scene::{Offers, Scene};
 use crate::shader::term::library;
 
@@ -23,10 +26,20 @@ fn is_possible(scene: &Scene, offers: Offers, effect: Effect) -> bool {
             offers.environment
         }
         "lights" | "shadows" | "light_specular" => offers.lights,
+        // It wants an atlas, and one that the renderer can draw is what its cost is told of.
+        "diffusion" => has_atlas(scene),
         // Its direction is nobody's guess.
         "key_light" => scene.effects.has(effect),
         _ => true,
     }
+}
+
+/// Whether light can stand in texels of the mesh's UV atlas, and be blurred there by a renderer.
+fn has_atlas(scene: &Scene) -> bool {
+    let Mesh { uvs, triangles, .. } = &scene.mesh;
+    let DiffusionChoices { method, seams, .. } = scene.choices.diffusion;
+    let drawn = method == Method::Separable && seams == Seams::Cut;
+    drawn && overlap(uvs, triangles, scene.diffusion.light_map_size).is_ok()
 }
 
 /// Whether an effect changes nothing without another.

@@ -10,7 +10,7 @@ use crate::engine::{Point, Task};
 use crate::fit::{self, FitOptions};
 use crate::model::effects::Effects;
 use crate::model::params::{Column, Param};
-use crate::prepare::{Loaded, PrepareOptions};
+use crate::prepare::{Loaded, PrepareOptions, untied};
 use crate::reference::ReferenceView;
 use crate::shader::{Budget, Facts, plan};
 use crate::subject::Subject;
@@ -105,7 +105,7 @@ impl Judge<'_> {
         let change = |loaded: &mut Loaded| {
             let scene = &mut loaded.scene;
             scene.fit.free_gains = false;
-            scene.fit.free = free(effects, &scene.fit.free);
+            scene.fit.free = untied(&free(effects, &scene.fit.free), &scene.params, &[]);
             // What is free of a set is chosen here: what else the scene frees is not to be warned of.
             loaded.warnings.retain(|warning| !warning.contains("no enabled effect asks for it"));
             let scene = &mut loaded.scene;

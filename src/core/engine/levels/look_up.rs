@@ -115,6 +115,8 @@ pub struct Finder<R> {
     made: Arc<Made<R>>,
     blocks: Vec<Block>,
     rows: usize,
+    /// Rows of what nothing leaves.
+    empty: Vec<usize>,
 }
 
 /// Numbers of a record of levels that are weighed at once.
@@ -141,6 +143,7 @@ impl<R: Number> Finder<R> {
             row += count;
         }
         numbers.sort_unstable();
+        let empty = (0..row).filter(|row| !numbers.iter().any(|(.., found)| found == row)).collect();
         let mut blocks: Vec<Block> = Vec::new();
         for (record, offset, row) in numbers {
             let stride = made.record(record).stride;
@@ -156,13 +159,14 @@ impl<R: Number> Finder<R> {
             let wide = first + WIDE <= stride;
             blocks.push(Block { record, first, wide, rows: vec![(offset - first, row)] });
         }
-        Self { made, blocks, rows: row }
+        Self { made, blocks, rows: row, empty }
     }
 
-    /// What a record of samples finds, a row a number; rows that nothing leaves stay as they are.
+    /// What a record of samples finds, a row a number; 0 of what nothing leaves.
     #[inline(always)]
     pub fn find(&self, corners: &Corners<R>, mut put: impl FnMut(usize, usize, R)) {
         for lane in 0..LANES {
+            self.empty.iter().for_each(|&row| put(row, lane, R::from(0.0)));
             let texels = corners.texels.map(|texels| texels[lane] as usize);
             let shares = corners.shares.map(|shares| shares[lane]);
             for block in &self.blocks {

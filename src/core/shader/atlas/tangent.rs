@@ -126,7 +126,7 @@ impl Along {
         Some(Pass { leaves, plan, ..pass.clone() })
     }
 
-    /// What is read of neighbours is where the surface lies: no seed moves that.
+    /// What is read of neighbours is where the surface lies: no seed moves that, nor what is made of it.
     fn neighbours(&self, pass: &Pass) -> Result<Option<Pass>, TangentError> {
         let source = &pass.plan.levels[0].name;
         if !self.moved.contains_key(source) {

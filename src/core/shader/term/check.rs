@@ -18,7 +18,7 @@ use crate::shader::rule::{LIBRARY, RULES, Rule};
 use crate::shader::search::components;
 
 /// Words that the modules which rules are built into give a meaning of their own.
-const TAKEN: [&str; 48] = [
+const TAKEN: [&str; 53] = [
     "weighs",
     "whole",
     "change",
@@ -67,10 +67,42 @@ const TAKEN: [&str; 48] = [
     "size",
     "texel",
     "clip",
+    "deviation",
+    "deviation_moves",
+    "reach",
+    "narrow",
+    "apart",
 ];
 
-/// Functions of those modules.
-const FUNCTIONS: [&str; 4] = ["sample_level", "vs_main", "fs_main", "cs_main"];
+/// Functions of the modules, and what else these declare outside of functions.
+const FUNCTIONS: [&str; 26] = [
+    "level_corners",
+    "level_at",
+    "sample_level",
+    "vs_main",
+    "fs_main",
+    "cs_main",
+    "cs_vertices",
+    "cs_shade",
+    "shaded",
+    "shadow_fetch",
+    "interpolated",
+    "handed_over",
+    "place_in_tile",
+    "first_numbers",
+    "clip_of",
+    "areas_of_corners",
+    "shares_of",
+    "step_of",
+    "mean_of_corners",
+    "varyings",
+    "corners",
+    "triangles",
+    "drawn",
+    "colors",
+    "coverages",
+    "uv_steps_here",
+];
 
 /// Whether a name is one of those that the passes over the atlas make of others': `NAME_level` is a level as it is bound,
 /// `NAME_along_u` what the first direction of a blur leaves, `NAME_dilated` what fills empty texels, `d_NAME` how a level moves.

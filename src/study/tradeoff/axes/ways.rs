@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use crate::StudyError;
-use crate::engine::Objective;
+use crate::engine::{Objective, Point};
 use crate::model::choices::{SpecularVisibility, SplitSum, Visibility};
 use crate::model::effects::Effect;
 use crate::reference::Difference;
@@ -102,10 +102,12 @@ impl Axis for Ways {
             let kept = (scene.choices, scene.diffusion, scene.effects);
             let present = kept == (own.choices, own.diffusion, own.effects);
             let since = Instant::now();
+            // A way may bring constants of its own, as a preset does.
+            let point = Point { params: scene.params.clone(), ..bench.point() };
             let evaluated = Evaluated::anew(scene)?;
-            evaluated.live_engine()?.loss(&bench.point());
+            evaluated.live_engine()?.loss(&point);
             let seconds = since.elapsed().as_secs_f64();
-            found.push((name, present, seconds, evaluated.images(&bench.point())?));
+            found.push((name, present, seconds, evaluated.images(&point)?));
         }
         let exact = found.last().map(|(.., images)| images.clone()).unwrap_or_default();
         let last = found.len().saturating_sub(1);

@@ -1,0 +1,67 @@
+//! docs/diffusion.json: the scanned head with light that scatters within the skin, fitted with and without it.
+
+use std::path::PathBuf;
+
+use serde_json::{Map, Value, json};
+
+use crate::lab::{Lab, Result};
+
+/// The scenes; the studio has lamps, and a view close up.
+const SCENES: [&str; 3] = ["forest", "sunrise", "studio"];
+
+/// Views, by their names in the scene files, and in the raw file.
+const VIEWS: [(&str, &str); 4] =
+    [("front", "front"), ("threequarter", "three_quarter"), ("profile", "profile"), ("closeup", "closeup")];
+
+/// Effects of the scenes without what scatters, and without what comes through.
+const WITHOUT: &str = r#"["diffuse", "normal_map", "occlusion", "rim", "lights", "shadows", "light_specular", "fresnel", "directional_occlusion"]"#;
+const DIFFUSION: &str = r#"["diffuse", "normal_map", "occlusion", "rim", "lights", "shadows", "light_specular", "fresnel", "directional_occlusion", "diffusion"]"#;
+
+/// What is free then.
+const OTHERS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength"]"#;
+const LEVELS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength", "diffusion_weight_1", "diffusion_weight_2", "diffusion_weight_3", "diffusion_radius_1", "diffusion_radius_2", "diffusion_radius_3"]"#;
+
+/// What is fitted: its row's name, and settings of the scene file.
+const CHOICES: [(&str, &[(&str, &str)]); 6] = [
+    ("no scattering", &[("model.effects", WITHOUT), ("fit.free", OTHERS)]),
+    ("`diffusion`", &[("model.effects", DIFFUSION), ("fit.free", LEVELS)]),
+    ("`diffusion`, `transmission`", &[]),
+    ("the same, `light_map_size = 1024`", &[("diffusion", "{ light_map_size = 1024 }")]),
+    ("the same, `ambient_normal = \"bumped\"`", &[("diffusion", "{ ambient_normal = \"bumped\" }")]),
+    ("the same, `seams = \"joined\"`", &[("diffusion", "{ seams = \"joined\" }")]),
+];
+
+/// All of them, as docs/results.md has them in a table.
+pub(crate) fn measure(lab: &Lab) -> Result<Value> {
+    let mut choices = Vec::new();
+    for (name, settings) in CHOICES {
+        let mut row = Map::new();
+        row.insert("name".to_owned(), json!(name));
+        for scene in SCENES {
+            let what = format!("{scene}, {name}");
+            let file = lab.scene(&what, &file(lab, scene), settings)?;
+            row.insert(scene.to_owned(), fitted(&lab.fit(&what, Some(&file), &[])?.0));
+        }
+        choices.push(Value::Object(row));
+    }
+    Ok(json!({ "choices": choices }))
+}
+
+/// A scene file of the scanned head.
+fn file(lab: &Lab, scene: &str) -> PathBuf {
+    lab.data.join(format!("lps_{scene}/full.toml"))
+}
+
+/// A row's figures of a fit of one scene.
+fn fitted(report: &Value) -> Value {
+    let mut row = Map::new();
+    for (view, name) in VIEWS {
+        row.insert(name.to_owned(), report["views"][view]["psnr"].clone());
+    }
+    for key in ["params", "evaluations"] {
+        row.insert(key.to_owned(), report[key].clone());
+    }
+    row.insert("loss".to_owned(), report["loss"]["end"].clone());
+    row.insert("seconds".to_owned(), report["seconds"]["fit"].clone());
+    row.into()
+}
