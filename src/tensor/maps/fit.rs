@@ -79,7 +79,7 @@ pub fn fit_maps(
     }
     let fixed = Fixed::of(&task);
     let (initial, _) = fixed.solve_constants(&task.illumination, &task.observed, &task.start)?;
-    let problem = problem(shared, &task, fixed.setup, &initial)?;
+    let problem = problem(shared, &task, &fixed, &initial)?;
     let MapTask { scene, illumination, observed, .. } = task;
     let mut rounds = Rounds {
         shared,
@@ -114,14 +114,13 @@ pub fn fit_maps(
 fn problem(
     shared: &SharedDevice,
     task: &MapTask<'_>,
-    setup: Setup,
+    fixed: &Fixed<'_>,
     initial: &Point,
 ) -> Result<Problem, MapError> {
     let views: Vec<&ViewSamples> = task.observed.iter().map(|view| &view.samples).collect();
     let cuts = cuts(&views, task.most_samples.unwrap_or_else(|| most_samples(shared)));
-    let columns = all_columns();
-    let shaded =
-        Shaded { setup, params: &initial.params, columns: &columns, illumination: &task.illumination };
+    let Fixed { setup, columns, .. } = fixed;
+    let shaded = Shaded { setup: *setup, params: &initial.params, columns, illumination: &task.illumination };
     let shade = |cut: &Cut| -> Result<(Shade, Inputs), TensorError> {
         let part = cut.views(&views);
         let part: Vec<&ViewSamples> = part.iter().map(AsRef::as_ref).collect();
@@ -137,6 +136,8 @@ fn problem(
 struct Fixed<'a> {
     scene: &'a Scene,
     setup: Setup,
+    /// What the shading operation takes of the constants. Asked for once: an effect may be added meanwhile.
+    columns: Vec<Column>,
     unknowns: Vec<Unknown>,
     held_out: Option<usize>,
     interrupt: Option<Arc<AtomicBool>>,
@@ -147,6 +148,7 @@ impl<'a> Fixed<'a> {
         Self {
             scene: task.scene,
             setup: task.scene.setup(),
+            columns: all_columns(),
             unknowns: task.unknowns.clone(),
             held_out: task.held_out,
             interrupt: task.interrupt.clone(),
@@ -231,7 +233,7 @@ impl Rounds<'_, '_> {
         let (next, losses) =
             self.fixed.solve_constants(&self.illumination, &self.observed, &self.constants)?;
         self.constants = next;
-        let columns = column_tensor(self.shared, &all_columns(), &self.constants);
+        let columns = column_tensor(self.shared, &self.fixed.columns, &self.constants);
         let exponent = self.constants.params.scalar(Param::SpecularLobe);
         let lobes = self.illumination.lobes.as_ref();
         let lobe = lobes.map(|stack| cube_tensor(self.shared, &stack.at(exponent).0));
