@@ -1,10 +1,8 @@
 //! docs/diffusion.json: the scanned head with light that scatters within the skin, fitted with and without it.
 
-use std::path::PathBuf;
-
 use serde_json::{Map, Value, json};
 
-use crate::lab::{Lab, Result};
+use crate::lab::{Choice, Lab, Result};
 
 /// The scenes; the studio has lamps, and a view close up.
 const SCENES: [&str; 3] = ["forest", "sunrise", "studio"];
@@ -22,7 +20,7 @@ const OTHERS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_
 const LEVELS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength", "diffusion_weight_1", "diffusion_weight_2", "diffusion_weight_3", "diffusion_radius_1", "diffusion_radius_2", "diffusion_radius_3"]"#;
 
 /// What is fitted: its row's name, and settings of the scene file.
-const CHOICES: [(&str, &[(&str, &str)]); 6] = [
+const CHOICES: [Choice; 6] = [
     ("no scattering", &[("model.effects", WITHOUT), ("fit.free", OTHERS)]),
     ("`diffusion`", &[("model.effects", DIFFUSION), ("fit.free", LEVELS)]),
     ("`diffusion`, `transmission`", &[]),
@@ -33,23 +31,7 @@ const CHOICES: [(&str, &[(&str, &str)]); 6] = [
 
 /// All of them, as docs/results.md has them in a table.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
-    let mut choices = Vec::new();
-    for (name, settings) in CHOICES {
-        let mut row = Map::new();
-        row.insert("name".to_owned(), json!(name));
-        for scene in SCENES {
-            let what = format!("{scene}, {name}");
-            let file = lab.scene(&what, &file(lab, scene), settings)?;
-            row.insert(scene.to_owned(), fitted(&lab.fit(&what, Some(&file), &[])?.0));
-        }
-        choices.push(Value::Object(row));
-    }
-    Ok(json!({ "choices": choices }))
-}
-
-/// A scene file of the scanned head.
-fn file(lab: &Lab, scene: &str) -> PathBuf {
-    lab.data.join(format!("lps_{scene}/full.toml"))
+    Ok(json!({ "choices": lab.choices(&CHOICES, &SCENES, "full.toml", fitted)? }))
 }
 
 /// A row's figures of a fit of one scene.

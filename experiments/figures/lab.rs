@@ -12,6 +12,9 @@ use toml_edit::{DocumentMut, Item};
 /// What a step gave, or why it failed, in words.
 pub(crate) type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
+/// What is fitted: its row's name, and settings of the scene file.
+pub(crate) type Choice = (&'static str, &'static [(&'static str, &'static str)]);
+
 /// The programs, the data and a folder to work in.
 pub(crate) struct Lab {
     /// The project's folder.
@@ -113,6 +116,33 @@ impl Lab {
         let text = self.skinfit(what, &arguments, true)?;
         let report = serde_json::from_str(&text).map_err(|e| format!("{what}: {e}: {text}"))?;
         Ok((report, folder))
+    }
+
+    /// A scene file of the scanned head.
+    pub(crate) fn head_scene(&self, scene: &str, file: &str) -> PathBuf {
+        self.data.join(format!("lps_{scene}/{file}"))
+    }
+
+    /// A row for each choice: its name, and of each scene of the scanned head what `fitted` takes of its fit's report.
+    pub(crate) fn choices(
+        &self,
+        choices: &[Choice],
+        scenes: &[&str],
+        file: &str,
+        fitted: fn(&Value) -> Value,
+    ) -> Result<Vec<Value>> {
+        let mut rows = Vec::new();
+        for &(name, settings) in choices {
+            let mut row = Map::new();
+            row.insert("name".to_owned(), name.into());
+            for &scene in scenes {
+                let what = format!("{scene}, {name}");
+                let changed = self.scene(&what, &self.head_scene(scene, file), settings)?;
+                row.insert(scene.to_owned(), fitted(&self.fit(&what, Some(&changed), &[])?.0));
+            }
+            rows.push(Value::Object(row));
+        }
+        Ok(rows)
     }
 
     /// A copy of a scene file with other `settings`: key by key, and the value as TOML.

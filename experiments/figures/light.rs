@@ -1,16 +1,17 @@
 //! docs/light.json: the scanned head under lamps and skies that it casts shadows in, fitted with each choice of its light.
 
-use std::path::PathBuf;
+use serde_json::{Value, json};
 
-use serde_json::{Map, Value, json};
-
-use crate::lab::{Lab, Result};
+use crate::lab::{Choice, Lab, Result};
 
 /// The scenes. The studio has lamps of its own and no scattering below the skin.
 const SCENES: [&str; 3] = ["forest", "sunrise", "studio_dry"];
 
+/// The file of each that asks for lights.
+const FILE: &str = "light.toml";
+
 /// What is fitted: its row's name, and settings of the scene file.
-const CHOICES: [(&str, &[(&str, &str)]); 7] = [
+const CHOICES: [Choice; 7] = [
     ("as the scene has it", &[]),
     ("`skin_reflection = \"none\"`", &[("model.skin_reflection", "\"none\"")]),
     ("`bounces = \"none\"`", &[("model.bounces", "\"none\"")]),
@@ -28,23 +29,8 @@ const RAYS: &[(&str, &str)] = &[
 
 /// All of them, as docs/results.md has them in a table.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
-    let mut choices = Vec::new();
-    for (name, settings) in CHOICES {
-        let mut row = Map::new();
-        row.insert("name".to_owned(), json!(name));
-        for scene in SCENES {
-            let what = format!("{scene}, {name}");
-            let file = lab.scene(&what, &file(lab, scene), settings)?;
-            row.insert(scene.to_owned(), fitted(&lab.fit(&what, Some(&file), &[])?.0));
-        }
-        choices.push(Value::Object(row));
-    }
+    let choices = lab.choices(&CHOICES, &SCENES, FILE, fitted)?;
     Ok(json!({ "choices": choices, "held_out": held_out(lab)? }))
-}
-
-/// A scene file of the scanned head.
-fn file(lab: &Lab, scene: &str) -> PathBuf {
-    lab.data.join(format!("lps_{scene}/light.toml"))
 }
 
 /// A row's figures of a fit of one scene.
@@ -61,7 +47,8 @@ fn fitted(report: &Value) -> Value {
 
 /// One skin for all scenes, each scored by a fit of the others.
 fn held_out(lab: &Lab) -> Result<Value> {
-    let files: Vec<String> = SCENES.iter().map(|scene| file(lab, scene).display().to_string()).collect();
+    let files: Vec<String> =
+        SCENES.iter().map(|scene| lab.head_scene(scene, FILE).display().to_string()).collect();
     let mut rows = Vec::new();
     for scene in SCENES {
         let run = lab.scratch.path().join(format!("held_{scene}")).display().to_string();
