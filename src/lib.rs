@@ -40,9 +40,10 @@
 //! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name |
 //! | render | [`Shader`] on the CPU, [`Renderer`] on a graphics adapter; [`write_exr`] |
 //! | take it to another engine | [`export_constants`] of [`Constants`], [`export_function`] |
+//! | add a [`Term`] of your own | [`register_term`], or `[model] terms` of a scene file |
 //! | differentiate it on burn's tensors | `skinfit_tensor::Shade` (feature `burn`) |
 //!
-//! `experiments/library` has runnable programs: a fit, a rendering, gradients on tensors.
+//! `experiments/library` has runnable programs: a fit, a rendering, a term of one's own, gradients on tensors.
 //!
 //! Images are linear Rec.709, premultiplied by their coverage; lengths are the scene's own; angles are degrees in
 //! files and radians in the library. Library errors say file, place, what is wrong and what to do. The library has no
@@ -68,6 +69,7 @@ pub use skinfit_core::prepare::{Baked, HeldOut, Loaded, Observed, PrepareOptions
 pub use skinfit_core::progress;
 pub use skinfit_core::render::files::write_exr;
 pub use skinfit_core::render::shade::Shader;
+pub use skinfit_core::shader::term::{Term, register as register_term};
 pub use skinfit_gpu::engine::GpuEngine;
 pub use skinfit_gpu::{Gpu, RenderOptions, Renderer};
 

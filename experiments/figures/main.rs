@@ -10,6 +10,7 @@
 //! how pages quote it. `tests/suite/documents.rs` reads every page against its raw files.
 
 mod accuracy;
+mod builds;
 mod diffusion;
 mod lab;
 mod light;
@@ -42,6 +43,7 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/effects_cost/results.json", timings::effects_cost),
     ("experiments/effects_cost/card.json", timings::effects_cost_on_a_card),
     ("experiments/scaling/results.json", timings::scaling),
+    ("experiments/builds/results.json", builds::measure),
     ("experiments/bench/results.json", timings::bench),
     ("experiments/network/results.json", timings::network),
     ("experiments/race/results.json", race::processor),

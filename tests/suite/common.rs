@@ -28,6 +28,16 @@ pub(crate) fn own_vectors() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors")
 }
 
+/// Those of light, specular and diffusion: the project's own, or those of `SKINFIT_VECTORS_LIGHT`.
+pub(crate) fn vectors_light() -> PathBuf {
+    named_by("SKINFIT_VECTORS_LIGHT").unwrap_or_else(own_vectors_light)
+}
+
+/// The project's own.
+pub(crate) fn own_vectors_light() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors_light")
+}
+
 /// The real scenes, environments and meshes: too large for the project, in `../shared/data` or where `SKINFIT_DATA`
 /// says. `None`, and said so, where they are missing and `SKINFIT_NO_DATA_TESTS` allows it.
 pub(crate) fn data() -> Option<PathBuf> {

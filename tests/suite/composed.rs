@@ -5,8 +5,6 @@
 //! out ([`LEFT_OUT`]). E_r and the split sum are tables of the oracle's own there, coarser than what the rules fit: the
 //! environment's lobe is put together here of the rules' directions, roughness and shares with those tables.
 
-use std::path::Path;
-
 use glam::DVec3;
 use skinfit::bake::coefficients::Coefficients;
 use skinfit::bake::harmonics::{Order, open_transfer};
@@ -31,6 +29,7 @@ use skinfit_core::program::shading::{Shading, constant};
 use skinfit_core::program::steps::{Rounding, Steps};
 
 use crate::by_rules::Number;
+use crate::common::vectors_light;
 use crate::scene_folder::{SCENE, SceneFolder};
 use crate::vectors;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
@@ -331,7 +330,7 @@ impl Rules {
 }
 
 fn read() -> Vectors {
-    Vectors::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors_light"))
+    Vectors::read(&vectors_light())
 }
 
 const PLAIN: Choices = Choices {

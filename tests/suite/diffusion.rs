@@ -1,7 +1,6 @@
 //! Texture-space diffusion against the vectors of an independent float64 oracle: stretch, light map, levels, what fragments
 //! look up and how it moves, in f64 and in f32.
 
-use std::path::Path;
 use std::sync::{Arc, OnceLock};
 
 use skinfit::engine::cubes_at::CubesAt;
@@ -24,6 +23,7 @@ use skinfit_core::program::shading::{Shading, constant};
 use skinfit_core::program::steps::{Rounding, Steps};
 
 use crate::by_rules::Function;
+use crate::common::vectors_light;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
 /// Light that each texel holds, in the place of lamps and sky.
@@ -218,7 +218,7 @@ fn all_read(vectors: &Vectors, name: &str) {
 }
 
 fn read() -> Vectors {
-    Vectors::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors_light"))
+    Vectors::read(&vectors_light())
 }
 
 /// The levels of an atlas.

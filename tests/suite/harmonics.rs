@@ -19,8 +19,8 @@ use crate::vectors::reader::{Node, Tolerance, Vectors};
 
 #[test]
 fn harmonics_meet_the_vectors() {
-    let vectors = Vectors::read(&common::vectors());
-    vectors::of_light(&vectors, "sh").iter().for_each(|file| sh_vector(&vectors, file));
+    let vectors = Vectors::read(&common::vectors_light());
+    vectors.of_kind("sh").iter().for_each(|file| sh_vector(&vectors, file));
 }
 
 pub(crate) fn sh_vector(vectors: &Vectors, file: &Node<'_>) {

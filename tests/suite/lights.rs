@@ -105,7 +105,7 @@ fn angles(
 
 #[test]
 fn lights_are_as_bright_as_the_vectors_say() {
-    light_vector(&Vectors::read(&common::vectors()).one("light"));
+    light_vector(&Vectors::read(&common::vectors_light()).one("light"));
 }
 
 /// Cycles' pixel filter: Blackman-Harris, 3 pixels wide.

@@ -1,8 +1,6 @@
 //! Specular light with Fresnel against the vectors of an independent float64 oracle (tests/vectors_light), and its hard
 //! cases: the exact integrals and filters, and the rules' functions with their derivatives.
 
-use std::path::Path;
-
 use skinfit::bake::radial::Radial;
 use skinfit::model::cube::{texel_direction, texel_solid_angle};
 use skinfit::shader::rule::LIBRARY;
@@ -11,6 +9,7 @@ use skinfit_core::specular::split_sum::{Quadrature, dielectric_sum, split_sum};
 use skinfit_core::specular::{SpecularModel, roughness_of};
 
 use crate::by_rules::Function;
+use crate::common::vectors_light;
 use crate::vectors;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
@@ -18,7 +17,7 @@ const MODELS: [(SpecularModel, &str); 2] =
     [(SpecularModel::Kelemen, "specular_lights.json"), (SpecularModel::Ggx, "specular_lights_ggx.json")];
 
 fn read() -> Vectors {
-    Vectors::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors_light"))
+    Vectors::read(&vectors_light())
 }
 
 /// The rules' text of specular light.

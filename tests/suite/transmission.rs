@@ -2,7 +2,6 @@
 //! found of thickness and of lights' ways inside, on meshes whose answer is known.
 
 use std::f64::consts::PI;
-use std::path::Path;
 
 use glam::{DVec3, Vec2, Vec3, vec3};
 use skinfit::bake::rays::RayMesh;
@@ -35,6 +34,7 @@ use skinfit_core::program::shading::{Shading, constant};
 use skinfit_core::program::steps::{Rounding, Steps};
 
 use crate::by_rules::Number;
+use crate::common::vectors_light;
 use crate::fixtures::{bare_scene, camera, quantile};
 use crate::graphics::bench::{self, Difference, EXACT, gpu};
 use crate::scene_folder::{SCENE, SceneFolder};
@@ -136,7 +136,7 @@ fn compare<R: Number>(root: &Node<'_>, like: R) {
 /// The oracle's cases: nothing, the ordinary, huge and infinite depths, and lengths at their bounds.
 #[test]
 fn light_comes_through_as_the_vectors_say_in_every_kind_of_number() {
-    let vectors = Vectors::read(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/vectors_light"));
+    let vectors = Vectors::read(&vectors_light());
     let root = vectors.files["transmission.json"].root();
     compare(&root, 0.0_f64);
     compare(&root, 0.0_f32);

@@ -18,7 +18,7 @@ use skinfit::samples::surface_records::Asked;
 use skinfit::samples::{SurfaceRecords, ViewSamples};
 use skinfit_core::program::graph::Input;
 
-use self::reader::{Node, Tolerance, Vectors};
+use self::reader::{Node, Tolerance, Vector, Vectors};
 use crate::by_rules::{Cubes, Fragments, Function, Number, Shaded, Wanted};
 use crate::{bakes, common, diffusion, evaluators, harmonics, lights, meshes, witness};
 
@@ -404,7 +404,8 @@ fn vectors_hold_in_simd_lanes_with_every_instruction_set_that_there_is() {
 const TINY: &str = "frag_09_tiny_frame";
 
 /// What is compared with nothing: a vector's name or kind, what its paths begin with, and why.
-const LEFT_OUT: [(&str, &str, &str); 13] = [
+type LeftOut = (&'static str, &'static str, &'static str);
+const LEFT_OUT: [LeftOut; 12] = [
     ("", "note", "a sentence for people"),
     ("fragment", "inputs.skinColor[3]", "the colour map's alpha, which listing 3-4 does not read"),
     (
@@ -420,7 +421,6 @@ const LEFT_OUT: [(&str, &str, &str); 13] = [
         "expected",
         "errors of formats over pixels that are not in the file; experiments measure their own",
     ),
-    ("light", "inputs.cases[25].f32_rel", "the tolerance of evaluators in f32: lights are evaluated in f64"),
     ("vertex", "inputs.uv", "texture coordinates pass through the vertex stage as they are"),
     ("vertex", "expected.SkinUVST", "texture coordinates pass through the vertex stage as they are"),
     ("vertex", "inputs.cam_pos[3]", "the 1 of a point"),
@@ -428,15 +428,12 @@ const LEFT_OUT: [(&str, &str, &str); 13] = [
     ("vertex", "inputs.dapple", "S.w is the z of (DappleXf N): of the matrix a row of three"),
 ];
 
-/// The vectors of a kind that the oracle keeps in a folder of its own, for which another folder may have none.
-pub(crate) fn of_light<'v>(vectors: &'v Vectors, kind: &str) -> Vec<Node<'v>> {
-    let folder = common::vectors();
-    if folder != common::own_vectors() && !vectors.have(kind) {
-        common::not_checked(&format!("{} holds no vectors of {kind}", folder.display()));
-        return Vec::new();
-    }
-    vectors.of_kind(kind)
-}
+/// Of the lights' vectors.
+const LEFT_OUT_OF_LIGHT: [LeftOut; 1] = [(
+    "light",
+    "inputs.cases[25].f32_rel",
+    "the tolerance of evaluators in f32: lights are evaluated in f64",
+)];
 
 /// Every comparison that there is, in f64 or on the CPU, and then what of the files was never looked at.
 #[test]
@@ -450,24 +447,42 @@ fn every_number_of_every_vector_is_compared() {
     vectors.of_kind("latlong").iter().for_each(bakes::latlong_vector);
     vectors.of_kind("prefilter").iter().for_each(|file| bakes::prefilter_vector(&vectors, file));
     vectors.of_kind("vertex").iter().for_each(meshes::vertex_vector);
-    lights::light_vector(&vectors.one("light"));
-    for file in of_light(&vectors, "diffusion") {
+    for file in vectors.of_kind("diffusion") {
         diffusion::clamped_vector::<f64>(&file);
         diffusion::clamped_vector::<f32>(&file);
     }
-    of_light(&vectors, "sh").iter().for_each(|file| harmonics::sh_vector(&vectors, file));
     witness::bench_on(&vectors, &evaluators::on_cpu()[..2]);
     witness::fit_of_the_bench(&vectors);
     witness::fragments_on(&vectors, &evaluators::on_cpu()[..2]);
 
-    let mut used = [false; LEFT_OUT.len()];
+    assert_all_compared(vectors.files.values(), &LEFT_OUT, folder == common::own_vectors());
+}
+
+/// The same of the lights and of spherical harmonics.
+#[test]
+fn every_number_of_the_vectors_of_lights_and_harmonics_is_compared() {
+    let folder = common::vectors_light();
+    let vectors = Vectors::read(&folder);
+    lights::light_vector(&vectors.one("light"));
+    vectors.of_kind("sh").iter().for_each(|file| harmonics::sh_vector(&vectors, file));
+    let these = vectors.files.values().filter(|vector| {
+        let kind = vector.root().at("kind").text();
+        ["light", "sh"].contains(&kind)
+    });
+    assert_all_compared(these, &LEFT_OUT_OF_LIGHT, folder == common::own_vectors_light());
+}
+
+/// Nothing of the files was left without a look but what the list names, and the list names nothing else where it is
+/// the files' own.
+fn assert_all_compared<'v>(vectors: impl Iterator<Item = &'v Vector>, left_out: &[LeftOut], own: bool) {
+    let mut used = vec![false; left_out.len()];
     let mut left = Vec::new();
-    for vector in vectors.files.values() {
+    for vector in vectors {
         let root = vector.root();
         root.at("name").assert_text(&vector.name);
         let kind = root.at("kind").text();
         for path in vector.left() {
-            let reason = LEFT_OUT.iter().position(|(of, beginning, _)| {
+            let reason = left_out.iter().position(|(of, beginning, _)| {
                 (of.is_empty() || *of == kind || *of == vector.name) && path.starts_with(beginning)
             });
             match reason {
@@ -479,10 +494,10 @@ fn every_number_of_every_vector_is_compared() {
     let (count, first) = (left.len(), left.iter().take(20).cloned().collect::<Vec<_>>().join("\n"));
     assert!(
         left.is_empty(),
-        "{count} numbers of the vectors are compared with nothing, nor in LEFT_OUT:\n{first}"
+        "{count} numbers of the vectors are compared with nothing, nor left out with a reason:\n{first}"
     );
-    if folder == common::own_vectors() {
-        let stale: Vec<_> = LEFT_OUT.iter().zip(used).filter(|(_, used)| !used).collect();
+    if own {
+        let stale: Vec<_> = left_out.iter().zip(used).filter(|(_, used)| !used).collect();
         assert!(stale.is_empty(), "these are compared after all: {stale:?}");
     }
 }

@@ -69,11 +69,6 @@ impl Vectors {
         Self { files }
     }
 
-    /// Whether there is a vector of that kind.
-    pub(crate) fn have(&self, kind: &str) -> bool {
-        self.files.values().any(|vector| vector.root().at("kind").text() == kind)
-    }
-
     /// Every vector of that kind, in the order of their files' names; none is a failure.
     pub(crate) fn of_kind(&self, kind: &str) -> Vec<Node<'_>> {
         let found: Vec<Node<'_>> =
