@@ -1,5 +1,6 @@
 //! How long builds take, and what of them: experiments/builds.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
 
@@ -10,6 +11,8 @@ use crate::studies::number;
 
 /// The last commit of which everything was one package.
 const ONE_PACKAGE: &str = "da7d59c";
+/// Sources that nobody writes.
+const PRINTED: [&str; 2] = ["engine/cpu/ahead/tapes.rs", "engine/loss/printed.rs"];
 /// How many of the longest compilations are named.
 const LONGEST: usize = 12;
 
@@ -38,11 +41,59 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
             "command line": seconds("command_line")?,
             "rule": seconds("rule")?,
             "sum of units": sum,
+            "packages": packages(lab, commit)?,
             "longest": longest,
             "after a rule": units("rule")?.into_iter().filter(|unit| number(&unit["seconds"]) >= 1.0).collect::<Vec<_>>(),
         });
     }
+    // A parameter of the key light, of which every file knew; and one of the effect `fresnel`, declared by a file of rules.
+    raw["one_package"]["files of a parameter"] = files_of(lab, ONE_PACKAGE, "side_specular\\|SideSpecular")?.into();
+    raw["members"]["files of a parameter"] = files_of(lab, &head, "fresnel_loss\\|FresnelLoss")?.into();
+    raw["rows"] = [
+        ("the first command, from nothing, s", "first"),
+        ("a new program after a line of the command line, s", "command line"),
+        ("a new program after a rule, s", "rule"),
+        ("all compilations of the first command, s", "sum of units"),
+        ("files of a parameter", "files of a parameter"),
+    ]
+    .map(|(what, key)| json!({ "what": what, "one_package": raw["one_package"][key], "members": raw["members"][key] }))
+    .to_vec()
+    .into();
     Ok(raw)
+}
+
+/// What git says of a commit, line by line.
+fn git(lab: &Lab, arguments: &[&str]) -> Result<Vec<String>> {
+    let mut command = Command::new("git");
+    command.args(arguments);
+    Ok(lab.run("the commit's files", command, false)?.lines().map(str::to_owned).collect())
+}
+
+/// How many files of the sources, tests aside, a parameter's name stands in.
+fn files_of(lab: &Lab, commit: &str, name: &str) -> Result<usize> {
+    let found = git(lab, &["grep", "-l", name, commit, "--", "src/*.rs", "src/*.wgsl"])?;
+    Ok(found.iter().filter(|file| !file.contains("/tests")).count())
+}
+
+/// The packages whose sources lie beneath `src`, and their lines of Rust without what is printed from the rules, the
+/// longest first.
+fn packages(lab: &Lab, commit: &str) -> Result<Vec<Value>> {
+    let mut lines = BTreeMap::<String, u64>::new();
+    let manifests = git(lab, &["ls-tree", "-r", "--name-only", commit, "--", "src"])?;
+    let members: Vec<&str> = manifests.iter().filter_map(|file| file.strip_suffix("/Cargo.toml")).collect();
+    for counted in git(lab, &["grep", "-c", "", commit, "--", "src/*.rs"])? {
+        let (file, count) = counted.rsplit_once(':').ok_or("a file and its lines")?;
+        let (_, file) = file.split_once(':').ok_or("a commit and its file")?;
+        if PRINTED.iter().any(|printed| file.ends_with(printed)) {
+            continue;
+        }
+        let member = members.iter().find(|member| file.starts_with(&format!("{member}/")));
+        *lines.entry(member.map_or("skinfit", |member| member).to_owned()).or_default() += count.parse::<u64>()?;
+    }
+    let mut packages: Vec<Value> =
+        lines.into_iter().map(|(name, lines)| json!({ "name": name, "lines": lines })).collect();
+    packages.sort_by_key(|package| std::cmp::Reverse(package["lines"].as_u64()));
+    Ok(packages)
 }
 
 /// What cargo's page of a build says of each compilation, the longest first.
