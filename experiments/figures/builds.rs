@@ -47,7 +47,8 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         });
     }
     // A parameter of the key light, of which every file knew; and one of the effect `fresnel`, declared by a file of rules.
-    raw["one_package"]["files of a parameter"] = files_of(lab, ONE_PACKAGE, "side_specular\\|SideSpecular")?.into();
+    raw["one_package"]["files of a parameter"] =
+        files_of(lab, ONE_PACKAGE, "side_specular\\|SideSpecular")?.into();
     raw["members"]["files of a parameter"] = files_of(lab, &head, "fresnel_loss\\|FresnelLoss")?.into();
     raw["rows"] = [
         ("the first command, from nothing, s", "first"),
@@ -88,7 +89,8 @@ fn packages(lab: &Lab, commit: &str) -> Result<Vec<Value>> {
             continue;
         }
         let member = members.iter().find(|member| file.starts_with(&format!("{member}/")));
-        *lines.entry(member.map_or("skinfit", |member| member).to_owned()).or_default() += count.parse::<u64>()?;
+        *lines.entry(member.map_or("skinfit", |member| member).to_owned()).or_default() +=
+            count.parse::<u64>()?;
     }
     let mut packages: Vec<Value> =
         lines.into_iter().map(|(name, lines)| json!({ "name": name, "lines": lines })).collect();
