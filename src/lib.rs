@@ -50,6 +50,9 @@
 //! signals, no progress bars and no command line: long work tells [`progress`] how far it is, and the program
 //! `skinfit` (feature `host`, on by default) shows it.
 //!
+//! What a term's file declares, and each of a scene's lights, is known to the process for as long as it runs: a name stands
+//! for one text, another text under it is an error, and there may be 1,024 effects in all.
+//!
 //! What stands here are a few names of the members of the workspace, which follow the data's one way: `skinfit_core`
 //! (everything on the CPU), `skinfit_gpu` (the renderer and the engine on an adapter),
 //! `skinfit_tensor`, `skinfit_report` (metrics, pictures and pages), `skinfit_study`, and `skinfit_host`, the command

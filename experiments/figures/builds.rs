@@ -46,16 +46,17 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
             "after a rule": units("rule")?.into_iter().filter(|unit| number(&unit["seconds"]) >= 1.0).collect::<Vec<_>>(),
         });
     }
-    // A parameter of the key light, of which every file knew; and one of the effect `fresnel`, declared by a file of rules.
-    raw["one_package"]["files of a parameter"] =
-        files_of(lab, ONE_PACKAGE, "side_specular\\|SideSpecular")?.into();
-    raw["members"]["files of a parameter"] = files_of(lab, &head, "fresnel_loss\\|FresnelLoss")?.into();
+    // A parameter of the paper's effects, then and now; and one of an effect that a file of rules declares.
+    let paper = "side_specular\\|SideSpecular";
+    raw["files"] = json!({
+        "side_specular": { "one_package": files_of(lab, ONE_PACKAGE, paper)?, "members": files_of(lab, &head, paper)? },
+        "fresnel_loss": files_of(lab, &head, "fresnel_loss\\|FresnelLoss")?,
+    });
     raw["rows"] = [
         ("the first command, from nothing, s", "first"),
         ("a new program after a line of the command line, s", "command line"),
         ("a new program after a rule, s", "rule"),
         ("all compilations of the first command, s", "sum of units"),
-        ("files of a parameter", "files of a parameter"),
     ]
     .map(|(what, key)| json!({ "what": what, "one_package": raw["one_package"][key], "members": raw["members"][key] }))
     .to_vec()

@@ -20,12 +20,17 @@ const OTHERS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_
 const LEVELS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength", "diffusion_weight_1", "diffusion_weight_2", "diffusion_weight_3", "diffusion_radius_1", "diffusion_radius_2", "diffusion_radius_3"]"#;
 
 /// What is fitted: its row's name, and settings of the scene file.
-const CHOICES: [Choice; 6] = [
+const CHOICES: [Choice; 8] = [
     ("no scattering", &[("model.effects", WITHOUT), ("fit.free", OTHERS)]),
     ("`diffusion`", &[("model.effects", DIFFUSION), ("fit.free", LEVELS)]),
     ("`diffusion`, `transmission`", &[]),
     ("the same, `light_map_size = 1024`", &[("diffusion", "{ light_map_size = 1024 }")]),
     ("the same, `ambient_normal = \"bumped\"`", &[("diffusion", "{ ambient_normal = \"bumped\" }")]),
+    ("the same, `unblurred = \"pixel\"`", &[("diffusion", "{ unblurred = \"pixel\" }")]),
+    (
+        "the same, `unblurred = \"pixel\"`, `light_map_size = 1024`, `ambient_normal = \"bumped\"`",
+        &[("diffusion", "{ unblurred = \"pixel\", light_map_size = 1024, ambient_normal = \"bumped\" }")],
+    ),
     ("the same, `seams = \"joined\"`", &[("diffusion", "{ seams = \"joined\" }")]),
 ];
 

@@ -29,6 +29,8 @@ pub(crate) struct Lab {
     pub(crate) suite: Option<PathBuf>,
     /// A copy of what runs the race of other frameworks, with its data and its rows.
     pub(crate) race: Option<PathBuf>,
+    /// A Python that has numpy and embreex.
+    pub(crate) python: Option<PathBuf>,
 }
 
 impl Lab {
@@ -48,6 +50,7 @@ impl Lab {
             scratch: tempfile::tempdir()?,
             suite: None,
             race: None,
+            python: None,
         })
     }
 

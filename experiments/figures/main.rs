@@ -20,6 +20,7 @@ mod results;
 mod strays;
 mod studies;
 mod timings;
+mod ways;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -40,8 +41,11 @@ const FILES: &[(&str, Measure)] = &[
     ("docs/noise.json", accuracy::noise),
     ("experiments/ablation/results.json", studies::ablation),
     ("experiments/accuracy_vs_time/results.json", studies::tradeoff),
+    ("experiments/accuracy_vs_time/light.json", ways::light),
+    ("experiments/accuracy_vs_time/diffusion.json", ways::diffusion),
     ("experiments/effects_cost/results.json", timings::effects_cost),
     ("experiments/effects_cost/card.json", timings::effects_cost_on_a_card),
+    ("experiments/rays/results.json", timings::rays),
     ("experiments/scaling/results.json", timings::scaling),
     ("experiments/builds/results.json", builds::measure),
     ("experiments/bench/results.json", timings::bench),
@@ -68,6 +72,9 @@ struct Arguments {
     /// The tests' program, where it is built already.
     #[arg(long)]
     suite: Option<PathBuf>,
+    /// A Python that has numpy and embreex.
+    #[arg(long)]
+    python: Option<PathBuf>,
     /// A copy of what runs the race of other frameworks, with its data and its rows.
     #[arg(long)]
     race: Option<PathBuf>,
@@ -98,6 +105,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             let mut lab = Lab::new(&root, &data, &root.join(&arguments.skinfit))?;
             lab.suite.clone_from(&arguments.suite);
             lab.race.clone_from(&arguments.race);
+            lab.python.clone_from(&arguments.python);
             // One that cannot be measured leaves its file as it was, and the others go on.
             if let Err(error) = measured(&lab, file, *measure) {
                 eprintln!("figures: {file}: {error}");

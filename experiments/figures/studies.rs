@@ -1,6 +1,6 @@
 //! What `skinfit ablate` and `tradeoff` find of the built-in scene and of the scanned head.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 
@@ -13,11 +13,24 @@ fn scene(lab: &Lab, name: &str) -> Option<PathBuf> {
     (name != "built_in").then(|| lab.data.join(format!("lps_{name}/scene.toml")))
 }
 
-/// What a study writes to `results.csv`.
+/// What a study of one of [`SCENES`] writes to `results.csv`.
 fn study(lab: &Lab, command: &str, name: &str, options: &[&str]) -> Result<Vec<Value>> {
+    study_of(lab, command, name, scene(lab, name).as_deref(), options)
+}
+
+/// What a study of a scene file, or of the built-in scene, writes to `results.csv`.
+///
+/// # Errors
+/// When the study is refused.
+pub(crate) fn study_of(
+    lab: &Lab,
+    command: &str,
+    name: &str,
+    scene: Option<&Path>,
+    options: &[&str],
+) -> Result<Vec<Value>> {
     let folder = lab.scratch.path().join(format!("{command}_{name}"));
-    let (file, output) =
-        (scene(lab, name).map(|file| file.display().to_string()), folder.display().to_string());
+    let (file, output) = (scene.map(|file| file.display().to_string()), folder.display().to_string());
     let mut arguments = vec![command];
     arguments.extend(file.as_deref());
     arguments.extend(["-o", &output]);

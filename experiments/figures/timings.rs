@@ -116,6 +116,25 @@ fn effects(raw: &mut Value, name: &str, mut rows: Vec<Value>) {
     raw[name] = rows.into();
 }
 
+/// experiments/rays: transfer vectors of the scanned head beside Embree's rays.
+pub(crate) fn rays(lab: &Lab) -> Result<Value> {
+    let python = lab.python.as_ref().ok_or("name a Python that has numpy and embreex by --python")?;
+    let scene = lab.head_scene("forest", "scene.toml").display().to_string();
+    let row = lab.scratch.path().join("rays.json").display().to_string();
+    let arguments = [scene.as_str(), "-o", &row, "--python", &python.display().to_string()];
+    lab.example("rays", "rays beside Embree", &arguments)?;
+    let raw: Value = serde_json::from_str(&std::fs::read_to_string(&row)?)?;
+    let rows = ["any", "nearest"].map(|query| {
+        let mut row = raw[query].clone();
+        row["name"] = query.into();
+        row["skinfit"] = (number(&row["skinfit"]) / 1e6).into();
+        row["embree"] = (number(&row["embree"]) / 1e6).into();
+        row
+    });
+    Ok(json!({ "rows": rows, "vertices": raw["vertices"], "distinct": raw["distinct"],
+        "triangles": raw["triangles"], "threads": raw["threads"] }))
+}
+
 /// experiments/scaling: the middle of three repeats.
 pub(crate) fn scaling(lab: &Lab) -> Result<Value> {
     let mut command = Command::new(lab.root.join("experiments/scaling/run"));

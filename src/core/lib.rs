@@ -16,7 +16,8 @@
 //! - [`shader`]: the model's formulas as rules in WGSL, and the planner that makes shaders of them.
 //! - [`program`]: planned rules as arithmetic on numbers, for the processor.
 //! - [`export`]: constants and shaders as text for other engines.
-//! - [`output`], [`progress`], [`simd`]: files written whole or not at all; progress bars; which
+//! - [`specular`]: the specular BRDFs in f64, their integrals, and the rational functions that the rules take for these.
+//! - [`output`], [`progress`], [`simd`]: files written whole or not at all; who is told how far long work is; which
 //!   SIMD instructions there are.
 
 pub mod bake;

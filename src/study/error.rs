@@ -28,12 +28,12 @@ pub enum StudyError {
     #[error("{0} Update its driver, or choose another adapter with WGPU_ADAPTER_NAME.")]
     Gpu(#[from] GpuError),
     /// An axis was named that the scene does not ask for.
-    #[error("--axis {axis}: {why}. Leave it out, or name a scene that does.")]
+    #[error("the axis {axis}: {why}. Leave it out, or name a scene that does.")]
     Idle { axis: &'static str, why: &'static str },
     /// A goal, and no axis whose settings could meet it.
     #[error(
         "{goal}: of the axes to be swept ({swept}) none can be set in a scene file, so there is nothing to choose. \
-         Name some of {settable} with --axis, too."
+         Sweep some of {settable}, too."
     )]
     NothingToSet { goal: &'static str, swept: String, settable: String },
     /// Nothing is left to be scored on.

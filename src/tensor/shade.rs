@@ -144,7 +144,7 @@ impl Backward<CubeBackend, INPUTS> for Adjoints {
     }
 }
 
-/// Tensors of what there is.
+/// The inputs' tensors, as the samples and cubes have them.
 fn inputs(
     shared: &SharedDevice,
     stage: &Stage,

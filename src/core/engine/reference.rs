@@ -282,7 +282,7 @@ pub fn deviation(got: &NormalEquations, want: &NormalEquations, unknowns: &[Unkn
     let k = unknowns.len();
     let mut worst = Deviation { what: "nothing".to_owned(), size: 0.0 };
     let mut see = |got: f64, want: f64, scale: f64, what: &dyn Fn() -> String| {
-        // What is 0 by its nature has to be 0.
+        // Where the reference is exactly 0, so must be what is compared.
         let off = (got - want).abs() / scale.max(f64::MIN_POSITIVE);
         let off = if got == want {
             0.0

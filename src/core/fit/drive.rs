@@ -38,7 +38,7 @@ const COST_TOLERANCE: f64 = 1e-12;
 /// They are run again while that gains more than this share of the first loss.
 const RESTART_GAIN: f64 = 1e-6;
 /// They have converged when the normal equations promise less than this share of the loss, or less
-/// than what they are not run again for: their crude stops leave a simplex 1e-4 above the others'
+/// than [`RESTART_GAIN`]: their crude stops leave a simplex 1e-4 above the others'
 /// answer, whereas one that is stuck is above it by percents.
 const LEFT_TO_GAIN: f64 = 1e-3;
 /// L-BFGS stops when the variables, scaled so that a step of 1 changes the image by 1, have this

@@ -47,6 +47,7 @@ use crate::model::params::{Channels, Param, Params};
 use crate::output::{self, OutputError};
 use crate::scene::names::names_of;
 use crate::scene::{Assignment, Loss};
+use crate::shader::term;
 
 /// What a `params.toml` holds.
 #[derive(Clone, Debug, PartialEq)]
@@ -144,6 +145,7 @@ impl ParamsFile {
         }
         writeln!(text, "form = \"{}\"", self.form.name())?;
         write_effects(text, self.effects)?;
+        write_terms(text, self.effects.unwrap_or_default())?;
         if let Some(loss) = self.loss {
             writeln!(text, "loss = \"{}\"", loss.name())?;
         }
@@ -221,6 +223,17 @@ fn write_effects(text: &mut String, effects: Option<Effects>) -> std::fmt::Resul
     let Some(effects) = effects else { return Ok(()) };
     let names: Vec<&str> = effects.iter().map(Effect::name).collect();
     writeln!(text, "effects = {names:?}")
+}
+
+/// The names that terms by files of the scene's own declare: whoever does not know them passes over them.
+fn write_terms(text: &mut String, effects: Effects) -> std::fmt::Result {
+    let own = term::enabled(effects).filter(|term| term.is_by_file());
+    let names = own.flat_map(|term| {
+        let effects = term.effects.iter().map(|effect| effect.name());
+        effects.chain(term.params.iter().map(|param| param.name()))
+    });
+    let names: Vec<&str> = names.collect();
+    if names.is_empty() { Ok(()) } else { writeln!(text, "terms = {names:?}") }
 }
 
 impl SceneValues {

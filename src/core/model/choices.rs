@@ -274,8 +274,8 @@ impl SkinReflection {
 impl Choices {
     /// Those that a scene file names, each by its key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 15] {
-        let [method, taps, ambient_normal, stretch, seams, lookup] = self.diffusion.named();
+    pub const fn named(&self) -> [(&'static str, &'static str); 16] {
+        let [method, taps, ambient_normal, stretch, seams, lookup, unblurred] = self.diffusion.named();
         let [through] = self.transmission.named();
         [
             ("specular_model", self.specular_model.name()),
@@ -292,6 +292,7 @@ impl Choices {
             stretch,
             seams,
             lookup,
+            unblurred,
             through,
         ]
     }
@@ -319,7 +320,7 @@ impl Choices {
     }
 
     /// The conditions that [`Self::holds`] knows.
-    pub const CONDITIONS: [&'static str; 14] = [
+    pub const CONDITIONS: [&'static str; 16] = [
         "kelemen",
         "ggx",
         "exact_split_sum",
@@ -333,6 +334,8 @@ impl Choices {
         "gathered_bounces",
         "glossy",
         "bumped_ambient",
+        "surface_levels",
+        "unblurred_in_pixel",
         "exact_stretch",
     ];
 }

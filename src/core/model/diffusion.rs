@@ -15,6 +15,8 @@ pub struct DiffusionChoices {
     pub seams: Seams,
     /// How fragments look levels up.
     pub lookup: Lookup,
+    /// Where light is taken that no blur has moved.
+    pub unblurred: Unblurred,
 }
 
 impl DiffusionChoices {
@@ -26,6 +28,7 @@ impl DiffusionChoices {
         stretch: Stretch::Exact,
         seams: Seams::Cut,
         lookup: Lookup::Chart,
+        unblurred: Unblurred::Map,
     };
 }
 
@@ -135,10 +138,20 @@ choice! {
     }
 }
 
+choice! {
+    /// Where the share of the light is taken that no blur has moved, which has all of what bumps and shadows draw.
+    Unblurred {
+        /// In the light map, as wide as its texels: the article's.
+        Map = "map",
+        /// In the pixel, as a scene without diffusion has it.
+        Pixel = "pixel",
+    }
+}
+
 impl DiffusionChoices {
     /// Those that a scene file names, each by its table and key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 6] {
+    pub const fn named(&self) -> [(&'static str, &'static str); 7] {
         [
             ("diffusion.method", self.method.name()),
             ("diffusion.taps", self.taps.name()),
@@ -146,6 +159,7 @@ impl DiffusionChoices {
             ("diffusion.stretch", self.stretch.name()),
             ("diffusion.seams", self.seams.name()),
             ("diffusion.lookup", self.lookup.name()),
+            ("diffusion.unblurred", self.unblurred.name()),
         ]
     }
 
@@ -155,6 +169,7 @@ impl DiffusionChoices {
         Some(match condition {
             "bumped_ambient" => self.ambient_normal == AmbientNormal::Bumped,
             "surface_levels" => self.method == Method::Surface,
+            "unblurred_in_pixel" => self.unblurred == Unblurred::Pixel,
             "exact_stretch" => self.stretch == Stretch::Exact,
             _ => return None,
         })

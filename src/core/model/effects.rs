@@ -10,7 +10,7 @@ use super::registry::{Added, RegistryError};
 /// One switchable part of the model: the place of its row among the built-in ones, which stand first, and those that
 /// [`register`](Effect::register) has added.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Effect(u8);
+pub struct Effect(u16);
 
 /// The built-in effects.
 #[allow(non_upper_case_globals, reason = "they are the values that an effect may have, as variants would be")]
@@ -151,7 +151,18 @@ impl Effect {
     /// Every effect: the built-in ones, then what was added.
     pub fn all() -> impl Iterator<Item = Self> {
         let most = Self::BUILT_IN.len() + ADDED.len();
-        (0..most).map(|place| Self(place as u8))
+        (0..most).map(|place| Self(place as u16))
+    }
+
+    /// Those that lists of effects offer: one within another is switched by a key of its own.
+    pub fn offered() -> impl Iterator<Item = Self> {
+        Self::all().filter(|effect| effect.info().within.is_none())
+    }
+
+    /// The effect that this one is part of and that a set lacks.
+    #[must_use]
+    pub fn lacks(self, effects: Effects) -> Option<Self> {
+        self.info().within.filter(|&whole| !effects.has(whole))
     }
 
     /// Add a row. A row of the same name and meaning is not added again.
@@ -200,7 +211,7 @@ impl Effect {
     pub fn from_name(name: &str) -> Option<Self> {
         let own = TABLE.iter().position(|row| row.name == name);
         let place = own.or_else(|| Some(TABLE.len() + ADDED.position(|row| row.name == name)?));
-        place.map(|place| Self(place as u8))
+        place.map(|place| Self(place as u16))
     }
 }
 
@@ -212,11 +223,12 @@ impl fmt::Debug for Effect {
 
 /// A set of enabled effects.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct Effects([u64; 4]);
+pub struct Effects([u64; Self::WORDS]);
 
 impl Effects {
-    /// How many effects there may be.
-    pub const MOST: usize = 256;
+    const WORDS: usize = 16;
+    /// How many effects a process tells apart: each of a scene's lights is one.
+    pub const MOST: usize = 64 * Self::WORDS;
 
     /// What a scene gets when it names no effects: the paper's fragment program.
     pub const SURFACE: Self = Self::of(&[
@@ -232,7 +244,7 @@ impl Effects {
     /// The set of the listed effects.
     #[must_use]
     pub const fn of(effects: &[Effect]) -> Self {
-        let mut set = Self([0; 4]);
+        let mut set = Self([0; Self::WORDS]);
         let mut i = 0;
         while i < effects.len() {
             set = set.with(effects[i]);
@@ -282,7 +294,13 @@ impl Effects {
 
     /// The enabled effects in the order of documentation.
     pub fn iter(self) -> impl Iterator<Item = Effect> {
-        (0..=u8::MAX).map(Effect).filter(move |&effect| self.has(effect))
+        self.0.into_iter().enumerate().flat_map(|(i, mut word)| {
+            std::iter::from_fn(move || {
+                let bit = word.trailing_zeros();
+                word &= word.checked_sub(1)?;
+                Some(Effect(64 * i as u16 + bit as u16))
+            })
+        })
     }
 
     /// Those of them that files have added.
@@ -475,7 +493,7 @@ mod tests {
 
     #[test]
     fn a_set_keeps_every_effect_that_there_may_be_apart() {
-        for place in 0..=u8::MAX {
+        for place in 0..Effects::MOST as u16 {
             let set = Effects::default().with(Effect(place));
             assert_eq!(set.iter().map(|effect| effect.0).collect::<Vec<_>>(), [place]);
             assert_eq!(set.alone_without(Effect(place)), Effects::default());

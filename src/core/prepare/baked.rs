@@ -124,7 +124,7 @@ impl Baked {
     /// The views that have a target beside what was observed there, with `samples` of all views.
     ///
     /// # Errors
-    /// When no view has a target, or a target asks nothing.
+    /// When no view has a target, or no pixel of a target counts.
     pub fn observe(self, samples: Vec<ViewSamples>) -> Result<Observed, PrepareError> {
         let has_target: Vec<bool> = self.scene.views.iter().map(|view| view.target.is_some()).collect();
         Observed::of(self.keep_targets()?, kept(samples, &has_target))

@@ -24,7 +24,7 @@ impl Baked {
     /// samples. Nothing else of the scene is copied.
     ///
     /// # Errors
-    /// When a marked view has no target or sees nothing of the mesh, or its target asks nothing.
+    /// When a marked view has no target or sees nothing of the mesh, or no pixel of its target counts.
     pub fn hold_out(mut self, marked: &[bool]) -> Result<(Self, HeldOut), PrepareError> {
         if !marked.contains(&true) {
             return Ok((self, HeldOut::default()));

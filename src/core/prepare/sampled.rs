@@ -27,7 +27,7 @@ impl Sampled {
     /// The views that have a target, beside it; the others are dropped from the scene, with a warning each.
     ///
     /// # Errors
-    /// When no view has a target, or a target asks nothing.
+    /// When no view has a target, or no pixel of a target counts.
     pub fn observe(self) -> Result<Observed, PrepareError> {
         self.baked.observe(self.samples)
     }

@@ -6,7 +6,9 @@ use super::Scene;
 use super::error::SceneError;
 use super::file::{DiffusionTable, Source, TapsValue};
 use super::numbers::whole;
-use crate::model::diffusion::{AmbientNormal, DiffusionChoices, Lookup, Method, Seams, Stretch, Taps};
+use crate::model::diffusion::{
+    AmbientNormal, DiffusionChoices, Lookup, Method, Seams, Stretch, Taps, Unblurred,
+};
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Param, Params};
 
@@ -105,7 +107,8 @@ pub(super) fn read(
         whole(source, table.light_map_size.as_ref(), "light_map_size", [64, 8192], default.light_map_size)?;
     let presets = (&Preset::ALL[..], Preset::name as fn(Preset) -> _);
     let preset = choice(source, "preset", table.preset.as_ref(), presets, default.preset)?;
-    let DiffusionChoices { method, ambient_normal, stretch, seams, lookup, .. } = DiffusionChoices::DEFAULT;
+    let DiffusionChoices { method, ambient_normal, stretch, seams, lookup, unblurred, .. } =
+        DiffusionChoices::DEFAULT;
     let choices = DiffusionChoices {
         method: choice(source, "method", table.method.as_ref(), (Method::ALL, Method::name), method)?,
         taps: taps(source, table.taps.as_ref())?,
@@ -119,6 +122,13 @@ pub(super) fn read(
         stretch: choice(source, "stretch", table.stretch.as_ref(), (Stretch::ALL, Stretch::name), stretch)?,
         seams: choice(source, "seams", table.seams.as_ref(), (Seams::ALL, Seams::name), seams)?,
         lookup: choice(source, "lookup", table.lookup.as_ref(), (Lookup::ALL, Lookup::name), lookup)?,
+        unblurred: choice(
+            source,
+            "unblurred",
+            table.unblurred.as_ref(),
+            (Unblurred::ALL, Unblurred::name),
+            unblurred,
+        )?,
     };
     Ok((Diffusion { light_map_size: size, preset }, choices))
 }

@@ -172,6 +172,7 @@ pub(super) struct DiffusionTable {
     pub stretch: Option<Spanned<String>>,
     pub seams: Option<Spanned<String>>,
     pub lookup: Option<Spanned<String>>,
+    pub unblurred: Option<Spanned<String>>,
 }
 
 /// `[transmission]`

@@ -100,16 +100,27 @@ fn choice<T: Copy + Default, const N: usize>(
 
 /// The `effects` key, where there is one.
 pub(super) fn effects(source: &Source, model: &ModelTable) -> Result<Option<Effects>, SceneError> {
-    let all: Vec<_> = Effect::all().map(|effect| (effect.name(), effect)).collect();
+    let offered: Vec<_> = Effect::offered().map(|effect| (effect.name(), effect)).collect();
     let parse = |names: &Vec<Spanned<String>>| {
         let mut effects = Effects::default();
         for name in names {
-            let effect = source.choose("effect", name, &all)?;
+            let effect = match Effect::from_name(name.get_ref()) {
+                Some(effect) => effect,
+                None => source.choose("effect", name, &offered)?,
+            };
             if effects.has(effect) {
                 let what = format!("the effect {} is listed twice", effect.name());
                 return Err(source.error(name, what, "Take one of them out"));
             }
             effects = effects.with(effect);
+        }
+        for name in names {
+            let whole = Effect::from_name(name.get_ref()).and_then(|effect| effect.lacks(effects));
+            if let Some(whole) = whole {
+                let what =
+                    format!("the effect {} is part of {}, which is not listed", name.get_ref(), whole.name());
+                return Err(source.error(name, what, "Leave it out, or list both"));
+            }
         }
         Ok(effects)
     };

@@ -9,7 +9,6 @@ use super::facts::{Budget, Facts};
 use super::quantity::{Attribute, Constant};
 use super::rule::{Rule, rules};
 use super::search::{PlanError, components};
-use crate::model::effects::Effects;
 
 /// A wanted quantity, and the domain where it is wanted.
 pub(super) type Want = (Domain, &'static str);
@@ -56,85 +55,111 @@ impl Means {
     }
 }
 
+/// A means within the graph.
+#[derive(Debug)]
+pub(super) struct Way {
+    pub(super) means: Means,
+    /// The wants of it that are not there already.
+    pub(super) needs: Bits,
+    /// All that it gives.
+    pub(super) gives: Bits,
+    /// Operations a fragment.
+    pub(super) cost: f64,
+    /// How far it is off, relative to white.
+    pub(super) error: f64,
+}
+
 /// The graph.
 pub(super) struct Graph<'a> {
     pub(super) facts: &'a Facts,
-    /// The wants, by rank: what lies further from the inputs has the greater number.
-    wants: Vec<Want>,
-    /// For each want, the means that give it.
-    means: Vec<Vec<Means>>,
-    given: Given<'a>,
+    /// The wants, each with its rank: what lies further from the inputs has the greater number.
+    wants: BTreeMap<Want, usize>,
+    /// For each want, the ways to it.
+    ways: Vec<Vec<Way>>,
 }
 
 /// What is there without any means.
 struct Given<'a> {
-    /// Whose attributes vertices have.
-    effects: Effects,
+    /// The names of what vertices have.
+    attributes: BTreeSet<&'static str>,
     /// Of fragments.
     fragments: &'a [&'static str],
     /// Of texels.
     texels: Fields,
 }
 
+/// Of each want the means that give it, with what they need that is not there already.
+type Open = BTreeMap<Want, Vec<(Means, Vec<Want>)>>;
+
 impl<'a> Graph<'a> {
     pub(super) fn new(facts: &'a Facts, fragments: &'a [&'static str]) -> Result<Self, PlanError> {
-        let given = Given { effects: facts.setup.effects, fragments, texels: texel_fields(facts) };
-        let mut means = all_means(facts);
-        let ranks = ranks(&means, &given)?;
-        let mut wants: Vec<Want> = means.keys().copied().collect();
-        wants.retain(|want| ranks.contains_key(want));
-        wants.sort_by_key(|want| (ranks[want], *want));
-        if wants.len() > Bits::MOST {
-            return Err(PlanError::TooMany { quantities: wants.len(), most: Bits::MOST });
-        }
-        let means = wants.iter().map(|want| means.remove(want).unwrap_or_default()).collect();
-        Ok(Self { facts, wants, means, given })
-    }
-
-    pub(super) fn bit(&self, want: Want) -> Option<Bits> {
-        self.wants.iter().position(|&w| w == want).map(Bits::one)
-    }
-
-    /// The means that give a want.
-    pub(super) fn means(&self, at: usize) -> &[Means] {
-        &self.means[at]
-    }
-
-    /// The wants of a means; `None` when one of them cannot be met.
-    pub(super) fn needs(&self, means: &Means) -> Option<Bits> {
-        means
-            .needs()
+        let attributes = Attribute::all(facts.setup.effects).map(Attribute::name).collect();
+        let given = Given { attributes, fragments, texels: texel_fields(facts) };
+        let open = |means: Means| {
+            let needs = means.needs().into_iter().filter(|&need| !given.has(need)).collect();
+            (means, needs)
+        };
+        let means: Open = all_means(facts)
             .into_iter()
-            .filter(|&want| !self.given.has(want))
-            .try_fold(Bits::default(), |bits, want| Some(bits.or(self.bit(want)?)))
+            .map(|(want, means)| (want, means.into_iter().map(open).collect()))
+            .collect();
+        let ranks = ranks(&means)?;
+        let mut sorted: Vec<Want> = ranks.keys().copied().collect();
+        sorted.sort_by_key(|want| (ranks[want], *want));
+        let wants: BTreeMap<Want, usize> = sorted.iter().enumerate().map(|(i, want)| (*want, i)).collect();
+        let way = |at: usize, (means, needs): &(Means, Vec<Want>)| -> Option<Way> {
+            let set = |set: Bits, want: &Want| Some(set.or(&Bits::one(*wants.get(want)?)));
+            let needs = needs.iter().try_fold(Bits::default(), set)?;
+            Some(Way {
+                means: *means,
+                needs,
+                gives: gives(means)
+                    .filter_map(|want| wants.get(&want))
+                    .fold(Bits::one(at), |all, &one| all.or(&Bits::one(one))),
+                cost: cost(facts, means),
+                error: error(facts, means),
+            })
+        };
+        let ways = |(at, want): (usize, &Want)| means[want].iter().filter_map(|open| way(at, open)).collect();
+        let ways = sorted.iter().enumerate().map(ways).collect();
+        Ok(Self { facts, wants, ways })
     }
 
-    /// Operations a fragment.
-    pub(super) fn cost(&self, means: &Means) -> f64 {
-        match means {
-            Means::Rule(rule) => self.facts.work.share(rule.domain) * rule.cost(self.facts),
-            Means::Edge(carried) => carried.cost(self.facts),
-        }
+    /// A want's number; `None` where nothing gives it.
+    pub(super) fn number(&self, want: Want) -> Option<usize> {
+        self.wants.get(&want).copied()
     }
 
-    pub(super) fn error(&self, means: &Means) -> f64 {
-        match means {
-            // What the scene names counts beside the budget.
-            Means::Rule(rule) if rule.named => 0.0,
-            Means::Rule(rule) => rule.error(self.facts),
-            Means::Edge(carried) => carried.error,
-        }
+    /// The ways to each want, by its number.
+    pub(super) fn ways(&self) -> &[Vec<Way>] {
+        &self.ways
     }
+}
 
-    /// All that a means gives.
-    pub(super) fn gives(&self, means: &Means, want: Bits) -> Bits {
-        match means {
-            Means::Rule(rule) => {
-                rule.gives.iter().filter_map(|(q, _)| self.bit((rule.domain, q))).fold(want, Bits::or)
-            }
-            Means::Edge(_) => want,
-        }
+/// Operations a fragment.
+fn cost(facts: &Facts, means: &Means) -> f64 {
+    match means {
+        Means::Rule(rule) => facts.work.share(rule.domain) * rule.cost(facts),
+        Means::Edge(carried) => carried.cost(facts),
     }
+}
+
+fn error(facts: &Facts, means: &Means) -> f64 {
+    match means {
+        // What the scene names counts beside the budget.
+        Means::Rule(rule) if rule.named => 0.0,
+        Means::Rule(rule) => rule.error(facts),
+        Means::Edge(carried) => carried.error,
+    }
+}
+
+/// What a rule gives; an edge gives what it is taken for.
+fn gives(means: &Means) -> impl Iterator<Item = Want> {
+    let rule = match means {
+        Means::Rule(rule) => Some(*rule),
+        Means::Edge(_) => None,
+    };
+    rule.into_iter().flat_map(|rule| rule.gives.iter().map(|(quantity, _)| (rule.domain, *quantity)))
 }
 
 impl Given<'_> {
@@ -147,7 +172,7 @@ impl Given<'_> {
         }
         constant.is_some()
             || quantity == "vertex_index"
-            || Attribute::all(self.effects).any(|attribute| attribute.name() == quantity)
+            || self.attributes.contains(quantity)
             || (domain == Domain::Fragment && self.fragments.contains(&quantity))
     }
 }
@@ -226,15 +251,14 @@ fn seen<I: Iterator<Item = &'static Rule>>(rules: impl Fn() -> I) -> BTreeSet<&'
 
 /// How far each want lies from the inputs: one more than the furthest of its needs, over all means. Wants
 /// that cannot be met have no rank.
-fn ranks(means: &BTreeMap<Want, Vec<Means>>, given: &Given<'_>) -> Result<BTreeMap<Want, usize>, PlanError> {
+fn ranks(means: &Open) -> Result<BTreeMap<Want, usize>, PlanError> {
     let mut ranks: BTreeMap<Want, usize> = BTreeMap::new();
     // Each round settles at least one more; cycles would never end, so rounds are counted.
     for _ in 0..=means.len() {
         let mut changed = false;
         for (want, ways) in means {
-            let rank = ways.iter().filter_map(|way| {
-                let open = way.needs().into_iter().filter(|&need| !given.has(need));
-                open.into_iter().try_fold(0, |rank: usize, need| Some(rank.max(ranks.get(&need)? + 1)))
+            let rank = ways.iter().filter_map(|(_, needs)| {
+                needs.iter().try_fold(0, |rank: usize, need| Some(rank.max(ranks.get(need)? + 1)))
             });
             if let Some(rank) = rank.max()
                 && ranks.get(want) != Some(&rank)

@@ -7,8 +7,9 @@
 //! decides where a quantity is computed as it decides how: a rule costs its operations times how often its domain is
 //! evaluated ([`Work`](super::domain::Work)), an edge what it takes to bring the quantity over. As needs always lie
 //! nearer to the inputs, no quantity is decided upon twice. A rule that gives several quantities pays once.
-//! A state's least cost is the sum, over what it still wants, of the cheapest rule's share: never more than
-//! the true cost, so the first solution found is the best.
+//! A state's least cost is the sum, over what it still wants and what every way to that wants in turn, of the cheapest
+//! rule's share: never more than the true cost, so the first solution found is the best. Where there is one way to most
+//! quantities, as for the many alike of a scene's lights, it is nearly the true cost, and the search goes straight.
 
 use pathfinding::directed::astar::astar;
 
@@ -16,7 +17,7 @@ use super::bits::Bits;
 use super::domain::Domain;
 use super::facts::{Budget, Facts};
 pub use super::graph::Carried;
-use super::graph::{Graph, Means};
+use super::graph::{Graph, Means, Way};
 use super::rule::Rule;
 use super::term;
 use crate::model::effects::{Effect, Effects};
@@ -35,16 +36,6 @@ pub enum PlanError {
     NoPlan {
         /// What was wanted.
         goals: String,
-    },
-    /// More quantities than a search tells apart.
-    #[error(
-        "{quantities} shader quantities are more than the {most} that a search tells apart. Enable fewer effects."
-    )]
-    TooMany {
-        /// Quantities of the scene's rules.
-        quantities: usize,
-        /// What the search tells apart.
-        most: usize,
     },
     /// Quantities of an atlas where there is none.
     #[error(
@@ -135,25 +126,23 @@ pub fn search(
     given: &[&'static str],
 ) -> Result<Found, PlanError> {
     let graph = Graph::new(facts, given)?;
-    let no_plan = || match term::of_texels(facts.setup.effects) {
-        Some(_) if facts.holds("atlas") != Some(true) => PlanError::no_atlas(facts.setup.effects),
-        _ => PlanError::NoPlan { goals: [vertex_goals, goals].concat().join(", ") },
-    };
+    let no_plan = || PlanError::NoPlan { goals: [vertex_goals, goals].concat().join(", ") };
+    let search = Search::new(&graph);
     let mut start = State { open: Bits::default(), have: Bits::default(), error: 0 };
     let wanted = vertex_goals.iter().map(|q| (Domain::Vertex, *q));
     for want in wanted.chain(goals.iter().map(|q| (Domain::Fragment, *q))) {
-        start.open = start.open.or(graph.bit(want).ok_or_else(no_plan)?);
+        let number = graph.number(want).ok_or_else(|| match term::of_texels(facts.setup.effects) {
+            Some(_) if facts.holds("atlas") != Some(true) => PlanError::no_atlas(facts.setup.effects),
+            _ => no_plan(),
+        })?;
+        start.open = start.open.or(&Bits::one(number));
     }
-    let (path, _) = astar(
-        &start,
-        |state| graph.successors(state),
-        |state| graph.least(state.open),
-        |s| s.open.is_empty(),
-    )
-    .ok_or_else(no_plan)?;
+    let (path, _) =
+        astar(&start, |state| search.successors(state), |state| search.least(state), |s| s.open.is_empty())
+            .ok_or_else(no_plan)?;
     let mut found = Found::default();
-    for means in path.windows(2).filter_map(|pair| graph.between(pair)) {
-        match means {
+    for way in path.windows(2).filter_map(|pair| search.between(pair)) {
+        match way.means {
             Means::Rule(rule) => found.rules.push(rule),
             Means::Edge(carried) => found.carried.push(carried),
         }
@@ -174,30 +163,43 @@ pub fn components(wgsl: &str) -> usize {
     }
 }
 
-impl Graph<'_> {
-    /// A means' cost in whole steps.
-    fn steps(&self, means: &Means) -> u64 {
-        (self.cost(means) * COST_STEPS).round() as u64
-    }
+/// A graph, and what bounds the cost of a state from below.
+struct Search<'a> {
+    graph: &'a Graph<'a>,
+    /// Of each want the cheapest way's share, in whole steps.
+    cheapest: Vec<u64>,
+    /// Of each want itself, and what every way to it wants in turn.
+    surely: Vec<Bits>,
+}
 
-    /// The open want that lies furthest from the inputs.
-    fn next(&self, state: &State) -> Option<usize> {
-        state.open.greatest()
+impl<'a> Search<'a> {
+    fn new(graph: &'a Graph<'a>) -> Self {
+        let share = |way: &Way| steps(way) / u64::from(way.gives.count());
+        let cheapest = graph.ways().iter().map(|ways| ways.iter().map(share).min().unwrap_or(0)).collect();
+        // Needs lie nearer to the inputs: theirs are there already.
+        let mut surely: Vec<Bits> = Vec::new();
+        for (at, ways) in graph.ways().iter().enumerate() {
+            let beyond =
+                |way: &Way| way.needs.iter().fold(Bits::default(), |all, need| all.or(&surely[need]));
+            let of_all = ways.iter().map(beyond).reduce(|all, way| all.and(&way)).unwrap_or_default();
+            surely.push(of_all.or(&Bits::one(at)));
+        }
+        Self { graph, cheapest, surely }
     }
 
     fn successors(&self, state: &State) -> Vec<(State, u64)> {
-        let Some(at) = self.next(state) else { return Vec::new() };
-        self.means(at).iter().filter_map(|means| self.step(state, at, means)).collect()
+        // The open want that lies furthest from the inputs.
+        let Some(at) = state.open.greatest() else { return Vec::new() };
+        self.graph.ways()[at].iter().filter_map(|way| self.step(state, at, way)).collect()
     }
 
-    fn step(&self, state: &State, at: usize, means: &Means) -> Option<(State, u64)> {
-        let gives = self.gives(means, Bits::one(at));
-        let have = state.have.or(gives);
-        let open = state.open.or(self.needs(means)?).without(have);
+    fn step(&self, state: &State, at: usize, way: &Way) -> Option<(State, u64)> {
+        let have = state.have.clone().or(&way.gives);
+        let open = state.open.clone().or(&way.needs).without(&have);
         // What lies beyond is never wanted again: forgetting it makes more states alike.
         let have = have.below(at);
-        let error = (self.error(means) * ERROR_STEPS).ceil() as u64;
-        let error = match self.facts.budget {
+        let error = (way.error * ERROR_STEPS).ceil() as u64;
+        let error = match self.graph.facts.budget {
             Budget::Within(most) => {
                 let sum = state.error + error;
                 (sum as f64 <= most * ERROR_STEPS + 0.5).then_some(sum)?
@@ -205,26 +207,27 @@ impl Graph<'_> {
             // Told by each rule's `refusal`; states that differ by it alone are the same.
             Budget::Exact | Budget::Paper => 0,
         };
-        Some((State { open, have, error }, self.steps(means)))
+        Some((State { open, have, error }, steps(way)))
     }
 
-    /// A bound on what the open wants cost at the least.
-    fn least(&self, open: Bits) -> u64 {
-        let cheapest = |at: usize| {
-            let share =
-                |means: &Means| self.steps(means) / u64::from(self.gives(means, Bits::one(at)).count());
-            self.means(at).iter().map(share).min().unwrap_or(0)
-        };
-        open.iter().map(cheapest).sum()
+    /// A bound on what is still to be paid at the least.
+    fn least(&self, state: &State) -> u64 {
+        let wanted = state.open.iter().fold(Bits::default(), |all, at| all.or(&self.surely[at]));
+        wanted.without(&state.have).iter().map(|at| self.cheapest[at]).sum()
     }
 
-    /// The means that leads from one state of a path to the next.
-    fn between(&self, pair: &[State]) -> Option<Means> {
-        let at = self.next(&pair[0])?;
-        let taken = self.means(at).iter().filter_map(|means| Some((means, self.step(&pair[0], at, means)?)));
-        // Of means that lead to the same state the path's cost chose the cheapest.
-        let (means, _) =
+    /// The way that leads from one state of a path to the next.
+    fn between(&self, pair: &[State]) -> Option<&Way> {
+        let at = pair[0].open.greatest()?;
+        let taken = self.graph.ways()[at].iter().filter_map(|way| Some((way, self.step(&pair[0], at, way)?)));
+        // Of ways that lead to the same state the path's cost chose the cheapest.
+        let (way, _) =
             taken.filter(|(_, (state, _))| *state == pair[1]).min_by_key(|(_, (_, cost))| *cost)?;
-        Some(*means)
+        Some(way)
     }
+}
+
+/// A way's cost in whole steps.
+fn steps(way: &Way) -> u64 {
+    (way.cost * COST_STEPS).round() as u64
 }

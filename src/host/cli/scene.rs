@@ -114,7 +114,7 @@ impl BakeArguments {
 
 /// `diffuse,rim,...` as a set of effects.
 pub(super) fn parse_effects(list: &str) -> Result<Effects, String> {
-    let known: Vec<&str> = Effect::all().map(Effect::name).collect();
+    let known: Vec<&str> = Effect::offered().map(Effect::name).collect();
     let parse = |name: &str| {
         Effect::from_name(name)
             .ok_or_else(|| format!("unknown effect `{name}`. {}.", suggestion(name, &known)))
@@ -130,6 +130,12 @@ pub(super) fn parse_effects(list: &str) -> Result<Effects, String> {
     }
     if effects == Effects::default() {
         return Err(format!("it names no effect. {}.", suggestion("", &known)));
+    }
+    if let Some((effect, whole)) = effects.iter().find_map(|effect| Some((effect, effect.lacks(effects)?))) {
+        let (effect, whole) = (effect.name(), whole.name());
+        return Err(format!(
+            "the effect {effect} is part of {whole}, which is not listed. Leave it out, or list both."
+        ));
     }
     Ok(effects)
 }

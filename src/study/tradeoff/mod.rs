@@ -159,8 +159,8 @@ fn estimated(bench: &Bench<'_>, axes: &[&'static dyn Axis]) -> Result<Vec<(&'sta
 /// Refuse a goal that no sweep of these axes could meet, before anything is measured.
 fn check_goal(goal: Option<Goal>, axes: &[&dyn Axis]) -> Result<(), StudyError> {
     let goal = match goal {
-        Some(Goal::Within(_)) => "--within",
-        Some(Goal::Seconds(_)) => "--budget",
+        Some(Goal::Within(_)) => "an error to stay within",
+        Some(Goal::Seconds(_)) => "a budget of time",
         None => return Ok(()),
     };
     if axes.iter().any(|axis| axis.settable()) {

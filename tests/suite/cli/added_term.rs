@@ -211,3 +211,24 @@ fn terms_that_cannot_be_used_are_refused_with_their_file_and_line() {
         },
     ]);
 }
+
+/// What other scenes do not know of the file's own term they pass over; a name that no term has stays a mistake.
+#[test]
+fn its_constants_can_be_used_where_nobody_knows_the_term() {
+    let sandbox = scene();
+    let fitted = sandbox.run(&["fit", "scene.toml", "-o", "run", "--engine", "cpu"]);
+    assert!(matches!(fitted.code, Some(0 | 1)), "{fitted:?}");
+    let params = sandbox.text("run/params.toml");
+    assert!(
+        params.contains("terms = [\"fresnel_reflection\", \"fresnel_weight\", \"fresnel_f0\"]"),
+        "{params}"
+    );
+    let elsewhere = Sandbox::new();
+    elsewhere.write("found.toml", params.as_bytes());
+    let header = elsewhere.run(&["export", "found.toml", "--to", "c"]).done().out;
+    assert!(header.contains("RIM_WEIGHT") && !header.contains("FRESNEL"), "{header}");
+    let render = ["render", "scene.toml", "--view", "front", "--engine", "cpu", "-o", "front.exr"];
+    elsewhere.run(&[&render[..], &["--params", "found.toml"]].concat()).done();
+    elsewhere.write("found.toml", params.replace("fresnel_f0 =", "fresnel_f1 =").as_bytes());
+    elsewhere.run(&["export", "found.toml", "--to", "c"]).refused(&["unknown parameter `fresnel_f1`"]);
+}

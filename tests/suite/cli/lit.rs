@@ -141,3 +141,25 @@ fn lamps_beside_a_path_tracers_images_have_their_own_colours() {
         }
     }
 }
+
+/// A search that weighed the ways to each light anew for every other's would not come back from a hundred.
+#[test]
+fn a_hundred_lights_are_planned_and_drawn() {
+    let sandbox = Sandbox::new();
+    let more = "\"reflection\", \"lights\", \"shadows\", \"light_specular\", \"fresnel\", \"directional_occlusion\"]";
+    sandbox.edit("\"reflection\"]", more);
+    let light = |i: usize| {
+        let angle = 0.06 * i as f64;
+        let (sin, cos) = angle.sin_cos();
+        format!(
+            "\n[[light]]\nname = \"l{i}\"\ntype = \"directional\"\ndirection = [{sin}, -1.0, {cos}]\nirradiance = [0.02, 0.02, 0.02]\n"
+        )
+    };
+    let lights: String = (0..100).map(light).collect();
+    sandbox.edit("[fit]", &format!("{lights}[fit]"));
+    let shader = sandbox.run(&["shader", "scene.toml"]);
+    assert_eq!(shader.code, Some(0), "{shader:?}");
+    assert!(shader.out.contains("light_l0_") && shader.out.contains("light_l99_"), "{}", shader.out);
+    let drawn = sandbox.run(&["render", "scene.toml", "--view", "front", "--engine", "cpu", "-o", "lit.exr"]);
+    assert_eq!(drawn.code, Some(0), "{drawn:?}");
+}

@@ -269,10 +269,10 @@ fn what_makes_no_sense_is_refused() {
     for view in ["front", "side"] {
         sandbox.edit(&format!("target = \"targets/{view}.exr\"\n"), "");
     }
-    run(&["--axis", "solver"]).refused(&["--axis solver: no view names a target"]);
+    run(&["--axis", "solver"]).refused(&["the axis solver: no view names a target"]);
     run(&["--axis", "format", "--within", "1%"]).refused(&[
-        "--within: of the axes to be swept (format) none can be set",
-        "Name some of silhouette, irradiance,",
+        "an error to stay within: of the axes to be swept (format) none can be set",
+        "Sweep some of silhouette, irradiance,",
     ]);
     sandbox.write("scene.toml", &before[&sandbox.path("scene.toml")]);
     assert!(sandbox.files() == before, "something was left");

@@ -38,21 +38,21 @@ pub(super) fn parse(text: &str, scene: Option<(Form, &Params)>) -> Result<Params
     let params = scene.map_or_else(|| Params::defaults(form), |(_, base)| base.clone());
     let mut file =
         ParamsFile { form, effects: None, loss: None, params, gains: Vec::new(), scenes: Vec::new() };
+    let strangers = Strangers::of(table.get_ref());
     for (key, value) in table.get_ref() {
         match (key.get_ref().as_ref(), value.get_ref()) {
-            ("form", DeValue::String(_)) => {}
-            ("effects", DeValue::Array(names)) => file.effects = Some(read_effects(names)?),
+            ("form", DeValue::String(_)) | ("terms", DeValue::Array(_)) => {}
+            ("effects", DeValue::Array(names)) => file.effects = Some(read_effects(names, &strangers)?),
             ("loss", DeValue::String(name)) => file.loss = Some(read_loss(name, value.span())?),
-            ("params", DeValue::Table(params)) => read_params(params, &mut file.params)?,
+            ("params", DeValue::Table(params)) => read_params(params, &mut file.params, &strangers)?,
             ("gains", DeValue::Table(gains)) => file.gains = read_gains(gains)?,
-            ("scenes", DeValue::Table(scenes)) => file.scenes = read_scenes(scenes)?,
-            ("form" | "effects" | "loss" | "params" | "gains" | "scenes", _) => {
-                let what =
-                    "form and loss are strings, effects a list of them, params, gains and scenes tables";
+            ("scenes", DeValue::Table(scenes)) => file.scenes = read_scenes(scenes, &strangers)?,
+            ("form" | "effects" | "terms" | "loss" | "params" | "gains" | "scenes", _) => {
+                let what = "form and loss are strings, effects and terms lists of them, params, gains and scenes tables";
                 return problem(value.span(), format!("`{}` is of the wrong kind: {what}.", key.get_ref()));
             }
             (name, _) => {
-                let known = "form, effects, loss, [params], [gains] and [scenes]";
+                let known = "form, effects, terms, loss, [params], [gains] and [scenes]";
                 return problem(key.span(), format!("unknown key `{name}`. This file knows {known}."));
             }
         }
@@ -81,9 +81,9 @@ fn check_form(found: Form, form: Form, place: Range<usize>) -> Result<(), Proble
     )
 }
 
-fn read_effects(names: &DeArray<'_>) -> Result<Effects, Problem> {
+fn read_effects(names: &DeArray<'_>, strangers: &Strangers<'_>) -> Result<Effects, Problem> {
     let effect = |name: &Spanned<DeValue<'_>>| {
-        let known = || Effect::all().map(Effect::name).collect::<Vec<_>>().join(", ");
+        let known = || Effect::offered().map(Effect::name).collect::<Vec<_>>().join(", ");
         match name.get_ref() {
             DeValue::String(text) => Effect::from_name(text).ok_or_else(|| Problem {
                 place: Some(name.span()),
@@ -94,13 +94,26 @@ fn read_effects(names: &DeArray<'_>) -> Result<Effects, Problem> {
     };
     let known = names
         .iter()
-        .filter(|name| !matches!(name.get_ref(), DeValue::String(text) if is_of_no_light(text, "light_")));
+        .filter(|name| !matches!(name.get_ref(), DeValue::String(text) if strangers.have(text, "light_")));
     known.map(effect).collect()
 }
 
-/// Whether a name is that of a light which no scene has that was read: it says nothing of this one.
-fn is_of_no_light(name: &str, head: &str) -> bool {
-    name.starts_with(head) && Effect::from_name(name).is_none() && Param::from_name(name).is_none()
+/// Effects and parameters of lights, or of terms by files, that no scene has which was read: they say nothing of this one.
+struct Strangers<'a>(Vec<&'a str>);
+
+impl<'a> Strangers<'a> {
+    /// Those whose names the key `terms` lists, beside all of lights.
+    fn of(table: &'a DeTable<'_>) -> Self {
+        let listed = table.get("terms").and_then(|names| names.get_ref().as_array());
+        Self(listed.into_iter().flatten().filter_map(|name| name.get_ref().as_str()).collect())
+    }
+
+    /// Whether a name is one of them; that of a light begins with `head`.
+    fn have(&self, name: &str, head: &str) -> bool {
+        (name.starts_with(head) || self.0.contains(&name))
+            && Effect::from_name(name).is_none()
+            && Param::from_name(name).is_none()
+    }
 }
 
 fn read_loss(name: &str, place: Range<usize>) -> Result<Loss, Problem> {
@@ -111,8 +124,8 @@ fn read_loss(name: &str, place: Range<usize>) -> Result<Loss, Problem> {
     }
 }
 
-fn read_params(table: &DeTable<'_>, params: &mut Params) -> Result<(), Problem> {
-    for (key, value) in table.iter().filter(|(key, _)| !is_of_no_light(key.get_ref(), "light.")) {
+fn read_params(table: &DeTable<'_>, params: &mut Params, strangers: &Strangers<'_>) -> Result<(), Problem> {
+    for (key, value) in table.iter().filter(|(key, _)| !strangers.have(key.get_ref(), "light.")) {
         let param = named(key)?;
         params.set_rgb(param, read_rgb(param, value)?);
     }
@@ -133,7 +146,7 @@ fn named(key: &Spanned<std::borrow::Cow<'_, str>>) -> Result<Param, Problem> {
 }
 
 /// What scenes have of their own.
-fn read_scenes(table: &DeTable<'_>) -> Result<Vec<SceneValues>, Problem> {
+fn read_scenes(table: &DeTable<'_>, strangers: &Strangers<'_>) -> Result<Vec<SceneValues>, Problem> {
     let mut scenes = Vec::new();
     for (name, tables) in table {
         let mut own = SceneValues { name: name.get_ref().to_string(), ..SceneValues::default() };
@@ -143,8 +156,8 @@ fn read_scenes(table: &DeTable<'_>) -> Result<Vec<SceneValues>, Problem> {
         };
         for (key, value) in parts {
             match (key.get_ref().as_ref(), value.get_ref()) {
-                ("effects", DeValue::Array(names)) => own.effects = Some(read_effects(names)?),
-                ("params", DeValue::Table(params)) => own.params = read_own(params)?,
+                ("effects", DeValue::Array(names)) => own.effects = Some(read_effects(names, strangers)?),
+                ("params", DeValue::Table(params)) => own.params = read_own(params, strangers)?,
                 ("gains", DeValue::Table(gains)) => own.gains = read_gains(gains)?,
                 ("effects" | "params" | "gains", _) => {
                     let key = key.get_ref();
@@ -169,9 +182,9 @@ fn read_scenes(table: &DeTable<'_>) -> Result<Vec<SceneValues>, Problem> {
 }
 
 /// The values of a scene's own parameters, in the order of the table.
-fn read_own(table: &DeTable<'_>) -> Result<Vec<(Param, [f64; 3])>, Problem> {
+fn read_own(table: &DeTable<'_>, strangers: &Strangers<'_>) -> Result<Vec<(Param, [f64; 3])>, Problem> {
     let mut own = Vec::new();
-    for (key, value) in table.iter().filter(|(key, _)| !is_of_no_light(key.get_ref(), "light.")) {
+    for (key, value) in table.iter().filter(|(key, _)| !strangers.have(key.get_ref(), "light.")) {
         let param = named(key)?;
         if !param.is_of_scene() {
             let what = format!("{} is the skin's, for all scenes: it stands under [params].", param.name());

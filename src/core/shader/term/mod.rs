@@ -75,6 +75,14 @@ pub struct Term {
     pub(super) origin: Origin,
 }
 
+impl Term {
+    /// Whether it comes from a file that a scene or a program brings, and is none of the library's own.
+    #[must_use]
+    pub fn is_by_file(&self) -> bool {
+        self.origin == Origin::File
+    }
+}
+
 /// The text of a family's file for one of its members, terms alike but for their names, such as the lamps of a scene:
 /// `NAME`, as a word or a part of one between `_` and `.`, stands for the member. `None` where it does not stand in it.
 #[must_use]

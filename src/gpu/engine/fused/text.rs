@@ -62,7 +62,7 @@ impl Fused {
         wgsl.push_str(&sample_struct(&self.fields()));
         let _ = write!(
             wgsl,
-            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // Pixels that are read, and all that there are.\n    read: u32,\n    slots: u32,\n    // Pixels that are left out after each block.\n    left_out: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
+            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // How many pixels a pass reads, and how many the part has.\n    read: u32,\n    slots: u32,\n    // Pixels that are left out after each block.\n    left_out: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
              @group(1) @binding(0) var<uniform> part: Part;\n\
              @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
              @group(1) @binding(2) var<storage, read> group_start: array<u32>;\n\

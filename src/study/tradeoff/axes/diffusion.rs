@@ -1,7 +1,7 @@
 //! Texture-space diffusion: each of its approximations beside the sum over the surface, all else as the scene has it.
 
 use super::ways::{Way, Ways};
-use crate::model::diffusion::{AmbientNormal, Method, Seams, Stretch, Taps};
+use crate::model::diffusion::{AmbientNormal, Method, Seams, Stretch, Taps, Unblurred};
 use crate::scene::Scene;
 use crate::scene::diffusion::Preset;
 
@@ -98,6 +98,28 @@ pub(super) const AMBIENT_NORMAL: Ways = ways(
         ("surface", |scene| {
             scene.choices.diffusion.method = Method::Surface;
             scene.choices.diffusion.ambient_normal = AmbientNormal::Bumped;
+        }),
+    ],
+);
+
+/// Where light is taken that no blur has moved.
+pub(super) const UNBLURRED: Ways = ways(
+    "unblurred",
+    "Where the light is taken that no blur has moved",
+    "Images with it out of the light map, and as it falls in the pixel; levels by distance over the surface, and it in the pixel, \
+     are the reference. Seconds are those of baking, tracing and one pass, nothing cached.",
+    &[
+        ("map", |scene| {
+            blurred(scene);
+            scene.choices.diffusion.unblurred = Unblurred::Map;
+        }),
+        ("pixel", |scene| {
+            blurred(scene);
+            scene.choices.diffusion.unblurred = Unblurred::Pixel;
+        }),
+        ("surface", |scene| {
+            scene.choices.diffusion.method = Method::Surface;
+            scene.choices.diffusion.unblurred = Unblurred::Pixel;
         }),
     ],
 );

@@ -41,6 +41,7 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &diffusion::SEAMS,
         &diffusion::AMBIENT_NORMAL,
         &diffusion::STRETCH,
+        &diffusion::UNBLURRED,
         &diffusion::LEVELS,
         &samples::Samples,
         &textures::Textures,

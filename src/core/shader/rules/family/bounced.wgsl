@@ -23,10 +23,10 @@ fn light_NAME_diffuse(albedo: vec3f, light_NAME_facing: f32, light_NAME_irradian
     return albedo * (light_NAME_facing * light_NAME_irradiance);
 }
 
-// E_l / pi with what the skin throws back of it, in the light map.
+// E_l / pi with what the skin throws back of it, in its colour, for the sum of all light.
 //
 // gives: light_NAME_lit
-// domain: texel
+// domain: texel, fragment
 // joins: diffusion_lit
 // when: lights, diffusion, lights_bounce
 // cost: 9
@@ -39,10 +39,10 @@ fn light_NAME_in_light_map_and_bounced(
     return light_NAME_color * ((vec3f(light_NAME_facing) + light_NAME_bounced) * light_NAME_irradiance);
 }
 
-// E_l / pi, in the light map.
+// E_l / pi in its colour, for the sum of all light.
 //
 // gives: light_NAME_lit
-// domain: texel
+// domain: texel, fragment
 // joins: diffusion_lit
 // when: lights, diffusion, !lights_bounce
 // cost: 6

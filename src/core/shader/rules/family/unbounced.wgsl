@@ -8,10 +8,10 @@ fn light_NAME_diffuse(albedo: vec3f, light_NAME_facing: f32, light_NAME_irradian
     return albedo * (light_NAME_facing * light_NAME_irradiance);
 }
 
-// E_l / pi, in the light map.
+// E_l / pi in its colour, for the sum of all light.
 //
 // gives: light_NAME_lit
-// domain: texel
+// domain: texel, fragment
 // joins: diffusion_lit
 // when: lights, diffusion
 // cost: 6

@@ -104,6 +104,35 @@ fn light_map(albedo: vec3f, diffusion_lit: vec3f, colour_mix: f32) -> vec3f {
     return color_power(albedo, colour_mix) * diffusion_lit;
 }
 
+// The ambient light of the pixel: what is seen of the environment along the bumped n.
+//
+// gives: ambient_lit
+// joins: diffusion_lit
+// when: diffusion, diffuse, unblurred_in_pixel
+// cost: 3
+fn ambient_light_of_pixel(irradiance: vec3f, ambient_open: vec3f) -> vec3f {
+    return irradiance * ambient_open;
+}
+
+// What no blur has moved: the light map.
+//
+// gives: diffusion_unblurred
+// when: diffusion, !unblurred_in_pixel
+// cost: 0
+fn unblurred_in_map(diffusion_level_0: vec3f) -> vec3f {
+    return diffusion_level_0;
+}
+
+// The same where it is seen, as sharp as the pixel's own normal and shadows.
+//
+// gives: diffusion_unblurred
+// when: diffusion, unblurred_in_pixel
+// uses: power
+// cost: 40
+fn unblurred_in_pixel(albedo: vec3f, diffusion_lit: vec3f, colour_mix: f32) -> vec3f {
+    return color_power(albedo, colour_mix) * diffusion_lit;
+}
+
 // Where texels lie, in the scene's unit.
 //
 // gives: diffusion_position
@@ -321,7 +350,7 @@ fn variance_5(
 // when: diffusion, !diffusion_five
 // cost: 27
 fn scattered_of_three(
-    diffusion_level_0: vec3f,
+    diffusion_unblurred: vec3f,
     diffusion_level_1: vec3f,
     diffusion_level_2: vec3f,
     diffusion_level_3: vec3f,
@@ -329,10 +358,10 @@ fn scattered_of_three(
     diffusion_weight_2: vec3f,
     diffusion_weight_3: vec3f,
 ) -> vec3f {
-    return diffusion_level_0
-        + diffusion_weight_1 * (diffusion_level_1 - diffusion_level_0)
-        + diffusion_weight_2 * (diffusion_level_2 - diffusion_level_0)
-        + diffusion_weight_3 * (diffusion_level_3 - diffusion_level_0);
+    return diffusion_unblurred
+        + diffusion_weight_1 * (diffusion_level_1 - diffusion_unblurred)
+        + diffusion_weight_2 * (diffusion_level_2 - diffusion_unblurred)
+        + diffusion_weight_3 * (diffusion_level_3 - diffusion_unblurred);
 }
 
 // sum of w_k L_k, where w_0 is 1 less the others.
@@ -341,7 +370,7 @@ fn scattered_of_three(
 // when: diffusion, diffusion_five
 // cost: 45
 fn scattered_of_five(
-    diffusion_level_0: vec3f,
+    diffusion_unblurred: vec3f,
     diffusion_level_1: vec3f,
     diffusion_level_2: vec3f,
     diffusion_level_3: vec3f,
@@ -353,12 +382,12 @@ fn scattered_of_five(
     diffusion_weight_4: vec3f,
     diffusion_weight_5: vec3f,
 ) -> vec3f {
-    return diffusion_level_0
-        + diffusion_weight_1 * (diffusion_level_1 - diffusion_level_0)
-        + diffusion_weight_2 * (diffusion_level_2 - diffusion_level_0)
-        + diffusion_weight_3 * (diffusion_level_3 - diffusion_level_0)
-        + diffusion_weight_4 * (diffusion_level_4 - diffusion_level_0)
-        + diffusion_weight_5 * (diffusion_level_5 - diffusion_level_0);
+    return diffusion_unblurred
+        + diffusion_weight_1 * (diffusion_level_1 - diffusion_unblurred)
+        + diffusion_weight_2 * (diffusion_level_2 - diffusion_unblurred)
+        + diffusion_weight_3 * (diffusion_level_3 - diffusion_unblurred)
+        + diffusion_weight_4 * (diffusion_level_4 - diffusion_unblurred)
+        + diffusion_weight_5 * (diffusion_level_5 - diffusion_unblurred);
 }
 
 // c^(1 - m): the rest of the colour, over the blurs.
