@@ -233,6 +233,6 @@ mod tensors {
     /// Tensors have no texels, and say so.
     pub(super) fn refuse_texels(shared: &SharedDevice, own: &Composed<'_>) {
         let error = operation(shared, own, &DIFFUSION, &[]).unwrap_err().to_string();
-        assert!(error.contains("diffusion"), "{error}");
+        assert!(error.contains("the effect diffusion is computed in texels"), "{error}");
     }
 }
