@@ -16,6 +16,7 @@ mod cli;
 mod common;
 mod composed;
 mod damage;
+mod diffused;
 mod diffusion;
 mod documents;
 mod engine;
