@@ -28,6 +28,7 @@ mod fixtures;
 mod fresnel;
 mod graphics;
 mod hard_lights;
+mod hard_skin;
 mod harmonics;
 mod instructions;
 mod joint;
