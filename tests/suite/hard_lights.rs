@@ -201,7 +201,7 @@ fn meshes_of_one_triangle_and_lights_within_closed_ones() {
 }
 
 /// A closed mesh about the origin, half a unit wide to each side.
-fn octahedron() -> Vec<u8> {
+pub(crate) fn octahedron() -> Vec<u8> {
     let corners: [[f32; 3]; 6] =
         [[1., 0., 0.], [-1., 0., 0.], [0., 1., 0.], [0., -1., 0.], [0., 0., 1.], [0., 0., -1.]];
     let mut bin = Vec::new();

@@ -23,7 +23,7 @@ use crate::fixtures::{environment, quantile};
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
 /// The light of a vector, and the factor on its colour; directions may have length 0 there.
-fn light_of(inputs: &Node<'_>) -> (Light, [f64; 3]) {
+pub(crate) fn light_of(inputs: &Node<'_>) -> (Light, [f64; 3]) {
     let three = |key: &str| DVec3::from_array(inputs.at(key).three());
     let number = |key: &str| inputs.get(key).map(|node| node.number());
     let lamp = || Lamp {

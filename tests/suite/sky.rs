@@ -413,6 +413,11 @@ fn head() -> Baked {
 
 /// The same with effects beside diffuse light, occlusion and rim; the lamp's own where lights are among them.
 pub(crate) fn head_with(more: &[Effect]) -> Baked {
+    head_changed(more, |_| ())
+}
+
+/// The same, changed before anything is baked.
+pub(crate) fn head_changed(more: &[Effect], change: impl FnOnce(&mut Scene)) -> Baked {
     let built_in = built_in();
     let text = std::fs::read_to_string(&built_in).unwrap();
     let path = built_in.with_file_name("sky.toml");
@@ -428,6 +433,7 @@ pub(crate) fn head_with(more: &[Effect]) -> Baked {
     let camera = &mut loaded.scene.views[0].camera;
     (camera.width, camera.height) = (64, 64);
     loaded.scene.quality.occlusion_rays = 64;
+    change(&mut loaded.scene);
     loaded.bake().unwrap()
 }
 

@@ -57,13 +57,18 @@ impl FitSettings {
     /// Hold what a fit of these maps leaves to the maps: a fitted environment has in its texels what turns and blurs it.
     /// Beside any map the roughness is held, which the cubes of the specular lobe are baked for.
     ///
-    /// To be done before bakes and samples are made, as what they hold depends on what is free.
-    pub fn hold_beside(&mut self, kinds: &[MapKind]) {
+    /// To be done before bakes and samples are made, as what they hold depends on what is free. Returns what is not free any
+    /// more, in the order of the columns.
+    pub fn hold_beside(&mut self, kinds: &[MapKind]) -> Vec<Param> {
         let environment = kinds.contains(&MapKind::Environment);
         let of_light = |param| matches!(param, Param::SpecularLobe | Param::EnvironmentRotation);
         let of_lobe = |param: Param| matches!(param.name(), "roughness" | "gloss");
         let held = |param| (environment && of_light(param)) || (!kinds.is_empty() && of_lobe(param));
+        let mut found: Vec<Param> =
+            self.free.iter().map(|column| column.param).filter(|&p| held(p)).collect();
+        found.dedup();
         self.free.retain(|column| !held(column.param));
+        found
     }
 }
 
@@ -194,10 +199,11 @@ mod tests {
         let fit = FitSettings { free: free.clone(), loss: Loss::default(), free_gains: false, maps };
         let held = |kinds: &[MapKind]| {
             let mut fit = fit.clone();
-            fit.hold_beside(kinds);
-            fit.free
+            let told = fit.hold_beside(kinds);
+            (fit.free, told)
         };
-        assert_eq!(held(&[MapKind::Color, MapKind::Environment]), [Column::tied(Param::Hilite)]);
-        assert_eq!(held(&[MapKind::Color, MapKind::Occlusion]), free);
+        let light = vec![Param::SpecularLobe, Param::EnvironmentRotation];
+        assert_eq!(held(&[MapKind::Color, MapKind::Environment]), (vec![Column::tied(Param::Hilite)], light));
+        assert_eq!(held(&[MapKind::Color, MapKind::Occlusion]), (free, Vec::new()));
     }
 }

@@ -66,7 +66,7 @@ pub struct MapStep {
 /// Fit maps and constants by turns. `told` hears of each step.
 ///
 /// # Errors
-/// When no effect reads a map, the device fails, or the constants cannot be fitted.
+/// When no effect reads a map, a constant is free that maps hold, the device fails, or the constants cannot be fitted.
 pub fn fit_maps(
     shared: &SharedDevice,
     task: MapTask<'_>,
@@ -76,6 +76,15 @@ pub fn fit_maps(
     // Told before the constants are fitted, which takes a while.
     if task.scene.needs().atlas {
         return Err(ShadingError::from(PlanError::no_atlas(task.scene.effects)).into());
+    }
+    // E_s follows its exponent, cube by cube; no other cube does.
+    let held = |param: &Param| is_sharpness(*param) && *param != Param::SpecularLobe;
+    let mut free = task.unknowns.iter().filter_map(|unknown| match unknown {
+        Unknown::Param(column) | Unknown::Own(_, column) => Some(column.param),
+        Unknown::Gain(_) => None,
+    });
+    if let Some(param) = free.find(held) {
+        return Err(MapError::Sharpness { param: param.name() });
     }
     let fixed = Fixed::of(&task);
     let (initial, _) = fixed.solve_constants(&task.illumination, &task.observed, &task.start)?;

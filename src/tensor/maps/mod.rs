@@ -65,6 +65,15 @@ pub enum MapError {
     /// The rules cannot be computed on the processor.
     #[error(transparent)]
     Shading(#[from] ShadingError),
+    /// A free constant that acts through cubes which tensors hold.
+    #[error(
+        "{param} cannot be fitted beside maps: it acts through cubes that were baked before, and the maps would be fitted to \
+         where it began. Hold it, or fit it without maps."
+    )]
+    Sharpness {
+        /// The parameter's name.
+        param: &'static str,
+    },
     /// Light that reaches the image by more than the fitted cubes.
     #[error(
         "{map} cannot be fitted beside the effect {effect}, which sees the environment by other bakes than its cubes. Leave one of them out."

@@ -10,7 +10,8 @@ use crate::buffer::TensorBuffer;
 use crate::gpu::{Gpu, GpuError};
 use crate::model::params::Param;
 use crate::pass;
-use crate::samples::{SurfaceRecords, ViewSamples};
+use crate::samples::ViewSamples;
+use crate::samples::surface_records::neutral;
 use crate::shaded::Shaded;
 
 /// The block of constants, and the pass that fills it.
@@ -105,26 +106,27 @@ impl Faces {
     }
 }
 
-/// What is no tensor of each sample, plane by plane; the share last.
+/// What is no tensor of each sample, plane by plane; the share last. What records lack is neutral, but for the normal, which
+/// is then their base.
 pub(super) fn fixed_planes(adjoint: &Adjoint, views: &[&ViewSamples]) -> Vec<f32> {
-    let slots = || views.iter().flat_map(|view| (0..view.surface.slots()).map(|slot| (&view.surface, slot)));
     let mut numbers = Vec::new();
     for (name, width) in adjoint.fixed() {
-        let number = |(surface, slot): (&SurfaceRecords, usize), c: usize| match name {
-            "base" => surface.fragment(slot).base[c],
-            "view" => surface.fragment(slot).view[c],
-            "normal" => surface.fragment(slot).normal[c],
-            "silhouette" => surface.fragment(slot).silhouette,
-            "dapple_normal" => surface.unmade(slot).dapple_normal[c],
-            "corner_silhouettes" => surface.unmade(slot).corner_silhouettes[c],
-            "corner_shares" => surface.unmade(slot).corner_shares[c],
-            _ => surface.fragment(slot).dapple,
-        };
         for c in 0..width {
-            numbers.extend(slots().map(|sample| number(sample, c)));
+            for ViewSamples { surface, .. } in views {
+                let row = |name: &str| surface.places().fields().find(|(held, ..)| *held == name);
+                let held = row(name).or_else(|| if name == "normal" { row("base") } else { None });
+                match held {
+                    Some((_, row, _)) => {
+                        numbers.extend((0..surface.slots()).map(|slot| surface.rows().number(row + c, slot)));
+                    }
+                    None => numbers.extend((0..surface.slots()).map(|_| neutral(name).unwrap_or(0.0))),
+                }
+            }
         }
     }
-    numbers.extend(slots().map(|(surface, slot)| surface.weight(slot)));
+    for ViewSamples { surface, .. } in views {
+        numbers.extend((0..surface.slots()).map(|slot| surface.weight(slot)));
+    }
     numbers
 }
 

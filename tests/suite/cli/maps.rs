@@ -75,14 +75,39 @@ fn a_fit_of_maps_leaves_them_as_images_and_in_the_scene_file() {
 fn a_fit_of_the_light_holds_what_turns_and_blurs_it() {
     let sandbox = Sandbox::new();
     sandbox.edit("loss = ", "maps = { rounds = 1, steps = 2 }\nloss = ");
-    warned(
-        sandbox.fit("run", &["--maps", "environment"]),
-        &["irradiance (maps/irradiance_fitted.exr)", "hilite"],
-    );
+    let ran = sandbox.fit("run", &["--maps", "environment"]);
+    let told: Vec<&str> = ran.err.lines().collect();
+    assert!(ran.code == Some(0) && told.len() == 2, "{ran:?}");
+    assert!(told.iter().all(|line| line.starts_with("skinfit: warning: ")), "{ran:?}");
+    assert!(told[0].contains("scene.toml") && told[0].contains("held at the start values"), "{ran:?}");
+    assert!(told[0].ends_with(": specular_lobe."), "{ran:?}");
+    assert!(told[1].contains("irradiance (maps/irradiance_fitted.exr)") && told[1].contains("hilite"));
     assert!(sandbox.json("run/report.json")["params"].get("specular_lobe").is_none());
     for cube in ["irradiance", "lobe", "hilite"] {
         assert!(sandbox.path(&format!("run/maps/{cube}_fitted.exr")).exists(), "{cube}");
     }
+}
+
+#[cfg(feature = "burn")]
+#[test]
+fn the_roughness_of_a_lobe_is_held_beside_any_map_and_that_is_told() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"fresnel\"]");
+    sandbox.edit("free = [", "free = [\"roughness\", \"gloss\", ");
+    sandbox.edit("hilite = 0.7\n", "hilite = 0.7\nroughness = 0.4\ngloss = 0.2\n");
+    sandbox.edit("loss = ", "maps = { rounds = 1, steps = 2 }\nloss = ");
+    let ran = warned(
+        sandbox.fit("run", &["--maps", "color"]),
+        &["scene.toml: --maps color: held at the start values, though free in the scene: roughness, gloss."],
+    );
+    let report = sandbox.json("run/report.json");
+    assert!(
+        report["params"].get("roughness").is_none() && report["params"].get("gloss").is_none(),
+        "{ran:?}"
+    );
+    assert!(report["warnings"][0].as_str().unwrap().contains("roughness, gloss"), "{report}");
+    let kept = sandbox.text("run/params.toml");
+    assert!(kept.contains("roughness = 0.4") && kept.contains("gloss = 0.2"), "{kept}");
 }
 
 #[cfg(feature = "burn")]

@@ -6,11 +6,12 @@
 //! - `frames`: tiles, sequences, layers
 //! - `pictures`: backdrops, bloom, haze
 //! - `faults`: what is refused, and lost devices
-//! - `vectors`: the conformance vectors through the shader rules
+//! - `vectors`: the conformance vectors through the shader rules; `light_vectors`: those of light
 //! - `fused`: the fit engine on the adapter against the plain f64 model
 //! - `samples`: samples that the adapter makes, beside the CPU's
 //! - `shadow_maps`: what the renderer has in the place of rays to lights
 //! - `textures`: maps filtered to the fragment, beside the CPU's samples and many of them
+//! - `ways`: both ways of shading with lights on, and what shades forward all the same
 //! - `exported`: exported GLSL in place of the renderer's own
 
 mod accuracy;
@@ -19,6 +20,7 @@ mod exported;
 mod faults;
 mod frames;
 mod fused;
+mod light_vectors;
 mod parity;
 mod pictures;
 mod samples;
@@ -26,3 +28,4 @@ mod shadow_maps;
 mod stability;
 mod textures;
 mod vectors;
+mod ways;

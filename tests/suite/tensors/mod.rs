@@ -4,11 +4,12 @@
 //! - `device`: one device, no copies; `drawn`: samples that the adapter drew
 //! - `matrices`: fixed linear maps
 //! - `maps`: fits of whole maps
-//! - `gradients`: the shading operation and its adjoint
+//! - `gradients`: the shading operation and its adjoint; `lit`: of lights, Fresnel and the sky
 
 pub(crate) mod bench;
 mod device;
 mod drawn;
 mod gradients;
+mod lit;
 mod maps;
 mod matrices;

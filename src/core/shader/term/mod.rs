@@ -114,10 +114,15 @@ pub fn enabled(effects: Effects) -> impl Iterator<Item = &'static Term> {
     terms().into_iter().filter(move |term| effects.has_any(term.effects))
 }
 
-/// An added effect of a set that has rules for texels of the atlas.
+/// An added effect of a set that is computed in texels of the atlas: one of its rules holds nowhere else.
 pub fn of_texels(effects: Effects) -> Option<Effect> {
+    let on = |name: &&str| Effect::from_name(name).is_none_or(|effect| effects.has(effect));
+    let there_alone = |term: &Term, rule: &Rule| {
+        let elsewhere = |other: &Rule| other.domain != Domain::Texel && other.function == rule.function;
+        rule.domain == Domain::Texel && rule.when.iter().all(on) && !term.rules.iter().any(elsewhere)
+    };
     let mut terms = enabled(effects);
-    terms.find(|term| term.rules.iter().any(|rule| rule.domain == Domain::Texel)).map(|term| term.effect)
+    terms.find(|term| term.rules.iter().any(|rule| there_alone(term, rule))).map(|term| term.effect)
 }
 
 /// The fields that the rules of added effects read of vertices.

@@ -62,7 +62,8 @@ pub(super) fn read(arguments: &Arguments, folder: &Path) -> Result<Vec<(String, 
         if !arguments.free.is_empty() {
             loaded.set_free(&arguments.free);
         }
-        arguments.maps.hold_constants(&mut loaded.scene.fit);
+        let held = arguments.maps.hold_constants(&mut loaded.scene.fit);
+        loaded.warnings.extend(held.map(|told| format!("{}: {told}", path.display())));
         Ok(loaded)
     };
     let mut loaded = paths.iter().map(one).collect::<Result<Vec<_>, _>>()?;

@@ -93,7 +93,10 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
     // The library's advice ends its words; the option that follows it comes after.
     let option = match error {
         MapError::TooLarge { .. } | MapError::OutOfMemory { .. } => Some("--adapter"),
-        MapError::Unread { .. } | MapError::Beside { .. } | MapError::NotUnwrapped { .. } => Some("--maps"),
+        MapError::Unread { .. }
+        | MapError::Beside { .. }
+        | MapError::Sharpness { .. }
+        | MapError::NotUnwrapped { .. } => Some("--maps"),
         MapError::Tensor(_)
         | MapError::Filtered { .. }
         | MapError::NotFinite { .. }
@@ -111,6 +114,7 @@ fn refusal(error: &MapError, scene: &Path) -> Refusal {
         | MapError::TooLarge { .. }
         | MapError::Unread { .. }
         | MapError::Beside { .. }
+        | MapError::Sharpness { .. }
         | MapError::Filtered { .. }
         | MapError::NotUnwrapped { .. } => Refusal::new(words),
     }

@@ -17,6 +17,7 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use super::Refusal;
+use crate::model::params::Param;
 use crate::report::maps::MapEvidence;
 use crate::scene::{FitSettings, MapKind};
 #[cfg(not(feature = "burn"))]
@@ -74,9 +75,13 @@ impl MapArguments {
         MapKind::ALL.into_iter().filter(named).collect()
     }
 
-    /// Hold the constants that the maps leave nothing to, before anything is made that depends on what is free.
-    pub(super) fn hold_constants(&self, fit: &mut FitSettings) {
-        fit.hold_beside(&self.kinds());
+    /// Hold the constants that the maps leave nothing to, before anything is made that depends on what is free; what the
+    /// user should know of that.
+    pub(super) fn hold_constants(&self, fit: &mut FitSettings) -> Option<String> {
+        let held: Vec<&str> = fit.hold_beside(&self.kinds()).into_iter().map(Param::name).collect();
+        let (maps, held) = (self.maps.join(","), held.join(", "));
+        let told = format!("--maps {maps}: held at the start values, though free in the scene: {held}.");
+        (!held.is_empty()).then_some(told)
     }
 
     /// Refuse maps in a program that was built without them.
@@ -104,7 +109,7 @@ impl MapArguments {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::params::{Column, Param};
+    use crate::model::params::Column;
     use crate::scene::{Loss, MapSettings};
 
     #[test]
@@ -114,7 +119,8 @@ mod tests {
             let free = [Param::EnvironmentRotation, Param::Hilite].map(Column::tied).to_vec();
             let (loss, settings) = (Loss::default(), MapSettings::default());
             let mut fit = FitSettings { free, loss, free_gains: false, maps: settings };
-            MapArguments { maps }.hold_constants(&mut fit);
+            let told = MapArguments { maps }.hold_constants(&mut fit);
+            assert!(told.is_none_or(|told| told.contains("environment_rotation") && fit.free.len() == 1));
             fit.free.len()
         };
         assert_eq!([held(&[]), held(&["color"]), held(&["color", "environment"])], [2, 2, 1]);

@@ -1,0 +1,187 @@
+//! Lights with their shadows, Fresnel, the sky that a point sees and light through thin parts on tensors: image and gradient
+//! beside the processor's engine, over the same samples; and what of the lobe's sharpness tensors cannot move, told.
+
+use burn::tensor::{Tensor, TensorData};
+use skinfit::engine::cpu::CpuEngine;
+use skinfit::engine::residual::Residuals;
+use skinfit::engine::view::ObservedView;
+use skinfit::engine::{Objective, Task, Unknown};
+use skinfit::maps::{MapError, MapTask, fit_maps};
+use skinfit::model::choices::{SpecularMap, SpecularModel, SpecularVisibility, SplitSum};
+use skinfit::model::effects::Effect;
+use skinfit::model::params::{Column, Param};
+use skinfit::prepare::Observed;
+use skinfit::samples::ViewSamples;
+use skinfit::scene::MapKind;
+use skinfit::scene::view::Target;
+use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
+
+use super::bench::{numbers, shared};
+use crate::lit::param;
+use crate::sky::{effect, head_changed, on_cpu};
+
+/// The built-in head under a lamp with its shadow, so small that light comes through it, with a target that it misses.
+fn head(model: SpecularModel) -> Observed {
+    let more = ["light_specular", "fresnel", "directional_occlusion", "transmission"].map(effect);
+    let more = [&[Effect::NormalMap, Effect::Lights, Effect::Shadows][..], &more].concat();
+    let baked = head_changed(&more, |scene| {
+        let camera = &mut scene.views[0].camera;
+        (camera.width, camera.height) = (20, 20);
+        scene.metres_per_unit = 0.004;
+        scene.choices.specular_model = model;
+        if model == SpecularModel::Ggx {
+            scene.choices.specular_map = SpecularMap::F0;
+            scene.choices.split_sum = SplitSum::Exact;
+            scene.choices.specular_visibility = SpecularVisibility::Cone;
+        }
+        for (name, value) in [
+            ("transmission_unit", 4.0),
+            ("transmission_length", 2.0),
+            ("gloss", 0.4),
+            ("f0", 0.06),
+            ("fresnel_loss", 0.7),
+            ("occlusion", 0.8),
+            ("environment_rotation", 15.0),
+        ] {
+            scene.params.set(param(name), value);
+        }
+        scene.params.set_rgb(param("transmission_weight"), [0.7, 0.5, 0.9]);
+        scene.params.set_rgb(param("specular_weight"), [0.9, 0.7, 0.5]);
+        // What may be free decides what samples hold of a sky that turns.
+        scene.fit.free = columns(model);
+    });
+    let made = on_cpu(&baked);
+    let target = Target {
+        rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
+        alpha: Some(made.alpha),
+        haze: None,
+        mask: None,
+        clipped_at: None,
+    };
+    baked.with_scene(|scene| scene.views[0].target = Some(target)).sample().unwrap().observe().unwrap()
+}
+
+/// Every way in which these effects move: weights a channel each, and what is looked up.
+fn columns(model: SpecularModel) -> Vec<Column> {
+    let rgb = ["specular_weight", "transmission_weight", "transmission_length", "light.side.color"];
+    let mut one = vec![
+        "base_weight",
+        "rim_weight",
+        "rim_exponent",
+        "occlusion",
+        "normal_strength",
+        "environment_rotation",
+        "f0",
+        "fresnel_loss",
+        "light.side.azimuth",
+        "light.side.elevation",
+    ];
+    if model == SpecularModel::Ggx {
+        one.push("f0_floor");
+    }
+    let each = rgb.into_iter().flat_map(|name| Column::per_channel(param(name)));
+    each.chain(one.into_iter().map(|name| Column::tied(param(name)))).collect()
+}
+
+fn operation(shared: &SharedDevice, observed: &Observed, columns: &[Column]) -> (Shade, Inputs) {
+    let task = observed.task();
+    let views: Vec<&ViewSamples> = task.views.iter().map(|view| &view.samples).collect();
+    let params = observed.start().params;
+    let shaded = Shaded { setup: task.setup, params: &params, columns, illumination: &task.illumination };
+    Shade::new(shared, &shaded, &views, Scatter::Exact).unwrap()
+}
+
+/// The loss of an image, and its slope by every number of that.
+fn loss(view: &ObservedView, task: &Task, image: &[f32]) -> (f64, Vec<f32>) {
+    let residuals = Residuals::new(task.loss);
+    let (mut loss, mut slopes, mut weights) = (0.0, vec![0.0; image.len()], 0.0);
+    for slot in 0..image.len() / 4 {
+        let weight = f64::from(view.pixel_weight(slot));
+        for c in 0..3 {
+            let (model, target) = (f64::from(image[4 * slot + c]), f64::from(view.target.number(c, slot)));
+            let row = residuals.weigh(view.clip, model, target, weight);
+            loss += row.loss;
+            slopes[4 * slot + c] = 2.0 * row.scale * row.residual;
+            weights += weight;
+        }
+    }
+    (loss / weights, slopes.into_iter().map(|slope| (slope / weights) as f32).collect())
+}
+
+#[test]
+fn lights_shadows_and_fresnel_move_tensors_as_they_move_the_processors_engine() {
+    let Some(shared) = shared() else { return };
+    for model in SpecularModel::ALL {
+        let observed = head(model);
+        let columns = columns(model);
+        let unknowns = columns.iter().copied().map(Unknown::Param).collect();
+        let task = Task { unknowns, ..observed.task() };
+        let (view, point) = (task.views[0].clone(), observed.start());
+        let engine = CpuEngine::new(task.clone()).unwrap();
+        let (shade, inputs) = operation(shared, &observed, &columns);
+        let image = numbers(shade.image(inputs.clone()).unwrap());
+        let planes = engine.image(0, &point);
+        let brightest = planes.iter().flatten().fold(0.0_f32, |most, x| most.max(*x));
+        let mut compared = 0;
+        for slot in (0..image.len() / 4).filter(|&slot| view.pixel_weight(slot) > 0.0) {
+            for c in 0..3 {
+                let (got, want) = (image[4 * slot + c], planes[c][slot]);
+                // Some hundred roundings of f32 each, of a lobe that is some ten times as bright at its peak.
+                assert!(
+                    (got - want).abs() <= 1e-4 * want.abs() + 1e-5 * brightest,
+                    "{model:?}: {got} {want}"
+                );
+                compared += 1;
+            }
+        }
+        assert!(compared > 300, "{compared}");
+        let (want_loss, want) = engine.gradient(&point);
+        let (got_loss, slopes) = loss(&view, &task, &image);
+        // Sums over a thousand residuals of such an image.
+        assert!((got_loss - want_loss).abs() <= 1e-5 * want_loss, "{model:?}: {got_loss} {want_loss}");
+        let shape = [shade.slots(), 4];
+        let slopes = Tensor::<2>::from_data(TensorData::new(slopes, shape), shared.device());
+        let free = inputs.columns.clone().autodiff().require_grad();
+        let tracked = Inputs { columns: free.clone(), ..inputs };
+        let gradients = (shade.image(tracked).unwrap() * slopes.autodiff()).sum().backward();
+        let got = numbers(free.grad(&gradients).unwrap());
+        let most = want.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
+        for ((column, got), want) in columns.iter().zip(got).zip(want) {
+            let name = Unknown::Param(*column).name();
+            // As between the engines (`slopes::EXACT`), of residuals that cancel ten times as far: the target is near.
+            let near = 1e-3 * want.abs() + 1e-5 * most;
+            assert!((f64::from(got) - want).abs() <= near, "{model:?}: {name}: {got} {want}");
+            assert!(want != 0.0, "{model:?}: {name} moves nothing");
+        }
+    }
+}
+
+#[test]
+fn a_lobes_roughness_is_held_by_tensors_and_beside_maps_and_that_is_told() {
+    let Some(shared) = shared() else { return };
+    let observed = head(SpecularModel::Kelemen);
+    let (task, params) = (observed.task(), observed.start().params);
+    let views: Vec<&ViewSamples> = task.views.iter().map(|view| &view.samples).collect();
+    let posed = observed.scene.mesh.pose();
+    for name in ["roughness", "gloss"] {
+        let columns = [Column::tied(param(name))];
+        let shaded = Shaded {
+            setup: task.setup,
+            params: &params,
+            columns: &columns,
+            illumination: &task.illumination,
+        };
+        let error = Shade::new(shared, &shaded, &views, Scatter::Exact).unwrap_err().to_string();
+        assert!(error.contains(name) && error.contains("cubes"), "{error}");
+        // The tensors' lobe would stay where the constants began.
+        let unknowns = ["base_weight", name].map(|name| Unknown::Param(Column::tied(param(name)))).to_vec();
+        let maps = MapTask::new(&observed, &posed, task.views.to_vec(), vec![MapKind::Color]);
+        let Err(error) = fit_maps(shared, MapTask { unknowns, ..maps }, &mut |_| {}) else {
+            panic!("{name} was fitted beside a map")
+        };
+        assert!(matches!(error, MapError::Sharpness { param } if param == name), "{error}");
+        assert!(error.to_string().contains(name), "{error}");
+    }
+    // E_s is another cube of its stack after each solve.
+    assert!(!Param::SpecularLobe.info().held);
+}
