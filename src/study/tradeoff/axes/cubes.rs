@@ -3,7 +3,7 @@
 use super::quality::{Swept, bake_seconds};
 use crate::StudyError;
 use crate::model::effects::{Effect, Effects, Needs};
-use crate::tradeoff::axis::{Axis, Knob, Rates, Sweep};
+use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
 use crate::tradeoff::bench::{Bench, Settings};
 
 /// The size of one kind of cube.
@@ -49,7 +49,7 @@ pub(super) const HILITE: CubeSize = CubeSize {
     asked: |needs| needs.hilite,
 };
 
-impl Axis for CubeSize {
+impl SceneAxis for CubeSize {
     fn name(&self) -> &'static str {
         self.name
     }

@@ -50,10 +50,10 @@ impl Swept<'_> {
         *self.knob.of(&mut bench.settings().quality)
     }
 
-    /// The values, the scene's own among them.
+    /// The values, the scenes' own among them.
     fn values(&self, bench: &Bench<'_>) -> Vec<u32> {
         let mut values = self.values.to_vec();
-        values.push(self.present(bench));
+        values.extend(bench.all.iter().map(|settings| *self.knob.of(&mut { settings.quality })));
         values.sort_unstable();
         values.dedup();
         values
