@@ -28,7 +28,7 @@ pub(super) struct SceneArguments {
 /// Which scenes, of a command that takes several, and where bakes are kept.
 #[derive(clap::Args)]
 pub(super) struct ScenesArguments {
-    /// The scene file; several are one skin in different lights; the built-in scene when left out.
+    /// The scene file, or several, as of one skin in different lights; the built-in scene when left out.
     #[arg(value_name = "SCENE")]
     pub named: Vec<PathBuf>,
     #[command(flatten)]
@@ -38,8 +38,8 @@ pub(super) struct ScenesArguments {
 /// What is not fitted, and scored all the same.
 #[derive(clap::Args)]
 pub(super) struct HoldOutArguments {
-    /// Leave a view out of what is fitted, and tell how well it is matched all the same, beside those that were fitted.
-    /// Of several scenes: a view in every one, a whole scene by its name, or SCENE/VIEW. May be given several times.
+    /// Leave a view out of what is fitted; it is scored all the same. Of several scenes: a view in every one, a whole scene
+    /// by its name, or SCENE/VIEW. May be given several times.
     #[arg(long, value_name = "NAME")]
     pub hold_out: Vec<String>,
 }

@@ -6,16 +6,15 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::settings::{Settings, Traced};
 use crate::StudyError;
 use crate::bake::rays::RayMesh;
 use crate::bake::{self, Illumination, Ranges};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Task};
-use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
 use crate::model::params::Params;
-use crate::model::texture_filter::TextureFilter;
 use crate::prepare::{Baked, Loaded, NamedScene, PrepareError, PrepareOptions, Sampled};
 use crate::reference::Difference;
 use crate::render::format::FormatShader;
@@ -25,34 +24,9 @@ use crate::samples::rows::Rows;
 use crate::samples::{self, Atlas, Hit, PosedSurface, SampleError, SurfaceBakes, ViewSamples, sample_hits};
 use crate::scene::names::names_of;
 use crate::scene::view::View;
-use crate::scene::{Loss, Quality, Scene};
+use crate::scene::{Loss, Scene};
 use crate::subject::{SampledScene, shaded};
 use crate::timing::seconds_of;
-
-/// The settings that a scene file can have.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// `[model] silhouette`
-    pub silhouette: Silhouette,
-    /// `[quality]`
-    pub quality: Quality,
-}
-
-/// What of the settings the samples depend on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Traced {
-    silhouette: Silhouette,
-    samples_per_axis: u32,
-    occlusion_rays: u32,
-    texture_filter: TextureFilter,
-}
-
-impl From<Settings> for Traced {
-    fn from(Settings { silhouette, quality }: Settings) -> Self {
-        let Quality { samples_per_axis, occlusion_rays, texture_filter, .. } = quality;
-        Self { silhouette, samples_per_axis, occlusion_rays, texture_filter }
-    }
-}
 
 /// The visible surface, a view each.
 type Surfaces = Arc<Vec<ViewSamples>>;
@@ -244,7 +218,7 @@ impl<'a> Bench<'a> {
         }
         // These go first: there is no need of both.
         self.last.replace(None);
-        let occluded = Traced { occlusion_rays: own.occlusion_rays, ..settings } == own;
+        let occluded = settings.is_but_for_occlusion(own);
         // What is found of the sky follows from the same rays.
         let occluded = occluded && bakes.sky.is_none();
         let made = if occluded { self.occluded(scene, bakes)? } else { traced(scene, bakes)? };

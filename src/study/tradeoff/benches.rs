@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::bench::{Bench, Rates, Settings};
+use super::bench::{Bench, Rates};
+use super::settings::Settings;
 use crate::StudyError;
 use crate::prepare::{NamedScene, PrepareError, PrepareOptions, read_one_skin, view_of};
 use crate::reference::Difference;

@@ -8,8 +8,8 @@
 use serde::Serialize;
 
 use super::axis::{Choose, Setting, Sweep};
-use super::bench::Settings;
 use super::benches::{Benches, difference};
+use super::settings::Settings;
 use crate::StudyError;
 use crate::reference::Difference;
 use crate::report::number;

@@ -2,7 +2,7 @@
 //!
 //! - [`axis`]: what an approximation's sweep is, and how long it will take; [`axes`]: each of them, a file each
 //! - [`mod@bench`]: a scene at other settings: baked, sampled, shaded; [`benches`]: all scenes of a study
-//! - `pooled`: the sweeps of several scenes as one
+//! - [`settings`]: what of a scene sweeps change; `pooled`: the sweeps of several scenes as one
 //! - [`mod@choose`]: the cheapest settings within an error, or the best within a time
 //! - [`files`]: the table, `results.csv`, `results.json`, plots; [`page`]: `report.html`
 
@@ -14,6 +14,7 @@ pub mod choose;
 pub mod files;
 pub mod page;
 mod pooled;
+pub mod settings;
 
 use std::path::PathBuf;
 

@@ -4,7 +4,8 @@ use super::quality::{Swept, bake_seconds};
 use crate::StudyError;
 use crate::model::effects::{Effect, Effects, Needs};
 use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// The size of one kind of cube.
 pub(super) struct CubeSize {

@@ -49,8 +49,8 @@ impl Fits {
         all.then_some(()).ok_or(Idle::Unasked("no view names a target to fit to"))
     }
 
-    /// What is left out of the fits, for the words on how they were measured.
-    pub(super) fn left_out(benches: &Benches<'_>) -> String {
+    /// What the fits are of and what they leave out, for the words on how they were measured.
+    pub(super) fn words(benches: &Benches<'_>) -> String {
         let several = match benches.names().as_slice() {
             [] => String::new(),
             names => format!(" Scenes: {}, fitted as one skin.", names.join(", ")),

@@ -7,7 +7,8 @@ use crate::model::effects::{Effect, Effects};
 use crate::model::params::Param;
 use crate::prepare::PrepareError;
 use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// The number of specular cubes an octave.
 pub(super) struct Density;

@@ -50,7 +50,7 @@ impl Axis for Pixels {
                 "A fit to every n-th block of pixels (128 of them), from the scene's start values; and one to a sixteenth whose answer is \
                      where a fit to all pixels starts. The error is how different the images of the fitted constants are from those fitted \
                      to all pixels. Seconds are those of the fit.{}",
-                Fits::left_out(benches)
+                Fits::words(benches)
             ),
             cost: "seconds",
             settings,

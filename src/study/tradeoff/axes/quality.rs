@@ -6,7 +6,8 @@ use crate::reference::Difference;
 use crate::scene::Scene;
 use crate::timing::{Job, Rounds, interleaved, seconds_of};
 use crate::tradeoff::axis::{Choose, Knob, Rates, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Settings, baked};
+use crate::tradeoff::bench::{Bench, baked};
+use crate::tradeoff::settings::Settings;
 
 /// How bakes, traces and fits are timed. What takes longer than a few seconds is run once: what disturbs it for a
 /// moment does not show in it. Of the others three rounds are the fewest with a middle.

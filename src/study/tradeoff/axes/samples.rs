@@ -5,7 +5,8 @@ use crate::StudyError;
 use crate::engine::Objective;
 use crate::timing::seconds_of;
 use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// Samples along a pixel's side.
 pub(super) struct Samples;

@@ -16,7 +16,8 @@ use crate::scene::{Scene, ShadowMaps};
 use crate::shader::Budget;
 use crate::timing::{Job, interleaved, seconds_of};
 use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Evaluated, Settings};
+use crate::tradeoff::bench::{Bench, Evaluated};
+use crate::tradeoff::settings::Settings;
 
 /// Filters and sizes of shadow maps.
 pub(super) struct Shadows;

@@ -8,7 +8,8 @@ use crate::render::image::Image;
 use crate::scene::facts::tessellation_error;
 use crate::shader::{Budget, Facts, plan};
 use crate::tradeoff::axis::{Choose, Rates, SceneAxis, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// Where the silhouette is evaluated, against how fine the mesh is.
 pub(super) struct Silhouettes;

@@ -8,7 +8,8 @@ use crate::render::image::Image;
 use crate::scene::Quality;
 use crate::timing::seconds_of;
 use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// Filters of texture maps.
 pub(super) struct Textures;
