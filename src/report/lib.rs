@@ -42,6 +42,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use crate::engine::joint::label;
 use crate::fit::outcome::Outcome;
 use crate::output::OutputError;
 pub use crate::prepare::StageSeconds;
@@ -272,16 +273,11 @@ fn is_ours(name: &str) -> bool {
 }
 
 impl RunInfo {
-    /// An unknown's name for people: a gain is named by its view and not by the view's number, and what a scene has of its
-    /// own by the scene.
+    /// An unknown's name for people.
     #[must_use]
     pub fn label(&self, name: &str) -> String {
-        let number = |text: &str| text.parse::<usize>().ok();
-        if let Some(view) = name.strip_prefix("gain.").and_then(number).and_then(|n| self.views.get(n)) {
-            return format!("gain.{}", view.name);
-        }
-        let own = name.split_once('/').and_then(|(scene, own)| Some((self.scenes.get(number(scene)?)?, own)));
-        own.map_or_else(|| name.to_owned(), |(scene, own)| format!("{scene}/{own}"))
+        let view = |number: usize| Some(self.views.get(number)?.name.clone());
+        label(name, |number| self.scenes.get(number).cloned(), view)
     }
 
     /// The views that took part in the fit.

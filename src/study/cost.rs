@@ -4,10 +4,11 @@ use serde::Serialize;
 
 use super::StudyError;
 use super::subject::Subject;
+use crate::engine::{Engine, Point};
 use crate::model::diffusion::{Method, Seams};
 use crate::model::effects::Effect;
 use crate::model::params::Params;
-use crate::prepare::Baked;
+use crate::prepare::{Baked, JointScene, JointScenes};
 use crate::shader::{Budget, Facts, plan};
 
 /// A cube lookup reads 2 x 2 texels of four 32-bit channels.
@@ -29,30 +30,60 @@ pub struct Counts {
 }
 
 impl Counts {
-    /// Of a scene at `params`.
+    /// Of a subject at `point`; of several scenes samples and bakes are added up, and what a sample or a fragment costs is the
+    /// mean over all samples.
     ///
     /// # Errors
     /// When the renderer has no shader for it.
-    pub fn new(subject: &Subject, params: &Params) -> Result<Self, StudyError> {
-        let scene = &subject.observed.scene;
+    pub fn new(subject: &Subject, point: &Point) -> Result<Self, StudyError> {
+        let of = |part| Self::of_scene(&subject.scenes, part, &subject.scenes.point_of(part, point).params);
+        let all = subject.scenes.fitted().map(of).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self::of_all(all))
+    }
+
+    fn of_scene(scenes: &JointScenes, part: &JointScene, params: &Params) -> Result<Self, StudyError> {
+        let scene = &part.baked.scene;
         let mut facts = Facts::of_scene(scene, params, Budget::Exact, false);
         // Told of what an adapter can draw, which the others are measured against.
         let diffusion = &mut facts.setup.choices.diffusion;
         (diffusion.method, diffusion.seams) = (Method::Separable, Seams::Cut);
         let planned = plan(&facts)?;
-        let attributes =
-            subject.engine.views().first().map_or(0, |view| view.samples.surface.rows().stride());
+        let views = scenes.views(part);
+        let attributes = views.first().map_or(0, |view| view.samples.surface.rows().stride());
         let needs = scene.needs();
         let lookups = [needs.irradiance, scene.effects.has(Effect::SideSpecular), needs.dapple, needs.hilite];
         let lookups = lookups.into_iter().filter(|&wanted| wanted).count();
-        let (bakes, baked_bytes) = bakes(&subject.observed);
+        let (bakes, baked_bytes) = bakes(&part.baked);
         Ok(Self {
-            samples: subject.engine.samples(),
+            samples: scenes.engine(part).map_or(0, Engine::samples),
             bytes_a_sample: attributes * size_of::<f32>() + lookups * LOOKUP_BYTES,
             operations: planned.cost,
             bakes,
             baked_bytes,
         })
+    }
+
+    fn of_all(mut scenes: Vec<Self>) -> Self {
+        if scenes.len() == 1 {
+            return scenes.remove(0);
+        }
+        let samples: u64 = scenes.iter().map(|scene| scene.samples).sum();
+        let mean = |of: &dyn Fn(&Self) -> f64| {
+            scenes.iter().map(|scene| scene.samples as f64 * of(scene)).sum::<f64>() / samples.max(1) as f64
+        };
+        let mut bakes: Vec<String> = Vec::new();
+        for name in scenes.iter().flat_map(|scene| &scene.bakes) {
+            if !bakes.contains(name) {
+                bakes.push(name.clone());
+            }
+        }
+        Self {
+            samples,
+            bytes_a_sample: mean(&|scene| scene.bytes_a_sample as f64).round() as usize,
+            operations: mean(&|scene| scene.operations),
+            bakes,
+            baked_bytes: scenes.iter().map(|scene| scene.baked_bytes).sum(),
+        }
     }
 
     /// What `other` need not have baked that this has.

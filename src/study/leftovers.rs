@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::output::OutputError;
+use crate::report::SCENES;
 
 /// What an earlier run says in its `results.json` that it left.
 #[derive(Clone, Debug)]
@@ -23,8 +24,10 @@ impl Leftovers {
         let earlier = std::fs::read(folder.join("results.json")).ok();
         let earlier = earlier.and_then(|bytes| serde_json::from_slice::<Earlier>(&bytes).ok());
         let mut files = earlier.map(|earlier| earlier.files).unwrap_or_default();
-        // A list that was tampered with must not reach beyond the folder.
-        files.retain(|name| Path::new(name).file_name().is_some_and(|file| file == name.as_str()));
+        // A list that was tampered with must not reach beyond the folder, and that of scenes in it.
+        let inner = format!("{SCENES}/");
+        let own = |name: &str| Path::new(name).file_name().is_some_and(|file| file == name);
+        files.retain(|name| own(name.strip_prefix(&inner).unwrap_or(name)));
         Self { folder: folder.to_owned(), files }
     }
 
@@ -41,6 +44,10 @@ impl Leftovers {
                 }
                 _ => {}
             }
+        }
+        // Where none is left in it, the folder of scenes goes, too; with anything else in it, it stays.
+        if self.files.iter().any(|name| name.starts_with(SCENES)) {
+            let _ = std::fs::remove_dir(self.folder.join(SCENES));
         }
         Ok(())
     }

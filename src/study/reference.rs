@@ -48,27 +48,70 @@ pub struct Difference {
     pub psnr: Option<f64>,
     /// Mean FLIP error, of the views; none where no pixel is fully covered.
     pub flip: Option<f64>,
+    /// What these are made of.
+    #[serde(skip)]
+    pub(crate) sums: Sums,
+}
+
+/// What a [`Difference`] is a mean of.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sums {
+    /// Of squared differences, over pixels and channels.
+    squares: f64,
+    /// Of the references' squares.
+    size: f64,
+    /// How many of either.
+    values: usize,
+    /// Of the views' PSNR and FLIP.
+    psnr: f64,
+    flip: f64,
+    /// Views with a fully covered pixel.
+    views: usize,
 }
 
 impl Difference {
     /// Of all views of a scene; what the references cover fully counts.
     #[must_use]
     pub fn of_all(references: &[Image], images: &[Image]) -> Self {
-        let (mut squares, mut size, mut values) = (0.0, 0.0, 0_usize);
-        let mut scores = Vec::new();
+        let mut all = Sums::default();
         for (reference, image) in references.iter().zip(images) {
-            let (view_squares, view_size, count) = sums(reference, image, &reference.alpha);
-            (squares, size, values) = (squares + view_squares, size + view_size, values + count);
-            scores.extend(Comparison::new(reference, image, &reference.alpha).scores());
+            let (squares, size, count) = sums(reference, image, &reference.alpha);
+            let scores = Comparison::new(reference, image, &reference.alpha).scores();
+            let (psnr, flip) = scores.map_or((0.0, 0.0), |scores| (scores.psnr, scores.flip));
+            let views = usize::from(scores.is_some());
+            all = all.plus(Sums { squares, size, values: count, psnr, flip, views });
         }
-        let mean = |score: fn(&Scores) -> f64| {
-            (!scores.is_empty()).then(|| scores.iter().map(score).sum::<f64>() / scores.len() as f64)
-        };
+        Self::of_sums(all)
+    }
+
+    /// Of all views of several scenes: every pixel counts as much as every other, and every view's score.
+    #[must_use]
+    pub fn pooled(scenes: impl IntoIterator<Item = Self>) -> Self {
+        Self::of_sums(scenes.into_iter().fold(Sums::default(), |all, scene| all.plus(scene.sums)))
+    }
+
+    fn of_sums(sums: Sums) -> Self {
+        let Sums { squares, size, values, psnr, flip, views } = sums;
+        let mean = |sum: f64| (views > 0).then(|| sum / views as f64);
         Self {
             linear: (squares / values.max(1) as f64).sqrt(),
             relative: relative(squares, size),
-            psnr: mean(|scores| scores.psnr),
-            flip: mean(|scores| scores.flip),
+            psnr: mean(psnr),
+            flip: mean(flip),
+            sums,
+        }
+    }
+}
+
+impl Sums {
+    fn plus(self, other: Self) -> Self {
+        Self {
+            squares: self.squares + other.squares,
+            size: self.size + other.size,
+            values: self.values + other.values,
+            psnr: self.psnr + other.psnr,
+            flip: self.flip + other.flip,
+            views: self.views + other.views,
         }
     }
 }

@@ -20,6 +20,12 @@ pub fn title(scene: &str) -> String {
     }
 }
 
+/// The title of a page about several scenes of these names.
+#[must_use]
+pub fn title_of_several(scenes: &[String]) -> String {
+    scenes.join(" + ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -11,6 +11,7 @@ mod graphics;
 mod held_out;
 mod interrupted;
 mod joint;
+mod joint_studies;
 mod lit;
 mod maps;
 mod outputs;

@@ -24,6 +24,22 @@ pub struct JointError {
     pub unknown: String,
 }
 
+/// What an unknown is called for people, by its [`Unknown::name`]: a gain by its view and not by the view's number, and what
+/// a scene has of its own by the scene.
+#[must_use]
+pub fn label(
+    name: &str,
+    scene: impl FnOnce(usize) -> Option<String>,
+    view: impl FnOnce(usize) -> Option<String>,
+) -> String {
+    let number = |text: &str| text.parse::<usize>().ok();
+    if let Some(view) = name.strip_prefix("gain.").and_then(number).and_then(view) {
+        return format!("gain.{view}");
+    }
+    let own = name.split_once('/').and_then(|(at, own)| Some((scene(number(at)?)?, own)));
+    own.map_or_else(|| name.to_owned(), |(scene, own)| format!("{scene}/{own}"))
+}
+
 /// The engines of several scenes as one objective.
 pub struct Joint {
     scenes: Vec<Part>,
@@ -77,16 +93,30 @@ impl Joint {
         }
         unknowns.sort_by_key(rank);
         let place = |unknown: &Unknown| unknowns.iter().position(|other| other == unknown);
-        let weight: f64 = engines.iter().map(|engine| engine.weight()).sum();
         let mut first = 0;
         let part = |(engine, own): (Box<dyn Engine>, Vec<Unknown>)| {
             let views = first..first + engine.views().len();
             first = views.end;
-            let share = if weight > 0.0 { engine.weight() / weight } else { 0.0 };
-            Part { places: own.iter().filter_map(place).collect(), views, share, engine }
+            Part { places: own.iter().filter_map(place).collect(), views, share: 0.0, engine }
         };
         let scenes = engines.into_iter().zip(of_scenes).map(part).collect();
-        Ok(Self { scenes, unknowns })
+        let mut joint = Self { scenes, unknowns };
+        joint.weigh();
+        Ok(joint)
+    }
+
+    /// Let each pass read only every `stride`-th block of pixels of each scene.
+    pub fn set_stride(&mut self, stride: usize) {
+        self.scenes.iter_mut().for_each(|part| part.engine.set_stride(stride));
+        self.weigh();
+    }
+
+    /// Find each scene's share of the weight.
+    fn weigh(&mut self) {
+        let weight: f64 = self.scenes.iter().map(|part| part.engine.weight()).sum();
+        for part in &mut self.scenes {
+            part.share = if weight > 0.0 { part.engine.weight() / weight } else { 0.0 };
+        }
     }
 
     /// Where the fit of all of them starts, from where each scene's would: the skin starts as in the first one.

@@ -1,6 +1,8 @@
 //! What a stage refuses.
 
+use super::marked::HoldOutError;
 use crate::bake::BakeError;
+use crate::engine::joint::JointError;
 use crate::fit::params_file::ParamsFileError;
 use crate::program::shading::ShadingError;
 use crate::samples::SampleError;
@@ -36,6 +38,25 @@ pub enum PrepareError {
     /// Scenes that cannot be fitted as one skin.
     #[error(transparent)]
     NotOneSkin(#[from] Box<NotOneSkin>),
+    /// One scene under two names.
+    #[error(
+        "{scene}: this scene is named twice: its images would count as twice as many as there are. Name it once."
+    )]
+    NamedTwice { scene: String },
+    /// Scenes of one name.
+    #[error(
+        "{scenes}: two of these scenes are called the same by their files and folders. Rename one of them."
+    )]
+    CalledTheSame { scenes: String },
+    /// What cannot be left out of a fit.
+    #[error(transparent)]
+    HoldOut(#[from] HoldOutError),
+    /// Scenes that leave other unknowns of the skin free.
+    #[error(transparent)]
+    Joint(#[from] JointError),
+    /// A fit of no scene.
+    #[error("there is no scene to fit. Name one.")]
+    NoScene,
     /// A fit without anything to match.
     #[error(
         "{scene}: no view names a target, so there is nothing to fit. Add target = \"image.exr\" to a [[view]]."

@@ -6,6 +6,7 @@ use super::observed::beside;
 use super::{Baked, PrepareError, StageSeconds};
 use crate::engine::view::ObservedView;
 use crate::samples;
+use crate::scene::Scene;
 use crate::scene::view::View;
 
 /// Views of a scene that take no part in its fit, beside what was observed there.
@@ -17,6 +18,14 @@ pub struct HeldOut {
     pub gains: Vec<f64>,
     /// Their samples and targets.
     pub observed: Vec<ObservedView>,
+}
+
+impl HeldOut {
+    /// Whether nothing is left of the scene to be fitted: all that it could be compared with is held out.
+    #[must_use]
+    pub fn is_all_of(&self, scene: &Scene) -> bool {
+        !self.views.is_empty() && scene.views.iter().all(|view| view.target.is_none())
+    }
 }
 
 impl Baked {

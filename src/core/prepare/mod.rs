@@ -7,7 +7,9 @@
 //! - [`Observed`]: of the views that have a target, samples beside what was observed there
 //! - [`HeldOut`]: views that are taken out of a scene before its fit, to score it on
 //!
-//! [`share_skin`] has several scenes agree on what a fit of them as one skin shares.
+//! Of several scenes that are fitted as one skin: [`scene_names`] calls them, [`share_skin`] has them agree on what is one
+//! for all, [`read_one_skin`] reads them so, [`NamedScene::marked`] says which of their views are held out, and
+//! [`JointScenes`] has them with what is minimised over all.
 //!
 //! A stage reads as the ones before it: `observed.scene`, `sampled.illumination`. Renderers start from a [`Baked`],
 //! engines from an [`Observed`].
@@ -15,7 +17,10 @@
 mod baked;
 mod error;
 mod held_out;
+mod joint_scenes;
 mod loaded;
+mod marked;
+mod named;
 mod observed;
 mod one_skin;
 mod options;
@@ -24,7 +29,10 @@ mod sampled;
 pub use self::baked::Baked;
 pub use self::error::{NotOneSkin, PrepareError};
 pub use self::held_out::HeldOut;
+pub use self::joint_scenes::{JointScene, JointScenes, ReadyScene, view_of};
 pub use self::loaded::{Loaded, untied};
+pub use self::marked::HoldOutError;
+pub use self::named::{NamedScene, read_one_skin, scene_names};
 pub use self::observed::Observed;
 pub use self::one_skin::share_skin;
 pub use self::options::{ClipOcclusion, PrepareOptions, Views};

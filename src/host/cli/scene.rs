@@ -10,6 +10,9 @@ use crate::demo;
 use crate::model::effects::{Effect, Effects};
 use crate::scene::suggestion;
 
+/// What the built-in scene is called in reports.
+const BUILT_IN: &str = "the built-in scene";
+
 /// Which scene, and where bakes are kept.
 #[derive(clap::Args)]
 pub(super) struct SceneArguments {
@@ -20,6 +23,25 @@ pub(super) struct SceneArguments {
     more: Vec<PathBuf>,
     #[command(flatten)]
     bakes: BakeArguments,
+}
+
+/// Which scenes, of a command that takes several, and where bakes are kept.
+#[derive(clap::Args)]
+pub(super) struct ScenesArguments {
+    /// The scene file, or several, as of one skin in different lights; the built-in scene when left out.
+    #[arg(value_name = "SCENE")]
+    pub named: Vec<PathBuf>,
+    #[command(flatten)]
+    pub bakes: BakeArguments,
+}
+
+/// What is not fitted, and scored all the same.
+#[derive(clap::Args)]
+pub(super) struct HoldOutArguments {
+    /// Leave a view out of what is fitted; it is scored all the same. Of several scenes: a view in every one, a whole scene
+    /// by its name, or SCENE/VIEW. May be given several times.
+    #[arg(long, value_name = "NAME")]
+    pub hold_out: Vec<String>,
 }
 
 /// Where bakes are kept, and on how many threads they and all else are computed.
@@ -51,7 +73,7 @@ impl SceneArguments {
     pub(super) fn kept_path(&self, folder: &Path) -> Result<PathBuf, Refusal> {
         if let Some(other) = self.more.first() {
             return Err(Refusal::new(format!(
-                "{}: this command takes one scene; `skinfit fit` alone takes several, as one skin. Name one.",
+                "{}: this command takes one scene; `fit`, `ablate`, `tradeoff` and `stability` alone take several. Name one.",
                 other.display()
             )));
         }
@@ -60,12 +82,39 @@ impl SceneArguments {
 
     /// What the scene at `path` is called in reports.
     pub(super) fn name(&self, path: &Path) -> String {
-        self.scene.as_ref().map_or_else(|| "the built-in scene".to_owned(), |_| path.display().to_string())
+        self.scene.as_ref().map_or_else(|| BUILT_IN.to_owned(), |_| path.display().to_string())
     }
 
     /// Where bakes are kept; `None` with `--no-cache`.
     pub(super) fn cache(&self) -> Option<PathBuf> {
         self.bakes.cache()
+    }
+}
+
+impl ScenesArguments {
+    /// The scenes' files, and what must stay alive for as long as they are read, as of [`SceneArguments::path`].
+    pub(super) fn paths(&self) -> Result<(Vec<PathBuf>, Option<TempDir>), Refusal> {
+        if !self.named.is_empty() || self.bakes.cache().is_some() {
+            return Ok((self.kept_paths(Path::new(""))?, None));
+        }
+        let scratch = unfinished::scratch()?;
+        Ok((self.kept_paths(scratch.path())?, Some(scratch)))
+    }
+
+    /// As [`BakeArguments::kept_path`], of each scene that is named.
+    pub(super) fn kept_paths(&self, folder: &Path) -> Result<Vec<PathBuf>, Refusal> {
+        match self.named.as_slice() {
+            [] => Ok(vec![self.bakes.kept_path(None, folder)?]),
+            scenes => scenes.iter().map(|scene| self.bakes.kept_path(Some(scene), folder)).collect(),
+        }
+    }
+
+    /// What the scenes are called in reports: their files.
+    pub(super) fn words(&self) -> String {
+        match self.named.as_slice() {
+            [] => BUILT_IN.to_owned(),
+            scenes => scenes.iter().map(|scene| scene.display().to_string()).collect::<Vec<_>>().join(", "),
+        }
     }
 }
 

@@ -5,27 +5,26 @@ use std::rc::Rc;
 
 use super::graphics::Task;
 use super::run_folder::{RunFolder, Work};
-use super::scene::SceneArguments;
+use super::scene::ScenesArguments;
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::output;
-use crate::prepare::{PrepareOptions, Sampled};
+use crate::prepare::scene_names;
 use crate::progress;
-use crate::scene::{LoadOptions, Scene};
 use crate::study::stability::evaluate::Evaluators;
 use crate::study::stability::lights::LightBox;
 use crate::study::stability::objectives::{EngineEvaluator, OnAdapter};
-use crate::study::stability::scene::{batches, sweepable};
+use crate::study::stability::scene::SweptScene;
 use crate::study::stability::shader::{Adapter, Rules};
 use crate::study::stability::{Study, evaluators, kept};
 
 /// Try hard cases on every evaluator, and search for new ones
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("Each evaluator (the model in f64 and f32, the CPU engine, the renderer's shader rules where there is a graphics adapter) is given every hard case of docs/model.md, samples of the scene with each parameter at its bounds and each effect on and off, and random numbers made to break it; engines also random lights, specular lobes and skies under random named choices. Each result must be finite, and as near to f64 as roundings explain. Cases that fail are made as simple as they stay failing and written to DIR/new_cases.toml; DIR/stability.json has every figure.\n\nExamples:\n  skinfit stability                                    the built-in scene\n  skinfit stability scene.toml -o stable --cases 50000 --seed 7\n  skinfit stability --replay stable/new_cases.toml     try again what failed", "a case failed on an evaluator, or the command was interrupted")
+    after_help = super::with_failure("Each evaluator (the model in f64 and f32, the CPU engine, the renderer's shader rules where there is a graphics adapter) is given every hard case of docs/model.md, samples of the scene with each parameter at its bounds and each effect on and off, and random numbers made to break it; engines also random lights, specular lobes and skies under random named choices. Each result must be finite, and as near to f64 as roundings explain. Cases that fail are made as simple as they stay failing and written to DIR/new_cases.toml; DIR/stability.json has every figure.\n\nOf several scenes, which need not be one skin, the samples of each are tried in its own light; one report says which scene a failure is of. Nothing is fitted, so there is nothing to hold out.\n\nExamples:\n  skinfit stability                                    the built-in scene\n  skinfit stability scene.toml -o stable --cases 50000 --seed 7\n  skinfit stability --replay stable/new_cases.toml     try again what failed\n  skinfit stability noon.toml night.toml -o stable    the samples of both", "a case failed on an evaluator, or the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
-    scene: SceneArguments,
+    scenes: ScenesArguments,
     /// The folder for stability.json and new_cases.toml; without it only the tables are printed.
     #[arg(short, long, value_name = "DIR")]
     output: Option<PathBuf>,
@@ -60,21 +59,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if let Some(path) = &arguments.replay {
         cases.extend(kept::read(path)?);
     }
-    let (path, _scratch) = arguments.scene.path()?;
-    let load = LoadOptions { targets: false, ..LoadOptions::default() };
-    let (scene, _) = Scene::load(&path, &load)?;
-    let effects = sweepable(scene.effects, scene.environment.is_some());
-    drop(scene);
-    let options = PrepareOptions {
-        effects: Some(effects),
-        cache: arguments.scene.cache(),
-        ..PrepareOptions::default()
-    };
-    let sampled = Sampled::new(&path, &options)?;
-    tell_warnings(&sampled.warnings);
+    let (paths, _scratch) = arguments.scenes.paths()?;
+    let cache = arguments.scenes.bakes.cache();
+    let mut scenes = Vec::new();
+    for (name, path) in scene_names(&paths)?.into_iter().zip(&paths) {
+        let scene = SweptScene::read(name, path, cache.as_deref())?;
+        tell_warnings(&scene.warnings);
+        scenes.push(scene);
+    }
     let study = Study {
-        swept: batches(&sampled, effects),
-        lights: LightBox::new(Some(sampled.baked.illumination)),
+        scenes,
+        lights: LightBox::new(None),
         kept: cases,
         seed: arguments.seed,
         cases: usize::try_from(arguments.cases).unwrap_or(usize::MAX),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::fitted_scene::Changes;
 use super::run_folder::{RunFolder, Work};
-use super::scene::SceneArguments;
+use super::scene::{HoldOutArguments, ScenesArguments};
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
 use crate::scene::suggestion;
 use crate::study::StudyError;
@@ -14,11 +14,11 @@ use crate::study::tradeoff::{Tradeoff, TradeoffOptions, Watcher, axes, files, tr
 /// Measure what accuracy costs in time: each approximation swept, error beside cost
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("DIR gets report.html (open it in a browser), results.csv, results.json, a plot of each axis and, with --within or --budget, scene.toml with the settings that meet it; what is measured stands there axis by axis, so that Ctrl-C leaves the axes that are done. How long it will take is said before.\n\nAxes:\n  format      f64, f32, f16, and the 12-bit fixed point of the paper's hardware, as its listing declares it\n  silhouette  per vertex, per fragment, bumped; against how fine the mesh is\n  irradiance, specular, hilite  texels a face of the cubes\n  filter      of the cubes: exact, the hardware's, nearest\n  lobes       specular cubes an octave of the exponent\n  rays        a vertex, for ambient occlusion\n  sky_lights  lights taken out of the panorama\n  visibility, specular_visibility  ways to the sky that a point and its specular lobe see\n  split_sum   ways to what a specular lobe reflects\n  taps, light_map_size, seams, ambient_normal, stretch, unblurred, levels  of texture-space diffusion\n  samples     along a pixel's side\n  texture_filter  of maps: bilinear, trilinear, anisotropic\n  shadows     in the renderer: at vertices, or shadow maps by size and filter\n  pixels      used in a fit\n  solver      of a fit\n\nErrors are root mean square differences of linear radiance, relative to the reference's own. A setting is marked\n`pareto` where no other is both as cheap and as accurate, `reference` where errors are measured against it, and\n`the scene's` where the scene has it.\n\nExamples:\n  skinfit tradeoff -o runs/cost                                the built-in scene, every axis\n  skinfit tradeoff scene.toml -o runs/cost --axis rays --axis samples\n  skinfit tradeoff scene.toml -o runs/cost --within 0.5%       the cheapest settings with that error\n  skinfit tradeoff scene.toml -o runs/cost --budget 200ms      the most accurate settings in that time", "no settings meet --within or --budget, or the command was interrupted")
+    after_help = super::with_failure("DIR gets report.html (open it in a browser), results.csv, results.json, a plot of each axis and, with --within or --budget, scene.toml with the settings that meet it; what is measured stands there axis by axis, so that Ctrl-C leaves the axes that are done. How long it will take is said before.\n\nAxes:\n  format      f64, f32, f16, and the 12-bit fixed point of the paper's hardware, as its listing declares it\n  silhouette  per vertex, per fragment, bumped; against how fine the mesh is\n  irradiance, specular, hilite  texels a face of the cubes\n  filter      of the cubes: exact, the hardware's, nearest\n  lobes       specular cubes an octave of the exponent\n  rays        a vertex, for ambient occlusion\n  sky_lights  lights taken out of the panorama\n  visibility, specular_visibility  ways to the sky that a point and its specular lobe see\n  split_sum   ways to what a specular lobe reflects\n  taps, light_map_size, seams, ambient_normal, stretch, unblurred, levels  of texture-space diffusion\n  samples     along a pixel's side\n  texture_filter  of maps: bilinear, trilinear, anisotropic\n  shadows     in the renderer: at vertices, or shadow maps by size and filter\n  pixels      used in a fit\n  solver      of a fit\n\nErrors are root mean square differences of linear radiance, relative to the reference's own. A setting is marked\n`pareto` where no other is both as cheap and as accurate, `reference` where errors are measured against it, and\n`the scene's` where the scene has it.\n\nSeveral scenes are one skin, as of `skinfit fit`. Each is measured by itself; errors are those of all of their views together, seconds are added up, other costs and counts are means. The fits of `pixels` and `solver` are of all scenes as one skin, without what --hold-out names; no other axis fits anything, so with --hold-out one of these two has to be among the axes. Chosen settings are those of every scene: scenes/NAME.toml for each.\n\nExamples:\n  skinfit tradeoff -o runs/cost                                the built-in scene, every axis\n  skinfit tradeoff scene.toml -o runs/cost --axis rays --axis samples\n  skinfit tradeoff scene.toml -o runs/cost --within 0.5%       the cheapest settings with that error\n  skinfit tradeoff scene.toml -o runs/cost --budget 200ms      the most accurate settings in that time\n  skinfit tradeoff noon.toml night.toml -o runs/cost           one skin in two lights, taken together\n  skinfit tradeoff noon.toml night.toml -o runs/cost --axis pixels --hold-out night/left    a view that no fit sees", "no settings meet --within or --budget, or the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
-    scene: SceneArguments,
+    scenes: ScenesArguments,
     /// The folder to write into; it is made if need be.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
@@ -28,6 +28,8 @@ pub(super) struct Arguments {
     /// Constants of an earlier fit, instead of the scene's start values.
     #[arg(long, value_name = "FILE")]
     params: Option<PathBuf>,
+    #[command(flatten)]
+    held: HoldOutArguments,
     /// Name the cheapest settings that are off by no more than this together, such as 0.5%.
     #[arg(long, value_name = "ERROR", allow_hyphen_values = true, value_parser = parse_error)]
     within: Option<f64>,
@@ -40,24 +42,27 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     unfinished::install();
     let mut folder = RunFolder::of_study(&arguments.output, Work::Tradeoff)?;
-    let path = arguments.scene.kept_path(folder.path())?;
+    let paths = arguments.scenes.kept_paths(folder.path())?;
     // Settings are evaluated more than once: without a cache of the user's, bakes are kept for as long as this takes.
     let scratch = unfinished::scratch()?;
     let options = TradeoffOptions {
         axes: arguments.axis.clone(),
         params: arguments.params.clone(),
-        cache: Some(arguments.scene.cache().unwrap_or_else(|| scratch.path().to_owned())),
+        hold_out: arguments.held.hold_out.clone(),
+        cache: Some(arguments.scenes.bakes.cache().unwrap_or_else(|| scratch.path().to_owned())),
         goal: arguments.within.map(Goal::Within).or(arguments.budget.map(Goal::Seconds)),
     };
-    let name = arguments.scene.name(&path);
+    let name = arguments.scenes.words();
     let mut leaving = Leaving { folder: &mut folder, scene: &name };
-    let found = tradeoff(&path, &options, Some(&mut leaving))?;
+    let found = tradeoff(&paths, &options, Some(&mut leaving))?;
     tell_warnings(&found.warnings);
     folder.keep_results();
     let mut written = files::write(folder.path(), &name, &found)?.len();
     if let Some(choice) = found.choice() {
-        folder.write_scene(&path, "scene.toml", Changes { settings: &choice.keys, ..Changes::default() })?;
-        written += 1;
+        for (path, file) in paths.iter().zip(files::chosen(&found)) {
+            folder.write_scene(path, &file, Changes { settings: &choice.keys, ..Changes::default() })?;
+            written += 1;
+        }
     }
     say(files::table(&found).trim_end())?;
     say(&format!("wrote {written} files to {}; open report.html there", folder.path().display()))?;

@@ -67,7 +67,8 @@ fn pictures(ablation: &Ablation) -> Vec<StripOf<'_>> {
     let mut pictures = Vec::new();
     for row in ablation.rows.iter().filter(|row| row.left_out.left_out.len() == 1) {
         let left_out = row.left_out.name();
-        for (view, reference) in row.views.iter().zip(&ablation.references) {
+        let held = row.held_out.iter().flat_map(|held| &held.views).zip(&ablation.held_out);
+        for (view, reference) in row.views.iter().zip(&ablation.references).chain(held) {
             if view.pictures.is_some() {
                 let name = format!("{}_without_{left_out}.png", file_stem(&view.view));
                 pictures.push(StripOf {
@@ -92,22 +93,23 @@ fn scores(view: &ViewRow) -> String {
     }
 }
 
-/// A row a case for all views together, then one for each view.
+/// A row a case for all views together, then one for each view; where some are held out, another for all of these, then
+/// one for each.
 fn csv(ablation: &Ablation) -> String {
+    let holds = !ablation.held_out.is_empty();
     let mut text = String::from(
         "left_out,view,loss,loss_change,std_error,t,linear_rms,relative_rms,psnr_db,ssim,flip,cpu_ms,cpu_ratio,\
-         gpu_ms,gpu_ratio,operations,bytes_a_sample,samples,baked_bytes,bakes,starts,best_start\n",
+         gpu_ms,gpu_ratio,operations,bytes_a_sample,samples,baked_bytes,bakes,starts,best_start",
     );
+    text += if holds { ",held_out,psnr_change_db\n" } else { "\n" };
     for row in &ablation.rows {
-        let (name, mean) = (row.left_out.name(), row.mean());
+        let name = row.left_out.name();
         let Row { loss, change, counts, starts, .. } = row;
-        let _ = writeln!(
+        let _ = write!(
             text,
-            "{name},all,{loss:e},{:e},{:e},{},{},{},{},{:.1},{},{},{},{},{}",
-            change.loss,
-            change.std_error,
-            change.t.map_or_else(String::new, |t| format!("{t:.2}")),
-            view_columns(&mean),
+            "{name},all,{loss:e},{},{},{},{},{:.1},{},{},{},{},{}",
+            change_columns(change),
+            view_columns(&row.mean()),
             timed(row.cpu),
             timed(row.gpu),
             counts.operations,
@@ -117,13 +119,32 @@ fn csv(ablation: &Ablation) -> String {
             counts.bakes.join(" "),
             starts.as_ref().map_or_else(|| ",".to_owned(), |s| format!("{},{}", s.tried.len(), s.best)),
         );
+        text += if holds { ",false,\n" } else { "\n" };
         for view in &row.views {
-            let name_of_view = view.view.replace([',', '"', '\n'], "_");
-            let _ =
-                writeln!(text, "{name},{name_of_view},{:e},,,,{},,,,,,,,,,,", view.loss, view_columns(view));
+            text += &view_line(&name, view, "");
+            text += if holds { ",false,\n" } else { "\n" };
+        }
+        let Some(held) = &row.held_out else { continue };
+        text += &view_line(&name, &held.mean(), &change_columns(&held.change));
+        let _ = writeln!(text, ",true,{}", held.psnr_change.map_or_else(String::new, |x| format!("{x:.5}")));
+        for view in &held.views {
+            text += &view_line(&name, view, "");
+            text += ",true,\n";
         }
     }
     text
+}
+
+fn change_columns(change: &Change) -> String {
+    let t = change.t.map_or_else(String::new, |t| format!("{t:.2}"));
+    format!("{:e},{:e},{t}", change.loss, change.std_error)
+}
+
+/// A line without what a case costs.
+fn view_line(left_out: &str, view: &ViewRow, change: &str) -> String {
+    let change = if change.is_empty() { ",," } else { change };
+    let name = view.view.replace([',', '"', '\n'], "_");
+    format!("{left_out},{name},{:e},{change},{},,,,,,,,,,,", view.loss, view_columns(view))
 }
 
 fn view_columns(view: &ViewRow) -> String {
@@ -140,6 +161,8 @@ fn json(scene: &str, ablation: &Ablation, files: &[String]) -> Result<String, se
     #[derive(Serialize)]
     struct File<'a> {
         scene: &'a str,
+        #[serde(skip_serializing_if = "<[String]>::is_empty")]
+        scenes: &'a [String],
         reference: crate::reference::Source,
         constants: &'a str,
         refitted: bool,
@@ -149,31 +172,10 @@ fn json(scene: &str, ablation: &Ablation, files: &[String]) -> Result<String, se
         warnings: &'a [String],
         files: &'a [String],
     }
-    let Ablation { source, constants, refitted, loss, adapter, rows, warnings, .. } = ablation;
+    let Ablation { source, scenes, constants, refitted, loss, adapter, rows, warnings, .. } = ablation;
     let (reference, refitted, loss) = (*source, *refitted, loss.name());
-    let file = File { scene, reference, constants, refitted, loss, adapter, rows, warnings, files };
+    let file = File { scene, scenes, reference, constants, refitted, loss, adapter, rows, warnings, files };
     Ok(serde_json::to_string_pretty(&file)? + "\n")
-}
-
-impl Row {
-    /// The means over the views.
-    #[must_use]
-    pub fn mean(&self) -> ViewRow {
-        let all = |value: &dyn Fn(&ViewRow) -> Option<f64>| {
-            let values: Vec<f64> = self.views.iter().filter_map(value).collect();
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
-        ViewRow {
-            view: "all".to_owned(),
-            loss: self.loss,
-            linear_rms: all(&|v| Some(v.linear_rms)).unwrap_or(0.0),
-            relative_rms: all(&|v| Some(v.relative_rms)).unwrap_or(0.0),
-            psnr: all(&|v| v.psnr),
-            ssim: all(&|v| v.ssim),
-            flip: all(&|v| v.flip),
-            pictures: None,
-        }
-    }
 }
 
 impl Change {
@@ -193,9 +195,12 @@ impl Change {
 /// The table on standard output, in the units of the page.
 #[must_use]
 pub fn table(ablation: &Ablation) -> String {
+    let holds = !ablation.held_out.is_empty();
     let width = ablation.rows.iter().map(|row| row.left_out.name().len()).max().unwrap_or(0).max(8);
+    let held =
+        if holds { format!("{:>10} {:>7} {:>8}  ", "held out", "t", "PSNR, dB") } else { String::new() };
     let mut text = format!(
-        "{:width$}  {:>10} {:>10} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}  {}\n",
+        "{:width$}  {:>10} {:>10} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}  {held}{}\n",
         "left out",
         "loss",
         "change",
@@ -220,14 +225,10 @@ pub fn table(ablation: &Ablation) -> String {
         let bytes = units::saved(own.bytes_a_sample as f64, whole.bytes_a_sample as f64);
         let _ = writeln!(
             text,
-            "{:width$}  {:>10.3e} {:>10} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}  {}",
+            "{:width$}  {:>10.3e} {:>10} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>7} {:>8}  {}{}",
             row.left_out.name(),
             row.loss,
-            match units::loss_percent(row.change.loss, full) {
-                _ if row.change.loss == 0.0 => "0".to_owned(),
-                Some(percent) => format!("{}%", signed(percent, 2)),
-                None => format!("{:+.2e}", row.change.loss),
-            },
+            change_in_words(&row.change, full.loss),
             row.change.t_in_words(),
             psnr_in_words(mean.psnr),
             score(mean.ssim, 4),
@@ -236,8 +237,26 @@ pub fn table(ablation: &Ablation) -> String {
             time(row.gpu),
             signed(units::saved(own.operations, whole.operations), 1),
             signed(bytes, 1),
+            held_out_in_words(row, full),
             whole.bakes_saved(own).join(" "),
         );
     }
     text
+}
+
+/// A change as a share of the whole model's loss, or as it is.
+fn change_in_words(change: &Change, whole: f64) -> String {
+    match units::loss_percent(change.loss, whole) {
+        _ if change.loss == 0.0 => "0".to_owned(),
+        Some(percent) => format!("{}%", signed(percent, 2)),
+        None => format!("{:+.2e}", change.loss),
+    }
+}
+
+/// How what is held out changes; nothing where nothing is.
+fn held_out_in_words(row: &Row, full: &Row) -> String {
+    let Some((held, whole)) = row.held_out.as_ref().zip(full.held_out.as_ref()) else { return String::new() };
+    let change = change_in_words(&held.change, whole.loss);
+    let psnr = held.psnr_change.map_or_else(|| "-".to_owned(), |change| signed(change, 2));
+    format!("{change:>10} {:>7} {psnr:>8}  ", held.change.t_in_words())
 }

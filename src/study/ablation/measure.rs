@@ -2,15 +2,13 @@
 
 use super::GpuTiming;
 use crate::StudyError;
-use crate::engine::cpu::CpuEngine;
-use crate::engine::{Objective, Point};
-use crate::subject::Subject;
+use crate::engine::Point;
+use crate::subject::{LivePass, Subject};
 use crate::timing::{Rounds, Timed, interleaved, seconds_of};
 
 /// The whole model, ready to be timed beside a case.
 pub struct Clocks {
-    engine: CpuEngine,
-    point: Point,
+    whole: LivePass,
     gpu: gpu::Clock,
     /// Why the renderer is not timed, where it should have been.
     pub warning: Option<String>,
@@ -26,7 +24,7 @@ impl Clocks {
             GpuTiming::Never => (gpu::Clock::none(), None),
             GpuTiming::Auto | GpuTiming::Always => gpu::Clock::open(whole, point, when == GpuTiming::Always)?,
         };
-        Ok(Self { engine: whole.live_engine()?, point: point.clone(), gpu, warning })
+        Ok(Self { whole: whole.live_pass(point)?, gpu, warning })
     }
 
     /// What the renderer is timed on.
@@ -35,15 +33,15 @@ impl Clocks {
         self.gpu.adapter()
     }
 
-    /// A pass of the CPU engine over all of a case's samples, and a frame of the renderer: both beside the
-    /// whole model's.
+    /// A pass of the CPU engine over all of a case's samples, and a frame of the renderer (of several scenes the first's):
+    /// both beside the whole model's.
     ///
     /// # Errors
     /// When the adapter fails, or a rule cannot be computed on the processor.
     pub fn time(&self, case: &Subject, point: &Point) -> Result<(Timed, Option<Timed>), StudyError> {
-        let own = case.live_engine()?;
-        let mut whole_pass = || Ok::<f64, StudyError>(seconds_of(|| self.engine.loss(&self.point)));
-        let mut own_pass = || Ok(seconds_of(|| own.loss(point)));
+        let own = case.live_pass(point)?;
+        let mut whole_pass = || Ok::<f64, StudyError>(seconds_of(|| self.whole.run()));
+        let mut own_pass = || Ok(seconds_of(|| own.run()));
         let cpu = interleaved(Rounds::default(), &mut [&mut whole_pass, &mut own_pass])?;
         Ok((cpu[1], self.gpu.time(case, point)?))
     }
@@ -92,7 +90,8 @@ mod gpu {
                 let warning = format!("GPU time is not measured: {} has no timestamps.", gpu.name());
                 return Ok((Self(None), Some(warning)));
             }
-            Ok((Self(Some(Open { gpu, whole: content(whole, point) })), None))
+            let open = content(whole, point).map(|whole| Open { gpu, whole });
+            Ok((Self(open), None))
         }
 
         pub(super) fn adapter(&self) -> Option<String> {
@@ -106,7 +105,8 @@ mod gpu {
             let Some(Open { gpu, whole }) = &self.0 else { return Ok(None) };
             let camera = whole.scene.views[0].camera;
             let mut whole = renderer(gpu, whole.clone())?;
-            let mut own = renderer(gpu, content(case, point))?;
+            let Some(own) = content(case, point) else { return Ok(None) };
+            let mut own = renderer(gpu, own)?;
             let frames = |renderer: &mut Renderer| -> Result<f64, StudyError> {
                 let times = renderer.frame_times(&camera, FRAMES)?;
                 Ok(1e-3 * Spread::of(&times).map_or(0.0, |spread| spread.median))
@@ -117,9 +117,11 @@ mod gpu {
         }
     }
 
-    /// A subject at the constants of `point`.
-    fn content(subject: &Subject, point: &Point) -> Content {
-        Content { params: point.params.clone(), ..Content::of(&subject.observed) }
+    /// The first scene that is fitted, at the constants of `point`.
+    fn content(subject: &Subject, point: &Point) -> Option<Content> {
+        let first = subject.scenes.fitted().next()?;
+        let Point { params, .. } = subject.scenes.point_of(first, point);
+        Some(Content { params, ..Content::of(&first.baked) })
     }
 
     fn renderer(gpu: &Gpu, content: Content) -> Result<Renderer, StudyError> {

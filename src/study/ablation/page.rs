@@ -4,17 +4,15 @@ use std::fmt::Write as _;
 
 use rayon::prelude::*;
 
-use super::units::{self, signed};
-use super::{Ablation, Row};
+use super::{Ablation, Row, tables};
 use crate::model::effects::Effect;
 use crate::reference::{Source, psnr_in_words};
 use crate::report::figures::triple;
-use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
+use crate::report::page::{Page, escape, facts, section, tile};
 use crate::report::pictures::Picture;
 use crate::report::plot::{Dot, Joined, Plot};
 use crate::report::{number, seconds};
-use crate::timing::Timed;
-use crate::titles::title;
+use crate::titles::{title, title_of_several};
 
 /// `report.html` of an ablation of the scene of that name.
 ///
@@ -23,21 +21,26 @@ use crate::titles::title;
 pub fn page(scene: &str, ablation: &Ablation) -> Result<String, String> {
     let Some((full, cases)) = ablation.rows.split_first() else { return Err("there is no row".to_owned()) };
     let mut main = warnings(&ablation.warnings);
-    main += &section("summary", "What each part is worth, and what it costs", &summary(ablation, full));
+    main +=
+        &section("summary", "What each part is worth, and what it costs", &tables::summary(ablation, full));
+    if let Some(table) = tables::held_out(ablation) {
+        main += &section("held-out", "What each part is worth to what no fit has seen", &table);
+    }
     main += &section("tradeoff", "Worth against cost", &tradeoff(ablation, full, cases));
     if let Some(table) = super::pairs::table(ablation) {
         main += &section("pairs", "Which parts stand in for each other", &table);
     }
-    let views = format!("<details><summary>Errors of each view</summary>{}</details>", views(ablation));
+    let views =
+        format!("<details><summary>Errors of each view</summary>{}</details>", tables::views(ablation));
     main += &section("views", "View by view", &views);
     if ablation.refitted {
-        main += &section("constants", "What the others made of it", &constants(ablation));
+        main += &section("constants", "What the others made of it", &tables::constants(ablation));
     }
     main += &section("pictures", "Pictures", &pictures(ablation, cases)?);
     main += &section("method", "How it was measured", &method(scene, ablation, full));
     let page = Page {
         kind: "ablation",
-        title: &title(scene),
+        title: &if ablation.scenes.is_empty() { title(scene) } else { title_of_several(&ablation.scenes) },
         lead: lead(ablation, cases),
         tiles: tiles(full, cases),
         main,
@@ -61,7 +64,12 @@ fn lead(ablation: &Ablation, cases: &[Row]) -> String {
         Source::Model => "the whole model's own images",
     };
     let refit = if ablation.refitted { ", what is left fitted again" } else { "" };
-    let mut text = format!("Each part of the model left out in turn{refit}, and compared with {against}.");
+    let scenes = match ablation.scenes.len() {
+        0 => String::new(),
+        several => format!(" of {several} scenes of one skin at once"),
+    };
+    let mut text =
+        format!("Each part of the model left out in turn{scenes}{refit}, and compared with {against}.");
     let most = single.iter().filter(|row| row.change.is_significant() && row.change.loss > 0.0);
     if let Some(row) = most.max_by(|a, b| a.change.loss.total_cmp(&b.change.loss)) {
         let _ = write!(text, " Nothing is missed as much as <b>{}</b>.", escape(&row.left_out.name()));
@@ -76,16 +84,22 @@ fn lead(ablation: &Ablation, cases: &[Row]) -> String {
         single.iter().filter(|row| !row.change.is_nothing() && !row.change.is_significant()).collect();
     let better: Vec<_> =
         single.iter().filter(|row| row.change.loss < 0.0 && row.change.is_significant()).collect();
+    let overfits: Vec<_> = single.iter().filter(|row| row.only_overfits()).collect();
     for (rows, words) in [
         (nothing, "Without a trace go"),
         (chance, "Within chance of making no difference:"),
         (better, "The images are matched better without"),
+        (overfits, "What is held out is matched no worse without"),
     ] {
         if !rows.is_empty() {
             let _ = write!(text, " {words} {}.", list(rows));
         }
     }
     text
+}
+
+fn plural(views: usize) -> &'static str {
+    if views == 1 { "view" } else { "views" }
 }
 
 fn tiles(full: &Row, cases: &[Row]) -> String {
@@ -101,93 +115,11 @@ fn tiles(full: &Row, cases: &[Row]) -> String {
         ("parts", single.to_string(), format!("{} cases", cases.len())),
         ("CPU pass", pass, "every lookup live".to_owned()),
     ];
-    tiles.iter().map(|(name, value, note)| tile(name, value, note)).collect()
-}
-
-/// Where the GPU's time stands in the table, when it was measured.
-const GPU_COLUMN: usize = 9;
-
-fn summary(ablation: &Ablation, full: &Row) -> String {
-    let mut columns = vec![
-        ("left out", "which effects or terms"),
-        ("loss", "mean loss over all views"),
-        ("change", "of the loss, with one standard error"),
-        (
-            "t",
-            "the change over its standard error; 3 and more is beyond chance; exact: the whole model left no misfit, so any change is real",
-        ),
-        ("linear RMS, %", "difference of linear radiance, relative to the reference's root mean square"),
-        ("PSNR, dB", "mean of the views"),
-        ("SSIM", "mean of the views"),
-        ("FLIP", "mean of the views"),
-        ("CPU saved, %", "of a pass over all samples, every lookup live, with the quartiles of the rounds"),
-        ("GPU saved, %", "of a frame of the first view"),
-        ("ops saved, %", "planned operations a fragment"),
-        ("bytes saved, %", "attributes and texels that a sample reads"),
-        ("bakes saved.", "what need not be baked"),
-    ];
-    let untimed = ablation.adapter.is_none();
-    if untimed {
-        columns.remove(GPU_COLUMN);
-    }
-    let mut table = Table::new(&columns);
-    for row in &ablation.rows {
-        let class = if row.left_out.left_out.is_empty() { "reference" } else { "" };
-        let mut cells = cells(row, full);
-        if untimed {
-            cells.remove(GPU_COLUMN);
-        }
-        table.row(class, &cells);
-    }
-    let note = "<p class=\"quiet\">Click a heading to sort. The first row is the whole model, timed \
-                in turns with a second copy of itself: the time that it seems to save is the noise of the clock.</p>";
-    format!("{note}{}", table.html("cases"))
-}
-
-fn cells(row: &Row, full: &Row) -> Vec<Cell> {
-    let mean = row.mean();
-    let minus = |text: String| text.replace('-', "−");
-    let saved = |own: f64, whole: f64| {
-        let percent = units::saved(own, whole);
-        Cell::value(minus(signed(percent, 1)), percent)
-    };
-    let time = |time: Option<Timed>| {
-        time.map_or_else(Cell::none, |time| {
-            let [percent, half] = units::time_saved(time);
-            let html = format!("{} <span class=\"pm inline\">± {half:.1}</span>", minus(signed(percent, 1)));
-            Cell::value(html, percent)
-        })
-    };
-    let change = match (row.change.loss, units::loss_percent(row.change.loss, full)) {
-        (0.0, _) => Cell::value("0", 0.0),
-        (change, None) => Cell::value(format!("+{}", number(change, 3)), change),
-        (change, Some(percent)) => {
-            let error = number(100.0 * row.change.std_error / full.loss, 2);
-            let html = format!("{}% <span class=\"pm inline\">± {error}</span>", minus(signed(percent, 2)));
-            Cell::value(html, change)
-        }
-    };
-    let t = match row.change.t {
-        _ if row.change.is_nothing() => Cell::none(),
-        // Sorted before every number.
-        None => Cell::value("exact", f64::MAX),
-        Some(t) => Cell::value(row.change.t_in_words().replace('-', "−"), t),
-    };
-    vec![
-        Cell::text(&row.left_out.name()),
-        Cell::value(number(row.loss, 4), row.loss),
-        change,
-        t,
-        Cell::value(number(100.0 * mean.relative_rms, 3), mean.relative_rms),
-        Cell::psnr(mean.psnr),
-        Cell::score(mean.ssim, 4),
-        Cell::score(mean.flip, 4),
-        time(row.cpu),
-        time(row.gpu),
-        saved(row.counts.operations, full.counts.operations),
-        saved(row.counts.bytes_a_sample as f64, full.counts.bytes_a_sample as f64),
-        Cell::text(&full.counts.bakes_saved(&row.counts).join(", ")),
-    ]
+    let held = full.held_out.as_ref().map(|held| {
+        let views = held.views.len();
+        ("PSNR, held out", psnr_in_words(held.psnr), format!("dB, mean of {views} {}", plural(views)))
+    });
+    tiles.iter().chain(&held).map(|(name, value, note)| tile(name, value, note)).collect()
 }
 
 fn tradeoff(ablation: &Ablation, full: &Row, cases: &[Row]) -> String {
@@ -228,88 +160,25 @@ fn tradeoff(ablation: &Ablation, full: &Row, cases: &[Row]) -> String {
     )
 }
 
-fn views(ablation: &Ablation) -> String {
-    let mut table = Table::new(&[
-        ("left out", "which effects or terms"),
-        ("view.", "the scene's view"),
-        ("loss", "the view's mean loss"),
-        ("linear RMS", "difference of linear radiance"),
-        ("linear RMS, %", "the same, relative to the reference's root mean square"),
-        ("PSNR, dB", ""),
-        ("SSIM", ""),
-        ("FLIP", ""),
-    ]);
-    for row in &ablation.rows {
-        let class = if row.left_out.left_out.is_empty() { "reference" } else { "" };
-        for view in &row.views {
-            table.row(
-                class,
-                &[
-                    Cell::text(&row.left_out.name()),
-                    Cell::text(&view.view),
-                    Cell::value(number(view.loss, 4), view.loss),
-                    Cell::value(number(view.linear_rms, 3), view.linear_rms),
-                    Cell::value(number(100.0 * view.relative_rms, 3), view.relative_rms),
-                    Cell::psnr(view.psnr),
-                    Cell::score(view.ssim, 4),
-                    Cell::score(view.flip, 4),
-                ],
-            );
-        }
-    }
-    table.html("by-view")
-}
-
-/// The constants of each case: how those that are left make up for what is missing.
-fn constants(ablation: &Ablation) -> String {
-    let names: Vec<&str> = ablation
-        .rows
-        .first()
-        .map(|row| row.constants.iter().map(|c| c.name.as_str()).collect())
-        .unwrap_or_default();
-    let columns: Vec<(&str, &str)> = std::iter::once(("left out", "which effects or terms"))
-        .chain(names.iter().map(|name| (*name, "its fitted value")))
-        .chain([("best start.", "which start's end was kept, and of how many")])
-        .collect();
-    let mut table = Table::new(&columns);
-    for row in &ablation.rows {
-        let class = if row.left_out.left_out.is_empty() { "reference" } else { "" };
-        let cell = |name: &&str| match row.constants.iter().find(|constant| constant.name == **name) {
-            None => Cell::none(),
-            Some(constant) => {
-                let error =
-                    constant.std_error.map_or_else(String::new, |error| format!(" ± {}", number(error, 2)));
-                let html = format!("{}<span class=\"pm\">{error}</span>", number(constant.value, 4));
-                Cell::value(html, constant.value)
-            }
-        };
-        let best = row.starts.as_ref().map_or_else(Cell::none, |starts| Cell::text(&starts.words()));
-        let cells: Vec<Cell> = std::iter::once(Cell::text(&row.left_out.name()))
-            .chain(names.iter().map(cell))
-            .chain([best])
-            .collect();
-        table.row(class, &cells);
-    }
-    table.html("by-constant")
-}
-
 /// Each part's views, those that matter most first.
 fn pictures(ablation: &Ablation, cases: &[Row]) -> Result<String, String> {
     let mut single: Vec<&Row> = cases.iter().filter(|row| row.left_out.left_out.len() == 1).collect();
     single.sort_by(|a, b| b.change.loss.total_cmp(&a.change.loss));
-    let before: Vec<Picture> =
-        ablation.references.iter().map(|reference| Picture::of_image(&reference.image)).collect();
+    let all = ablation.references.iter().chain(&ablation.held_out);
+    let before: Vec<Picture> = all.map(|reference| Picture::of_image(&reference.image)).collect();
     let case = |(i, row): (usize, &&Row)| -> Result<String, String> {
         let name = row.left_out.name();
         let without = format!("without {name}");
         let mut views = String::new();
-        for (view, before) in row.views.iter().zip(&before) {
+        let held = row.held_out.iter().flat_map(|held| &held.views).map(|view| (view, " (held out)"));
+        let all = row.views.iter().map(|view| (view, "")).chain(held);
+        for ((view, note), before) in all.zip(&before) {
             let Some((image, flip)) = &view.pictures else { continue };
             let words = ["reference", without.as_str(), "wipe in the reference"];
             let triple = triple(&view.view, before, image, flip, words)?;
             let _ = write!(
                 views,
-                "<article class=\"view\"><header><h3>{}</h3></header>{triple}</article>",
+                "<article class=\"view\"><header><h3>{}{note}</h3></header>{triple}</article>",
                 escape(&view.view)
             );
         }
@@ -329,15 +198,24 @@ fn pictures(ablation: &Ablation, cases: &[Row]) -> Result<String, String> {
     Ok(single.par_iter().enumerate().map(case).collect::<Result<Vec<_>, _>>()?.concat())
 }
 
+/// How several scenes are taken together.
+const SEVERAL: &str = " A part is left out of all scenes at once, and losses are means over the weighted pixels and channels of all. \
+                       Samples and bakes are added up; what a sample or a fragment costs is the mean over all samples; the \
+                       renderer draws the first scene.";
+/// What held-out views are for.
+const HELD_OUT: &str = " What is held out is in no fit, and no score or change but its own is of it.";
+
 fn method(scene: &str, ablation: &Ablation, full: &Row) -> String {
     let reference = match ablation.source {
         Source::Targets => "the scene's target images",
         Source::Model => "the whole model's images: the scene names no target",
     };
+    let held_out: Vec<&str> = ablation.held_out.iter().map(|reference| reference.name.as_str()).collect();
     let effects: Vec<&str> = ablation.setup.effects.iter().map(Effect::name).collect();
     let rows = [
         ("software", format!("skinfit {}", env!("CARGO_PKG_VERSION"))),
         ("scene", scene.to_owned()),
+        ("held out", held_out.join(", ")),
         ("reference", reference.to_owned()),
         ("constants", ablation.constants.clone()),
         ("form", ablation.setup.form.name().to_owned()),
@@ -349,13 +227,16 @@ fn method(scene: &str, ablation: &Ablation, full: &Row) -> String {
         ("threads", rayon::current_num_threads().to_string()),
         ("instructions", crate::simd::instructions()),
     ];
-    let rows: Vec<(String, String)> = rows.into_iter().map(|(name, text)| (name.to_owned(), text)).collect();
+    let told = rows.into_iter().filter(|(name, _)| *name != "held out" || !held_out.is_empty());
+    let rows: Vec<(String, String)> = told.map(|(name, text)| (name.to_owned(), text)).collect();
+    let note = if held_out.is_empty() { "" } else { HELD_OUT };
+    let several = if ablation.scenes.is_empty() { "" } else { SEVERAL };
     format!(
         "<p>A case and the whole model are compared on the same pixels. The standard error of the loss's change is that of sums over \
          blocks of pixels (sides of 8, 16, 32, … pixels; the greatest error counts), as neighbouring pixels err alike. It tells chance \
          in these images from a change that other images of the kind would show too. Times are medians of rounds in which the case and \
          the whole model take turns; ± is half the distance of the quartiles. Operations are the shader planner's, of the exact \
-         shader; bytes are a sample's attributes and the texels of its lookups.</p>{}",
+         shader; bytes are a sample's attributes and the texels of its lookups.{several}{note}</p>{}",
         facts(&rows)
     )
 }

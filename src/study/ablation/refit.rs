@@ -45,7 +45,7 @@ impl Starts {
 
 /// A fit whose standard errors know which residuals are neighbours.
 pub(super) fn errors_of(subject: &Subject) -> FitOptions {
-    FitOptions { widths: subject.observed.image_widths(), ..FitOptions::default() }
+    FitOptions { widths: subject.scenes.widths(), ..FitOptions::default() }
 }
 
 /// The best fit of what is free in `subject`: from the scene's `own` start, from [`DRAWN`] drawn about it and, of a model

@@ -1,14 +1,13 @@
 //! The units in which the page and the terminal tell what a part is worth and what it costs: shares of the whole
 //! model's, in percent.
 
-use super::Row;
 use crate::timing::Timed;
 
-/// The change of a case's loss, in percent of the whole model's. `None` where that is next to nothing, of which
+/// The change of a case's loss, in percent of the `whole` model's. `None` where that is next to nothing, of which
 /// percentages say nothing: the change itself is told then.
-pub(super) fn loss_percent(change: f64, full: &Row) -> Option<f64> {
-    let percent = 100.0 * change / full.loss;
-    (full.loss > 0.0 && percent.abs() < 1e4).then_some(percent)
+pub(super) fn loss_percent(change: f64, whole: f64) -> Option<f64> {
+    let percent = 100.0 * change / whole;
+    (whole > 0.0 && percent.abs() < 1e4).then_some(percent)
 }
 
 /// What a case needs less than the whole model, in percent.

@@ -37,22 +37,23 @@ use check::{Verdict, check_against, check_frame};
 use demands::{Circumstances, DEMANDS};
 use evaluate::{Evaluator, Evaluators};
 use kept::KeptCase;
-use lights::LightBox;
+use lights::{LightBox, LightKind};
 use objectives::{Cpu, EngineEvaluator};
 use plain::Plain;
 use reference::{FEW, Reference};
 use report::Report;
+use scene::SweptScene;
 use search::Hunt;
 
 /// What is studied.
 #[derive(Debug)]
 pub struct Study {
-    /// The lights, with a scene's own where one is swept.
+    /// The lights of cases that are of no scene.
     pub lights: LightBox,
     /// Cases from files.
     pub kept: Vec<KeptCase>,
-    /// A scene's samples.
-    pub swept: Vec<Batch>,
+    /// The scenes whose samples are tried, and in whose light kept cases are that say so.
+    pub scenes: Vec<SweptScene>,
     /// What random cases are drawn from.
     pub seed: u64,
     /// How many of them.
@@ -76,8 +77,8 @@ impl Study {
         hard::cases().len()
             + hard::frames().len()
             + DEMANDS.len()
-            + self.kept.len()
-            + self.swept.len()
+            + self.kept.iter().map(|case| self.lights_of(case).len()).sum::<usize>()
+            + self.scenes.iter().map(|scene| scene.batches.len()).sum::<usize>()
             + self.cases
             + lit::batches(self.cases)
     }
@@ -88,7 +89,7 @@ impl Study {
         let names = evaluators.iter().map(Evaluator::name).collect();
         let mut report = Report::new(names, self.seed);
         for case in hard::cases() {
-            let verdicts = self.verdicts(evaluators, &case.batch, &case.holds);
+            let verdicts = verdicts(evaluators, &self.lights, &case.batch, &case.holds);
             report.add((case.name, case.hard), case.batch.fragments.len(), verdicts);
             progress(1);
         }
@@ -105,36 +106,54 @@ impl Study {
             progress(1);
         }
         for case in &self.kept {
-            let verdicts = self.verdicts(evaluators, &case.batch, &[]);
-            let name = format!("kept: {}", case.name);
-            report.add((&name, "found by a search"), case.batch.fragments.len(), verdicts);
-            progress(1);
+            for (lights, scene) in self.lights_of(case) {
+                let verdicts = verdicts(evaluators, lights, &case.batch, &[]);
+                let place = scene.map_or_else(String::new, |scene| format!(" (in {scene})"));
+                let name = format!("kept: {}{place}", case.name);
+                report.add((&name, "found by a search"), case.batch.fragments.len(), verdicts);
+                progress(1);
+            }
         }
-        let mut swept = Hunt::new(evaluators, &self.lights);
-        for batch in &self.swept {
-            swept.batch(batch);
-            progress(1);
+        for scene in &self.scenes {
+            let mut swept = Hunt::new(evaluators, &scene.lights);
+            for batch in &scene.batches {
+                swept.batch(batch);
+                progress(1);
+            }
+            report.add_scene(self.called(scene), swept);
         }
         let mut hunt = Hunt::new(evaluators, &self.lights);
         hunt.random(self.seed, self.cases, progress);
         report.lit = lit::search(evaluators, &self.lights, (self.seed, self.cases), progress);
-        report.swept = swept.tallies;
         report.random = hunt.tallies;
-        report.found = swept.found.into_iter().chain(hunt.found).collect();
+        report.found.extend(hunt.found);
         report
     }
 
-    fn verdicts(
-        &self,
-        evaluators: &Evaluators,
-        batch: &Batch,
-        holds: &[hard::Holds],
-    ) -> Vec<Option<Verdict>> {
-        let reference = Reference::new(&self.lights, batch, FEW);
-        let check =
-            |evaluator: &dyn Evaluator| check_against(evaluator, &self.lights, batch, holds, &reference);
-        evaluators.iter().map(|evaluator| Some(check(evaluator))).collect()
+    /// A scene's name, where there are several.
+    fn called<'a>(&self, scene: &'a SweptScene) -> Option<&'a str> {
+        (self.scenes.len() > 1).then_some(scene.name.as_str())
     }
+
+    /// The lights that a kept case is tried in, and of several scenes the one that they are of.
+    fn lights_of(&self, case: &KeptCase) -> Vec<(&LightBox, Option<&str>)> {
+        if case.batch.setting.lights != LightKind::Scene || self.scenes.is_empty() {
+            return vec![(&self.lights, None)];
+        }
+        self.scenes.iter().map(|scene| (&scene.lights, self.called(scene))).collect()
+    }
+}
+
+/// How each evaluator does in a batch.
+fn verdicts(
+    evaluators: &Evaluators,
+    lights: &LightBox,
+    batch: &Batch,
+    holds: &[hard::Holds],
+) -> Vec<Option<Verdict>> {
+    let reference = Reference::new(lights, batch, FEW);
+    let check = |evaluator: &dyn Evaluator| check_against(evaluator, lights, batch, holds, &reference);
+    evaluators.iter().map(|evaluator| Some(check(evaluator))).collect()
 }
 
 /// How far an engine is from what is demanded, as a verdict.

@@ -1,11 +1,12 @@
 //! What a study of stability found: for people, and as JSON.
 
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
 use serde::Serialize;
 
 use super::check::Verdict;
-use super::search::{Found, Tally};
+use super::search::{Found, Hunt, Tally};
 
 /// One case on every evaluator.
 #[derive(Clone, Debug)]
@@ -31,14 +32,26 @@ pub struct Report {
     pub random: Vec<Tally>,
     /// For each evaluator that is an engine, the random search of lights.
     pub lit: Vec<Tally>,
-    /// For each evaluator, the scene's samples.
+    /// For each evaluator, the samples of all scenes.
     pub swept: Vec<Tally>,
+    /// The same of each scene, by its name, where there are several.
+    pub scenes: Vec<(String, Vec<Tally>)>,
     /// New hard cases.
     pub found: Vec<Found>,
     /// What the search was drawn from.
     pub seed: u64,
     /// What is missing, loudly.
     pub missing: Vec<String>,
+}
+
+/// What was tried beside hard cases.
+struct Search<'a> {
+    /// What it is called where it failed.
+    what: String,
+    /// What its row is called.
+    row: String,
+    /// How each evaluator did.
+    tallies: &'a [Tally],
 }
 
 impl Report {
@@ -76,6 +89,37 @@ impl Report {
         }
     }
 
+    /// Take note of what became of a scene's samples; `name` where there are several scenes.
+    pub fn add_scene(&mut self, name: Option<&str>, hunt: Hunt<'_>) {
+        for (all, own) in self.swept.iter_mut().zip(&hunt.tallies) {
+            all.merge(own);
+        }
+        let place = |failure: String| match name {
+            Some(name) => format!("in {name}: {failure}"),
+            None => failure,
+        };
+        self.found
+            .extend(hunt.found.into_iter().map(|found| Found { failure: place(found.failure), ..found }));
+        self.scenes.extend(name.map(|name| (name.to_owned(), hunt.tallies)));
+    }
+
+    /// The searches; of several scenes each one's samples by themselves.
+    fn searches(&self) -> Vec<Search<'_>> {
+        let of =
+            |what: &str, row: &str, tallies| Search { what: what.to_owned(), row: row.to_owned(), tallies };
+        let mut all = vec![
+            of("random search", "random search", self.random.as_slice()),
+            of("random lights", "random lights", &self.lit),
+        ];
+        if self.scenes.is_empty() {
+            all.push(of("scene", "the scene's samples", &self.swept));
+        }
+        for (name, tallies) in &self.scenes {
+            all.push(of(&format!("scene {name}"), &format!("samples of {name}"), tallies));
+        }
+        all
+    }
+
     /// Everything that is not finite or out of tolerance, a line each.
     #[must_use]
     pub fn failures(&self) -> Vec<String> {
@@ -87,9 +131,7 @@ impl Report {
                 }
             }
         }
-        for (what, tallies) in
-            [("random search", &self.random), ("random lights", &self.lit), ("scene", &self.swept)]
-        {
+        for Search { what, tallies, .. } in self.searches() {
             for (tally, evaluator) in tallies.iter().zip(&self.evaluators) {
                 if let Some(failure) = &tally.worst.failure {
                     let Tally { failed, tried, .. } = tally;
@@ -106,7 +148,10 @@ impl Report {
     #[must_use]
     pub fn text(&self) -> String {
         let mut text = String::new();
-        let width = self.rows.iter().map(|row| row.name.len()).max().unwrap_or(0).max(24);
+        let searches = self.searches();
+        let names = self.rows.iter().map(|row| row.name.len());
+        let names = names.chain(searches.iter().map(|search| search.row.len()));
+        let width = names.max().unwrap_or(0).max(24);
         let _ = writeln!(
             text,
             "Worst deviation from the model in f64, as a share of the number (and of what rounding explains):\n"
@@ -127,25 +172,21 @@ impl Report {
         for case in &self.rows {
             row(&case.name, case.verdicts.iter().map(|v| v.as_ref().map_or("-".into(), cell)).collect());
         }
-        let searches = [
-            ("random search", &self.random),
-            ("random lights", &self.lit),
-            ("the scene's samples", &self.swept),
-        ];
-        for (name, tallies) in searches {
+        for Search { row: name, tallies, .. } in searches {
             let cell = |tally: &Tally| if tally.tried == 0 { "-".to_owned() } else { cell(&tally.worst) };
-            row(name, tallies.iter().map(cell).collect());
+            row(&name, tallies.iter().map(cell).collect());
         }
         text.push('\n');
         for (index, name) in self.evaluators.iter().enumerate() {
             let [random, lit, swept] = [&self.random, &self.lit, &self.swept].map(|tallies| &tallies[index]);
             let _ = writeln!(
                 text,
-                "{name}: {} hard cases, {} random ones, {} of lights, {} samples of the scene; {}",
+                "{name}: {} hard cases, {} random ones, {} of lights, {} samples of the {}; {}",
                 self.hard[index],
                 random.tried,
                 lit.tried,
                 swept.tried,
+                if self.scenes.is_empty() { "scene" } else { "scenes" },
                 match self.failed(index) {
                     0 => "none failed".to_owned(),
                     failed => format!("at least {failed} failed"),
@@ -185,6 +226,7 @@ impl Report {
             random: tally(&self.random[i]),
             lights: tally(&self.lit[i]),
             scene: tally(&self.swept[i]),
+            scenes: self.scenes.iter().map(|(name, tallies)| (name.as_str(), tally(&tallies[i]))).collect(),
             cases: self
                 .rows
                 .iter()
@@ -231,7 +273,10 @@ struct OutEngine<'a> {
     hard: usize,
     random: OutTally,
     lights: OutTally,
+    /// Of all scenes.
     scene: OutTally,
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    scenes: BTreeMap<&'a str, OutTally>,
     cases: Vec<OutCase<'a>>,
 }
 

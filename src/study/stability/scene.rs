@@ -1,19 +1,54 @@
 //! A scene's own samples through every evaluator: parameters at each bound, effects one by one.
 
+use std::path::Path;
+
 use super::case::{Batch, FragmentInputs, Setting};
-use super::lights::LightKind;
+use super::lights::{LightBox, LightKind};
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
-use crate::prepare::Sampled;
+use crate::prepare::{PrepareError, PrepareOptions, Sampled};
 use crate::samples::{LANES, ViewSamples};
+use crate::scene::{LoadOptions, Scene};
 
 /// Fragments that are taken of a view.
 const OF_A_VIEW: usize = 128;
 /// Where a parameter has no bound.
 const FAR: f64 = 1e3;
+
+/// A scene whose samples are tried.
+#[derive(Debug)]
+pub struct SweptScene {
+    /// What it is called among several.
+    pub name: String,
+    /// The lights, with its own.
+    pub lights: LightBox,
+    /// Its samples in every setting.
+    pub batches: Vec<Batch>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+impl SweptScene {
+    /// Read, bake and sample the scene at `path`, called `name`; bakes are kept in `cache`.
+    ///
+    /// # Errors
+    /// When a stage refuses its input.
+    pub fn read(name: String, path: &Path, cache: Option<&Path>) -> Result<Self, PrepareError> {
+        let load = LoadOptions { targets: false, ..LoadOptions::default() };
+        let (scene, _) = Scene::load(path, &load)?;
+        let effects = sweepable(scene.effects, scene.environment.is_some());
+        drop(scene);
+        let cache = cache.map(Path::to_owned);
+        let options = PrepareOptions { effects: Some(effects), cache, ..PrepareOptions::default() };
+        let sampled = Sampled::new(path, &options)?;
+        let batches = batches(&sampled, effects);
+        let Sampled { baked, .. } = sampled;
+        Ok(Self { name, batches, lights: LightBox::new(Some(baked.illumination)), warnings: baked.warnings })
+    }
+}
 
 /// Every setting that a scene is swept through, on a share of its samples.
 #[must_use]

@@ -36,6 +36,15 @@ pub struct Tally {
     pub worst: Verdict,
 }
 
+impl Tally {
+    /// Both together.
+    pub fn merge(&mut self, other: &Self) {
+        self.tried += other.tried;
+        self.failed += other.failed;
+        self.worst.merge(other.worst.clone());
+    }
+}
+
 /// Failing cases that are kept of each evaluator: more of them would mostly say the same.
 const KEPT: usize = 10;
 

@@ -12,7 +12,7 @@ use crate::engine::{Objective, Point, Task};
 use crate::model::params::Param;
 
 fn study(seed: u64, cases: usize) -> Study {
-    Study { lights: LightBox::new(None), kept: Vec::new(), swept: Vec::new(), seed, cases, pixels: 10_000 }
+    Study { lights: LightBox::new(None), kept: Vec::new(), scenes: Vec::new(), seed, cases, pixels: 10_000 }
 }
 
 /// The model in f32 with one of its guards taken out.

@@ -135,7 +135,7 @@ fn conclude(
     path: &[(String, usize)],
 ) -> Result<Suggestion, StudyError> {
     let first = judge.whole(sets[path[0].1].effects)?;
-    let (at, form) = (first.observed.start(), first.observed.scene.form);
+    let (at, form) = (first.scenes.start.clone(), first.scenes.first().baked.scene.form);
     let clocks = Clocks::new(&first, &at, options.gpu)?;
     let mut warnings: Vec<String> = clocks.warning.clone().into_iter().collect();
     let (mut steps, mut last) = (Vec::new(), None);
@@ -143,10 +143,10 @@ fn conclude(
         let subject = judge.whole(sets[*set].effects)?;
         let Fitted { point, .. } = judge.fit(&subject)?;
         let (cpu, gpu) = clocks.time(&subject, &point)?;
-        let counts = Counts::new(&subject, &point.params)?;
+        let counts = Counts::new(&subject, &point)?;
         steps.push(Step { what: what.clone(), set: *set, counts, cpu, gpu });
-        warnings.extend(subject.observed.warnings.iter().cloned());
-        last = Some((point, subject.observed.scene.fit.free.clone()));
+        warnings.extend(subject.scenes.first().baked.warnings.iter().cloned());
+        last = Some((point, subject.scenes.first().baked.scene.fit.free.clone()));
     }
     warnings.sort();
     warnings.dedup();

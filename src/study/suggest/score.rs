@@ -4,13 +4,13 @@ use std::path::Path;
 use std::sync::Arc;
 
 use crate::StudyError;
+use crate::engine::Point;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
-use crate::engine::{Point, Task};
 use crate::fit::{self, FitOptions};
 use crate::model::effects::Effects;
 use crate::model::params::{Column, Param};
-use crate::prepare::{Loaded, PrepareOptions, untied};
+use crate::prepare::{Baked, Loaded, PrepareOptions, untied};
 use crate::reference::ReferenceView;
 use crate::shader::{Budget, Facts, plan};
 use crate::subject::Subject;
@@ -43,7 +43,8 @@ impl Judge<'_> {
     /// When a stage refuses its input, or a fit cannot be done.
     pub fn score(&self, effects: Effects) -> Result<(f64, f64), StudyError> {
         let subject = self.subject(effects, Some(1))?;
-        let views = subject.engine.views();
+        let only = subject.scenes.first();
+        let (baked, views) = (&only.baked, subject.scenes.views(only));
         let folds = views.len().min(MOST_FOLDS);
         let mut scores = Vec::new();
         for fold in 0..folds {
@@ -51,20 +52,22 @@ impl Judge<'_> {
             let seen: Vec<ObservedView> =
                 (0..views.len()).filter(|&i| !held(i)).map(|i| views[i].clone()).collect();
             let gains = |of: &dyn Fn(usize) -> bool| -> Vec<f64> {
-                let gains = &subject.observed.gains;
-                (0..views.len()).filter(|&i| of(i)).map(|i| gains.get(i).copied().unwrap_or(1.0)).collect()
+                (0..views.len())
+                    .filter(|&i| of(i))
+                    .map(|i| baked.gains.get(i).copied().unwrap_or(1.0))
+                    .collect()
             };
-            let point = self.fit_views(&subject, seen.into(), gains(&|i| !held(i)))?;
+            let point = self.fit_views(baked, seen.into(), gains(&|i| !held(i)))?;
             // What the fit found, on every view.
             let everywhere = Point { params: point.params, gains: gains(&|_| true) };
             let images = subject.images(&everywhere)?;
             for i in (0..views.len()).filter(|&i| held(i)) {
-                let reference = ReferenceView::new(&subject.observed.scene.views[i], &views[i]);
-                let errors = reference.errors(&images[i], subject.observed.scene.fit.loss);
+                let reference = ReferenceView::new(&baked.scene.views[i], &views[i]);
+                let errors = reference.errors(&images[i], baked.scene.fit.loss);
                 scores.extend(errors.scores.map(|scores| scores.psnr.min(ALIKE)));
             }
         }
-        let scene = &subject.observed.scene;
+        let scene = &baked.scene;
         let planned = plan(&Facts::of_scene(scene, &scene.params, Budget::Exact, false))?;
         let mean = scores.iter().sum::<f64>() / scores.len().max(1) as f64;
         Ok((mean, planned.cost))
@@ -83,18 +86,17 @@ impl Judge<'_> {
     /// # Errors
     /// When it cannot be done.
     pub fn fit(&self, subject: &Subject) -> Result<Fitted, StudyError> {
-        let (views, gains) = (Arc::clone(&subject.observed.views), subject.observed.gains.clone());
-        Ok(Fitted { point: self.fit_views(subject, views, gains)? })
+        Ok(Fitted { point: subject.fit(&FitOptions::default())?.end })
     }
 
     fn fit_views(
         &self,
-        subject: &Subject,
+        baked: &Baked,
         views: Arc<[ObservedView]>,
         gains: Vec<f64>,
     ) -> Result<Point, StudyError> {
-        let engine = CpuEngine::new(Task { views, ..subject.observed.task() })?;
-        let start = Point { gains, ..subject.observed.start() };
+        let engine = CpuEngine::new(baked.task_over(views))?;
+        let start = Point { gains, ..baked.start() };
         let outcome = fit::fit(&engine, &start, &FitOptions::default(), &mut |_| {});
         let scene = || self.scene.display().to_string();
         Ok(outcome.map_err(|error| StudyError::Fit { scene: scene(), error })?.end)
@@ -113,7 +115,7 @@ impl Judge<'_> {
                 scene.quality.samples_per_axis = samples;
             }
         };
-        Subject::new(self.scene, &prepare, None, change)
+        Subject::new(self.scene, &prepare, change)
     }
 }
 

@@ -12,10 +12,10 @@ use crate::engine::cpu::CpuEngine;
 use crate::engine::{Objective as _, Task, Unknown};
 use crate::fit::outcome::Outcome;
 use crate::fit::{FitOptions, SolverKind, fit};
-use crate::prepare::{Observed, PrepareOptions, Sampled};
+use crate::prepare::{Observed, PrepareOptions};
 use crate::scene::Loss;
 use crate::stability::lights::LightBox;
-use crate::stability::scene::{batches, sweepable};
+use crate::stability::scene::SweptScene;
 use crate::stability::{Study, evaluators, kept};
 
 /// Run a job. The figures, but for those that are times, are the same for any number of threads.
@@ -74,17 +74,12 @@ fn fit_figures<'a>(outcome: &Outcome, rmse: f64, view: impl Fn(usize) -> &'a str
 }
 
 fn run_stability(job: &Job, scene: &Path, cache: Option<&Path>) -> Result<Figures, JobError> {
-    let options = PrepareOptions { cache: cache.map(Path::to_owned), ..PrepareOptions::default() };
-    let mut sampled = Sampled::new(scene, &options)?;
-    let effects = sweepable(sampled.scene.effects, sampled.scene.environment.is_some());
-    if effects != sampled.scene.effects {
-        sampled = Sampled::new(scene, &PrepareOptions { effects: Some(effects), ..options })?;
-    }
+    let swept = SweptScene::read(String::new(), scene, cache)?;
     let whole =
         |key: &str, default: u64| usize::try_from(job.whole(key).unwrap_or(default)).unwrap_or(usize::MAX);
     let study = Study {
-        swept: batches(&sampled, effects),
-        lights: LightBox::new(Some(sampled.baked.illumination)),
+        scenes: vec![swept],
+        lights: LightBox::new(None),
         kept: kept::built_in()?,
         seed: job.whole("seed").unwrap_or(0),
         cases: whole("cases", 10_000),

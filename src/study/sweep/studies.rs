@@ -23,10 +23,11 @@ pub(super) fn ablation(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobErr
         pairs: job.is_set("pairs"),
         refit: job.is_set("refit"),
         params: inputs.constants.map(Into::into),
+        hold_out: Vec::new(),
         cache: cache(&inputs),
         gpu: GpuTiming::Never,
     };
-    let found = ablate(inputs.scene, &options)?;
+    let found = ablate(&[inputs.scene.to_owned()], &options)?;
     let figures = Figures::from([("unconverged".to_owned(), found.unconverged().join("; ").into())]);
     Ok(Findings { figures, rows: found.rows.iter().map(case).collect() })
 }
@@ -63,10 +64,11 @@ pub(super) fn tradeoffs(job: &Job, inputs: Inputs<'_>) -> Result<Findings, JobEr
     let options = TradeoffOptions {
         axes: axes.filter_map(|axis| axis.as_str().map(str::to_owned)).collect(),
         params: inputs.constants.map(Into::into),
+        hold_out: Vec::new(),
         cache: cache(&inputs),
         goal: None,
     };
-    let found = tradeoff(inputs.scene, &options, None)?;
+    let found = tradeoff(&[inputs.scene.to_owned()], &options, None)?;
     let rows = found.sweeps.iter().flat_map(|sweep| sweep.settings.iter().map(|s| setting(sweep, s)));
     Ok(Findings { figures: Figures::new(), rows: rows.collect() })
 }

@@ -4,14 +4,54 @@ use serde::Serialize;
 
 use super::bench::Bench;
 pub use super::bench::Rates;
+use super::benches::Benches;
+use super::pooled::pooled;
 use crate::StudyError;
 use crate::model::effects::Silhouette;
 use crate::reference::Difference;
 use crate::scene::Quality;
 use crate::timing::Timed;
 
-/// An approximation.
+/// An approximation, swept over all scenes of a study.
 pub trait Axis: Sync {
+    /// Its name on the command line.
+    fn name(&self) -> &'static str;
+    /// Whether a scene asks for it at all, and several can be taken together.
+    ///
+    /// # Errors
+    /// The reason why not, without a full stop.
+    fn applies(&self, benches: &Benches<'_>) -> Result<(), Idle>;
+    /// Whether a scene file can have its settings, so that some may be chosen.
+    fn settable(&self) -> bool {
+        false
+    }
+    /// Whether it is about fits, which may leave views out.
+    fn fits(&self) -> bool {
+        false
+    }
+    /// About how many seconds [`sweep`](Self::sweep) will take, from the `rates` of each scene and cheap settings tried.
+    ///
+    /// # Errors
+    /// When a stage fails.
+    fn seconds(&self, benches: &Benches<'_>, rates: &[Rates]) -> Result<f64, StudyError>;
+    /// Measure each setting.
+    ///
+    /// # Errors
+    /// When a stage fails.
+    fn sweep(&self, benches: &Benches<'_>) -> Result<Sweep, StudyError>;
+}
+
+/// Why an axis is not swept.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Idle {
+    /// No scene asks for it.
+    Unasked(&'static str),
+    /// The scenes cannot be taken together along it.
+    Apart(&'static str),
+}
+
+/// An approximation that is swept in each scene by itself.
+pub trait SceneAxis: Sync {
     /// Its name on the command line.
     fn name(&self) -> &'static str;
     /// Whether the scene asks for it at all; else why not, without a full stop.
@@ -19,7 +59,14 @@ pub trait Axis: Sync {
     /// # Errors
     /// The reason.
     fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str>;
-    /// Whether a scene file can have its settings, so that some may be chosen.
+    /// Whether two scenes have the same settings along it; else why not, without a full stop.
+    ///
+    /// # Errors
+    /// The reason.
+    fn alike(&self, _: &Bench<'_>, _: &Bench<'_>) -> Result<(), &'static str> {
+        Ok(())
+    }
+    /// As of [`Axis::settable`].
     fn settable(&self) -> bool {
         false
     }
@@ -33,6 +80,37 @@ pub trait Axis: Sync {
     /// # Errors
     /// When a stage fails.
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError>;
+}
+
+/// The scenes that ask for it are swept one after the other, and taken together.
+impl<T: SceneAxis> Axis for T {
+    fn name(&self) -> &'static str {
+        SceneAxis::name(self)
+    }
+
+    fn applies(&self, benches: &Benches<'_>) -> Result<(), Idle> {
+        let mut asked = benches.scenes.iter().filter(|bench| SceneAxis::applies(self, bench).is_ok());
+        let Some(first) = asked.next() else {
+            return SceneAxis::applies(self, benches.first()).map_err(Idle::Unasked);
+        };
+        asked.try_for_each(|other| self.alike(first, other).map_err(Idle::Apart))
+    }
+
+    fn settable(&self) -> bool {
+        SceneAxis::settable(self)
+    }
+
+    fn seconds(&self, benches: &Benches<'_>, rates: &[Rates]) -> Result<f64, StudyError> {
+        let asked = benches.scenes.iter().zip(rates);
+        let asked = asked.filter(|(bench, _)| SceneAxis::applies(self, bench).is_ok());
+        asked.map(|(bench, rates)| SceneAxis::seconds(self, bench, *rates)).sum()
+    }
+
+    fn sweep(&self, benches: &Benches<'_>) -> Result<Sweep, StudyError> {
+        let asked = benches.scenes.iter().filter(|bench| SceneAxis::applies(self, bench).is_ok());
+        let swept = asked.map(|bench| Ok((bench.name.as_str(), SceneAxis::sweep(self, bench)?)));
+        pooled(&swept.collect::<Result<Vec<_>, StudyError>>()?)
+    }
 }
 
 /// What was measured along an axis.
@@ -70,7 +148,7 @@ pub struct Setting {
     pub counts: Vec<(&'static str, f64)>,
     /// Whether the others are measured against it.
     pub reference: bool,
-    /// Whether it is what the scene has at present.
+    /// Whether it is what the scene has at present; of several, what any of them has.
     pub present: bool,
     /// Whether no other setting is both as cheap and as accurate.
     pub pareto: bool,

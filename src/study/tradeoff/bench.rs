@@ -6,64 +6,43 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
+use super::settings::{Settings, Traced};
 use crate::StudyError;
 use crate::bake::rays::RayMesh;
 use crate::bake::{self, Illumination, Ranges};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Task};
-use crate::model::effects::Silhouette;
 use crate::model::evaluate::Setup;
 use crate::model::params::Params;
-use crate::model::texture_filter::TextureFilter;
-use crate::prepare::{Baked, PrepareError, PrepareOptions, Sampled};
+use crate::prepare::{Baked, Loaded, NamedScene, PrepareError, PrepareOptions, Sampled};
 use crate::reference::Difference;
 use crate::render::format::FormatShader;
 use crate::render::image::Image;
 use crate::render::shade::Shader;
 use crate::samples::rows::Rows;
 use crate::samples::{self, Atlas, Hit, PosedSurface, SampleError, SurfaceBakes, ViewSamples, sample_hits};
+use crate::scene::names::names_of;
 use crate::scene::view::View;
-use crate::scene::{Loss, Quality, Scene};
-use crate::subject::shaded;
+use crate::scene::{Loss, Scene};
+use crate::subject::{SampledScene, shaded};
 use crate::timing::seconds_of;
-
-/// The settings that a scene file can have.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settings {
-    /// `[model] silhouette`
-    pub silhouette: Silhouette,
-    /// `[quality]`
-    pub quality: Quality,
-}
-
-/// What of the settings the samples depend on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Traced {
-    silhouette: Silhouette,
-    samples_per_axis: u32,
-    occlusion_rays: u32,
-    texture_filter: TextureFilter,
-}
-
-impl From<Settings> for Traced {
-    fn from(Settings { silhouette, quality }: Settings) -> Self {
-        let Quality { samples_per_axis, occlusion_rays, texture_filter, .. } = quality;
-        Self { silhouette, samples_per_axis, occlusion_rays, texture_filter }
-    }
-}
 
 /// The visible surface, a view each.
 type Surfaces = Arc<Vec<ViewSamples>>;
 
 /// A scene, to be evaluated at any settings.
 pub struct Bench<'a> {
+    /// What it is called among several.
+    pub name: String,
     /// Its file.
     pub path: &'a Path,
     /// As it stands; its samples are `surfaces`.
     pub baked: Baked,
     /// The parameter file, if any.
     pub params: Option<&'a Path>,
+    /// The settings of all scenes of the study, its own among them.
+    pub all: Vec<Settings>,
     /// Its samples as it stands.
     surfaces: Surfaces,
     /// Those of the other settings that were evaluated last: one set of them is a good part of the memory.
@@ -106,10 +85,28 @@ impl<'a> Bench<'a> {
             cache: cache.map(Path::to_owned),
             ..PrepareOptions::default()
         };
-        let Sampled { baked, samples } = Sampled::new(path, &options)?;
+        let [name, ..] = names_of(path);
+        let loaded = Loaded::read(path, &options)?;
+        Self::of(path, NamedScene { name, loaded }, params, cache)
+    }
+
+    /// Bake and sample a scene that was read from `path`.
+    ///
+    /// # Errors
+    /// When a stage refuses its input.
+    pub fn of(
+        path: &'a Path,
+        NamedScene { name, loaded }: NamedScene,
+        params: Option<&'a Path>,
+        cache: Option<&Path>,
+    ) -> Result<Self, StudyError> {
+        let Sampled { baked, samples } = loaded.bake()?.sample()?;
         let surfaces = Arc::new(samples);
         let (last, hits) = (RefCell::default(), RefCell::default());
-        Ok(Self { path, baked, params, surfaces, last, hits, cache: options.cache })
+        let cache = cache.map(Path::to_owned);
+        let mut bench = Self { name, path, baked, params, all: Vec::new(), surfaces, last, hits, cache };
+        bench.all = vec![bench.settings()];
+        Ok(bench)
     }
 
     /// The same scene at other constants, which move neither its mesh nor its samples.
@@ -117,7 +114,8 @@ impl<'a> Bench<'a> {
     pub fn at(&self, params: Params) -> Self {
         let baked = self.baked.clone().with_scene(|scene| scene.params = params);
         let (surfaces, last, hits) = (Arc::clone(&self.surfaces), RefCell::default(), RefCell::default());
-        Self { baked, surfaces, last, hits, cache: self.cache.clone(), ..*self }
+        let (name, all, cache) = (self.name.clone(), self.all.clone(), self.cache.clone());
+        Self { name, all, baked, surfaces, last, hits, cache, ..*self }
     }
 
     /// What its sweeps are made of, measured.
@@ -153,12 +151,12 @@ impl<'a> Bench<'a> {
         self.baked.start()
     }
 
-    /// The scene as it stands at its own start values, to be fitted: constants of an earlier fit would be the answer
-    /// already.
+    /// The scene as it stands at its own start values, to be fitted but for the marked views: constants of an earlier fit
+    /// would be the answer already.
     ///
     /// # Errors
     /// When a stage refuses its input.
-    pub fn to_fit(&self) -> Result<Sampled, StudyError> {
+    pub fn to_fit(&self, marked: &[bool]) -> Result<SampledScene, StudyError> {
         let baked = match self.params {
             None => self.baked.clone(),
             Some(_) => {
@@ -167,7 +165,10 @@ impl<'a> Bench<'a> {
                 Baked::new(self.path, &options)?
             }
         };
-        Ok(Sampled { baked, samples: self.surfaces.to_vec() })
+        let kept = self.surfaces.iter().zip(marked).filter(|(_, marked)| !**marked);
+        let samples: Vec<ViewSamples> = kept.map(|(samples, _)| samples.clone()).collect();
+        let (baked, held) = baked.hold_out(marked)?;
+        Ok(SampledScene { name: self.name.clone(), sampled: Sampled { baked, samples }, held })
     }
 
     /// The scene with these settings.
@@ -217,7 +218,7 @@ impl<'a> Bench<'a> {
         }
         // These go first: there is no need of both.
         self.last.replace(None);
-        let occluded = Traced { occlusion_rays: own.occlusion_rays, ..settings } == own;
+        let occluded = settings.is_but_for_occlusion(own);
         // What is found of the sky follows from the same rays.
         let occluded = occluded && bakes.sky.is_none();
         let made = if occluded { self.occluded(scene, bakes)? } else { traced(scene, bakes)? };
@@ -319,7 +320,7 @@ impl Evaluated {
     pub fn images(&self, point: &Point) -> Result<Vec<Image>, StudyError> {
         let samples: Vec<&ViewSamples> = self.samples.iter().collect();
         let shader = Shader::new(self.setup(), &self.illumination, &point.params)?;
-        Ok(shaded(&self.scene, &shader, &samples, &point.gains))
+        Ok(shaded(&self.scene, &self.scene.views, &shader, (&samples, &point.gains)))
     }
 
     /// An engine over the samples that does every lookup anew, as a renderer does; its targets are black.

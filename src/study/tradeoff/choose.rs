@@ -8,7 +8,8 @@
 use serde::Serialize;
 
 use super::axis::{Choose, Setting, Sweep};
-use super::bench::{Bench, Settings};
+use super::benches::{Benches, difference};
+use super::settings::Settings;
 use crate::StudyError;
 use crate::reference::Difference;
 use crate::report::number;
@@ -29,7 +30,7 @@ pub struct Choice {
     pub goal: String,
     /// The setting along each axis.
     pub settings: Vec<(&'static str, String)>,
-    /// What a scene file must say.
+    /// What a scene file must say; of several scenes each one's.
     #[serde(skip)]
     pub keys: Vec<Choose>,
     /// The error of all settings together, measured.
@@ -63,12 +64,12 @@ const TIGHTER: f64 = 0.8;
 ///
 /// # Errors
 /// When a stage fails.
-pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Answer, StudyError> {
+pub fn choose(benches: &Benches<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Answer, StudyError> {
     let axes: Vec<Vec<&Setting>> = sweeps.iter().map(candidates).filter(|axis| !axis.is_empty()).collect();
     let names: Vec<&'static str> =
         sweeps.iter().filter(|sweep| !candidates(sweep).is_empty()).map(|sweep| sweep.axis).collect();
     let references: Vec<&Setting> = sweeps.iter().flat_map(reference).collect();
-    let exact = bench.evaluate(settings(bench, &references))?.images(&bench.point())?;
+    let exact = benches.images(&|own| settings(own, &references))?;
     let mut asked = match goal {
         Goal::Within(error) => error,
         Goal::Seconds(_) => f64::INFINITY,
@@ -82,8 +83,7 @@ pub fn choose(bench: &Bench<'_>, sweeps: &[Sweep], goal: Goal) -> Result<Answer,
             }
         };
         let Some(found) = found else { break };
-        let error =
-            Difference::of_all(&exact, &bench.evaluate(settings(bench, &found))?.images(&bench.point())?);
+        let error = difference(&exact, &benches.images(&|own| settings(own, &found))?);
         let (seconds, foretold) = sums(&found);
         if matches!(goal, Goal::Within(most) if error.relative > most) {
             least = least.min(error.relative);
@@ -138,8 +138,7 @@ fn reference(sweep: &Sweep) -> Option<&Setting> {
 }
 
 /// The scene's own settings with these in their place.
-fn settings(bench: &Bench<'_>, chosen: &[&Setting]) -> Settings {
-    let mut settings = bench.settings();
+fn settings(mut settings: Settings, chosen: &[&Setting]) -> Settings {
     for choose in chosen.iter().filter_map(|setting| setting.choose) {
         match choose {
             Choose::Quality(knob, value) => *knob.of(&mut settings.quality) = value,

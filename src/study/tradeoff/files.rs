@@ -12,10 +12,18 @@ use crate::StudyError;
 use crate::leftovers::Leftovers;
 use crate::output::{self, OutputError};
 use crate::reference::{psnr_in_csv, psnr_in_words};
+use crate::report::SCENES;
 use crate::timing::Timed;
 
-/// What the CLI adds: the scene with what was chosen.
-pub const CHOSEN: &str = "scene.toml";
+/// What the CLI adds where settings were chosen: each scene with them.
+#[must_use]
+pub fn chosen(tradeoff: &Tradeoff) -> Vec<String> {
+    match (tradeoff.choice(), tradeoff.scenes.as_slice()) {
+        (None, _) => Vec::new(),
+        (Some(_), []) => vec!["scene.toml".to_owned()],
+        (Some(_), scenes) => scenes.iter().map(|scene| format!("{SCENES}/{scene}.toml")).collect(),
+    }
+}
 
 /// Write `results.csv`, `results.json`, `report.html` and a plot for each axis, `<axis>.svg`; what an earlier
 /// tradeoff left there and this one does not write anew goes. What was written.
@@ -31,7 +39,7 @@ pub fn write(folder: &Path, scene: &str, tradeoff: &Tradeoff) -> Result<Vec<Path
     ];
     files.extend(tradeoff.sweeps.iter().map(plot));
     let mut names: Vec<String> = files.iter().map(|(name, _)| name.clone()).collect();
-    names.extend(tradeoff.choice().map(|_| CHOSEN.to_owned()));
+    names.extend(chosen(tradeoff));
     let json = json(scene, tradeoff, &names).map_err(|e| OutputError::new(folder, &e))?;
     files.push(("results.json".to_owned(), json));
     let mut written = Vec::new();
@@ -80,6 +88,10 @@ fn json(scene: &str, tradeoff: &Tradeoff, files: &[String]) -> Result<String, se
     #[derive(Serialize)]
     struct File<'a> {
         scene: &'a str,
+        #[serde(skip_serializing_if = "<[String]>::is_empty")]
+        scenes: &'a [String],
+        #[serde(skip_serializing_if = "<[String]>::is_empty")]
+        held_out: &'a [String],
         axes: &'a [Sweep],
         choice: Option<&'a Choice>,
         missed: Option<&'a Missed>,
@@ -88,10 +100,10 @@ fn json(scene: &str, tradeoff: &Tradeoff, files: &[String]) -> Result<String, se
         warnings: &'a [String],
         files: &'a [String],
     }
-    let Tradeoff { sweeps, warnings, pending, .. } = tradeoff;
+    let Tradeoff { scenes, held_out, sweeps, warnings, pending, .. } = tradeoff;
     let (choice, missed) = (tradeoff.choice(), tradeoff.missed());
-    Ok(serde_json::to_string_pretty(&File { scene, axes: sweeps, choice, missed, pending, warnings, files })?
-        + "\n")
+    let file = File { scene, scenes, held_out, axes: sweeps, choice, missed, pending, warnings, files };
+    Ok(serde_json::to_string_pretty(&file)? + "\n")
 }
 
 /// The tables on standard output.

@@ -9,10 +9,14 @@ use crate::report::page::{Cell, Page, Table, escape, facts, section, tile};
 use crate::report::plot::{Dot, Joined, Plot};
 use crate::report::{count, number, seconds};
 use crate::timing::Timed;
-use crate::titles::title;
+use crate::titles::{title, title_of_several};
 
 /// Errors of so much of the image's root mean square are told of each axis.
 const TOLD: [f64; 2] = [0.01, 0.001];
+
+/// How several scenes are taken together.
+const TOGETHER: &str =
+    " Several scenes are taken together: errors are those of all of their views, seconds are added up.";
 
 /// `report.html` of a tradeoff of the scene of that name.
 #[must_use]
@@ -39,11 +43,17 @@ pub fn page(scene: &str, tradeoff: &Tradeoff) -> String {
     for sweep in &tradeoff.sweeps {
         main += &section(sweep.axis, sweep.title, &axis(sweep));
     }
-    main += &section("method", "How it was measured", &method(scene));
-    let lead = "Each approximation swept by itself, all else as the scene has it. The error is the root mean square difference of the \
-                images in linear radiance, relative to the reference's own root mean square, over all views; the cost is beside it."
-        .to_owned();
-    Page { kind: "tradeoff", title: &title(scene), lead, tiles: tiles(tradeoff), main }.html()
+    main += &section("method", "How it was measured", &method(scene, tradeoff));
+    let together = if tradeoff.scenes.is_empty() { "" } else { TOGETHER };
+    let lead = format!(
+        "Each approximation swept by itself, all else as the scene has it. The error is the root mean square difference of the \
+                images in linear radiance, relative to the reference's own root mean square, over all views; the cost is beside it.{together}"
+    );
+    let title = match tradeoff.scenes.as_slice() {
+        [] => title(scene),
+        scenes => title_of_several(scenes),
+    };
+    Page { kind: "tradeoff", title: &title, lead, tiles: tiles(tradeoff), main }.html()
 }
 
 fn tiles(tradeoff: &Tradeoff) -> String {
@@ -263,14 +273,17 @@ fn traces(sweep: &Sweep) -> String {
     format!("<h3>The loss on the way</h3>{}{}", plot.svg(), plot.legend())
 }
 
-fn method(scene: &str) -> String {
+fn method(scene: &str, tradeoff: &Tradeoff) -> String {
+    let held_out = tradeoff.held_out.join(", ");
     let rows = [
         ("software", format!("skinfit {}", env!("CARGO_PKG_VERSION"))),
         ("scene", scene.to_owned()),
+        ("left out of fits", held_out.clone()),
         ("threads", rayon::current_num_threads().to_string()),
         ("instructions", crate::simd::instructions()),
-    ]
-    .map(|(name, text)| (name.to_owned(), text));
+    ];
+    let told = rows.into_iter().filter(|(_, text)| !text.is_empty());
+    let rows: Vec<(String, String)> = told.map(|(name, text)| (name.to_owned(), text)).collect();
     format!(
         "<p>Times are of rounds in which all settings of an axis take turns, after one that warms up: of bakes, traces and passes the \
          least, of fits the median, with the rounds' quartiles beside them; what takes more than 3 s is run once. Counts \

@@ -167,6 +167,53 @@ fn a_second_ablation_leaves_nothing_of_the_first_and_no_other_command_s_results_
 }
 
 #[test]
+fn what_is_held_out_tells_a_part_that_only_overfits() {
+    let sandbox = Sandbox::new();
+    // Of two views one shows the hilite, and the other does not.
+    let render = ["render", "scene.toml", "--engine", "cpu", "--params", "truth.toml", "--set", "hilite=0"];
+    sandbox.run(&[&render[..], &["--view", "side", "-o", "targets/side.exr"]].concat()).done();
+    let ablate = ["ablate", "scene.toml", "--gpu", "never", "-o"];
+    let ran = sandbox.run(&[&ablate[..], &["held", "--hold-out", "side"]].concat()).done();
+    let rows = rows(&sandbox, "held");
+    let views = |row: &Value| -> Vec<String> {
+        row["views"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|view| view["view"].as_str().unwrap().to_owned())
+            .collect()
+    };
+    for row in rows.values() {
+        assert_eq!((views(row), views(&row["held_out"])), (vec!["front".into()], vec!["side".into()]));
+    }
+    // The view that is fitted is the model's own; what its fit finds is wrong for the other by the hilite, and by that alone.
+    assert!(loss(&rows[""]) < 1e-9 && loss(&rows[""]["held_out"]) > 1e-4, "{}", rows[""]);
+    let change = |row: &Value| row["change"]["loss"].as_f64().unwrap();
+    let hilite = &rows["hilite"];
+    assert!(change(hilite) > 0.0 && change(&hilite["held_out"]) < 0.0, "{hilite}");
+    assert!(hilite["held_out"]["psnr_change"].as_f64().unwrap() > 0.0, "{hilite}");
+    assert_eq!(rows[""]["held_out"]["psnr_change"].as_f64(), Some(0.0));
+    let head = ran.out.lines().next().unwrap();
+    assert!(head.contains("bytes, %    held out       t PSNR, dB  bakes saved"), "{head}");
+    let csv = sandbox.text("held/results.csv");
+    let (head, lines) = csv.split_once('\n').unwrap();
+    assert!(head.ends_with(",best_start,held_out,psnr_change_db"), "{head}");
+    assert!(lines.lines().all(|line| line.matches(',').count() == head.matches(',').count()), "{csv}");
+    let of = |start: &str| lines.lines().filter(|line| line.starts_with(start)).collect::<Vec<_>>();
+    let names: Vec<&str> = of("hilite,").iter().map(|line| line.split(',').nth(1).unwrap()).collect();
+    assert_eq!(names, ["all", "front", "held out", "side"]);
+    assert!(of("hilite,held out,")[0].contains(",true,") && of("hilite,front,")[0].ends_with(",false,"));
+    let page = sandbox.text("held/report.html");
+    assert!(page.contains(">only overfits</td>") && page.contains("matched no worse without <b>"), "{page}");
+    assert!(sandbox.path("held/side_without_hilite.png").exists());
+    // Nothing of this is there unless it is asked for.
+    sandbox.run(&[&ablate[..], &["whole"]].concat()).done();
+    assert!(self::rows(&sandbox, "whole")[""].get("held_out").is_none());
+    assert!(sandbox.text("whole/results.csv").lines().next().unwrap().ends_with(",best_start"));
+    assert!(!sandbox.text("whole/report.html").contains("held out"));
+}
+
+#[test]
 fn a_page_is_called_by_the_scenes_folder() {
     let sandbox = small();
     sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--gpu", "never"]).done();
@@ -278,16 +325,16 @@ fn the_sunrise_is_fitted_again_as_well_as_from_its_own_start() {
     std::fs::write(&scene, scene_text(&data.canonicalize().unwrap(), "lps_sunrise")).unwrap();
     let cache = Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics");
     let options = PrepareOptions { fit: true, cache: Some(cache), ..PrepareOptions::default() };
-    let whole = Subject::new(&scene, &options, None, |_| {}).unwrap();
+    let whole = Subject::new(&scene, &options, |_| {}).unwrap();
     let end = whole.fit(&FitOptions::default()).unwrap().end;
     // Without it, the valley that the whole fit's end lies in was the higher one.
-    let effects = whole.observed.scene.effects.without(Effect::SideSpecular);
+    let effects = whole.scenes.first().baked.scene.effects.without(Effect::SideSpecular);
     let options = PrepareOptions { effects: Some(effects), ..options };
-    let subject = Subject::new(&scene, &options, None, |loaded| {
+    let subject = Subject::new(&scene, &options, |loaded| {
         loaded.scene.fit.free.retain(|column| column.param.asked_for(effects));
     })
     .unwrap();
-    let own = subject.observed.start();
+    let own = subject.scenes.start.clone();
     let plain = subject.fit(&FitOptions::default()).unwrap().loss_end;
     let (refitted, starts) = refit(&subject, Some(&end), &own).unwrap();
     println!("by a plain fit {plain:e}, again {:e}: {starts:?}", refitted.loss_end);
@@ -341,6 +388,12 @@ fn what_is_refused_leaves_no_folder() {
     let before = sandbox.files();
     sandbox.run(&["ablate", "none.toml", "-o", "parts"]).refused(&["none.toml: there is no such file"]);
     sandbox.run(&["ablate", "scene.toml", "-o", "parts", "--params", "none.toml"]).refused(&["none.toml"]);
+    let ablate = ["ablate", "scene.toml", "-o", "parts", "--hold-out"];
+    sandbox
+        .run(&[&ablate[..], &["sid"]].concat())
+        .refused(&["no view `sid` with a target", "Did you mean `side`?"]);
+    let both = [&ablate[..], &["front", "--hold-out", "side"]].concat();
+    sandbox.run(&both).refused(&["nothing is left to fit", "Leave one of them in"]);
     sandbox.write("file", b"in the way");
     sandbox.run(&["ablate", "scene.toml", "-o", "file"]).refused(&["file: cannot be written"]);
     sandbox.remove("file");

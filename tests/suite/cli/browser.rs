@@ -202,6 +202,12 @@ fn pages_work_in_a_browser() {
         let colours = screenshot(browser, &parts, &format!("ablation_{width}.png"), width);
         assert!(colours > 300, "{colours} colours");
     }
+    let held = ["ablate", "scene.toml", "-o", "held", "--gpu", "never", "--refit", "--hold-out", "side"];
+    sandbox.run(&held);
+    let held = sandbox.path("held/report.html");
+    check(browser, &held, &["cases", "by-held-out", "by-view", "by-constant"], true, true);
+    let colours = screenshot(browser, &held, "ablation_held_out.png", 1200);
+    assert!(colours > 300, "{colours} colours");
     // Without scripts tables, plots and pictures stay. (The browser takes no screenshot with scripts off, so
     // they are taken out.)
     let html = sandbox.text("parts/report.html");

@@ -26,7 +26,7 @@ const LIGHTS: [(&str, [&str; 2]); 3] = [
 ];
 
 /// A folder with three scenes of one skin, and with targets that the program renders of them.
-fn lit() -> Sandbox {
+pub(super) fn lit() -> Sandbox {
     let sandbox = Sandbox::new();
     for (name, [truth, start]) in LIGHTS {
         let scene = SCENE
@@ -223,9 +223,12 @@ fn scenes_that_are_no_one_skin_are_refused_and_leave_nothing() {
     refused(&["noon.toml", "night.toml", "--hold-out", "front", "--hold-out", "side"], &["nothing is left"]);
     refused(&["noon.toml", "--free", "hilite,hilite"], &["--free lists hilite twice"]);
     assert!(sandbox.files() == before, "files were left");
+    let ran = sandbox.run(&["suggest", "noon.toml", "night.toml", "-o", "deep/run"]);
+    let takers = "`fit`, `ablate`, `tradeoff` and `stability` alone take several";
+    ran.refused(&["night.toml: this command takes one scene", takers]);
     for command in ["ablate", "tradeoff"] {
-        let ran = sandbox.run(&[command, "noon.toml", "night.toml", "-o", "deep/run"]);
-        ran.refused(&["night.toml: this command takes one scene", "`skinfit fit` alone takes several"]);
+        let ran = sandbox.run(&[command, "noon.toml", "other_loss.toml", "-o", "deep/run"]);
+        ran.refused(&["other_loss.toml: it cannot be fitted as one skin with noon.toml", "its loss differs"]);
     }
     assert!(sandbox.files() == before, "files were left");
     // What the command line says of all scenes makes them one.

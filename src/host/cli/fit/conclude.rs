@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::Arguments;
 use super::evidence::evidence;
-use super::scenes::{Part, Scenes};
+use super::scenes::Scenes;
 use super::solve::Solving;
 use super::words::{Times, advice, advice_on_maps, tell_run};
 use crate::cli::fitted_scene::{Changes, Start};
@@ -19,6 +19,7 @@ use crate::fit::params_file::{Origin, ParamsFile, SceneValues};
 use crate::model::choices::Choices;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
+use crate::prepare::JointScene;
 use crate::report::{self, RunInfo, SCENES, ViewEvidence};
 use crate::scene::Scene;
 
@@ -52,7 +53,7 @@ pub(super) fn conclude(
         };
         let maps = maps.map_or(&[][..], |left| &left.named);
         named.extend(folder.write_scene(
-            &part.path,
+            part.path(),
             &file,
             Changes { maps, ..changes(arguments, scenes, part) },
         )?);
@@ -90,7 +91,7 @@ pub(super) fn conclude(
 }
 
 /// Where the fit differed from a scene's file.
-fn changes<'a>(arguments: &'a Arguments, scenes: &'a Scenes, part: &'a Part) -> Changes<'a> {
+fn changes<'a>(arguments: &'a Arguments, scenes: &'a Scenes, part: &'a JointScene) -> Changes<'a> {
     let Scene { form, params, fit, .. } = &*part.baked.scene;
     let start = Start { form: *form, params, free: &fit.free };
     // Where maps are fitted, the constants start from what their last round found; of several scenes, from the first's.
@@ -111,7 +112,7 @@ fn write_params(
     outcome: &Outcome,
 ) -> Result<(), Refusal> {
     let Some(first) = scenes.parts.first() else { return Ok(()) };
-    let gains = |part: &Part| {
+    let gains = |part: &JointScene| {
         let fitted = part.baked.scene.views.iter().zip(scenes.point_of(part, &outcome.end).gains);
         // They stand after those that were fitted, whose numbers the unknowns know.
         let held = part.held.views.iter().zip(part.held.gains.iter().copied());
@@ -122,7 +123,7 @@ fn write_params(
         numbers.push(part.number.map(|number| (number, first_view)));
         first_view += part.number.map_or(0, |_| part.baked.scene.views.len());
     }
-    let own = |part: &Part| {
+    let own = |part: &JointScene| {
         let at = scenes.point_of(part, &outcome.end);
         let free = |param: Param| part.baked.scene.fit.free.iter().any(|column| column.param == param);
         let given = |param: Param| param.info().held || (param.info().found && !free(param));
@@ -141,8 +142,7 @@ fn write_params(
         gains: if several { Vec::new() } else { gains(first) },
         scenes: if several { scenes.parts.iter().map(own).collect() } else { Vec::new() },
     };
-    let files: Vec<String> = scenes.parts.iter().map(|part| part.path.display().to_string()).collect();
-    let (files, set) = (files.join(", "), arguments.set.checked());
+    let (files, set) = (scenes.files(), arguments.set.checked());
     let origin = Origin {
         scene: Path::new(&files),
         outcome: Some(outcome),
@@ -153,20 +153,14 @@ fn write_params(
 }
 
 fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec<ViewEvidence>) -> RunInfo {
-    let each = |of: &dyn Fn(&Part) -> String| alike(scenes.parts.iter().map(of).collect());
-    let scene = match arguments.scenes.is_empty() {
-        false => {
-            scenes.parts.iter().map(|part| part.path.display().to_string()).collect::<Vec<_>>().join(", ")
-        }
-        true => "the built-in scene".to_owned(),
-    };
+    let each = |of: &dyn Fn(&JointScene) -> String| alike(scenes.parts.iter().map(of).collect());
     let set = arguments.set.words();
     let held: Vec<String> = views.iter().filter(|view| view.held_out).map(|view| view.name.clone()).collect();
-    let effects = |part: &Part| {
+    let effects = |part: &JointScene| {
         let names: Vec<&str> = part.baked.scene.effects.iter().map(Effect::name).collect();
         names.join(", ")
     };
-    let filter = |part: &Part| part.baked.scene.quality.texture_filter.name().to_owned();
+    let filter = |part: &JointScene| part.baked.scene.quality.texture_filter.name().to_owned();
     let filtered = scenes.parts.iter().any(|part| part.baked.scene.quality.texture_filter.reads_levels());
     let mut engine_facts: Vec<(String, String)> = Vec::new();
     for fact in scenes.joint.engines().flat_map(Engine::provenance) {
@@ -176,7 +170,7 @@ fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec
     }
     let loss = scenes.parts.first().map_or_else(Default::default, |part| part.baked.scene.fit.loss);
     RunInfo {
-        scene,
+        scene: arguments.scenes.words(),
         scenes: match scenes.several() {
             true => scenes.fitted().map(|part| part.name.clone()).collect(),
             false => Vec::new(),
@@ -194,7 +188,7 @@ fn run_info(arguments: &Arguments, solving: Solving, scenes: &Scenes, views: Vec
         ]
         .into_iter()
         .chain((0..Choices::default().named().len()).map(|i| {
-            let chosen = |part: &Part| part.baked.scene.choices.named()[i].1.to_owned();
+            let chosen = |part: &JointScene| part.baked.scene.choices.named()[i].1.to_owned();
             (Choices::default().named()[i].0.to_owned(), each(&chosen))
         }))
         .chain([

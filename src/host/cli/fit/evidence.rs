@@ -1,13 +1,13 @@
 //! The evidence: each view's target, fit and terms.
 
-use super::scenes::{Part, Scenes};
+use super::scenes::Scenes;
 use crate::cli::Refusal;
 use crate::cli::compared::compared;
 use crate::cli::fit_engine::surfaced_views;
 use crate::engine::Point;
 use crate::engine::view::ObservedView;
 use crate::model::params::Params;
-use crate::prepare::Baked;
+use crate::prepare::{Baked, JointScene};
 use crate::progress;
 use crate::render::places::places;
 use crate::render::shade::Shader;
@@ -17,7 +17,7 @@ use crate::scene::view::View;
 /// For each view the target, the fit and its terms: those that were fitted, scene by scene, then those that were held
 /// out.
 pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>, Refusal> {
-    let count = |part: &Part| part.baked.scene.views.len() + part.held.views.len();
+    let count = |part: &JointScene| part.baked.scene.views.len() + part.held.views.len();
     let bar = progress::bar("pictures", scenes.parts.iter().map(count).sum::<usize>() as u64);
     let (mut fitted, mut others) = (Vec::new(), Vec::new());
     for part in &scenes.parts {
@@ -28,7 +28,7 @@ pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>
             let name = scenes.view_name(part, &view.name);
             ViewEvidence { name, held_out, ..shown(part, (&shader, &own.params), (view, observed, gain)) }
         };
-        if let Some(engine) = part.number.and_then(|number| scenes.engine(number)) {
+        if let Some(engine) = scenes.engine(part) {
             let observed = surfaced_views(engine)?;
             let views = part.baked.scene.views.iter().zip(observed.iter()).zip(&own.gains);
             fitted.extend(views.map(|((view, observed), &gain)| shown((view, observed, gain, false))));
@@ -43,7 +43,7 @@ pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>
 
 /// The images of a view of a scene, at the scene's constants.
 fn shown(
-    part: &Part,
+    part: &JointScene,
     (shader, params): (&Shader, &Params),
     (view, observed, gain): (&View, &ObservedView, f64),
 ) -> ViewEvidence {

@@ -1,13 +1,12 @@
 //! `skinfit fit`: a scene goes in, fitted constants come out, with the evidence of how good they are.
 //!
-//! - `scenes`: the scenes of a fit, each read, baked and given an engine; `hold_out`: which of their views it does not see
+//! - `scenes`: the scenes of a fit, each read, baked and given an engine
 //! - `solve`: the search, and what it goes on from
 //! - `evidence`: each view's target, fit and terms
 //! - `conclude`: what is left in the run folder; `words`: the outcome in words
 
 mod conclude;
 mod evidence;
-mod hold_out;
 mod scenes;
 mod solve;
 mod words;
@@ -19,7 +18,7 @@ use super::fit_engine::FitEngineArguments;
 use super::interrupt::Interrupt;
 use super::maps::MapArguments;
 use super::run_folder::RunFolder;
-use super::scene::BakeArguments;
+use super::scene::{HoldOutArguments, ScenesArguments};
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, unfinished};
 use crate::model::params::Param;
@@ -34,11 +33,8 @@ use solve::{Solving, solve};
     after_help = super::with_exit_codes("The run folder holds report.html (open it in a browser), report.json, params.toml (feeds render and the next fit), scene.toml, a picture and an EXR of the terms for each view, and what --resume needs; of several scenes, scenes/NAME.toml for each instead of scene.toml, and pictures named SCENE_VIEW; with --maps, maps.json and the fitted maps in maps/ instead of the latter.\n\nSeveral scenes are fitted as one skin: form, silhouette, lookups, loss, the skin's effects and what is free of it have to be the same in all; the skin's values start as in the first. Mesh, maps, views, gains, light and what belongs to it (`each scene's own` in `skinfit params`) stay each scene's. A scene is called by its file, or by its folder where the file is scene.toml.\n\nExamples:\n  skinfit fit                                  the built-in scene\n  skinfit fit scene.toml -o runs/a             your own\n  skinfit fit scene.toml -o runs/a --resume    go on after Ctrl-C\n  skinfit fit scene.toml --params runs/a/params.toml --solver lm --starts 8 --seed 1\n  skinfit fit scene.toml --set hilite=0.7,0.6,0.5    start there\n  skinfit fit scene.toml --hold-out left    how well do the constants hold for a view that the fit has not seen?\n  skinfit fit noon.toml night.toml -o runs/skin    one skin in two lights\n  skinfit fit noon.toml night.toml dusk.toml --hold-out dusk    and how it does in a third\n  skinfit fit scene.toml --engine gpu --samples gpu    passes and samples on a graphics adapter\n  skinfit fit scene.toml --maps color,specular --hold-out left    whole maps too (a build with --features burn)")
 )]
 pub(super) struct Arguments {
-    /// The scene file; several are fitted as one skin; the built-in scene when left out.
-    #[arg(value_name = "SCENE")]
-    scenes: Vec<PathBuf>,
     #[command(flatten)]
-    bakes: BakeArguments,
+    scenes: ScenesArguments,
     /// The run folder [default: runs/<the scene's folder>, or of a NAME.toml that is not scene.toml
     /// runs/<the scene's folder>.NAME; of several scenes these names with a + between them].
     #[arg(short, long, value_name = "RUN")]
@@ -48,11 +44,8 @@ pub(super) struct Arguments {
     params: Option<PathBuf>,
     #[command(flatten)]
     set: SetArguments,
-    /// Leave a view out of the fit, and tell how well it is matched all the same: the report has its scores beside
-    /// those of the views that were fitted. Of several scenes: a view in every one, a whole scene by its name, or
-    /// SCENE/VIEW. May be given several times; with --maps, once.
-    #[arg(long, value_name = "NAME")]
-    hold_out: Vec<String>,
+    #[command(flatten)]
+    held: HoldOutArguments,
     /// What is free (comma-separated parameters), instead of the scenes' own [fit] free.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_param)]
     free: Vec<Param>,
@@ -95,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     unfinished::install_saying(
         "interrupted before the search began: the run folder is as it was; only bakes in the cache were kept.".into(),
     );
-    let mut folder = RunFolder::open(arguments.output.as_deref(), &arguments.scenes)?;
+    let mut folder = RunFolder::open(arguments.output.as_deref(), &arguments.scenes.named)?;
     let loaded = scenes::read(arguments, folder.path())?;
     let solving = Solving::of(arguments, folder.path())?;
     let interrupt = Interrupt::default();
@@ -112,7 +105,7 @@ impl Arguments {
     fn check(&self) -> Result<(), Refusal> {
         self.maps.check()?;
         self.engine.check(self.maps.any())?;
-        if self.scenes.len() > 1 && self.maps.any() {
+        if self.scenes.named.len() > 1 && self.maps.any() {
             return Err(Refusal::new(
                 "--maps fits the maps of one scene, and several are named. Name one scene, or leave --maps out.",
             ));

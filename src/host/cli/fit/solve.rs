@@ -4,7 +4,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::Arguments;
-use super::scenes::{Part, Scenes};
+use super::scenes::Scenes;
 use crate::cli::Refusal;
 use crate::cli::fingerprint::fingerprint;
 use crate::cli::interrupt::Interrupt;
@@ -15,6 +15,7 @@ use crate::fit::state::Saved;
 use crate::fit::state::StateError;
 use crate::fit::{self, FitError, FitOptions, SolverKind};
 use crate::output::OutputError;
+use crate::prepare::JointScene;
 use crate::progress;
 
 /// How the unknowns are searched for: as the command line says, else as the fit that is resumed was
@@ -76,13 +77,12 @@ pub(super) fn solve(
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");
-    let outcome = fit::fit(&scenes.joint, &scenes.start()?, &options, &mut |iteration| {
+    let outcome = fit::fit(&scenes.joint, &scenes.start, &options, &mut |iteration| {
         bar.set_position(iteration.iteration);
         bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
     });
     bar.finish_and_clear();
-    let files: Vec<String> = scenes.parts.iter().map(|part| part.path.display().to_string()).collect();
-    let files = files.join(", ");
+    let files = scenes.files();
     outcome.map_err(|error| match error {
         // It names its file itself.
         FitError::State(StateError::Unwritable(error)) => Refusal::from(error),
@@ -97,7 +97,7 @@ pub(super) fn solve(
 
 /// What the fit is of: a scene's own items, or those of all scenes by their names.
 fn fingerprint_of(scenes: &Scenes) -> Fingerprint {
-    let of = |part: &Part| fingerprint(&part.baked.scene, &part.held);
+    let of = |part: &JointScene| fingerprint(&part.baked.scene, &part.held);
     match scenes.parts.as_slice() {
         [part] => of(part),
         parts => {

@@ -41,10 +41,10 @@ pub(super) fn tell_run(
         let by = if engine.own_sample_seconds().is_some() { "GPU" } else { "CPU" };
         say(&format!("{} samples made by the {by} in {:.3} s", run.samples, times.samples))?;
     }
-    for part in scenes.fitted() {
-        let name = part.number.and_then(|number| scenes.engine(number)).map_or("", Engine::name);
+    for (part, why) in scenes.parts.iter().zip(&scenes.whys) {
+        let name = scenes.engine(part).map_or("", Engine::name);
         let whose = if scenes.several() { format!("{}: ", part.name) } else { String::new() };
-        if let Some(why) = &part.why {
+        if let Some(why) = why {
             say(&format!("{whose}passes on the {}: {why}", name.to_uppercase()))?;
         }
     }
@@ -128,14 +128,14 @@ pub(super) fn advice_on_maps(
     if left.evidence.interrupted {
         return Some(format!(
             "the fit of the maps was interrupted. {}",
-            arguments.maps.advice(folder, &arguments.hold_out)
+            arguments.maps.advice(folder, &arguments.held.hold_out)
         ));
     }
     let iterations = outcome.iterations;
     match outcome.ending {
         Ending::Interrupted => Some(format!(
             "the last solve of the constants was interrupted after {iterations} iterations; the maps are fitted. {}",
-            arguments.maps.advice(folder, &arguments.hold_out)
+            arguments.maps.advice(folder, &arguments.held.hold_out)
         )),
         Ending::RanOut => Some(format!(
             "the last solve of the constants ran out after {iterations} iterations and has not converged. Fit again \

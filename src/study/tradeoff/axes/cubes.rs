@@ -3,8 +3,9 @@
 use super::quality::{Swept, bake_seconds};
 use crate::StudyError;
 use crate::model::effects::{Effect, Effects, Needs};
-use crate::tradeoff::axis::{Axis, Knob, Rates, Sweep};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// The size of one kind of cube.
 pub(super) struct CubeSize {
@@ -49,7 +50,7 @@ pub(super) const HILITE: CubeSize = CubeSize {
     asked: |needs| needs.hilite,
 };
 
-impl Axis for CubeSize {
+impl SceneAxis for CubeSize {
     fn name(&self) -> &'static str {
         self.name
     }

@@ -4,13 +4,13 @@ use super::format::images_in;
 use crate::StudyError;
 use crate::model::formats::{Emulated, Format, HardwareFilter, NearestTexel};
 use crate::reference::Difference;
-use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
+use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::Bench;
 
 /// Filters of cube lookups.
 pub(super) struct Filters;
 
-impl Axis for Filters {
+impl SceneAxis for Filters {
     fn name(&self) -> &'static str {
         "filter"
     }

@@ -4,15 +4,16 @@ use std::cell::RefCell;
 
 use super::quality::ROUNDS;
 use crate::StudyError;
-use crate::engine::Point;
-use crate::engine::cpu::CpuEngine;
+use crate::engine::{BLOCK, Point};
 use crate::fit::outcome::Outcome;
 use crate::fit::{self, FitOptions, SolverKind};
 use crate::reference::Difference;
+use crate::render::image::Image;
 use crate::subject::Subject;
 use crate::timing::{Job, interleaved};
-use crate::tradeoff::axis::{Rates, Setting, mark_pareto};
+use crate::tradeoff::axis::{Idle, Rates, Setting, mark_pareto};
 use crate::tradeoff::bench::Bench;
+use crate::tradeoff::benches::Benches;
 
 /// A solver that has not ended by then is stopped; the best of them take some ten iterations.
 pub(super) const MOST_ITERATIONS: u64 = 300;
@@ -37,17 +38,41 @@ pub(super) struct Fits {
 type Run = (String, Vec<usize>, SolverKind);
 
 impl Fits {
-    pub(super) fn new(bench: &Bench<'_>) -> Result<Self, StudyError> {
-        Ok(Self { subject: Subject::of(bench.to_fit()?, None)? })
+    pub(super) fn new(benches: &Benches<'_>) -> Result<Self, StudyError> {
+        Ok(Self { subject: benches.to_fit()? })
     }
 
-    /// The seconds that [`Self::measure`] takes for runs of these seconds.
-    pub(super) fn seconds(runs: &[f64], rates: Rates) -> f64 {
-        ROUNDS.expected(runs) + (1 + runs.len()) as f64 * rates.images
+    /// Whether every scene has something to be fitted to.
+    pub(super) fn apply(benches: &Benches<'_>) -> Result<(), Idle> {
+        let targets = |bench: &Bench<'_>| bench.baked.scene.views.iter().any(|view| view.target.is_some());
+        let all = benches.scenes.iter().all(targets);
+        all.then_some(()).ok_or(Idle::Unasked("no view names a target to fit to"))
     }
 
+    /// What the fits are of and what they leave out, for the words on how they were measured.
+    pub(super) fn words(benches: &Benches<'_>) -> String {
+        let several = match benches.names().as_slice() {
+            [] => String::new(),
+            names => format!(" Scenes: {}, fitted as one skin.", names.join(", ")),
+        };
+        match benches.held_out().as_slice() {
+            [] => several,
+            held => format!("{several} No fit sees {}; errors are of all views.", held.join(", ")),
+        }
+    }
+
+    /// The seconds that [`Self::measure`] takes for runs of so many passes over all scenes.
+    pub(super) fn seconds(passes: &[f64], rates: &[Rates]) -> f64 {
+        let (pass, images) =
+            rates.iter().fold((0.0, 0.0), |(pass, images), rates| (pass + rates.pass, images + rates.images));
+        let runs: Vec<f64> = passes.iter().map(|passes| passes * pass).collect();
+        ROUNDS.expected(&runs) + (1 + runs.len()) as f64 * images
+    }
+
+    /// How many blocks of pixels there are.
     pub(super) fn blocks(&self) -> usize {
-        self.subject.engine.blocks()
+        let views = self.subject.scenes.joint.engines().flat_map(|engine| engine.views().iter());
+        views.map(|view| view.samples.groups().div_ceil(BLOCK)).sum()
     }
 
     /// Each run's setting, beside that of run `reference`, and how it ended.
@@ -72,7 +97,9 @@ impl Fits {
         drop(jobs);
         drop(works);
         let outcomes: Vec<(Outcome, u64)> = outcomes.into_iter().filter_map(RefCell::into_inner).collect();
-        let images = |point: &Point| self.subject.images(point);
+        let images = |point: &Point| -> Result<Vec<Image>, StudyError> {
+            Ok([self.subject.images(point)?, self.subject.held_out_images(point)?].concat())
+        };
         let best = images(&outcomes[reference].0.end)?;
         let setting = |(i, (outcome, passes)): (usize, &(Outcome, u64))| -> Result<Setting, StudyError> {
             Ok(Setting {
@@ -95,20 +122,19 @@ impl Fits {
 
     /// One run: its last outcome, the seconds and passes of all its fits.
     fn fit(&self, (_, strides, solver): &Run) -> Result<(Outcome, f64, u64), StudyError> {
-        let scene = &self.subject.observed.scene;
-        let mut start = self.subject.observed.start();
+        let mut start = self.subject.scenes.start.clone();
         let (mut seconds, mut passes, mut last) = (0.0, 0, None);
         // Terms that earlier fits kept would be a present.
-        let mut engine = CpuEngine::new(self.subject.observed.task())?;
+        let mut objective = self.subject.objective_anew()?;
         for &stride in strides {
-            engine.set_stride(stride);
+            objective.set_stride(stride);
             let options = FitOptions {
                 solver: *solver,
                 max_iterations: Some(MOST_ITERATIONS),
                 ..FitOptions::default()
             };
-            let outcome = fit::fit(&engine, &start, &options, &mut |_| {})
-                .map_err(|error| StudyError::Fit { scene: scene.path.display().to_string(), error })?;
+            let outcome = fit::fit(&objective, &start, &options, &mut |_| {})
+                .map_err(|error| StudyError::Fit { scene: self.subject.scenes.files(), error })?;
             seconds += outcome.seconds;
             passes += outcome.evaluations;
             start = outcome.end.clone();

@@ -6,13 +6,13 @@ use crate::model::formats::{Declared, Emulated, Fixed, Format, Half, Single};
 use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::timing::{Rounds, interleaved, seconds_of};
-use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
+use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, Evaluated};
 
 /// Number formats.
 pub(super) struct Formats;
 
-impl Axis for Formats {
+impl SceneAxis for Formats {
     fn name(&self) -> &'static str {
         "format"
     }

@@ -6,13 +6,14 @@ use crate::bake;
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::Param;
 use crate::prepare::PrepareError;
-use crate::tradeoff::axis::{Axis, Knob, Rates, Sweep};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// The number of specular cubes an octave.
 pub(super) struct Density;
 
-impl Axis for Density {
+impl SceneAxis for Density {
     fn name(&self) -> &'static str {
         "lobes"
     }

@@ -3,8 +3,8 @@
 use super::fits::{Fits, expected_passes};
 use crate::StudyError;
 use crate::fit::SolverKind;
-use crate::tradeoff::axis::{Axis, Rates, Sweep};
-use crate::tradeoff::bench::Bench;
+use crate::tradeoff::axis::{Axis, Idle, Rates, Sweep};
+use crate::tradeoff::benches::Benches;
 
 /// Pixels used in a fit: every n-th block of them, or a coarse fit first and finer ones from there.
 pub(super) struct Pixels;
@@ -17,19 +17,21 @@ impl Axis for Pixels {
         "pixels"
     }
 
-    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        let targets = bench.baked.scene.views.iter().any(|view| view.target.is_some());
-        targets.then_some(()).ok_or("no view names a target to fit to")
+    fn applies(&self, benches: &Benches<'_>) -> Result<(), Idle> {
+        Fits::apply(benches)
     }
 
-    fn seconds(&self, _: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
+    fn fits(&self) -> bool {
+        true
+    }
+
+    fn seconds(&self, _: &Benches<'_>, rates: &[Rates]) -> Result<f64, StudyError> {
         let share = |strides: &[usize]| strides.iter().map(|&stride| 1.0 / stride as f64).sum::<f64>();
-        let passes = STRIDES.map(|strides| share(strides) * rates.pass);
-        Ok(Fits::seconds(&passes.map(|pass| pass * expected_passes(SolverKind::Varpro)), rates))
+        Ok(Fits::seconds(&STRIDES.map(|strides| share(strides) * expected_passes(SolverKind::Varpro)), rates))
     }
 
-    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
-        let fits = Fits::new(bench)?;
+    fn sweep(&self, benches: &Benches<'_>) -> Result<Sweep, StudyError> {
+        let fits = Fits::new(benches)?;
         let name = |strides: &[usize]| {
             let part = |stride: &usize| if *stride == 1 { "all".to_owned() } else { format!("1/{stride}") };
             strides.iter().map(part).collect::<Vec<_>>().join(", then ")
@@ -44,10 +46,12 @@ impl Axis for Pixels {
         Ok(Sweep {
             axis: self.name(),
             title: "Pixels used in a fit",
-            method: "A fit to every n-th block of pixels (128 of them), from the scene's start values; and one to a sixteenth whose answer is \
+            method: format!(
+                "A fit to every n-th block of pixels (128 of them), from the scene's start values; and one to a sixteenth whose answer is \
                      where a fit to all pixels starts. The error is how different the images of the fitted constants are from those fitted \
-                     to all pixels. Seconds are those of the fit."
-                .to_owned(),
+                     to all pixels. Seconds are those of the fit.{}",
+                Fits::words(benches)
+            ),
             cost: "seconds",
             settings,
             traces: Vec::new(),

@@ -6,7 +6,8 @@ use crate::reference::Difference;
 use crate::scene::Scene;
 use crate::timing::{Job, Rounds, interleaved, seconds_of};
 use crate::tradeoff::axis::{Choose, Knob, Rates, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Settings, baked};
+use crate::tradeoff::bench::{Bench, baked};
+use crate::tradeoff::settings::Settings;
 
 /// How bakes, traces and fits are timed. What takes longer than a few seconds is run once: what disturbs it for a
 /// moment does not show in it. Of the others three rounds are the fewest with a middle.
@@ -50,10 +51,10 @@ impl Swept<'_> {
         *self.knob.of(&mut bench.settings().quality)
     }
 
-    /// The values, the scene's own among them.
+    /// The values, the scenes' own among them.
     fn values(&self, bench: &Bench<'_>) -> Vec<u32> {
         let mut values = self.values.to_vec();
-        values.push(self.present(bench));
+        values.extend(bench.all.iter().map(|settings| *self.knob.of(&mut { settings.quality })));
         values.sort_unstable();
         values.dedup();
         values

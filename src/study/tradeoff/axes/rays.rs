@@ -3,13 +3,14 @@
 use super::quality::{Swept, bake_seconds};
 use crate::StudyError;
 use crate::model::effects::{Effect, Effects};
-use crate::tradeoff::axis::{Axis, Knob, Rates, Sweep};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// The number of occlusion rays.
 pub(super) struct Rays;
 
-impl Axis for Rays {
+impl SceneAxis for Rays {
     fn name(&self) -> &'static str {
         "rays"
     }

@@ -14,7 +14,8 @@ use crate::prepare::PrepareError;
 use crate::samples::{self, PosedSurface, SampleError, SurfaceBakes};
 use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, PosedMesh, VertexField};
-use crate::tradeoff::bench::{Bench, Evaluated, Settings};
+use crate::tradeoff::bench::{Bench, Evaluated};
+use crate::tradeoff::settings::Settings;
 
 /// A mesh in the world, cut finer or coarser, with the occlusion of its vertices.
 pub(super) struct Remeshed {

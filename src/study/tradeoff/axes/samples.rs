@@ -4,13 +4,14 @@ use super::quality::Swept;
 use crate::StudyError;
 use crate::engine::Objective;
 use crate::timing::seconds_of;
-use crate::tradeoff::axis::{Axis, Knob, Rates, Sweep};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// Samples along a pixel's side.
 pub(super) struct Samples;
 
-impl Axis for Samples {
+impl SceneAxis for Samples {
     fn name(&self) -> &'static str {
         "samples"
     }

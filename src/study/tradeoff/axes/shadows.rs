@@ -15,8 +15,9 @@ use crate::render::shading::Shading;
 use crate::scene::{Scene, ShadowMaps};
 use crate::shader::Budget;
 use crate::timing::{Job, interleaved, seconds_of};
-use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Evaluated, Settings};
+use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
+use crate::tradeoff::bench::{Bench, Evaluated};
+use crate::tradeoff::settings::Settings;
 
 /// Filters and sizes of shadow maps.
 pub(super) struct Shadows;
@@ -28,7 +29,7 @@ const REFERENCE_RAYS: u32 = 16;
 /// Samples along a pixel's side that the renderer takes at most.
 const MOST_SAMPLES: u32 = 8;
 
-impl Axis for Shadows {
+impl SceneAxis for Shadows {
     fn name(&self) -> &'static str {
         "shadows"
     }
@@ -43,6 +44,11 @@ impl Axis for Shadows {
         Gpu::open(&Choice::default())
             .map(drop)
             .map_err(|_| "there is no graphics adapter, which draws shadow maps")
+    }
+
+    fn alike(&self, one: &Bench<'_>, other: &Bench<'_>) -> Result<(), &'static str> {
+        let same = one.baked.scene.shadow_maps == other.baked.scene.shadow_maps;
+        same.then_some(()).ok_or("the scenes' shadow maps differ")
     }
 
     fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {

@@ -7,8 +7,9 @@ use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::scene::facts::tessellation_error;
 use crate::shader::{Budget, Facts, plan};
-use crate::tradeoff::axis::{Axis, Choose, Rates, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::axis::{Choose, Rates, SceneAxis, Setting, Sweep, mark_pareto};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// Where the silhouette is evaluated, against how fine the mesh is.
 pub(super) struct Silhouettes;
@@ -18,7 +19,7 @@ const COARSER: usize = 3;
 /// How often it is cut finer, each time with edges of half the length.
 const FINER: usize = 2;
 
-impl Axis for Silhouettes {
+impl SceneAxis for Silhouettes {
     fn name(&self) -> &'static str {
         "silhouette"
     }
@@ -27,6 +28,13 @@ impl Axis for Silhouettes {
         let scene = &bench.baked.scene;
         let asked = scene.effects.needs(Silhouette::Fragment).rim;
         asked.then_some(()).ok_or("no effect asks for the silhouette")
+    }
+
+    fn alike(&self, one: &Bench<'_>, other: &Bench<'_>) -> Result<(), &'static str> {
+        let of = |bench: &Bench<'_>| (bench.baked.scene.mesh.pose(), bench.baked.scene.metres_per_unit);
+        let ((one, unit), (other, other_unit)) = (of(one), of(other));
+        let same = one.positions == other.positions && one.triangles == other.triangles && unit == other_unit;
+        same.then_some(()).ok_or("it is swept over how fine a mesh is, and the scenes' meshes differ")
     }
 
     fn settable(&self) -> bool {

@@ -8,7 +8,7 @@ use crate::model::effects::Effect;
 use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::scene::Scene;
-use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
+use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, Evaluated};
 
 /// The number of lights.
@@ -39,7 +39,7 @@ struct Found {
     images: Vec<Image>,
 }
 
-impl Axis for SkyLights {
+impl SceneAxis for SkyLights {
     fn name(&self) -> &'static str {
         "sky_lights"
     }

@@ -4,8 +4,8 @@ use super::fits::{Fits, MOST_ITERATIONS, expected_passes};
 use crate::StudyError;
 use crate::fit::SolverKind;
 use crate::fit::outcome::Outcome;
-use crate::tradeoff::axis::{Axis, Rates, Sweep, Trace};
-use crate::tradeoff::bench::Bench;
+use crate::tradeoff::axis::{Axis, Idle, Rates, Sweep, Trace};
+use crate::tradeoff::benches::Benches;
 
 /// The solvers.
 pub(super) struct Solvers;
@@ -15,16 +15,20 @@ impl Axis for Solvers {
         "solver"
     }
 
-    fn applies(&self, bench: &Bench<'_>) -> Result<(), &'static str> {
-        super::pixels::Pixels.applies(bench)
+    fn applies(&self, benches: &Benches<'_>) -> Result<(), Idle> {
+        Fits::apply(benches)
     }
 
-    fn seconds(&self, _: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {
-        Ok(Fits::seconds(&SolverKind::ALL.map(|kind| expected_passes(kind) * rates.pass), rates))
+    fn fits(&self) -> bool {
+        true
     }
 
-    fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
-        let fits = Fits::new(bench)?;
+    fn seconds(&self, _: &Benches<'_>, rates: &[Rates]) -> Result<f64, StudyError> {
+        Ok(Fits::seconds(&SolverKind::ALL.map(expected_passes), rates))
+    }
+
+    fn sweep(&self, benches: &Benches<'_>) -> Result<Sweep, StudyError> {
+        let fits = Fits::new(benches)?;
         let runs: Vec<_> =
             SolverKind::ALL.into_iter().map(|kind| (kind.name().to_owned(), vec![1], kind)).collect();
         let (settings, outcomes) = fits.measure(&runs, 0)?;
@@ -38,7 +42,8 @@ impl Axis for Solvers {
             method: format!(
                 "Each solver from the scene's start values on all pixels, {MOST_ITERATIONS} iterations at most. The error is how different \
                  the images of its constants are from those of variable projection. Seconds are those of the fit; the curve shows the loss \
-                 after so many seconds."
+                 after so many seconds.{}",
+                Fits::words(benches)
             ),
             cost: "seconds",
             settings,

@@ -7,8 +7,9 @@ use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::scene::Quality;
 use crate::timing::seconds_of;
-use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Settings};
+use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
+use crate::tradeoff::bench::Bench;
+use crate::tradeoff::settings::Settings;
 
 /// Filters of texture maps.
 pub(super) struct Textures;
@@ -28,7 +29,7 @@ fn settings(own: Settings) -> Vec<(String, Settings, bool)> {
     filters.into_iter().chain([(format!("bilinear, {n} × {n} samples"), with(many), true)]).collect()
 }
 
-impl Axis for Textures {
+impl SceneAxis for Textures {
     fn name(&self) -> &'static str {
         "texture_filter"
     }
@@ -40,6 +41,11 @@ impl Axis for Textures {
             || maps.specular.is_some()
             || maps.attenuator.is_some();
         any.then_some(()).ok_or("no effect looks a texture map up")
+    }
+
+    fn alike(&self, one: &Bench<'_>, other: &Bench<'_>) -> Result<(), &'static str> {
+        let most = |bench: &Bench<'_>| bench.settings().quality.samples_per_axis.max(REFERENCE);
+        (most(one) == most(other)).then_some(()).ok_or("the scenes' samples_per_axis differ")
     }
 
     fn seconds(&self, bench: &Bench<'_>, rates: Rates) -> Result<f64, StudyError> {

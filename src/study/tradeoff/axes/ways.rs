@@ -9,7 +9,7 @@ use crate::model::effects::Effect;
 use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::scene::Scene;
-use crate::tradeoff::axis::{Axis, Rates, Setting, Sweep, mark_pareto};
+use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
 use crate::tradeoff::bench::{Bench, Evaluated};
 
 /// A way, by its name in scene files, and what it changes of a scene.
@@ -76,7 +76,7 @@ pub(super) const SPLIT_SUM: Ways = Ways {
     ],
 };
 
-impl Axis for Ways {
+impl SceneAxis for Ways {
     fn name(&self) -> &'static str {
         self.axis
     }
