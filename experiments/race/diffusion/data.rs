@@ -224,7 +224,8 @@ impl Data {
         let mut target = Rows::new(3, groups);
         self.fill(&mut target, (0, 3), &order, &format!("target_{which}"));
         let weight = |slot: usize| if slot < count { 1.0 } else { 0.0 };
-        let weights = (0..groups).map(|group| Row::of(std::array::from_fn(|lane| weight(group * LANES + lane))));
+        let weights =
+            (0..groups).map(|group| Row::of(std::array::from_fn(|lane| weight(group * LANES + lane))));
         let weight = if count.is_multiple_of(LANES) { Vec::new() } else { weights.collect() };
         let samples = ViewSamples {
             group_start: (0..=groups as u32).collect(),

@@ -8,15 +8,17 @@ use skinfit::engine::cpu::CpuEngine;
 use skinfit::fit::{FitOptions, SolverKind, fit};
 
 use super::data::{Data, Manifest, vector};
+use super::secant::Secant;
 use super::window::Window;
 use super::{engine, point};
 use crate::data::Result;
-use crate::measure::gauss_newton_step;
 
 /// Texels along a side of the window.
 const SIDE: usize = 80;
 /// Texels about it that are computed: at the radii where fits end, light from further off weighs nothing.
 const HALO: usize = 40;
+/// Steps on the window, at the most: what the whole moves is more than further ones gain.
+const ON_WINDOW: u64 = 8;
 /// Steps over all pixels, at the most.
 const MOST: usize = 20;
 
@@ -67,26 +69,22 @@ fn window(data: &Data, manifest: &Manifest) -> Window {
     Window { low, high: low.map(|at| at + SIDE), halo: HALO }
 }
 
-/// A fit on the window to convergence, then bounded Gauss-Newton steps over all pixels until the criterion holds.
+/// A fit on the window, then bounded steps over all pixels until the criterion holds.
 fn fit_to_criterion(engines: &Engines, manifest: &Manifest, which: &str, start: &Point) -> Result<Run> {
     let clock = Instant::now();
-    let options = FitOptions { solver: SolverKind::Lm, ..FitOptions::default() };
+    let options =
+        FitOptions { solver: SolverKind::Lm, max_iterations: Some(ON_WINDOW), ..FitOptions::default() };
     let part = fit(&engines.part, start, &options, &mut |_| {}).map_err(|error| error.to_string())?;
     let mut evaluations = part.evaluations as f64 * engines.share;
     let (mut point, mut best) = (part.end, f64::INFINITY);
-    if std::env::var_os("RACE_VERBOSE").is_some() {
-        eprintln!("{which}: window {:.2} ms, {} evaluations", 1e3 * clock.elapsed().as_secs_f64(), part.evaluations);
-    }
+    let mut secant = Secant::new(&engines.whole, &point);
     for _ in 0..=MOST {
         let (error, tolerance) = criterion(manifest, which, &point)?;
         best = best.min(error);
-        if std::env::var_os("RACE_VERBOSE").is_some() {
-            eprintln!("{which}: {:.2} ms error {error:.3e}", 1e3 * clock.elapsed().as_secs_f64());
-        }
         if error < tolerance {
             return Ok(Run { seconds: Some(clock.elapsed().as_secs_f64()), evaluations, best });
         }
-        point = gauss_newton_step(&engines.whole, &point);
+        point = secant.step(&engines.whole);
         evaluations += 1.0;
     }
     Ok(Run { seconds: None, evaluations, best })

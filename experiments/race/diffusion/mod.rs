@@ -2,10 +2,11 @@
 //! of the program that times the other frameworks (its FORMAT.md).
 //!
 //! - `data`: the folder as texels and samples of the engine's own; `window`: a part of it
-//! - this module: passes; `fits`: whole fits
+//! - this module: passes; `fits`: whole fits, `secant`: their steps
 
 mod data;
 mod fits;
+mod secant;
 mod window;
 
 use std::cell::Cell;

@@ -162,7 +162,12 @@ impl ViewPass<'_> {
             #[inline(always)]
             || {
                 for (rows, corners) in rows.chunks_mut(stride).zip(&corners[first..first + count]) {
-                    finder.find(simd, corners, |row, numbers| numbers.store(&mut rows[row]));
+                    finder.find(
+                        simd,
+                        corners,
+                        #[inline(always)]
+                        |row, numbers| numbers.store(&mut rows[row]),
+                    );
                 }
             },
         );

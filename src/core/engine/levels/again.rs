@@ -89,8 +89,7 @@ impl<R: Number> LevelMaker<R> {
         if atlas.covered() == 0 {
             return made;
         }
-        let with: Vec<Vec<f64>> =
-            self.program.passes.iter().map(|pass| numbers(pass, params)).collect();
+        let with: Vec<Vec<f64>> = self.program.passes.iter().map(|pass| numbers(pass, params)).collect();
         let wanted = self.flow.wanted(&before, &with, all);
         for ((at, pass), with) in self.program.passes.iter().enumerate().zip(with) {
             let mut record = before.made_with(at, &with).map(Arc::clone).unwrap_or_default();

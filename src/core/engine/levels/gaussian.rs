@@ -8,7 +8,7 @@ use std::borrow::Cow;
 use std::f64::consts::LOG2_E;
 
 use super::records::{Made, Record, sixteen};
-use super::taps::{Near, Taps};
+use super::taps::Taps;
 use super::{Number, Texel};
 use crate::model::real::Real;
 use crate::program::levels::GaussianOf;
@@ -62,11 +62,6 @@ impl<'a, R: Number> Sources<'a, R> {
         Self { stride, record: copied.numbers.into(), count }
     }
 
-    #[inline(always)]
-    fn load<S: Simd>(&self, simd: S, texel: usize, from: usize) -> R::Sixteen<S> {
-        R::load(simd, sixteen(&self.record, texel * self.stride + from))
-    }
-
     /// A texel's numbers.
     #[inline(always)]
     fn texel(&self, texel: usize) -> &[R] {
@@ -104,72 +99,82 @@ impl<'a, R: Number> Gaussian<'a, R> {
         numbers: &[R::Sixteen<S>],
         (leaves, stride): (&mut [R], usize),
     ) {
-        let moves = self.moved.iter().any(Option::is_some);
-        let deviations = R::array::<S>(numbers[0]);
-        let taps = self.of.reach.map(|reach| Taps::new::<S>(simd, reach, numbers[0]));
-        let mut by_deviation = [[R::from(0.0); 3]; LANES];
-        for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
-            let here = first + lane;
-            by_deviation[lane] = match &taps {
-                Some(taps) => {
-                    let near = taps.near(self.atlas, self.of.axis, here, lane);
-                    self.by_taps(simd, here, &near, moves, leaves)
+        // How the level itself moves as the deviation does.
+        let mut slopes = [[R::from(0.0); 3]; LANES];
+        let of = (first, numbers[0]);
+        match self.of.reach {
+            Some(1) => self.by_taps::<S, 1>(simd, of, (leaves, stride), &mut slopes),
+            Some(2) => self.by_taps::<S, 2>(simd, of, (leaves, stride), &mut slopes),
+            Some(3) => self.by_taps::<S, 3>(simd, of, (leaves, stride), &mut slopes),
+            Some(_) => self.by_taps::<S, 4>(simd, of, (leaves, stride), &mut slopes),
+            None => {
+                let deviations = R::array::<S>(numbers[0]);
+                for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
+                    slopes[lane] = self.by_steps(first + lane, deviations[lane], leaves);
                 }
-                None => self.by_steps(here, deviations[lane], moves, leaves),
-            };
+            }
         }
         for (k, moved) in self.moved.iter().enumerate() {
             let Some(moved) = *moved else { continue };
             let moved = R::array::<S>(numbers[moved]);
             for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
-                let leaf = &mut leaves[3 * k..3 * k + 3];
-                (0..3).for_each(|c| leaf[c] = leaf[c] + moved[lane] * by_deviation[lane][c]);
+                for c in 0..3 {
+                    leaves[3 * k + c] = leaves[3 * k + c] + moved[lane] * slopes[lane][c];
+                }
             }
         }
     }
 
-    /// Blur by taps that lie a deviation apart; how the level itself moves as that does.
+    /// Blur by `REACH` taps to either side that lie a deviation apart.
     #[inline(always)]
-    fn by_taps<S: Simd>(
+    fn by_taps<S: Simd, const REACH: usize>(
         &self,
         simd: S,
-        here: usize,
-        near: &Near<R>,
-        moves: bool,
-        leaves: &mut [R],
-    ) -> Texel<R> {
-        let numbers = 3 * self.sources.count;
-        let mut by_deviation = [R::from(0.0); 3];
-        let share = R::splat(simd, near.share);
-        for from in (0..numbers).step_by(LANES) {
-            let own = self.sources.load(simd, here, from);
-            let (mut sum, mut change) = (R::splat(simd, R::from(0.0)), R::splat(simd, R::from(0.0)));
-            for tap in near.taps() {
-                let [a, b, c, d] = tap.texels.map(|texel| self.sources.load(simd, texel as usize, from));
-                let [before, after] = tap.shares.map(|share| R::splat(simd, share));
-                let weight = R::splat(simd, tap.weight);
-                let (down, up) = (b - a, d - c);
-                let off = after.mul_add(up, before.mul_add(down, (a - own) + (c - own)));
-                sum = weight.mul_add(off, sum);
-                if moves && from == 0 {
-                    change = R::splat(simd, tap.slope).mul_add(up - down, change);
+        (first, deviations): (usize, R::Sixteen<S>),
+        (leaves, stride): (&mut [R], usize),
+        slopes: &mut [Texel<R>; LANES],
+    ) {
+        let zero = R::splat(simd, R::from(0.0));
+        let taps = Taps::<R, REACH>::new::<S>(simd, deviations);
+        let Sources { stride: width, count, .. } = *self.sources;
+        let record = &*self.sources.record;
+        for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
+            let here = first + lane;
+            let near = taps.near(self.atlas, self.of.axis, here, lane);
+            let share = R::splat(simd, near.share);
+            for from in (0..3 * count).step_by(LANES) {
+                let own = R::load(simd, sixteen(record, here * width + from));
+                let (mut sum, mut change) = (zero, zero);
+                for k in 0..REACH {
+                    let [a, b, c, d] = near.texels[k];
+                    let a = R::load(simd, sixteen(record, a as usize * width + from));
+                    let b = R::load(simd, sixteen(record, b as usize * width + from));
+                    let c = R::load(simd, sixteen(record, c as usize * width + from));
+                    let d = R::load(simd, sixteen(record, d as usize * width + from));
+                    let [weight, slope] = taps.weight(k);
+                    let [before, after] = near.shares[k];
+                    let (down, up) = (b - a, d - c);
+                    let off = R::splat(simd, before).mul_add(down, (a - own) + (c - own));
+                    let off = R::splat(simd, after).mul_add(up, off);
+                    sum = R::splat(simd, weight).mul_add(off, sum);
+                    change = R::splat(simd, slope).mul_add(up - down, change);
+                }
+                let off = sum * share;
+                put(&R::array::<S>(own + off), &mut leaves[from..]);
+                // The level itself stands first.
+                if from == 0 {
+                    let change = (change - R::splat(simd, near.slopes) * off) * share;
+                    let change = R::array::<S>(change);
+                    slopes[lane] = [change[0], change[1], change[2]];
                 }
             }
-            let off = sum * share;
-            if moves && from == 0 {
-                let change = (change - R::splat(simd, near.slopes) * off) * share;
-                let [x, y, z, ..] = R::array(change);
-                by_deviation = [x, y, z];
-            }
-            put(&R::array(own + off), &mut leaves[from..]);
+            self.clear(leaves);
         }
-        self.clear(leaves);
-        by_deviation
     }
 
     /// Blur by all texels within six deviations; how the level itself moves as that does.
     #[inline(always)]
-    fn by_steps(&self, here: usize, deviation: R, moves: bool, leaves: &mut [R]) -> Texel<R> {
+    fn by_steps(&self, here: usize, deviation: R, leaves: &mut [R]) -> Texel<R> {
         let (zero, one) = (R::from(0.0), R::from(1.0));
         let own = self.sources.texel(here);
         let wide: f64 = deviation.into();
@@ -188,12 +193,10 @@ impl<'a, R: Number> Gaussian<'a, R> {
             for k in 0..numbers {
                 leaves[k] = leaves[k] + weight * (near[k] - own[k]);
             }
-            if moves {
-                let slope = weight * deviations * deviations / narrow;
-                slopes = slopes + slope;
-                let change = change.iter_mut().zip(near.iter().zip(own));
-                change.for_each(|(sum, (&value, &own))| *sum = *sum + slope * (value - own));
-            }
+            let slope = weight * deviations * deviations / narrow;
+            slopes = slopes + slope;
+            let change = change.iter_mut().zip(near.iter().zip(own));
+            change.for_each(|(sum, (&value, &own))| *sum = *sum + slope * (value - own));
         }
         let weighs = zero.lt(weights);
         let share = one / if weighs { weights } else { one };
@@ -216,10 +219,13 @@ impl<'a, R: Number> Gaussian<'a, R> {
 /// The first of sixteen numbers, as many as there is room for: a multiple of four.
 #[inline(always)]
 pub(super) fn put<R: Copy>(numbers: &[R; LANES], room: &mut [R]) {
-    match room.len() {
-        4 => room.copy_from_slice(&numbers[..4]),
-        8 => room.copy_from_slice(&numbers[..8]),
-        12 => room.copy_from_slice(&numbers[..12]),
-        _ => room[..LANES].copy_from_slice(numbers),
+    if let Some(room) = room.first_chunk_mut() {
+        *room = *numbers;
+        return;
+    }
+    let (numbers, _) = numbers.as_chunks::<4>();
+    let (room, _) = room.as_chunks_mut::<4>();
+    for (room, numbers) in room.iter_mut().zip(numbers) {
+        *room = *numbers;
     }
 }

@@ -157,26 +157,28 @@ impl<R: Number> Finder<R> {
 
     /// What a record of samples finds, a row a number; 0 of what nothing leaves.
     #[inline(always)]
-    pub fn find<S: Simd>(
-        &self,
-        simd: S,
-        corners: &Corners<R>,
-        mut put: impl FnMut(usize, R::Sixteen<S>),
-    ) {
+    pub fn find<S: Simd>(&self, simd: S, corners: &Corners<R>, mut put: impl FnMut(usize, R::Sixteen<S>)) {
         let nothing = R::splat(simd, R::from(0.0));
-        self.empty.iter().for_each(|&row| put(row, nothing));
+        for &row in &self.empty {
+            put(row, nothing);
+        }
         for block in &self.blocks {
             let record = self.made.record(block.record);
             // A row a sample, and then a row a number.
             let mut found = [nothing; LANES];
-            for (lane, found) in found.iter_mut().enumerate() {
-                for (texels, shares) in corners.texels.iter().zip(&corners.shares) {
-                    let numbers = R::load(simd, record.sixteen(texels[lane] as usize, block.first));
-                    *found = numbers.mul_add(R::splat(simd, shares[lane]), *found);
+            for lane in 0..LANES {
+                let mut sum = nothing;
+                for k in 0..4 {
+                    let texel = corners.texels[k][lane] as usize;
+                    let numbers = R::load(simd, record.sixteen(texel, block.first));
+                    sum = numbers.mul_add(R::splat(simd, corners.shares[k][lane]), sum);
                 }
+                found[lane] = sum;
             }
             R::transpose(simd, &mut found);
-            block.rows.iter().for_each(|&(k, row)| put(row, found[k]));
+            for &(k, row) in &block.rows {
+                put(row, found[k]);
+            }
         }
     }
 }
@@ -204,7 +206,12 @@ impl<R: Number> LevelMaker<R> {
             if let Some(finder) = finder.as_ref().filter(|_| !corners.is_empty()) {
                 with_simd!(instructions, simd => {
                     for (rows, corners) in found.chunks_mut(stride).zip(&corners[own]) {
-                        finder.find(simd, corners, |row, numbers| rows[row] = R::array(numbers));
+                        finder.find(
+                            simd,
+                            corners,
+                            #[inline(always)]
+                            |row, numbers| rows[row] = R::array(numbers),
+                        );
                     }
                 });
             }

@@ -1,7 +1,7 @@
 //! What levels are made of, and sixteen of it as the processor computes with them at once.
 
-use fearless_simd::f32x16;
 use fearless_simd::prelude::*;
+use fearless_simd::{f32x16, i32x16};
 
 use crate::engine::lanes::Lanes;
 use crate::model::batch::Batch;
@@ -17,11 +17,17 @@ pub trait Number: Real<Texel = Self, Wide = Self, Mask = bool> + From<f32> + Int
     /// These sixteen.
     fn load<S: Simd>(simd: S, numbers: &[Self; LANES]) -> Self::Sixteen<S>;
 
+    /// Sixteen that are held as f32.
+    fn held<S: Simd>(simd: S, numbers: &[f32; LANES]) -> Self::Sixteen<S>;
+
     /// The same number sixteen times.
     fn splat<S: Simd>(simd: S, number: Self) -> Self::Sixteen<S>;
 
     /// Each of them.
     fn array<S: Simd>(numbers: Self::Sixteen<S>) -> [Self; LANES];
+
+    /// Each of them, which are whole.
+    fn whole<S: Simd>(numbers: Self::Sixteen<S>) -> [i32; LANES];
 
     /// Sixteen times sixteen, rows and columns exchanged.
     fn transpose<S: Simd>(simd: S, rows: &mut [Self::Sixteen<S>; LANES]);
@@ -36,6 +42,11 @@ impl Number for f32 {
     }
 
     #[inline(always)]
+    fn held<S: Simd>(simd: S, numbers: &[f32; LANES]) -> Lanes<S> {
+        Self::load(simd, numbers)
+    }
+
+    #[inline(always)]
     fn splat<S: Simd>(simd: S, number: Self) -> Lanes<S> {
         Lanes::splat(simd, number)
     }
@@ -45,18 +56,30 @@ impl Number for f32 {
         numbers.to_array()
     }
 
+    #[inline(always)]
+    fn whole<S: Simd>(numbers: Lanes<S>) -> [i32; LANES] {
+        let whole: i32x16<S> = numbers.0.to_int();
+        whole.to_array()
+    }
+
     /// Numbered by row and column, eight bits, they are renumbered four times by a turn of these bits: the last bit of the
     /// column goes to the front.
     #[inline(always)]
     fn transpose<S: Simd>(simd: S, rows: &mut [Lanes<S>; LANES]) {
-        for _ in 0..LANES.ilog2() {
-            let mut turned = *rows;
-            for i in 0..LANES / 2 {
-                let (even, odd) = simd.deinterleave_f32x16(rows[2 * i].0, rows[2 * i + 1].0);
-                (turned[i], turned[i + LANES / 2]) = (Lanes(even), Lanes(odd));
-            }
-            *rows = turned;
+        let mut turned = *rows;
+        for _ in 0..LANES.ilog2() / 2 {
+            turn(simd, rows, &mut turned);
+            turn(simd, &turned, rows);
         }
+    }
+}
+
+/// A turn of the bits by one.
+#[inline(always)]
+fn turn<S: Simd>(simd: S, rows: &[Lanes<S>; LANES], turned: &mut [Lanes<S>; LANES]) {
+    for i in 0..LANES / 2 {
+        let (even, odd) = simd.deinterleave_f32x16(rows[2 * i].0, rows[2 * i + 1].0);
+        (turned[i], turned[i + LANES / 2]) = (Lanes(even), Lanes(odd));
     }
 }
 
@@ -69,6 +92,11 @@ impl Number for f64 {
     }
 
     #[inline(always)]
+    fn held<S: Simd>(_: S, numbers: &[f32; LANES]) -> Batch<Self, LANES> {
+        Batch(numbers.map(Self::from))
+    }
+
+    #[inline(always)]
     fn splat<S: Simd>(_: S, number: Self) -> Batch<Self, LANES> {
         Batch([number; LANES])
     }
@@ -76,6 +104,11 @@ impl Number for f64 {
     #[inline(always)]
     fn array<S: Simd>(numbers: Batch<Self, LANES>) -> [Self; LANES] {
         numbers.0
+    }
+
+    #[inline(always)]
+    fn whole<S: Simd>(numbers: Batch<Self, LANES>) -> [i32; LANES] {
+        numbers.0.map(|number| number as i32)
     }
 
     #[inline(always)]

@@ -169,7 +169,9 @@ impl<'a, R: Number> Run<'a, R> {
                     for (block, slots) in slots.chunks(LANES).enumerate() {
                         let mut rows = [nothing; LANES];
                         for (row, slot) in rows.iter_mut().zip(slots) {
-                            *row = slot.map_or(nothing, |number| numbers[number]);
+                            if let Some(number) = *slot {
+                                *row = numbers[number];
+                            }
                         }
                         R::transpose(simd, &mut rows);
                         for (leaves, row) in leaves.chunks_mut(stride).zip(rows) {
@@ -214,9 +216,14 @@ impl<'a, R: Number> Run<'a, R> {
                 || {
                     for (block, texels) in texels.chunks_mut(stride * LANES).enumerate() {
                         let first = (chunk * CHUNK + block) * LANES;
-                        self.pass.steps.run(&shared, like, registers, |at| self.field(simd, at, first));
-                        numbers.clear();
-                        numbers.extend(self.pass.steps.outputs(&shared, registers));
+                        self.pass.steps.run(
+                            &shared,
+                            like,
+                            registers,
+                            #[inline(always)]
+                            |at| self.field(simd, at, first),
+                        );
+                        self.pass.steps.put(&shared, registers, numbers);
                         then(first, numbers, texels, stride);
                     }
                 },
@@ -229,17 +236,24 @@ impl<'a, R: Number> Run<'a, R> {
     #[inline(always)]
     fn field<S: Simd>(&self, simd: S, at: usize, first: usize) -> R::Sixteen<S> {
         let last = self.atlas.covered() - 1;
-        let lanes: [R; LANES] = match self.loads[at] {
-            Load::Row(row) => self.atlas.rows().record(first / LANES)[row].map(R::from),
+        let mut lanes = [R::from(0.0); LANES];
+        match self.loads[at] {
+            Load::Row(row) => return R::held(simd, &self.atlas.rows().record(first / LANES)[row]),
             Load::Level(record, offset) => {
                 let record = self.made.record(record);
-                std::array::from_fn(|lane| record.numbers[(first + lane).min(last) * record.stride + offset])
+                for (lane, number) in lanes.iter_mut().enumerate() {
+                    *number = record.numbers[(first + lane).min(last) * record.stride + offset];
+                }
             }
-            Load::Apart(component) => std::array::from_fn(|lane| {
-                self.apart.get((first + lane).min(last)).map_or(R::from(0.0), |apart| apart[component])
-            }),
-            Load::Nothing => [R::from(0.0); LANES],
-        };
+            Load::Apart(component) => {
+                for (lane, number) in lanes.iter_mut().enumerate() {
+                    if let Some(apart) = self.apart.get((first + lane).min(last)) {
+                        *number = apart[component];
+                    }
+                }
+            }
+            Load::Nothing => {}
+        }
         R::load(simd, &lanes)
     }
 }
