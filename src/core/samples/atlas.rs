@@ -276,7 +276,7 @@ impl Atlas {
         self.margins.number(chart, texel)
     }
 
-    /// How many texels on either side of a covered one are of its chart, without a gap, up to [`ROOM`].
+    /// How many texels on either side of a covered one are of its chart, without a gap; 255 of more.
     #[inline(always)]
     #[must_use]
     pub fn room(&self, axis: Axis, place: usize) -> i32 {
@@ -333,17 +333,14 @@ impl Texels for Atlas {
     }
 }
 
-/// Texels of room that are counted at the most.
-const ROOM: u8 = u8::MAX;
-
-/// Each covered texel's room along an axis.
+/// Each covered texel's room along an axis, as far as a byte goes.
 fn room(atlas: &Atlas, axis: Axis) -> Vec<u8> {
     // In their order those before a texel are counted first, and against it those after.
     let mut sides = [-1, 1].map(|side| (side, vec![0_u8; atlas.covered()]));
     for (side, counts) in &mut sides {
         let count = |at: usize, counts: &[u8]| {
             let next = atlas.place_along(axis, at, *side).filter(|&next| next < counts.len());
-            next.map_or(0, |next| counts[next].saturating_add(1).min(ROOM))
+            next.map_or(0, |next| counts[next].saturating_add(1))
         };
         for k in 0..counts.len() {
             let at = if *side < 0 { k } else { counts.len() - 1 - k };
