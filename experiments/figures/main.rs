@@ -51,6 +51,7 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/bench/results.json", timings::bench),
     ("experiments/network/results.json", timings::network),
     ("experiments/race/results.json", race::processor),
+    ("experiments/race/diffusion.json", race::diffusion),
     ("experiments/race/card.json", race::graphics_card),
     ("experiments/race/h200.json", race::earlier),
 ];

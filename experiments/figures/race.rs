@@ -48,6 +48,31 @@ pub(crate) fn processor(lab: &Lab) -> Result<Value> {
     Ok(raw)
 }
 
+/// experiments/race: our row of texture-space diffusion on two threads, beside what the other frameworks' program left of
+/// theirs.
+pub(crate) fn diffusion(lab: &Lab) -> Result<Value> {
+    let folder = lab.race.as_ref().ok_or("name the folder of the diffusion race's data by --race")?;
+    let name = "512_442368";
+    let data = folder.join("data").join(name).display().to_string();
+    let row = lab.scratch.path().join("row.json").display().to_string();
+    let arguments = [data.as_str(), "--diffusion", "--threads", "2", "-o", &row];
+    lab.example("race", &format!("the race of diffusion, {name}"), &arguments)?;
+    let mut rows: Vec<Value> = vec![serde_json::from_str(&std::fs::read_to_string(&row)?)?];
+    let others = folder.join("results").join(format!("{name}_cpu.json"));
+    if let Ok(text) = std::fs::read_to_string(others) {
+        rows.extend(serde_json::from_str::<Vec<Value>>(&text)?);
+    }
+    let rows = rows.iter().filter(|row| row["error"].is_null()).map(|row| {
+        let milliseconds = |what: &str| row[what]["median"].as_f64().map(|seconds| 1e3 * seconds);
+        let mut shown = racer(row);
+        for (key, what) in [("forward", "forward"), ("gradient", "grad"), ("normal", "normal")] {
+            shown[key] = milliseconds(what).into();
+        }
+        shown
+    });
+    Ok(json!({ "rows": rows.collect::<Vec<_>>() }))
+}
+
 /// A framework's row: nanoseconds a pixel of the fastest repetition, milliseconds of its fastest fits.
 fn racer(row: &Value) -> Value {
     let a_pixel =

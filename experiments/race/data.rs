@@ -82,12 +82,12 @@ impl Manifest {
     }
 }
 
-fn numbers(folder: &Path, name: &str) -> Result<Vec<u8>> {
+pub(crate) fn numbers(folder: &Path, name: &str) -> Result<Vec<u8>> {
     let path = folder.join(format!("{name}.f32"));
     std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-fn parse(bytes: &[u8]) -> impl Iterator<Item = f32> {
+pub(crate) fn parse(bytes: &[u8]) -> impl Iterator<Item = f32> {
     bytes.as_chunks().0.iter().map(|&four| f32::from_le_bytes(four))
 }
 

@@ -2,8 +2,14 @@
 //! other frameworks do them. Reads a data folder, writes one row of the table as JSON.
 //!
 //! `cargo run --release --example race -- DATA_DIR [--mode sampled|pre] [--engine cpu|gpu] -o row.json`
+//! `cargo run --release --example race -- DATA_DIR --diffusion -o row.json`
+//!
+//! - this module: the surface model; [`diffusion`]: light that scatters within the skin, which has data of its own
+//! - `data`: the folder of the first; `racer`: both engines; `measure`: what both races measure with
 
 mod data;
+mod diffusion;
+mod measure;
 mod racer;
 
 use std::path::PathBuf;
@@ -12,13 +18,13 @@ use std::time::Instant;
 
 use clap::Parser;
 use data::{Manifest, Result};
+use measure::{gauss_newton_step, peak_rss_mb, timed};
 use racer::Racer;
 use serde_json::{Value, json};
 use skinfit::engine::cpu::CpuEngine;
 use skinfit::engine::gpu::{GpuEngine, Memory};
 use skinfit::engine::{Point, Task, Unknown};
-use skinfit::fit::coordinates::Coordinates;
-use skinfit::fit::{FitOptions, bounded, fit};
+use skinfit::fit::{FitOptions, fit};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::Param;
@@ -35,6 +41,9 @@ struct Arguments {
     /// What makes the passes.
     #[arg(long, default_value = "cpu", value_parser = ["cpu", "gpu"])]
     engine: String,
+    /// The data is that of the race of texture-space diffusion.
+    #[arg(long, conflicts_with_all = ["mode", "engine"])]
+    diffusion: bool,
     /// Where the row is written; standard output when left out.
     #[arg(short, long)]
     output: Option<PathBuf>,
@@ -50,24 +59,6 @@ struct Arguments {
 }
 
 const SETUP: Setup = Setup::new(Form::Corrected, Silhouette::Bumped, Effects::SURFACE.with(Effect::Haze));
-
-fn timed(reps: usize, mut run: impl FnMut()) -> Value {
-    run();
-    let (mut seconds, start) = (Vec::new(), Instant::now());
-    while seconds.len() < reps || (start.elapsed().as_secs_f64() < 1.0 && seconds.len() < 200) {
-        let t = Instant::now();
-        run();
-        seconds.push(t.elapsed().as_secs_f64());
-    }
-    seconds.sort_by(f64::total_cmp);
-    json!({"median": seconds[seconds.len() / 2], "min": seconds[0], "reps": seconds.len()})
-}
-
-fn peak_rss_mb() -> f64 {
-    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
-    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
-    line.and_then(|l| l.trim().trim_end_matches(" kB").trim().parse::<f64>().ok()).unwrap_or(0.0) / 1024.0
-}
 
 /// The engine over the target `which`. With `keep` false the CPU's looks everything up anew in each pass; the GPU's
 /// does so where the bump strength is free.
@@ -146,20 +137,6 @@ struct Run {
     best: f64,
 }
 
-/// One bounded Gauss-Newton step over all pixels.
-fn gauss_newton_step(engine: &dyn Racer, point: &Point) -> Point {
-    let sums = engine.normal_equations(point);
-    let coordinates = Coordinates::new(engine.unknowns(), point);
-    let at = coordinates.origin();
-    let slope: Vec<f64> = (0..at.len()).map(|i| coordinates.slope(i, at[i])).collect();
-    let k = at.len();
-    let hessian: Vec<f64> = (0..k * k).map(|ij| sums.jtj[ij] * slope[ij / k] * slope[ij % k]).collect();
-    let gradient: Vec<f64> = (0..k).map(|i| sums.jtr[i] * slope[i]).collect();
-    let (lower, upper) = coordinates.room(at);
-    let step = bounded::minimise(&hessian, &gradient, &lower, &upper);
-    coordinates.point(&coordinates.moved(at, &step))
-}
-
 fn fits(arguments: &Arguments, manifest: &Manifest, start: &Point) -> Result<Value> {
     let mut fits = serde_json::Map::new();
     for which in ["clean", "noisy"] {
@@ -183,6 +160,10 @@ fn fits(arguments: &Arguments, manifest: &Manifest, start: &Point) -> Result<Val
 }
 
 fn run(arguments: &Arguments) -> Result<Value> {
+    if arguments.diffusion {
+        let Arguments { data, reps, passes_only, .. } = arguments;
+        return diffusion::run(&diffusion::Options { folder: data, reps: *reps, passes_only: *passes_only });
+    }
     let manifest = Manifest::read(&arguments.data)?;
     let pre = arguments.mode == "pre";
     let truth = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };

@@ -35,6 +35,8 @@ pub struct LevelPass {
     pub leaves: Vec<(String, usize)>,
     /// What is done with what the steps yield.
     pub then: Then,
+    /// Whether what it leaves moves along a seed.
+    pub moves: bool,
 }
 
 /// What a pass does with what its steps yield of a texel.
@@ -125,6 +127,13 @@ impl LevelProgram {
 
     /// Add a pass with those that leave how its leaves move.
     fn add(&mut self, passes: &[Named<'_>]) -> Result<(), LowerError> {
+        let first = self.passes.len();
+        self.add_each(passes)?;
+        self.passes[first..].iter_mut().for_each(|added| added.moves = passes.len() > 1);
+        Ok(())
+    }
+
+    fn add_each(&mut self, passes: &[Named<'_>]) -> Result<(), LowerError> {
         let alone = |pass: &Named<'_>, then| LevelPass::new(std::slice::from_ref(pass), then);
         let together = match passes[0].pass.kind {
             PassKind::Draw => Some(Then::Leave),
@@ -281,7 +290,29 @@ impl LevelPass {
         }
         let leaves = passes.iter().flat_map(|pass| pass.pass.leaves.iter().map(|leaf| pass.level(leaf)));
         let leaves = leaves.collect();
-        Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then })
+        Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then, moves: false })
+    }
+
+    /// The levels that it reads, and what it reads of a texel, by name.
+    pub fn reads(&self) -> impl Iterator<Item = &str> {
+        let fields = self.steps.fields().iter().map(|field| field.name.as_str());
+        let mut sources: Vec<&str> = Vec::new();
+        match &self.then {
+            Then::Leave => {}
+            Then::Neighbours(source) => sources.push(source),
+            Then::Blur(BlurOf { source, moving, .. }) => {
+                sources.push(source);
+                sources.extend(moving.iter().flatten().map(String::as_str));
+            }
+            Then::Surface(SurfaceOf { source, texels, moving }) => {
+                sources.push(source);
+                sources.extend(texels.iter().chain(moving.iter().flatten()).map(String::as_str));
+            }
+            Then::Gaussian(of) => {
+                sources.extend(of.columns.iter().filter_map(|column| column.source.as_deref()));
+            }
+        }
+        fields.chain(sources)
     }
 }
 

@@ -141,6 +141,15 @@ impl Steps {
         }
     }
 
+    /// What [`Self::run`] computed, in place of what stood in `outputs`.
+    #[inline(always)]
+    pub fn put<R: Real>(&self, shared: &Setting<'_, R>, registers: &[R::Wide], outputs: &mut Vec<R>) {
+        outputs.clear();
+        for &slot in &self.outputs {
+            outputs.push(R::narrow(wide(shared, registers, slot)));
+        }
+    }
+
     /// What [`Self::run`] computed.
     #[inline(always)]
     pub fn outputs<'o, R: Real>(
@@ -179,23 +188,32 @@ impl Step {
         registers: &mut [R::Wide],
         field: &impl Fn(usize) -> R,
     ) {
-        let get = |slot| wide(shared, registers, slot);
-        let number = |slot| R::narrow(get(slot));
+        // No closures: what is not inlined is compiled without the instructions that lanes need.
         let exact = rounding == Rounding::Address;
         let (value, out) = match self {
             Self::Field(at, out) => (rounded(rounding, field(at)), out),
-            Self::Unary(op, a, out) if exact => (unary(op, get(a)), out),
-            Self::Unary(op, a, out) => (rounded(rounding, unary(op, number(a))), out),
-            Self::Binary(op, [a, b], out) if exact => (binary(op, get(a), get(b)), out),
-            Self::Binary(op, [a, b], out) => (rounded(rounding, binary(op, number(a), number(b))), out),
+            Self::Unary(op, a, out) if exact => (unary(op, wide(shared, registers, a)), out),
+            Self::Unary(op, a, out) => {
+                (rounded(rounding, unary(op, R::narrow(wide(shared, registers, a)))), out)
+            }
+            Self::Binary(op, [a, b], out) if exact => {
+                (binary(op, wide(shared, registers, a), wide(shared, registers, b)), out)
+            }
+            Self::Binary(op, [a, b], out) => {
+                let a = R::narrow(wide(shared, registers, a));
+                let b = R::narrow(wide(shared, registers, b));
+                (rounded(rounding, binary(op, a, b)), out)
+            }
             Self::Select([condition, yes, no], out) => {
-                let condition = get(condition);
-                let chosen = Real::select(condition.ge(condition.lit(0.5)), get(yes), get(no));
+                let condition: R::Wide = wide(shared, registers, condition);
+                let (yes, no) = (wide(shared, registers, yes), wide(shared, registers, no));
+                let chosen = Real::select(condition.ge(condition.lit(0.5)), yes, no);
                 // Of numbers that were rounded, unless the choice has a rounding of its own.
                 let declared = matches!(rounding, Rounding::Half | Rounding::Fixed);
                 (if declared { rounded(rounding, R::narrow(chosen)) } else { chosen }, out)
             }
             Self::Lookup(resource, [face, s, t], along, first) => {
+                let get = |slot| wide(shared, registers, slot);
                 let cube = shared.cubes[resource];
                 let at = cube.footprint_at(get(face), get(s), get(t));
                 let channels = match along {

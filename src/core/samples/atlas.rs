@@ -28,6 +28,7 @@ use crate::scene::maps::{Map, Maps};
 use crate::scene::mesh::{PosedMesh, tile_outside_atlas};
 use crate::scene::mip_maps::MipMaps;
 use crate::shader::Facts;
+use crate::shader::atlas::Axis;
 use crate::shader::facts::FaceSizes;
 
 /// A texel that the mesh does not cover.
@@ -89,6 +90,8 @@ pub struct Atlas {
     rows: Rows,
     /// Made where it is asked for.
     dilation: OnceLock<Dilation>,
+    /// Along u and v.
+    room: OnceLock<[Vec<u8>; 2]>,
     margins: Margins,
 }
 
@@ -142,6 +145,7 @@ impl Atlas {
             inputs,
             rows,
             dilation: OnceLock::new(),
+            room: OnceLock::new(),
             margins: Margins::default(),
         };
         if setup.choices.diffusion.seams == Seams::Joined {
@@ -168,8 +172,19 @@ impl Atlas {
             }
         }
         let charts = texels.iter().map(|&texel| charts[texel as usize]).collect();
-        let dilation = OnceLock::new();
-        Self { size, places, texels, charts, inputs, rows, dilation, margins: Margins::default() }
+        let (dilation, room) = (OnceLock::new(), OnceLock::new());
+        Self { size, places, texels, charts, inputs, rows, dilation, room, margins: Margins::default() }
+    }
+
+    /// The same, but lookups by one fetch find in each empty texel what another shows, which is covered: pairs of texels,
+    /// row by row.
+    #[must_use]
+    pub fn with_shown(mut self, shown: impl IntoIterator<Item = (u32, u32)>) -> Self {
+        let place = |texel: u32| Some(self.places[texel as usize]).filter(|&place| place != EMPTY);
+        let shown = shown.into_iter().filter(|&(texel, _)| place(texel).is_none());
+        let shown = shown.filter_map(|(texel, of)| Some((texel, place(of)?)));
+        self.dilation = OnceLock::from(Dilation::of_copies(shown));
+        self
     }
 
     /// Texels along a side.
@@ -261,6 +276,40 @@ impl Atlas {
         self.margins.number(chart, texel)
     }
 
+    /// How many texels on either side of a covered one are of its chart, without a gap; 255 of more.
+    #[inline(always)]
+    #[must_use]
+    pub fn room(&self, axis: Axis, place: usize) -> i32 {
+        let [along_u, along_v] = self.room.get_or_init(|| [Axis::U, Axis::V].map(|axis| room(self, axis)));
+        i32::from(match axis {
+            Axis::U => along_u[place],
+            Axis::V => along_v[place],
+        })
+    }
+
+    /// The texel so many steps from a covered one, no further than it has [room](Self::room).
+    #[inline(always)]
+    #[must_use]
+    pub fn place_within(&self, axis: Axis, place: usize, step: i32) -> u32 {
+        match axis {
+            // Row by row.
+            Axis::U => (place as i32 + step) as u32,
+            Axis::V => self.places[(self.texels[place] as i32 + step * self.size as i32) as usize],
+        }
+    }
+
+    /// The texel of the same chart so many steps from a covered one, [`Self::place_of_chart`].
+    #[inline(always)]
+    #[must_use]
+    pub fn place_along(&self, axis: Axis, place: usize, step: i64) -> Option<usize> {
+        let [column, row] = self.texel(place).map(i64::from);
+        let chart = self.charts[place];
+        match axis {
+            Axis::U => self.place_of_chart(chart, column.saturating_add(step), row),
+            Axis::V => self.place_of_chart(chart, column, row.saturating_add(step)),
+        }
+    }
+
     /// The row of a record that holds a number; `None` where it was not asked for.
     #[must_use]
     pub fn row(&self, input: &Input) -> Option<usize> {
@@ -282,6 +331,24 @@ impl Texels for Atlas {
     fn at(&self, column: i64, row: i64) -> Option<(u32, u32)> {
         self.place(column, row).map(|place| (place as u32, self.charts[place]))
     }
+}
+
+/// Each covered texel's room along an axis, as far as a byte goes.
+fn room(atlas: &Atlas, axis: Axis) -> Vec<u8> {
+    // In their order those before a texel are counted first, and against it those after.
+    let mut sides = [-1, 1].map(|side| (side, vec![0_u8; atlas.covered()]));
+    for (side, counts) in &mut sides {
+        let count = |at: usize, counts: &[u8]| {
+            let next = atlas.place_along(axis, at, *side).filter(|&next| next < counts.len());
+            next.map_or(0, |next| counts[next].saturating_add(1))
+        };
+        for k in 0..counts.len() {
+            let at = if *side < 0 { k } else { counts.len() - 1 - k };
+            counts[at] = count(at, counts);
+        }
+    }
+    let [(_, before), (_, after)] = sides;
+    before.into_iter().zip(after).map(|(before, after)| before.min(after)).collect()
 }
 
 /// Rings about a place in which a chart's nearest texel is looked for before all of them are.

@@ -10,7 +10,8 @@ const RINGS: usize = 2;
 
 /// Which texels are filled beyond those that are covered, and from which.
 ///
-/// Filled texels are numbered on from the covered ones, ring by ring and row by row.
+/// Filled texels are numbered on from the covered ones, ring by ring and row by row; those that show just another have its
+/// number.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Dilation {
     /// The number of each filled texel, by its place in the atlas.
@@ -48,6 +49,11 @@ impl Dilation {
         dilation
     }
 
+    /// Empty texels that each show one that is covered, by their places in the atlas and the numbers of those.
+    pub(super) fn of_copies(copies: impl Iterator<Item = (u32, u32)>) -> Self {
+        Self { numbers: copies.collect(), ..Self::default() }
+    }
+
     /// The number of a filled texel, by its place in the atlas, row by row.
     #[must_use]
     pub fn number(&self, texel: u32) -> Option<usize> {
@@ -55,9 +61,9 @@ impl Dilation {
     }
 
     /// Of each filled texel, in the order of their numbers, those that it is the mean of.
-    pub fn filled(&self) -> impl Iterator<Item = &[u32]> {
-        let starts = std::iter::once(0).chain(self.ends.iter().copied());
-        starts.zip(&self.ends).map(|(start, &end)| &self.neighbours[start..end])
+    pub fn filled(&self) -> impl ExactSizeIterator<Item = &[u32]> {
+        let start = |at: usize| at.checked_sub(1).map_or(0, |before| self.ends[before]);
+        (0..self.ends.len()).map(move |at| &self.neighbours[start(at)..self.ends[at]])
     }
 }
 

@@ -50,10 +50,14 @@ impl CpuEngine {
         if let Some(found) = lock().as_ref().filter(same) {
             return Some(Arc::clone(found));
         }
+        // Levels are made in the memory of the last ones, where nobody has these any more.
+        drop(lock().take());
         let params = &point.params;
         let cubes = || CubesAt::new(&self.illumination, params, |x| x);
+        // Of an engine for images, every pass is another's.
+        let anew = pass.levels.moves() || self.fitted.unknowns.is_empty();
         let views = self.views.iter().map(|view| match &view.samples.atlas {
-            Some(atlas) if pass.levels.moves() && view.samples.records() > 0 => {
+            Some(atlas) if anew && view.samples.records() > 0 => {
                 let made = pass.levels.levels(atlas, params, cubes);
                 Found::Levels(Finder::new(&pass.levels, made), self.corners(pass.levels.program().dilated))
             }

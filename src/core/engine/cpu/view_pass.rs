@@ -162,7 +162,12 @@ impl ViewPass<'_> {
             #[inline(always)]
             || {
                 for (rows, corners) in rows.chunks_mut(stride).zip(&corners[first..first + count]) {
-                    finder.find(corners, |row, lane, number| rows[row][lane] = number);
+                    finder.find(
+                        simd,
+                        corners,
+                        #[inline(always)]
+                        |row, numbers| numbers.store(&mut rows[row]),
+                    );
                 }
             },
         );

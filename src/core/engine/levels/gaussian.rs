@@ -1,19 +1,19 @@
 //! One direction of a Gaussian blur of several levels at once: which texels count, and what each weighs, is found once for
 //! a level and for how it moves along every seed.
 //!
-//! `shader/atlas/blur.wgsl` and `blur_tangent.wgsl` have the same of one level.
+//! `shader/atlas/blur.wgsl` and `blur_tangent.wgsl` have the same of one level. What is summed up are differences to the texel
+//! itself: what is alike everywhere stays so to the bit.
 
 use std::borrow::Cow;
 use std::f64::consts::LOG2_E;
 
-use super::records::{Made, Record};
+use super::records::{Made, Record, sixteen};
+use super::taps::Taps;
 use super::{Number, Texel};
+use crate::model::real::Real;
 use crate::program::levels::GaussianOf;
-use crate::samples::Atlas;
-use crate::shader::atlas::Axis;
-
-/// Numbers that are weighed at once.
-const WIDE: usize = 16;
+use crate::samples::{Atlas, LANES};
+use crate::simd::Simd;
 
 /// What is blurred: texels' numbers side by side, in the order of the leaves.
 pub(super) struct Sources<'a, R: Number> {
@@ -23,7 +23,8 @@ pub(super) struct Sources<'a, R: Number> {
     count: usize,
 }
 
-/// The order of a pass' columns in which those with a source come first, as these stand in their record.
+/// The order of a pass' columns in which those with a source come first, as these stand in their record. The pass leaves
+/// them in this order.
 pub(super) fn ordered(of: &GaussianOf, place: impl Fn(&str) -> Option<(usize, usize)>) -> Vec<usize> {
     let mut order: Vec<usize> = (0..of.columns.len()).collect();
     let key = |&column: &usize| {
@@ -42,7 +43,7 @@ impl<'a, R: Number> Sources<'a, R> {
             order.iter().map_while(|&column| made.place(of.columns[column].source.as_deref()?)).collect();
         let count = places.len();
         let Some(&(first, _)) = places.first() else {
-            return Self { record: Vec::new().into(), stride: 0, count: 0 };
+            return Self { record: vec![R::from(0.0); LANES].into(), stride: 0, count: 0 };
         };
         let record = made.record(first);
         let in_order = places.iter().enumerate().all(|(k, &place)| place == (first, 3 * k));
@@ -51,27 +52,21 @@ impl<'a, R: Number> Sources<'a, R> {
             return Self { record: record.numbers.as_slice().into(), stride: record.stride, count };
         }
         let mut copied = Record::new(count, atlas.covered());
-        for (texel, numbers) in copied.numbers.chunks_mut(copied.stride).enumerate() {
+        let stride = copied.stride;
+        for (texel, numbers) in copied.of_texels().chunks_mut(stride).enumerate() {
             for (k, &(record, offset)) in places.iter().enumerate() {
                 numbers[3 * k..3 * k + 3].copy_from_slice(&made.record(record).at(texel, offset));
             }
         }
         copied.extend(atlas.margins().shares());
-        Self { stride: copied.stride, record: copied.numbers.into(), count }
+        Self { stride, record: copied.numbers.into(), count }
     }
 
+    /// A texel's numbers.
     #[inline(always)]
-    fn at(&self, texel: usize) -> &[R] {
+    fn texel(&self, texel: usize) -> &[R] {
         &self.record[texel * self.stride..(texel + 1) * self.stride]
     }
-}
-
-/// A texel that counts: its place among those that are covered, what it weighs, and how that moves as the deviation does.
-#[derive(Clone, Copy)]
-pub(super) struct Weighed<R> {
-    place: u32,
-    weight: R,
-    slope: R,
 }
 
 /// A pass at work.
@@ -79,131 +74,158 @@ pub(super) struct Gaussian<'a, R: Number> {
     pub(super) of: &'a GaussianOf,
     pub(super) atlas: &'a Atlas,
     pub(super) sources: &'a Sources<'a, R>,
-    /// The pass' columns, in the order in which the sources stand.
-    pub(super) order: &'a [usize],
+    /// For each leaf in the order in which they stand, which of the steps' numbers is how the deviation moves along its seed.
+    pub(super) moved: Vec<Option<usize>>,
 }
 
-impl<R: Number> Gaussian<'_, R> {
-    /// What the pass leaves of a texel, into its record. `number` gives the deviation, and then how it moves; `near` is
-    /// memory to work in.
+impl<'a, R: Number> Gaussian<'a, R> {
+    pub(super) fn new(
+        of: &'a GaussianOf,
+        order: &[usize],
+        atlas: &'a Atlas,
+        sources: &'a Sources<'a, R>,
+    ) -> Self {
+        let moved = order.iter().map(|&column| of.columns[column].moved.map(|moved| 1 + moved)).collect();
+        Self { of, atlas, sources, moved }
+    }
+
+    /// What the pass leaves of up to sixteen texels from `first` on, `stride` numbers each. `numbers` are their deviations,
+    /// and then how these move.
     #[inline(always)]
-    pub(super) fn blur(
+    pub(super) fn blur<S: Simd>(
         &self,
-        here: usize,
-        number: impl Fn(usize) -> R,
-        near: &mut Vec<Weighed<R>>,
-        leaves: &mut [R],
+        simd: S,
+        first: usize,
+        numbers: &[R::Sixteen<S>],
+        (leaves, stride): (&mut [R], usize),
     ) {
-        let zero = R::from(0.0);
-        let moves = self.of.columns.iter().any(|column| column.moved.is_some());
-        self.weigh(here, number(0), moves, near);
-        let own = self.sources.at(here);
-        let (mut weights, mut slopes) = (zero, zero);
-        // Of the level itself, by how the weights move.
-        let mut change: Texel<R> = [zero; 3];
-        for texel in near.iter() {
-            weights = weights + texel.weight;
-            if moves {
-                let value = self.sources.at(texel.place as usize);
-                slopes = slopes + texel.slope;
-                (0..3).for_each(|c| change[c] = change[c] + texel.slope * (value[c] - own[c]));
-            }
-        }
-        let weighs = zero.lt(weights);
-        let share = R::from(1.0) / if weighs { weights } else { R::from(1.0) };
-        let mut means = [zero; WIDE];
-        for first in (0..3 * self.sources.count).step_by(WIDE) {
-            let width = WIDE.min(self.sources.stride - first);
-            if width == WIDE {
-                self.mean::<WIDE>(first, near, own, share, &mut means);
-            } else {
-                for four in (0..width).step_by(4) {
-                    let mut mean = [zero; 4];
-                    self.mean::<4>(first + four, near, own, share, &mut mean);
-                    means[four..four + 4].copy_from_slice(&mean);
+        // How the level itself moves as the deviation does.
+        let mut slopes = [[R::from(0.0); 3]; LANES];
+        let of = (first, numbers[0]);
+        match self.of.reach {
+            Some(1) => self.by_taps::<S, 1>(simd, of, (leaves, stride), &mut slopes),
+            Some(2) => self.by_taps::<S, 2>(simd, of, (leaves, stride), &mut slopes),
+            Some(3) => self.by_taps::<S, 3>(simd, of, (leaves, stride), &mut slopes),
+            Some(_) => self.by_taps::<S, 4>(simd, of, (leaves, stride), &mut slopes),
+            None => {
+                let deviations = R::array::<S>(numbers[0]);
+                for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
+                    slopes[lane] = self.by_steps(first + lane, deviations[lane], leaves);
                 }
             }
-            let width = width.min(3 * self.sources.count - first);
-            for (k, mean) in means[..width].iter().enumerate() {
-                let (column, c) = ((first + k) / 3, (first + k) % 3);
-                leaves[3 * self.order[column] + c] = *mean;
+        }
+        for (k, moved) in self.moved.iter().enumerate() {
+            let Some(moved) = *moved else { continue };
+            let moved = R::array::<S>(numbers[moved]);
+            for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
+                for c in 0..3 {
+                    leaves[3 * k + c] = leaves[3 * k + c] + moved[lane] * slopes[lane][c];
+                }
             }
-        }
-        if !moves || !weighs {
-            return;
-        }
-        let value = [0, 1, 2].map(|c| leaves[c] - own[c]);
-        let by_deviation: Texel<R> = std::array::from_fn(|c| (change[c] - slopes * value[c]) * share);
-        for (column, leaf) in self.of.columns.iter().zip(leaves.chunks_mut(3)) {
-            let Some(moved) = column.moved else { continue };
-            let moved = number(1 + moved);
-            (0..3).for_each(|c| leaf[c] = leaf[c] + moved * by_deviation[c]);
         }
     }
 
-    /// Weighted means of `N` numbers from `first` on, of differences to the texel itself: what is alike everywhere stays so
-    /// to the bit.
+    /// Blur by `REACH` taps to either side that lie a deviation apart.
     #[inline(always)]
-    fn mean<const N: usize>(
+    fn by_taps<S: Simd, const REACH: usize>(
         &self,
-        first: usize,
-        near: &[Weighed<R>],
-        own: &[R],
-        share: R,
-        means: &mut [R; N],
+        simd: S,
+        (first, deviations): (usize, R::Sixteen<S>),
+        (leaves, stride): (&mut [R], usize),
+        slopes: &mut [Texel<R>; LANES],
     ) {
-        let own: [R; N] = std::array::from_fn(|k| own[first + k]);
-        let mut sum = [R::from(0.0); N];
-        for texel in near {
-            let numbers = &self.sources.at(texel.place as usize)[first..first + N];
-            for k in 0..N {
-                sum[k] = sum[k] + texel.weight * (numbers[k] - own[k]);
+        let zero = R::splat(simd, R::from(0.0));
+        let taps = Taps::<R, REACH>::new::<S>(simd, deviations);
+        let Sources { stride: width, count, .. } = *self.sources;
+        let record = &*self.sources.record;
+        for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
+            let here = first + lane;
+            let near = taps.near(self.atlas, self.of.axis, here, lane);
+            let share = R::splat(simd, near.share);
+            for from in (0..3 * count).step_by(LANES) {
+                let own = R::load(simd, sixteen(record, here * width + from));
+                let (mut sum, mut change) = (zero, zero);
+                for k in 0..REACH {
+                    let [a, b, c, d] = near.texels[k];
+                    let a = R::load(simd, sixteen(record, a as usize * width + from));
+                    let b = R::load(simd, sixteen(record, b as usize * width + from));
+                    let c = R::load(simd, sixteen(record, c as usize * width + from));
+                    let d = R::load(simd, sixteen(record, d as usize * width + from));
+                    let [weight, slope] = taps.weight(k);
+                    let [before, after] = near.shares[k];
+                    let (down, up) = (b - a, d - c);
+                    let off = R::splat(simd, before).mul_add(down, (a - own) + (c - own));
+                    let off = R::splat(simd, after).mul_add(up, off);
+                    sum = R::splat(simd, weight).mul_add(off, sum);
+                    change = R::splat(simd, slope).mul_add(up - down, change);
+                }
+                let off = sum * share;
+                put(&R::array::<S>(own + off), &mut leaves[from..]);
+                // The level itself stands first.
+                if from == 0 {
+                    let change = (change - R::splat(simd, near.slopes) * off) * share;
+                    let change = R::array::<S>(change);
+                    slopes[lane] = [change[0], change[1], change[2]];
+                }
             }
-        }
-        for k in 0..N {
-            means[k] = own[k] + sum[k] * share;
+            self.clear(leaves);
         }
     }
 
-    /// The texels that count at one.
+    /// Blur by all texels within six deviations; how the level itself moves as that does.
     #[inline(always)]
-    fn weigh(&self, here: usize, deviation: R, moves: bool, near: &mut Vec<Weighed<R>>) {
-        near.clear();
+    fn by_steps(&self, here: usize, deviation: R, leaves: &mut [R]) -> Texel<R> {
         let (zero, one) = (R::from(0.0), R::from(1.0));
-        let [column, row] = self.atlas.texel(here).map(i64::from);
-        let chart = self.atlas.chart(here);
-        let mut add = |step: i64, weight: R, slope: R| {
-            let place = match self.of.axis {
-                Axis::U => self.atlas.place_of_chart(chart, column.saturating_add(step), row),
-                Axis::V => self.atlas.place_of_chart(chart, column, row.saturating_add(step)),
-            };
-            if let Some(place) = place {
-                near.push(Weighed { place: place as u32, weight, slope });
-            }
-        };
-        // exp(-d^2 / 2).
-        let weight = |deviations: R| (one.lit(-0.5 * LOG2_E) * deviations * deviations).exp2();
-        if let Some(reach) = self.of.reach {
-            for tap in -(reach as i64)..=reach as i64 {
-                let step = one.lit(tap as f64);
-                let (at, weighs) = (step * deviation, weight(step));
-                let low = at.floor();
-                let f = at - low;
-                let first: f64 = low.into();
-                let first = first as i64;
-                add(first, weighs * (one - f), -(weighs * step));
-                add(first.saturating_add(1), weighs * f, weighs * step);
-            }
-            return;
-        }
+        let own = self.sources.texel(here);
         let wide: f64 = deviation.into();
         let reach = (6.0 * wide).ceil().min(f64::from(self.atlas.size())) as i64;
         let narrow = if one.lit(1e-10).lt(deviation) { deviation } else { one.lit(1e-10) };
+        let (mut weights, mut slopes, mut change) = (zero, zero, [zero; 3]);
+        let numbers = 3 * self.sources.count;
+        leaves.fill(zero);
         for step in -reach..=reach {
+            let Some(place) = self.atlas.place_along(self.of.axis, here, step) else { continue };
             let deviations = one.lit(step as f64) / narrow;
-            let weighs = weight(deviations);
-            let slope = if moves { weighs * deviations * deviations / narrow } else { zero };
-            add(step, weighs, slope);
+            // exp(-d^2 / 2).
+            let weight = (one.lit(-0.5 * LOG2_E) * deviations * deviations).exp2();
+            let near = self.sources.texel(place);
+            weights = weights + weight;
+            for k in 0..numbers {
+                leaves[k] = leaves[k] + weight * (near[k] - own[k]);
+            }
+            let slope = weight * deviations * deviations / narrow;
+            slopes = slopes + slope;
+            let change = change.iter_mut().zip(near.iter().zip(own));
+            change.for_each(|(sum, (&value, &own))| *sum = *sum + slope * (value - own));
         }
+        let weighs = zero.lt(weights);
+        let share = one / if weighs { weights } else { one };
+        let off = [0, 1, 2].map(|c| if c < numbers { leaves[c] * share } else { zero });
+        for k in 0..numbers {
+            leaves[k] = own[k] + leaves[k] * share;
+        }
+        std::array::from_fn(|c| if weighs { (change[c] - slopes * off[c]) * share } else { zero })
+    }
+
+    /// Clear the leaves without a source.
+    #[inline(always)]
+    fn clear(&self, leaves: &mut [R]) {
+        if self.sources.count < self.moved.len() {
+            leaves[3 * self.sources.count..].fill(R::from(0.0));
+        }
+    }
+}
+
+/// The first of sixteen numbers, as many as there is room for: a multiple of four.
+#[inline(always)]
+pub(super) fn put<R: Copy>(numbers: &[R; LANES], room: &mut [R]) {
+    if let Some(room) = room.first_chunk_mut() {
+        *room = *numbers;
+        return;
+    }
+    let (numbers, _) = numbers.as_chunks::<4>();
+    let (room, _) = room.as_chunks_mut::<4>();
+    for (room, numbers) in room.iter_mut().zip(numbers) {
+        *room = *numbers;
     }
 }

@@ -8,13 +8,13 @@ use rayon::prelude::*;
 use super::{LevelMaker, Made, Number};
 use crate::engine::cubes_at::CubesAt;
 use crate::model::params::Params;
+use crate::model::real::Real;
 use crate::samples::{Atlas, LANES, ViewSamples};
+use crate::simd::Simd;
 use crate::with_simd;
 
 /// Records of samples that a thread takes at once.
 const CHUNK: usize = 256;
-/// Numbers of a texel that are weighed at once.
-const WIDE: usize = 16;
 
 /// The texels that a record of samples looks up, four each, and what these count; a sample that finds none has shares
 /// of 0.
@@ -119,13 +119,11 @@ pub struct Finder<R> {
     empty: Vec<usize>,
 }
 
-/// Numbers of a record of levels that are weighed at once.
+/// Sixteen numbers of a record of levels, which are weighed at once.
 #[derive(Debug)]
 struct Block {
     record: usize,
     first: usize,
-    /// Whether they are [`WIDE`], and not four.
-    wide: bool,
     /// Which of them are looked up, and the row of each.
     rows: Vec<(usize, usize)>,
 }
@@ -146,52 +144,42 @@ impl<R: Number> Finder<R> {
         let empty = (0..row).filter(|row| !numbers.iter().any(|(.., found)| found == row)).collect();
         let mut blocks: Vec<Block> = Vec::new();
         for (record, offset, row) in numbers {
-            let stride = made.record(record).stride;
             let there = |block: &&mut Block| {
-                let width = if block.wide { WIDE } else { 4 };
-                block.record == record && (block.first..block.first + width).contains(&offset)
+                block.record == record && (block.first..block.first + LANES).contains(&offset)
             };
-            if let Some(block) = blocks.last_mut().filter(there) {
-                block.rows.push((offset - block.first, row));
-                continue;
+            match blocks.last_mut().filter(there) {
+                Some(block) => block.rows.push((offset - block.first, row)),
+                None => blocks.push(Block { record, first: offset, rows: vec![(0, row)] }),
             }
-            let first = offset - offset % 4;
-            let wide = first + WIDE <= stride;
-            blocks.push(Block { record, first, wide, rows: vec![(offset - first, row)] });
         }
         Self { made, blocks, rows: row, empty }
     }
 
     /// What a record of samples finds, a row a number; 0 of what nothing leaves.
     #[inline(always)]
-    pub fn find(&self, corners: &Corners<R>, mut put: impl FnMut(usize, usize, R)) {
-        for lane in 0..LANES {
-            self.empty.iter().for_each(|&row| put(row, lane, R::from(0.0)));
-            let texels = corners.texels.map(|texels| texels[lane] as usize);
-            let shares = corners.shares.map(|shares| shares[lane]);
-            for block in &self.blocks {
-                if block.wide {
-                    let found = self.mean::<WIDE>(block, texels, shares);
-                    block.rows.iter().for_each(|&(k, row)| put(row, lane, found[k]));
-                } else {
-                    let found = self.mean::<4>(block, texels, shares);
-                    block.rows.iter().for_each(|&(k, row)| put(row, lane, found[k]));
+    pub fn find<S: Simd>(&self, simd: S, corners: &Corners<R>, mut put: impl FnMut(usize, R::Sixteen<S>)) {
+        let nothing = R::splat(simd, R::from(0.0));
+        for &row in &self.empty {
+            put(row, nothing);
+        }
+        for block in &self.blocks {
+            let record = self.made.record(block.record);
+            // A row a sample, and then a row a number.
+            let mut found = [nothing; LANES];
+            for lane in 0..LANES {
+                let mut sum = nothing;
+                for k in 0..4 {
+                    let texel = corners.texels[k][lane] as usize;
+                    let numbers = R::load(simd, record.sixteen(texel, block.first));
+                    sum = numbers.mul_add(R::splat(simd, corners.shares[k][lane]), sum);
                 }
+                found[lane] = sum;
+            }
+            R::transpose(simd, &mut found);
+            for &(k, row) in &block.rows {
+                put(row, found[k]);
             }
         }
-    }
-
-    #[inline(always)]
-    fn mean<const N: usize>(&self, block: &Block, texels: [usize; 4], shares: [R; 4]) -> [R; N] {
-        let record = self.made.record(block.record);
-        let mut sum = [R::from(0.0); N];
-        for (texel, share) in texels.into_iter().zip(shares) {
-            let numbers = &record.numbers[texel * record.stride + block.first..][..N];
-            for k in 0..N {
-                sum[k] = sum[k] + share * numbers[k];
-            }
-        }
-        sum
     }
 }
 
@@ -217,9 +205,13 @@ impl<R: Number> LevelMaker<R> {
             let mut found = vec![[R::from(0.0); LANES]; stride * own.len()];
             if let Some(finder) = finder.as_ref().filter(|_| !corners.is_empty()) {
                 with_simd!(instructions, simd => {
-                    let _ = simd;
                     for (rows, corners) in found.chunks_mut(stride).zip(&corners[own]) {
-                        finder.find(corners, |row, lane, number| rows[row][lane] = number);
+                        finder.find(
+                            simd,
+                            corners,
+                            #[inline(always)]
+                            |row, numbers| rows[row] = R::array(numbers),
+                        );
                     }
                 });
             }

@@ -5,41 +5,40 @@
 //! `shader/atlas/blur.wgsl`, `blur_tangent.wgsl` and `level.wgsl`. Texel by texel, so nothing depends on threads.
 //!
 //! - this module: [`LevelMaker`], which makes levels anew when a number changes that they are made with
-//! - `records`: levels in memory; `run`: a pass over them
-//! - `gaussian`: one direction of a Gaussian, of a level and of how it moves; `blur`: likewise by a rule's own taps;
+//! - `number`: what levels are made of; `records`: levels in memory
+//! - `again`: which passes have to run again, and whose memory they may have; `run`: a pass
+//! - `gaussian`: one direction of a Gaussian, of a level and of how it moves, by `taps`; `blur`: likewise by a rule's own;
 //!   `neighbours`: how far these lie apart; `surface`: sums by distance in space; `look_up`: what samples find
 
+mod again;
 mod blur;
 mod gaussian;
 mod look_up;
 mod neighbours;
+mod number;
 mod records;
 mod run;
 mod surface;
+mod taps;
 #[cfg(test)]
 mod tests;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
+use self::again::Flow;
 pub use self::look_up::{Corners, Finder, corners_of};
+pub use self::number::Number;
 pub use self::records::Made;
-use self::run::Run;
 use super::cubes_at::CubesAt;
 use crate::bake::stacks::Stack;
 use crate::model::effects::Effects;
 use crate::model::params::Params;
-use crate::model::real::Real;
 use crate::program::graph::Input;
 use crate::program::levels::{LevelPass, LevelProgram};
 use crate::program::shading::constant;
 use crate::samples::{Atlas, ViewSamples};
 use crate::shader::PlanError;
-
-/// What levels are made of: f32 or f64.
-pub trait Number: Real<Texel = Self, Wide = Self, Mask = bool> + From<f32> + Into<f64> + Send + Sync {}
-impl Number for f32 {}
-impl Number for f64 {}
 
 /// A number of up to three components.
 type Texel<R> = [R; 3];
@@ -48,11 +47,14 @@ type Texel<R> = [R; 3];
 #[derive(Debug)]
 pub struct LevelMaker<R> {
     program: LevelProgram,
+    flow: Flow,
     /// The numbers that texels share, for each pass.
     constants: Vec<Input>,
     /// Stacks of cubes that a pass looks up.
     stacks: Vec<Stack>,
     last: Mutex<Vec<Last<R>>>,
+    /// Memory that no level stands in any more.
+    spare: Mutex<Vec<Vec<R>>>,
     count: AtomicU64,
 }
 
@@ -76,8 +78,9 @@ impl<R: Number> LevelMaker<R> {
         }
         let names = |pass: &LevelPass| -> Vec<String> { pass.steps.resources().to_vec() };
         let read: Vec<String> = program.passes.iter().flat_map(names).collect();
-        let stacks = Stack::read(&read);
-        Self { program, constants, stacks, last: Mutex::default(), count: AtomicU64::new(0) }
+        let (stacks, flow) = (Stack::read(&read), Flow::new(&program));
+        let (last, spare) = (Mutex::default(), Mutex::default());
+        Self { program, flow, constants, stacks, last, spare, count: AtomicU64::new(0) }
     }
 
     /// The passes.
@@ -139,8 +142,8 @@ impl<R: Number> LevelMaker<R> {
     }
 
     /// The levels of an atlas that samples look up, at `params`, those texels with them that a lookup by one fetch has
-    /// filled: the last ones, where nothing has changed that they are
-    /// made with. `cubes` gives the cubes at `params`.
+    /// filled. The last ones, where nothing has changed that they are made with; else what that changes is made anew, in the
+    /// memory of the last ones where nobody else has these. `cubes` gives the cubes at `params`.
     pub fn levels(
         &self,
         atlas: &Arc<Atlas>,
@@ -148,44 +151,47 @@ impl<R: Number> LevelMaker<R> {
         cubes: impl FnOnce() -> CubesAt<R>,
     ) -> Arc<Made<R>> {
         let with = self.made_with(params);
-        if let Some(levels) = self.known(atlas, &with) {
-            return levels;
-        }
+        let before = match self.known(atlas, &with) {
+            Known::Same(levels) => return levels,
+            Known::Other(levels) => Arc::unwrap_or_clone(levels),
+            Known::Nothing => Made::new(atlas.covered()),
+        };
         // Nothing is locked meanwhile: a thread that waits for others may come here again.
         self.count.fetch_add(1, Ordering::Relaxed);
         let reads = self.program.passes.iter().any(|pass| !pass.steps.resources().is_empty());
         let cubes = if reads { cubes() } else { CubesAt::dark(|x| R::from(x)) };
-        let mut levels = self.make(atlas, params, &cubes);
-        levels.retain(|name| self.program.looked_up.iter().any(|(found, _)| found == name));
-        if self.program.dilated {
-            levels.fill(atlas.dilation());
-        }
-        let levels = Arc::new(levels);
+        let levels = Arc::new(self.make_again(before, atlas, params, &cubes, false));
         let made = Last { atlas: Arc::clone(atlas), with, levels: Arc::clone(&levels) };
-        self.last.lock().unwrap_or_else(PoisonError::into_inner).push(made);
+        let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
+        last.retain(|made| !Arc::ptr_eq(&made.atlas, atlas));
+        last.push(made);
         levels
     }
 
-    /// Levels that were made with the same numbers. Others go, and those of an atlas that nobody else has any more, such
-    /// as an earlier frame's.
-    fn known(&self, atlas: &Arc<Atlas>, with: &[f64]) -> Option<Arc<Made<R>>> {
+    /// Take the levels of an atlas that were made last. Those of an atlas that nobody else has any more, such as an earlier
+    /// frame's, go.
+    fn known(&self, atlas: &Arc<Atlas>, with: &[f64]) -> Known<R> {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
-        last.retain(|made| made.with == with && Arc::strong_count(&made.atlas) > 1);
-        let made = last.iter().find(|made| Arc::ptr_eq(&made.atlas, atlas))?;
-        Some(Arc::clone(&made.levels))
+        last.retain(|made| Arc::strong_count(&made.atlas) > 1);
+        match last.iter().position(|made| Arc::ptr_eq(&made.atlas, atlas)) {
+            Some(at) if last[at].with == with => Known::Same(Arc::clone(&last[at].levels)),
+            Some(at) => Known::Other(last.swap_remove(at).levels),
+            None => Known::Nothing,
+        }
     }
 
     /// Every level, those between with them.
     #[must_use]
     pub fn make(&self, atlas: &Atlas, params: &Params, cubes: &CubesAt<R>) -> Made<R> {
-        let mut made = Made::new(atlas.covered());
-        if atlas.covered() == 0 {
-            return made;
-        }
-        for pass in &self.program.passes {
-            let record = Run::new(pass, (atlas, &made), params, cubes).record();
-            made.push(pass.leaves.iter().map(|(name, _)| name.clone()), record);
-        }
-        made
+        self.make_again(Made::new(atlas.covered()), atlas, params, cubes, true)
     }
+}
+
+/// What is known of an atlas' levels.
+enum Known<R> {
+    /// They were made with the same numbers.
+    Same(Arc<Made<R>>),
+    /// With others.
+    Other(Arc<Made<R>>),
+    Nothing,
 }

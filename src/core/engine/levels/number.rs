@@ -1,0 +1,145 @@
+//! What levels are made of, and sixteen of it as the processor computes with them at once.
+
+use fearless_simd::prelude::*;
+use fearless_simd::{f32x16, i32x16};
+
+use crate::engine::lanes::Lanes;
+use crate::model::batch::Batch;
+use crate::model::real::Real;
+use crate::samples::LANES;
+use crate::simd::Simd;
+
+/// What levels are made of: f32 or f64.
+pub trait Number: Real<Texel = Self, Wide = Self, Mask = bool> + From<f32> + Into<f64> + Send + Sync {
+    /// Sixteen of them.
+    type Sixteen<S: Simd>: Real<Texel = Self, Wide = Self::Sixteen<S>> + Send + Sync;
+
+    /// These sixteen.
+    fn load<S: Simd>(simd: S, numbers: &[Self; LANES]) -> Self::Sixteen<S>;
+
+    /// Sixteen that are held as f32.
+    fn held<S: Simd>(simd: S, numbers: &[f32; LANES]) -> Self::Sixteen<S>;
+
+    /// The same number sixteen times.
+    fn splat<S: Simd>(simd: S, number: Self) -> Self::Sixteen<S>;
+
+    /// Each of them.
+    fn array<S: Simd>(numbers: Self::Sixteen<S>) -> [Self; LANES];
+
+    /// Each of them, which are whole.
+    fn whole<S: Simd>(numbers: Self::Sixteen<S>) -> [i32; LANES];
+
+    /// Sixteen times sixteen, rows and columns exchanged.
+    fn transpose<S: Simd>(simd: S, rows: &mut [Self::Sixteen<S>; LANES]);
+}
+
+impl Number for f32 {
+    type Sixteen<S: Simd> = Lanes<S>;
+
+    #[inline(always)]
+    fn load<S: Simd>(simd: S, numbers: &[Self; LANES]) -> Lanes<S> {
+        Lanes(f32x16::load_array_ref(simd, numbers))
+    }
+
+    #[inline(always)]
+    fn held<S: Simd>(simd: S, numbers: &[f32; LANES]) -> Lanes<S> {
+        Self::load(simd, numbers)
+    }
+
+    #[inline(always)]
+    fn splat<S: Simd>(simd: S, number: Self) -> Lanes<S> {
+        Lanes::splat(simd, number)
+    }
+
+    #[inline(always)]
+    fn array<S: Simd>(numbers: Lanes<S>) -> [Self; LANES] {
+        numbers.to_array()
+    }
+
+    #[inline(always)]
+    fn whole<S: Simd>(numbers: Lanes<S>) -> [i32; LANES] {
+        let whole: i32x16<S> = numbers.0.to_int();
+        whole.to_array()
+    }
+
+    /// Numbered by row and column, eight bits, they are renumbered four times by a turn of these bits: the last bit of the
+    /// column goes to the front.
+    #[inline(always)]
+    fn transpose<S: Simd>(simd: S, rows: &mut [Lanes<S>; LANES]) {
+        let mut turned = *rows;
+        for _ in 0..LANES.ilog2() / 2 {
+            turn(simd, rows, &mut turned);
+            turn(simd, &turned, rows);
+        }
+    }
+}
+
+/// A turn of the bits by one.
+#[inline(always)]
+fn turn<S: Simd>(simd: S, rows: &[Lanes<S>; LANES], turned: &mut [Lanes<S>; LANES]) {
+    for i in 0..LANES / 2 {
+        let (even, odd) = simd.deinterleave_f32x16(rows[2 * i].0, rows[2 * i + 1].0);
+        (turned[i], turned[i + LANES / 2]) = (Lanes(even), Lanes(odd));
+    }
+}
+
+impl Number for f64 {
+    type Sixteen<S: Simd> = Batch<Self, LANES>;
+
+    #[inline(always)]
+    fn load<S: Simd>(_: S, numbers: &[Self; LANES]) -> Batch<Self, LANES> {
+        Batch(*numbers)
+    }
+
+    #[inline(always)]
+    fn held<S: Simd>(_: S, numbers: &[f32; LANES]) -> Batch<Self, LANES> {
+        Batch(numbers.map(Self::from))
+    }
+
+    #[inline(always)]
+    fn splat<S: Simd>(_: S, number: Self) -> Batch<Self, LANES> {
+        Batch([number; LANES])
+    }
+
+    #[inline(always)]
+    fn array<S: Simd>(numbers: Batch<Self, LANES>) -> [Self; LANES] {
+        numbers.0
+    }
+
+    #[inline(always)]
+    fn whole<S: Simd>(numbers: Batch<Self, LANES>) -> [i32; LANES] {
+        numbers.0.map(|number| number as i32)
+    }
+
+    #[inline(always)]
+    fn transpose<S: Simd>(_: S, rows: &mut [Batch<Self, LANES>; LANES]) {
+        let before = *rows;
+        for (i, row) in rows.iter_mut().enumerate() {
+            row.0 = std::array::from_fn(|k| before[k].0[i]);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simd::levels;
+    use crate::with_simd;
+
+    fn assert_transposed<S: Simd, R: Number + PartialEq + std::fmt::Debug>(simd: S) {
+        let number = |i: usize, k: usize| R::from((LANES * i + k) as f32);
+        let mut rows = std::array::from_fn(|i| R::load(simd, &std::array::from_fn(|k| number(i, k))));
+        R::transpose(simd, &mut rows);
+        for (i, row) in rows.into_iter().enumerate() {
+            assert_eq!(R::array(row), std::array::from_fn(|k| number(k, i)));
+        }
+    }
+
+    #[test]
+    fn rows_become_columns() {
+        for level in levels() {
+            with_simd!(level, simd => assert_transposed::<_, f32>(simd));
+            with_simd!(level, simd => assert_transposed::<_, f64>(simd));
+        }
+    }
+}
