@@ -1,5 +1,7 @@
 //! A plan's passes over the UV atlas: the levels that they leave, and the compute shaders that make them.
 //!
+//! - this module: the levels, and when they are made; `list`: which texels passes take; `pass`: one of them on the device
+//!
 //! Levels are made once and again when something has changed that they are made of: the pose, a light, a constant. They are
 //! the same whatever camera looks.
 

@@ -1,5 +1,6 @@
 //! How a part is dispatched: workgroups, and their uniform block.
 
+use super::cuts::records;
 use super::fused::WORKGROUP;
 use super::part::Part;
 use super::parts::Parts;
@@ -24,6 +25,16 @@ fn tiles(pixels: usize, most: usize) -> u32 {
 pub(super) const PART_BYTES: usize = 32;
 
 impl Parts {
+    /// Samples of a part, padding included.
+    pub(super) fn samples(part: &Part, views: &[ObservedView]) -> usize {
+        records(&views[part.view], &part.groups).len() * LANES
+    }
+
+    /// Pixels of a part.
+    pub(super) fn slots(part: &Part) -> usize {
+        part.groups.len() * LANES
+    }
+
     /// Workgroups of a part's dispatch.
     pub(super) fn workgroups(part: &Part) -> u32 {
         tiles(part.read as usize, MOST_WORKGROUPS)

@@ -240,16 +240,6 @@ impl Parts {
         write(gpu, buffer, (rows, self.traits.levels), &records(view, &part.groups));
     }
 
-    /// Samples of a part, padding included.
-    pub(super) fn samples(part: &Part, views: &[ObservedView]) -> usize {
-        records(&views[part.view], &part.groups).len() * LANES
-    }
-
-    /// Pixels of a part.
-    pub(super) fn slots(part: &Part) -> usize {
-        part.groups.len() * LANES
-    }
-
     /// Upload a part that does not stay on the device.
     pub(super) fn stream(&self, gpu: &Gpu, views: &[ObservedView], part: &Part) -> Result<(), GpuError> {
         self.upload(gpu, &views[part.view], part, true)

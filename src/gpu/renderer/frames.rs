@@ -31,11 +31,15 @@ impl Renderer {
         self.times_of(camera, frames, |_| true)
     }
 
-    /// As [`Self::frame_times`], of the passes over the UV atlas alone.
+    /// As [`Self::frame_times`], of the passes over the UV atlas alone. Empty, too, of an adapter that is a program on the
+    /// CPU: the host's clock tells no pass from another.
     ///
     /// # Errors
     /// As of [`Self::render`].
     pub fn atlas_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
+        if self.gpu.is_software() {
+            return Ok(Vec::new());
+        }
         self.times_of(camera, frames, |pass| pass == ATLAS)
     }
 
