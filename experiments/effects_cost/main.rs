@@ -9,6 +9,8 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use skinfit::engine::gpu::{DeviceSampleError, DeviceSamples, GpuEngine, Memory};
 use skinfit::engine::view::ObservedView;
 use skinfit::engine::{Task, Unknown};
+use skinfit::gpu::atlas::AtlasTraffic;
+use skinfit::gpu::bandwidth::copied_bytes_a_second;
 use skinfit::gpu::upload::Content;
 use skinfit::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use skinfit::model::effects::{Effect, Effects};
@@ -62,6 +64,8 @@ struct Row {
     /// Of a compute pass over the stored samples of the same image, likewise; none where nothing is shown, or what
     /// is drawn is not the effects' image.
     compute: Option<(f64, f64)>,
+    /// Of the passes over the UV atlas, where the effects have some: how many, their bytes, and their time, likewise.
+    atlas: (AtlasTraffic, Option<(f64, f64)>),
 }
 
 /// Rounds in which frames and compute passes take turns.
@@ -84,14 +88,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     rows.push(measure(&arguments, &gpu, "the scene's effects", full, Plan::clone)?);
     rows.push(measure(&arguments, &gpu, "the same fetches alone", full, Plan::fetches_alone)?);
     let mut text = String::from(
-        "effects,rules,attributes,bindings,constants,uploaded bytes,SPIR-V instructions,planned operations,forward median ms,forward spread ms,median ms,spread ms,compute median ms,compute spread ms\n",
+        "effects,rules,attributes,bindings,constants,uploaded bytes,SPIR-V instructions,planned operations,forward median ms,forward spread ms,median ms,spread ms,compute median ms,compute spread ms,atlas passes,atlas bytes,atlas median ms,atlas spread ms,copied bytes a second\n",
     );
+    let copied = copied_bytes_a_second(&gpu)?;
     for row in &rows {
         let time = |times: Option<(f64, f64)>| {
             times.map_or(",".to_owned(), |(median, spread)| format!("{median:.4},{spread:.4}"))
         };
         text += &format!(
-            "{},{},{},{},{},{},{},{:.0},{},{},{}\n",
+            "{},{},{},{},{},{},{},{:.0},{},{},{},{},{},{},{}\n",
             row.name,
             row.rules,
             row.attributes,
@@ -102,7 +107,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             row.operations,
             time(row.forward),
             time(row.buffered),
-            time(row.compute)
+            time(row.compute),
+            row.atlas.0.passes,
+            row.atlas.0.bytes,
+            time(row.atlas.1),
+            copied.map_or_else(String::new, |bytes| format!("{bytes:.4e}"))
         );
     }
     skinfit::output::write(&arguments.output, text.as_bytes())?;
@@ -171,6 +180,9 @@ fn measure(
         }
     }
     let [drawn, shaded, computed] = times.map(median_and_spread);
+    let traffic = buffered.atlas_traffic();
+    let over_atlas =
+        if traffic.passes > 0 { buffered.atlas_times(&camera, arguments.frames)? } else { Vec::new() };
     let plan = forward.plan();
     Ok(Row {
         name: name.to_owned(),
@@ -184,6 +196,7 @@ fn measure(
         forward: drawn,
         buffered: shaded,
         compute: computed,
+        atlas: (traffic, median_and_spread(over_atlas)),
     })
 }
 

@@ -68,7 +68,40 @@ pub(crate) fn effects_cost_on_a_card(lab: &Lab) -> Result<Value> {
         }));
     }
     raw["lit"] = lit.into();
+    raw["diffused"] = diffused(lab, &demo.join("scene.toml"), &table)?;
     Ok(raw)
+}
+
+/// The lit head with light that scatters within the skin, in the sizes of light maps and by the taps of blurs.
+fn diffused(lab: &Lab, demo: &Path, table: &str) -> Result<Value> {
+    let mut rows = Vec::new();
+    for (size, taps) in [("512", "5"), ("1024", "5"), ("1024", "\"full\"")] {
+        let effects = LIT[1].1.replace("[", "[\"diffusion\", ");
+        let settings: Vec<(&str, &str)> = LIT
+            .into_iter()
+            .map(|(key, value)| if key == LIT[1].0 { (key, effects.as_str()) } else { (key, value) })
+            .chain([("diffusion.light_map_size", size), ("diffusion.taps", taps)])
+            .collect();
+        let name = format!("{size} x {size}, {} taps", taps.trim_matches('"'));
+        let scene = lab.scene(&format!("diffused {size} {}", taps.trim_matches('"')), demo, &settings)?;
+        let arguments = [&scene.display().to_string(), "-o", table, "--full", "--exact"];
+        lab.example("effects_cost", &format!("light map {name}"), &arguments)?;
+        let found = csv(&std::fs::read_to_string(table)?)?;
+        let frame = found.first().ok_or("no row of the frame")?;
+        let bytes = number(&frame["atlas bytes"]);
+        let floor = 1e3 * bytes / number(&frame["copied bytes a second"]);
+        rows.push(json!({
+            "name": name,
+            "passes": frame["atlas passes"],
+            "mib": bytes / f64::from(1 << 20),
+            "atlas ms": frame["atlas median ms"],
+            "GB a second": 1e-9 * number(&frame["copied bytes a second"]),
+            "bytes ms": floor,
+            "to bytes": number(&frame["atlas median ms"]) / floor,
+            "frame ms": frame["median ms"],
+        }));
+    }
+    Ok(rows.into())
 }
 
 /// What is changed in the built-in scene: four lights with shadow maps, the sky that each point sees, and a specular with

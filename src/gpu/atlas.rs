@@ -1,34 +1,60 @@
-//! A plan's passes over the UV atlas: the levels that they leave, and the programs that draw them.
+//! A plan's passes over the UV atlas: the levels that they leave, and the compute shaders that make them.
+//!
+//! - this module: the levels, and when they are made; `list`: which texels passes take; `pass`: one of them on the device
+//!
+//! Levels are made once and again when something has changed that they are made of: the pose, a light, a constant. They are
+//! the same whatever camera looks.
+
+mod list;
+mod pass;
 
 use std::collections::HashMap;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use wgpu::{
-    Color, CommandEncoder, CommandEncoderDescriptor, LoadOp, Operations, RenderPassColorAttachment,
-    RenderPassDescriptor, StoreOp, TextureFormat, TextureView,
-};
+use wgpu::{CommandEncoder, CommandEncoderDescriptor, TextureFormat, TextureUsages, TextureView};
 
+use self::list::Texels;
+pub(crate) use self::list::{empty_near, tiles};
+use self::pass::AtlasPass;
+use super::compute::compute_pass;
 use super::constants::Values;
 use super::device::Gpu;
 use super::error::{GpuError, Oversized};
-use super::pipeline::{Outputs, Pipeline};
 use super::readback::Copy;
-use super::targets::{Tile, texture};
+use super::targets::{Tile, texture_for};
 use super::timing::Timer;
 use super::upload::{Bound, Content, Uploads};
-use crate::samples::atlas::overlap;
 use crate::scene::mesh::{Mesh, tile_outside_atlas};
 use crate::scene::view::Camera;
 use crate::shader::Plan;
 use crate::shader::atlas::{Level, Pass};
 
+/// What passes over the atlas are timed as.
+pub(super) const ATLAS: &str = "atlas";
+
 /// A quantity in x, y and z, the chart in w.
 const FORMAT: TextureFormat = TextureFormat::Rgba32Float;
+
+/// What passes over the UV atlas take.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AtlasTraffic {
+    /// How many there are.
+    pub passes: usize,
+    /// Bytes of levels and of lists of texels that they read and write, each once a pass: what vertices, maps and lights
+    /// take is not among them.
+    pub bytes: u64,
+}
 
 /// Passes on the device.
 pub(super) struct Atlas {
     levels: HashMap<String, TextureView>,
-    /// Each with the levels that it leaves.
-    passes: Vec<(Pipeline, Vec<TextureView>)>,
+    passes: Vec<AtlasPass>,
+    /// Whether the levels are not those of what is set.
+    stale: AtomicBool,
+    /// The constants that were set last, pass by pass.
+    constants: Mutex<Vec<Vec<f32>>>,
+    made: AtomicU64,
 }
 
 impl Atlas {
@@ -39,24 +65,38 @@ impl Atlas {
     pub(super) fn new(gpu: &Gpu, plan: &Plan, uploads: &mut Uploads) -> Result<Option<Self>, GpuError> {
         let Some(size) = plan.facts.atlas.filter(|_| !plan.passes.is_empty()) else { return Ok(None) };
         check(gpu, size, uploads)?;
-        let mut atlas = Self { levels: HashMap::new(), passes: Vec::with_capacity(plan.passes.len()) };
+        let Mesh { uvs, triangles, .. } = &uploads.content().scene.mesh;
+        let texels = Texels::new(gpu, uvs, triangles, size)?;
+        let mut atlas = Self {
+            levels: HashMap::new(),
+            passes: Vec::with_capacity(plan.passes.len()),
+            stale: AtomicBool::new(true),
+            constants: Mutex::default(),
+            made: AtomicU64::new(0),
+        };
         for pass in &plan.passes {
-            atlas.push(gpu, size, pass, uploads)?;
+            atlas.push(gpu, (size, &texels), pass, uploads)?;
         }
+        gpu.check()?;
         Ok(Some(atlas))
     }
 
-    fn push(&mut self, gpu: &Gpu, size: u32, pass: &Pass, uploads: &mut Uploads) -> Result<(), GpuError> {
+    fn push(
+        &mut self,
+        gpu: &Gpu,
+        (size, texels): (u32, &Texels),
+        pass: &Pass,
+        uploads: &mut Uploads,
+    ) -> Result<(), GpuError> {
+        let read = self.bound(&pass.plan.levels)?;
         let mut left = Vec::with_capacity(pass.leaves.len());
         for level in &pass.leaves {
-            let view = texture(gpu, &level.name, size, size, FORMAT, 1);
+            // What no pass writes, as it is empty, is 0 from the start.
+            let view = texture_for(gpu, &level.name, [size, size], FORMAT, 1, TextureUsages::STORAGE_BINDING);
             self.levels.insert(level.name.clone(), view.clone());
             left.push(view);
         }
-        let formats = vec![FORMAT; left.len()];
-        let outputs = Outputs { formats: &formats, multisamples: 1, depth: false };
-        let read = self.bound(&pass.plan.levels)?;
-        self.passes.push((Pipeline::new(gpu, pass.plan.clone(), uploads, read, outputs)?, left));
+        self.passes.push(AtlasPass::new(gpu, pass, uploads, read, (texels, &left))?);
         Ok(())
     }
 
@@ -74,24 +114,38 @@ impl Atlas {
 
     /// Set the constants of what is drawn next.
     pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>) {
-        self.passes.iter().for_each(|(program, _)| program.inputs.set(gpu, values));
+        let blocks: Vec<Vec<f32>> = self.passes.iter().map(|pass| pass.inputs.set(gpu, values)).collect();
+        let mut last = self.constants.lock().unwrap_or_else(std::sync::PoisonError::into_inner);
+        if *last != blocks {
+            *last = blocks;
+            self.forget();
+        }
     }
 
-    /// Draw every pass, in order.
-    pub(super) fn draw(&self, encoder: &mut CommandEncoder, mut timer: Option<&mut Timer>) {
-        for (program, left) in &self.passes {
-            let ops = Operations { load: LoadOp::Clear(Color::TRANSPARENT), store: StoreOp::Store };
-            let attachment =
-                |view| Some(RenderPassColorAttachment { view, depth_slice: None, resolve_target: None, ops });
-            let attachments: Vec<_> = left.iter().map(attachment).collect();
-            let mut pass = encoder.begin_render_pass(&RenderPassDescriptor {
-                label: Some("atlas"),
-                color_attachments: &attachments,
-                timestamp_writes: timer.as_mut().and_then(|timer| timer.around("atlas")),
-                ..RenderPassDescriptor::default()
-            });
-            program.draw(&mut pass);
+    /// Have the levels made anew: the mesh, or what shines on it, has moved.
+    pub(super) fn forget(&self) {
+        self.stale.store(true, Ordering::Relaxed);
+    }
+
+    /// What the passes take: how many there are, and the bytes that they read of levels and lists, and write, each once.
+    pub(super) fn traffic(&self) -> AtlasTraffic {
+        AtlasTraffic { passes: self.passes.len(), bytes: self.passes.iter().map(|pass| pass.bytes).sum() }
+    }
+
+    /// How often the levels were made.
+    pub(super) fn made(&self) -> u64 {
+        self.made.load(Ordering::Relaxed)
+    }
+
+    /// Run every pass, in order, where the levels are not there yet.
+    pub(super) fn draw(&self, encoder: &mut CommandEncoder, timer: Option<&mut Timer>) {
+        if !self.stale.swap(false, Ordering::Relaxed) {
+            return;
         }
+        self.made.fetch_add(1, Ordering::Relaxed);
+        self.passes.iter().for_each(|pass| pass.pack(encoder));
+        let mut run = compute_pass(encoder, ATLAS, timer);
+        self.passes.iter().for_each(|pass| pass.run(&mut run));
     }
 }
 
@@ -129,11 +183,10 @@ fn check(gpu: &Gpu, size: u32, uploads: &Uploads) -> Result<(), GpuError> {
         let of = Oversized::Map;
         return Err(GpuError::TextureSize { adapter, what, width: side, height: side, limit, of });
     }
-    let Mesh { uvs, triangles, .. } = &uploads.content().scene.mesh;
-    if let Some([u, v]) = tile_outside_atlas(uvs) {
-        return Err(GpuError::OutsideAtlas { u, v });
+    match tile_outside_atlas(&uploads.content().scene.mesh.uvs) {
+        Some([u, v]) => Err(GpuError::OutsideAtlas { u, v }),
+        None => Ok(()),
     }
-    overlap(uvs, triangles, size).map_err(|error| GpuError::Plan(error.to_string()))
 }
 
 #[cfg(test)]
@@ -142,7 +195,13 @@ mod tests {
 
     #[test]
     fn a_level_that_no_pass_leaves_is_refused_by_its_name() {
-        let atlas = Atlas { levels: HashMap::new(), passes: Vec::new() };
+        let atlas = Atlas {
+            levels: HashMap::new(),
+            passes: Vec::new(),
+            stale: AtomicBool::new(true),
+            constants: Mutex::default(),
+            made: AtomicU64::new(0),
+        };
         let error = atlas
             .bound(&[Level { name: "mist".to_owned(), kind: "vec3f" }])
             .err()

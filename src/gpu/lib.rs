@@ -7,15 +7,15 @@
 //!   `vertices`: the mesh at rest, its morph targets and bones)
 //! - `constants`: the uniform block
 //! - `targets`: what is drawn into, in tiles where an image with its samples is too large for one
-//! - `program`: a plan on the device: its `pipeline`, and before it its passes over the UV atlas ([`atlas`])
-//! - `visibility_buffer`: a plan that compute shaders evaluate
+//! - `program`: a plan on the device: its `pipeline` (`formats`: what that reads, in wgpu's words), and before it its passes over the UV atlas ([`atlas`])
+//! - `visibility_buffer`: a plan that compute shaders evaluate; `compute`: what they are made with
 //! - `shadow`: shadow maps: what each light sees first
 //! - `filter`: passes over whole images: `resolve` (samples to pixels) and `bloom`
 //! - `geometry`: what is stored of each sample, drawn instead of shaded: the GPU engine's samples
 //! - `records`: where the numbers of a stored sample stand on the device
 //! - `readback`: images from the device
 //! - [`probe`]: rules evaluated for given numbers
-//! - [`timing`]: GPU time by pass
+//! - [`timing`]: GPU time by pass; [`bandwidth`]: how fast the adapter's memory is
 //! - [`renderer`]: all of it: from a scene and a camera to an image; `stage`: the targets of one size, and what is drawn
 //!   into them
 //! - [`engine`]: loss, gradient and normal equations over samples
@@ -28,12 +28,15 @@ use skinfit_core::{bake, model, prepare, render, samples, scene, shader};
 
 pub mod adapter;
 pub mod atlas;
+pub mod bandwidth;
 mod bloom;
+mod compute;
 pub(crate) mod constants;
 pub mod device;
 pub mod engine;
 pub mod error;
 mod filter;
+mod formats;
 pub(crate) mod geometry;
 mod pipeline;
 pub mod probe;

@@ -5,18 +5,18 @@ use wgpu::{
     BindGroupLayoutEntry, BindingType, Buffer, BufferBindingType, BufferUsages, ColorTargetState,
     ColorWrites, CompareFunction, DepthBiasState, DepthStencilState, FragmentState, IndexFormat,
     MultisampleState, PipelineCompilationOptions, PipelineLayoutDescriptor, PrimitiveState, RenderPass,
-    RenderPipeline, RenderPipelineDescriptor, SamplerBindingType, ShaderModuleDescriptor, ShaderSource,
-    ShaderStages, StencilState, TextureFormat, TextureSampleType, TextureViewDimension, VertexAttribute,
-    VertexBufferLayout, VertexFormat, VertexState, VertexStepMode,
+    RenderPipeline, RenderPipelineDescriptor, ShaderModuleDescriptor, ShaderSource, ShaderStages,
+    StencilState, TextureFormat, VertexAttribute, VertexBufferLayout, VertexState, VertexStepMode,
 };
 
 use super::constants::{self, Values};
 use super::device::Gpu;
 use super::error::GpuError;
+use super::formats::{binding_type, vertex_format};
 use super::targets::DEPTH;
 use super::upload::{Bound, Uploads};
 use crate::shader::quantity::Kind;
-use crate::shader::{Attribute, Plan, Resource};
+use crate::shader::{Plan, Resource};
 
 /// A plan's pipeline, and what is bound to it.
 pub(super) struct Pipeline {
@@ -92,12 +92,12 @@ impl Inputs {
         Ok(Self { plan, layout, bound, constants, attributes })
     }
 
-    /// Set the constants of what is drawn next; they hold for all that is submitted at once.
-    pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>) {
-        if let Some(buffer) = &self.constants {
-            let block = constants::block(&self.plan.constants, values);
-            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&block));
-        }
+    /// Set the constants of what is drawn next; they hold for all that is submitted at once. Returns them.
+    pub(super) fn set(&self, gpu: &Gpu, values: &Values<'_>) -> Vec<f32> {
+        let Some(buffer) = &self.constants else { return Vec::new() };
+        let block = constants::block(&self.plan.constants, values);
+        gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&block));
+        block
     }
 }
 
@@ -175,32 +175,6 @@ pub(super) fn layout(gpu: &Gpu, plan: &Plan, stages: Stages) -> BindGroupLayout 
     gpu.device.create_bind_group_layout(&BindGroupLayoutDescriptor { label: Some("plan"), entries: &entries })
 }
 
-fn binding_type(kind: Kind) -> BindingType {
-    let texture = |filterable, view_dimension| BindingType::Texture {
-        sample_type: TextureSampleType::Float { filterable },
-        view_dimension,
-        multisampled: false,
-    };
-    match kind {
-        Kind::Faces => texture(false, TextureViewDimension::D2Array),
-        Kind::Cube => texture(true, TextureViewDimension::Cube),
-        Kind::Texels => texture(false, TextureViewDimension::D2),
-        Kind::Map => texture(true, TextureViewDimension::D2),
-        Kind::Sampler => BindingType::Sampler(SamplerBindingType::Filtering),
-        Kind::Depth => BindingType::Texture {
-            sample_type: TextureSampleType::Depth,
-            view_dimension: TextureViewDimension::D2Array,
-            multisampled: false,
-        },
-        Kind::Comparison => BindingType::Sampler(SamplerBindingType::Comparison),
-        Kind::Storage | Kind::Rows => BindingType::Buffer {
-            ty: BufferBindingType::Storage { read_only: true },
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        },
-    }
-}
-
 pub(super) fn bind(
     gpu: &Gpu,
     layout: &BindGroupLayout,
@@ -215,22 +189,6 @@ pub(super) fn bind(
         .map(|(i, bound)| BindGroupEntry { binding: 1 + i as u32, resource: bound.binding() });
     let entries: Vec<_> = constants.into_iter().chain(resources).collect();
     gpu.device.create_bind_group(&BindGroupDescriptor { label: Some("plan"), layout, entries: &entries })
-}
-
-fn vertex_format(attribute: Attribute) -> VertexFormat {
-    match attribute {
-        Attribute::Chart => VertexFormat::Float32,
-        Attribute::Position | Attribute::Normal | Attribute::Corner => VertexFormat::Float32x3,
-        Attribute::Tangent | Attribute::Weights => VertexFormat::Float32x4,
-        Attribute::Uv => VertexFormat::Float32x2,
-        Attribute::Occlusion => VertexFormat::Float32,
-        Attribute::Joints => VertexFormat::Uint32x4,
-        Attribute::Field(field) => match field.info().numbers {
-            1 => VertexFormat::Float32,
-            2 => VertexFormat::Float32x2,
-            _ => VertexFormat::Float32x3,
-        },
-    }
 }
 
 /// What is nearer hides what is behind.

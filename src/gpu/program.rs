@@ -2,7 +2,7 @@
 
 use wgpu::{CommandEncoder, RenderPass, TextureFormat};
 
-use super::atlas::Atlas;
+use super::atlas::{Atlas, AtlasTraffic};
 use super::constants::Values;
 use super::device::Gpu;
 use super::error::GpuError;
@@ -109,7 +109,22 @@ impl<P: AsRef<Inputs>> Program<P> {
         }
     }
 
-    /// Draw the passes that go before.
+    /// Have the passes that go before run again: what they show has moved.
+    pub(super) fn forget(&self) {
+        self.atlas.iter().for_each(Atlas::forget);
+    }
+
+    /// What these take.
+    pub(super) fn atlas_traffic(&self) -> AtlasTraffic {
+        self.atlas.as_ref().map(Atlas::traffic).unwrap_or_default()
+    }
+
+    /// How often these ran.
+    pub(super) fn atlas_made(&self) -> u64 {
+        self.atlas.as_ref().map_or(0, Atlas::made)
+    }
+
+    /// Run the passes that go before, where what they leave is not there yet.
     pub(super) fn prepare(&self, encoder: &mut CommandEncoder, timer: Option<&mut Timer>) {
         if let Some(atlas) = &self.atlas {
             atlas.draw(encoder, timer);

@@ -1,19 +1,16 @@
 //! From a scene and a camera to an image.
 
 mod frames;
+mod made;
 
-use super::bloom::Finish;
+use super::atlas::AtlasTraffic;
 use super::device::Gpu;
 use super::error::GpuError;
 use super::program::{Program, Shaded};
-use super::resolve::Resolve;
 use super::stage::Stage;
-use super::targets::{Key, Precision, Targets};
 use super::timing::PassTime;
 use super::upload::{Content, Uploads};
-use super::visibility_buffer::fits;
 use crate::bake::PoseBake;
-use crate::model::effects::Effect;
 use crate::model::terms::TermName;
 use crate::render::antialias::Antialias;
 use crate::render::backdrop::Backdrop;
@@ -21,10 +18,7 @@ use crate::render::image::Image;
 use crate::render::shading::Shading;
 use crate::scene::mesh::Mesh;
 use crate::scene::view::{Background, Camera};
-use crate::shader::{Budget, Facts, Plan, plan};
-
-/// A budget that is at least this is drawn into 16-bit targets, which round to 2^-11.
-const HALF_ERROR: f64 = 1e-3;
+use crate::shader::{Budget, Facts, Plan};
 
 /// How images are made.
 #[derive(Clone, Copy, Debug)]
@@ -146,6 +140,18 @@ impl Renderer {
         self.uploads.shadow_maps_drawn()
     }
 
+    /// What the whole image's passes over the UV atlas take.
+    #[must_use]
+    pub fn atlas_traffic(&self) -> AtlasTraffic {
+        self.programs[0].atlas_traffic()
+    }
+
+    /// How often the levels of the UV atlas were made for the whole image: once, and again where the mesh has moved.
+    #[must_use]
+    pub fn atlas_made(&self) -> u64 {
+        self.programs[0].atlas_made()
+    }
+
     /// Put something behind the mesh in the frames to come.
     pub fn set_background(&mut self, background: Background) {
         self.background = background;
@@ -160,6 +166,7 @@ impl Renderer {
     /// When something was baked for another mesh.
     pub fn set_mesh(&mut self, mesh: &Mesh, own: Option<&PoseBake>) -> Result<(), GpuError> {
         self.uploads.set_mesh(&self.gpu, mesh, own)?;
+        self.programs.iter().for_each(Program::forget);
         let weights = mesh.morphs.iter().map(|morph| morph.weight);
         self.morph_weights.iter_mut().zip(weights).for_each(|(old, new)| *old = new);
         Ok(())
@@ -237,62 +244,6 @@ impl Renderer {
                 finish.set_backdrop(&self.gpu, backdrop);
             }
         }
-    }
-
-    /// The place of the program that draws the whole, or a term; made if it is not there yet.
-    fn program(&mut self, output: Option<TermName>) -> Result<usize, GpuError> {
-        if let Some(i) = self.programs.iter().position(|program| program.plan().facts.output == output) {
-            return Ok(i);
-        }
-        let plan =
-            plan(&Facts { output, ..self.facts }).map_err(|error| GpuError::Plan(error.to_string()))?;
-        let program = self.compiled(plan)?;
-        self.programs.push(program);
-        Ok(self.programs.len() - 1)
-    }
-
-    /// A plan on the device, where it is to be evaluated and can be.
-    fn compiled(&mut self, plan: Plan) -> Result<Program<Shaded>, GpuError> {
-        let wanted =
-            self.options.shading == Shading::VisibilityBuffer && self.options.antialias.multisamples() == 1;
-        let format = self.key(1, 1, hazy(&plan), true).precision.wgsl();
-        let modules = wanted.then(|| plan.visibility_buffer(format)).flatten();
-        let modules = modules.filter(|modules| fits(&self.gpu, &plan, modules, &self.uploads));
-        let key = self.key(1, 1, hazy(&plan), modules.is_some());
-        Program::shaded(&self.gpu, plan, modules.as_ref(), &mut self.uploads, &key)
-    }
-
-    fn key(&self, width: u32, height: u32, hazy: bool, computed: bool) -> Key {
-        let antialias = self.options.antialias;
-        // WebGPU multisamples no 32-bit targets.
-        let half = antialias.multisamples() > 1
-            || match self.options.budget {
-                Budget::Exact => false,
-                Budget::Paper => true,
-                Budget::Within(error) => error >= HALF_ERROR,
-            };
-        let precision = if half { Precision::Half } else { Precision::Full };
-        let blooms = hazy && self.facts.setup.effects.has(Effect::Bloom);
-        Key { width, height, antialias, precision, hazy, blooms, computed }
-    }
-
-    /// The place of the targets for such images; those of another size give way to them.
-    fn stage(&mut self, camera: &Camera, program: usize) -> Result<usize, GpuError> {
-        let program = &self.programs[program];
-        let key = self.key(camera.width, camera.height, hazy(program.plan()), program.is_computed());
-        self.stages
-            .retain(|stage| (stage.targets.key.width, stage.targets.key.height) == (key.width, key.height));
-        if let Some(i) = self.stages.iter().position(|stage| stage.targets.key == key) {
-            return Ok(i);
-        }
-        let targets = Targets::new(&self.gpu, key)?;
-        let resolve = targets.samples.as_ref().map(|samples| Resolve::new(&self.gpu, &targets, samples));
-        let sigma = self.uploads.content().scene.bloom.sigma;
-        let backdrop = self.backdrop.as_ref().map(|(_, backdrop)| backdrop);
-        let finish = Finish::new(&self.gpu, &targets, sigma, backdrop);
-        self.gpu.check()?;
-        self.stages.push(Stage { targets, resolve, finish });
-        Ok(self.stages.len() - 1)
     }
 }
 

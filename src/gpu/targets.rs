@@ -202,7 +202,7 @@ pub(super) fn texture(
 }
 
 /// As [`texture`], for `usage` beside.
-fn texture_for(
+pub(super) fn texture_for(
     gpu: &Gpu,
     label: &str,
     [width, height]: [u32; 2],

@@ -2,10 +2,12 @@
 
 use super::error::ShadingError;
 use super::graph::{Graph, Id, Input};
+pub use super::level_then::{BlurOf, GaussianColumn, GaussianOf, SurfaceOf, Then};
 use super::lower::{LowerError, Natives, STEP_ALONG_U, STEP_ALONG_V, Source, Value};
 use super::steps::{Rounding, Steps};
 use crate::model::diffusion::Lookup;
 use crate::model::terms::TermName;
+use crate::shader::atlas::named::{Named, groups};
 use crate::shader::atlas::{APART, Axis, Level, Pass, PassKind, TAPS, TEXEL};
 use crate::shader::emit::Plan;
 use crate::shader::rule::Kernel;
@@ -39,67 +41,6 @@ pub struct LevelPass {
     pub moves: bool,
 }
 
-/// What a pass does with what its steps yield of a texel.
-#[derive(Clone, Debug)]
-pub enum Then {
-    /// It leaves that.
-    Leave,
-    /// One direction of a blur, whose taps the steps yield.
-    Blur(BlurOf),
-    /// One direction of a blur by a Gaussian, of several levels at once.
-    Gaussian(GaussianOf),
-    /// A sum over the surface; the steps yield the variance, and how that moves.
-    Surface(SurfaceOf),
-    /// It leaves that; how far each texel's neighbours lie apart, by what a level holds, is the steps' field
-    /// [`APART_FIELD`].
-    Neighbours(String),
-}
-
-/// One direction of a blur by taps.
-#[derive(Clone, Debug)]
-pub struct BlurOf {
-    /// Along which axis.
-    pub axis: Axis,
-    /// Taps to either side, each a place and a weight that the steps yield.
-    pub reach: usize,
-    /// The level that is blurred.
-    pub source: String,
-    /// Where the kernel moves: the level that holds how the source moves, if it does.
-    pub moving: Option<Option<String>>,
-}
-
-/// A sum over the surface: levels by their names.
-#[derive(Clone, Debug)]
-pub struct SurfaceOf {
-    /// What is summed up.
-    pub source: String,
-    /// Where texels lie, which way they face, and what area they have.
-    pub texels: [String; 3],
-    /// Where the variance moves: the level that holds how the source moves, if it does.
-    pub moving: Option<Option<String>>,
-}
-
-/// One direction of a blur by a Gaussian: of a level, and of how that moves. The steps yield the deviation, in texels, and
-/// then how it moves along each seed that moves it.
-#[derive(Clone, Debug)]
-pub struct GaussianOf {
-    /// Along which axis.
-    pub axis: Axis,
-    /// Taps to either side, a deviation apart; `None` where every texel within six deviations counts.
-    pub reach: Option<usize>,
-    /// What each of the pass' leaves is of. The first is the level itself.
-    pub columns: Vec<GaussianColumn>,
-}
-
-/// A level that a Gaussian blurs.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GaussianColumn {
-    /// The level; `None` of one that is 0 everywhere.
-    pub source: Option<String>,
-    /// Which of the steps' numbers after the deviation is how that moves along the leaf's seed.
-    pub moved: Option<usize>,
-}
-
 impl LevelProgram {
     /// Of a plan over stored samples, along a chain's seeds; empty where nothing is computed in texels.
     ///
@@ -108,15 +49,7 @@ impl LevelProgram {
     pub fn new(plan: &Plan, chain: &Chain) -> Result<Self, LowerError> {
         let dilated = plan.facts.setup.choices.diffusion.lookup == Lookup::Dilated;
         let mut program = Self { dilated, ..Self::default() };
-        for (at, pass) in plan.passes.iter().enumerate() {
-            // Each seed has tangents of its own; what does not move is the plan's.
-            let tangents = chain.along.iter().enumerate().flat_map(|(k, along)| {
-                let moved: Vec<String> = along.moved.values().map(|level| level.name.clone()).collect();
-                let own = along.passes.iter().zip(&along.derived).filter(move |(_, from)| **from == at);
-                own.map(move |(pass, _)| Named { pass, seed: Some((k, moved.clone())) })
-            });
-            let passes: Vec<Named<'_>> =
-                std::iter::once(Named { pass, seed: None }).chain(tangents).collect();
+        for passes in groups(plan, chain) {
             program.add(&passes)?;
         }
         let found = plan.looked_up(chain).into_iter();
@@ -217,32 +150,12 @@ impl LevelProgram {
     }
 }
 
-/// Along the `k`-th seed: a level that holds how another moves.
-fn tangent_of(k: usize, name: &str) -> String {
-    format!("d{k}{}", name.strip_prefix('d').unwrap_or(name))
-}
-
 /// What a texel's neighbours are apart, of a pass over them.
 pub const APART_FIELD: &str = "apart";
 
-/// A pass, and of one that leaves how levels move, along which seed, and the names of those.
-struct Named<'a> {
-    pass: &'a Pass,
-    seed: Option<(usize, Vec<String>)>,
-}
-
-impl Named<'_> {
-    /// The name of a level in the program.
-    fn name(&self, name: &str) -> String {
-        match &self.seed {
-            Some((k, moved)) if moved.iter().any(|level| level == name) => tangent_of(*k, name),
-            _ => name.to_owned(),
-        }
-    }
-
-    fn level(&self, level: &Level) -> (String, usize) {
-        (self.name(&level.name), components(level.kind))
-    }
+/// A level of a pass in the program, with how many numbers it has.
+fn level_of(named: &Named<'_>, level: &Level) -> (String, usize) {
+    (named.name(&level.name), components(level.kind))
 }
 
 /// The kernel of a blur's pass.
@@ -254,10 +167,10 @@ fn kernel(pass: &Pass) -> Kernel {
 fn gaussian(axis: Axis, passes: &[Named<'_>]) -> GaussianOf {
     let mut movers = 0;
     let column = |pass: &Named<'_>| match &pass.pass.moving {
-        None => GaussianColumn { source: Some(pass.level(&pass.pass.plan.levels[0]).0), moved: None },
+        None => GaussianColumn { source: Some(level_of(pass, &pass.pass.plan.levels[0]).0), moved: None },
         Some(kernel) => {
             movers += 1;
-            let source = kernel.blurred.as_ref().map(|moved| pass.level(moved).0);
+            let source = kernel.blurred.as_ref().map(|moved| level_of(pass, moved).0);
             GaussianColumn { source, moved: Some(movers - 1) }
         }
     };
@@ -277,7 +190,7 @@ impl LevelPass {
         let mut deviation = false;
         for pass in passes {
             let moves = pass.pass.moving.is_some();
-            let numbers = pass.lowered(&mut graph)?;
+            let numbers = lowered(pass, &mut graph)?;
             match then {
                 // The deviation once, and then how it moves.
                 Then::Gaussian(_) => {
@@ -288,7 +201,7 @@ impl LevelPass {
                 _ => outputs.extend(numbers),
             }
         }
-        let leaves = passes.iter().flat_map(|pass| pass.pass.leaves.iter().map(|leaf| pass.level(leaf)));
+        let leaves = passes.iter().flat_map(|pass| pass.pass.leaves.iter().map(|leaf| level_of(pass, leaf)));
         let leaves = leaves.collect();
         Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then, moves: false })
     }
@@ -316,34 +229,32 @@ impl LevelPass {
     }
 }
 
-impl Named<'_> {
-    /// The pass' function in a graph, and what it yields.
-    fn lowered(&self, graph: &mut Graph) -> Result<Vec<Id>, LowerError> {
-        let pass = self.pass;
-        let entry = match pass.kind {
-            PassKind::Draw => TEXEL,
-            PassKind::Blur(_) | PassKind::Surface => TAPS,
-            PassKind::Neighbours | PassKind::Dilate => APART,
+/// The pass' function in a graph, and what it yields.
+fn lowered(named: &Named<'_>, graph: &mut Graph) -> Result<Vec<Id>, LowerError> {
+    let pass = named.pass;
+    let entry = match pass.kind {
+        PassKind::Draw => TEXEL,
+        PassKind::Blur(_) | PassKind::Surface => TAPS,
+        PassKind::Neighbours | PassKind::Dilate => APART,
+    };
+    let source = Source::new(&pass.plan.wgsl, Natives::Written)?;
+    let sample = source.argument(entry)?;
+    let mut numbers: Vec<Id> = Vec::new();
+    for (name, width) in sample {
+        let held = pass.plan.varyings.iter().any(|(held, _)| *held == name);
+        let is_level = pass.plan.levels.iter().any(|level| level.name == name)
+            || (pass.kind == PassKind::Neighbours && name == APART_FIELD);
+        let name = if is_level { named.name(&name) } else { name };
+        // What is neither fills a structure that would be empty.
+        let number = |component| match held || is_level {
+            true => graph.field(&name, component),
+            false => graph.constant(0.0),
         };
-        let source = Source::new(&pass.plan.wgsl, Natives::Written)?;
-        let sample = source.argument(entry)?;
-        let mut numbers: Vec<Id> = Vec::new();
-        for (name, width) in sample {
-            let held = pass.plan.varyings.iter().any(|(held, _)| *held == name);
-            let is_level = pass.plan.levels.iter().any(|level| level.name == name)
-                || (pass.kind == PassKind::Neighbours && name == APART_FIELD);
-            let name = if is_level { self.name(&name) } else { name };
-            // What is neither fills a structure that would be empty.
-            let number = |component| match held || is_level {
-                true => graph.field(&name, component),
-                false => graph.constant(0.0),
-            };
-            numbers.extend((0..width).map(number));
-        }
-        let outputs = source.call(graph, entry, vec![Value::Numbers(numbers)])?;
-        check_steps(pass, graph)?;
-        Ok(outputs)
+        numbers.extend((0..width).map(number));
     }
+    let outputs = source.call(graph, entry, vec![Value::Numbers(numbers)])?;
+    check_steps(pass, graph)?;
+    Ok(outputs)
 }
 
 /// Refuse `dpdx` and `dpdy` of what no vertex holds: how that goes from texel to texel is not known.

@@ -21,6 +21,7 @@ mod draft;
 mod error;
 pub mod evaluate;
 pub mod graph;
+mod level_then;
 pub mod levels;
 pub mod lower;
 pub mod native;

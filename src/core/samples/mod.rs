@@ -18,7 +18,8 @@
 //! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
 //! - [`visibility`]: how much of a light reaches a place of the mesh
-//! - [`atlas`]: texels of the UV atlas, samples of the mesh as well; `dilation`: empty ones that are filled;
+//! - [`atlas`]: texels of the UV atlas, samples of the mesh as well; `texel_cover`: which are covered;
+//!   `texel_fields`: what they hold; `texel_error`: why there are none; `dilation`: empty ones that are filled;
 //!   `seams`: what lies beyond the borders of its charts
 
 pub mod atlas;
@@ -41,6 +42,9 @@ mod supply;
 mod surface;
 pub mod surface_records;
 pub mod targets;
+mod texel_cover;
+mod texel_error;
+mod texel_fields;
 mod through;
 mod trace;
 pub mod visibility;

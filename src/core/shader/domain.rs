@@ -100,10 +100,10 @@ pub enum EdgeError {
 }
 
 /// Texture coordinates, by which texels are found.
-pub(in crate::shader) const UV: &str = "vertex_uv";
+pub const UV: &str = "vertex_uv";
 
 /// The chart of the atlas that a point lies in, counted from 1: a fragment looks up texels of its own chart.
-pub(in crate::shader) const CHART: &str = "vertex_chart";
+pub const CHART: &str = "vertex_chart";
 
 /// Every edge from one domain to another. Passes from texels to texels are rules of their own (`pass`): each costs
 /// [`TAP_COST`] a tap and direction beside its kernel.

@@ -11,7 +11,7 @@
 //! - [`search`]: the cheapest set of rules within the accuracy budget (A*); `graph`: what it searches
 //! - [`emit`]: the plan: the chosen rules, and what they read; `calls`: declarations, functions and calls; `module`: its
 //!   WGSL, for rasterised fragments, for stored samples, or as a function for other engines; [`visibility_buffer`]: for
-//!   compute shaders that shade what the rasteriser found; `fetches`: what it costs at the least
+//!   compute shaders that shade what the rasteriser found; `vertex_stage`: a vertex stage that is one; `fetches`: what it costs at the least
 //! - [`atlas`]: passes over the UV atlas, their text and their tangents
 //! - [`kept`]: what of stored samples need not be computed anew in each pass
 //! - [`term`]: effects, parameters and rules that a file adds
@@ -36,6 +36,7 @@ pub mod rule;
 pub mod search;
 pub mod tangent;
 pub mod term;
+pub mod vertex_stage;
 pub mod visibility_buffer;
 
 pub use domain::{Domain, Work};

@@ -61,6 +61,14 @@ pub enum PlanError {
         /// The level.
         level: &'static str,
     },
+    /// Steps between texels that no triangle tells.
+    #[error(
+        "{level} is made of steps from texel to texel (dpdx, dpdy) of what no vertex holds, which graphics adapters do not know. Have rules take steps of what vertices hold, as `vertex_position`."
+    )]
+    BetweenTexels {
+        /// The level.
+        level: String,
+    },
     /// Quantities that the processor alone finds.
     #[error(
         "{field} is found at each sample by rays, which samples made on an adapter have none of. Have the CPU make the samples."

@@ -6,16 +6,13 @@ use std::fmt::Write as _;
 
 use super::domain::{Domain, UV};
 use super::emit::{Plan, hazy};
-use super::module::uniform;
-use super::quantity::Attribute;
+use super::vertex_stage::{CORNERS, Clip, means};
 
-/// Threads of a workgroup of `cs_vertices`.
-pub const VERTICES: u32 = 64;
 /// Samples along the sides of a workgroup of `cs_shade`; `place_in_tile` knows of eight.
 pub const TILE: u32 = 8;
 
 /// What takes steps between neighbouring fragments, or leaves one out: a compute shader knows none.
-const BETWEEN_FRAGMENTS: [&str; 7] =
+pub(super) const BETWEEN_FRAGMENTS: [&str; 7] =
     ["dpdx", "dpdy", "fwidth", "textureSample(", "textureSampleBias(", "textureSampleCompare(", "discard"];
 /// What fragments are handed of texture coordinates, in rules and out of them.
 const COORDINATES: [&str; 2] = ["vertex_uv", "at.vertex_uv"];
@@ -45,59 +42,17 @@ impl Plan {
         if BETWEEN_FRAGMENTS.iter().any(|function| fragments.contains(function)) {
             return None;
         }
-        let stride = 4 + self.varyings.iter().map(|(_, kind)| numbers(kind)).sum::<usize>();
+        let stride = self.stride(Clip::Handed);
         Some(VisibilityBuffer {
-            vertices: self.vertices_module(stride),
+            vertices: self.vertices_module(),
             triangles: triangles_module(stride),
             shading: self.shading_module(stride, color),
             stride,
         })
     }
 
-    fn vertices_module(&self, stride: usize) -> String {
-        let mut wgsl = self.bindings(true) + &self.functions(&[Domain::Vertex]);
-        wgsl.push_str("\nstruct Vertex {\n    vertex_index: u32,\n");
-        for attribute in &self.attributes {
-            let _ = writeln!(wgsl, "    {}: {},", attribute.name(), attribute.wgsl());
-        }
-        let clip = Some(("clip", "vec4f"));
-        let varyings = self.varyings_struct();
-        let calls = self.calls(Domain::Vertex, uniform, |name| format!("vertex.{name}"));
-        let names = clip.iter().chain(&self.varyings).map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
-        let _ = write!(
-            wgsl,
-            "}}\n\n{varyings}\nfn handed_over(vertex: Vertex) -> Varyings {{\n{calls}    return Varyings({names});\n}}\n\n\
-             @group(1) @binding(0) var<storage, read> attributes: array<u32>;\n\
-             @group(1) @binding(1) var<storage, read_write> varyings: array<f32>;\n\n\
-             @compute @workgroup_size({VERTICES})\n\
-             fn cs_vertices(@builtin(global_invocation_id) id: vec3u, @builtin(num_workgroups) groups: vec3u) {{\n    \
-             let count = arrayLength(&varyings) / {stride}u;\n    \
-             let i = id.x + {VERTICES}u * groups.x * id.y;\n    if (i >= count) {{\n        return;\n    }}\n    \
-             let at = handed_over(Vertex(i"
-        );
-        let mut first = 0;
-        for attribute in &self.attributes {
-            let _ = write!(wgsl, ", {}", read(*attribute, first));
-            first += attribute.bytes() / 4;
-        }
-        let _ = write!(wgsl, "));\n    let first = {stride}u * i;\n");
-        let mut place = 0;
-        for (name, kind) in clip.into_iter().chain(self.varyings.iter().copied()) {
-            for k in 0..numbers(kind) {
-                let part = if numbers(kind) == 1 { String::new() } else { format!("[{k}]") };
-                let _ = writeln!(wgsl, "    varyings[first + {place}u] = at.{name}{part};");
-                place += 1;
-            }
-        }
-        wgsl.push_str("}\n");
-        wgsl
-    }
-
-    /// The structure of what is handed over.
-    fn varyings_struct(&self) -> String {
-        let member = |(name, kind): &(&str, &str)| format!("    {name}: {kind},\n");
-        let members: String = self.varyings.iter().map(member).collect();
-        format!("struct Varyings {{\n    clip: vec4f,\n{members}}}\n")
+    fn vertices_module(&self) -> String {
+        self.bindings(true) + &self.functions(&[Domain::Vertex]) + &self.vertex_stage(Clip::Handed)
     }
 
     fn shading_module(&self, stride: usize, color: &str) -> String {
@@ -108,7 +63,7 @@ impl Plan {
                  var<private> uv_steps_here: vec4f;\n",
             );
         }
-        let _ = write!(wgsl, "\n{}", self.varyings_struct());
+        let _ = write!(wgsl, "\n{}", self.varyings_struct(Clip::Handed));
         wgsl.push_str(&self.fragment_function("fn shaded", ["", ""]));
         let _ = write!(
             wgsl,
@@ -123,6 +78,7 @@ impl Plan {
         if hazy(&self.facts) {
             wgsl.push_str("@group(1) @binding(5) var coverages: texture_storage_2d<r32float, write>;\n");
         }
+        wgsl.push_str(CORNERS);
         wgsl.push_str(include_str!("visibility_buffer.wgsl"));
         wgsl.push_str(&self.interpolation());
         let (empty, stores) = if hazy(&self.facts) {
@@ -154,12 +110,7 @@ impl Plan {
             "\nfn interpolated(triangle: u32, at: vec2f) -> Varyings {\n    let first = first_numbers(triangle);\n    \
              let areas = areas_of_corners(first, at);\n    let shares = shares_of(areas);\n",
         );
-        let places = self.varyings.iter().scan(4, |next, (name, kind)| {
-            let place = *next;
-            *next += numbers(kind);
-            Some((*name, *kind, place))
-        });
-        let places: Vec<(&str, &str, usize)> = places.collect();
+        let places = self.places(Clip::Handed);
         let uv = places.iter().find(|(name, ..)| *name == UV).filter(|_| self.takes_steps());
         if let Some(&(_, kind, place)) = uv {
             let of = |shares: &str| means(kind, place, shares);
@@ -188,28 +139,25 @@ impl Plan {
     }
 }
 
-/// A value of the corners' numbers from that place on.
-fn means(kind: &str, place: usize, shares: &str) -> String {
-    let mean = |k| format!("mean_of_corners(first, {}u, {shares})", place + k);
-    let parts = (0..numbers(kind)).map(mean).collect::<Vec<_>>().join(", ");
-    if numbers(kind) == 1 { parts } else { format!("{kind}({parts})") }
-}
-
 /// A text of fragments that take the steps of texture coordinates from their triangle, not from their neighbours.
 fn without_neighbours(wgsl: &str) -> String {
+    with_steps(wgsl, ["uv_steps_here.xy", "uv_steps_here.zw"])
+}
+
+/// A text in which what is read by the steps of texture coordinates, along x and along y, is told these.
+pub(super) fn with_steps(wgsl: &str, [along, down]: [&str; 2]) -> String {
     let mut calls = wgsl.split("textureSample(");
     let mut text = calls.next().unwrap_or_default().to_owned();
     for call in calls {
         let (arguments, rest) = call.split_at(call.find(')').unwrap_or(call.len()));
         if COORDINATES.iter().any(|uv| arguments.ends_with(&format!(", map_sampler, {uv}"))) {
-            let _ = write!(text, "textureSampleGrad({arguments}, uv_steps_here.xy, uv_steps_here.zw{rest}");
+            let _ = write!(text, "textureSampleGrad({arguments}, {along}, {down}{rest}");
         } else {
             let _ = write!(text, "textureSample({call}");
         }
     }
     for uv in COORDINATES {
-        text = text.replace(&format!("dpdx({uv})"), "uv_steps_here.xy");
-        text = text.replace(&format!("dpdy({uv})"), "uv_steps_here.zw");
+        text = text.replace(&format!("dpdx({uv})"), along).replace(&format!("dpdy({uv})"), down);
     }
     text
 }
@@ -225,28 +173,6 @@ fn triangles_module(stride: usize) -> String {
          return Corner(clip, i / 3u + 1u);\n}}\n\n\
          @fragment\nfn fs_main(at: Corner) -> @location(0) u32 {{\n    return at.triangle;\n}}\n"
     )
-}
-
-/// An attribute of vertex `i`, where all vertices' numbers of those before it, `first` each, come first.
-fn read(attribute: Attribute, first: u64) -> String {
-    let kind = attribute.wgsl();
-    let count = attribute.bytes() / 4;
-    let number = |k| {
-        let word = format!("attributes[{first}u * count + {count}u * i + {k}u]");
-        if kind.ends_with('u') || kind == "u32" { word } else { format!("bitcast<f32>({word})") }
-    };
-    let parts = (0..count).map(number).collect::<Vec<_>>().join(", ");
-    if count == 1 { parts } else { format!("{kind}({parts})") }
-}
-
-/// Numbers of a WGSL type.
-fn numbers(kind: &str) -> usize {
-    match kind {
-        "f32" => 1,
-        "vec2f" => 2,
-        "vec3f" => 3,
-        _ => 4,
-    }
 }
 
 #[cfg(test)]

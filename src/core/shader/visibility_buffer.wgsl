@@ -10,11 +10,6 @@ fn place_in_tile(i: u32) -> vec2u {
     return vec2u(x, y);
 }
 
-// Where the numbers of a triangle's corners begin.
-fn first_numbers(triangle: u32) -> vec3u {
-    return STRIDE * vec3u(corners[3u * triangle], corners[3u * triangle + 1u], corners[3u * triangle + 2u]);
-}
-
 fn clip_of(first: u32) -> vec3f {
     return vec3f(varyings[first], varyings[first + 1u], varyings[first + 3u]);
 }
@@ -54,9 +49,4 @@ fn step_of(areas: vec3f, neighbour: vec3f) -> vec3f {
     let sum = areas.x + areas.y + areas.z;
     let step = (change - (change.x + change.y + change.z) * shares_of(areas)) / sum;
     return select(vec3f(0.0), step, sum != 0.0);
-}
-
-fn mean_of_corners(first: vec3u, number: u32, shares: vec3f) -> f32 {
-    return shares.x * varyings[first.x + number] + shares.y * varyings[first.y + number]
-        + shares.z * varyings[first.z + number];
 }

@@ -65,7 +65,7 @@ impl GpuEngine {
             weight: (0.0, 0),
             alpha,
             traits,
-            looked_up: [Vec::new(), Vec::new()],
+            looked_up: Default::default(),
             held: None,
             device: Mutex::new(OnDevice {
                 parts: Parts::default(),
@@ -101,13 +101,14 @@ impl GpuEngine {
     fn upload(&mut self, memory: Memory) -> Result<(), GpuError> {
         let faces = self.lock().lights.face_sizes();
         let fitted = |turned| self.fitted(Written { turned, gained: false }, faces);
-        let levels = DeviceLevels::new(fitted, &self.views)?;
+        let levels = DeviceLevels::new(&self.gpu, fitted, &self.views)?;
         if let Some(levels) = &levels {
             self.traits.levels = levels.rows();
-            self.looked_up = [false, true].map(|turned| levels.fields(turned));
+            self.looked_up = [false, true].map(|turned| levels.looked(turned));
         }
+        let shared = levels.as_ref().and_then(DeviceLevels::buffer);
         let start = Instant::now();
-        let parts = Parts::new(&self.gpu, &self.views, &self.traits, memory, self.made.as_deref())?;
+        let parts = Parts::new(&self.gpu, &self.views, &self.traits, memory, (self.made.as_deref(), shared))?;
         let own = |made: &Arc<DeviceSamples>| made.seconds() + start.elapsed().as_secs_f64();
         self.made_seconds = self.made.as_ref().map_or(0.0, own);
         let device = self.device.get_mut().unwrap_or_else(PoisonError::into_inner);

@@ -6,9 +6,10 @@ use web_time::Instant;
 
 use wgpu::{BindGroup, Buffer, BufferUsages, ComputePassDescriptor, ComputePipeline};
 
+use super::dispatch::PART_BYTES;
 use super::fused::Fused;
 use super::lights::Inputs;
-use super::parts::{PART_BYTES, Parts};
+use super::parts::Parts;
 use super::pipeline::{Uniform, bind_part, buffer, encoder, part_layout, pipeline};
 use super::{GpuEngine, OnDevice};
 use crate::model::terms::TermName;

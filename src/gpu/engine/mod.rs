@@ -4,16 +4,18 @@
 //! - `equations`: how sums become normal equations; `objective`: what solvers see
 //! - [`fused`]: the text of that pass
 //! - `parts`: samples and targets on the device, each `part` of them within a binding; what does not fit the
-//!   memory allowed is uploaded anew in each pass
+//!   memory allowed is uploaded anew in each pass. `cuts`: where views are cut; `dispatch`: how a part is dispatched
 //! - [`DeviceSamples`]: samples that the adapter makes itself, by the production renderer's geometry pass
 //! - `terms`: samples replaced by their terms, where no free parameter needs a lookup
-//! - `levels`: what samples look up of the UV atlas
+//! - `levels`: levels of the UV atlas, and what samples look up of them
 //! - `lights`: the cubes and the uniform block, as shaders are given them
 //! - `program`: the shaders of a wish, and one run of them
 //! - `images`: the forward pass: images, and how long they take
 //! - `pipeline`: what both make pipelines and bindings with
 
 mod build;
+mod cuts;
+mod dispatch;
 mod equations;
 pub mod fused;
 mod images;
@@ -31,7 +33,7 @@ use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use self::equations::Passed;
-use self::fused::{Fitted, Fused, Layout, Wish};
+use self::fused::{Fitted, Fused, Layout, Looked, Wish};
 use self::images::Images;
 use self::levels::DeviceLevels;
 use self::lights::DeviceLights;
@@ -76,9 +78,8 @@ pub struct GpuEngine {
     weight: (f64, u64),
     alpha: bool,
     traits: Traits,
-    /// What samples look up of the UV atlas, each with how many numbers it has: where the environment is not turned, and
-    /// where it is.
-    looked_up: [Vec<(String, usize)>; 2],
+    /// How samples look up what stands in the UV atlas: where the environment is not turned, and where it is.
+    looked_up: [Looked; 2],
     /// The parameters that terms are made with, where terms stand in the place of samples.
     held: Option<Vec<Param>>,
     /// What changes between passes; a pass at a time.
@@ -184,7 +185,7 @@ impl GpuEngine {
             gained: written.gained,
             faces,
             layout: Layout::of_samples(&self.traits.places, self.traits.rows)
-                .with_levels(self.looked_up[usize::from(written.turned)].clone(), self.traits.levels),
+                .with_levels(self.looked_up[usize::from(written.turned)].clone()),
             several: self.traits.several,
             weighted: self.traits.weighted,
             clipped: self.traits.clipped,
@@ -201,10 +202,10 @@ impl GpuEngine {
 
     /// Have on the device what samples look up of the UV atlas at `point`.
     fn look_up(&self, point: &Point, device: &mut OnDevice) -> Result<(), GpuError> {
-        let OnDevice { parts, levels, .. } = device;
+        let OnDevice { parts, lights, levels, .. } = device;
         let Some(levels) = levels else { return Ok(()) };
         let at = (self.written(point).turned, &point.params);
-        levels.set(&self.gpu, at, &self.illumination, &self.views, parts)
+        levels.set(&self.gpu, at, (&self.illumination, lights), &self.views, parts)
     }
 
     /// How often levels of the UV atlas were made: once for as long as nothing changes that moves them.

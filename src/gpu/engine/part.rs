@@ -61,7 +61,8 @@ impl Size {
 }
 
 impl PartBuffers {
-    pub(super) fn new(gpu: &Gpu, size: Size) -> Result<Self, GpuError> {
+    /// Of that size; levels that are there already are looked up as they are.
+    pub(super) fn new(gpu: &Gpu, size: Size, shared: Option<&Buffer>) -> Result<Self, GpuError> {
         let buffer = |label, bytes: u64, usage| {
             gpu.device.create_buffer(&BufferDescriptor {
                 label: Some(label),
@@ -70,11 +71,12 @@ impl PartBuffers {
                 mapped_at_creation: false,
             })
         };
+        let own = || (size.levels > 0).then(|| buffer("levels", size.levels, BufferUsages::STORAGE));
         let made = Self {
             samples: buffer("samples", size.samples, BufferUsages::STORAGE),
             group_start: buffer("group starts", size.starts, BufferUsages::STORAGE),
             targets: buffer("targets", size.targets, BufferUsages::STORAGE),
-            levels: (size.levels > 0).then(|| buffer("levels", size.levels, BufferUsages::STORAGE)),
+            levels: shared.cloned().or_else(own),
         };
         gpu.check()?;
         Ok(made)

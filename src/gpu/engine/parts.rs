@@ -5,34 +5,15 @@ use std::ops::Range;
 use wgpu::Buffer;
 
 use super::Memory;
-use super::fused::WORKGROUP;
+use super::cuts::{blocks, cut, records, write};
 use super::part::{Part, PartBuffers, Size};
 use super::samples::DeviceSamples;
-use crate::records::packed;
 use crate::samples::LANES;
 use crate::samples::rows::Row;
 use crate::samples::surface_records::Places;
-use crate::{Gpu, GpuError, MOST_OF_A_DISPATCH};
+use crate::{Gpu, GpuError};
 use skinfit_core::engine::BLOCK;
 use skinfit_core::engine::view::ObservedView;
-
-/// Pixels that a thread shades, about: fewer leave processors idle, more leave sums long.
-const PIXELS_A_THREAD: usize = 4;
-/// Most workgroups of a part: eight for each of the 132 processors of an H200, which the largest adapters resemble.
-/// With the 56 sums of the race, a processor holds four at a time; six for each take 7% longer, as the second turn leaves
-/// processors half empty.
-const MOST_WORKGROUPS: usize = 1056;
-
-/// Workgroups for so many pixels, of which each thread shades a few.
-fn tiles(pixels: usize, most: usize) -> u32 {
-    pixels.div_ceil(WORKGROUP as usize * PIXELS_A_THREAD).clamp(1, most) as u32
-}
-
-/// Records that are packed at once: 3 to 21 MB.
-const PACKED_RECORDS: usize = 1 << 14;
-
-/// Bytes of a dispatch's uniform block.
-pub(super) const PART_BYTES: usize = 32;
 
 /// What is the same for all views.
 #[derive(Clone, Copy, Debug, Default)]
@@ -83,28 +64,38 @@ impl Traits {
 pub(super) struct Parts {
     pub(super) parts: Vec<Part>,
     traits: Traits,
-    stride: usize,
+    pub(super) stride: usize,
     /// Bytes that a part's samples may take, or their terms.
     limit: u64,
     memory: Memory,
     /// What the samples of each view look up of the UV atlas, record by record; nothing where there is none.
     levels: Vec<Vec<Row>>,
+    /// The levels that all samples look up, where these stand in a buffer.
+    shared_levels: Option<Buffer>,
 }
 
 impl Parts {
-    /// The parts of `views`; their samples are `made` on the device, or else uploaded.
+    /// The parts of `views`; their samples are `made` on the device, or else uploaded, and may look up `levels` that stand
+    /// there.
     pub(super) fn new(
         gpu: &Gpu,
         views: &[ObservedView],
         traits: &Traits,
         memory: Memory,
-        made: Option<&DeviceSamples>,
+        (made, levels): (Option<&DeviceSamples>, Option<&Buffer>),
     ) -> Result<Self, GpuError> {
         let limits = gpu.device.limits();
         let limit = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         let limit = memory.part.map_or(limit, |part| part.min(limit));
-        let mut parts =
-            Self { parts: Vec::new(), traits: *traits, stride: 1, limit, memory, levels: Vec::new() };
+        let mut parts = Self {
+            parts: Vec::new(),
+            traits: *traits,
+            stride: 1,
+            limit,
+            memory,
+            levels: Vec::new(),
+            shared_levels: levels.cloned(),
+        };
         if let (Some(_), Some(most)) = (made, memory.resident) {
             let bytes = views.iter().map(|view| parts.size(view, &(0..view.samples.groups())).total()).sum();
             if bytes > most {
@@ -118,13 +109,13 @@ impl Parts {
                 let resident = memory.resident.is_none_or(|most| used + size.total() <= most);
                 let buffers = if resident {
                     used += size.total();
-                    PartBuffers::new(gpu, size)?
+                    PartBuffers::new(gpu, size, levels)?
                 } else {
                     // The largest that any streamed part can be: a cut's limit.
                     let buffers = match shared.take() {
                         Some((buffers, most)) if size.within(most) => (buffers, most),
-                        Some((_, most)) => (PartBuffers::new(gpu, size.max(most))?, size.max(most)),
-                        None => (PartBuffers::new(gpu, size)?, size),
+                        Some((_, most)) => (PartBuffers::new(gpu, size.max(most), levels)?, size.max(most)),
+                        None => (PartBuffers::new(gpu, size, levels)?, size),
                     };
                     shared.insert(buffers).0.clone()
                 };
@@ -167,14 +158,16 @@ impl Parts {
     pub(super) fn bytes(&self) -> (u64, u64) {
         let bytes = |part: &Part| {
             let PartBuffers { samples, group_start, targets, levels } = &part.buffers;
-            let own = [Some(samples), Some(group_start), Some(targets), levels.as_ref()];
+            let levels = levels.as_ref().filter(|_| self.shared_levels.is_none());
+            let own = [Some(samples), Some(group_start), Some(targets), levels];
             own.into_iter().flatten().map(Buffer::size).sum::<u64>()
         };
         let own: u64 = self.parts.iter().filter(|part| part.resident).map(bytes).sum();
         let mut streamed = self.parts.iter().filter(|part| !part.resident);
         let uploaded = streamed.clone().map(|part| part.uploaded).sum();
         // All that are streamed take turns in the same buffers.
-        (own + streamed.next().map_or(0, bytes), uploaded)
+        let shared = self.shared_levels.as_ref().map_or(0, Buffer::size);
+        (own + shared + streamed.next().map_or(0, bytes), uploaded)
     }
 
     /// Read every `stride`-th block; returns the weight of the pixels that are read, and how many count.
@@ -215,7 +208,7 @@ impl Parts {
             let size = self.size(&views[part.view], &part.groups);
             // Longer records than the samples' had a buffer of their own.
             if part.buffers.samples.size() > size.samples.max(16) {
-                self.parts[index].buffers = PartBuffers::new(gpu, size)?;
+                self.parts[index].buffers = PartBuffers::new(gpu, size, self.shared_levels.as_ref())?;
             }
             let part = &self.parts[index];
             self.upload(gpu, &views[part.view], part, made.is_none())?;
@@ -225,7 +218,7 @@ impl Parts {
 
     /// Whether samples look something up of the UV atlas.
     pub(super) const fn have_levels(&self) -> bool {
-        self.traits.levels > 0
+        self.traits.levels > 0 || self.shared_levels.is_some()
     }
 
     /// Have what the samples of each view look up beside them.
@@ -245,54 +238,6 @@ impl Parts {
     fn upload_levels(&self, gpu: &Gpu, view: &ObservedView, part: &Part) {
         let (Some(buffer), Some(rows)) = (&part.buffers.levels, self.levels.get(part.view)) else { return };
         write(gpu, buffer, (rows, self.traits.levels), &records(view, &part.groups));
-    }
-
-    /// Samples of a part, padding included.
-    pub(super) fn samples(part: &Part, views: &[ObservedView]) -> usize {
-        records(&views[part.view], &part.groups).len() * LANES
-    }
-
-    /// Pixels of a part.
-    pub(super) fn slots(part: &Part) -> usize {
-        part.groups.len() * LANES
-    }
-
-    /// Workgroups of a part's dispatch.
-    pub(super) fn workgroups(part: &Part) -> u32 {
-        tiles(part.read as usize, MOST_WORKGROUPS)
-    }
-
-    /// Most workgroups that a part's dispatch may have, at any stride.
-    pub(super) fn most_workgroups(part: &Part) -> u32 {
-        tiles(Self::slots(part), MOST_WORKGROUPS)
-    }
-
-    /// Workgroups of a part's image. Where nothing is added up a workgroup costs nothing, and an image takes a tenth
-    /// less time than with [`MOST_WORKGROUPS`] (4 to 16 million pixels on an H200).
-    pub(super) fn image_workgroups(part: &Part) -> u32 {
-        tiles(Self::slots(part), MOST_OF_A_DISPATCH as usize)
-    }
-
-    /// The uniform block of a part's dispatch: its counts and gain, and where its sums go.
-    pub(super) fn block(
-        &self,
-        views: &[ObservedView],
-        part: &Part,
-        gain: f64,
-        first_sum: u32,
-    ) -> [u8; PART_BYTES] {
-        // A target without a clip lies between the largest numbers; WGSL promises nothing about infinities.
-        let clip = views[part.view].clip.map_or((f32::MIN, f32::MAX), |clip| (clip.low, clip.high));
-        let slots = part.groups.len() * LANES;
-        let left_out = (self.stride - 1) * BLOCK * LANES;
-        let counts = [part.read, slots as u32, left_out as u32, first_sum];
-        let numbers = [gain as f32, clip.0, clip.1].map(f32::to_bits);
-        let words = counts.into_iter().chain(numbers);
-        let mut block = [0; PART_BYTES];
-        for (bytes, word) in block.chunks_exact_mut(4).zip(words) {
-            bytes.copy_from_slice(&word.to_ne_bytes());
-        }
-        block
     }
 
     /// Upload a part that does not stay on the device.
@@ -349,47 +294,4 @@ impl Parts {
         }
         gpu.check()
     }
-}
-
-/// Ranges of groups, whole blocks each, whose records of so many rows stay within the limit. A block that is beyond
-/// it on its own is left to the adapter to refuse.
-fn cut(view: &ObservedView, rows: usize, limit: u64) -> Vec<Range<usize>> {
-    let groups = view.samples.groups();
-    let bytes = |range: &Range<usize>| (size_of::<Row>() * rows * records(view, range).len()) as u64;
-    let (mut ranges, mut start, mut end) = (Vec::new(), 0, 0);
-    while end < groups {
-        let next = groups.min(end + BLOCK);
-        if bytes(&(start..next)) > limit && end > start {
-            ranges.push(start..end);
-            start = end;
-        }
-        end = next;
-    }
-    if end > start {
-        ranges.push(start..end);
-    }
-    ranges
-}
-
-fn records(view: &ObservedView, groups: &Range<usize>) -> Range<usize> {
-    let starts = &view.samples.group_start;
-    starts[groups.start] as usize..starts[groups.end] as usize
-}
-
-/// Weight and count of each block of pixels.
-fn blocks(view: &ObservedView, groups: &Range<usize>) -> Vec<(f64, u64)> {
-    let block = |first: usize| view.weight_and_count(first..groups.end.min(first + BLOCK));
-    groups.clone().step_by(BLOCK).map(block).collect()
-}
-
-/// Write a range of records to a buffer, as they stand on an adapter; returns how many bytes they take.
-fn write(gpu: &Gpu, buffer: &Buffer, (rows, stride): (&[Row], usize), range: &Range<usize>) -> u64 {
-    let rows = &rows[range.start * stride..range.end * stride];
-    // Some at a time: they are packed in the host's memory.
-    let mut offset = 0;
-    for some in rows.chunks(PACKED_RECORDS * stride.max(1)) {
-        gpu.queue.write_buffer(buffer, offset, bytemuck::cast_slice(&packed(some, stride)));
-        offset += size_of_val(some) as u64;
-    }
-    offset
 }

@@ -2,10 +2,11 @@
 
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
+use super::dispatch::PART_BYTES;
 use super::fused::{ColumnOf, Fused, PARTS, Slab, Sum, Wish, gather_module};
 use super::lights::Inputs;
 use super::part::Part;
-use super::parts::{PART_BYTES, Parts};
+use super::parts::Parts;
 use super::pipeline::{
     READ, UNIFORM, Uniform, WRITE, bind, bind_part, buffer, encoder, layout, part_layout, pipeline,
 };

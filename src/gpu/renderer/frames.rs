@@ -4,6 +4,7 @@ use wgpu::CommandEncoderDescriptor;
 
 use super::Renderer;
 use crate::GpuError;
+use crate::atlas::ATLAS;
 use crate::constants::Values;
 use crate::model::terms::TermName;
 use crate::readback::Copy;
@@ -21,17 +22,40 @@ pub(super) struct Drawn {
 impl Renderer {
     /// GPU milliseconds of each of so many frames, drawn one right after another with nothing read back: an
     /// adapter that waits for the CPU between frames lowers its clock. Empty where there are no timestamps.
-    /// Without the bloom.
+    /// Without the bloom. Levels of the UV atlas are made for each, as where the pose or the light moves from frame to
+    /// frame.
     ///
     /// # Errors
     /// As of [`Self::render`].
     pub fn frame_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
+        self.times_of(camera, frames, |_| true)
+    }
+
+    /// As [`Self::frame_times`], of the passes over the UV atlas alone. Empty, too, of an adapter that is a program on the
+    /// CPU: the host's clock tells no pass from another.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub fn atlas_times(&mut self, camera: &Camera, frames: usize) -> Result<Vec<f64>, GpuError> {
+        if self.gpu.is_software() {
+            return Ok(Vec::new());
+        }
+        self.times_of(camera, frames, |pass| pass == ATLAS)
+    }
+
+    fn times_of(
+        &mut self,
+        camera: &Camera,
+        frames: usize,
+        counts: fn(&str) -> bool,
+    ) -> Result<Vec<f64>, GpuError> {
         let program = self.program(None)?;
         let stage = self.stage(camera, program)?;
         let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
         let (program, stage, morph_weights) = (&programs[program], &stages[stage], morph_weights.as_slice());
         let mut timers = Vec::with_capacity(frames);
         for _ in 0..frames {
+            program.forget();
             for (i, &tile) in stage.targets.tiles.iter().enumerate() {
                 let mut timer = Timer::new(gpu);
                 let params = &uploads.content().params;
@@ -53,7 +77,8 @@ impl Renderer {
             if !gpu.is_software() {
                 timer.collect(gpu)?;
             }
-            let milliseconds: f64 = timer.times.iter().map(|time| time.milliseconds).sum();
+            let counted = timer.times.iter().filter(|time| counts(time.pass));
+            let milliseconds: f64 = counted.map(|time| time.milliseconds).sum();
             match times.last_mut() {
                 Some(last) if tile > 0 => *last += milliseconds,
                 _ => times.push(milliseconds),

@@ -8,6 +8,7 @@
 //! - `faults`: what is refused, and lost devices
 //! - `vectors`: the conformance vectors through the shader rules; `light_vectors`: those of light
 //! - `fused`: the fit engine on the adapter against the plain f64 model
+//! - `levels`: levels of the UV atlas that an adapter makes for either
 //! - `samples`: samples that the adapter makes, beside the CPU's
 //! - `shadow_maps`: what the renderer has in the place of rays to lights
 //! - `textures`: maps filtered to the fragment, beside the CPU's samples and many of them
@@ -21,6 +22,7 @@ mod faults;
 mod frames;
 mod fused;
 mod light_vectors;
+mod levels;
 mod parity;
 mod pictures;
 mod samples;

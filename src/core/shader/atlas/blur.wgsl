@@ -4,12 +4,10 @@
         let tap: vec2f = {kernel};
         let low = floor(tap.x);
         let f = tap.x - low;
-        for (var side = 0; side < 2; side++) {
-            let place = here + (i32(low) + side) * {axis};
-            let inside = all(place >= vec2i(0)) && all(place < size);
-            let texel = textureLoad({source}, clamp(place, vec2i(0), size - 1), 0);
+        for (var side = 0; side < {sides}; side++) {
+            let texel = texel_near(here, i32(low) + side);
             let share = select(1.0 - f, f, side == 1);
-            sum += select(0.0, tap.y * share, inside && texel.w == middle.w) * vec4f(texel.xyz - middle.xyz, 1.0);
+            sum += select(0.0, tap.y * share, texel.w == middle.w) * vec4f(texel.xyz - middle.xyz, 1.0);
         }
     }
     let weighs = sum.w > 0.0;

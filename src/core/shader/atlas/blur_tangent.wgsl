@@ -9,12 +9,10 @@
         let low = floor(tap.x);
         let f = tap.x - low;
         for (var side = 0; side < 2; side++) {
-            let place = here + (i32(low) + side) * {axis};
-            let inside = all(place >= vec2i(0)) && all(place < size);
-            let near = clamp(place, vec2i(0), size - 1);
-            let texel = textureLoad({source}, near, 0);
+            let texel = texel_near(here, i32(low) + side);
+            let near = clamp(here + (i32(low) + side) * {axis}, vec2i(0), size - 1);
             let share = select(1.0 - f, f, side == 1);
-            let counts = inside && texel.w == middle.w;
+            let counts = texel.w == middle.w;
             let weight = select(0.0, tap.y * share, counts);
             let moved = select(0.0, slope.y * share + tap.y * select(-slope.x, slope.x, side == 1), counts);
             sum += weight * vec4f(texel.xyz - middle.xyz, 1.0);

@@ -1,10 +1,4 @@
 
-// A triangle that covers the atlas.
-@vertex
-fn vs_main(@builtin(vertex_index) corner: u32) -> @builtin(position) vec4f {
-    return vec4f(f32(4u * (corner & 1u)) - 1.0, f32(2u * (corner & 2u)) - 1.0, 0.0, 1.0);
-}
-
 // A texel; outside the atlas nothing.
 fn texel_at(place: vec2i) -> vec4f {
     let size = vec2i(textureDimensions({source}));
@@ -26,10 +20,8 @@ fn mean_around(here: vec2i) -> vec4f {
 
 // A texel, where it is empty the mean of the filled ones among its neighbours, in the second ring of those that the first has
 // filled (MODEL 6.5).
-@fragment
-fn fs_main(@builtin(position) at: vec4f) -> @location(0) vec4f {
+fn dilated(here: vec2i) -> vec4f {
     let size = vec2i(textureDimensions({source}));
-    let here = vec2i(at.xy);
     let middle = texel_at(here);
     if (middle.w > 0.0) {
         return middle;
@@ -49,3 +41,4 @@ fn fs_main(@builtin(position) at: vec4f) -> @location(0) vec4f {
     }
     return vec4f(sum.xyz / max(sum.w, 1.0), min(sum.w, 1.0));
 }
+

@@ -1,25 +1,37 @@
 //! Passes over the UV atlas: texels' quantities, and blurs of them, in the order in which they are made.
 //!
 //! A *level* is a texture of the atlas' size, four 32-bit floats a texel: a quantity, and in w the texel's chart, counted
-//! from 1, 0 where the mesh has no surface. A *draw* draws the mesh with its texture coordinates as
-//! positions, and leaves the levels that a pass or a fragment reads. A *blur* reads a level and leaves another, along u
+//! from 1, 0 where the mesh has no surface. A *draw* evaluates the rules of texels in each that the mesh covers, and
+//! leaves the levels that a pass or a fragment reads. A *blur* reads a level and leaves another, along u
 //! or along v. Draws and blurs take turns where texels' rules need what was blurred; texels that need nothing of that are
 //! computed anew in each draw.
 //!
 //! Beside stored samples stand stored texels: the same passes are functions of them ([`TEXEL`], [`TAPS`]), which the
 //! processor evaluates.
 //!
-//! - this module: from the rules that a search has found to passes; `text`: their WGSL
-//! - [`tangent`]: passes that leave how levels move
+//! - this module: from the rules that a search has found to passes; `order`: which come before which; `level`: what
+//!   they leave
+//! - `text`: their WGSL; `kernel`: that of blurs
+//! - [`tangent`]: passes that leave how levels move; [`named`]: these beside the plan's
+//! - [`buffers`]: passes over stored texels as compute shaders, for the engine on an adapter (`layers`: where levels stand;
+//!   `columns`: what moves beside what is blurred)
 
+pub mod buffers;
+mod columns;
+mod kernel;
+mod layers;
+mod level;
+pub mod named;
+mod order;
 pub mod tangent;
 #[cfg(test)]
 mod tests;
 pub(super) mod text;
 
-use std::collections::{BTreeMap, BTreeSet};
-
-pub use self::text::stored;
+pub use self::level::{Axis, Level};
+pub(super) use self::order::with_vertices;
+use self::order::{depths, in_levels, upstream};
+pub use self::text::{sample_buffered_level, stored};
 use super::domain::{CHART, DIRECTIONS, Domain, TAP_COST, UV};
 use super::emit::Plan;
 use super::facts::{Facts, Source};
@@ -27,83 +39,26 @@ use super::rule::{Kernel, Rule};
 use super::search::{Carried, Found, PlanError};
 use crate::model::diffusion::Seams;
 
-/// Levels that a draw leaves: an adapter draws into 32 bytes a sample at once, by WebGPU's defaults.
-const LEVELS_A_DRAW: usize = 2;
+/// Levels that a draw leaves: an adapter writes into so many textures at once, by WebGPU's defaults.
+const LEVELS_A_DRAW: usize = 4;
 
-/// The ending of levels whose empty texels were filled.
-const DILATED: &str = "_dilated";
-
-/// A texture of the atlas: a quantity of its texels, or one that is blurred along u alone.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Level {
-    /// Its name; bound as `NAME_level`.
-    pub name: String,
-    /// The quantity's WGSL type: an `f32`, `vec2f` or `vec3f`.
-    pub kind: &'static str,
-}
-
-impl Level {
-    fn new(name: impl Into<String>, kind: &'static str) -> Self {
-        Self { name: name.into(), kind }
-    }
-
-    /// Its name as it is bound.
-    #[must_use]
-    pub fn bound(&self) -> String {
-        format!("{}_level", self.name)
-    }
-
-    /// The same, its empty texels filled for lookups by one fetch.
-    pub(super) fn dilated(&self) -> Self {
-        Self::new(format!("{}{DILATED}", self.name), self.kind)
-    }
-
-    /// The quantity that a fragment finds there.
-    pub(super) fn quantity(&self) -> &str {
-        self.name.strip_suffix(DILATED).unwrap_or(&self.name)
-    }
-
-    /// The components of a texel that hold it.
-    pub(super) fn swizzle(&self) -> &'static str {
-        match self.kind {
-            "f32" => "x",
-            "vec2f" => "xy",
-            _ => "xyz",
-        }
-    }
-}
-
-/// Along which axis of the atlas.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Axis {
-    /// From left to right.
-    U,
-    /// From top to bottom.
-    V,
-}
-
-impl Axis {
-    /// From a texel to its neighbour, as WGSL.
-    pub(super) const fn step(self) -> &'static str {
-        match self {
-            Self::U => "vec2i(1, 0)",
-            Self::V => "vec2i(0, 1)",
-        }
-    }
-}
+/// Texels that a workgroup of a blur takes, along its axis and across; that of another pass takes [`TEXELS`] of the list.
+pub const TILE: [u32; 2] = [64, 4];
+/// Threads of a workgroup that takes texels one by one.
+pub const TEXELS: u32 = 64;
 
 /// How a pass is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PassKind {
-    /// The mesh, its texture coordinates as positions, without depth and culling.
+    /// The rules of texels, of what the mesh's vertices hand over.
     Draw,
-    /// Three vertices without attributes, which cover the atlas: a blur along an axis.
+    /// A blur along an axis.
     Blur(Axis),
-    /// The same vertices: how far what is read lies from one neighbour to the next.
+    /// How far what is read lies from one neighbour to the next.
     Neighbours,
-    /// Nothing: the processor alone sums up over the surface.
+    /// The processor alone sums up over the surface.
     Surface,
-    /// The same vertices: what is read, its empty texels filled two rings deep.
+    /// What is read, its empty texels filled two rings deep.
     Dilate,
 }
 
@@ -112,10 +67,10 @@ pub enum PassKind {
 pub struct Pass {
     /// How it is drawn.
     pub kind: PassKind,
-    /// What it leaves: a target each, cleared to 0.
+    /// What it leaves: of the texels that the mesh covers (and of those that it fills); others stay 0.
     pub leaves: Vec<Level>,
     /// Its rules, and what they read; of a blur the first level is what is blurred. The module's entry points are
-    /// `vs_main` and `fs_main`, over stored texels [`TEXEL`] or [`TAPS`].
+    /// `cs_texels` and of a draw before it `cs_vertices`, over stored texels [`TEXEL`] or [`TAPS`].
     pub plan: Plan,
     /// Of a blur that leaves how another moves, and whose kernel moves itself.
     pub moving: Option<MovingKernel>,
@@ -126,6 +81,8 @@ pub struct Pass {
 pub struct MovingKernel {
     /// The level that holds how what is blurred moves; `None` where it stays.
     pub blurred: Option<Level>,
+    /// How the kernel's value does.
+    slope: kernel::Slope,
 }
 
 /// Over stored texels: the function of a `Sample` that yields what a draw leaves, one value after another.
@@ -169,7 +126,9 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
             rule.gives.iter().map(|(quantity, swizzle)| Level::new(*quantity, rule.given_type(swizzle)))
         });
         let leaves: Vec<Level> = given.filter(|level| stored.contains(level.name.as_str())).collect();
-        passes.extend(leaves.chunks(LEVELS_A_DRAW).map(|leaves| draw(facts, found, &texels, leaves)));
+        for leaves in leaves.chunks(LEVELS_A_DRAW) {
+            passes.push(draw(facts, found, &texels, leaves)?);
+        }
         let blurs = texels.iter().filter(|rule| rule.blur.is_some() && depth(rule) == Some(layer + 1));
         passes.extend(blurs.flat_map(|rule| blurs_of(facts, rule)));
     }
@@ -209,69 +168,7 @@ fn dilate(facts: &Facts, source: &Level) -> Pass {
 /// Texels around one.
 const NEIGHBOURS: f64 = 8.0;
 
-/// How many blurs lie before each of the texels' quantities, itself with them.
-fn depths(texels: &[&'static Rule]) -> BTreeMap<&'static str, usize> {
-    let mut depths = BTreeMap::new();
-    // Each round settles at least one more.
-    for _ in texels {
-        for rule in texels {
-            let before = rule.needs.iter().filter_map(|(need, _)| depths.get(need)).max().copied();
-            let depth = before.unwrap_or(0) + usize::from(rule.blur.is_some());
-            depths.extend(rule.gives.iter().map(|(quantity, _)| (*quantity, depth)));
-        }
-    }
-    depths
-}
-
-/// The texels' quantities that stand in the atlas: what fragments look up, and what blurs and their kernels read.
-fn in_levels(texels: &[&'static Rule], carried: &[Carried]) -> BTreeSet<&'static str> {
-    let sampled = carried.iter().filter(|on| on.edge.from == Domain::Texel).map(|on| on.quantity);
-    let blurs = texels.iter().filter(|rule| rule.blur.is_some());
-    let read = blurs.flat_map(|rule| rule.needs.iter().map(|(need, _)| *need));
-    sampled.chain(read).collect()
-}
-
-/// The rules of `domain` among `rules` that yield `goals` there, in their order; what is in `stops` is there already.
-pub(super) fn upstream(
-    rules: &[&'static Rule],
-    domain: Domain,
-    goals: &[&str],
-    stops: &dyn Fn(&Rule) -> bool,
-) -> Vec<&'static Rule> {
-    let of_domain = || rules.iter().filter(|rule| rule.domain == domain && !stops(rule));
-    let mut wanted: BTreeSet<&str> = goals.iter().copied().collect();
-    loop {
-        let before = wanted.len();
-        for rule in of_domain() {
-            if rule.gives.iter().any(|(quantity, _)| wanted.contains(quantity)) {
-                wanted.extend(rule.needs.iter().map(|(need, _)| *need));
-            }
-        }
-        if wanted.len() == before {
-            let chosen = |rule: &&&Rule| rule.gives.iter().any(|(quantity, _)| wanted.contains(quantity));
-            return of_domain().filter(chosen).copied().collect();
-        }
-    }
-}
-
-/// The vertices' rules that `goals` and the quantities on edges to `domain` take, then `shading`.
-pub(super) fn with_vertices(
-    found: &Found,
-    domain: Domain,
-    goals: &[&'static str],
-    shading: Vec<&'static Rule>,
-) -> Vec<&'static Rule> {
-    let needed =
-        |quantity: &str| shading.iter().any(|rule| rule.needs.iter().any(|(need, _)| *need == quantity));
-    let carried = found.carried.iter().filter(|on| on.edge.from == Domain::Vertex && on.edge.to == domain);
-    let arriving = carried.map(|on| on.quantity).filter(|quantity| needed(quantity));
-    let goals: Vec<&str> = goals.iter().copied().chain(arriving).collect();
-    let mut rules = upstream(&found.rules, Domain::Vertex, &goals, &|_| false);
-    rules.extend(shading);
-    rules
-}
-
-fn draw(facts: &Facts, found: &Found, texels: &[&'static Rule], leaves: &[Level]) -> Pass {
+fn draw(facts: &Facts, found: &Found, texels: &[&'static Rule], leaves: &[Level]) -> Result<Pass, PlanError> {
     let goals: Vec<&str> = leaves.iter().map(|level| level.name.as_str()).collect();
     let shading = upstream(texels, Domain::Texel, &goals, &|rule| rule.blur.is_some());
     let blurred = texels.iter().filter(|rule| rule.blur.is_some());
@@ -285,9 +182,16 @@ fn draw(facts: &Facts, found: &Found, texels: &[&'static Rule], leaves: &[Level]
     let mut plan = Plan::of_rules(facts, &rules, &found.carried, levels);
     if facts.source == Source::Raster {
         plan.varyings.push((CHART, "f32"));
+        let held = plan.varyings.iter().any(|(name, _)| *name == UV);
+        if !held && text::takes_steps(&plan.functions(&[Domain::Texel])) {
+            plan.varyings.push((UV, "vec2f"));
+        }
     }
     plan.wgsl = text::draw(&plan, leaves);
-    Pass { kind: PassKind::Draw, leaves: leaves.to_vec(), plan, moving: None }
+    if facts.source == Source::Raster && text::is_between_texels(&plan.wgsl) {
+        return Err(PlanError::BetweenTexels { level: leaves[0].name.clone() });
+    }
+    Ok(Pass { kind: PassKind::Draw, leaves: leaves.to_vec(), plan, moving: None })
 }
 
 /// The name of what a blur leaves along u.
@@ -309,7 +213,7 @@ fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
     if blur.kernel == Kernel::Surface {
         let source = Level::new(blur.of, kind);
         let mut plan = blur_plan(facts, rule, &source);
-        plan.wgsl = text::blur(&plan, rule, Axis::U, &source);
+        plan.wgsl = kernel::blur(&plan, rule, Axis::U, &source);
         let leaves = vec![Level::new(rule.gives[0].0, kind)];
         return vec![Pass { kind: PassKind::Surface, leaves, plan, moving: None }];
     }
@@ -319,7 +223,7 @@ fn blurs_of(facts: &Facts, rule: &'static Rule) -> Vec<Pass> {
     ];
     let pass = |(axis, source, leaves): (Axis, Level, Level)| {
         let mut plan = blur_plan(facts, rule, &source);
-        plan.wgsl = text::blur(&plan, rule, axis, &source);
+        plan.wgsl = kernel::blur(&plan, rule, axis, &source);
         Pass { kind: PassKind::Blur(axis), leaves: vec![leaves], plan, moving: None }
     };
     directions.into_iter().map(pass).collect()

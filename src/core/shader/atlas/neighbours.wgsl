@@ -1,4 +1,6 @@
-    // From the texel's one neighbour of the same chart to the other, half of it, along u and v; to the one that there is; 0
+    let size = vec2i(textureDimensions({source}));
+    let middle = textureLoad({source}, here, 0);
+{reads}    // From the texel's one neighbour of the same chart to the other, half of it, along u and v; to the one that there is; 0
     // with none (MODEL 6).
     var apart = vec2f(0.0);
     for (var axis = 0; axis < 2; axis++) {
@@ -16,5 +18,5 @@
         }
         apart[axis] = distance(ends[0], ends[1]) / max(found, 1.0);
     }
-    return {value};
+    textureStore(left_0_level, here, {value});
 }

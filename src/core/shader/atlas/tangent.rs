@@ -6,7 +6,8 @@
 
 use std::collections::BTreeMap;
 
-use super::text::{self, Slope};
+use super::kernel::{self, Slope};
+use super::text;
 use super::{Axis, Level, MovingKernel, Pass, PassKind};
 use crate::shader::emit::Plan;
 use crate::shader::rule::Rule;
@@ -90,12 +91,12 @@ impl Along {
             (None, None) => return Ok(None),
             (Some(moved), None) => {
                 plan.levels[0] = moved.clone();
-                plan.wgsl = text::blur(&plan, rule, axis, &moved);
+                plan.wgsl = kernel::blur(&plan, rule, axis, &moved);
             }
             (moved, Some(slope)) => {
                 plan.levels.extend(moved.iter().chain(&slope.levels).cloned());
-                plan.wgsl = text::blur_tangent(&plan, rule, axis, (&source, moved.as_ref()), &slope);
-                moving = Some(MovingKernel { blurred: moved });
+                plan.wgsl = kernel::blur_tangent(&plan, rule, axis, (&source, moved.as_ref()), &slope);
+                moving = Some(MovingKernel { blurred: moved, slope });
             }
         }
         let leaves = pass.leaves.iter().map(|level| self.leave(level)).collect();

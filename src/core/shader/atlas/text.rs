@@ -1,31 +1,46 @@
-//! The WGSL of passes over the atlas.
+//! The WGSL of passes over the atlas, texel by texel: draws, what neighbours say, empty texels that are filled; and lookups.
+//!
+//! Beside the rasteriser's plans these are compute shaders, a thread for each texel that the mesh covers: group 1 holds the
+//! list of these, before it what a draw takes of vertices and triangles, and after it the levels that are left.
 
 use std::fmt::Write as _;
 
-use super::{APART, Axis, Level, TAPS, TEXEL};
+use super::kernel::{TAP, arguments, of_kernel};
+use super::{APART, Axis, Level, TEXEL};
 use crate::shader::domain::{CHART, Domain, UV};
 use crate::shader::emit::Plan;
 use crate::shader::facts::{Facts, Source};
 use crate::shader::module::{sample_struct, uniform};
-use crate::shader::quantity::Constant;
-use crate::shader::rule::{Kernel, Rule};
+use crate::shader::rule::Rule;
+use crate::shader::vertex_stage::{CORNERS, Clip, means};
+use crate::shader::visibility_buffer::{BETWEEN_FRAGMENTS, with_steps};
 
-/// The functions by which fragments look levels up.
-pub(crate) fn sample_level(facts: &Facts) -> &'static str {
-    if facts.dilates() { include_str!("level_dilated.wgsl") } else { include_str!("level.wgsl") }
+/// The functions by which fragments look levels up that are textures.
+pub(crate) fn sample_level(facts: &Facts) -> String {
+    let by = if facts.dilates() { LOOK_UP_DILATED } else { LOOK_UP };
+    format!("{}{by}", include_str!("level_texture.wgsl"))
 }
 
-/// One direction of a blur, and how it moves: one head, and what differs.
-const BLUR: &str = concat!(include_str!("blur_head.wgsl"), include_str!("blur.wgsl"));
-const BLUR_TANGENT: &str = concat!(include_str!("blur_head.wgsl"), include_str!("blur_tangent.wgsl"));
-/// How far neighbours lie apart.
-const NEIGHBOURS: &str = concat!(include_str!("blur_head.wgsl"), include_str!("neighbours.wgsl"));
+/// The functions by which samples look levels up that stand in the buffer `levels`, `SIZE` texels a side.
+#[must_use]
+pub fn sample_buffered_level(dilated: bool) -> String {
+    let by = if dilated { LOOK_UP_DILATED } else { LOOK_UP };
+    format!("{}{by}", include_str!("level_buffer.wgsl"))
+}
 
+/// Lookups among the texels of a chart, and whatever these are of.
+const LOOK_UP: &str = include_str!("level.wgsl");
+const LOOK_UP_DILATED: &str = include_str!("level_dilated.wgsl");
+
+/// The head of an entry point, up to a texel's place.
+const EACH_TEXEL: &str = include_str!("each_texel.wgsl");
+/// How far neighbours lie apart.
+const NEIGHBOURS: &str = include_str!("neighbours.wgsl");
 /// Empty texels that are filled.
 const DILATE: &str = include_str!("dilate.wgsl");
 
-/// Where the mesh lies in the atlas: v runs downwards.
-const IN_ATLAS: &str = "vec4f(2.0 * vertex_uv.x - 1.0, 1.0 - 2.0 * vertex_uv.y, 0.0, 1.0)";
+/// How a draw's list says where a texel is, in which triangle, and what the second and third corner count there.
+const LISTED: &str = "vec4u";
 
 /// A draw of the mesh into the atlas.
 pub(super) fn draw(plan: &Plan, leaves: &[Level]) -> String {
@@ -39,19 +54,142 @@ pub(super) fn draw_of(plan: &Plan, functions: &str, lines: &str, targets: &[(Lev
     if plan.facts.source != Source::Raster {
         return texel_of(plan, functions, lines, targets);
     }
-    let mut wgsl = plan.vertex_module_at("", IN_ATLAS);
-    wgsl.push_str(functions);
-    wgsl.push_str("\nstruct Texel {\n");
-    for (i, (level, _)) in targets.iter().enumerate() {
-        let _ = writeln!(wgsl, "    @location({i}) {}: vec4f,", level.name);
+    let stated = plan.declarations(true) + functions;
+    let mut wgsl = stated.clone();
+    wgsl.push_str(&plan.vertex_stage(Clip::Left));
+    let _ = write!(
+        wgsl,
+        "\nconst STRIDE = {}u;\n@group(1) @binding(2) var<storage, read> corners: array<u32>;\n",
+        plan.stride(Clip::Left)
+    );
+    wgsl.push_str(&listed(3, LISTED, targets.len()));
+    wgsl.push_str(CORNERS);
+    let steps = steps(plan, &stated);
+    for (name, kind) in steps.iter().flat_map(|step| step.names().map(|name| (name, step.kind))) {
+        let _ = writeln!(wgsl, "var<private> {name}: {kind};");
     }
-    wgsl.push_str("}\n\n@fragment\nfn fs_main(at: Varyings) -> Texel {\n");
-    wgsl.push_str(&reads(&plan.levels, "vec2i(at.clip.xy)"));
+    if !steps.is_empty() {
+        wgsl.push_str(&share_steps(plan));
+    }
+    let _ = write!(
+        wgsl,
+        "\n{EACH_TEXEL}    let first = first_numbers(listed.y);\n    \
+         let second_and_third = vec2f(bitcast<f32>(listed.z), bitcast<f32>(listed.w));\n    \
+         let shares = vec3f(1.0 - second_and_third.x - second_and_third.y, second_and_third);\n"
+    );
+    wgsl.push_str(&steps_set(&steps));
+    let handed = plan.places(Clip::Left).into_iter().map(|(_, kind, place)| means(kind, place, "shares"));
+    let _ = writeln!(wgsl, "    let at = Varyings({});", handed.collect::<Vec<_>>().join(", "));
+    // A block of their own: what rules give may be called like anything before.
+    wgsl.push_str("    {\n");
+    wgsl.push_str(&reads(&plan.levels, "here"));
     wgsl.push_str(&plan.calls(Domain::Texel, uniform, |name| format!("at.{name}")));
     wgsl.push_str(lines);
-    let values: Vec<String> = targets.iter().map(|(level, value)| texel(level, value)).collect();
-    let _ = write!(wgsl, "    return Texel({});\n}}\n", values.join(", "));
+    for (i, (level, value)) in targets.iter().enumerate() {
+        let value = texel(level, value, &format!("round(at.{CHART})"));
+        let _ = writeln!(wgsl, "    textureStore(left_{i}_level, here, {value});");
+    }
+    wgsl.push_str("    }\n}\n");
+    with_triangles_steps(&wgsl, plan, &steps)
+}
+
+/// The list of texels and the levels that are left, from that binding of group 1 on.
+fn listed(first: usize, kind: &str, leaves: usize) -> String {
+    let mut wgsl = format!("@group(1) @binding({first}) var<storage, read> texels: array<{kind}>;\n");
+    for i in 0..leaves {
+        let _ = writeln!(
+            wgsl,
+            "@group(1) @binding({}) var left_{i}_level: texture_storage_2d<rgba32float, write>;",
+            first + 1 + i
+        );
+    }
     wgsl
+}
+
+/// What rules take the steps of (`dpdx`, `dpdy`) that vertices hand over. A compute shader knows no neighbours, but what the
+/// triangle's corners say; that is exact.
+struct Steps {
+    name: &'static str,
+    kind: &'static str,
+    /// Its first number's place.
+    place: usize,
+}
+
+impl Steps {
+    /// What holds the steps along u and along v.
+    fn names(&self) -> [String; 2] {
+        [format!("{}_along_u", self.name), format!("{}_along_v", self.name)]
+    }
+}
+
+fn steps(plan: &Plan, wgsl: &str) -> Vec<Steps> {
+    let taken = |name: &str| ["dpdx", "dpdy"].iter().any(|call| wgsl.contains(&format!("{call}({name})")));
+    let places = plan.places(Clip::Left).into_iter();
+    let stepped = places.filter(|(name, ..)| *name != UV && taken(name));
+    stepped.map(|(name, kind, place)| Steps { name, kind, place }).collect()
+}
+
+/// Whether rules of texels take steps to neighbours.
+pub(super) fn takes_steps(functions: &str) -> bool {
+    functions.contains("dpdx(") || functions.contains("dpdy(")
+}
+
+/// Whether a draw is left with steps that the triangle does not tell.
+pub(super) fn is_between_texels(wgsl: &str) -> bool {
+    BETWEEN_FRAGMENTS.iter().any(|function| wgsl.contains(function))
+}
+
+/// How the corners' shares go on to the next texel along u, and along v.
+fn share_steps(plan: &Plan) -> String {
+    let uv =
+        plan.places(Clip::Left).into_iter().find(|(name, ..)| *name == UV).map_or(0, |(.., place)| place);
+    format!(
+        "\nfn corner_in_texels(first: u32) -> vec2f {{\n    \
+         return {}.0 * vec2f(varyings[first + {uv}u], varyings[first + {uv}u + 1u]);\n}}\n\n\
+         fn share_steps(first: vec3u) -> array<vec3f, 2> {{\n    \
+         let a = corner_in_texels(first.x);\n    \
+         let b = corner_in_texels(first.y) - a;\n    \
+         let c = corner_in_texels(first.z) - a;\n    \
+         let area = b.x * c.y - b.y * c.x;\n    \
+         let along = vec2f(c.y, -b.y) / area;\n    \
+         let down = vec2f(-c.x, b.x) / area;\n    \
+         return array<vec3f, 2>(vec3f(-along.x - along.y, along), vec3f(-down.x - down.y, down));\n}}\n",
+        size(plan)
+    )
+}
+
+/// The lines that set what [`Steps`] are held in.
+fn steps_set(steps: &[Steps]) -> String {
+    let mut wgsl = String::new();
+    if !steps.is_empty() {
+        wgsl.push_str(
+            "    let next = share_steps(first);\n    let along = next[0];\n    let down = next[1];\n",
+        );
+    }
+    for step in steps {
+        for (name, shares) in step.names().iter().zip(["along", "down"]) {
+            let _ = writeln!(wgsl, "    {name} = {};", means(step.kind, step.place, shares));
+        }
+    }
+    wgsl
+}
+
+/// A text that takes steps from what [`steps_set`] has set; those of texture coordinates are a texel's.
+fn with_triangles_steps(wgsl: &str, plan: &Plan, steps: &[Steps]) -> String {
+    let one = format!("1.0 / {}.0", size(plan));
+    let (along, down) = (format!("vec2f({one}, 0.0)"), format!("vec2f(0.0, {one})"));
+    let mut text = with_steps(wgsl, [&along, &down]);
+    for step in steps {
+        let [along, down] = step.names();
+        text = text.replace(&format!("dpdx({})", step.name), &along);
+        text = text.replace(&format!("dpdy({})", step.name), &down);
+    }
+    text
+}
+
+/// Texels along the atlas' side.
+fn size(plan: &Plan) -> u32 {
+    plan.facts.atlas.unwrap_or(1)
 }
 
 /// The same of a stored texel.
@@ -73,9 +211,8 @@ fn texel_of(plan: &Plan, functions: &str, lines: &str, targets: &[(Level, String
     wgsl
 }
 
-/// A texel that holds a value of a level's type; interpolation rounds the chart.
-fn texel(level: &Level, value: &str) -> String {
-    let chart = format!("round(at.{CHART})");
+/// A texel of a chart that holds a value of a level's type.
+fn texel(level: &Level, value: &str, chart: &str) -> String {
     match level.kind {
         "f32" => format!("vec4f({value}, 0.0, 0.0, {chart})"),
         "vec2f" => format!("vec4f({value}, 0.0, {chart})"),
@@ -84,7 +221,7 @@ fn texel(level: &Level, value: &str) -> String {
 }
 
 /// Levels' quantities at a texel.
-fn reads(levels: &[Level], place: &str) -> String {
+pub(super) fn reads(levels: &[Level], place: &str) -> String {
     let read = |level: &Level| {
         let (bound, swizzle) = (level.bound(), level.swizzle());
         format!("    let {}: {} = textureLoad({bound}, {place}, 0).{swizzle};\n", level.name, level.kind)
@@ -110,7 +247,12 @@ pub(crate) fn sampled(facts: &Facts, levels: &[Level]) -> String {
 
 /// A level, its empty texels filled.
 pub(super) fn dilate(plan: &Plan, source: &Level) -> String {
-    format!("{}{}", plan.declarations(true), DILATE.replace("{source}", &source.bound()))
+    let filled = DILATE.replace("{source}", &source.bound());
+    format!(
+        "{}{}{filled}\n{EACH_TEXEL}    textureStore(left_0_level, here, dilated(here));\n}}\n",
+        plan.declarations(true),
+        listed(0, LISTED, 1)
+    )
 }
 
 /// The lines that read levels' quantities of the fields of a stored sample or texel, `at`.
@@ -119,144 +261,17 @@ pub fn stored(levels: &[Level]) -> String {
     levels.iter().map(|Level { name, kind }| format!("    let {name}: {kind} = at.{name};\n")).collect()
 }
 
-/// One direction of a blur.
-pub(super) fn blur(plan: &Plan, rule: &Rule, axis: Axis, source: &Level) -> String {
-    match plan.facts.source {
-        Source::Raster => filled(BLUR, plan, rule, axis, source, (&[], None)),
-        Source::Samples | Source::Terms => taps_of(plan, rule, axis, &[], None),
-    }
-}
-
-/// How a kernel's value moves.
-pub(super) struct Slope {
-    /// The tangent's name.
-    pub(super) name: String,
-    /// What it is called with after the kernel's own arguments.
-    pub(super) along: Vec<String>,
-    /// The functions that it takes.
-    pub(super) functions: String,
-    /// The levels that it reads beside the kernel's.
-    pub(super) levels: Vec<Level>,
-}
-
-impl Slope {
-    fn call(&self, rule: &Rule, axis: Axis, tap: &str) -> String {
-        let mut given = arguments(rule, axis, tap);
-        given.extend(self.along.iter().cloned());
-        format!("{}({})", self.name, given.join(", "))
-    }
-}
-
-/// How one direction of a blur moves, where its kernel does; `moved` holds how what is blurred moves.
-pub(super) fn blur_tangent(
-    plan: &Plan,
-    rule: &Rule,
-    axis: Axis,
-    (source, moved): (&Level, Option<&Level>),
-    slope: &Slope,
-) -> String {
-    if plan.facts.source != Source::Raster {
-        return taps_of(plan, rule, axis, &slope.levels, Some(slope));
-    }
-    let of = |level: &Level, place: &str| format!("textureLoad({}, {place}, 0).xyz", level.bound());
-    let at = |place: &str| moved.map_or("vec3f(0.0)".to_owned(), |level| of(level, place));
-    let template = BLUR_TANGENT.replace("{moved}", &at("near")).replace("{moved_here}", &at("here"));
-    let template = format!("{}{template}", slope.functions);
-    filled(&template, plan, rule, axis, source, (&slope.levels, Some(slope)))
-}
-
-/// A tap in the passes' loops.
-const TAP: &str = "f32(i)";
-
-/// How a kernel is written in the passes' loops.
-struct Loop {
-    /// Lines before the loop.
-    before: String,
-    /// Taps to either side.
-    reach: String,
-    /// Where a tap lies, and what it weighs.
-    tap: String,
-    /// How both move, where they do.
-    slope: String,
-}
-
-/// The loop of a kernel, `slope` being how its function's value moves.
-fn taps(facts: &Facts, rule: &Rule, axis: Axis, slope: Option<&Slope>) -> Loop {
-    let value = |tap: &str| format!("{}({})", rule.function, arguments(rule, axis, tap).join(", "));
-    let moved = |tap: &str| slope.map_or_else(String::new, |slope| slope.call(rule, axis, tap));
-    let kernel = rule.blur.as_ref().map_or(Kernel::Taps(1), |blur| blur.kernel);
-    let counted = match kernel {
-        Kernel::Taps(taps) => {
-            let reach = (taps / 2).to_string();
-            return Loop { before: String::new(), reach, tap: value(TAP), slope: moved(TAP) };
-        }
-        Kernel::Gaussian => facts.setup.choices.diffusion.taps.count(),
-        // No loop of these: a texel's two neighbours, or what the processor finds.
-        Kernel::Neighbours | Kernel::Surface => Some(1),
-    };
-    let mut before = format!("    let deviation: f32 = {};\n", value(TAP));
-    if slope.is_some() {
-        before += &format!("    let deviation_moves: f32 = {};\n", moved(TAP));
-    }
-    match counted {
-        // A deviation apart.
-        Some(taps) => Loop {
-            before,
-            reach: (taps / 2).to_string(),
-            tap: "vec2f(f32(i) * deviation, exp(-0.5 * f32(i * i)))".to_owned(),
-            slope: "vec2f(f32(i) * deviation_moves, 0.0)".to_owned(),
-        },
-        // A texel apart, within six deviations.
-        None => {
-            before += "    let reach = i32(min(ceil(6.0 * deviation), f32(max(size.x, size.y))));\n    \
-                       let narrow: f32 = max(deviation, 1e-10);\n";
-            let steps = "f32(i) / narrow";
-            Loop {
-                before,
-                reach: "reach".to_owned(),
-                tap: format!("vec2f(f32(i), exp(-0.5 * ({steps}) * ({steps})))"),
-                slope: format!("vec2f(0.0, tap.y * ({steps}) * ({steps}) * deviation_moves / narrow)"),
-            }
-        }
-    }
-}
-
-/// What a kernel is made of, and how it moves, of a stored texel.
-fn taps_of(plan: &Plan, rule: &Rule, axis: Axis, beside: &[Level], slope: Option<&Slope>) -> String {
-    let levels: Vec<Level> = of_kernel(plan, rule).into_iter().chain(beside.iter().cloned()).collect();
-    let fields: Vec<(&str, &str)> = levels.iter().map(|level| (level.name.as_str(), level.kind)).collect();
-    let functions = slope.map_or("", |slope| &slope.functions);
-    let mut wgsl = format!("{}{functions}{}", plan.declarations(true), sample_struct(&fields));
-    let (reach, kind) = match rule.blur.as_ref().map(|blur| blur.kernel) {
-        Some(Kernel::Taps(taps)) => ((taps / 2) as i32, "vec2f"),
-        _ => (0, "f32"),
-    };
-    let mut values = Vec::new();
-    for tap in -reach..=reach {
-        let tap = format!("{tap}.0");
-        values.push(format!("{}({})", rule.function, arguments(rule, axis, &tap).join(", ")));
-        values.extend(slope.map(|slope| slope.call(rule, axis, &tap)));
-    }
-    wgsl.push_str("\nstruct Taps {\n");
-    (0..values.len()).for_each(|i| wgsl.push_str(&format!("    of_{i}: {kind},\n")));
-    let _ = writeln!(wgsl, "}}\n\nfn {TAPS}(at: Sample) -> Taps {{");
-    wgsl.push_str(&stored(&levels));
-    let _ = write!(wgsl, "    return Taps({});\n}}\n", values.join(", "));
-    wgsl
-}
-
 /// A pass over neighbours.
 pub(super) fn neighbours(plan: &Plan, rule: &Rule, source: &Level) -> String {
     let value = format!("{}({})", rule.function, arguments(rule, Axis::U, TAP).join(", "));
     if plan.facts.source == Source::Raster {
         let leaf = Level { name: rule.gives[0].0.to_owned(), kind: rule.returns };
-        let value = texel(&leaf, &value).replace(&format!("round(at.{CHART})"), "middle.w");
         let body = NEIGHBOURS
             .replace("{source}", &source.bound())
             .replace("{reads}", &reads(&of_kernel(plan, rule), "here"))
-            .replace("{before}", "")
-            .replace("{value}", &value);
-        return format!("{}{body}", plan.declarations(true));
+            .replace("{value}", &texel(&leaf, &value, "middle.w"));
+        let declared = plan.declarations(true) + &listed(0, LISTED, 1);
+        return format!("{declared}\n{EACH_TEXEL}{body}");
     }
     let mut fields: Vec<(String, &str)> =
         of_kernel(plan, rule).iter().map(|level| (level.name.clone(), level.kind)).collect();
@@ -266,43 +281,4 @@ pub(super) fn neighbours(plan: &Plan, rule: &Rule, source: &Level) -> String {
     wgsl.push_str(&stored(&of_kernel(plan, rule)));
     let _ = write!(wgsl, "    let apart: vec2f = at.apart;\n    return {value};\n}}\n");
     wgsl
-}
-
-/// The text of one direction of a blur, its markers replaced, after the plan's declarations; `beside` are levels that it
-/// reads beside the kernel's.
-fn filled(
-    template: &str,
-    plan: &Plan,
-    rule: &Rule,
-    axis: Axis,
-    source: &Level,
-    (beside, slope): (&[Level], Option<&Slope>),
-) -> String {
-    let Loop { before, reach, tap, slope } = taps(&plan.facts, rule, axis, slope);
-    let body = template
-        .replace("{source}", &source.bound())
-        .replace("{reads}", &reads(&[&of_kernel(plan, rule)[..], beside].concat(), "here"))
-        .replace("{before}", &before)
-        .replace("{reach}", &reach)
-        .replace("{kernel}", &tap)
-        .replace("{slope}", &slope)
-        .replace("{axis}", axis.step());
-    format!("{}{body}", plan.declarations(true))
-}
-
-/// The levels that a kernel reads at its texel.
-fn of_kernel(plan: &Plan, rule: &Rule) -> Vec<Level> {
-    let read = |level: &&Level| rule.parameters().iter().any(|(name, _)| *name == level.name);
-    plan.levels.iter().filter(read).cloned().collect()
-}
-
-/// What a kernel is called with.
-fn arguments(rule: &Rule, axis: Axis, tap: &str) -> Vec<String> {
-    let argument = |&(name, kind): &(&'static str, &'static str)| match (name, Constant::from_name(name)) {
-        ("tap", _) => tap.to_owned(),
-        ("axis", _) => format!("vec2f({})", axis.step()),
-        (_, Some(constant)) => uniform(constant, kind),
-        (_, None) => name.to_owned(),
-    };
-    rule.parameters().iter().map(argument).collect()
 }

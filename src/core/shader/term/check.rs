@@ -75,7 +75,7 @@ const TAKEN: [&str; 53] = [
 ];
 
 /// Functions of the modules, and what else these declare outside of functions.
-const FUNCTIONS: [&str; 26] = [
+const FUNCTIONS: [&str; 47] = [
     "level_corners",
     "level_at",
     "sample_level",
@@ -102,6 +102,27 @@ const FUNCTIONS: [&str; 26] = [
     "colors",
     "coverages",
     "uv_steps_here",
+    "cs_texels",
+    "texels",
+    "tiles",
+    "staged",
+    "own",
+    "texel_at",
+    "texel_near",
+    "blurred",
+    "dilated",
+    "mean_around",
+    "corner_in_texels",
+    "share_steps",
+    "attributes",
+    "level_size",
+    "level_texel",
+    "levels",
+    "leave",
+    "records",
+    "is_inside",
+    "filled",
+    "covered_texel",
 ];
 
 /// Whether a name is one of those that the passes over the atlas make of others': `NAME_level` is a level as it is bound,

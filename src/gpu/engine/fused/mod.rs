@@ -19,7 +19,7 @@ mod reduce;
 mod terms;
 mod text;
 
-pub use self::layout::Layout;
+pub use self::layout::{Layout, Looked};
 pub use self::reduce::gather_module;
 pub use self::terms::{held_parameters, terms_module};
 
@@ -182,6 +182,11 @@ impl Fused {
     #[must_use]
     pub fn fields(&self) -> Vec<(String, &'static str)> {
         self.plan.sample_inputs(&self.chain)
+    }
+
+    /// How it moves along the free parameters.
+    pub(super) const fn chain(&self) -> &Chain {
+        &self.chain
     }
 
     /// What makes that of a sample which it looks up of the UV atlas.

@@ -72,9 +72,7 @@ impl Fused {
              @group(1) @binding(5) var<storage, read> samples_quads: array<vec4f>;\n\
              @group(1) @binding(6) var<storage, read> targets_quads: array<vec4f>;\n\n"
         );
-        if self.fitted.layout.has_levels() {
-            wgsl.push_str("@group(1) @binding(7) var<storage, read> levels: array<f32>;\n\n");
-        }
+        wgsl.push_str(&self.fitted.layout.levels_declared());
         wgsl.push_str(&loss_text(self.fitted.loss));
         wgsl.push('\n');
         wgsl.push_str(&functions());

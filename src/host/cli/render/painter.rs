@@ -277,7 +277,16 @@ mod gpu {
             if !self.gpu.timestamps() {
                 lines.push(format!("{:>16}  the adapter has no timestamps", "GPU time"));
             }
-            let mebibytes = self.renderer.uploaded_bytes() as f64 / f64::from(1 << 20);
+            let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+            let atlas = self.renderer.atlas_traffic();
+            if atlas.passes > 0 {
+                let (moved, passes) = (mebibytes(atlas.bytes), atlas.passes);
+                lines.push(format!(
+                    "{:>16}  {passes:9} over the UV atlas, {moved:.3} MiB read and left",
+                    "passes"
+                ));
+            }
+            let mebibytes = mebibytes(self.renderer.uploaded_bytes());
             lines.push(format!("{:>16}  {mebibytes:9.3} MiB", "uploaded"));
             lines.push(format!("{:>16}  {:9} of 16-bit cubes", "texels cut", self.renderer.clipped_texels()));
             let names = plan.resources.iter().map(|r| r.name()).collect::<Vec<_>>().join(", ");

@@ -1,10 +1,10 @@
-//! What samples look up of the UV atlas: made by the processor ([`LevelMaker`]), and uploaded when it has changed.
+//! What samples look up of the UV atlas, made by the processor ([`LevelMaker`]), and uploaded when it has changed: where an
+//! adapter does not make levels itself.
 
-use super::fused::{Fitted, Fused};
-use super::parts::Parts;
 use crate::bake::Illumination;
+use crate::engine::parts::Parts;
+use crate::model::effects::Effects;
 use crate::model::params::Params;
-use crate::model::terms::TermName;
 use crate::samples::rows::Row;
 use crate::{Gpu, GpuError};
 use skinfit_core::engine::cubes_at::CubesAt;
@@ -13,42 +13,30 @@ use skinfit_core::engine::view::ObservedView;
 use skinfit_core::program::levels::LevelProgram;
 
 /// Makes the rows beside samples.
-pub(super) struct DeviceLevels {
+pub(in crate::engine) struct UploadedLevels {
     /// For an environment that is not turned, and for one that is.
     makers: [LevelMaker<f32>; 2],
     /// What the rows were made with that are on the device.
     made_with: Option<(bool, Vec<f64>)>,
 }
 
-impl DeviceLevels {
-    /// Of a fit, whose environment is turned or not; `None` where nothing is computed in texels.
+impl UploadedLevels {
+    /// Of the programs for an environment that is not turned, and for one that is.
+    pub(super) fn new(programs: [LevelProgram; 2]) -> Self {
+        Self { makers: programs.map(LevelMaker::new), made_with: None }
+    }
+
+    /// Refuse views without the texels that the effects are computed in.
     ///
     /// # Errors
-    /// When no rules yield it, the processor cannot compute them, or the samples have no texels.
-    pub(super) fn new(
-        fitted: impl Fn(bool) -> Fitted,
-        views: &[ObservedView],
-    ) -> Result<Option<Self>, GpuError> {
-        let setup = fitted(true).setup;
-        if !setup.needs().atlas {
-            return Ok(None);
-        }
-        let maker = |turned: bool| -> Result<LevelMaker<f32>, GpuError> {
-            let mut program = LevelProgram::default();
-            // Images of one term alone look up no more than this.
-            let terms = TermName::of(setup.effects).into_iter().map(Some);
-            for output in std::iter::once(None).chain(terms) {
-                let fused = Fused::new(Fitted { output, ..fitted(turned) }).map_err(GpuError::Plan)?;
-                program.extend(fused.levels().map_err(|error| GpuError::Plan(error.to_string()))?);
-            }
-            Ok(LevelMaker::new(program))
-        };
-        let makers = [maker(false)?, maker(true)?];
-        for (maker, view) in makers.iter().flat_map(|maker| views.iter().map(move |view| (maker, view))) {
-            let checked = maker.check(setup.effects, &view.samples);
+    /// When one has none.
+    pub(super) fn check(&self, effects: Effects, views: &[ObservedView]) -> Result<(), GpuError> {
+        for (maker, view) in self.makers.iter().flat_map(|maker| views.iter().map(move |view| (maker, view)))
+        {
+            let checked = maker.check(effects, &view.samples);
             checked.map_err(|error| GpuError::Plan(error.to_string()))?;
         }
-        Ok(Some(Self { makers, made_with: None }))
+        Ok(())
     }
 
     /// Rows that there is room for, of each record.

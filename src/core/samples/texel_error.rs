@@ -1,0 +1,44 @@
+//! Why texels cannot be had.
+
+use crate::program::shading::ShadingError;
+
+/// Texels that cannot be had.
+#[derive(Clone, Debug, thiserror::Error, PartialEq)]
+pub enum AtlasError {
+    /// Nothing tells where the mesh lies.
+    #[error(
+        "the mesh has no texture coordinates, but the enabled effects are computed in texels of its UV atlas. Give a \
+         mesh with TEXCOORD_0, or leave the effects out."
+    )]
+    NoUvs,
+    /// A tiled mesh: several places would share a texel.
+    #[error(
+        "texture coordinates lie in the tile ({u}, {v}), but effects that are computed in the UV atlas need all of \
+         them in the unit square. Lay the mesh out there, or leave those effects out."
+    )]
+    Outside {
+        /// The tile's column.
+        u: f32,
+        /// The tile's row.
+        v: f32,
+    },
+    /// Texels that are of two places of the surface.
+    #[error(
+        "{:.1}% of the texels that the mesh covers of its UV atlas are of two or more places of the surface (mirrored or \
+         overlapping charts), and a texel cannot hold two lights. Unwrap the mesh so that its charts lie apart, or leave the effects out that are computed there.",
+        100.0 * share
+    )]
+    Overlap {
+        /// Their share of the covered texels.
+        share: f64,
+    },
+    /// A quantity that texels do not hold, or whose step to the next texel is not known.
+    #[error("`{quantity}` is not stored with texels: dpdx and dpdy are there for what vertices hold.")]
+    NotStored {
+        /// The quantity.
+        quantity: String,
+    },
+    /// The effects cannot be computed.
+    #[error(transparent)]
+    Shading(#[from] ShadingError),
+}
