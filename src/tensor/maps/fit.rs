@@ -127,8 +127,9 @@ fn problem(
     initial: &Point,
 ) -> Result<Problem, MapError> {
     let views: Vec<&ViewSamples> = task.observed.iter().map(|view| &view.samples).collect();
-    let cuts = cuts(&views, task.most_samples.unwrap_or_else(|| most_samples(shared)));
     let Fixed { setup, columns, .. } = fixed;
+    let fields = setup.needs().fields;
+    let cuts = cuts(&views, task.most_samples.unwrap_or_else(|| most_samples(shared, fields)));
     let shaded = Shaded { setup: *setup, params: &initial.params, columns, illumination: &task.illumination };
     let shade = |cut: &Cut| -> Result<(Shade, Inputs), TensorError> {
         let part = cut.views(&views);

@@ -4,10 +4,11 @@ use std::borrow::Cow;
 use std::ops::Range;
 
 use crate::SharedDevice;
+use crate::model::fields::Fields;
 use crate::samples::{LANES, ViewSamples};
 
 /// Bytes that a sample takes in the largest buffer: base, view, normal, three corners' silhouettes and shares, a normal
-/// for the dapple, and the sample's share, 19 numbers of 32 bits at most.
+/// for the dapple, and the sample's share, 19 numbers of 32 bits at most, beside what files of rules declare.
 const SAMPLE_BYTES: u64 = 76;
 
 /// Whole groups of one view or of several, one after the other.
@@ -19,12 +20,12 @@ pub struct Cut {
     pub samples: Range<usize>,
 }
 
-/// The most samples that a buffer of the device has room for.
+/// The most samples that a buffer of the device has room for, where rules read these fields of them, too.
 #[must_use]
-pub fn most_samples(shared: &SharedDevice) -> usize {
+pub fn most_samples(shared: &SharedDevice, fields: Fields) -> usize {
     let limits = shared.gpu().device.limits();
     let bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-    (bytes / SAMPLE_BYTES) as usize
+    (bytes / (SAMPLE_BYTES + 4 * fields.numbers() as u64)) as usize
 }
 
 /// The groups of all views in their order, in parts of at most so many samples; a group is never cut.
