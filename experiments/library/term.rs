@@ -9,7 +9,7 @@ use std::error::Error;
 use skinfit::export::Provenance;
 use skinfit::model::params::Column;
 use skinfit::scene::view::Target;
-use skinfit::shader::{ENGINE_BUDGET, Facts};
+use skinfit::shader::{Budget, Facts};
 use skinfit::{ExportTarget, FitOptions, Loaded, PrepareOptions, Shader};
 use skinfit::{built_in_scene, export_function, fit, register_term};
 
@@ -51,7 +51,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}: {:.4?} of {WEIGHT:?}", weight.name(), found.0);
     println!("{}: {:.4} of {F0}", f0.name(), found.1);
 
-    let facts = Facts::of_scene(&observed.scene, &outcome.end.params, ENGINE_BUDGET, false);
+    let facts = Facts::of_scene(&observed.scene, &outcome.end.params, Budget::Within(0.05), false);
     let text = export_function(ExportTarget::Glsl, &facts, &outcome.end.params, &Provenance::default())?;
     std::fs::write("library_term.glsl", text)?;
     println!("the shader: library_term.glsl");
