@@ -36,7 +36,10 @@ const CHOICES: [Choice; 8] = [
 
 /// All of them, as docs/results.md has them in a table.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
-    Ok(json!({ "choices": lab.choices(&CHOICES, &SCENES, "full.toml", fitted)? }))
+    let choices = lab.choices(&CHOICES, &SCENES, "full.toml", fitted)?;
+    // What a view close up ends at where there is no scattering to be missed.
+    let (dry, _) = lab.fit("no scattering at all", Some(&lab.head_scene("studio_dry", "light.toml")), &[])?;
+    Ok(json!({ "choices": choices, "dry": fitted(&dry) }))
 }
 
 /// A row's figures of a fit of one scene.

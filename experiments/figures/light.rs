@@ -16,14 +16,14 @@ const FILE: &str = "light.toml";
 /// What is fitted: its row's name, and settings of the scene file.
 const CHOICES: [Choice; 9] = [
     ("as the scene has it", &[]),
-    ("`texture_filter = \"trilinear\"`", &[("quality", "{ texture_filter = \"trilinear\" }")]),
-    ("`texture_filter = \"anisotropic\"`", &[("quality", "{ texture_filter = \"anisotropic\" }")]),
     ("`skin_reflection = \"none\"`", &[("model.skin_reflection", "\"none\"")]),
     ("`bounces = \"none\"`", &[("model.bounces", "\"none\"")]),
     ("`visibility = \"scalar\"`", &[("model.visibility", "\"scalar\"")]),
     ("`specular_visibility = \"lagarde\"`", &[("model.specular_visibility", "\"lagarde\"")]),
     ("16 lights, `visibility = \"sh6\"`", &[("environment.lights", "16"), ("model.visibility", "\"sh6\"")]),
     ("16 lights, both by rays", RAYS),
+    ("`texture_filter = \"trilinear\"`", &[("quality", "{ texture_filter = \"trilinear\" }")]),
+    ("`texture_filter = \"anisotropic\"`", &[("quality", "{ texture_filter = \"anisotropic\" }")]),
 ];
 
 const RAYS: &[(&str, &str)] = &[

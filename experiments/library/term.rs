@@ -8,7 +8,8 @@ use std::error::Error;
 
 use skinfit::export::Provenance;
 use skinfit::model::params::Column;
-use skinfit::scene::view::Target;
+use skinfit::samples::ViewSamples;
+use skinfit::scene::view::{Target, View};
 use skinfit::shader::{Budget, Facts};
 use skinfit::{ExportTarget, FitOptions, Loaded, PrepareOptions, Shader};
 use skinfit::{built_in_scene, export_function, fit, register_term};
@@ -34,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     truth.set(f0, F0);
     let mut sampled = loaded.bake()?.sample()?;
     let shader = Shader::new(sampled.setup(), &sampled.illumination, &truth)?;
-    let drawn = |(view, samples)| {
+    let drawn = |(view, samples): (&View, &ViewSamples)| {
         let image = shader.shade(samples, &view.camera, 1.0).image;
         Target { rgb: image.rgb, alpha: Some(image.alpha), haze: None, mask: None, clipped_at: None }
     };
