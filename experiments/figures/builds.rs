@@ -1,4 +1,4 @@
-//! How long builds take, and what of them: experiments/builds.
+//! How long builds take, and of what: experiments/builds.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -16,52 +16,37 @@ const PRINTED: [&str; 2] = ["engine/cpu/ahead/tapes.rs", "engine/loss/printed.rs
 /// How many of the longest compilations are named.
 const LONGEST: usize = 12;
 
-/// experiments/builds: the last commit with one package, and this one.
+/// experiments/builds: this commit, and how the last one with a single package was divided.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
-    let mut head = Command::new("git");
-    head.args(["rev-parse", "--short", "HEAD"]);
-    let head = lab.run("the commit", head, false)?.trim().to_owned();
+    let head = git(lab, &["rev-parse", "--short", "HEAD"])?.join("");
     let pages = lab.scratch.path();
     let mut command = Command::new("experiments/builds/run");
-    command.arg(pages).args([ONE_PACKAGE, &head]);
+    command.arg(pages).arg(&head);
     let rows = csv(&lab.run("builds from nothing", command, false)?)?;
-    let mut raw = json!({});
-    for (name, commit) in [("one_package", ONE_PACKAGE), ("members", &head)] {
-        let seconds = |what: &str| {
-            let row = rows.iter().find(|row| row["commit"] == *commit && row["what"] == what);
-            row.map(|row| row["seconds"].clone()).ok_or(format!("no row of {commit}, {what}"))
-        };
-        let units = |what: &str| units(&pages.join(format!("{commit}_{what}.html")));
-        let mut longest = units("first")?;
-        let sum: f64 = longest.iter().map(|unit| number(&unit["seconds"])).sum();
-        longest.truncate(LONGEST);
-        raw[name] = json!({
-            "commit": commit,
-            "first": seconds("first")?,
-            "command line": seconds("command_line")?,
-            "rule": seconds("rule")?,
-            "sum of units": sum,
-            "packages": packages(lab, commit)?,
-            "longest": longest,
-            "after a rule": units("rule")?.into_iter().filter(|unit| number(&unit["seconds"]) >= 1.0).collect::<Vec<_>>(),
-        });
-    }
+    let row = |(what, name): (&str, &str)| -> Result<Value> {
+        let row = rows.iter().find(|row| row["what"] == what).ok_or(format!("no row of {what}"))?;
+        Ok(json!({ "what": name, "seconds": row["seconds"] }))
+    };
+    let built = [
+        ("first", "the first command, from nothing"),
+        ("command_line", "a new program after a line of the command line"),
+        ("rule", "a new program after a rule"),
+    ];
+    let mut longest = units(&pages.join(format!("{head}_first.html")))?;
+    let sum: f64 = longest.iter().map(|unit| number(&unit["seconds"])).sum();
+    longest.truncate(LONGEST);
     // A parameter of the paper's effects, then and now; and one of an effect that a file of rules declares.
     let paper = "side_specular\\|SideSpecular";
-    raw["files"] = json!({
-        "side_specular": { "one_package": files_of(lab, ONE_PACKAGE, paper)?, "members": files_of(lab, &head, paper)? },
-        "fresnel_loss": files_of(lab, &head, "fresnel_loss\\|FresnelLoss")?,
-    });
-    raw["rows"] = [
-        ("the first command, from nothing, s", "first"),
-        ("a new program after a line of the command line, s", "command line"),
-        ("a new program after a rule, s", "rule"),
-        ("all compilations of the first command, s", "sum of units"),
-    ]
-    .map(|(what, key)| json!({ "what": what, "one_package": raw["one_package"][key], "members": raw["members"][key] }))
-    .to_vec()
-    .into();
-    Ok(raw)
+    Ok(json!({
+        "rows": built.into_iter().map(row).collect::<Result<Vec<Value>>>()?,
+        "sum": sum,
+        "longest": longest,
+        "packages": { "then": packages(lab, ONE_PACKAGE)?, "now": packages(lab, &head)? },
+        "files": {
+            "side_specular": { "then": files_of(lab, ONE_PACKAGE, paper)?, "now": files_of(lab, &head, paper)? },
+            "fresnel_loss": files_of(lab, &head, "fresnel_loss\\|FresnelLoss")?,
+        },
+    }))
 }
 
 /// What git says of a commit, line by line.

@@ -5,8 +5,8 @@ use serde_json::{Map, Value, json};
 use crate::lab::{Lab, Result};
 use crate::studies::{number, study_of};
 
-/// Scenes of the scanned head.
-const LIT: [&str; 3] = ["forest", "sunrise", "studio_dry"];
+/// Scenes of the scanned head; the studio takes no lights out of its panorama.
+const LIT: [&str; 2] = ["forest", "sunrise"];
 const SCATTERING: [&str; 3] = ["forest", "sunrise", "studio"];
 
 const LIGHT: [&str; 7] =

@@ -1,4 +1,4 @@
-//! The programs of experiments/library run, and what they say holds: each ends with exit code 1 where it does not.
+//! Programs of experiments/library run, and leave what they say.
 
 use std::path::PathBuf;
 use std::process::Command;
@@ -37,7 +37,7 @@ fn a_fit_and_a_term_of_ones_own() {
 }
 
 #[test]
-fn a_rendering_and_gradients_on_tensors() {
+fn a_rendering() {
     if gpu().is_none() {
         return;
     }
@@ -46,8 +46,4 @@ fn a_rendering_and_gradients_on_tensors() {
     assert!(
         folder.path().join("library_gpu.exr").is_file() && folder.path().join("library_cpu.exr").is_file()
     );
-    if cfg!(feature = "burn") {
-        let (gradients, _) = printed("library_gradients");
-        assert!(gradients.contains("base_weight"), "{gradients}");
-    }
 }

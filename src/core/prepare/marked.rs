@@ -15,17 +15,17 @@ pub(super) type Place<'a> = (&'a str, &'a Path, &'a [View]);
 pub enum HoldOutError {
     /// Two things have that name.
     #[error(
-        "{scenes}: --hold-out {name}: a scene is called so, and a view. Name each view with its scene: SCENE/VIEW."
+        "{scenes}: held out {name}: a scene is called so, and a view. Name each view with its scene: SCENE/VIEW."
     )]
     Ambiguous { scenes: String, name: String },
     /// Nothing is left.
     #[error(
-        "{scenes}: --hold-out {names}: that is every view with a target, so nothing is left to fit. Leave one of them in, \
+        "{scenes}: held out {names}: that is every view with a target, so nothing is left to fit. Leave one of them in, \
          or add a [[view]]."
     )]
     Everything { scenes: String, names: String },
     /// Nothing has that name.
-    #[error("{scenes}: --hold-out: there is {what} `{name}` with a target. {suggestion}.")]
+    #[error("{scenes}: held out: there is {what} `{name}` with a target. {suggestion}.")]
     Unknown { scenes: String, what: &'static str, name: String, suggestion: String },
 }
 
@@ -60,7 +60,7 @@ pub(super) fn marked(names: &[String], scenes: &[Place<'_>]) -> Result<Vec<Vec<b
         views.iter().zip(marks).any(|(view, mark)| view.target.is_some() && !mark)
     };
     if !names.is_empty() && !scenes.iter().zip(&marks).any(left) {
-        return Err(HoldOutError::Everything { scenes: files(scenes), names: names.join(" --hold-out ") });
+        return Err(HoldOutError::Everything { scenes: files(scenes), names: names.join(", ") });
     }
     Ok(marks)
 }

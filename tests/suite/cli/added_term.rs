@@ -226,7 +226,7 @@ fn its_constants_can_be_used_where_nobody_knows_the_term() {
     let elsewhere = Sandbox::new();
     elsewhere.write("found.toml", params.as_bytes());
     let header = elsewhere.run(&["export", "found.toml", "--to", "c"]).done().out;
-    assert!(header.contains("RIM_WEIGHT") && !header.contains("FRESNEL"), "{header}");
+    assert!(header.contains("rim_weight") && !header.contains("fresnel"), "{header}");
     let render = ["render", "scene.toml", "--view", "front", "--engine", "cpu", "-o", "front.exr"];
     elsewhere.run(&[&render[..], &["--params", "found.toml"]].concat()).done();
     elsewhere.write("found.toml", params.replace("fresnel_f0 =", "fresnel_f1 =").as_bytes());

@@ -92,7 +92,7 @@ fn what_cannot_be_held_out_is_refused_and_leaves_nothing() {
         let options: Vec<&str> = names.iter().flat_map(|name| ["--hold-out", name]).collect();
         sandbox.fit("deep/run", &options).refused(words);
     };
-    refused(&["sid"], &["scene.toml: --hold-out: there is no view `sid`", "Did you mean `side`?"]);
-    refused(&["front", "side"], &["scene.toml: --hold-out front --hold-out side", "nothing is left to fit"]);
+    refused(&["sid"], &["scene.toml: held out: there is no view `sid`", "Did you mean `side`?"]);
+    refused(&["front", "side"], &["scene.toml: held out front, side", "nothing is left to fit"]);
     assert!(sandbox.files() == before, "files were left");
 }
