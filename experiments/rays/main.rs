@@ -98,7 +98,7 @@ fn embree(
 ) -> Result<Vec<(String, f64)>, Box<dyn Error>> {
     let folder = tempfile::tempdir()?;
     let write = |name: &str, bytes: &[u8]| fs::write(folder.path().join(name), bytes);
-    let of = |numbers: &[glam::Vec3]| -> Vec<[f32; 3]> { numbers.iter().map(|v| v.to_array()).collect() };
+    let of = |numbers: &[glam::Vec3]| -> Vec<[f32; 3]> { numbers.iter().map(glam::Vec3::to_array).collect() };
     let at =
         |numbers: &[glam::Vec3]| -> Vec<[f32; 3]> { points.iter().map(|&i| numbers[i].to_array()).collect() };
     write("positions.f32", bytemuck::cast_slice(&of(&posed.positions)))?;

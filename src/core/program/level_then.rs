@@ -14,7 +14,7 @@ pub enum Then {
     /// A sum over the surface; the steps yield the variance, and how that moves.
     Surface(SurfaceOf),
     /// It leaves that; how far each texel's neighbours lie apart, by what a level holds, is the steps' field
-    /// [`APART_FIELD`].
+    /// `APART_FIELD`.
     Neighbours(String),
 }
 
