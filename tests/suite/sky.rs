@@ -1,6 +1,7 @@
 //! The sky that a point sees, and what the skin throws back, from the bakes through samples, engines and renderer.
 
-use std::sync::Arc;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
 
 use glam::{DVec3, Vec2, Vec3};
 use skinfit::bake::rays::RayMesh;
@@ -411,6 +412,19 @@ fn head() -> Baked {
     head_with(&[Effect::Lights, Effect::Shadows, effect("directional_occlusion")])
 }
 
+/// The built-in scene with a lamp, written once: tests read it side by side.
+fn beside_a_lamp() -> &'static Path {
+    static SCENE: OnceLock<PathBuf> = OnceLock::new();
+    SCENE.get_or_init(|| {
+        let built_in = built_in();
+        let text = std::fs::read_to_string(&built_in).unwrap();
+        let path = built_in.with_file_name("sky.toml");
+        let lamp = "\n[[light]]\nname = \"side\"\ntype = \"directional\"\ndirection = [-0.8, -0.3, -0.4]\nirradiance = [2.0, 1.5, 1.0]\n";
+        std::fs::write(&path, text + lamp).unwrap();
+        path
+    })
+}
+
 /// The same with effects beside diffuse light, occlusion and rim; the lamp's own where lights are among them.
 pub(crate) fn head_with(more: &[Effect]) -> Baked {
     head_changed(more, |_| ())
@@ -418,14 +432,10 @@ pub(crate) fn head_with(more: &[Effect]) -> Baked {
 
 /// The same, changed before anything is baked.
 pub(crate) fn head_changed(more: &[Effect], change: impl FnOnce(&mut Scene)) -> Baked {
-    let built_in = built_in();
-    let text = std::fs::read_to_string(&built_in).unwrap();
-    let path = built_in.with_file_name("sky.toml");
-    let lamp = "\n[[light]]\nname = \"side\"\ntype = \"directional\"\ndirection = [-0.8, -0.3, -0.4]\nirradiance = [2.0, 1.5, 1.0]\n";
-    std::fs::write(&path, text + lamp).unwrap();
+    let path = beside_a_lamp();
     library::register_all();
     let options = PrepareOptions { views: Views::First, cache: Some(cache()), ..PrepareOptions::default() };
-    let mut loaded = Loaded::read(&path, &PrepareOptions { effects: None, ..options }).unwrap();
+    let mut loaded = Loaded::read(path, &PrepareOptions { effects: None, ..options }).unwrap();
     let plain = Effects::of(&[Effect::Diffuse, Effect::Occlusion, Effect::Rim]);
     let effects = more.iter().fold(plain, |all, &one| all.with(one));
     let lit = effects.has(Effect::Lights);
