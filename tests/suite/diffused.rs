@@ -8,11 +8,10 @@ use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Baked;
 use skinfit::render::shading::Shading;
 use skinfit::scene::Scene;
-use skinfit::scene::view::Target;
 
 use crate::graphics::bench::{Difference, EXACT, gpu, keep, on_gpu, quantile};
 use crate::lit::param;
-use crate::sky::{effect, head_changed, on_cpu};
+use crate::sky::{brighter, effect, head_changed, on_cpu};
 use crate::slopes::{self, Nearness};
 
 /// The built-in head in scattered light: blurs some texels wide, half of the colour before them.
@@ -92,14 +91,7 @@ fn slopes_are_finite_differences_on_every_engine() {
         scene.diffusion.light_map_size = 64;
         scene.fit.free = columns();
     });
-    let made = on_cpu(&baked);
-    let target = Target {
-        rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
-        alpha: Some(made.alpha),
-        haze: None,
-        mask: None,
-        clipped_at: None,
-    };
+    let target = brighter(on_cpu(&baked));
     let baked = baked.with_scene(|scene| scene.views[0].target = Some(target));
     let observed = baked.sample().unwrap().observe().unwrap();
     let unknowns: Vec<Unknown> = columns().into_iter().map(Unknown::Param).collect();

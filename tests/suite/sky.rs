@@ -21,7 +21,7 @@ use skinfit::render::shade::Shader;
 use skinfit::samples::{PosedSurface, sample_views};
 use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
-use skinfit::scene::view::{Background, View};
+use skinfit::scene::view::{Background, Target, View};
 use skinfit::scene::{Quality, Scene};
 use skinfit::shader::term::library;
 
@@ -447,6 +447,17 @@ pub(crate) fn head_changed(more: &[Effect], change: impl FnOnce(&mut Scene)) -> 
     loaded.bake().unwrap()
 }
 
+/// A target that an image does not match: a little brighter, by a factor and a sum.
+pub(crate) fn brighter(made: Image) -> Target {
+    Target {
+        rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
+        alpha: Some(made.alpha),
+        haze: None,
+        mask: None,
+        clipped_at: None,
+    }
+}
+
 pub(crate) fn on_cpu(baked: &Baked) -> Image {
     let sampled = baked.clone().sample().unwrap();
     let shader = Shader::new(sampled.setup(), &sampled.illumination, &sampled.scene.params).unwrap();
@@ -500,14 +511,7 @@ fn slopes_are_finite_differences_on_every_engine() {
             scene.choices.bounces = bounces;
             scene.params.set(Param::Occlusion, 0.8);
         });
-        let made = on_cpu(&baked);
-        let target = skinfit::scene::view::Target {
-            rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
-            alpha: Some(made.alpha),
-            haze: None,
-            mask: None,
-            clipped_at: None,
-        };
+        let target = brighter(on_cpu(&baked));
         let observed = baked
             .with_scene(|scene| scene.views[0].target = Some(target))
             .sample()

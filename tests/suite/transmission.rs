@@ -23,7 +23,7 @@ use skinfit::render::image::Image;
 use skinfit::samples::PosedSurface;
 use skinfit::scene::light::{Beam, Lamp};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
-use skinfit::scene::view::{Background, Target, View};
+use skinfit::scene::view::{Background, View};
 use skinfit::scene::{Light, LightKind, Quality, Scene};
 use skinfit::shader::facts::FaceSizes;
 use skinfit::shader::tangent::chain::Seed;
@@ -38,7 +38,7 @@ use crate::common::vectors_light;
 use crate::fixtures::{bare_scene, camera, quantile};
 use crate::graphics::bench::{self, Difference, EXACT, gpu};
 use crate::scene_folder::{SCENE, SceneFolder};
-use crate::sky::{bakes, effect, gentle, head_with, image, on_cpu, scene, shape};
+use crate::sky::{bakes, brighter, effect, gentle, head_with, image, on_cpu, scene, shape};
 use crate::slopes;
 use crate::vectors::reader::{Node, Tolerance, Vectors};
 
@@ -369,14 +369,7 @@ fn at_a_weight_of_0_an_image_is_what_it_is_without_the_effect() {
 #[test]
 fn slopes_are_finite_differences_on_every_engine() {
     let baked = head(16);
-    let made = on_cpu(&baked);
-    let target = Target {
-        rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
-        alpha: Some(made.alpha),
-        haze: None,
-        mask: None,
-        clipped_at: None,
-    };
+    let target = brighter(on_cpu(&baked));
     let baked = baked.with_scene(|scene| scene.views[0].target = Some(target));
     let mut columns = vec!["base_weight", "light.side.color", "environment_rotation"];
     columns.extend(["transmission_weight", "transmission_length"]);

@@ -8,10 +8,9 @@ use skinfit::model::effects::Effect;
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Baked;
 use skinfit::render::image::Image;
-use skinfit::scene::view::Target;
 
 use crate::graphics::bench::{Difference, EXACT, gpu, quantile};
-use crate::sky::{effect, head_with, on_cpu};
+use crate::sky::{brighter, effect, head_with, on_cpu};
 use crate::slopes;
 
 fn param(name: &str) -> Param {
@@ -71,14 +70,7 @@ fn with_all_weight_on_it_an_image_is_what_it_is_without_diffusion() {
 #[test]
 fn slopes_are_finite_differences_on_every_engine() {
     let baked = head(Unblurred::Pixel, 16);
-    let made = on_cpu(&baked);
-    let target = Target {
-        rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
-        alpha: Some(made.alpha),
-        haze: None,
-        mask: None,
-        clipped_at: None,
-    };
+    let target = brighter(on_cpu(&baked));
     let baked = baked.with_scene(|scene| {
         scene.views[0].target = Some(target);
         scene.params.set(param("colour_mix"), 0.4);

@@ -11,10 +11,9 @@ use skinfit::model::diffusion::{DiffusionChoices, Lookup, Seams, Stretch, Taps};
 use skinfit::model::effects::Effect;
 use skinfit::model::params::{Column, Param};
 use skinfit::prepare::{Baked, Observed};
-use skinfit::scene::view::Target;
 
 use super::bench::{EXACT, gpu};
-use crate::sky::{head_with, on_cpu};
+use crate::sky::{brighter, head_with, on_cpu};
 
 fn param(name: &str) -> Param {
     Param::from_name(name).unwrap()
@@ -40,14 +39,7 @@ fn head(choices: DiffusionChoices) -> Baked {
 }
 
 fn observed(baked: Baked) -> Observed {
-    let made = on_cpu(&baked);
-    let target = Target {
-        rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
-        alpha: Some(made.alpha),
-        haze: None,
-        mask: None,
-        clipped_at: None,
-    };
+    let target = brighter(on_cpu(&baked));
     let baked = baked.with_scene(|scene| scene.views[0].target = Some(target));
     baked.sample().unwrap().observe().unwrap()
 }

@@ -13,12 +13,11 @@ use skinfit::model::params::{Column, Param};
 use skinfit::prepare::Observed;
 use skinfit::samples::ViewSamples;
 use skinfit::scene::MapKind;
-use skinfit::scene::view::Target;
 use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
 
 use super::bench::{numbers, shared};
 use crate::lit::param;
-use crate::sky::{effect, head_changed, on_cpu};
+use crate::sky::{brighter, effect, head_changed, on_cpu};
 
 /// The built-in head under a lamp with its shadow, so small that light comes through it, with a target that it misses.
 fn head(model: SpecularModel) -> Observed {
@@ -50,14 +49,7 @@ fn head(model: SpecularModel) -> Observed {
         // What may be free decides what samples hold of a sky that turns.
         scene.fit.free = columns(model);
     });
-    let made = on_cpu(&baked);
-    let target = Target {
-        rgb: made.rgb.iter().map(|rgb| rgb.map(|x| 1.2 * x + 0.01)).collect(),
-        alpha: Some(made.alpha),
-        haze: None,
-        mask: None,
-        clipped_at: None,
-    };
+    let target = brighter(on_cpu(&baked));
     baked.with_scene(|scene| scene.views[0].target = Some(target)).sample().unwrap().observe().unwrap()
 }
 
