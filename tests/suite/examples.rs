@@ -47,3 +47,13 @@ fn a_rendering() {
         folder.path().join("library_gpu.exr").is_file() && folder.path().join("library_cpu.exr").is_file()
     );
 }
+
+#[cfg(feature = "burn")]
+#[test]
+fn gradients_on_tensors() {
+    if gpu().is_none() {
+        return;
+    }
+    let (gradients, _) = printed("library_gradients");
+    assert_eq!(gradients.matches("by differences").count(), 3, "{gradients}");
+}

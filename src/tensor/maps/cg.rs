@@ -8,7 +8,7 @@
 use burn::tensor::Tensor;
 
 use super::MapError;
-use super::problem::{Problem, read};
+use super::problem::{Problem, largest, read};
 
 /// A direction is forgotten when the slope has grown by more than this.
 const MOST_GROWTH: f64 = 1e4;
@@ -91,7 +91,7 @@ fn inverse_diagonal(
     // A texel and its neighbours: 2 on the diagonal for each, 2 again for the rows beside it.
     let rough = layer.neighbours.clone() * (4.0 * layer.roughness());
     let diagonal = (moved - g.clone()).abs() + rough;
-    let most = f64::from(read(diagonal.clone().max())?[0]);
+    let most = largest(diagonal.clone())?;
     // Texels that next to nothing sees are moved as if a little more did.
     Ok(diagonal.clamp_min((1e-6 * most).max(1e-30)).recip())
 }
@@ -104,7 +104,7 @@ fn step(
     g: &Tensor<2>,
     d: &Tensor<2>,
 ) -> Result<f64, MapError> {
-    let longest = f64::from(read(d.clone().abs().max())?[0]);
+    let longest = largest(d.clone().abs())?;
     if longest < f64::from(f32::MIN_POSITIVE) || !longest.is_finite() {
         return Ok(0.0);
     }

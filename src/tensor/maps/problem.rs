@@ -246,3 +246,14 @@ pub fn read<const D: usize>(tensor: Tensor<D>) -> Result<Vec<f32>, TensorError> 
     let data = tensor.try_into_data().map_err(|error| unread(error.to_string()))?;
     data.try_to_vec::<f32>().map_err(|error| unread(format!("{error:?}")))
 }
+
+/// The largest of a tensor's numbers, slice by slice: one reduction of burn's leaves out what is beyond some 262,000
+/// numbers on adapters that allow 65,535 workgroups (0.22.1).
+///
+/// # Errors
+/// When the device does not give it.
+pub fn largest(tensor: Tensor<2>) -> Result<f64, TensorError> {
+    const ROWS: usize = 1 << 16;
+    let slices = tensor.max_dim(1).split(ROWS, 0).into_iter().map(Tensor::max).collect();
+    Ok(f64::from(read(Tensor::cat(slices, 0).max())?[0]))
+}

@@ -1,6 +1,7 @@
 //! Fixed linear maps and their transposes.
 
 use burn::tensor::Tensor;
+use skinfit::maps::problem::largest;
 use skinfit::model::cube::Cube;
 use skinfit::tensor::Sparse;
 use skinfit::tensor::footprint::cube_border;
@@ -81,5 +82,17 @@ fn a_cubes_border_is_the_one_that_the_cube_itself_makes() {
             // A third is rounded to f32.
             assert!((got - want).abs() < 1e-7, "{got} {want}");
         }
+    }
+}
+
+#[test]
+fn the_largest_of_many_numbers_is_found_wherever_it_stands() {
+    let Some(shared) = shared() else { return };
+    // More than one dispatch of burn's reductions takes.
+    let rows = 400_000;
+    for at in [0, rows / 2, rows - 1] {
+        let mut list = vec![0.25; 3 * rows];
+        list[3 * at + 1] = 0.5;
+        assert_eq!(largest(matrix(&list, 3, shared.device())).unwrap(), 0.5, "{at}");
     }
 }
