@@ -1,5 +1,5 @@
-//! Figures that stand in a page without a raw file: numbers with a unit of measure, powers of ten, and decimals in
-//! cells of tables.
+//! Figures that stand in a page without a raw file: numbers with a unit of measure, decimals, and numbers times a power of
+//! ten (a power alone is an order of magnitude, as tolerances are given).
 
 use std::path::Path;
 
@@ -30,7 +30,7 @@ pub(crate) fn strays(page: &Path, text: &str) -> Result<Vec<String>, String> {
         return Ok(Vec::new());
     }
     let own = without_code(&without_figures(text)?);
-    let mut found = in_cells(&own);
+    let mut found = Vec::new();
     // A unit in the next cell of a table is another column's; a definition may go over two lines.
     let mut own = own.replace('|', " | ").split_whitespace().collect::<Vec<_>>().join(" ");
     for (_, words, _) in DEFINITIONS.iter().filter(|(page, ..)| name == *page) {
@@ -51,7 +51,7 @@ pub(crate) fn strays(page: &Path, text: &str) -> Result<Vec<String>, String> {
     Ok(found)
 }
 
-/// Whether a word is a number with a unit, its own or the next word; or a number times a power of ten.
+/// Whether a word is a number with a unit, its own or the next word; a decimal; or a number times a power of ten.
 fn measured(word: &str, next: &str) -> bool {
     let word = word.trim_start_matches(['-', '+', '±', '~', '<', '>', '*', '"']);
     let number = word.trim_end_matches(|c: char| !c.is_ascii_digit());
@@ -61,20 +61,17 @@ fn measured(word: &str, next: &str) -> bool {
     if word.contains("·10") {
         return true;
     }
+    let decimal = number.split_once('.').is_some_and(|(whole, part)| {
+        [whole, part].iter().all(|digits| !digits.is_empty() && digits.chars().all(|c| c.is_ascii_digit()))
+    });
+    let ends = |c: char| ".,;:*\"%×".contains(c);
+    if decimal && word[number.len()..].chars().all(ends) {
+        return true;
+    }
     let is_number = number.chars().all(|c| c.is_ascii_digit() || ".,e-".contains(c));
     let unit = |word: &str| UNITS.contains(&word.trim_end_matches(['.', ',', ';', ':', '*', '"']));
     let behind = &word[number.len()..];
     is_number && (unit(behind) || (behind.is_empty() && unit(next)))
-}
-
-/// Cells of tables that are a number with decimals and nothing else.
-fn in_cells(text: &str) -> Vec<String> {
-    let rows = text.lines().filter(|line| line.starts_with('|'));
-    rows.filter(|row| {
-        row.split('|').any(|cell| cell.contains('.') && cell.trim().trim_matches('*').parse::<f64>().is_ok())
-    })
-    .map(str::to_owned)
-    .collect()
 }
 
 /// Without code in fences, in backquotes and indented, and without comments.
@@ -95,6 +92,22 @@ pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
     ("docs/rendering.md", "more than 16 million samples", "a limit of the program"),
     ("experiments/race/README.md", "with 2% noise", "what was added"),
     ("docs/studies.md", "more than 3 s is run once", "a rule of the program"),
+    ("README.md", "Rust 1.95", "a version"),
+    ("README.md", "Apache 2.0", "a version"),
+    ("docs/accuracy.md", "within 0.0002 of the integrals", "a bound that tests hold"),
+    ("docs/accuracy.md", "every roughness from 0.05 on", "where the bound holds"),
+    ("docs/accuracy.md", "within 0.0005 from f0 = 0.002 on", "a bound that tests hold, and where"),
+    ("docs/accuracy.md", "A pixel is 0.018 units", "of the scene"),
+    ("docs/accuracy.md", "over 1.5 pixels", "Mitsuba's renderer"),
+    ("docs/accuracy.md", "5 beyond 2, and 0.3 beyond 3", "the normal distribution"),
+    ("docs/dependencies.md", "glTF 2.0", "a version"),
+    ("docs/dependencies.md", "(0.22.1: ", "a version"),
+    ("docs/rendering.md", "Vulkan specification (1.3,", "a version"),
+    ("docs/rendering.md", "below 0.003, 0.0015 and 0.001", "bounds that a test holds"),
+    ("docs/results.md", "CC-BY 3.0", "a licence"),
+    ("docs/results.md", "(it is 0.52)", "the target's material"),
+    ("docs/results.md", "(0.056)", "the target's material"),
+    ("docs/shaders.md", "OpenGL 4.3, OpenGL ES 3.1", "versions"),
 ];
 
 #[cfg(test)]
@@ -110,7 +123,8 @@ mod tests {
             "off by 0.3%",
             "5.2 times as fast",
             "at most 3.0·10⁻⁴ of it",
-            "28.7 to 30.1 dB",
+            "a share of 0.07,",
+            "28 to 30.1 dB",
             "| a | 0.899 |",
             "**1,024 MB**",
         ] {
@@ -124,6 +138,7 @@ mod tests {
             "| 8 | seconds of baking |",
             "<!-- figures: page.json#a | {x} | -->\n| a |\n| --- |\n| 0.5 |\n<!-- end -->",
             "| 3 | of 4 passes |",
+            "to 10⁻⁶, by burn 0.22.1, as in figure 3.",
         ] {
             assert_eq!(found(text), 0, "{text}");
         }

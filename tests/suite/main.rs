@@ -21,6 +21,7 @@ mod diffusion;
 mod documents;
 mod engine;
 mod evaluators;
+mod every_effect;
 mod examples;
 mod exports;
 mod figures;

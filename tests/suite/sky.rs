@@ -413,7 +413,7 @@ fn head() -> Baked {
 }
 
 /// The built-in scene with a lamp, written once: tests read it side by side.
-fn beside_a_lamp() -> &'static Path {
+pub(crate) fn beside_a_lamp() -> &'static Path {
     static SCENE: OnceLock<PathBuf> = OnceLock::new();
     SCENE.get_or_init(|| {
         let built_in = built_in();

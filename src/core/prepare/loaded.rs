@@ -57,7 +57,9 @@ impl Loaded {
         if options.time.is_none() {
             check_area(&scene)?;
         }
+        let known: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
         options.views.choose(&mut scene)?;
+        let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
         let (mut gains, mut fitted) = (vec![1.0; scene.views.len()], None);
         if let Some(path) = &options.params {
             let file = ParamsFile::read(path, scene.form, &scene.params)?.of_scene(&scene.path);
@@ -66,6 +68,7 @@ impl Loaded {
                 let given = file.gains.iter().find(|(name, _)| *name == view.name);
                 *gain = given.map_or(1.0, |&(_, gain)| gain);
             }
+            warnings.extend(unknown_gains(path, &file.gains, &known));
         }
         options.set.iter().for_each(|assignment| assignment.apply(&mut scene.params));
         scene.fit.free = untied(&scene.fit.free, &scene.params, &options.set);
@@ -75,7 +78,6 @@ impl Loaded {
             cache: options.cache.clone(),
         };
         let seconds = StageSeconds { load: start.elapsed().as_secs_f64(), ..StageSeconds::default() };
-        let warnings = warnings.iter().map(ToString::to_string).collect();
         Ok(Self { scene, fitted, gains, seconds, warnings, asked })
     }
 
@@ -118,6 +120,19 @@ fn check_area(scene: &Scene) -> Result<(), PrepareError> {
         true => Ok(()),
         false => Err(PrepareError::Collapsed { scene: scene.path.display().to_string() }),
     }
+}
+
+/// What is to be said of gains that no view of the scene has.
+fn unknown_gains(path: &Path, gains: &[(String, f64)], known: &[String]) -> Option<String> {
+    let unknown: Vec<&str> =
+        gains.iter().map(|(name, _)| name.as_str()).filter(|name| !known.iter().any(|k| k == name)).collect();
+    let (names, file) = (unknown.join(", "), path.display());
+    (!unknown.is_empty()).then(|| {
+        format!(
+            "{file}: [gains] has {names}, and no view of the scene is called so; there are {}. These gains do nothing.",
+            known.join(", ")
+        )
+    })
 }
 
 /// The free columns, with one a channel for each parameter whose start has three different values (a tied column would

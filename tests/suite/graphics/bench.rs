@@ -53,7 +53,7 @@ pub(crate) const EXACT: RenderOptions = RenderOptions {
 /// The paper's fragment program.
 pub(crate) const SURFACE: Effects = Effects::SURFACE;
 
-/// Every effect.
+/// Every effect of the tables.
 pub(crate) fn everything() -> Effects {
     Effect::BUILT_IN.into_iter().collect()
 }
