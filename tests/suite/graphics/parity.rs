@@ -23,6 +23,7 @@ use crate::every_effect::{every_effect, shown};
 const SIZE: u32 = 128;
 
 /// How far apart the engines may be, relative to the image's mean radiance.
+#[derive(Clone, Copy)]
 struct Tolerance {
     /// Half of the interior pixels.
     median: f32,
