@@ -6,8 +6,9 @@ use skinfit::engine::gpu::{GpuEngine, Memory};
 use skinfit::engine::reference::Reference;
 use skinfit::engine::{Objective, Point, Task, Unknown};
 use skinfit::gpu::RenderOptions;
-use skinfit::model::params::{Column, Param};
-use skinfit::model::transmission::FARTHEST;
+use skinfit::model::params::Column;
+#[cfg(feature = "burn")]
+use skinfit::model::{params::Param, transmission::FARTHEST};
 use skinfit::prepare::Observed;
 use skinfit::render::shading::Shading;
 
