@@ -5,6 +5,7 @@ use fearless_simd::{f32x8, f32x16, i32x16};
 
 use super::lanes::Lanes;
 use crate::samples::LANES;
+use crate::samples::rows::Row;
 use crate::simd::Simd;
 
 /// The 2 x 2 texels of each lane's lookup: the upper and the lower row, of each four channels, of each
@@ -26,11 +27,14 @@ impl<S: Simd> Corners<S> {
         let numbers = texels.as_flattened();
         let count = numbers.len() - 4 * row;
         let (upper, lower) = (&numbers[..count], &numbers[4 * row..][..count]);
-        // One row after the other, so that the eight registers of one are enough at a time.
-        Self([
-            transposed(simd, gathered(simd, upper, &first)),
-            transposed(simd, gathered(simd, lower, &first)),
-        ])
+        let mut rows = [[f32x16::splat(simd, 0.0); 8]; 2];
+        for pair in 0..8 {
+            // By way of u32, so that the end of a range cannot overflow, which would be asked too.
+            let (i, j) = (first[2 * pair] as u32 as usize, first[2 * pair + 1] as u32 as usize);
+            rows[0][pair] = joined(simd, &upper[i..i + 8], &upper[j..j + 8]);
+            rows[1][pair] = joined(simd, &lower[i..i + 8], &lower[j..j + 8]);
+        }
+        Self([transposed(simd, rows[0]), transposed(simd, rows[1])])
     }
 
     /// A channel's four corners.
@@ -47,16 +51,22 @@ impl<S: Simd> Corners<S> {
 #[repr(align(64))]
 struct Line([i32; LANES]);
 
-/// Eight numbers from each of the places on, those of two places a register.
+/// Numbers that stand in memory from here on. Each check of an index ends a block of instructions, and the compiler moves what
+/// is made of texels down to the block where it is read: behind the texels of all lookups, each of which would be held
+/// meanwhile, sixteen registers where four will do.
 #[inline(always)]
-fn gathered<S: Simd>(simd: S, numbers: &[f32], first: &[i32; LANES]) -> [f32x16<S>; 8] {
-    let mut pairs = [f32x16::splat(simd, 0.0); 8];
-    for pair in 0..8 {
-        // By way of u32, so that the end of a range cannot overflow, which would be asked too.
-        let (i, j) = (first[2 * pair] as u32 as usize, first[2 * pair + 1] as u32 as usize);
-        pairs[pair] = joined(simd, &numbers[i..i + 8], &numbers[j..j + 8]);
+pub(super) fn made_here<S: Simd, const N: usize>(numbers: [Lanes<S>; N]) -> [Lanes<S>; N] {
+    let lines = numbers.map(|number| {
+        let mut row = Row::ZERO;
+        number.store(&mut row);
+        row
+    });
+    let lines = std::hint::black_box(&lines);
+    let mut made = numbers;
+    for (made, line) in made.iter_mut().zip(lines) {
+        *made = Lanes::of_row(made.0.simd, line);
     }
-    pairs
+    made
 }
 
 /// Two lanes' pairs of texels in one register.

@@ -3,7 +3,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x16, i32x16, mask32x16};
 
-use super::corners::Corners;
+use super::corners::{Corners, made_here};
 use super::lanes::Lanes;
 use crate::model::real::Real;
 use crate::simd::Simd;
@@ -158,7 +158,7 @@ impl<S: Simd> Real for Lanes<S> {
             let across = fy.mul_add(lower_step - upper_step, upper_step);
             slopes[channel] = dx.mul_add(across, dy * down);
         }
-        (values, slopes)
+        (made_here(values), made_here(slopes))
     }
 
     #[inline(always)]

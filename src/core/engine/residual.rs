@@ -141,7 +141,7 @@ use crate::program::graph::Unary;
             let tape = Tape::new(&graph, &outputs);
             // Nothing but constants is the same for all.
             assert!(tape.uniform_values(|_| f64::NAN).iter().all(|x| x.is_finite()));
-            let (statements, outputs) = statements(&tape, "    ");
+            let (statements, outputs) = statements(&tape, "    ", |_, _| String::new());
             let order: Vec<&str> = tape.fields.iter().map(|field| field.name.as_str()).collect();
             assert_eq!(order, ["shown", "observed", "weight"]);
             text.push_str(&format!(

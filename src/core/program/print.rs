@@ -2,7 +2,9 @@
 //!
 //! The text is generic over [`Real`](crate::model::real::Real). Around it stand `lit(x)`, a constant; `u(k)`, a number
 //! that all samples share, by its place in [`Tape::uniform_values`]; `samples(k)`, field k of the tape; `kept(k)`, the k-th
-//! number that is kept; and `cubes`, those that are looked up.
+//! number that is kept; and `cubes`, those that are looked up. An output is left as soon as it is there: held to the end it
+//! would take a register from everything behind it. And texels are asked for only where all of them are known: a processor
+//! that works ahead then waits for many at once.
 
 use std::fmt::Write as _;
 
@@ -10,9 +12,10 @@ use super::cut::KEPT;
 use super::graph::{Binary, Native, Node, Unary};
 use super::tape::{CallOf, Instruction, Mend, Operand, Slot, Tape, Test};
 
-/// A tape's instructions as statements, each line indented by `indent`; the outputs' expressions.
+/// A tape's instructions as statements, each line indented by `indent`, in which `put` says how an output of that number is
+/// left, by its expression; empty where it says nothing. Also the outputs' expressions.
 #[must_use]
-pub fn statements(tape: &Tape, indent: &str) -> (String, Vec<String>) {
+pub fn statements(tape: &Tape, indent: &str, put: fn(usize, &str) -> String) -> (String, Vec<String>) {
     let differs = tape.graph.made_of(|graph, id| matches!(graph.node(id), Node::Uniform(_)));
     let constant = |operand: &Operand| match *operand {
         Operand::Of(id) | Operand::ReciprocalOf(id) | Operand::FlagOf(id) => !differs[id.index()],
@@ -23,13 +26,77 @@ pub fn statements(tape: &Tape, indent: &str) -> (String, Vec<String>) {
         tape.uniforms.iter().zip(values).map(|(operand, value)| constant(operand).then_some(value)).collect();
     let mut printer =
         Printer { tape, constants, text: String::new(), indent: indent.to_owned(), ends: Vec::new() };
+    let outputs: Vec<String> = tape.outputs.iter().map(|slot| printer.slot(slot)).collect();
+    let last = last_written(tape);
+    let mut left = vec![false; outputs.len()];
+    let ahead = looked_up_ahead(tape);
     for (at, instruction) in tape.instructions.iter().enumerate() {
         printer.close(at);
-        printer.instruction(at, instruction);
+        if ahead.first() == Some(&at) {
+            ahead.iter().for_each(|&lookup| printer.footprint(lookup));
+        }
+        printer.instruction(at, instruction, ahead.contains(&at));
+        for (k, slot) in tape.outputs.iter().enumerate() {
+            let there = matches!(*slot, Slot::Register(register) if last[register] <= at);
+            if there && !left[k] && printer.ends.iter().all(|&end| end == at + 1) {
+                printer.close(at + 1);
+                printer.put(&put(k, &outputs[k]));
+                left[k] = true;
+            }
+        }
     }
     printer.close(tape.instructions.len());
-    let outputs = tape.outputs.iter().map(|slot| printer.slot(slot)).collect();
+    (0..outputs.len()).filter(|&k| !left[k]).for_each(|k| printer.put(&put(k, &outputs[k])));
     (printer.text, outputs)
+}
+
+/// Of each register the last instruction that writes it.
+fn last_written(tape: &Tape) -> Vec<usize> {
+    let mut last = vec![0; tape.registers];
+    for (at, instruction) in tape.instructions.iter().enumerate() {
+        written(instruction).for_each(|register| last[register] = at);
+    }
+    last
+}
+
+/// The registers that an instruction writes.
+fn written(instruction: &Instruction) -> Box<dyn Iterator<Item = usize> + '_> {
+    let of_call = |call: &'_ CallOf| {
+        let registers = call.parts.iter().chain(call.slopes.iter().flatten()).flatten().copied();
+        registers.collect::<Vec<_>>().into_iter()
+    };
+    match instruction {
+        Instruction::Load(_, out)
+        | Instruction::Unary(.., out)
+        | Instruction::Binary(.., out)
+        | Instruction::MultiplyAdd(_, out)
+        | Instruction::SubtractProduct(_, out)
+        | Instruction::Select(.., out) => Box::new(std::iter::once(*out)),
+        Instruction::Call(call) => Box::new(of_call(call)),
+        Instruction::Unit(call, flag, _) => Box::new(of_call(call).chain([*flag])),
+        Instruction::Mend(mend) => Box::new(mend.parts.iter().flatten().copied()),
+    }
+}
+
+/// The lookups whose places are known where the first one stands.
+fn looked_up_ahead(tape: &Tape) -> Vec<usize> {
+    let lookup = |instruction: &Instruction| match instruction {
+        Instruction::Call(call) if matches!(call.native, Native::Lookup(_)) => Some(call.arguments.clone()),
+        _ => None,
+    };
+    let Some(first) = tape.instructions.iter().position(|instruction| lookup(instruction).is_some()) else {
+        return Vec::new();
+    };
+    let mut written_since = vec![false; tape.registers];
+    let mut ahead = Vec::new();
+    for (at, instruction) in tape.instructions.iter().enumerate().skip(first) {
+        let known = |slot: &Slot| !matches!(*slot, Slot::Register(register) if written_since[register]);
+        if lookup(instruction).is_some_and(|place| place.iter().all(known)) {
+            ahead.push(at);
+        }
+        written(instruction).for_each(|register| written_since[register] = true);
+    }
+    ahead
 }
 
 struct Printer<'a> {
@@ -55,6 +122,23 @@ impl Printer<'_> {
         }
     }
 
+    /// How an output is left.
+    fn put(&mut self, words: &str) {
+        if !words.is_empty() {
+            self.line(words);
+        }
+    }
+
+    /// The texels of a lookup that stands further down.
+    fn footprint(&mut self, at: usize) {
+        if let Instruction::Call(call) = &self.tape.instructions[at]
+            && let Native::Lookup(resource) = call.native
+        {
+            let place = self.slots(&call.arguments);
+            self.line(&format!("let texels{at} = cubes[{resource}].footprint_at({place});"));
+        }
+    }
+
     fn slot(&self, slot: &Slot) -> String {
         match *slot {
             Slot::Register(at) => format!("r{at}"),
@@ -69,7 +153,7 @@ impl Printer<'_> {
         slots.iter().map(|slot| self.slot(slot)).collect::<Vec<_>>().join(", ")
     }
 
-    fn instruction(&mut self, at: usize, instruction: &Instruction) {
+    fn instruction(&mut self, at: usize, instruction: &Instruction, ahead: bool) {
         let of = |slot: &Slot| self.slot(slot);
         let (expression, out) = match instruction {
             Instruction::Load(field, out) => {
@@ -89,11 +173,11 @@ impl Printer<'_> {
                 (format!("select({}, {}, {})", self.test(test), of(yes), of(no)), out)
             }
             Instruction::Call(call) => {
-                call_lines(self, call, false);
+                call_lines(self, call, false, ahead.then_some(at));
                 return;
             }
             Instruction::Unit(call, flag, skip) => {
-                call_lines(self, call, true);
+                call_lines(self, call, true, None);
                 self.line(&format!("let r{flag} = unit.has_direction;"));
                 self.line("if !unit.all {");
                 self.indent.push_str("    ");
@@ -162,7 +246,8 @@ fn parts(parts: &[Option<usize>], count: usize, mended: bool) -> String {
     (0..count).map(part).collect::<Vec<_>>().join(", ")
 }
 
-fn call_lines(printer: &mut Printer<'_>, call: &CallOf, mended: bool) {
+/// A call; of a lookup whose texels are known already, which these are.
+fn call_lines(printer: &mut Printer<'_>, call: &CallOf, mended: bool, ahead: Option<usize>) {
     let arguments = printer.slots(&call.arguments);
     let along: Vec<(String, &Vec<Option<usize>>)> =
         call.along.iter().map(|d| printer.slots(d)).zip(&call.slopes).collect();
@@ -184,7 +269,10 @@ fn call_lines(printer: &mut Printer<'_>, call: &CallOf, mended: bool) {
         Native::Lookup(resource) => {
             let value = parts(&call.parts, 4, false);
             printer.line(&format!("let cube = cubes[{resource}];"));
-            printer.line(&format!("let at = cube.footprint_at({arguments});"));
+            printer.line(&match ahead {
+                Some(lookup) => format!("let at = texels{lookup};"),
+                None => format!("let at = cube.footprint_at({arguments});"),
+            });
             match &along[..] {
                 [] => printer.line(&format!("let [{value}] = cube.sample_at(&at);")),
                 [(d, slopes)] => printer.line(&format!(

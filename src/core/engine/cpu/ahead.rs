@@ -204,7 +204,8 @@ pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<
 
 /// A tape's statements and outputs as they are printed, and what they are known by.
 fn printed(tape: &Tape) -> (String, Vec<String>, u64) {
-    let (statements, outputs) = statements(tape, "            ");
+    let put = |k: usize, output: &str| format!("put({k}, i, {output});");
+    let (statements, outputs) = statements(tape, "            ", put);
     // FNV-1a: what differs has another key but once in 2^64.
     let mut key = 0xcbf2_9ce4_8422_2325_u64;
     for byte in statements.bytes().chain(outputs.iter().flat_map(|output| output.bytes().chain([b';']))) {

@@ -2,7 +2,7 @@
 
 use prefetch_index::prefetch_index;
 
-use super::streams::{AHEAD, Column, Stream, StreamOf, first_neutral, store};
+use super::streams::{AHEAD, Column, Stream, StreamOf, first_neutral};
 use crate::engine::lanes::Lanes;
 use crate::model::cube::Cube;
 use crate::model::real::Real;
@@ -81,10 +81,10 @@ impl<'a> Block<'a> {
         Lanes::of_row(simd, &field[at])
     }
 
-    /// Record `i`'s number of an output.
+    /// The outputs' columns, where there are as many.
     #[inline(always)]
-    pub(super) fn put<S: Simd>(&self, output: usize, i: usize, value: Lanes<S>) {
-        store(&self.columns[output][i], value);
+    pub(super) fn columns<const N: usize>(&self) -> Option<&'a [Column; N]> {
+        self.columns.first_chunk()
     }
 }
 

@@ -4,6 +4,7 @@
 // stored samples, `kept` numbers that no free parameter moves, `u` numbers that all samples share.
 
 use super::super::block::{Block, along};
+use super::super::streams::{BATCH, store};
 use crate::engine::lanes::Lanes;
 use crate::model::cube::CubePoint;
 use crate::model::real::{Real, select};
@@ -13,60 +14,60 @@ use crate::program::native::Unit;
 use crate::simd::Simd;
 
 pub(super) const KEYS: [u64; 54] = [
-    0x2b907a95a4c0373d,
-    0xd23bb9802aa04a24,
-    0xf1d45136e8debdca,
-    0x3f8038490dc23e65,
-    0x6d7d27af6407953d,
-    0x7447c7b02b3633bd,
-    0xcb2ed533cf4be708,
-    0x36a56ca816f3ed77,
-    0x2464e31aec5689bc,
-    0x4a16e7344f48bf81,
-    0xcee8a020a78523d2,
-    0xd3c413917303094d,
-    0x4fbaff28fc601ec7,
-    0x443974704c6c1c83,
-    0xcb4e43a6b510ef8a,
-    0x0238487d4674aa44,
-    0x4deddc96bed52330,
-    0xdd9c7c4af13f6c24,
-    0x827686b1da2a5935,
-    0x011ac5d4af38d330,
-    0x5d23884890a042e2,
-    0xddb662d17bf80cbf,
-    0x8dd9981e2c7e8644,
-    0xd18ad9224d49cbd1,
-    0x6398a99715fe5d83,
-    0x411a77fb0f40008c,
-    0x15d1e3603badb5eb,
-    0x4628ecfa7bcb9cef,
-    0xf9e06f834b155426,
-    0x461b4fe8bfb2dc67,
-    0x20dc02d4d197dc84,
-    0x51a55172abd5a473,
-    0xe7c6ec157dd441b9,
-    0x297f3682b51370de,
-    0x07817b3f206d0946,
-    0x20d7b1b4b85e51e4,
-    0x4f499e9450336b29,
-    0x0c094a9cab3e5f6e,
-    0xe697a227115c1ba6,
-    0x64ae95140b89d17b,
-    0x9f44dec19337da39,
-    0x43cf3c4c19ba24ad,
-    0x2b8d3ae6615d387a,
-    0xe707d08e5cc15939,
-    0x07f472831e3a7025,
-    0x6dc6caa602f1396a,
-    0x25478c4765868b08,
-    0xd15d4b031725f81a,
-    0x9ea1c6dfcf719b28,
-    0x4fa94358cdff5951,
-    0xb6c997c60b201fe5,
-    0x5c2e918dea0e6091,
-    0x255b944418e8feae,
-    0x6e1afd1bfe628e08,
+    0xd955a148dbb59042,
+    0x77164c010d751a13,
+    0xe3306ade4e32c845,
+    0x8d757c3db5d5418f,
+    0x603324a1df85eca9,
+    0xb93c451348935fab,
+    0x3366c4547522f299,
+    0xfcdf1f3bffc99f71,
+    0x507d8aaaa03407eb,
+    0x30d649678f58c339,
+    0xca111353b9cdcc04,
+    0x9d76f88fc6eecbdc,
+    0xe2f37b4c4b61a517,
+    0xf028961cb02079f7,
+    0x7b3492e1fda9fdaa,
+    0x74eaf6400930be09,
+    0xa9294c8004e27bf9,
+    0xedc9d597ba9f7447,
+    0x3d553e151f8d5dfb,
+    0xf65da7aeee51a51c,
+    0xbc38b729dbbb8986,
+    0x9b22738c85fda3b2,
+    0x0a82fe77162a7922,
+    0x63b3370c9605ca33,
+    0x3ef3c0876994ae81,
+    0x6b4032e8d8a5da34,
+    0x62144648c0ce5a0d,
+    0x9fe286b8eeec68b2,
+    0xdb1a60db02962f35,
+    0x867d5d19923bea49,
+    0xbfc2075fbd4c44c3,
+    0x40499ea4bee3e5f2,
+    0x38ff2967d64c5ff7,
+    0x1f5e1cc176ec14b6,
+    0x6eddd4447087b032,
+    0xdf491bfa097d847f,
+    0xc6f4dd906f67c7d0,
+    0xcae464c6bb6dd9ab,
+    0xa32da147f3fad3cb,
+    0x874c314e8165a7af,
+    0x83e10328a4b51c10,
+    0xbcde144f7d9e3607,
+    0x6331d139f303ed46,
+    0x490cfde3e719d962,
+    0x869631bf6e6c1ed9,
+    0x94b616e760582d47,
+    0x77c96453f067e855,
+    0xb0e93b7d8c9b5dd5,
+    0xa28d4218c08ef34e,
+    0xeeeb7bcf11ed4879,
+    0x27dfe0552a883135,
+    0x7ca682539d79957c,
+    0x7ac521574db5b143,
+    0xad2f02c80d9056a0,
 ];
 
 #[inline(always)]
@@ -140,7 +141,9 @@ fn surface_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<15>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -188,55 +191,59 @@ fn surface_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r15, r14, r13] = point.place();
             let r2 = samples(9);
+            put(0, i, r2);
             let r1 = samples(10);
+            put(1, i, r1);
             let r0 = samples(16);
+            let texels32 = cubes[0].footprint_at(r3, r4, r5);
+            let texels37 = cubes[1].footprint_at(r6, r8, r10);
+            let texels44 = cubes[2].footprint_at(r6, r8, r10);
+            let texels49 = cubes[2].footprint_at(r15, r14, r13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels32;
             let [r12, r7, r9, _] = cube.sample_at(&at);
             let r12 = r0 * r12;
+            put(2, i, r12);
             let r7 = r0 * r7;
+            put(3, i, r7);
             let r9 = r0 * r9;
+            put(4, i, r9);
             let r0 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels37;
             let [r5, r4, r3, _] = cube.sample_at(&at);
             let r5 = r0 * r5;
+            put(5, i, r5);
             let r0 = samples(13);
             let r4 = r0 * r4;
+            put(6, i, r4);
             let r0 = samples(14);
             let r3 = r0 * r3;
+            put(7, i, r3);
             let r0 = samples(15);
             let cube = cubes[2];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels44;
             let [r11, r16, r17, _] = cube.sample_at(&at);
             let r11 = r0 * r11;
+            put(8, i, r11);
             let r16 = r0 * r16;
+            put(9, i, r16);
             let r17 = r0 * r17;
+            put(10, i, r17);
             let r0 = samples(11);
             let cube = cubes[2];
-            let at = cube.footprint_at(r15, r14, r13);
+            let at = texels49;
             let [r10, r8, r6, _] = cube.sample_at(&at);
             let r10 = r0 * r10;
+            put(11, i, r10);
             let r8 = r0 * r8;
+            put(12, i, r8);
             let r6 = r0 * r6;
+            put(13, i, r6);
             let r0 = select(r1.ge(lit(1.2e-38)), r1, lit(1.0));
             let r0 = r0.log2();
             let r0 = r0 * lit(0.6931471805599453);
-            block.put(0, i, r2);
-            block.put(1, i, r1);
-            block.put(2, i, r12);
-            block.put(3, i, r7);
-            block.put(4, i, r9);
-            block.put(5, i, r5);
-            block.put(6, i, r4);
-            block.put(7, i, r3);
-            block.put(8, i, r11);
-            block.put(9, i, r16);
-            block.put(10, i, r17);
-            block.put(11, i, r10);
-            block.put(12, i, r8);
-            block.put(13, i, r6);
-            block.put(14, i, r0);
+            put(14, i, r0);
         }
         },
     );
@@ -252,7 +259,9 @@ fn surface_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
@@ -278,6 +287,7 @@ fn surface_value<S: Simd>(simd: S, block: Block<'_>) {
             let r8 = r6.mul_add(u(8), r8);
             let r8 = r3.mul_add(r5, r8);
             let r8 = r2.mul_add(u(9), r8);
+            put(0, i, r8);
             let r2 = kept(12);
             let r5 = kept(3);
             let r3 = r0 * u(10);
@@ -289,6 +299,7 @@ fn surface_value<S: Simd>(simd: S, block: Block<'_>) {
             let r9 = r6.mul_add(u(13), r9);
             let r9 = r5.mul_add(r3, r9);
             let r9 = r2.mul_add(u(14), r9);
+            put(1, i, r9);
             let r2 = kept(13);
             let r3 = kept(4);
             let r0 = r0 * u(15);
@@ -300,9 +311,7 @@ fn surface_value<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = r5.mul_add(u(18), r1);
             let r1 = r3.mul_add(r0, r1);
             let r1 = r2.mul_add(u(19), r1);
-            block.put(0, i, r8);
-            block.put(1, i, r9);
-            block.put(2, i, r1);
+            put(2, i, r1);
         }
         },
     );
@@ -318,7 +327,9 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<24>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
@@ -329,6 +340,7 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = u(2) * r1;
             let r1 = r1.exp2();
             let r2 = kept(11);
+            put(15, i, r2);
             let r3 = kept(2);
             let r4 = kept(0);
             let r5 = lit(1.0) - r4;
@@ -337,6 +349,7 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = r5 * r6;
             let r8 = u(5) * r7;
             let r9 = kept(8);
+            put(18, i, r9);
             let r10 = kept(5);
             let r11 = r6.mul_add(u(6), u(7));
             let r12 = r5 * r11;
@@ -344,10 +357,13 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r12 = r9.mul_add(u(8), r12);
             let r12 = r3.mul_add(r8, r12);
             let r12 = r2.mul_add(u(9), r12);
+            put(0, i, r12);
             let r8 = kept(12);
+            put(16, i, r8);
             let r13 = kept(3);
             let r14 = r7 * u(10);
             let r15 = kept(9);
+            put(19, i, r15);
             let r16 = kept(6);
             let r17 = r6.mul_add(u(11), u(12));
             let r18 = r5 * r17;
@@ -355,10 +371,13 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r18 = r15.mul_add(u(13), r18);
             let r18 = r13.mul_add(r14, r18);
             let r18 = r8.mul_add(u(14), r18);
+            put(1, i, r18);
             let r14 = kept(13);
+            put(17, i, r14);
             let r19 = kept(4);
             let r20 = r7 * u(15);
             let r21 = kept(10);
+            put(20, i, r21);
             let r22 = kept(7);
             let r23 = r6.mul_add(u(16), u(17));
             let r24 = r5 * r23;
@@ -366,12 +385,19 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r24 = r21.mul_add(u(18), r24);
             let r24 = r19.mul_add(r20, r24);
             let r24 = r14.mul_add(u(19), r24);
+            put(2, i, r24);
             let r20 = r5 * r10;
+            put(3, i, r20);
             let r25 = r5 * r16;
+            put(4, i, r25);
             let r26 = r5 * r22;
+            put(5, i, r26);
             let r27 = r7 * r10;
+            put(6, i, r27);
             let r28 = r7 * r16;
+            put(7, i, r28);
             let r29 = r7 * r22;
+            put(8, i, r29);
             let r30 = kept(14);
             let r30 = r1 * r30;
             let r30 = select(r0.ge(lit(1.2e-38)), r30, lit(0.0));
@@ -381,57 +407,42 @@ fn surface_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r31 = u(5) * r1;
             let r31 = r3 * r31;
             let r31 = r10.mul_add(r0, r31);
+            put(9, i, r31);
             let r0 = u(11) * r30;
             let r0 = r5 * r0;
             let r32 = u(10) * r1;
             let r32 = r13 * r32;
             let r32 = r16.mul_add(r0, r32);
+            put(10, i, r32);
             let r30 = u(16) * r30;
             let r30 = r5 * r30;
             let r1 = u(15) * r1;
             let r1 = r19 * r1;
             let r1 = r22.mul_add(r30, r1);
+            put(11, i, r1);
             let r30 = r3 * r7;
+            put(12, i, r30);
             let r5 = r7 * r13;
+            put(13, i, r5);
             let r7 = r7 * r19;
+            put(14, i, r7);
             let r4 = r4 - lit(1.0);
             let r11 = r11 * r4;
             let r6 = r6 * r4;
             let r0 = u(5) * r6;
             let r0 = r3 * r0;
             let r0 = r10.mul_add(r11, r0);
+            put(21, i, r0);
             let r17 = r17 * r4;
             let r11 = u(10) * r6;
             let r11 = r13 * r11;
             let r11 = r16.mul_add(r17, r11);
+            put(22, i, r11);
             let r4 = r23 * r4;
             let r6 = u(15) * r6;
             let r6 = r19 * r6;
             let r6 = r22.mul_add(r4, r6);
-            block.put(0, i, r12);
-            block.put(1, i, r18);
-            block.put(2, i, r24);
-            block.put(3, i, r20);
-            block.put(4, i, r25);
-            block.put(5, i, r26);
-            block.put(6, i, r27);
-            block.put(7, i, r28);
-            block.put(8, i, r29);
-            block.put(9, i, r31);
-            block.put(10, i, r32);
-            block.put(11, i, r1);
-            block.put(12, i, r30);
-            block.put(13, i, r5);
-            block.put(14, i, r7);
-            block.put(15, i, r2);
-            block.put(16, i, r8);
-            block.put(17, i, r14);
-            block.put(18, i, r9);
-            block.put(19, i, r15);
-            block.put(20, i, r21);
-            block.put(21, i, r0);
-            block.put(22, i, r11);
-            block.put(23, i, r6);
+            put(23, i, r6);
         }
         },
     );
@@ -447,7 +458,9 @@ fn surface_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<13>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -485,13 +498,21 @@ fn surface_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             }
             let point = CubePoint::of_unit([r12, r13, r14]);
             let [r6, r8, r10] = point.place();
+            put(3, i, r6);
+            put(4, i, r8);
+            put(5, i, r10);
             let r15 = samples(16);
+            let texels22 = cubes[0].footprint_at(r3, r4, r5);
+            let texels35 = cubes[1].footprint_at(r6, r8, r10);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels22;
             let [r7, r9, r11, _] = cube.sample_at(&at);
             let r7 = r15 * r7;
+            put(0, i, r7);
             let r9 = r15 * r9;
+            put(1, i, r9);
             let r11 = r15 * r11;
+            put(2, i, r11);
             let r15 = r0 * r12;
             let r15 = r1.mul_add(r13, r15);
             let r15 = r2.mul_add(r14, r15);
@@ -501,32 +522,26 @@ fn surface_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r2 = (-r14).mul_add(r15, r2);
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r15, r14, r13] = point.place();
+            put(6, i, r15);
+            put(7, i, r14);
+            put(8, i, r13);
             let r2 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels35;
             let [r1, r0, r12, _] = cube.sample_at(&at);
             let r1 = r2 * r1;
+            put(9, i, r1);
             let r2 = samples(13);
             let r0 = r2 * r0;
+            put(10, i, r0);
             let r2 = samples(14);
             let r12 = r2 * r12;
+            put(11, i, r12);
             let r2 = samples(10);
             let r2 = select(r2.ge(lit(1.2e-38)), r2, lit(1.0));
             let r2 = r2.log2();
             let r2 = r2 * lit(0.6931471805599453);
-            block.put(0, i, r7);
-            block.put(1, i, r9);
-            block.put(2, i, r11);
-            block.put(3, i, r6);
-            block.put(4, i, r8);
-            block.put(5, i, r10);
-            block.put(6, i, r15);
-            block.put(7, i, r14);
-            block.put(8, i, r13);
-            block.put(9, i, r1);
-            block.put(10, i, r0);
-            block.put(11, i, r12);
-            block.put(12, i, r2);
+            put(12, i, r2);
         }
         },
     );
@@ -542,7 +557,9 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
@@ -559,8 +576,10 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(2) * r7;
             let r7 = r7.exp2();
             let r8 = samples(0);
+            let texels12 = cubes[0].footprint_at(r0, r1, r2);
+            let texels22 = cubes[0].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels12;
             let [r9, r10, r11, _] = cube.sample_at(&at);
             let r9 = r8 * r9;
             let r2 = kept(0);
@@ -572,7 +591,7 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = u(5) * r6;
             let r12 = samples(8);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels22;
             let [r13, r14, r15, _] = cube.sample_at(&at);
             let r13 = r12 * r13;
             let r5 = kept(9);
@@ -582,6 +601,7 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = r13.mul_add(u(8), r4);
             let r4 = r2.mul_add(r0, r4);
             let r4 = r9.mul_add(u(9), r4);
+            put(0, i, r4);
             let r10 = r8 * r10;
             let r9 = kept(1);
             let r0 = r6 * u(10);
@@ -593,6 +613,7 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r14.mul_add(u(13), r13);
             let r13 = r9.mul_add(r0, r13);
             let r13 = r10.mul_add(u(14), r13);
+            put(1, i, r13);
             let r11 = r8 * r11;
             let r8 = kept(2);
             let r6 = r6 * u(15);
@@ -604,9 +625,7 @@ fn surface_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = r15.mul_add(u(18), r7);
             let r7 = r8.mul_add(r6, r7);
             let r7 = r11.mul_add(u(19), r7);
-            block.put(0, i, r4);
-            block.put(1, i, r13);
-            block.put(2, i, r7);
+            put(2, i, r7);
         }
         },
     );
@@ -622,7 +641,9 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<27>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
@@ -639,10 +660,15 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(2) * r7;
             let r7 = r7.exp2();
             let r8 = samples(0);
+            let texels12 = cubes[0].footprint_at(r0, r1, r2);
+            let texels22 = cubes[0].footprint_at(r3, r4, r5);
+            let texels95 = cubes[1].footprint_at(r0, r1, r2);
+            let texels97 = cubes[1].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels12;
             let [r9, r10, r11, _] = cube.sample_at(&at);
             let r9 = r8 * r9;
+            put(15, i, r9);
             let r12 = kept(0);
             let r13 = samples(5);
             let r14 = lit(1.0) - r13;
@@ -652,9 +678,10 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r17 = u(5) * r16;
             let r18 = samples(8);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels22;
             let [r19, r20, r21, _] = cube.sample_at(&at);
             let r19 = r18 * r19;
+            put(18, i, r19);
             let r22 = kept(9);
             let r23 = r15.mul_add(u(6), u(7));
             let r24 = r14 * r23;
@@ -662,10 +689,13 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r24 = r19.mul_add(u(8), r24);
             let r24 = r12.mul_add(r17, r24);
             let r24 = r9.mul_add(u(9), r24);
+            put(0, i, r24);
             let r10 = r8 * r10;
+            put(16, i, r10);
             let r17 = kept(1);
             let r25 = r16 * u(10);
             let r20 = r18 * r20;
+            put(19, i, r20);
             let r26 = kept(10);
             let r27 = r15.mul_add(u(11), u(12));
             let r28 = r14 * r27;
@@ -673,10 +703,13 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r28 = r20.mul_add(u(13), r28);
             let r28 = r17.mul_add(r25, r28);
             let r28 = r10.mul_add(u(14), r28);
+            put(1, i, r28);
             let r11 = r8 * r11;
+            put(17, i, r11);
             let r25 = kept(2);
             let r29 = r16 * u(15);
             let r21 = r18 * r21;
+            put(20, i, r21);
             let r30 = kept(11);
             let r31 = r15.mul_add(u(16), u(17));
             let r32 = r14 * r31;
@@ -684,12 +717,19 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r32 = r21.mul_add(u(18), r32);
             let r32 = r25.mul_add(r29, r32);
             let r32 = r11.mul_add(u(19), r32);
+            put(2, i, r32);
             let r29 = r14 * r22;
+            put(3, i, r29);
             let r33 = r14 * r26;
+            put(4, i, r33);
             let r34 = r14 * r30;
+            put(5, i, r34);
             let r35 = r16 * r22;
+            put(6, i, r35);
             let r36 = r16 * r26;
+            put(7, i, r36);
             let r37 = r16 * r30;
+            put(8, i, r37);
             let r38 = kept(12);
             let r38 = r7 * r38;
             let r38 = select(r6.ge(lit(1.2e-38)), r38, lit(0.0));
@@ -699,78 +739,63 @@ fn surface_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r39 = u(5) * r7;
             let r39 = r12 * r39;
             let r39 = r22.mul_add(r6, r39);
+            put(9, i, r39);
             let r6 = u(11) * r38;
             let r6 = r14 * r6;
             let r40 = u(10) * r7;
             let r40 = r17 * r40;
             let r40 = r26.mul_add(r6, r40);
+            put(10, i, r40);
             let r38 = u(16) * r38;
             let r38 = r14 * r38;
             let r7 = u(15) * r7;
             let r7 = r25 * r7;
             let r7 = r30.mul_add(r38, r7);
+            put(11, i, r7);
             let r38 = r12 * r16;
+            put(12, i, r38);
             let r14 = r16 * r17;
+            put(13, i, r14);
             let r16 = r16 * r25;
+            put(14, i, r16);
             let r13 = r13 - lit(1.0);
             let r23 = r23 * r13;
             let r15 = r15 * r13;
             let r6 = u(5) * r15;
             let r6 = r12 * r6;
             let r6 = r22.mul_add(r23, r6);
+            put(21, i, r6);
             let r27 = r27 * r13;
             let r23 = u(10) * r15;
             let r23 = r17 * r23;
             let r23 = r26.mul_add(r27, r23);
+            put(22, i, r23);
             let r13 = r31 * r13;
             let r15 = u(15) * r15;
             let r15 = r25 * r15;
             let r15 = r30.mul_add(r13, r15);
+            put(23, i, r15);
             let cube = cubes[1];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels95;
             let [r13, r30, r25, _] = cube.sample_at(&at);
             let r13 = r8 * r13;
             let cube = cubes[1];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels97;
             let [r2, r1, r0, _] = cube.sample_at(&at);
             let r2 = r18 * r2;
             let r2 = u(8) * r2;
             let r2 = u(9).mul_add(r13, r2);
+            put(24, i, r2);
             let r30 = r8 * r30;
             let r1 = r18 * r1;
             let r1 = u(13) * r1;
             let r1 = u(14).mul_add(r30, r1);
+            put(25, i, r1);
             let r25 = r8 * r25;
             let r0 = r18 * r0;
             let r0 = u(18) * r0;
             let r0 = u(19).mul_add(r25, r0);
-            block.put(0, i, r24);
-            block.put(1, i, r28);
-            block.put(2, i, r32);
-            block.put(3, i, r29);
-            block.put(4, i, r33);
-            block.put(5, i, r34);
-            block.put(6, i, r35);
-            block.put(7, i, r36);
-            block.put(8, i, r37);
-            block.put(9, i, r39);
-            block.put(10, i, r40);
-            block.put(11, i, r7);
-            block.put(12, i, r38);
-            block.put(13, i, r14);
-            block.put(14, i, r16);
-            block.put(15, i, r9);
-            block.put(16, i, r10);
-            block.put(17, i, r11);
-            block.put(18, i, r19);
-            block.put(19, i, r20);
-            block.put(20, i, r21);
-            block.put(21, i, r6);
-            block.put(22, i, r23);
-            block.put(23, i, r15);
-            block.put(24, i, r2);
-            block.put(25, i, r1);
-            block.put(26, i, r0);
+            put(26, i, r0);
         }
         },
     );
@@ -786,7 +811,9 @@ fn surface_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -795,20 +822,21 @@ fn surface_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r3, r4, r5] = point.place();
             let r2 = samples(16);
+            let texels5 = cubes[0].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels5;
             let [r1, r0, r6, _] = cube.sample_at(&at);
             let r1 = r2 * r1;
+            put(0, i, r1);
             let r0 = r2 * r0;
+            put(1, i, r0);
             let r6 = r2 * r6;
+            put(2, i, r6);
             let r2 = samples(10);
             let r2 = select(r2.ge(lit(1.2e-38)), r2, lit(1.0));
             let r2 = r2.log2();
             let r2 = r2 * lit(0.6931471805599453);
-            block.put(0, i, r1);
-            block.put(1, i, r0);
-            block.put(2, i, r6);
-            block.put(3, i, r2);
+            put(3, i, r2);
         }
         },
     );
@@ -824,7 +852,9 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<20>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
@@ -877,8 +907,11 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = u(4) * r10;
             let r10 = r10.exp2();
             let r9 = samples(0);
+            let texels34 = cubes[0].footprint_at(r0, r2, r4);
+            let texels44 = cubes[0].footprint_at(r8, r7, r6);
+            let texels47 = cubes[1].footprint_at(r8, r7, r6);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r2, r4);
+            let at = texels34;
             let [r12, r1, r3, _] = cube.sample_at(&at);
             let r12 = r9 * r12;
             let r4 = kept(0);
@@ -890,12 +923,12 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = u(7) * r11;
             let r5 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels44;
             let [r13, r14, r15, _] = cube.sample_at(&at);
             let r13 = r5 * r13;
             let r16 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels47;
             let [r17, r18, r19, _] = cube.sample_at(&at);
             let r17 = r16 * r17;
             let r16 = r10.mul_add(u(8), u(9));
@@ -904,6 +937,7 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = r13.mul_add(u(10), r16);
             let r16 = r4.mul_add(r0, r16);
             let r16 = r12.mul_add(u(11), r16);
+            put(0, i, r16);
             let r1 = r9 * r1;
             let r12 = kept(1);
             let r0 = r11 * u(12);
@@ -916,6 +950,7 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = r14.mul_add(u(15), r4);
             let r4 = r12.mul_add(r0, r4);
             let r4 = r1.mul_add(u(16), r4);
+            put(1, i, r4);
             let r3 = r9 * r3;
             let r9 = kept(2);
             let r11 = r11 * u(17);
@@ -928,9 +963,7 @@ fn surface_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r15.mul_add(u(20), r10);
             let r10 = r9.mul_add(r11, r10);
             let r10 = r3.mul_add(u(21), r10);
-            block.put(0, i, r16);
-            block.put(1, i, r4);
-            block.put(2, i, r10);
+            put(2, i, r10);
         }
         },
     );
@@ -946,7 +979,9 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<20>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<27>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
@@ -1015,10 +1050,14 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = u(4) * r16;
             let r16 = r16.exp2();
             let r15 = samples(0);
+            let texels47 = cubes[0].footprint_at(r0, r1, r4);
+            let texels57 = cubes[0].footprint_at(r9, r10, r11);
+            let texels60 = cubes[1].footprint_at(r9, r10, r11);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r4);
+            let at = texels47;
             let ([r14, r13, r12, _], [r3, r5, r2, _]) = cube.sample_with_slope(&at, cube.texels([r7, r8]));
             let r14 = r15 * r14;
+            put(15, i, r14);
             let r8 = kept(0);
             let r7 = samples(11);
             let r4 = lit(1.0) - r7;
@@ -1028,12 +1067,13 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = u(7) * r0;
             let r20 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels57;
             let ([r21, r22, r23, _], [r24, r25, r26, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r21 = r20 * r21;
+            put(18, i, r21);
             let r27 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels60;
             let ([r28, r29, r30, _], [r31, r32, r33, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r28 = r27 * r28;
             let r6 = r1.mul_add(u(8), u(9));
@@ -1042,10 +1082,13 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = r21.mul_add(u(10), r11);
             let r11 = r8.mul_add(r19, r11);
             let r11 = r14.mul_add(u(11), r11);
+            put(0, i, r11);
             let r13 = r15 * r13;
+            put(16, i, r13);
             let r19 = kept(1);
             let r10 = r0 * u(12);
             let r22 = r20 * r22;
+            put(19, i, r22);
             let r9 = samples(16);
             let r29 = r9 * r29;
             let r34 = r1.mul_add(u(13), u(14));
@@ -1054,10 +1097,13 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r36 = r22.mul_add(u(15), r36);
             let r36 = r19.mul_add(r10, r36);
             let r36 = r13.mul_add(u(16), r36);
+            put(1, i, r36);
             let r12 = r15 * r12;
+            put(17, i, r12);
             let r10 = kept(2);
             let r37 = r0 * u(17);
             let r23 = r20 * r23;
+            put(20, i, r23);
             let r38 = samples(18);
             let r30 = r38 * r30;
             let r39 = r1.mul_add(u(18), u(19));
@@ -1066,12 +1112,19 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = r23.mul_add(u(20), r41);
             let r41 = r10.mul_add(r37, r41);
             let r41 = r12.mul_add(u(21), r41);
+            put(2, i, r41);
             let r37 = r4 * r28;
+            put(3, i, r37);
             let r42 = r4 * r29;
+            put(4, i, r42);
             let r43 = r4 * r30;
+            put(5, i, r43);
             let r44 = r0 * r28;
+            put(6, i, r44);
             let r45 = r0 * r29;
+            put(7, i, r45);
             let r46 = r0 * r30;
+            put(8, i, r46);
             let r47 = kept(3);
             let r47 = r16 * r47;
             let r47 = select(r17.ge(lit(1.2e-38)), r47, lit(0.0));
@@ -1081,78 +1134,63 @@ fn surface_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r48 = u(7) * r16;
             let r48 = r8 * r48;
             let r48 = r28.mul_add(r17, r48);
+            put(9, i, r48);
             let r17 = u(13) * r47;
             let r17 = r4 * r17;
             let r49 = u(12) * r16;
             let r49 = r19 * r49;
             let r49 = r29.mul_add(r17, r49);
+            put(10, i, r49);
             let r47 = u(18) * r47;
             let r47 = r4 * r47;
             let r16 = u(17) * r16;
             let r16 = r10 * r16;
             let r16 = r30.mul_add(r47, r16);
+            put(11, i, r16);
             let r47 = r8 * r0;
+            put(12, i, r47);
             let r4 = r0 * r19;
+            put(13, i, r4);
             let r0 = r0 * r10;
+            put(14, i, r0);
             let r7 = r7 - lit(1.0);
             let r6 = r6 * r7;
             let r1 = r1 * r7;
             let r17 = u(7) * r1;
             let r17 = r8 * r17;
             let r17 = r28.mul_add(r6, r17);
+            put(21, i, r17);
             let r34 = r34 * r7;
             let r6 = u(12) * r1;
             let r6 = r19 * r6;
             let r6 = r29.mul_add(r34, r6);
+            put(22, i, r6);
             let r7 = r39 * r7;
             let r1 = u(17) * r1;
             let r1 = r10 * r1;
             let r1 = r30.mul_add(r7, r1);
+            put(23, i, r1);
             let r3 = r15 * r3;
             let r24 = r20 * r24;
             let r31 = r27 * r31;
             let r31 = r18 * r31;
             let r31 = u(10).mul_add(r24, r31);
             let r31 = u(11).mul_add(r3, r31);
+            put(24, i, r31);
             let r5 = r15 * r5;
             let r25 = r20 * r25;
             let r32 = r9 * r32;
             let r32 = r35 * r32;
             let r32 = u(15).mul_add(r25, r32);
             let r32 = u(16).mul_add(r5, r32);
+            put(25, i, r32);
             let r2 = r15 * r2;
             let r26 = r20 * r26;
             let r33 = r38 * r33;
             let r33 = r40 * r33;
             let r33 = u(20).mul_add(r26, r33);
             let r33 = u(21).mul_add(r2, r33);
-            block.put(0, i, r11);
-            block.put(1, i, r36);
-            block.put(2, i, r41);
-            block.put(3, i, r37);
-            block.put(4, i, r42);
-            block.put(5, i, r43);
-            block.put(6, i, r44);
-            block.put(7, i, r45);
-            block.put(8, i, r46);
-            block.put(9, i, r48);
-            block.put(10, i, r49);
-            block.put(11, i, r16);
-            block.put(12, i, r47);
-            block.put(13, i, r4);
-            block.put(14, i, r0);
-            block.put(15, i, r14);
-            block.put(16, i, r13);
-            block.put(17, i, r12);
-            block.put(18, i, r21);
-            block.put(19, i, r22);
-            block.put(20, i, r23);
-            block.put(21, i, r17);
-            block.put(22, i, r6);
-            block.put(23, i, r1);
-            block.put(24, i, r31);
-            block.put(25, i, r32);
-            block.put(26, i, r33);
+            put(26, i, r33);
         }
         },
     );
@@ -1168,7 +1206,9 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<20>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
@@ -1237,10 +1277,16 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = u(4) * r16;
             let r16 = r16.exp2();
             let r15 = samples(0);
+            let texels47 = cubes[0].footprint_at(r0, r1, r4);
+            let texels57 = cubes[0].footprint_at(r9, r10, r11);
+            let texels60 = cubes[1].footprint_at(r9, r10, r11);
+            let texels152 = cubes[2].footprint_at(r0, r1, r4);
+            let texels154 = cubes[2].footprint_at(r9, r10, r11);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r4);
+            let at = texels47;
             let ([r14, r13, r12, _], [r3, r5, r2, _]) = cube.sample_with_slope(&at, cube.texels([r7, r8]));
             let r14 = r15 * r14;
+            put(15, i, r14);
             let r8 = kept(0);
             let r7 = samples(11);
             let r19 = lit(1.0) - r7;
@@ -1250,12 +1296,13 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r22 = u(7) * r21;
             let r23 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels57;
             let ([r24, r25, r26, _], [r27, r28, r29, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r24 = r23 * r24;
+            put(18, i, r24);
             let r30 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels60;
             let ([r31, r32, r33, _], [r34, r35, r36, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r31 = r30 * r31;
             let r6 = r20.mul_add(u(8), u(9));
@@ -1264,10 +1311,13 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r37 = r24.mul_add(u(10), r37);
             let r37 = r8.mul_add(r22, r37);
             let r37 = r14.mul_add(u(11), r37);
+            put(0, i, r37);
             let r13 = r15 * r13;
+            put(16, i, r13);
             let r22 = kept(1);
             let r38 = r21 * u(12);
             let r25 = r23 * r25;
+            put(19, i, r25);
             let r39 = samples(16);
             let r32 = r39 * r32;
             let r40 = r20.mul_add(u(13), u(14));
@@ -1276,10 +1326,13 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r42 = r25.mul_add(u(15), r42);
             let r42 = r22.mul_add(r38, r42);
             let r42 = r13.mul_add(u(16), r42);
+            put(1, i, r42);
             let r12 = r15 * r12;
+            put(17, i, r12);
             let r38 = kept(2);
             let r43 = r21 * u(17);
             let r26 = r23 * r26;
+            put(20, i, r26);
             let r44 = samples(18);
             let r33 = r44 * r33;
             let r45 = r20.mul_add(u(18), u(19));
@@ -1288,12 +1341,19 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r47 = r26.mul_add(u(20), r47);
             let r47 = r38.mul_add(r43, r47);
             let r47 = r12.mul_add(u(21), r47);
+            put(2, i, r47);
             let r43 = r19 * r31;
+            put(3, i, r43);
             let r48 = r19 * r32;
+            put(4, i, r48);
             let r49 = r19 * r33;
+            put(5, i, r49);
             let r50 = r21 * r31;
+            put(6, i, r50);
             let r51 = r21 * r32;
+            put(7, i, r51);
             let r52 = r21 * r33;
+            put(8, i, r52);
             let r53 = kept(3);
             let r53 = r16 * r53;
             let r53 = select(r17.ge(lit(1.2e-38)), r53, lit(0.0));
@@ -1303,99 +1363,84 @@ fn surface_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r54 = u(7) * r16;
             let r54 = r8 * r54;
             let r54 = r31.mul_add(r17, r54);
+            put(9, i, r54);
             let r17 = u(13) * r53;
             let r17 = r19 * r17;
             let r55 = u(12) * r16;
             let r55 = r22 * r55;
             let r55 = r32.mul_add(r17, r55);
+            put(10, i, r55);
             let r53 = u(18) * r53;
             let r53 = r19 * r53;
             let r16 = u(17) * r16;
             let r16 = r38 * r16;
             let r16 = r33.mul_add(r53, r16);
+            put(11, i, r16);
             let r53 = r8 * r21;
+            put(12, i, r53);
             let r19 = r21 * r22;
+            put(13, i, r19);
             let r21 = r21 * r38;
+            put(14, i, r21);
             let r7 = r7 - lit(1.0);
             let r6 = r6 * r7;
             let r20 = r20 * r7;
             let r17 = u(7) * r20;
             let r17 = r8 * r17;
             let r17 = r31.mul_add(r6, r17);
+            put(21, i, r17);
             let r40 = r40 * r7;
             let r6 = u(12) * r20;
             let r6 = r22 * r6;
             let r6 = r32.mul_add(r40, r6);
+            put(22, i, r6);
             let r7 = r45 * r7;
             let r20 = u(17) * r20;
             let r20 = r38 * r20;
             let r20 = r33.mul_add(r7, r20);
+            put(23, i, r20);
             let r3 = r15 * r3;
             let r27 = r23 * r27;
             let r34 = r30 * r34;
             let r34 = r18 * r34;
             let r34 = u(10).mul_add(r27, r34);
             let r34 = u(11).mul_add(r3, r34);
+            put(24, i, r34);
             let r5 = r15 * r5;
             let r28 = r23 * r28;
             let r35 = r39 * r35;
             let r35 = r41 * r35;
             let r35 = u(15).mul_add(r28, r35);
             let r35 = u(16).mul_add(r5, r35);
+            put(25, i, r35);
             let r2 = r15 * r2;
             let r29 = r23 * r29;
             let r36 = r44 * r36;
             let r36 = r46 * r36;
             let r36 = u(20).mul_add(r29, r36);
             let r36 = u(21).mul_add(r2, r36);
+            put(26, i, r36);
             let cube = cubes[2];
-            let at = cube.footprint_at(r0, r1, r4);
+            let at = texels152;
             let [r2, r29, r46, _] = cube.sample_at(&at);
             let r2 = r15 * r2;
             let cube = cubes[2];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels154;
             let [r4, r1, r0, _] = cube.sample_at(&at);
             let r4 = r23 * r4;
             let r4 = u(10) * r4;
             let r4 = u(11).mul_add(r2, r4);
+            put(27, i, r4);
             let r29 = r15 * r29;
             let r1 = r23 * r1;
             let r1 = u(15) * r1;
             let r1 = u(16).mul_add(r29, r1);
+            put(28, i, r1);
             let r46 = r15 * r46;
             let r0 = r23 * r0;
             let r0 = u(20) * r0;
             let r0 = u(21).mul_add(r46, r0);
-            block.put(0, i, r37);
-            block.put(1, i, r42);
-            block.put(2, i, r47);
-            block.put(3, i, r43);
-            block.put(4, i, r48);
-            block.put(5, i, r49);
-            block.put(6, i, r50);
-            block.put(7, i, r51);
-            block.put(8, i, r52);
-            block.put(9, i, r54);
-            block.put(10, i, r55);
-            block.put(11, i, r16);
-            block.put(12, i, r53);
-            block.put(13, i, r19);
-            block.put(14, i, r21);
-            block.put(15, i, r14);
-            block.put(16, i, r13);
-            block.put(17, i, r12);
-            block.put(18, i, r24);
-            block.put(19, i, r25);
-            block.put(20, i, r26);
-            block.put(21, i, r17);
-            block.put(22, i, r6);
-            block.put(23, i, r20);
-            block.put(24, i, r34);
-            block.put(25, i, r35);
-            block.put(26, i, r36);
-            block.put(27, i, r4);
-            block.put(28, i, r1);
-            block.put(29, i, r0);
+            put(29, i, r0);
         }
         },
     );
@@ -1411,14 +1456,16 @@ fn surface_all_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<1>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(10);
             let r0 = select(r0.ge(lit(1.2e-38)), r0, lit(1.0));
             let r0 = r0.log2();
             let r0 = r0 * lit(0.6931471805599453);
-            block.put(0, i, r0);
+            put(0, i, r0);
         }
         },
     );
@@ -1434,7 +1481,9 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<1>(i);
@@ -1501,13 +1550,17 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = u(6) * r10;
             let r10 = r10.exp2();
             let r6 = samples(0);
+            let texels47 = cubes[0].footprint_at(r2, r1, r3);
+            let texels50 = cubes[1].footprint_at(r8, r0, r12);
+            let texels59 = cubes[0].footprint_at(r11, r7, r4);
+            let texels62 = cubes[2].footprint_at(r11, r7, r4);
             let cube = cubes[0];
-            let at = cube.footprint_at(r2, r1, r3);
+            let at = texels47;
             let [r5, r13, r14, _] = cube.sample_at(&at);
             let r5 = r6 * r5;
             let r3 = samples(10);
             let cube = cubes[1];
-            let at = cube.footprint_at(r8, r0, r12);
+            let at = texels50;
             let [r1, r2, r15, _] = cube.sample_at(&at);
             let r1 = r3 * r1;
             let r12 = samples(11);
@@ -1518,12 +1571,12 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = u(9) * r9;
             let r8 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r7, r4);
+            let at = texels59;
             let [r16, r17, r18, _] = cube.sample_at(&at);
             let r16 = r8 * r16;
             let r19 = samples(13);
             let cube = cubes[2];
-            let at = cube.footprint_at(r11, r7, r4);
+            let at = texels62;
             let [r20, r21, r22, _] = cube.sample_at(&at);
             let r20 = r19 * r20;
             let r19 = r10.mul_add(u(10), u(11));
@@ -1532,6 +1585,7 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = r16.mul_add(u(12), r19);
             let r19 = r1.mul_add(r0, r19);
             let r19 = r5.mul_add(u(13), r19);
+            put(0, i, r19);
             let r13 = r6 * r13;
             let r2 = r3 * r2;
             let r5 = r9 * u(14);
@@ -1544,6 +1598,7 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = r17.mul_add(u(17), r0);
             let r0 = r2.mul_add(r5, r0);
             let r0 = r13.mul_add(u(18), r0);
+            put(1, i, r0);
             let r14 = r6 * r14;
             let r15 = r3 * r15;
             let r9 = r9 * u(19);
@@ -1556,9 +1611,7 @@ fn surface_all_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r18.mul_add(u(22), r10);
             let r10 = r15.mul_add(r9, r10);
             let r10 = r14.mul_add(u(23), r10);
-            block.put(0, i, r19);
-            block.put(1, i, r0);
-            block.put(2, i, r10);
+            put(2, i, r10);
         }
         },
     );
@@ -1574,7 +1627,9 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<33>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<1>(i);
@@ -1681,15 +1736,21 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r17 = r17.log2();
             let r17 = u(9) * r17;
             let r17 = r17.exp2();
+            let texels81 = cubes[3].footprint_at(r4, r6, r19);
+            let texels86 = cubes[0].footprint_at(r4, r6, r19);
+            let texels97 = cubes[1].footprint_at(r11, r3, r7);
+            let texels116 = cubes[3].footprint_at(r14, r10, r2);
+            let texels127 = cubes[0].footprint_at(r14, r10, r2);
+            let texels138 = cubes[2].footprint_at(r14, r10, r2);
             let cube = cubes[3];
-            let at = cube.footprint_at(r4, r6, r19);
+            let at = texels81;
             let [r15, r16, r8, _] = cube.sample_at(&at);
             let r5 = samples(0);
             let r15 = r5 * r15;
             let r16 = r5 * r16;
             let r8 = r5 * r8;
             let cube = cubes[0];
-            let at = cube.footprint_at(r4, r6, r19);
+            let at = texels86;
             let [value, across, down] = cube.sample_with_gradient(&at);
             let [r13, r9, r27, _] = value;
             let [r28, r29, r30, _] = along(cube.texels([r20, r21]), across, down);
@@ -1701,11 +1762,14 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r32 = r5 * r32;
             let r33 = r5 * r33;
             let r13 = r5 * r13;
+            put(15, i, r13);
             let r9 = r5 * r9;
+            put(16, i, r9);
             let r27 = r5 * r27;
+            put(17, i, r27);
             let r5 = samples(10);
             let cube = cubes[1];
-            let at = cube.footprint_at(r11, r3, r7);
+            let at = texels97;
             let ([r23, r22, r21, _], [r20, r19, r6, _]) = cube.sample_with_slope(&at, cube.texels([r1, r0]));
             let r20 = r5 * r20;
             let r19 = r5 * r19;
@@ -1726,7 +1790,7 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = r21 * r11;
             let r7 = r22 * r7;
             let cube = cubes[3];
-            let at = cube.footprint_at(r14, r10, r2);
+            let at = texels116;
             let [r4, r34, r35, _] = cube.sample_at(&at);
             let r36 = samples(14);
             let r4 = r36 * r4;
@@ -1736,10 +1800,13 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r34 = u(16) * r34;
             let r35 = u(17) * r35;
             let r4 = u(18).mul_add(r15, r4);
+            put(27, i, r4);
             let r34 = u(19).mul_add(r16, r34);
+            put(28, i, r34);
             let r35 = u(20).mul_add(r8, r35);
+            put(29, i, r35);
             let cube = cubes[0];
-            let at = cube.footprint_at(r14, r10, r2);
+            let at = texels127;
             let [value, across, down] = cube.sample_with_gradient(&at);
             let [r8, r16, r15, _] = value;
             let [r37, r38, r39, _] = along(cube.texels([r18, r24]), across, down);
@@ -1751,11 +1818,14 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = r36 * r41;
             let r42 = r36 * r42;
             let r8 = r36 * r8;
+            put(18, i, r8);
             let r16 = r36 * r16;
+            put(19, i, r16);
             let r15 = r36 * r15;
+            put(20, i, r15);
             let r36 = samples(13);
             let cube = cubes[2];
-            let at = cube.footprint_at(r14, r10, r2);
+            let at = texels138;
             let [value, across, down] = cube.sample_with_gradient(&at);
             let [r43, r44, r45, _] = value;
             let [r46, r47, r48, _] = along(cube.texels([r18, r24]), across, down);
@@ -1766,6 +1836,7 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r36 = r1.mul_add(u(21), u(22));
             let r26 = r36 * r5;
             let r3 = r43.mul_add(r26, r3);
+            put(21, i, r3);
             let r36 = r0 * r36;
             let r46 = r36 * r46;
             let r49 = r36 * r49;
@@ -1773,13 +1844,16 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r49 = u(15).mul_add(r40, r49);
             let r36 = r43 * r36;
             let r46 = u(18).mul_add(r28, r46);
+            put(24, i, r46);
             let r36 = r8.mul_add(u(15), r36);
             let r28 = r0 * r1;
             let r40 = u(12) * r28;
             let r49 = r40.mul_add(r20, r49);
             let r49 = u(18).mul_add(r31, r49);
+            put(30, i, r49);
             let r36 = r23.mul_add(r40, r36);
             let r36 = r13.mul_add(u(18), r36);
+            put(0, i, r36);
             let r40 = samples(15);
             let r47 = r40 * r47;
             let r50 = r40 * r50;
@@ -1788,6 +1862,7 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = r1.mul_add(u(25), u(26));
             let r31 = r40 * r5;
             let r7 = r44.mul_add(r31, r7);
+            put(22, i, r7);
             let r40 = r0 * r40;
             let r5 = r1 * r5;
             let r47 = r40 * r47;
@@ -1797,12 +1872,15 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r50 = u(16).mul_add(r41, r50);
             let r40 = r44 * r40;
             let r47 = u(19).mul_add(r29, r47);
+            put(25, i, r47);
             let r40 = r16.mul_add(u(16), r40);
             let r29 = r28 * u(14);
             let r50 = r29.mul_add(r19, r50);
             let r50 = u(19).mul_add(r32, r50);
+            put(31, i, r50);
             let r40 = r22.mul_add(r29, r40);
             let r40 = r9.mul_add(u(19), r40);
+            put(1, i, r40);
             let r29 = samples(16);
             let r48 = r29 * r48;
             let r51 = r29 * r51;
@@ -1810,22 +1888,32 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r48 = r1 * r48;
             let r51 = r1 * r51;
             let r11 = r45.mul_add(r5, r11);
+            put(23, i, r11);
             let r48 = u(17).mul_add(r39, r48);
             let r51 = u(17).mul_add(r42, r51);
             let r1 = r45 * r1;
             let r48 = u(20).mul_add(r30, r48);
+            put(26, i, r48);
             let r1 = r15.mul_add(u(17), r1);
             let r30 = r28 * u(13);
             let r51 = r30.mul_add(r6, r51);
             let r51 = u(20).mul_add(r33, r51);
+            put(32, i, r51);
             let r1 = r21.mul_add(r30, r1);
             let r1 = r27.mul_add(u(20), r1);
+            put(2, i, r1);
             let r30 = r0 * r43;
+            put(3, i, r30);
             let r33 = r0 * r44;
+            put(4, i, r33);
             let r6 = r0 * r45;
+            put(5, i, r6);
             let r42 = r28 * r43;
+            put(6, i, r42);
             let r39 = r28 * r44;
+            put(7, i, r39);
             let r5 = r28 * r45;
+            put(8, i, r5);
             let r29 = kept(0);
             let r29 = r17 * r29;
             let r29 = select(r12.ge(lit(1.2e-38)), r29, lit(0.0));
@@ -1835,7 +1923,9 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r32 = u(12) * r17;
             let r32 = r23 * r32;
             let r32 = r43.mul_add(r12, r32);
+            put(9, i, r32);
             let r23 = r23 * r28;
+            put(12, i, r23);
             let r12 = u(23) * r29;
             let r12 = r0 * r12;
             let r29 = u(25) * r29;
@@ -1844,43 +1934,14 @@ fn surface_all_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = r22 * r0;
             let r17 = u(13) * r17;
             let r0 = r44.mul_add(r12, r0);
+            put(10, i, r0);
             let r17 = r21 * r17;
             let r22 = r28 * r22;
+            put(13, i, r22);
             let r17 = r45.mul_add(r29, r17);
+            put(11, i, r17);
             let r21 = r28 * r21;
-            block.put(0, i, r36);
-            block.put(1, i, r40);
-            block.put(2, i, r1);
-            block.put(3, i, r30);
-            block.put(4, i, r33);
-            block.put(5, i, r6);
-            block.put(6, i, r42);
-            block.put(7, i, r39);
-            block.put(8, i, r5);
-            block.put(9, i, r32);
-            block.put(10, i, r0);
-            block.put(11, i, r17);
-            block.put(12, i, r23);
-            block.put(13, i, r22);
-            block.put(14, i, r21);
-            block.put(15, i, r13);
-            block.put(16, i, r9);
-            block.put(17, i, r27);
-            block.put(18, i, r8);
-            block.put(19, i, r16);
-            block.put(20, i, r15);
-            block.put(21, i, r3);
-            block.put(22, i, r7);
-            block.put(23, i, r11);
-            block.put(24, i, r46);
-            block.put(25, i, r47);
-            block.put(26, i, r48);
-            block.put(27, i, r4);
-            block.put(28, i, r34);
-            block.put(29, i, r35);
-            block.put(30, i, r49);
-            block.put(31, i, r50);
-            block.put(32, i, r51);
+            put(14, i, r21);
         }
         },
     );
@@ -1896,7 +1957,9 @@ fn bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<15>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -1944,57 +2007,61 @@ fn bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r7, r14, r13] = point.place();
             let r2 = samples(9);
+            put(0, i, r2);
             let r1 = samples(15);
+            let texels31 = cubes[0].footprint_at(r3, r4, r5);
+            let texels42 = cubes[1].footprint_at(r6, r8, r10);
+            let texels49 = cubes[2].footprint_at(r6, r8, r10);
+            let texels54 = cubes[2].footprint_at(r7, r14, r13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels31;
             let [r0, r12, r9, _] = cube.sample_at(&at);
             let r0 = r1 * r0;
+            put(1, i, r0);
             let r12 = r1 * r12;
+            put(2, i, r12);
             let r9 = r1 * r9;
+            put(3, i, r9);
             let r15 = r15.abs();
             let r15 = lit(1.0).min(r15);
             let r15 = lit(1.0) - r15;
             let r1 = binary(Binary::GreaterEqual, r15, lit(1.2e-38));
+            put(4, i, r1);
             let r15 = select(r15.ge(lit(1.2e-38)), r15, lit(1.0));
             let r15 = r15.log2();
+            put(5, i, r15);
             let r5 = samples(11);
             let cube = cubes[1];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels42;
             let [r4, r3, r11, _] = cube.sample_at(&at);
             let r4 = r5 * r4;
+            put(6, i, r4);
             let r5 = samples(12);
             let r3 = r5 * r3;
+            put(7, i, r3);
             let r5 = samples(13);
             let r11 = r5 * r11;
+            put(8, i, r11);
             let r5 = samples(14);
             let cube = cubes[2];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels49;
             let [r16, r17, r18, _] = cube.sample_at(&at);
             let r16 = r5 * r16;
+            put(9, i, r16);
             let r17 = r5 * r17;
+            put(10, i, r17);
             let r18 = r5 * r18;
+            put(11, i, r18);
             let r5 = samples(10);
             let cube = cubes[2];
-            let at = cube.footprint_at(r7, r14, r13);
+            let at = texels54;
             let [r10, r8, r6, _] = cube.sample_at(&at);
             let r10 = r5 * r10;
+            put(12, i, r10);
             let r8 = r5 * r8;
+            put(13, i, r8);
             let r6 = r5 * r6;
-            block.put(0, i, r2);
-            block.put(1, i, r0);
-            block.put(2, i, r12);
-            block.put(3, i, r9);
-            block.put(4, i, r1);
-            block.put(5, i, r15);
-            block.put(6, i, r4);
-            block.put(7, i, r3);
-            block.put(8, i, r11);
-            block.put(9, i, r16);
-            block.put(10, i, r17);
-            block.put(11, i, r18);
-            block.put(12, i, r10);
-            block.put(13, i, r8);
-            block.put(14, i, r6);
+            put(14, i, r6);
         }
         },
     );
@@ -2010,7 +2077,9 @@ fn bumped_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
@@ -2035,6 +2104,7 @@ fn bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r8 = r6.mul_add(u(7), r8);
             let r8 = r2.mul_add(r5, r8);
             let r8 = r1.mul_add(u(8), r8);
+            put(0, i, r8);
             let r1 = kept(13);
             let r5 = kept(2);
             let r2 = r4 * u(9);
@@ -2046,6 +2116,7 @@ fn bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r9 = r6.mul_add(u(12), r9);
             let r9 = r5.mul_add(r2, r9);
             let r9 = r1.mul_add(u(13), r9);
+            put(1, i, r9);
             let r1 = kept(14);
             let r2 = kept(3);
             let r4 = r4 * u(14);
@@ -2057,9 +2128,7 @@ fn bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = r5.mul_add(u(17), r0);
             let r0 = r2.mul_add(r4, r0);
             let r0 = r1.mul_add(u(18), r0);
-            block.put(0, i, r8);
-            block.put(1, i, r9);
-            block.put(2, i, r0);
+            put(2, i, r0);
         }
         },
     );
@@ -2075,7 +2144,9 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<15>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<24>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<15>(i);
@@ -2084,6 +2155,7 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = u(0) * r0;
             let r1 = r1.exp2();
             let r2 = kept(12);
+            put(15, i, r2);
             let r3 = kept(1);
             let r4 = kept(0);
             let r5 = lit(1.0) - r4;
@@ -2093,6 +2165,7 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r8 = r5 * r7;
             let r9 = u(4) * r8;
             let r10 = kept(9);
+            put(18, i, r10);
             let r11 = kept(6);
             let r12 = r7.mul_add(u(5), u(6));
             let r13 = r5 * r12;
@@ -2100,10 +2173,13 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r10.mul_add(u(7), r13);
             let r13 = r3.mul_add(r9, r13);
             let r13 = r2.mul_add(u(8), r13);
+            put(0, i, r13);
             let r9 = kept(13);
+            put(16, i, r9);
             let r14 = kept(2);
             let r15 = r8 * u(9);
             let r16 = kept(10);
+            put(19, i, r16);
             let r17 = kept(7);
             let r18 = r7.mul_add(u(10), u(11));
             let r19 = r5 * r18;
@@ -2111,10 +2187,13 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = r16.mul_add(u(12), r19);
             let r19 = r14.mul_add(r15, r19);
             let r19 = r9.mul_add(u(13), r19);
+            put(1, i, r19);
             let r15 = kept(14);
+            put(17, i, r15);
             let r20 = kept(3);
             let r21 = r8 * u(14);
             let r22 = kept(11);
+            put(20, i, r22);
             let r23 = kept(8);
             let r24 = r7.mul_add(u(15), u(16));
             let r25 = r5 * r24;
@@ -2122,12 +2201,19 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r25 = r22.mul_add(u(17), r25);
             let r25 = r20.mul_add(r21, r25);
             let r25 = r15.mul_add(u(18), r25);
+            put(2, i, r25);
             let r21 = r5 * r11;
+            put(3, i, r21);
             let r26 = r5 * r17;
+            put(4, i, r26);
             let r27 = r5 * r23;
+            put(5, i, r27);
             let r28 = r8 * r11;
+            put(6, i, r28);
             let r29 = r8 * r17;
+            put(7, i, r29);
             let r30 = r8 * r23;
+            put(8, i, r30);
             let r0 = r0 * lit(0.6931471805599453);
             let r0 = r1 * r0;
             let r0 = select(r6.ge(lit(0.5)), r0, lit(0.0));
@@ -2137,57 +2223,42 @@ fn bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r31 = u(4) * r1;
             let r31 = r3 * r31;
             let r31 = r11.mul_add(r6, r31);
+            put(9, i, r31);
             let r6 = u(10) * r0;
             let r6 = r5 * r6;
             let r32 = u(9) * r1;
             let r32 = r14 * r32;
             let r32 = r17.mul_add(r6, r32);
+            put(10, i, r32);
             let r0 = u(15) * r0;
             let r0 = r5 * r0;
             let r1 = u(14) * r1;
             let r1 = r20 * r1;
             let r1 = r23.mul_add(r0, r1);
+            put(11, i, r1);
             let r0 = r3 * r8;
+            put(12, i, r0);
             let r5 = r8 * r14;
+            put(13, i, r5);
             let r8 = r8 * r20;
+            put(14, i, r8);
             let r4 = r4 - lit(1.0);
             let r12 = r12 * r4;
             let r7 = r7 * r4;
             let r6 = u(4) * r7;
             let r6 = r3 * r6;
             let r6 = r11.mul_add(r12, r6);
+            put(21, i, r6);
             let r18 = r18 * r4;
             let r12 = u(9) * r7;
             let r12 = r14 * r12;
             let r12 = r17.mul_add(r18, r12);
+            put(22, i, r12);
             let r4 = r24 * r4;
             let r7 = u(14) * r7;
             let r7 = r20 * r7;
             let r7 = r23.mul_add(r4, r7);
-            block.put(0, i, r13);
-            block.put(1, i, r19);
-            block.put(2, i, r25);
-            block.put(3, i, r21);
-            block.put(4, i, r26);
-            block.put(5, i, r27);
-            block.put(6, i, r28);
-            block.put(7, i, r29);
-            block.put(8, i, r30);
-            block.put(9, i, r31);
-            block.put(10, i, r32);
-            block.put(11, i, r1);
-            block.put(12, i, r0);
-            block.put(13, i, r5);
-            block.put(14, i, r8);
-            block.put(15, i, r2);
-            block.put(16, i, r9);
-            block.put(17, i, r15);
-            block.put(18, i, r10);
-            block.put(19, i, r16);
-            block.put(20, i, r22);
-            block.put(21, i, r6);
-            block.put(22, i, r12);
-            block.put(23, i, r7);
+            put(23, i, r7);
         }
         },
     );
@@ -2203,7 +2274,9 @@ fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<14>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -2241,13 +2314,21 @@ fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             }
             let point = CubePoint::of_unit([r12, r13, r14]);
             let [r6, r8, r10] = point.place();
+            put(5, i, r6);
+            put(6, i, r8);
+            put(7, i, r10);
             let r15 = samples(15);
+            let texels22 = cubes[0].footprint_at(r3, r4, r5);
+            let texels41 = cubes[1].footprint_at(r6, r8, r10);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels22;
             let [r7, r9, r11, _] = cube.sample_at(&at);
             let r7 = r15 * r7;
+            put(0, i, r7);
             let r9 = r15 * r9;
+            put(1, i, r9);
             let r11 = r15 * r11;
+            put(2, i, r11);
             let r15 = r0 * r12;
             let r15 = r1.mul_add(r13, r15);
             let r15 = r2.mul_add(r14, r15);
@@ -2255,37 +2336,31 @@ fn bumped_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r5 = lit(1.0).min(r5);
             let r5 = lit(1.0) - r5;
             let r4 = binary(Binary::GreaterEqual, r5, lit(1.2e-38));
+            put(3, i, r4);
             let r5 = select(r5.ge(lit(1.2e-38)), r5, lit(1.0));
             let r5 = r5.log2();
+            put(4, i, r5);
             let r15 = r15 * lit(2.0);
             let r0 = (-r12).mul_add(r15, r0);
             let r1 = (-r13).mul_add(r15, r1);
             let r2 = (-r14).mul_add(r15, r2);
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r15, r14, r13] = point.place();
+            put(8, i, r15);
+            put(9, i, r14);
+            put(10, i, r13);
             let r2 = samples(11);
             let cube = cubes[1];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels41;
             let [r1, r0, r12, _] = cube.sample_at(&at);
             let r1 = r2 * r1;
+            put(11, i, r1);
             let r2 = samples(12);
             let r0 = r2 * r0;
+            put(12, i, r0);
             let r2 = samples(13);
             let r12 = r2 * r12;
-            block.put(0, i, r7);
-            block.put(1, i, r9);
-            block.put(2, i, r11);
-            block.put(3, i, r4);
-            block.put(4, i, r5);
-            block.put(5, i, r6);
-            block.put(6, i, r8);
-            block.put(7, i, r10);
-            block.put(8, i, r15);
-            block.put(9, i, r14);
-            block.put(10, i, r13);
-            block.put(11, i, r1);
-            block.put(12, i, r0);
-            block.put(13, i, r12);
+            put(13, i, r12);
         }
         },
     );
@@ -2301,7 +2376,9 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
@@ -2316,8 +2393,10 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = u(0) * r6;
             let r6 = r6.exp2();
             let r7 = samples(0);
+            let texels10 = cubes[0].footprint_at(r0, r1, r2);
+            let texels21 = cubes[0].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels10;
             let [r8, r9, r10, _] = cube.sample_at(&at);
             let r8 = r7 * r8;
             let r2 = kept(0);
@@ -2330,7 +2409,7 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = u(4) * r0;
             let r12 = samples(9);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels21;
             let [r13, r14, r15, _] = cube.sample_at(&at);
             let r13 = r12 * r13;
             let r5 = kept(11);
@@ -2340,6 +2419,7 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = r13.mul_add(u(7), r4);
             let r4 = r2.mul_add(r11, r4);
             let r4 = r8.mul_add(u(8), r4);
+            put(0, i, r4);
             let r9 = r7 * r9;
             let r8 = kept(1);
             let r11 = r0 * u(9);
@@ -2351,6 +2431,7 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r14.mul_add(u(12), r13);
             let r13 = r8.mul_add(r11, r13);
             let r13 = r9.mul_add(u(13), r13);
+            put(1, i, r13);
             let r10 = r7 * r10;
             let r7 = kept(2);
             let r0 = r0 * u(14);
@@ -2362,9 +2443,7 @@ fn bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = r15.mul_add(u(17), r6);
             let r6 = r7.mul_add(r0, r6);
             let r6 = r10.mul_add(u(18), r6);
-            block.put(0, i, r4);
-            block.put(1, i, r13);
-            block.put(2, i, r6);
+            put(2, i, r6);
         }
         },
     );
@@ -2380,7 +2459,9 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<27>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
@@ -2395,10 +2476,15 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(0) * r6;
             let r7 = r7.exp2();
             let r8 = samples(0);
+            let texels10 = cubes[0].footprint_at(r0, r1, r2);
+            let texels21 = cubes[0].footprint_at(r3, r4, r5);
+            let texels94 = cubes[1].footprint_at(r0, r1, r2);
+            let texels96 = cubes[1].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels10;
             let [r9, r10, r11, _] = cube.sample_at(&at);
             let r9 = r8 * r9;
+            put(15, i, r9);
             let r12 = kept(0);
             let r13 = samples(5);
             let r14 = lit(1.0) - r13;
@@ -2409,9 +2495,10 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r18 = u(4) * r17;
             let r19 = samples(9);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels21;
             let [r20, r21, r22, _] = cube.sample_at(&at);
             let r20 = r19 * r20;
+            put(18, i, r20);
             let r23 = kept(11);
             let r24 = r16.mul_add(u(5), u(6));
             let r25 = r14 * r24;
@@ -2419,10 +2506,13 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r25 = r20.mul_add(u(7), r25);
             let r25 = r12.mul_add(r18, r25);
             let r25 = r9.mul_add(u(8), r25);
+            put(0, i, r25);
             let r10 = r8 * r10;
+            put(16, i, r10);
             let r18 = kept(1);
             let r26 = r17 * u(9);
             let r21 = r19 * r21;
+            put(19, i, r21);
             let r27 = kept(12);
             let r28 = r16.mul_add(u(10), u(11));
             let r29 = r14 * r28;
@@ -2430,10 +2520,13 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r29 = r21.mul_add(u(12), r29);
             let r29 = r18.mul_add(r26, r29);
             let r29 = r10.mul_add(u(13), r29);
+            put(1, i, r29);
             let r11 = r8 * r11;
+            put(17, i, r11);
             let r26 = kept(2);
             let r30 = r17 * u(14);
             let r22 = r19 * r22;
+            put(20, i, r22);
             let r31 = kept(13);
             let r32 = r16.mul_add(u(15), u(16));
             let r33 = r14 * r32;
@@ -2441,12 +2534,19 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r33 = r22.mul_add(u(17), r33);
             let r33 = r26.mul_add(r30, r33);
             let r33 = r11.mul_add(u(18), r33);
+            put(2, i, r33);
             let r30 = r14 * r23;
+            put(3, i, r30);
             let r34 = r14 * r27;
+            put(4, i, r34);
             let r35 = r14 * r31;
+            put(5, i, r35);
             let r36 = r17 * r23;
+            put(6, i, r36);
             let r37 = r17 * r27;
+            put(7, i, r37);
             let r38 = r17 * r31;
+            put(8, i, r38);
             let r6 = r6 * lit(0.6931471805599453);
             let r6 = r7 * r6;
             let r6 = select(r15.ge(lit(0.5)), r6, lit(0.0));
@@ -2456,78 +2556,63 @@ fn bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r39 = u(4) * r7;
             let r39 = r12 * r39;
             let r39 = r23.mul_add(r15, r39);
+            put(9, i, r39);
             let r15 = u(10) * r6;
             let r15 = r14 * r15;
             let r40 = u(9) * r7;
             let r40 = r18 * r40;
             let r40 = r27.mul_add(r15, r40);
+            put(10, i, r40);
             let r6 = u(15) * r6;
             let r6 = r14 * r6;
             let r7 = u(14) * r7;
             let r7 = r26 * r7;
             let r7 = r31.mul_add(r6, r7);
+            put(11, i, r7);
             let r6 = r12 * r17;
+            put(12, i, r6);
             let r14 = r17 * r18;
+            put(13, i, r14);
             let r17 = r17 * r26;
+            put(14, i, r17);
             let r13 = r13 - lit(1.0);
             let r24 = r24 * r13;
             let r16 = r16 * r13;
             let r15 = u(4) * r16;
             let r15 = r12 * r15;
             let r15 = r23.mul_add(r24, r15);
+            put(21, i, r15);
             let r28 = r28 * r13;
             let r24 = u(9) * r16;
             let r24 = r18 * r24;
             let r24 = r27.mul_add(r28, r24);
+            put(22, i, r24);
             let r13 = r32 * r13;
             let r16 = u(14) * r16;
             let r16 = r26 * r16;
             let r16 = r31.mul_add(r13, r16);
+            put(23, i, r16);
             let cube = cubes[1];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels94;
             let [r13, r31, r26, _] = cube.sample_at(&at);
             let r13 = r8 * r13;
             let cube = cubes[1];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels96;
             let [r2, r1, r0, _] = cube.sample_at(&at);
             let r2 = r19 * r2;
             let r2 = u(7) * r2;
             let r2 = u(8).mul_add(r13, r2);
+            put(24, i, r2);
             let r31 = r8 * r31;
             let r1 = r19 * r1;
             let r1 = u(12) * r1;
             let r1 = u(13).mul_add(r31, r1);
+            put(25, i, r1);
             let r26 = r8 * r26;
             let r0 = r19 * r0;
             let r0 = u(17) * r0;
             let r0 = u(18).mul_add(r26, r0);
-            block.put(0, i, r25);
-            block.put(1, i, r29);
-            block.put(2, i, r33);
-            block.put(3, i, r30);
-            block.put(4, i, r34);
-            block.put(5, i, r35);
-            block.put(6, i, r36);
-            block.put(7, i, r37);
-            block.put(8, i, r38);
-            block.put(9, i, r39);
-            block.put(10, i, r40);
-            block.put(11, i, r7);
-            block.put(12, i, r6);
-            block.put(13, i, r14);
-            block.put(14, i, r17);
-            block.put(15, i, r9);
-            block.put(16, i, r10);
-            block.put(17, i, r11);
-            block.put(18, i, r20);
-            block.put(19, i, r21);
-            block.put(20, i, r22);
-            block.put(21, i, r15);
-            block.put(22, i, r24);
-            block.put(23, i, r16);
-            block.put(24, i, r2);
-            block.put(25, i, r1);
-            block.put(26, i, r0);
+            put(26, i, r0);
         }
         },
     );
@@ -2543,7 +2628,9 @@ fn bumped_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -2552,15 +2639,16 @@ fn bumped_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r3, r4, r5] = point.place();
             let r2 = samples(15);
+            let texels5 = cubes[0].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels5;
             let [r1, r0, r6, _] = cube.sample_at(&at);
             let r1 = r2 * r1;
+            put(0, i, r1);
             let r0 = r2 * r0;
+            put(1, i, r0);
             let r6 = r2 * r6;
-            block.put(0, i, r1);
-            block.put(1, i, r0);
-            block.put(2, i, r6);
+            put(2, i, r6);
         }
         },
     );
@@ -2576,7 +2664,9 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
@@ -2631,8 +2721,11 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = u(4) * r11;
             let r11 = r11.exp2();
             let r10 = samples(0);
+            let texels36 = cubes[0].footprint_at(r2, r4, r12);
+            let texels46 = cubes[0].footprint_at(r8, r7, r6);
+            let texels49 = cubes[1].footprint_at(r8, r7, r6);
             let cube = cubes[0];
-            let at = cube.footprint_at(r2, r4, r12);
+            let at = texels36;
             let [r9, r1, r3, _] = cube.sample_at(&at);
             let r9 = r10 * r9;
             let r12 = kept(0);
@@ -2644,12 +2737,12 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r2 = u(7) * r0;
             let r5 = samples(13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels46;
             let [r13, r14, r15, _] = cube.sample_at(&at);
             let r13 = r5 * r13;
             let r16 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels49;
             let [r17, r18, r19, _] = cube.sample_at(&at);
             let r17 = r16 * r17;
             let r16 = r11.mul_add(u(8), u(9));
@@ -2658,6 +2751,7 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = r13.mul_add(u(10), r16);
             let r16 = r12.mul_add(r2, r16);
             let r16 = r9.mul_add(u(11), r16);
+            put(0, i, r16);
             let r1 = r10 * r1;
             let r9 = kept(1);
             let r2 = r0 * u(12);
@@ -2670,6 +2764,7 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r12 = r14.mul_add(u(15), r12);
             let r12 = r9.mul_add(r2, r12);
             let r12 = r1.mul_add(u(16), r12);
+            put(1, i, r12);
             let r3 = r10 * r3;
             let r10 = kept(2);
             let r0 = r0 * u(17);
@@ -2682,9 +2777,7 @@ fn bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = r15.mul_add(u(20), r11);
             let r11 = r10.mul_add(r0, r11);
             let r11 = r3.mul_add(u(21), r11);
-            block.put(0, i, r16);
-            block.put(1, i, r12);
-            block.put(2, i, r11);
+            put(2, i, r11);
         }
         },
     );
@@ -2700,7 +2793,9 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<27>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
@@ -2775,10 +2870,14 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r13 * u(6);
             let r13 = r13.exp2();
             let r12 = samples(0);
+            let texels53 = cubes[0].footprint_at(r3, r7, r8);
+            let texels63 = cubes[0].footprint_at(r11, r4, r10);
+            let texels66 = cubes[1].footprint_at(r11, r4, r10);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r7, r8);
+            let at = texels53;
             let ([r6, r19, r20, _], [r21, r22, r23, _]) = cube.sample_with_slope(&at, cube.texels([r5, r2]));
             let r6 = r12 * r6;
+            put(15, i, r6);
             let r2 = kept(0);
             let r5 = samples(11);
             let r8 = lit(1.0) - r5;
@@ -2788,12 +2887,13 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r24 = u(9) * r3;
             let r25 = samples(13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r4, r10);
+            let at = texels63;
             let ([r26, r27, r28, _], [r29, r30, r31, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r26 = r25 * r26;
+            put(18, i, r26);
             let r32 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r11, r4, r10);
+            let at = texels66;
             let ([r33, r34, r35, _], [r36, r37, r38, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r33 = r32 * r33;
             let r18 = r7.mul_add(u(10), u(11));
@@ -2802,10 +2902,13 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r26.mul_add(u(12), r10);
             let r10 = r2.mul_add(r24, r10);
             let r10 = r6.mul_add(u(13), r10);
+            put(0, i, r10);
             let r19 = r12 * r19;
+            put(16, i, r19);
             let r24 = kept(1);
             let r4 = r3 * u(14);
             let r27 = r25 * r27;
+            put(19, i, r27);
             let r11 = samples(15);
             let r34 = r11 * r34;
             let r39 = r7.mul_add(u(15), u(16));
@@ -2814,10 +2917,13 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = r27.mul_add(u(17), r41);
             let r41 = r24.mul_add(r4, r41);
             let r41 = r19.mul_add(u(18), r41);
+            put(1, i, r41);
             let r20 = r12 * r20;
+            put(17, i, r20);
             let r4 = kept(2);
             let r42 = r3 * u(19);
             let r28 = r25 * r28;
+            put(20, i, r28);
             let r43 = samples(17);
             let r35 = r43 * r35;
             let r44 = r7.mul_add(u(20), u(21));
@@ -2826,12 +2932,19 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r46 = r28.mul_add(u(22), r46);
             let r46 = r4.mul_add(r42, r46);
             let r46 = r20.mul_add(u(23), r46);
+            put(2, i, r46);
             let r42 = r8 * r33;
+            put(3, i, r42);
             let r47 = r8 * r34;
+            put(4, i, r47);
             let r48 = r8 * r35;
+            put(5, i, r48);
             let r49 = r3 * r33;
+            put(6, i, r49);
             let r50 = r3 * r34;
+            put(7, i, r50);
             let r51 = r3 * r35;
+            put(8, i, r51);
             let r15 = r15 * lit(0.6931471805599453);
             let r15 = r14 * r15;
             let r15 = select(r16.ge(lit(1.2e-38)), r15, lit(0.0));
@@ -2841,35 +2954,44 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r14 = r2 * r14;
             let r52 = r14 * r15;
             let r52 = r33.mul_add(r16, r52);
+            put(9, i, r52);
             let r16 = u(15) * r15;
             let r16 = r8 * r16;
             let r53 = r8 * u(14);
             let r53 = r24 * r53;
             let r54 = r15 * r53;
             let r54 = r34.mul_add(r16, r54);
+            put(10, i, r54);
             let r16 = u(20) * r15;
             let r16 = r8 * r16;
             let r55 = r8 * u(19);
             let r55 = r4 * r55;
             let r15 = r15 * r55;
             let r15 = r35.mul_add(r16, r15);
+            put(11, i, r15);
             let r16 = r2 * r3;
+            put(12, i, r16);
             let r56 = r3 * r24;
+            put(13, i, r56);
             let r3 = r3 * r4;
+            put(14, i, r3);
             let r5 = r5 - lit(1.0);
             let r18 = r18 * r5;
             let r7 = r7 * r5;
             let r57 = u(9) * r7;
             let r57 = r2 * r57;
             let r57 = r33.mul_add(r18, r57);
+            put(21, i, r57);
             let r39 = r39 * r5;
             let r18 = u(14) * r7;
             let r18 = r24 * r18;
             let r18 = r34.mul_add(r39, r18);
+            put(22, i, r18);
             let r5 = r44 * r5;
             let r7 = u(19) * r7;
             let r7 = r4 * r7;
             let r7 = r35.mul_add(r5, r7);
+            put(23, i, r7);
             let r21 = r12 * r21;
             let r13 = u(4) * r13;
             let r5 = binary(Binary::Less, lit(0.0), r0);
@@ -2887,6 +3009,7 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r36 = u(12).mul_add(r29, r36);
             let r36 = (-r14).mul_add(r0, r36);
             let r36 = u(13).mul_add(r21, r36);
+            put(24, i, r36);
             let r22 = r12 * r22;
             let r30 = r25 * r30;
             let r21 = u(15) * r0;
@@ -2897,6 +3020,7 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r37 = u(17).mul_add(r30, r37);
             let r37 = (-r53).mul_add(r0, r37);
             let r37 = u(18).mul_add(r22, r37);
+            put(25, i, r37);
             let r23 = r12 * r23;
             let r31 = r25 * r31;
             let r25 = u(20) * r0;
@@ -2907,33 +3031,7 @@ fn bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r38 = u(22).mul_add(r31, r38);
             let r38 = (-r55).mul_add(r0, r38);
             let r38 = u(23).mul_add(r23, r38);
-            block.put(0, i, r10);
-            block.put(1, i, r41);
-            block.put(2, i, r46);
-            block.put(3, i, r42);
-            block.put(4, i, r47);
-            block.put(5, i, r48);
-            block.put(6, i, r49);
-            block.put(7, i, r50);
-            block.put(8, i, r51);
-            block.put(9, i, r52);
-            block.put(10, i, r54);
-            block.put(11, i, r15);
-            block.put(12, i, r16);
-            block.put(13, i, r56);
-            block.put(14, i, r3);
-            block.put(15, i, r6);
-            block.put(16, i, r19);
-            block.put(17, i, r20);
-            block.put(18, i, r26);
-            block.put(19, i, r27);
-            block.put(20, i, r28);
-            block.put(21, i, r57);
-            block.put(22, i, r18);
-            block.put(23, i, r7);
-            block.put(24, i, r36);
-            block.put(25, i, r37);
-            block.put(26, i, r38);
+            put(26, i, r38);
         }
         },
     );
@@ -2949,7 +3047,9 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
@@ -3024,10 +3124,16 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r13 * u(6);
             let r13 = r13.exp2();
             let r12 = samples(0);
+            let texels53 = cubes[0].footprint_at(r3, r7, r8);
+            let texels63 = cubes[0].footprint_at(r11, r4, r10);
+            let texels66 = cubes[1].footprint_at(r11, r4, r10);
+            let texels179 = cubes[2].footprint_at(r3, r7, r8);
+            let texels181 = cubes[2].footprint_at(r11, r4, r10);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r7, r8);
+            let at = texels53;
             let ([r6, r19, r20, _], [r21, r22, r23, _]) = cube.sample_with_slope(&at, cube.texels([r5, r2]));
             let r6 = r12 * r6;
+            put(15, i, r6);
             let r2 = kept(0);
             let r5 = samples(11);
             let r24 = lit(1.0) - r5;
@@ -3037,12 +3143,13 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r27 = u(9) * r26;
             let r28 = samples(13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r4, r10);
+            let at = texels63;
             let ([r29, r30, r31, _], [r32, r33, r34, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r29 = r28 * r29;
+            put(18, i, r29);
             let r35 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r11, r4, r10);
+            let at = texels66;
             let ([r36, r37, r38, _], [r39, r40, r41, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r36 = r35 * r36;
             let r18 = r25.mul_add(u(10), u(11));
@@ -3051,10 +3158,13 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r42 = r29.mul_add(u(12), r42);
             let r42 = r2.mul_add(r27, r42);
             let r42 = r6.mul_add(u(13), r42);
+            put(0, i, r42);
             let r19 = r12 * r19;
+            put(16, i, r19);
             let r27 = kept(1);
             let r43 = r26 * u(14);
             let r30 = r28 * r30;
+            put(19, i, r30);
             let r44 = samples(15);
             let r37 = r44 * r37;
             let r45 = r25.mul_add(u(15), u(16));
@@ -3063,10 +3173,13 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r47 = r30.mul_add(u(17), r47);
             let r47 = r27.mul_add(r43, r47);
             let r47 = r19.mul_add(u(18), r47);
+            put(1, i, r47);
             let r20 = r12 * r20;
+            put(17, i, r20);
             let r43 = kept(2);
             let r48 = r26 * u(19);
             let r31 = r28 * r31;
+            put(20, i, r31);
             let r49 = samples(17);
             let r38 = r49 * r38;
             let r50 = r25.mul_add(u(20), u(21));
@@ -3075,12 +3188,19 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r52 = r31.mul_add(u(22), r52);
             let r52 = r43.mul_add(r48, r52);
             let r52 = r20.mul_add(u(23), r52);
+            put(2, i, r52);
             let r48 = r24 * r36;
+            put(3, i, r48);
             let r53 = r24 * r37;
+            put(4, i, r53);
             let r54 = r24 * r38;
+            put(5, i, r54);
             let r55 = r26 * r36;
+            put(6, i, r55);
             let r56 = r26 * r37;
+            put(7, i, r56);
             let r57 = r26 * r38;
+            put(8, i, r57);
             let r15 = r15 * lit(0.6931471805599453);
             let r15 = r14 * r15;
             let r15 = select(r16.ge(lit(1.2e-38)), r15, lit(0.0));
@@ -3090,35 +3210,44 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r14 = r2 * r14;
             let r58 = r14 * r15;
             let r58 = r36.mul_add(r16, r58);
+            put(9, i, r58);
             let r16 = u(15) * r15;
             let r16 = r24 * r16;
             let r59 = r24 * u(14);
             let r59 = r27 * r59;
             let r60 = r15 * r59;
             let r60 = r37.mul_add(r16, r60);
+            put(10, i, r60);
             let r16 = u(20) * r15;
             let r16 = r24 * r16;
             let r61 = r24 * u(19);
             let r61 = r43 * r61;
             let r15 = r15 * r61;
             let r15 = r38.mul_add(r16, r15);
+            put(11, i, r15);
             let r16 = r2 * r26;
+            put(12, i, r16);
             let r62 = r26 * r27;
+            put(13, i, r62);
             let r26 = r26 * r43;
+            put(14, i, r26);
             let r5 = r5 - lit(1.0);
             let r18 = r18 * r5;
             let r25 = r25 * r5;
             let r63 = u(9) * r25;
             let r63 = r2 * r63;
             let r63 = r36.mul_add(r18, r63);
+            put(21, i, r63);
             let r45 = r45 * r5;
             let r18 = u(14) * r25;
             let r18 = r27 * r18;
             let r18 = r37.mul_add(r45, r18);
+            put(22, i, r18);
             let r5 = r50 * r5;
             let r25 = u(19) * r25;
             let r25 = r43 * r25;
             let r25 = r38.mul_add(r5, r25);
+            put(23, i, r25);
             let r21 = r12 * r21;
             let r13 = u(4) * r13;
             let r5 = binary(Binary::Less, lit(0.0), r0);
@@ -3136,6 +3265,7 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r39 = u(12).mul_add(r32, r39);
             let r39 = (-r14).mul_add(r0, r39);
             let r39 = u(13).mul_add(r21, r39);
+            put(24, i, r39);
             let r22 = r12 * r22;
             let r33 = r28 * r33;
             let r21 = u(15) * r0;
@@ -3146,6 +3276,7 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r40 = u(17).mul_add(r33, r40);
             let r40 = (-r59).mul_add(r0, r40);
             let r40 = u(18).mul_add(r22, r40);
+            put(25, i, r40);
             let r23 = r12 * r23;
             let r34 = r28 * r34;
             let r22 = u(20) * r0;
@@ -3156,54 +3287,28 @@ fn bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = u(22).mul_add(r34, r41);
             let r41 = (-r61).mul_add(r0, r41);
             let r41 = u(23).mul_add(r23, r41);
+            put(26, i, r41);
             let cube = cubes[2];
-            let at = cube.footprint_at(r3, r7, r8);
+            let at = texels179;
             let [r23, r0, r61, _] = cube.sample_at(&at);
             let r23 = r12 * r23;
             let cube = cubes[2];
-            let at = cube.footprint_at(r11, r4, r10);
+            let at = texels181;
             let [r8, r7, r3, _] = cube.sample_at(&at);
             let r8 = r28 * r8;
             let r8 = u(12) * r8;
             let r8 = u(13).mul_add(r23, r8);
+            put(27, i, r8);
             let r0 = r12 * r0;
             let r7 = r28 * r7;
             let r7 = u(17) * r7;
             let r7 = u(18).mul_add(r0, r7);
+            put(28, i, r7);
             let r61 = r12 * r61;
             let r3 = r28 * r3;
             let r3 = u(22) * r3;
             let r3 = u(23).mul_add(r61, r3);
-            block.put(0, i, r42);
-            block.put(1, i, r47);
-            block.put(2, i, r52);
-            block.put(3, i, r48);
-            block.put(4, i, r53);
-            block.put(5, i, r54);
-            block.put(6, i, r55);
-            block.put(7, i, r56);
-            block.put(8, i, r57);
-            block.put(9, i, r58);
-            block.put(10, i, r60);
-            block.put(11, i, r15);
-            block.put(12, i, r16);
-            block.put(13, i, r62);
-            block.put(14, i, r26);
-            block.put(15, i, r6);
-            block.put(16, i, r19);
-            block.put(17, i, r20);
-            block.put(18, i, r29);
-            block.put(19, i, r30);
-            block.put(20, i, r31);
-            block.put(21, i, r63);
-            block.put(22, i, r18);
-            block.put(23, i, r25);
-            block.put(24, i, r39);
-            block.put(25, i, r40);
-            block.put(26, i, r41);
-            block.put(27, i, r8);
-            block.put(28, i, r7);
-            block.put(29, i, r3);
+            put(29, i, r3);
         }
         },
     );
@@ -3219,7 +3324,9 @@ fn smooth_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<15>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
@@ -3261,55 +3368,59 @@ fn smooth_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r12, r11, r10] = point.place();
             let r2 = samples(6);
+            put(0, i, r2);
             let r1 = samples(7);
+            put(1, i, r1);
             let r0 = samples(13);
+            let texels26 = cubes[0].footprint_at(r3, r4, r5);
+            let texels31 = cubes[1].footprint_at(r15, r14, r13);
+            let texels38 = cubes[2].footprint_at(r15, r14, r13);
+            let texels43 = cubes[2].footprint_at(r12, r11, r10);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels26;
             let [r9, r6, r7, _] = cube.sample_at(&at);
             let r9 = r0 * r9;
+            put(2, i, r9);
             let r6 = r0 * r6;
+            put(3, i, r6);
             let r7 = r0 * r7;
+            put(4, i, r7);
             let r0 = samples(9);
             let cube = cubes[1];
-            let at = cube.footprint_at(r15, r14, r13);
+            let at = texels31;
             let [r5, r4, r3, _] = cube.sample_at(&at);
             let r5 = r0 * r5;
+            put(5, i, r5);
             let r0 = samples(10);
             let r4 = r0 * r4;
+            put(6, i, r4);
             let r0 = samples(11);
             let r3 = r0 * r3;
+            put(7, i, r3);
             let r0 = samples(12);
             let cube = cubes[2];
-            let at = cube.footprint_at(r15, r14, r13);
+            let at = texels38;
             let [r8, r16, r17, _] = cube.sample_at(&at);
             let r8 = r0 * r8;
+            put(8, i, r8);
             let r16 = r0 * r16;
+            put(9, i, r16);
             let r17 = r0 * r17;
+            put(10, i, r17);
             let r0 = samples(8);
             let cube = cubes[2];
-            let at = cube.footprint_at(r12, r11, r10);
+            let at = texels43;
             let [r13, r14, r15, _] = cube.sample_at(&at);
             let r13 = r0 * r13;
+            put(11, i, r13);
             let r14 = r0 * r14;
+            put(12, i, r14);
             let r15 = r0 * r15;
+            put(13, i, r15);
             let r0 = select(r1.ge(lit(1.2e-38)), r1, lit(1.0));
             let r0 = r0.log2();
             let r0 = r0 * lit(0.6931471805599453);
-            block.put(0, i, r2);
-            block.put(1, i, r1);
-            block.put(2, i, r9);
-            block.put(3, i, r6);
-            block.put(4, i, r7);
-            block.put(5, i, r5);
-            block.put(6, i, r4);
-            block.put(7, i, r3);
-            block.put(8, i, r8);
-            block.put(9, i, r16);
-            block.put(10, i, r17);
-            block.put(11, i, r13);
-            block.put(12, i, r14);
-            block.put(13, i, r15);
-            block.put(14, i, r0);
+            put(14, i, r0);
         }
         },
     );
@@ -3325,7 +3436,9 @@ fn smooth_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<14>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<13>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
@@ -3357,13 +3470,21 @@ fn smooth_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             }
             let point = CubePoint::of_unit([r9, r10, r11]);
             let [r15, r14, r13] = point.place();
+            put(3, i, r15);
+            put(4, i, r14);
+            put(5, i, r13);
             let r12 = samples(13);
+            let texels16 = cubes[0].footprint_at(r3, r4, r5);
+            let texels29 = cubes[1].footprint_at(r15, r14, r13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels16;
             let [r6, r7, r8, _] = cube.sample_at(&at);
             let r6 = r12 * r6;
+            put(0, i, r6);
             let r7 = r12 * r7;
+            put(1, i, r7);
             let r8 = r12 * r8;
+            put(2, i, r8);
             let r12 = r0 * r9;
             let r12 = r1.mul_add(r10, r12);
             let r12 = r2.mul_add(r11, r12);
@@ -3373,32 +3494,26 @@ fn smooth_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r2 = (-r11).mul_add(r12, r2);
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r12, r11, r10] = point.place();
+            put(6, i, r12);
+            put(7, i, r11);
+            put(8, i, r10);
             let r2 = samples(9);
             let cube = cubes[1];
-            let at = cube.footprint_at(r15, r14, r13);
+            let at = texels29;
             let [r1, r0, r9, _] = cube.sample_at(&at);
             let r1 = r2 * r1;
+            put(9, i, r1);
             let r2 = samples(10);
             let r0 = r2 * r0;
+            put(10, i, r0);
             let r2 = samples(11);
             let r9 = r2 * r9;
+            put(11, i, r9);
             let r2 = samples(7);
             let r2 = select(r2.ge(lit(1.2e-38)), r2, lit(1.0));
             let r2 = r2.log2();
             let r2 = r2 * lit(0.6931471805599453);
-            block.put(0, i, r6);
-            block.put(1, i, r7);
-            block.put(2, i, r8);
-            block.put(3, i, r15);
-            block.put(4, i, r14);
-            block.put(5, i, r13);
-            block.put(6, i, r12);
-            block.put(7, i, r11);
-            block.put(8, i, r10);
-            block.put(9, i, r1);
-            block.put(10, i, r0);
-            block.put(11, i, r9);
-            block.put(12, i, r2);
+            put(12, i, r2);
         }
         },
     );
@@ -3414,7 +3529,9 @@ fn hazy_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<16>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -3462,58 +3579,62 @@ fn hazy_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r15, r14, r13] = point.place();
             let r2 = samples(9);
+            put(0, i, r2);
             let r1 = samples(10);
+            put(1, i, r1);
             let r0 = samples(16);
+            let texels32 = cubes[0].footprint_at(r3, r4, r5);
+            let texels37 = cubes[1].footprint_at(r6, r8, r10);
+            let texels44 = cubes[2].footprint_at(r6, r8, r10);
+            let texels49 = cubes[2].footprint_at(r15, r14, r13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels32;
             let [r12, r7, r9, _] = cube.sample_at(&at);
             let r12 = r0 * r12;
+            put(2, i, r12);
             let r7 = r0 * r7;
+            put(3, i, r7);
             let r9 = r0 * r9;
+            put(4, i, r9);
             let r5 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels37;
             let [r4, r3, r11, _] = cube.sample_at(&at);
             let r4 = r5 * r4;
+            put(5, i, r4);
             let r5 = samples(13);
             let r3 = r5 * r3;
+            put(6, i, r3);
             let r5 = samples(14);
             let r11 = r5 * r11;
+            put(7, i, r11);
             let r5 = samples(15);
             let cube = cubes[2];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels44;
             let [r16, r17, r18, _] = cube.sample_at(&at);
             let r16 = r5 * r16;
+            put(8, i, r16);
             let r17 = r5 * r17;
+            put(9, i, r17);
             let r18 = r5 * r18;
+            put(10, i, r18);
             let r5 = samples(11);
             let cube = cubes[2];
-            let at = cube.footprint_at(r15, r14, r13);
+            let at = texels49;
             let [r10, r8, r6, r19] = cube.sample_at(&at);
             let r19 = r5 * r19;
             let r19 = r0 * r19;
+            put(11, i, r19);
             let r10 = r5 * r10;
+            put(12, i, r10);
             let r8 = r5 * r8;
+            put(13, i, r8);
             let r6 = r5 * r6;
+            put(14, i, r6);
             let r5 = select(r1.ge(lit(1.2e-38)), r1, lit(1.0));
             let r5 = r5.log2();
             let r5 = r5 * lit(0.6931471805599453);
-            block.put(0, i, r2);
-            block.put(1, i, r1);
-            block.put(2, i, r12);
-            block.put(3, i, r7);
-            block.put(4, i, r9);
-            block.put(5, i, r4);
-            block.put(6, i, r3);
-            block.put(7, i, r11);
-            block.put(8, i, r16);
-            block.put(9, i, r17);
-            block.put(10, i, r18);
-            block.put(11, i, r19);
-            block.put(12, i, r10);
-            block.put(13, i, r8);
-            block.put(14, i, r6);
-            block.put(15, i, r5);
+            put(15, i, r5);
         }
         },
     );
@@ -3529,7 +3650,9 @@ fn hazy_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<16>(i);
@@ -3555,6 +3678,7 @@ fn hazy_value<S: Simd>(simd: S, block: Block<'_>) {
             let r8 = r6.mul_add(u(8), r8);
             let r8 = r3.mul_add(r5, r8);
             let r8 = r2.mul_add(u(9), r8);
+            put(0, i, r8);
             let r2 = kept(13);
             let r5 = kept(3);
             let r3 = r0 * u(10);
@@ -3566,6 +3690,7 @@ fn hazy_value<S: Simd>(simd: S, block: Block<'_>) {
             let r9 = r6.mul_add(u(13), r9);
             let r9 = r5.mul_add(r3, r9);
             let r9 = r2.mul_add(u(14), r9);
+            put(1, i, r9);
             let r2 = kept(14);
             let r3 = kept(4);
             let r0 = r0 * u(15);
@@ -3577,12 +3702,10 @@ fn hazy_value<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = r5.mul_add(u(18), r1);
             let r1 = r3.mul_add(r0, r1);
             let r1 = r2.mul_add(u(19), r1);
+            put(2, i, r1);
             let r2 = kept(11);
             let r2 = r2 * u(20);
-            block.put(0, i, r8);
-            block.put(1, i, r9);
-            block.put(2, i, r1);
-            block.put(3, i, r2);
+            put(3, i, r2);
         }
         },
     );
@@ -3598,7 +3721,9 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<26>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<16>(i);
@@ -3609,6 +3734,7 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = u(2) * r1;
             let r1 = r1.exp2();
             let r2 = kept(12);
+            put(16, i, r2);
             let r3 = kept(2);
             let r4 = kept(0);
             let r5 = lit(1.0) - r4;
@@ -3617,6 +3743,7 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = r5 * r6;
             let r8 = u(5) * r7;
             let r9 = kept(8);
+            put(19, i, r9);
             let r10 = kept(5);
             let r11 = r6.mul_add(u(6), u(7));
             let r12 = r5 * r11;
@@ -3624,10 +3751,13 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r12 = r9.mul_add(u(8), r12);
             let r12 = r3.mul_add(r8, r12);
             let r12 = r2.mul_add(u(9), r12);
+            put(0, i, r12);
             let r8 = kept(13);
+            put(17, i, r8);
             let r13 = kept(3);
             let r14 = r7 * u(10);
             let r15 = kept(9);
+            put(20, i, r15);
             let r16 = kept(6);
             let r17 = r6.mul_add(u(11), u(12));
             let r18 = r5 * r17;
@@ -3635,10 +3765,13 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r18 = r15.mul_add(u(13), r18);
             let r18 = r13.mul_add(r14, r18);
             let r18 = r8.mul_add(u(14), r18);
+            put(1, i, r18);
             let r14 = kept(14);
+            put(18, i, r14);
             let r19 = kept(4);
             let r20 = r7 * u(15);
             let r21 = kept(10);
+            put(21, i, r21);
             let r22 = kept(7);
             let r23 = r6.mul_add(u(16), u(17));
             let r24 = r5 * r23;
@@ -3646,14 +3779,23 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r24 = r21.mul_add(u(18), r24);
             let r24 = r19.mul_add(r20, r24);
             let r24 = r14.mul_add(u(19), r24);
+            put(2, i, r24);
             let r20 = kept(11);
+            put(25, i, r20);
             let r25 = r20 * u(20);
+            put(3, i, r25);
             let r26 = r5 * r10;
+            put(4, i, r26);
             let r27 = r5 * r16;
+            put(5, i, r27);
             let r28 = r5 * r22;
+            put(6, i, r28);
             let r29 = r7 * r10;
+            put(7, i, r29);
             let r30 = r7 * r16;
+            put(8, i, r30);
             let r31 = r7 * r22;
+            put(9, i, r31);
             let r32 = kept(15);
             let r32 = r1 * r32;
             let r32 = select(r0.ge(lit(1.2e-38)), r32, lit(0.0));
@@ -3663,59 +3805,42 @@ fn hazy_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r33 = u(5) * r1;
             let r33 = r3 * r33;
             let r33 = r10.mul_add(r0, r33);
+            put(10, i, r33);
             let r0 = u(11) * r32;
             let r0 = r5 * r0;
             let r34 = u(10) * r1;
             let r34 = r13 * r34;
             let r34 = r16.mul_add(r0, r34);
+            put(11, i, r34);
             let r32 = u(16) * r32;
             let r32 = r5 * r32;
             let r1 = u(15) * r1;
             let r1 = r19 * r1;
             let r1 = r22.mul_add(r32, r1);
+            put(12, i, r1);
             let r32 = r3 * r7;
+            put(13, i, r32);
             let r5 = r7 * r13;
+            put(14, i, r5);
             let r7 = r7 * r19;
+            put(15, i, r7);
             let r4 = r4 - lit(1.0);
             let r11 = r11 * r4;
             let r6 = r6 * r4;
             let r0 = u(5) * r6;
             let r0 = r3 * r0;
             let r0 = r10.mul_add(r11, r0);
+            put(22, i, r0);
             let r17 = r17 * r4;
             let r11 = u(10) * r6;
             let r11 = r13 * r11;
             let r11 = r16.mul_add(r17, r11);
+            put(23, i, r11);
             let r4 = r23 * r4;
             let r6 = u(15) * r6;
             let r6 = r19 * r6;
             let r6 = r22.mul_add(r4, r6);
-            block.put(0, i, r12);
-            block.put(1, i, r18);
-            block.put(2, i, r24);
-            block.put(3, i, r25);
-            block.put(4, i, r26);
-            block.put(5, i, r27);
-            block.put(6, i, r28);
-            block.put(7, i, r29);
-            block.put(8, i, r30);
-            block.put(9, i, r31);
-            block.put(10, i, r33);
-            block.put(11, i, r34);
-            block.put(12, i, r1);
-            block.put(13, i, r32);
-            block.put(14, i, r5);
-            block.put(15, i, r7);
-            block.put(16, i, r2);
-            block.put(17, i, r8);
-            block.put(18, i, r14);
-            block.put(19, i, r9);
-            block.put(20, i, r15);
-            block.put(21, i, r21);
-            block.put(22, i, r0);
-            block.put(23, i, r11);
-            block.put(24, i, r6);
-            block.put(25, i, r20);
+            put(24, i, r6);
         }
         },
     );
@@ -3731,7 +3856,9 @@ fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
@@ -3748,8 +3875,10 @@ fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(2) * r7;
             let r7 = r7.exp2();
             let r8 = samples(0);
+            let texels12 = cubes[0].footprint_at(r0, r1, r2);
+            let texels22 = cubes[0].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels12;
             let [r9, r10, r11, r12] = cube.sample_at(&at);
             let r9 = r8 * r9;
             let r2 = kept(0);
@@ -3761,7 +3890,7 @@ fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = u(5) * r6;
             let r13 = samples(8);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels22;
             let [r14, r15, r16, _] = cube.sample_at(&at);
             let r14 = r13 * r14;
             let r5 = kept(9);
@@ -3771,6 +3900,7 @@ fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = r14.mul_add(u(8), r4);
             let r4 = r2.mul_add(r0, r4);
             let r4 = r9.mul_add(u(9), r4);
+            put(0, i, r4);
             let r10 = r8 * r10;
             let r9 = kept(1);
             let r0 = r6 * u(10);
@@ -3782,6 +3912,7 @@ fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r14 = r15.mul_add(u(13), r14);
             let r14 = r9.mul_add(r0, r14);
             let r14 = r10.mul_add(u(14), r14);
+            put(1, i, r14);
             let r11 = r8 * r11;
             let r10 = kept(2);
             let r6 = r6 * u(15);
@@ -3793,14 +3924,12 @@ fn hazy_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = r16.mul_add(u(18), r7);
             let r7 = r10.mul_add(r6, r7);
             let r7 = r11.mul_add(u(19), r7);
+            put(2, i, r7);
             let r11 = samples(16);
             let r12 = r8 * r12;
             let r12 = r11 * r12;
             let r12 = r12 * u(20);
-            block.put(0, i, r4);
-            block.put(1, i, r14);
-            block.put(2, i, r7);
-            block.put(3, i, r12);
+            put(3, i, r12);
         }
         },
     );
@@ -3816,7 +3945,9 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<13>(i);
@@ -3833,10 +3964,15 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(2) * r7;
             let r7 = r7.exp2();
             let r8 = samples(0);
+            let texels12 = cubes[0].footprint_at(r0, r1, r2);
+            let texels22 = cubes[0].footprint_at(r3, r4, r5);
+            let texels99 = cubes[1].footprint_at(r0, r1, r2);
+            let texels101 = cubes[1].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels12;
             let [r9, r10, r11, r12] = cube.sample_at(&at);
             let r9 = r8 * r9;
+            put(16, i, r9);
             let r13 = kept(0);
             let r14 = samples(5);
             let r15 = lit(1.0) - r14;
@@ -3846,9 +3982,10 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r18 = u(5) * r17;
             let r19 = samples(8);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels22;
             let [r20, r21, r22, _] = cube.sample_at(&at);
             let r20 = r19 * r20;
+            put(19, i, r20);
             let r23 = kept(9);
             let r24 = r16.mul_add(u(6), u(7));
             let r25 = r15 * r24;
@@ -3856,10 +3993,13 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r25 = r20.mul_add(u(8), r25);
             let r25 = r13.mul_add(r18, r25);
             let r25 = r9.mul_add(u(9), r25);
+            put(0, i, r25);
             let r10 = r8 * r10;
+            put(17, i, r10);
             let r18 = kept(1);
             let r26 = r17 * u(10);
             let r21 = r19 * r21;
+            put(20, i, r21);
             let r27 = kept(10);
             let r28 = r16.mul_add(u(11), u(12));
             let r29 = r15 * r28;
@@ -3867,10 +4007,13 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r29 = r21.mul_add(u(13), r29);
             let r29 = r18.mul_add(r26, r29);
             let r29 = r10.mul_add(u(14), r29);
+            put(1, i, r29);
             let r11 = r8 * r11;
+            put(18, i, r11);
             let r26 = kept(2);
             let r30 = r17 * u(15);
             let r22 = r19 * r22;
+            put(21, i, r22);
             let r31 = kept(11);
             let r32 = r16.mul_add(u(16), u(17));
             let r33 = r15 * r32;
@@ -3878,16 +4021,25 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r33 = r22.mul_add(u(18), r33);
             let r33 = r26.mul_add(r30, r33);
             let r33 = r11.mul_add(u(19), r33);
+            put(2, i, r33);
             let r30 = samples(16);
             let r12 = r8 * r12;
             let r12 = r30 * r12;
+            put(29, i, r12);
             let r34 = r12 * u(20);
+            put(3, i, r34);
             let r35 = r15 * r23;
+            put(4, i, r35);
             let r36 = r15 * r27;
+            put(5, i, r36);
             let r37 = r15 * r31;
+            put(6, i, r37);
             let r38 = r17 * r23;
+            put(7, i, r38);
             let r39 = r17 * r27;
+            put(8, i, r39);
             let r40 = r17 * r31;
+            put(9, i, r40);
             let r41 = kept(12);
             let r41 = r7 * r41;
             let r41 = select(r6.ge(lit(1.2e-38)), r41, lit(0.0));
@@ -3897,84 +4049,67 @@ fn hazy_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r42 = u(5) * r7;
             let r42 = r13 * r42;
             let r42 = r23.mul_add(r6, r42);
+            put(10, i, r42);
             let r6 = u(11) * r41;
             let r6 = r15 * r6;
             let r43 = u(10) * r7;
             let r43 = r18 * r43;
             let r43 = r27.mul_add(r6, r43);
+            put(11, i, r43);
             let r41 = u(16) * r41;
             let r41 = r15 * r41;
             let r7 = u(15) * r7;
             let r7 = r26 * r7;
             let r7 = r31.mul_add(r41, r7);
+            put(12, i, r7);
             let r41 = r13 * r17;
+            put(13, i, r41);
             let r15 = r17 * r18;
+            put(14, i, r15);
             let r17 = r17 * r26;
+            put(15, i, r17);
             let r14 = r14 - lit(1.0);
             let r24 = r24 * r14;
             let r16 = r16 * r14;
             let r6 = u(5) * r16;
             let r6 = r13 * r6;
             let r6 = r23.mul_add(r24, r6);
+            put(22, i, r6);
             let r28 = r28 * r14;
             let r24 = u(10) * r16;
             let r24 = r18 * r24;
             let r24 = r27.mul_add(r28, r24);
+            put(23, i, r24);
             let r14 = r32 * r14;
             let r16 = u(15) * r16;
             let r16 = r26 * r16;
             let r16 = r31.mul_add(r14, r16);
+            put(24, i, r16);
             let cube = cubes[1];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels99;
             let [r14, r31, r26, r32] = cube.sample_at(&at);
             let r14 = r8 * r14;
             let cube = cubes[1];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels101;
             let [r2, r1, r0, _] = cube.sample_at(&at);
             let r2 = r19 * r2;
             let r2 = u(8) * r2;
             let r2 = u(9).mul_add(r14, r2);
+            put(25, i, r2);
             let r31 = r8 * r31;
             let r1 = r19 * r1;
             let r1 = u(13) * r1;
             let r1 = u(14).mul_add(r31, r1);
+            put(26, i, r1);
             let r26 = r8 * r26;
             let r0 = r19 * r0;
             let r0 = u(18) * r0;
             let r0 = u(19).mul_add(r26, r0);
+            put(27, i, r0);
             let r32 = r8 * r32;
             let r32 = r30 * r32;
             let r32 = u(20) * r32;
-            block.put(0, i, r25);
-            block.put(1, i, r29);
-            block.put(2, i, r33);
-            block.put(3, i, r34);
-            block.put(4, i, r35);
-            block.put(5, i, r36);
-            block.put(6, i, r37);
-            block.put(7, i, r38);
-            block.put(8, i, r39);
-            block.put(9, i, r40);
-            block.put(10, i, r42);
-            block.put(11, i, r43);
-            block.put(12, i, r7);
-            block.put(13, i, r41);
-            block.put(14, i, r15);
-            block.put(15, i, r17);
-            block.put(16, i, r9);
-            block.put(17, i, r10);
-            block.put(18, i, r11);
-            block.put(19, i, r20);
-            block.put(20, i, r21);
-            block.put(21, i, r22);
-            block.put(22, i, r6);
-            block.put(23, i, r24);
-            block.put(24, i, r16);
-            block.put(25, i, r2);
-            block.put(26, i, r1);
-            block.put(27, i, r0);
-            block.put(28, i, r32);
-            block.put(29, i, r12);
+            put(28, i, r32);
         }
         },
     );
@@ -3990,7 +4125,9 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<21>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
@@ -4043,8 +4180,11 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = u(4) * r10;
             let r10 = r10.exp2();
             let r9 = samples(0);
+            let texels34 = cubes[0].footprint_at(r0, r2, r4);
+            let texels44 = cubes[0].footprint_at(r8, r7, r6);
+            let texels47 = cubes[1].footprint_at(r8, r7, r6);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r2, r4);
+            let at = texels34;
             let [r12, r1, r3, r5] = cube.sample_at(&at);
             let r12 = r9 * r12;
             let r4 = kept(0);
@@ -4056,12 +4196,12 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = u(7) * r11;
             let r13 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels44;
             let [r14, r15, r16, _] = cube.sample_at(&at);
             let r14 = r13 * r14;
             let r17 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels47;
             let [r18, r19, r20, _] = cube.sample_at(&at);
             let r18 = r17 * r18;
             let r17 = r10.mul_add(u(8), u(9));
@@ -4070,6 +4210,7 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r17 = r14.mul_add(u(10), r17);
             let r17 = r4.mul_add(r0, r17);
             let r17 = r12.mul_add(u(11), r17);
+            put(0, i, r17);
             let r1 = r9 * r1;
             let r12 = kept(1);
             let r0 = r11 * u(12);
@@ -4082,6 +4223,7 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = r15.mul_add(u(15), r4);
             let r4 = r12.mul_add(r0, r4);
             let r4 = r1.mul_add(u(16), r4);
+            put(1, i, r4);
             let r3 = r9 * r3;
             let r1 = kept(2);
             let r11 = r11 * u(17);
@@ -4094,14 +4236,12 @@ fn hazy_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r16.mul_add(u(20), r10);
             let r10 = r1.mul_add(r11, r10);
             let r10 = r3.mul_add(u(21), r10);
+            put(2, i, r10);
             let r3 = samples(19);
             let r5 = r9 * r5;
             let r5 = r3 * r5;
             let r5 = r5 * u(22);
-            block.put(0, i, r17);
-            block.put(1, i, r4);
-            block.put(2, i, r10);
-            block.put(3, i, r5);
+            put(3, i, r5);
         }
         },
     );
@@ -4117,7 +4257,9 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<21>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
@@ -4186,10 +4328,14 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = u(4) * r16;
             let r16 = r16.exp2();
             let r15 = samples(0);
+            let texels47 = cubes[0].footprint_at(r0, r1, r4);
+            let texels57 = cubes[0].footprint_at(r9, r10, r11);
+            let texels60 = cubes[1].footprint_at(r9, r10, r11);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r4);
+            let at = texels47;
             let ([r14, r13, r12, r3], [r5, r2, r19, r20]) = cube.sample_with_slope(&at, cube.texels([r7, r8]));
             let r14 = r15 * r14;
+            put(16, i, r14);
             let r8 = kept(0);
             let r7 = samples(11);
             let r4 = lit(1.0) - r7;
@@ -4199,12 +4345,13 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r21 = u(7) * r0;
             let r22 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels57;
             let ([r23, r24, r25, _], [r26, r27, r28, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r23 = r22 * r23;
+            put(19, i, r23);
             let r29 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels60;
             let ([r30, r31, r32, _], [r33, r34, r35, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r30 = r29 * r30;
             let r6 = r1.mul_add(u(8), u(9));
@@ -4213,10 +4360,13 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = r23.mul_add(u(10), r11);
             let r11 = r8.mul_add(r21, r11);
             let r11 = r14.mul_add(u(11), r11);
+            put(0, i, r11);
             let r13 = r15 * r13;
+            put(17, i, r13);
             let r21 = kept(1);
             let r10 = r0 * u(12);
             let r24 = r22 * r24;
+            put(20, i, r24);
             let r9 = samples(16);
             let r31 = r9 * r31;
             let r36 = r1.mul_add(u(13), u(14));
@@ -4225,10 +4375,13 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r38 = r24.mul_add(u(15), r38);
             let r38 = r21.mul_add(r10, r38);
             let r38 = r13.mul_add(u(16), r38);
+            put(1, i, r38);
             let r12 = r15 * r12;
+            put(18, i, r12);
             let r10 = kept(2);
             let r39 = r0 * u(17);
             let r25 = r22 * r25;
+            put(21, i, r25);
             let r40 = samples(18);
             let r32 = r40 * r32;
             let r41 = r1.mul_add(u(18), u(19));
@@ -4237,16 +4390,25 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r43 = r25.mul_add(u(20), r43);
             let r43 = r10.mul_add(r39, r43);
             let r43 = r12.mul_add(u(21), r43);
+            put(2, i, r43);
             let r39 = samples(19);
             let r3 = r15 * r3;
             let r3 = r39 * r3;
+            put(29, i, r3);
             let r44 = r3 * u(22);
+            put(3, i, r44);
             let r45 = r4 * r30;
+            put(4, i, r45);
             let r46 = r4 * r31;
+            put(5, i, r46);
             let r47 = r4 * r32;
+            put(6, i, r47);
             let r48 = r0 * r30;
+            put(7, i, r48);
             let r49 = r0 * r31;
+            put(8, i, r49);
             let r50 = r0 * r32;
+            put(9, i, r50);
             let r51 = kept(3);
             let r51 = r16 * r51;
             let r51 = select(r17.ge(lit(1.2e-38)), r51, lit(0.0));
@@ -4256,84 +4418,67 @@ fn hazy_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r52 = u(7) * r16;
             let r52 = r8 * r52;
             let r52 = r30.mul_add(r17, r52);
+            put(10, i, r52);
             let r17 = u(13) * r51;
             let r17 = r4 * r17;
             let r53 = u(12) * r16;
             let r53 = r21 * r53;
             let r53 = r31.mul_add(r17, r53);
+            put(11, i, r53);
             let r51 = u(18) * r51;
             let r51 = r4 * r51;
             let r16 = u(17) * r16;
             let r16 = r10 * r16;
             let r16 = r32.mul_add(r51, r16);
+            put(12, i, r16);
             let r51 = r8 * r0;
+            put(13, i, r51);
             let r4 = r0 * r21;
+            put(14, i, r4);
             let r0 = r0 * r10;
+            put(15, i, r0);
             let r7 = r7 - lit(1.0);
             let r6 = r6 * r7;
             let r1 = r1 * r7;
             let r17 = u(7) * r1;
             let r17 = r8 * r17;
             let r17 = r30.mul_add(r6, r17);
+            put(22, i, r17);
             let r36 = r36 * r7;
             let r6 = u(12) * r1;
             let r6 = r21 * r6;
             let r6 = r31.mul_add(r36, r6);
+            put(23, i, r6);
             let r7 = r41 * r7;
             let r1 = u(17) * r1;
             let r1 = r10 * r1;
             let r1 = r32.mul_add(r7, r1);
+            put(24, i, r1);
             let r5 = r15 * r5;
             let r26 = r22 * r26;
             let r33 = r29 * r33;
             let r33 = r18 * r33;
             let r33 = u(10).mul_add(r26, r33);
             let r33 = u(11).mul_add(r5, r33);
+            put(25, i, r33);
             let r2 = r15 * r2;
             let r27 = r22 * r27;
             let r34 = r9 * r34;
             let r34 = r37 * r34;
             let r34 = u(15).mul_add(r27, r34);
             let r34 = u(16).mul_add(r2, r34);
+            put(26, i, r34);
             let r19 = r15 * r19;
             let r28 = r22 * r28;
             let r35 = r40 * r35;
             let r35 = r42 * r35;
             let r35 = u(20).mul_add(r28, r35);
             let r35 = u(21).mul_add(r19, r35);
+            put(27, i, r35);
             let r20 = r15 * r20;
             let r20 = r39 * r20;
             let r20 = u(22) * r20;
-            block.put(0, i, r11);
-            block.put(1, i, r38);
-            block.put(2, i, r43);
-            block.put(3, i, r44);
-            block.put(4, i, r45);
-            block.put(5, i, r46);
-            block.put(6, i, r47);
-            block.put(7, i, r48);
-            block.put(8, i, r49);
-            block.put(9, i, r50);
-            block.put(10, i, r52);
-            block.put(11, i, r53);
-            block.put(12, i, r16);
-            block.put(13, i, r51);
-            block.put(14, i, r4);
-            block.put(15, i, r0);
-            block.put(16, i, r14);
-            block.put(17, i, r13);
-            block.put(18, i, r12);
-            block.put(19, i, r23);
-            block.put(20, i, r24);
-            block.put(21, i, r25);
-            block.put(22, i, r17);
-            block.put(23, i, r6);
-            block.put(24, i, r1);
-            block.put(25, i, r33);
-            block.put(26, i, r34);
-            block.put(27, i, r35);
-            block.put(28, i, r20);
-            block.put(29, i, r3);
+            put(28, i, r20);
         }
         },
     );
@@ -4349,7 +4494,9 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<21>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<34>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<4>(i);
@@ -4418,10 +4565,16 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = u(4) * r16;
             let r16 = r16.exp2();
             let r15 = samples(0);
+            let texels47 = cubes[0].footprint_at(r0, r1, r4);
+            let texels57 = cubes[0].footprint_at(r9, r10, r11);
+            let texels60 = cubes[1].footprint_at(r9, r10, r11);
+            let texels159 = cubes[2].footprint_at(r0, r1, r4);
+            let texels161 = cubes[2].footprint_at(r9, r10, r11);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r4);
+            let at = texels47;
             let ([r14, r13, r12, r3], [r5, r2, r19, r20]) = cube.sample_with_slope(&at, cube.texels([r7, r8]));
             let r14 = r15 * r14;
+            put(16, i, r14);
             let r8 = kept(0);
             let r7 = samples(11);
             let r21 = lit(1.0) - r7;
@@ -4431,12 +4584,13 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r24 = u(7) * r23;
             let r25 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels57;
             let ([r26, r27, r28, _], [r29, r30, r31, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r26 = r25 * r26;
+            put(19, i, r26);
             let r32 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels60;
             let ([r33, r34, r35, _], [r36, r37, r38, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r33 = r32 * r33;
             let r6 = r22.mul_add(u(8), u(9));
@@ -4445,10 +4599,13 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r39 = r26.mul_add(u(10), r39);
             let r39 = r8.mul_add(r24, r39);
             let r39 = r14.mul_add(u(11), r39);
+            put(0, i, r39);
             let r13 = r15 * r13;
+            put(17, i, r13);
             let r24 = kept(1);
             let r40 = r23 * u(12);
             let r27 = r25 * r27;
+            put(20, i, r27);
             let r41 = samples(16);
             let r34 = r41 * r34;
             let r42 = r22.mul_add(u(13), u(14));
@@ -4457,10 +4614,13 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r44 = r27.mul_add(u(15), r44);
             let r44 = r24.mul_add(r40, r44);
             let r44 = r13.mul_add(u(16), r44);
+            put(1, i, r44);
             let r12 = r15 * r12;
+            put(18, i, r12);
             let r40 = kept(2);
             let r45 = r23 * u(17);
             let r28 = r25 * r28;
+            put(21, i, r28);
             let r46 = samples(18);
             let r35 = r46 * r35;
             let r47 = r22.mul_add(u(18), u(19));
@@ -4469,16 +4629,25 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r49 = r28.mul_add(u(20), r49);
             let r49 = r40.mul_add(r45, r49);
             let r49 = r12.mul_add(u(21), r49);
+            put(2, i, r49);
             let r45 = samples(19);
             let r3 = r15 * r3;
             let r3 = r45 * r3;
+            put(33, i, r3);
             let r50 = r3 * u(22);
+            put(3, i, r50);
             let r51 = r21 * r33;
+            put(4, i, r51);
             let r52 = r21 * r34;
+            put(5, i, r52);
             let r53 = r21 * r35;
+            put(6, i, r53);
             let r54 = r23 * r33;
+            put(7, i, r54);
             let r55 = r23 * r34;
+            put(8, i, r55);
             let r56 = r23 * r35;
+            put(9, i, r56);
             let r57 = kept(3);
             let r57 = r16 * r57;
             let r57 = select(r17.ge(lit(1.2e-38)), r57, lit(0.0));
@@ -4488,109 +4657,92 @@ fn hazy_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r58 = u(7) * r16;
             let r58 = r8 * r58;
             let r58 = r33.mul_add(r17, r58);
+            put(10, i, r58);
             let r17 = u(13) * r57;
             let r17 = r21 * r17;
             let r59 = u(12) * r16;
             let r59 = r24 * r59;
             let r59 = r34.mul_add(r17, r59);
+            put(11, i, r59);
             let r57 = u(18) * r57;
             let r57 = r21 * r57;
             let r16 = u(17) * r16;
             let r16 = r40 * r16;
             let r16 = r35.mul_add(r57, r16);
+            put(12, i, r16);
             let r57 = r8 * r23;
+            put(13, i, r57);
             let r21 = r23 * r24;
+            put(14, i, r21);
             let r23 = r23 * r40;
+            put(15, i, r23);
             let r7 = r7 - lit(1.0);
             let r6 = r6 * r7;
             let r22 = r22 * r7;
             let r17 = u(7) * r22;
             let r17 = r8 * r17;
             let r17 = r33.mul_add(r6, r17);
+            put(22, i, r17);
             let r42 = r42 * r7;
             let r6 = u(12) * r22;
             let r6 = r24 * r6;
             let r6 = r34.mul_add(r42, r6);
+            put(23, i, r6);
             let r7 = r47 * r7;
             let r22 = u(17) * r22;
             let r22 = r40 * r22;
             let r22 = r35.mul_add(r7, r22);
+            put(24, i, r22);
             let r5 = r15 * r5;
             let r29 = r25 * r29;
             let r36 = r32 * r36;
             let r36 = r18 * r36;
             let r36 = u(10).mul_add(r29, r36);
             let r36 = u(11).mul_add(r5, r36);
+            put(25, i, r36);
             let r2 = r15 * r2;
             let r30 = r25 * r30;
             let r37 = r41 * r37;
             let r37 = r43 * r37;
             let r37 = u(15).mul_add(r30, r37);
             let r37 = u(16).mul_add(r2, r37);
+            put(26, i, r37);
             let r19 = r15 * r19;
             let r31 = r25 * r31;
             let r38 = r46 * r38;
             let r38 = r48 * r38;
             let r38 = u(20).mul_add(r31, r38);
             let r38 = u(21).mul_add(r19, r38);
+            put(27, i, r38);
             let r20 = r15 * r20;
             let r20 = r45 * r20;
             let r20 = u(22) * r20;
+            put(28, i, r20);
             let cube = cubes[2];
-            let at = cube.footprint_at(r0, r1, r4);
+            let at = texels159;
             let [r19, r31, r48, r46] = cube.sample_at(&at);
             let r19 = r15 * r19;
             let cube = cubes[2];
-            let at = cube.footprint_at(r9, r10, r11);
+            let at = texels161;
             let [r4, r1, r0, _] = cube.sample_at(&at);
             let r4 = r25 * r4;
             let r4 = u(10) * r4;
             let r4 = u(11).mul_add(r19, r4);
+            put(29, i, r4);
             let r31 = r15 * r31;
             let r1 = r25 * r1;
             let r1 = u(15) * r1;
             let r1 = u(16).mul_add(r31, r1);
+            put(30, i, r1);
             let r48 = r15 * r48;
             let r0 = r25 * r0;
             let r0 = u(20) * r0;
             let r0 = u(21).mul_add(r48, r0);
+            put(31, i, r0);
             let r46 = r15 * r46;
             let r46 = r45 * r46;
             let r46 = u(22) * r46;
-            block.put(0, i, r39);
-            block.put(1, i, r44);
-            block.put(2, i, r49);
-            block.put(3, i, r50);
-            block.put(4, i, r51);
-            block.put(5, i, r52);
-            block.put(6, i, r53);
-            block.put(7, i, r54);
-            block.put(8, i, r55);
-            block.put(9, i, r56);
-            block.put(10, i, r58);
-            block.put(11, i, r59);
-            block.put(12, i, r16);
-            block.put(13, i, r57);
-            block.put(14, i, r21);
-            block.put(15, i, r23);
-            block.put(16, i, r14);
-            block.put(17, i, r13);
-            block.put(18, i, r12);
-            block.put(19, i, r26);
-            block.put(20, i, r27);
-            block.put(21, i, r28);
-            block.put(22, i, r17);
-            block.put(23, i, r6);
-            block.put(24, i, r22);
-            block.put(25, i, r36);
-            block.put(26, i, r37);
-            block.put(27, i, r38);
-            block.put(28, i, r20);
-            block.put(29, i, r4);
-            block.put(30, i, r1);
-            block.put(31, i, r0);
-            block.put(32, i, r46);
-            block.put(33, i, r3);
+            put(32, i, r46);
         }
         },
     );
@@ -4606,7 +4758,9 @@ fn hazy_bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<16>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -4654,60 +4808,64 @@ fn hazy_bumped_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r1, r2]);
             let [r7, r14, r13] = point.place();
             let r2 = samples(9);
+            put(0, i, r2);
             let r1 = samples(15);
+            let texels31 = cubes[0].footprint_at(r3, r4, r5);
+            let texels42 = cubes[1].footprint_at(r6, r8, r10);
+            let texels49 = cubes[2].footprint_at(r6, r8, r10);
+            let texels54 = cubes[2].footprint_at(r7, r14, r13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels31;
             let [r0, r12, r9, _] = cube.sample_at(&at);
             let r0 = r1 * r0;
+            put(1, i, r0);
             let r12 = r1 * r12;
+            put(2, i, r12);
             let r9 = r1 * r9;
+            put(3, i, r9);
             let r15 = r15.abs();
             let r15 = lit(1.0).min(r15);
             let r15 = lit(1.0) - r15;
             let r5 = binary(Binary::GreaterEqual, r15, lit(1.2e-38));
+            put(4, i, r5);
             let r15 = select(r15.ge(lit(1.2e-38)), r15, lit(1.0));
             let r15 = r15.log2();
+            put(5, i, r15);
             let r4 = samples(11);
             let cube = cubes[1];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels42;
             let [r3, r11, r16, _] = cube.sample_at(&at);
             let r3 = r4 * r3;
+            put(6, i, r3);
             let r4 = samples(12);
             let r11 = r4 * r11;
+            put(7, i, r11);
             let r4 = samples(13);
             let r16 = r4 * r16;
+            put(8, i, r16);
             let r4 = samples(14);
             let cube = cubes[2];
-            let at = cube.footprint_at(r6, r8, r10);
+            let at = texels49;
             let [r17, r18, r19, _] = cube.sample_at(&at);
             let r17 = r4 * r17;
+            put(9, i, r17);
             let r18 = r4 * r18;
+            put(10, i, r18);
             let r19 = r4 * r19;
+            put(11, i, r19);
             let r4 = samples(10);
             let cube = cubes[2];
-            let at = cube.footprint_at(r7, r14, r13);
+            let at = texels54;
             let [r10, r8, r6, r20] = cube.sample_at(&at);
             let r20 = r4 * r20;
             let r20 = r1 * r20;
+            put(12, i, r20);
             let r10 = r4 * r10;
+            put(13, i, r10);
             let r8 = r4 * r8;
+            put(14, i, r8);
             let r6 = r4 * r6;
-            block.put(0, i, r2);
-            block.put(1, i, r0);
-            block.put(2, i, r12);
-            block.put(3, i, r9);
-            block.put(4, i, r5);
-            block.put(5, i, r15);
-            block.put(6, i, r3);
-            block.put(7, i, r11);
-            block.put(8, i, r16);
-            block.put(9, i, r17);
-            block.put(10, i, r18);
-            block.put(11, i, r19);
-            block.put(12, i, r20);
-            block.put(13, i, r10);
-            block.put(14, i, r8);
-            block.put(15, i, r6);
+            put(15, i, r6);
         }
         },
     );
@@ -4723,7 +4881,9 @@ fn hazy_bumped_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<16>(i);
@@ -4748,6 +4908,7 @@ fn hazy_bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r8 = r6.mul_add(u(7), r8);
             let r8 = r2.mul_add(r5, r8);
             let r8 = r1.mul_add(u(8), r8);
+            put(0, i, r8);
             let r1 = kept(14);
             let r5 = kept(2);
             let r2 = r4 * u(9);
@@ -4759,6 +4920,7 @@ fn hazy_bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r9 = r6.mul_add(u(12), r9);
             let r9 = r5.mul_add(r2, r9);
             let r9 = r1.mul_add(u(13), r9);
+            put(1, i, r9);
             let r1 = kept(15);
             let r2 = kept(3);
             let r4 = r4 * u(14);
@@ -4770,12 +4932,10 @@ fn hazy_bumped_value<S: Simd>(simd: S, block: Block<'_>) {
             let r0 = r5.mul_add(u(17), r0);
             let r0 = r2.mul_add(r4, r0);
             let r0 = r1.mul_add(u(18), r0);
+            put(2, i, r0);
             let r1 = kept(12);
             let r1 = r1 * u(19);
-            block.put(0, i, r8);
-            block.put(1, i, r9);
-            block.put(2, i, r0);
-            block.put(3, i, r1);
+            put(3, i, r1);
         }
         },
     );
@@ -4791,7 +4951,9 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<26>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<16>(i);
@@ -4800,6 +4962,7 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r1 = u(0) * r0;
             let r1 = r1.exp2();
             let r2 = kept(13);
+            put(16, i, r2);
             let r3 = kept(1);
             let r4 = kept(0);
             let r5 = lit(1.0) - r4;
@@ -4809,6 +4972,7 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r8 = r5 * r7;
             let r9 = u(4) * r8;
             let r10 = kept(9);
+            put(19, i, r10);
             let r11 = kept(6);
             let r12 = r7.mul_add(u(5), u(6));
             let r13 = r5 * r12;
@@ -4816,10 +4980,13 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r10.mul_add(u(7), r13);
             let r13 = r3.mul_add(r9, r13);
             let r13 = r2.mul_add(u(8), r13);
+            put(0, i, r13);
             let r9 = kept(14);
+            put(17, i, r9);
             let r14 = kept(2);
             let r15 = r8 * u(9);
             let r16 = kept(10);
+            put(20, i, r16);
             let r17 = kept(7);
             let r18 = r7.mul_add(u(10), u(11));
             let r19 = r5 * r18;
@@ -4827,10 +4994,13 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = r16.mul_add(u(12), r19);
             let r19 = r14.mul_add(r15, r19);
             let r19 = r9.mul_add(u(13), r19);
+            put(1, i, r19);
             let r15 = kept(15);
+            put(18, i, r15);
             let r20 = kept(3);
             let r21 = r8 * u(14);
             let r22 = kept(11);
+            put(21, i, r22);
             let r23 = kept(8);
             let r24 = r7.mul_add(u(15), u(16));
             let r25 = r5 * r24;
@@ -4838,14 +5008,23 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r25 = r22.mul_add(u(17), r25);
             let r25 = r20.mul_add(r21, r25);
             let r25 = r15.mul_add(u(18), r25);
+            put(2, i, r25);
             let r21 = kept(12);
+            put(25, i, r21);
             let r26 = r21 * u(19);
+            put(3, i, r26);
             let r27 = r5 * r11;
+            put(4, i, r27);
             let r28 = r5 * r17;
+            put(5, i, r28);
             let r29 = r5 * r23;
+            put(6, i, r29);
             let r30 = r8 * r11;
+            put(7, i, r30);
             let r31 = r8 * r17;
+            put(8, i, r31);
             let r32 = r8 * r23;
+            put(9, i, r32);
             let r0 = r0 * lit(0.6931471805599453);
             let r0 = r1 * r0;
             let r0 = select(r6.ge(lit(0.5)), r0, lit(0.0));
@@ -4855,59 +5034,42 @@ fn hazy_bumped_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r33 = u(4) * r1;
             let r33 = r3 * r33;
             let r33 = r11.mul_add(r6, r33);
+            put(10, i, r33);
             let r6 = u(10) * r0;
             let r6 = r5 * r6;
             let r34 = u(9) * r1;
             let r34 = r14 * r34;
             let r34 = r17.mul_add(r6, r34);
+            put(11, i, r34);
             let r0 = u(15) * r0;
             let r0 = r5 * r0;
             let r1 = u(14) * r1;
             let r1 = r20 * r1;
             let r1 = r23.mul_add(r0, r1);
+            put(12, i, r1);
             let r0 = r3 * r8;
+            put(13, i, r0);
             let r5 = r8 * r14;
+            put(14, i, r5);
             let r8 = r8 * r20;
+            put(15, i, r8);
             let r4 = r4 - lit(1.0);
             let r12 = r12 * r4;
             let r7 = r7 * r4;
             let r6 = u(4) * r7;
             let r6 = r3 * r6;
             let r6 = r11.mul_add(r12, r6);
+            put(22, i, r6);
             let r18 = r18 * r4;
             let r12 = u(9) * r7;
             let r12 = r14 * r12;
             let r12 = r17.mul_add(r18, r12);
+            put(23, i, r12);
             let r4 = r24 * r4;
             let r7 = u(14) * r7;
             let r7 = r20 * r7;
             let r7 = r23.mul_add(r4, r7);
-            block.put(0, i, r13);
-            block.put(1, i, r19);
-            block.put(2, i, r25);
-            block.put(3, i, r26);
-            block.put(4, i, r27);
-            block.put(5, i, r28);
-            block.put(6, i, r29);
-            block.put(7, i, r30);
-            block.put(8, i, r31);
-            block.put(9, i, r32);
-            block.put(10, i, r33);
-            block.put(11, i, r34);
-            block.put(12, i, r1);
-            block.put(13, i, r0);
-            block.put(14, i, r5);
-            block.put(15, i, r8);
-            block.put(16, i, r2);
-            block.put(17, i, r9);
-            block.put(18, i, r15);
-            block.put(19, i, r10);
-            block.put(20, i, r16);
-            block.put(21, i, r22);
-            block.put(22, i, r6);
-            block.put(23, i, r12);
-            block.put(24, i, r7);
-            block.put(25, i, r21);
+            put(24, i, r7);
         }
         },
     );
@@ -4923,7 +5085,9 @@ fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
@@ -4938,8 +5102,10 @@ fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = u(0) * r6;
             let r6 = r6.exp2();
             let r7 = samples(0);
+            let texels10 = cubes[0].footprint_at(r0, r1, r2);
+            let texels21 = cubes[0].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels10;
             let [r8, r9, r10, r11] = cube.sample_at(&at);
             let r8 = r7 * r8;
             let r2 = kept(0);
@@ -4952,7 +5118,7 @@ fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r12 = u(4) * r0;
             let r13 = samples(9);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels21;
             let [r14, r15, r16, _] = cube.sample_at(&at);
             let r14 = r13 * r14;
             let r5 = kept(11);
@@ -4962,6 +5128,7 @@ fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = r14.mul_add(u(7), r4);
             let r4 = r2.mul_add(r12, r4);
             let r4 = r8.mul_add(u(8), r4);
+            put(0, i, r4);
             let r9 = r7 * r9;
             let r8 = kept(1);
             let r12 = r0 * u(9);
@@ -4973,6 +5140,7 @@ fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r14 = r15.mul_add(u(12), r14);
             let r14 = r8.mul_add(r12, r14);
             let r14 = r9.mul_add(u(13), r14);
+            put(1, i, r14);
             let r10 = r7 * r10;
             let r9 = kept(2);
             let r0 = r0 * u(14);
@@ -4984,14 +5152,12 @@ fn hazy_bumped_lobe_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = r16.mul_add(u(17), r6);
             let r6 = r9.mul_add(r0, r6);
             let r6 = r10.mul_add(u(18), r6);
+            put(2, i, r6);
             let r10 = samples(17);
             let r11 = r7 * r11;
             let r11 = r10 * r11;
             let r11 = r11 * u(19);
-            block.put(0, i, r4);
-            block.put(1, i, r14);
-            block.put(2, i, r6);
-            block.put(3, i, r11);
+            put(3, i, r11);
         }
         },
     );
@@ -5007,7 +5173,9 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<18>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<14>(i);
@@ -5022,10 +5190,15 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(0) * r6;
             let r7 = r7.exp2();
             let r8 = samples(0);
+            let texels10 = cubes[0].footprint_at(r0, r1, r2);
+            let texels21 = cubes[0].footprint_at(r3, r4, r5);
+            let texels98 = cubes[1].footprint_at(r0, r1, r2);
+            let texels100 = cubes[1].footprint_at(r3, r4, r5);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels10;
             let [r9, r10, r11, r12] = cube.sample_at(&at);
             let r9 = r8 * r9;
+            put(16, i, r9);
             let r13 = kept(0);
             let r14 = samples(5);
             let r15 = lit(1.0) - r14;
@@ -5036,9 +5209,10 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = u(4) * r18;
             let r20 = samples(9);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels21;
             let [r21, r22, r23, _] = cube.sample_at(&at);
             let r21 = r20 * r21;
+            put(19, i, r21);
             let r24 = kept(11);
             let r25 = r17.mul_add(u(5), u(6));
             let r26 = r15 * r25;
@@ -5046,10 +5220,13 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r26 = r21.mul_add(u(7), r26);
             let r26 = r13.mul_add(r19, r26);
             let r26 = r9.mul_add(u(8), r26);
+            put(0, i, r26);
             let r10 = r8 * r10;
+            put(17, i, r10);
             let r19 = kept(1);
             let r27 = r18 * u(9);
             let r22 = r20 * r22;
+            put(20, i, r22);
             let r28 = kept(12);
             let r29 = r17.mul_add(u(10), u(11));
             let r30 = r15 * r29;
@@ -5057,10 +5234,13 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r30 = r22.mul_add(u(12), r30);
             let r30 = r19.mul_add(r27, r30);
             let r30 = r10.mul_add(u(13), r30);
+            put(1, i, r30);
             let r11 = r8 * r11;
+            put(18, i, r11);
             let r27 = kept(2);
             let r31 = r18 * u(14);
             let r23 = r20 * r23;
+            put(21, i, r23);
             let r32 = kept(13);
             let r33 = r17.mul_add(u(15), u(16));
             let r34 = r15 * r33;
@@ -5068,16 +5248,25 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r34 = r23.mul_add(u(17), r34);
             let r34 = r27.mul_add(r31, r34);
             let r34 = r11.mul_add(u(18), r34);
+            put(2, i, r34);
             let r31 = samples(17);
             let r12 = r8 * r12;
             let r12 = r31 * r12;
+            put(29, i, r12);
             let r35 = r12 * u(19);
+            put(3, i, r35);
             let r36 = r15 * r24;
+            put(4, i, r36);
             let r37 = r15 * r28;
+            put(5, i, r37);
             let r38 = r15 * r32;
+            put(6, i, r38);
             let r39 = r18 * r24;
+            put(7, i, r39);
             let r40 = r18 * r28;
+            put(8, i, r40);
             let r41 = r18 * r32;
+            put(9, i, r41);
             let r6 = r6 * lit(0.6931471805599453);
             let r6 = r7 * r6;
             let r6 = select(r16.ge(lit(0.5)), r6, lit(0.0));
@@ -5087,84 +5276,67 @@ fn hazy_bumped_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r42 = u(4) * r7;
             let r42 = r13 * r42;
             let r42 = r24.mul_add(r16, r42);
+            put(10, i, r42);
             let r16 = u(10) * r6;
             let r16 = r15 * r16;
             let r43 = u(9) * r7;
             let r43 = r19 * r43;
             let r43 = r28.mul_add(r16, r43);
+            put(11, i, r43);
             let r6 = u(15) * r6;
             let r6 = r15 * r6;
             let r7 = u(14) * r7;
             let r7 = r27 * r7;
             let r7 = r32.mul_add(r6, r7);
+            put(12, i, r7);
             let r6 = r13 * r18;
+            put(13, i, r6);
             let r15 = r18 * r19;
+            put(14, i, r15);
             let r18 = r18 * r27;
+            put(15, i, r18);
             let r14 = r14 - lit(1.0);
             let r25 = r25 * r14;
             let r17 = r17 * r14;
             let r16 = u(4) * r17;
             let r16 = r13 * r16;
             let r16 = r24.mul_add(r25, r16);
+            put(22, i, r16);
             let r29 = r29 * r14;
             let r25 = u(9) * r17;
             let r25 = r19 * r25;
             let r25 = r28.mul_add(r29, r25);
+            put(23, i, r25);
             let r14 = r33 * r14;
             let r17 = u(14) * r17;
             let r17 = r27 * r17;
             let r17 = r32.mul_add(r14, r17);
+            put(24, i, r17);
             let cube = cubes[1];
-            let at = cube.footprint_at(r0, r1, r2);
+            let at = texels98;
             let [r14, r32, r27, r33] = cube.sample_at(&at);
             let r14 = r8 * r14;
             let cube = cubes[1];
-            let at = cube.footprint_at(r3, r4, r5);
+            let at = texels100;
             let [r2, r1, r0, _] = cube.sample_at(&at);
             let r2 = r20 * r2;
             let r2 = u(7) * r2;
             let r2 = u(8).mul_add(r14, r2);
+            put(25, i, r2);
             let r32 = r8 * r32;
             let r1 = r20 * r1;
             let r1 = u(12) * r1;
             let r1 = u(13).mul_add(r32, r1);
+            put(26, i, r1);
             let r27 = r8 * r27;
             let r0 = r20 * r0;
             let r0 = u(17) * r0;
             let r0 = u(18).mul_add(r27, r0);
+            put(27, i, r0);
             let r33 = r8 * r33;
             let r33 = r31 * r33;
             let r33 = u(19) * r33;
-            block.put(0, i, r26);
-            block.put(1, i, r30);
-            block.put(2, i, r34);
-            block.put(3, i, r35);
-            block.put(4, i, r36);
-            block.put(5, i, r37);
-            block.put(6, i, r38);
-            block.put(7, i, r39);
-            block.put(8, i, r40);
-            block.put(9, i, r41);
-            block.put(10, i, r42);
-            block.put(11, i, r43);
-            block.put(12, i, r7);
-            block.put(13, i, r6);
-            block.put(14, i, r15);
-            block.put(15, i, r18);
-            block.put(16, i, r9);
-            block.put(17, i, r10);
-            block.put(18, i, r11);
-            block.put(19, i, r21);
-            block.put(20, i, r22);
-            block.put(21, i, r23);
-            block.put(22, i, r16);
-            block.put(23, i, r25);
-            block.put(24, i, r17);
-            block.put(25, i, r2);
-            block.put(26, i, r1);
-            block.put(27, i, r0);
-            block.put(28, i, r33);
-            block.put(29, i, r12);
+            put(28, i, r33);
         }
         },
     );
@@ -5180,7 +5352,9 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
@@ -5235,8 +5409,11 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = u(4) * r11;
             let r11 = r11.exp2();
             let r10 = samples(0);
+            let texels36 = cubes[0].footprint_at(r2, r4, r12);
+            let texels46 = cubes[0].footprint_at(r8, r7, r6);
+            let texels49 = cubes[1].footprint_at(r8, r7, r6);
             let cube = cubes[0];
-            let at = cube.footprint_at(r2, r4, r12);
+            let at = texels36;
             let [r9, r1, r3, r5] = cube.sample_at(&at);
             let r9 = r10 * r9;
             let r12 = kept(0);
@@ -5248,12 +5425,12 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r2 = u(7) * r0;
             let r13 = samples(13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels46;
             let [r14, r15, r16, _] = cube.sample_at(&at);
             let r14 = r13 * r14;
             let r17 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels49;
             let [r18, r19, r20, _] = cube.sample_at(&at);
             let r18 = r17 * r18;
             let r17 = r11.mul_add(u(8), u(9));
@@ -5262,6 +5439,7 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r17 = r14.mul_add(u(10), r17);
             let r17 = r12.mul_add(r2, r17);
             let r17 = r9.mul_add(u(11), r17);
+            put(0, i, r17);
             let r1 = r10 * r1;
             let r9 = kept(1);
             let r2 = r0 * u(12);
@@ -5274,6 +5452,7 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r12 = r15.mul_add(u(15), r12);
             let r12 = r9.mul_add(r2, r12);
             let r12 = r1.mul_add(u(16), r12);
+            put(1, i, r12);
             let r3 = r10 * r3;
             let r1 = kept(2);
             let r0 = r0 * u(17);
@@ -5286,14 +5465,12 @@ fn hazy_bumped_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = r16.mul_add(u(20), r11);
             let r11 = r1.mul_add(r0, r11);
             let r11 = r3.mul_add(u(21), r11);
+            put(2, i, r11);
             let r3 = samples(18);
             let r5 = r10 * r5;
             let r5 = r3 * r5;
             let r5 = r5 * u(22);
-            block.put(0, i, r17);
-            block.put(1, i, r12);
-            block.put(2, i, r11);
-            block.put(3, i, r5);
+            put(3, i, r5);
         }
         },
     );
@@ -5309,7 +5486,9 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
@@ -5384,10 +5563,14 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r13 * u(6);
             let r13 = r13.exp2();
             let r12 = samples(0);
+            let texels53 = cubes[0].footprint_at(r3, r7, r8);
+            let texels63 = cubes[0].footprint_at(r11, r4, r10);
+            let texels66 = cubes[1].footprint_at(r11, r4, r10);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r7, r8);
+            let at = texels53;
             let ([r6, r19, r20, r21], [r22, r23, r24, r25]) = cube.sample_with_slope(&at, cube.texels([r5, r2]));
             let r6 = r12 * r6;
+            put(16, i, r6);
             let r2 = kept(0);
             let r5 = samples(11);
             let r8 = lit(1.0) - r5;
@@ -5397,12 +5580,13 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r26 = u(9) * r3;
             let r27 = samples(13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r4, r10);
+            let at = texels63;
             let ([r28, r29, r30, _], [r31, r32, r33, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r28 = r27 * r28;
+            put(19, i, r28);
             let r34 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r11, r4, r10);
+            let at = texels66;
             let ([r35, r36, r37, _], [r38, r39, r40, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r35 = r34 * r35;
             let r18 = r7.mul_add(u(10), u(11));
@@ -5411,10 +5595,13 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r28.mul_add(u(12), r10);
             let r10 = r2.mul_add(r26, r10);
             let r10 = r6.mul_add(u(13), r10);
+            put(0, i, r10);
             let r19 = r12 * r19;
+            put(17, i, r19);
             let r26 = kept(1);
             let r4 = r3 * u(14);
             let r29 = r27 * r29;
+            put(20, i, r29);
             let r11 = samples(15);
             let r36 = r11 * r36;
             let r41 = r7.mul_add(u(15), u(16));
@@ -5423,10 +5610,13 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r43 = r29.mul_add(u(17), r43);
             let r43 = r26.mul_add(r4, r43);
             let r43 = r19.mul_add(u(18), r43);
+            put(1, i, r43);
             let r20 = r12 * r20;
+            put(18, i, r20);
             let r4 = kept(2);
             let r44 = r3 * u(19);
             let r30 = r27 * r30;
+            put(21, i, r30);
             let r45 = samples(17);
             let r37 = r45 * r37;
             let r46 = r7.mul_add(u(20), u(21));
@@ -5435,16 +5625,25 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r48 = r30.mul_add(u(22), r48);
             let r48 = r4.mul_add(r44, r48);
             let r48 = r20.mul_add(u(23), r48);
+            put(2, i, r48);
             let r44 = samples(18);
             let r21 = r12 * r21;
             let r21 = r44 * r21;
+            put(29, i, r21);
             let r49 = r21 * u(24);
+            put(3, i, r49);
             let r50 = r8 * r35;
+            put(4, i, r50);
             let r51 = r8 * r36;
+            put(5, i, r51);
             let r52 = r8 * r37;
+            put(6, i, r52);
             let r53 = r3 * r35;
+            put(7, i, r53);
             let r54 = r3 * r36;
+            put(8, i, r54);
             let r55 = r3 * r37;
+            put(9, i, r55);
             let r15 = r15 * lit(0.6931471805599453);
             let r15 = r14 * r15;
             let r15 = select(r16.ge(lit(1.2e-38)), r15, lit(0.0));
@@ -5454,35 +5653,44 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r14 = r2 * r14;
             let r56 = r14 * r15;
             let r56 = r35.mul_add(r16, r56);
+            put(10, i, r56);
             let r16 = u(15) * r15;
             let r16 = r8 * r16;
             let r57 = r8 * u(14);
             let r57 = r26 * r57;
             let r58 = r15 * r57;
             let r58 = r36.mul_add(r16, r58);
+            put(11, i, r58);
             let r16 = u(20) * r15;
             let r16 = r8 * r16;
             let r59 = r8 * u(19);
             let r59 = r4 * r59;
             let r15 = r15 * r59;
             let r15 = r37.mul_add(r16, r15);
+            put(12, i, r15);
             let r16 = r2 * r3;
+            put(13, i, r16);
             let r60 = r3 * r26;
+            put(14, i, r60);
             let r3 = r3 * r4;
+            put(15, i, r3);
             let r5 = r5 - lit(1.0);
             let r18 = r18 * r5;
             let r7 = r7 * r5;
             let r61 = u(9) * r7;
             let r61 = r2 * r61;
             let r61 = r35.mul_add(r18, r61);
+            put(22, i, r61);
             let r41 = r41 * r5;
             let r18 = u(14) * r7;
             let r18 = r26 * r18;
             let r18 = r36.mul_add(r41, r18);
+            put(23, i, r18);
             let r5 = r46 * r5;
             let r7 = u(19) * r7;
             let r7 = r4 * r7;
             let r7 = r37.mul_add(r5, r7);
+            put(24, i, r7);
             let r22 = r12 * r22;
             let r13 = u(4) * r13;
             let r5 = binary(Binary::Less, lit(0.0), r0);
@@ -5500,6 +5708,7 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r38 = u(12).mul_add(r31, r38);
             let r38 = (-r14).mul_add(r0, r38);
             let r38 = u(13).mul_add(r22, r38);
+            put(25, i, r38);
             let r23 = r12 * r23;
             let r32 = r27 * r32;
             let r22 = u(15) * r0;
@@ -5510,6 +5719,7 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r39 = u(17).mul_add(r32, r39);
             let r39 = (-r57).mul_add(r0, r39);
             let r39 = u(18).mul_add(r23, r39);
+            put(26, i, r39);
             let r24 = r12 * r24;
             let r33 = r27 * r33;
             let r27 = u(20) * r0;
@@ -5520,39 +5730,11 @@ fn hazy_bumped_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r40 = u(22).mul_add(r33, r40);
             let r40 = (-r59).mul_add(r0, r40);
             let r40 = u(23).mul_add(r24, r40);
+            put(27, i, r40);
             let r25 = r12 * r25;
             let r25 = r44 * r25;
             let r25 = u(24) * r25;
-            block.put(0, i, r10);
-            block.put(1, i, r43);
-            block.put(2, i, r48);
-            block.put(3, i, r49);
-            block.put(4, i, r50);
-            block.put(5, i, r51);
-            block.put(6, i, r52);
-            block.put(7, i, r53);
-            block.put(8, i, r54);
-            block.put(9, i, r55);
-            block.put(10, i, r56);
-            block.put(11, i, r58);
-            block.put(12, i, r15);
-            block.put(13, i, r16);
-            block.put(14, i, r60);
-            block.put(15, i, r3);
-            block.put(16, i, r6);
-            block.put(17, i, r19);
-            block.put(18, i, r20);
-            block.put(19, i, r28);
-            block.put(20, i, r29);
-            block.put(21, i, r30);
-            block.put(22, i, r61);
-            block.put(23, i, r18);
-            block.put(24, i, r7);
-            block.put(25, i, r38);
-            block.put(26, i, r39);
-            block.put(27, i, r40);
-            block.put(28, i, r25);
-            block.put(29, i, r21);
+            put(28, i, r25);
         }
         },
     );
@@ -5568,7 +5750,9 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<19>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<34>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<3>(i);
@@ -5653,8 +5837,13 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r17 = r16 * r17;
             let r17 = select(r0.ge(lit(1.2e-38)), r17, lit(0.0));
             let r16 = select(r0.ge(lit(1.2e-38)), r16, u(9));
+            let texels63 = cubes[2].footprint_at(r18, r5, r8);
+            let texels69 = cubes[0].footprint_at(r18, r5, r8);
+            let texels94 = cubes[2].footprint_at(r2, r3, r1);
+            let texels105 = cubes[0].footprint_at(r2, r3, r1);
+            let texels113 = cubes[1].footprint_at(r2, r3, r1);
             let cube = cubes[2];
-            let at = cube.footprint_at(r18, r5, r8);
+            let at = texels63;
             let [r0, r15, r14, r13] = cube.sample_at(&at);
             let r12 = samples(0);
             let r0 = r12 * r0;
@@ -5662,15 +5851,18 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r14 = r12 * r14;
             let r13 = r12 * r13;
             let cube = cubes[0];
-            let at = cube.footprint_at(r18, r5, r8);
+            let at = texels69;
             let ([r9, r19, r20, r21], [r22, r23, r24, r25]) = cube.sample_with_slope(&at, cube.texels([r7, r6]));
             let r22 = r12 * r22;
             let r23 = r12 * r23;
             let r24 = r12 * r24;
             let r25 = r12 * r25;
             let r9 = r12 * r9;
+            put(16, i, r9);
             let r19 = r12 * r19;
+            put(17, i, r19);
             let r20 = r12 * r20;
+            put(18, i, r20);
             let r21 = r12 * r21;
             let r12 = samples(11);
             let r6 = lit(1.0) - r12;
@@ -5689,7 +5881,7 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r28 = u(15) * r18;
             let r18 = u(16) * r18;
             let cube = cubes[2];
-            let at = cube.footprint_at(r2, r3, r1);
+            let at = texels94;
             let [r29, r30, r31, _] = cube.sample_at(&at);
             let r32 = samples(13);
             let r29 = r32 * r29;
@@ -5699,26 +5891,33 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r30 = u(18) * r30;
             let r31 = u(19) * r31;
             let r29 = u(20).mul_add(r0, r29);
+            put(29, i, r29);
             let r30 = u(21).mul_add(r15, r30);
+            put(30, i, r30);
             let r31 = u(22).mul_add(r14, r31);
+            put(31, i, r31);
             let cube = cubes[0];
-            let at = cube.footprint_at(r2, r3, r1);
+            let at = texels105;
             let ([r14, r15, r0, _], [r33, r34, r35, _]) = cube.sample_with_slope(&at, cube.texels([r11, r10]));
             let r33 = r32 * r33;
             let r34 = r32 * r34;
             let r35 = r32 * r35;
             let r14 = r32 * r14;
+            put(19, i, r14);
             let r15 = r32 * r15;
+            put(20, i, r15);
             let r0 = r32 * r0;
+            put(21, i, r0);
             let r32 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r2, r3, r1);
+            let at = texels113;
             let ([r36, r37, r38, _], [r39, r40, r41, _]) = cube.sample_with_slope(&at, cube.texels([r11, r10]));
             let r39 = r32 * r39;
             let r36 = r32 * r36;
             let r32 = r16.mul_add(u(11), u(23));
             let r10 = r32 * r12;
             let r27 = r36.mul_add(r10, r27);
+            put(22, i, r27);
             let r32 = r6 * r32;
             let r39 = r32 * r39;
             let r39 = (-r36).mul_add(r7, r39);
@@ -5729,6 +5928,7 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(14) * r33;
             let r32 = r26.mul_add(r7, r32);
             let r32 = r9.mul_add(u(20), r32);
+            put(0, i, r32);
             let r7 = kept(1);
             let r18 = r7 * r18;
             let r10 = samples(15);
@@ -5738,6 +5938,7 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = r16.mul_add(u(13), u(25));
             let r11 = r10 * r12;
             let r18 = r37.mul_add(r11, r18);
+            put(23, i, r18);
             let r10 = r6 * r10;
             let r12 = r16 * r12;
             let r40 = r10 * r40;
@@ -5749,6 +5950,7 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r34 = r33 * u(16);
             let r10 = r7.mul_add(r34, r10);
             let r10 = r19.mul_add(u(21), r10);
+            put(1, i, r10);
             let r34 = kept(2);
             let r28 = r34 * r28;
             let r8 = samples(17);
@@ -5756,6 +5958,7 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r38 = r8 * r38;
             let r41 = r16 * r41;
             let r28 = r38.mul_add(r12, r28);
+            put(24, i, r28);
             let r41 = (-r38).mul_add(r5, r41);
             let r16 = r38 * r16;
             let r41 = u(19).mul_add(r35, r41);
@@ -5763,80 +5966,66 @@ fn hazy_bumped_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r35 = r33 * u(15);
             let r16 = r34.mul_add(r35, r16);
             let r16 = r20.mul_add(u(22), r16);
+            put(2, i, r16);
             let r35 = samples(18);
             let r25 = r35 * r25;
             let r13 = r35 * r13;
             let r25 = u(26) * r25;
+            put(28, i, r25);
             let r13 = u(26) * r13;
+            put(32, i, r13);
             let r21 = r35 * r21;
+            put(33, i, r21);
             let r35 = r21 * u(26);
+            put(3, i, r35);
             let r5 = r6 * r36;
+            put(4, i, r5);
             let r12 = r6 * r37;
+            put(5, i, r12);
             let r8 = r6 * r38;
+            put(6, i, r8);
             let r11 = r33 * r36;
+            put(7, i, r11);
             let r1 = r33 * r37;
+            put(8, i, r1);
             let r3 = r33 * r38;
+            put(9, i, r3);
             let r2 = u(11) * r17;
             let r2 = r6 * r2;
             let r42 = u(14) * r6;
             let r42 = r26 * r42;
             let r39 = (-r42).mul_add(r4, r39);
             let r26 = r26 * r33;
+            put(13, i, r26);
             let r39 = u(20).mul_add(r22, r39);
+            put(25, i, r39);
             let r42 = r42 * r17;
             let r42 = r36.mul_add(r2, r42);
+            put(10, i, r42);
             let r2 = u(12) * r17;
             let r2 = r6 * r2;
             let r36 = r6 * u(16);
             let r36 = r7 * r36;
             let r40 = (-r36).mul_add(r4, r40);
             let r7 = r33 * r7;
+            put(14, i, r7);
             let r40 = u(21).mul_add(r23, r40);
+            put(26, i, r40);
             let r36 = r17 * r36;
             let r36 = r37.mul_add(r2, r36);
+            put(11, i, r36);
             let r2 = u(13) * r17;
             let r2 = r6 * r2;
             let r6 = r6 * u(15);
             let r6 = r34 * r6;
             let r41 = (-r6).mul_add(r4, r41);
             let r34 = r33 * r34;
+            put(15, i, r34);
             let r41 = u(22).mul_add(r24, r41);
+            put(27, i, r41);
             let r6 = r17 * r6;
             let r6 = r38.mul_add(r2, r6);
-            block.put(0, i, r32);
-            block.put(1, i, r10);
-            block.put(2, i, r16);
-            block.put(3, i, r35);
-            block.put(4, i, r5);
-            block.put(5, i, r12);
-            block.put(6, i, r8);
-            block.put(7, i, r11);
-            block.put(8, i, r1);
-            block.put(9, i, r3);
-            block.put(10, i, r42);
-            block.put(11, i, r36);
-            block.put(12, i, r6);
-            block.put(13, i, r26);
-            block.put(14, i, r7);
-            block.put(15, i, r34);
-            block.put(16, i, r9);
-            block.put(17, i, r19);
-            block.put(18, i, r20);
-            block.put(19, i, r14);
-            block.put(20, i, r15);
-            block.put(21, i, r0);
-            block.put(22, i, r27);
-            block.put(23, i, r18);
-            block.put(24, i, r28);
-            block.put(25, i, r39);
-            block.put(26, i, r40);
-            block.put(27, i, r41);
-            block.put(28, i, r25);
-            block.put(29, i, r29);
-            block.put(30, i, r30);
-            block.put(31, i, r31);
-            block.put(32, i, r13);
-            block.put(33, i, r21);
+            put(12, i, r6);
         }
         },
     );
@@ -5852,7 +6041,9 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<4>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
@@ -5907,13 +6098,17 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = u(4) * r11;
             let r11 = r11.exp2();
             let r10 = samples(0);
+            let texels37 = cubes[0].footprint_at(r1, r3, r5);
+            let texels40 = cubes[1].footprint_at(r2, r12, r4);
+            let texels49 = cubes[0].footprint_at(r8, r7, r6);
+            let texels52 = cubes[2].footprint_at(r8, r7, r6);
             let cube = cubes[0];
-            let at = cube.footprint_at(r1, r3, r5);
+            let at = texels37;
             let [r9, r13, r14, r15] = cube.sample_at(&at);
             let r9 = r10 * r9;
             let r5 = samples(10);
             let cube = cubes[1];
-            let at = cube.footprint_at(r2, r12, r4);
+            let at = texels40;
             let [r3, r1, r16, _] = cube.sample_at(&at);
             let r3 = r5 * r3;
             let r4 = samples(11);
@@ -5924,12 +6119,12 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r12 = u(7) * r0;
             let r2 = samples(13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels49;
             let [r17, r18, r19, _] = cube.sample_at(&at);
             let r17 = r2 * r17;
             let r20 = samples(12);
             let cube = cubes[2];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels52;
             let [r21, r22, r23, _] = cube.sample_at(&at);
             let r21 = r20 * r21;
             let r20 = r11.mul_add(u(8), u(9));
@@ -5938,6 +6133,7 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r20 = r17.mul_add(u(10), r20);
             let r20 = r3.mul_add(r12, r20);
             let r20 = r9.mul_add(u(11), r20);
+            put(0, i, r20);
             let r13 = r10 * r13;
             let r1 = r5 * r1;
             let r9 = r0 * u(12);
@@ -5950,6 +6146,7 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r12 = r18.mul_add(u(15), r12);
             let r12 = r1.mul_add(r9, r12);
             let r12 = r13.mul_add(u(16), r12);
+            put(1, i, r12);
             let r14 = r10 * r14;
             let r16 = r5 * r16;
             let r0 = r0 * u(17);
@@ -5962,13 +6159,11 @@ fn hazy_bumped_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r11 = r19.mul_add(u(20), r11);
             let r11 = r16.mul_add(r0, r11);
             let r11 = r14.mul_add(u(21), r11);
+            put(2, i, r11);
             let r15 = r10 * r15;
             let r15 = r5 * r15;
             let r15 = r15 * u(22);
-            block.put(0, i, r20);
-            block.put(1, i, r12);
-            block.put(2, i, r11);
-            block.put(3, i, r15);
+            put(3, i, r15);
         }
         },
     );
@@ -5984,7 +6179,9 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<16>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
@@ -6059,13 +6256,18 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r13 = r13 * u(6);
             let r13 = r13.exp2();
             let r12 = samples(0);
+            let texels54 = cubes[0].footprint_at(r3, r2, r19);
+            let texels57 = cubes[1].footprint_at(r7, r5, r8);
+            let texels66 = cubes[0].footprint_at(r11, r10, r9);
+            let texels69 = cubes[2].footprint_at(r11, r10, r9);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r2, r19);
+            let at = texels54;
             let ([r6, r22, r23, r24], [r25, r26, r27, r28]) = cube.sample_with_slope(&at, cube.texels([r20, r21]));
             let r6 = r12 * r6;
+            put(16, i, r6);
             let r21 = samples(10);
             let cube = cubes[1];
-            let at = cube.footprint_at(r7, r5, r8);
+            let at = texels57;
             let [r20, r19, r2, _] = cube.sample_at(&at);
             let r20 = r21 * r20;
             let r8 = samples(11);
@@ -6076,12 +6278,13 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r29 = u(9) * r3;
             let r30 = samples(13);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r10, r9);
+            let at = texels66;
             let ([r31, r32, r33, _], [r34, r35, r36, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r31 = r30 * r31;
+            put(19, i, r31);
             let r37 = samples(12);
             let cube = cubes[2];
-            let at = cube.footprint_at(r11, r10, r9);
+            let at = texels69;
             let ([r38, r39, r40, _], [r41, r42, r43, _]) = cube.sample_with_slope(&at, cube.texels([r1, r18]));
             let r38 = r37 * r38;
             let r18 = r7.mul_add(u(10), u(11));
@@ -6090,10 +6293,13 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r9 = r31.mul_add(u(12), r9);
             let r9 = r20.mul_add(r29, r9);
             let r9 = r6.mul_add(u(13), r9);
+            put(0, i, r9);
             let r22 = r12 * r22;
+            put(17, i, r22);
             let r19 = r21 * r19;
             let r29 = r3 * u(14);
             let r32 = r30 * r32;
+            put(20, i, r32);
             let r10 = samples(14);
             let r39 = r10 * r39;
             let r11 = r7.mul_add(u(15), u(16));
@@ -6102,10 +6308,13 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r45 = r32.mul_add(u(17), r45);
             let r45 = r19.mul_add(r29, r45);
             let r45 = r22.mul_add(u(18), r45);
+            put(1, i, r45);
             let r23 = r12 * r23;
+            put(18, i, r23);
             let r2 = r21 * r2;
             let r29 = r3 * u(19);
             let r33 = r30 * r33;
+            put(21, i, r33);
             let r46 = samples(15);
             let r40 = r46 * r40;
             let r47 = r7.mul_add(u(20), u(21));
@@ -6114,15 +6323,24 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r49 = r33.mul_add(u(22), r49);
             let r49 = r2.mul_add(r29, r49);
             let r49 = r23.mul_add(u(23), r49);
+            put(2, i, r49);
             let r24 = r12 * r24;
             let r24 = r21 * r24;
+            put(29, i, r24);
             let r29 = r24 * u(24);
+            put(3, i, r29);
             let r50 = r5 * r38;
+            put(4, i, r50);
             let r51 = r5 * r39;
+            put(5, i, r51);
             let r52 = r5 * r40;
+            put(6, i, r52);
             let r53 = r3 * r38;
+            put(7, i, r53);
             let r54 = r3 * r39;
+            put(8, i, r54);
             let r55 = r3 * r40;
+            put(9, i, r55);
             let r15 = r15 * lit(0.6931471805599453);
             let r15 = r14 * r15;
             let r15 = select(r16.ge(lit(1.2e-38)), r15, lit(0.0));
@@ -6132,35 +6350,44 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r14 = r20 * r14;
             let r56 = r14 * r15;
             let r56 = r38.mul_add(r16, r56);
+            put(10, i, r56);
             let r16 = u(15) * r15;
             let r16 = r5 * r16;
             let r57 = r5 * u(14);
             let r57 = r19 * r57;
             let r58 = r15 * r57;
             let r58 = r39.mul_add(r16, r58);
+            put(11, i, r58);
             let r16 = u(20) * r15;
             let r16 = r5 * r16;
             let r59 = r5 * u(19);
             let r59 = r2 * r59;
             let r15 = r15 * r59;
             let r15 = r40.mul_add(r16, r15);
+            put(12, i, r15);
             let r16 = r20 * r3;
+            put(13, i, r16);
             let r60 = r3 * r19;
+            put(14, i, r60);
             let r3 = r3 * r2;
+            put(15, i, r3);
             let r8 = r8 - lit(1.0);
             let r18 = r18 * r8;
             let r7 = r7 * r8;
             let r61 = u(9) * r7;
             let r61 = r20 * r61;
             let r61 = r38.mul_add(r18, r61);
+            put(22, i, r61);
             let r11 = r11 * r8;
             let r18 = u(14) * r7;
             let r18 = r19 * r18;
             let r18 = r39.mul_add(r11, r18);
+            put(23, i, r18);
             let r8 = r47 * r8;
             let r7 = u(19) * r7;
             let r7 = r2 * r7;
             let r7 = r40.mul_add(r8, r7);
+            put(24, i, r7);
             let r25 = r12 * r25;
             let r13 = u(4) * r13;
             let r8 = binary(Binary::Less, lit(0.0), r0);
@@ -6178,6 +6405,7 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = u(12).mul_add(r34, r41);
             let r41 = (-r14).mul_add(r0, r41);
             let r41 = u(13).mul_add(r25, r41);
+            put(25, i, r41);
             let r26 = r12 * r26;
             let r35 = r30 * r35;
             let r25 = u(15) * r0;
@@ -6188,6 +6416,7 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r42 = u(17).mul_add(r35, r42);
             let r42 = (-r57).mul_add(r0, r42);
             let r42 = u(18).mul_add(r26, r42);
+            put(26, i, r42);
             let r27 = r12 * r27;
             let r36 = r30 * r36;
             let r30 = u(20) * r0;
@@ -6198,39 +6427,11 @@ fn hazy_bumped_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r43 = u(22).mul_add(r36, r43);
             let r43 = (-r59).mul_add(r0, r43);
             let r43 = u(23).mul_add(r27, r43);
+            put(27, i, r43);
             let r28 = r12 * r28;
             let r28 = r21 * r28;
             let r28 = u(24) * r28;
-            block.put(0, i, r9);
-            block.put(1, i, r45);
-            block.put(2, i, r49);
-            block.put(3, i, r29);
-            block.put(4, i, r50);
-            block.put(5, i, r51);
-            block.put(6, i, r52);
-            block.put(7, i, r53);
-            block.put(8, i, r54);
-            block.put(9, i, r55);
-            block.put(10, i, r56);
-            block.put(11, i, r58);
-            block.put(12, i, r15);
-            block.put(13, i, r16);
-            block.put(14, i, r60);
-            block.put(15, i, r3);
-            block.put(16, i, r6);
-            block.put(17, i, r22);
-            block.put(18, i, r23);
-            block.put(19, i, r31);
-            block.put(20, i, r32);
-            block.put(21, i, r33);
-            block.put(22, i, r61);
-            block.put(23, i, r18);
-            block.put(24, i, r7);
-            block.put(25, i, r41);
-            block.put(26, i, r42);
-            block.put(27, i, r43);
-            block.put(28, i, r28);
-            block.put(29, i, r24);
+            put(28, i, r28);
         }
         },
     );
@@ -6246,7 +6447,9 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
@@ -6299,13 +6502,17 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = u(4) * r10;
             let r10 = r10.exp2();
             let r9 = samples(0);
+            let texels35 = cubes[0].footprint_at(r12, r1, r3);
+            let texels38 = cubes[1].footprint_at(r0, r4, r2);
+            let texels47 = cubes[0].footprint_at(r8, r7, r6);
+            let texels50 = cubes[2].footprint_at(r8, r7, r6);
             let cube = cubes[0];
-            let at = cube.footprint_at(r12, r1, r3);
+            let at = texels35;
             let [r5, r13, r14, _] = cube.sample_at(&at);
             let r5 = r9 * r5;
             let r3 = samples(10);
             let cube = cubes[1];
-            let at = cube.footprint_at(r0, r4, r2);
+            let at = texels38;
             let [r1, r12, r15, _] = cube.sample_at(&at);
             let r1 = r3 * r1;
             let r2 = samples(11);
@@ -6316,12 +6523,12 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = u(7) * r11;
             let r0 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels47;
             let [r16, r17, r18, _] = cube.sample_at(&at);
             let r16 = r0 * r16;
             let r19 = samples(13);
             let cube = cubes[2];
-            let at = cube.footprint_at(r8, r7, r6);
+            let at = texels50;
             let [r20, r21, r22, _] = cube.sample_at(&at);
             let r20 = r19 * r20;
             let r19 = r10.mul_add(u(8), u(9));
@@ -6330,6 +6537,7 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = r16.mul_add(u(10), r19);
             let r19 = r1.mul_add(r4, r19);
             let r19 = r5.mul_add(u(11), r19);
+            put(0, i, r19);
             let r13 = r9 * r13;
             let r12 = r3 * r12;
             let r5 = r11 * u(12);
@@ -6342,6 +6550,7 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = r17.mul_add(u(15), r4);
             let r4 = r12.mul_add(r5, r4);
             let r4 = r13.mul_add(u(16), r4);
+            put(1, i, r4);
             let r14 = r9 * r14;
             let r15 = r3 * r15;
             let r11 = r11 * u(17);
@@ -6354,9 +6563,7 @@ fn surface_anew_value<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r18.mul_add(u(20), r10);
             let r10 = r15.mul_add(r11, r10);
             let r10 = r14.mul_add(u(21), r10);
-            block.put(0, i, r19);
-            block.put(1, i, r4);
-            block.put(2, i, r10);
+            put(2, i, r10);
         }
         },
     );
@@ -6372,7 +6579,9 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(3);
@@ -6441,13 +6650,20 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r15 = u(4) * r16;
             let r15 = r15.exp2();
             let r14 = samples(0);
+            let texels48 = cubes[0].footprint_at(r0, r8, r5);
+            let texels51 = cubes[1].footprint_at(r1, r7, r4);
+            let texels60 = cubes[0].footprint_at(r11, r10, r9);
+            let texels63 = cubes[2].footprint_at(r11, r10, r9);
+            let texels155 = cubes[3].footprint_at(r0, r8, r5);
+            let texels157 = cubes[3].footprint_at(r11, r10, r9);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r8, r5);
+            let at = texels48;
             let ([r13, r12, r3, _], [r20, r21, r22, _]) = cube.sample_with_slope(&at, cube.texels([r2, r19]));
             let r13 = r14 * r13;
+            put(15, i, r13);
             let r19 = samples(10);
             let cube = cubes[1];
-            let at = cube.footprint_at(r1, r7, r4);
+            let at = texels51;
             let [r2, r23, r24, _] = cube.sample_at(&at);
             let r2 = r19 * r2;
             let r4 = samples(11);
@@ -6458,12 +6674,13 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r26 = u(7) * r25;
             let r27 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r10, r9);
+            let at = texels60;
             let ([r28, r29, r30, _], [r31, r32, r33, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r28 = r27 * r28;
+            put(18, i, r28);
             let r34 = samples(13);
             let cube = cubes[2];
-            let at = cube.footprint_at(r11, r10, r9);
+            let at = texels63;
             let ([r35, r36, r37, _], [r38, r39, r40, _]) = cube.sample_with_slope(&at, cube.texels([r18, r6]));
             let r35 = r34 * r35;
             let r6 = r1.mul_add(u(8), u(9));
@@ -6472,10 +6689,13 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = r28.mul_add(u(10), r41);
             let r41 = r2.mul_add(r26, r41);
             let r41 = r13.mul_add(u(11), r41);
+            put(0, i, r41);
             let r12 = r14 * r12;
+            put(16, i, r12);
             let r23 = r19 * r23;
             let r26 = r25 * u(12);
             let r29 = r27 * r29;
+            put(19, i, r29);
             let r42 = samples(15);
             let r36 = r42 * r36;
             let r43 = r1.mul_add(u(13), u(14));
@@ -6484,10 +6704,13 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r45 = r29.mul_add(u(15), r45);
             let r45 = r23.mul_add(r26, r45);
             let r45 = r12.mul_add(u(16), r45);
+            put(1, i, r45);
             let r3 = r14 * r3;
+            put(17, i, r3);
             let r24 = r19 * r24;
             let r19 = r25 * u(17);
             let r30 = r27 * r30;
+            put(20, i, r30);
             let r26 = samples(16);
             let r37 = r26 * r37;
             let r46 = r1.mul_add(u(18), u(19));
@@ -6496,12 +6719,19 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r48 = r30.mul_add(u(20), r48);
             let r48 = r24.mul_add(r19, r48);
             let r48 = r3.mul_add(u(21), r48);
+            put(2, i, r48);
             let r19 = r7 * r35;
+            put(3, i, r19);
             let r49 = r7 * r36;
+            put(4, i, r49);
             let r50 = r7 * r37;
+            put(5, i, r50);
             let r51 = r25 * r35;
+            put(6, i, r51);
             let r52 = r25 * r36;
+            put(7, i, r52);
             let r53 = r25 * r37;
+            put(8, i, r53);
             let r16 = r16 * lit(0.6931471805599453);
             let r16 = r15 * r16;
             let r16 = select(r17.ge(lit(1.2e-38)), r16, lit(0.0));
@@ -6511,99 +6741,84 @@ fn surface_anew_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r54 = u(7) * r15;
             let r54 = r2 * r54;
             let r54 = r35.mul_add(r17, r54);
+            put(9, i, r54);
             let r17 = u(13) * r16;
             let r17 = r7 * r17;
             let r55 = u(12) * r15;
             let r55 = r23 * r55;
             let r55 = r36.mul_add(r17, r55);
+            put(10, i, r55);
             let r16 = u(18) * r16;
             let r16 = r7 * r16;
             let r15 = u(17) * r15;
             let r15 = r24 * r15;
             let r15 = r37.mul_add(r16, r15);
+            put(11, i, r15);
             let r16 = r2 * r25;
+            put(12, i, r16);
             let r7 = r25 * r23;
+            put(13, i, r7);
             let r25 = r25 * r24;
+            put(14, i, r25);
             let r4 = r4 - lit(1.0);
             let r6 = r6 * r4;
             let r1 = r1 * r4;
             let r17 = u(7) * r1;
             let r17 = r2 * r17;
             let r17 = r35.mul_add(r6, r17);
+            put(21, i, r17);
             let r43 = r43 * r4;
             let r6 = u(12) * r1;
             let r6 = r23 * r6;
             let r6 = r36.mul_add(r43, r6);
+            put(22, i, r6);
             let r4 = r46 * r4;
             let r1 = u(17) * r1;
             let r1 = r24 * r1;
             let r1 = r37.mul_add(r4, r1);
+            put(23, i, r1);
             let r20 = r14 * r20;
             let r31 = r27 * r31;
             let r38 = r34 * r38;
             let r38 = r18 * r38;
             let r38 = u(10).mul_add(r31, r38);
             let r38 = u(11).mul_add(r20, r38);
+            put(24, i, r38);
             let r21 = r14 * r21;
             let r32 = r27 * r32;
             let r39 = r42 * r39;
             let r39 = r44 * r39;
             let r39 = u(15).mul_add(r32, r39);
             let r39 = u(16).mul_add(r21, r39);
+            put(25, i, r39);
             let r22 = r14 * r22;
             let r33 = r27 * r33;
             let r40 = r26 * r40;
             let r40 = r47 * r40;
             let r40 = u(20).mul_add(r33, r40);
             let r40 = u(21).mul_add(r22, r40);
+            put(26, i, r40);
             let cube = cubes[3];
-            let at = cube.footprint_at(r0, r8, r5);
+            let at = texels155;
             let [r22, r33, r47, _] = cube.sample_at(&at);
             let r22 = r14 * r22;
             let cube = cubes[3];
-            let at = cube.footprint_at(r11, r10, r9);
+            let at = texels157;
             let [r5, r8, r0, _] = cube.sample_at(&at);
             let r5 = r27 * r5;
             let r5 = u(10) * r5;
             let r5 = u(11).mul_add(r22, r5);
+            put(27, i, r5);
             let r33 = r14 * r33;
             let r8 = r27 * r8;
             let r8 = u(15) * r8;
             let r8 = u(16).mul_add(r33, r8);
+            put(28, i, r8);
             let r47 = r14 * r47;
             let r0 = r27 * r0;
             let r0 = u(20) * r0;
             let r0 = u(21).mul_add(r47, r0);
-            block.put(0, i, r41);
-            block.put(1, i, r45);
-            block.put(2, i, r48);
-            block.put(3, i, r19);
-            block.put(4, i, r49);
-            block.put(5, i, r50);
-            block.put(6, i, r51);
-            block.put(7, i, r52);
-            block.put(8, i, r53);
-            block.put(9, i, r54);
-            block.put(10, i, r55);
-            block.put(11, i, r15);
-            block.put(12, i, r16);
-            block.put(13, i, r7);
-            block.put(14, i, r25);
-            block.put(15, i, r13);
-            block.put(16, i, r12);
-            block.put(17, i, r3);
-            block.put(18, i, r28);
-            block.put(19, i, r29);
-            block.put(20, i, r30);
-            block.put(21, i, r17);
-            block.put(22, i, r6);
-            block.put(23, i, r1);
-            block.put(24, i, r38);
-            block.put(25, i, r39);
-            block.put(26, i, r40);
-            block.put(27, i, r5);
-            block.put(28, i, r8);
-            block.put(29, i, r0);
+            put(29, i, r0);
         }
         },
     );
@@ -6619,7 +6834,9 @@ fn listing_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<15>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -6695,55 +6912,59 @@ fn listing_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r0, r2, r4]);
             let [r9, r10, r1] = point.place();
             let r4 = samples(9);
+            put(0, i, r4);
             let r2 = samples(10);
+            put(1, i, r2);
             let r0 = samples(16);
+            let texels72 = cubes[0].footprint_at(r6, r7, r8);
+            let texels77 = cubes[1].footprint_at(r12, r13, r14);
+            let texels84 = cubes[2].footprint_at(r12, r13, r14);
+            let texels89 = cubes[2].footprint_at(r9, r10, r1);
             let cube = cubes[0];
-            let at = cube.footprint_at(r6, r7, r8);
+            let at = texels72;
             let [r5, r11, r3, _] = cube.sample_at(&at);
             let r5 = r0 * r5;
+            put(2, i, r5);
             let r11 = r0 * r11;
+            put(3, i, r11);
             let r3 = r0 * r3;
+            put(4, i, r3);
             let r0 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r12, r13, r14);
+            let at = texels77;
             let [r8, r7, r6, _] = cube.sample_at(&at);
             let r8 = r0 * r8;
+            put(5, i, r8);
             let r0 = samples(13);
             let r7 = r0 * r7;
+            put(6, i, r7);
             let r0 = samples(14);
             let r6 = r0 * r6;
+            put(7, i, r6);
             let r0 = samples(15);
             let cube = cubes[2];
-            let at = cube.footprint_at(r12, r13, r14);
+            let at = texels84;
             let [r15, r16, r17, _] = cube.sample_at(&at);
             let r15 = r0 * r15;
+            put(8, i, r15);
             let r16 = r0 * r16;
+            put(9, i, r16);
             let r17 = r0 * r17;
+            put(10, i, r17);
             let r0 = samples(11);
             let cube = cubes[2];
-            let at = cube.footprint_at(r9, r10, r1);
+            let at = texels89;
             let [r14, r13, r12, _] = cube.sample_at(&at);
             let r14 = r0 * r14;
+            put(11, i, r14);
             let r13 = r0 * r13;
+            put(12, i, r13);
             let r12 = r0 * r12;
+            put(13, i, r12);
             let r0 = select(r2.ge(lit(1.2e-38)), r2, lit(1.0));
             let r0 = r0.log2();
             let r0 = r0 * lit(0.6931471805599453);
-            block.put(0, i, r4);
-            block.put(1, i, r2);
-            block.put(2, i, r5);
-            block.put(3, i, r11);
-            block.put(4, i, r3);
-            block.put(5, i, r8);
-            block.put(6, i, r7);
-            block.put(7, i, r6);
-            block.put(8, i, r15);
-            block.put(9, i, r16);
-            block.put(10, i, r17);
-            block.put(11, i, r14);
-            block.put(12, i, r13);
-            block.put(13, i, r12);
-            block.put(14, i, r0);
+            put(14, i, r0);
         }
         },
     );
@@ -6759,7 +6980,9 @@ fn listing_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<13>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -6808,13 +7031,21 @@ fn listing_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = select(r4.ge(lit(0.5)), r10, lit(1.0));
             let point = CubePoint::of_unit([r3, r11, r4]);
             let [r12, r13, r14] = point.place();
+            put(3, i, r12);
+            put(4, i, r13);
+            put(5, i, r14);
             let r4 = samples(16);
+            let texels45 = cubes[0].footprint_at(r6, r7, r8);
+            let texels75 = cubes[1].footprint_at(r12, r13, r14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r6, r7, r8);
+            let at = texels45;
             let [r11, r3, r15, _] = cube.sample_at(&at);
             let r11 = r4 * r11;
+            put(0, i, r11);
             let r3 = r4 * r3;
+            put(1, i, r3);
             let r15 = r4 * r15;
+            put(2, i, r15);
             let r4 = r0 * r5;
             let r4 = r2.mul_add(r9, r4);
             let r4 = r1.mul_add(r10, r4);
@@ -6841,32 +7072,26 @@ fn listing_lobe_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r4 = select(r9.ge(lit(0.5)), r4, lit(1.0));
             let point = CubePoint::of_unit([r0, r2, r4]);
             let [r9, r10, r1] = point.place();
+            put(6, i, r9);
+            put(7, i, r10);
+            put(8, i, r1);
             let r4 = samples(12);
             let cube = cubes[1];
-            let at = cube.footprint_at(r12, r13, r14);
+            let at = texels75;
             let [r2, r0, r5, _] = cube.sample_at(&at);
             let r2 = r4 * r2;
+            put(9, i, r2);
             let r4 = samples(13);
             let r0 = r4 * r0;
+            put(10, i, r0);
             let r4 = samples(14);
             let r5 = r4 * r5;
+            put(11, i, r5);
             let r4 = samples(10);
             let r4 = select(r4.ge(lit(1.2e-38)), r4, lit(1.0));
             let r4 = r4.log2();
             let r4 = r4 * lit(0.6931471805599453);
-            block.put(0, i, r11);
-            block.put(1, i, r3);
-            block.put(2, i, r15);
-            block.put(3, i, r12);
-            block.put(4, i, r13);
-            block.put(5, i, r14);
-            block.put(6, i, r9);
-            block.put(7, i, r10);
-            block.put(8, i, r1);
-            block.put(9, i, r2);
-            block.put(10, i, r0);
-            block.put(11, i, r5);
-            block.put(12, i, r4);
+            put(12, i, r4);
         }
         },
     );
@@ -6882,7 +7107,9 @@ fn listing_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<17>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<7>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
@@ -6906,16 +7133,21 @@ fn listing_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r4, r5, r3]);
             let [r6, r7, r8] = point.place();
             let r3 = samples(16);
+            let texels20 = cubes[0].footprint_at(r6, r7, r8);
             let cube = cubes[0];
-            let at = cube.footprint_at(r6, r7, r8);
+            let at = texels20;
             let [r5, r4, r9, _] = cube.sample_at(&at);
             let r5 = r3 * r5;
+            put(0, i, r5);
             let r4 = r3 * r4;
+            put(1, i, r4);
             let r9 = r3 * r9;
+            put(2, i, r9);
             let r3 = samples(10);
             let r3 = select(r3.ge(lit(1.2e-38)), r3, lit(1.0));
             let r3 = r3.log2();
             let r3 = r3 * lit(0.6931471805599453);
+            put(3, i, r3);
             let r8 = samples(3);
             let r7 = samples(5);
             let r6 = samples(4);
@@ -6924,17 +7156,13 @@ fn listing_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r10 = r7.mul_add(r1, r10);
             let r0 = r0 * r10;
             let r0 = (-r8).mul_add(lit(2.0), r0);
+            put(4, i, r0);
             let r2 = r2 * r10;
             let r2 = (-r6).mul_add(lit(2.0), r2);
+            put(5, i, r2);
             let r10 = r1 * r10;
             let r10 = (-r7).mul_add(lit(2.0), r10);
-            block.put(0, i, r5);
-            block.put(1, i, r4);
-            block.put(2, i, r9);
-            block.put(3, i, r3);
-            block.put(4, i, r0);
-            block.put(5, i, r2);
-            block.put(6, i, r10);
+            put(6, i, r10);
         }
         },
     );
@@ -6950,7 +7178,9 @@ fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<23>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<7>(i);
@@ -7016,8 +7246,11 @@ fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = u(6) * r6;
             let r6 = r6.exp2();
             let r1 = samples(0);
+            let texels59 = cubes[0].footprint_at(r8, r2, r7);
+            let texels69 = cubes[0].footprint_at(r3, r5, r0);
+            let texels72 = cubes[1].footprint_at(r3, r5, r0);
             let cube = cubes[0];
-            let at = cube.footprint_at(r8, r2, r7);
+            let at = texels59;
             let [r9, r10, r11, _] = cube.sample_at(&at);
             let r9 = r1 * r9;
             let r7 = kept(0);
@@ -7029,12 +7262,12 @@ fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r8 = u(9) * r4;
             let r12 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r3, r5, r0);
+            let at = texels69;
             let [r13, r14, r15, _] = cube.sample_at(&at);
             let r13 = r12 * r13;
             let r16 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r3, r5, r0);
+            let at = texels72;
             let [r17, r18, r19, _] = cube.sample_at(&at);
             let r17 = r16 * r17;
             let r16 = r6.mul_add(u(10), u(11));
@@ -7043,6 +7276,7 @@ fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r16 = r13.mul_add(u(12), r16);
             let r16 = r7.mul_add(r8, r16);
             let r16 = r9.mul_add(u(13), r16);
+            put(0, i, r16);
             let r10 = r1 * r10;
             let r9 = kept(1);
             let r8 = r4 * u(14);
@@ -7055,6 +7289,7 @@ fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = r14.mul_add(u(17), r7);
             let r7 = r9.mul_add(r8, r7);
             let r7 = r10.mul_add(u(18), r7);
+            put(1, i, r7);
             let r11 = r1 * r11;
             let r1 = kept(2);
             let r4 = r4 * u(19);
@@ -7067,9 +7302,7 @@ fn listing_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r6 = r15.mul_add(u(22), r6);
             let r6 = r1.mul_add(r4, r6);
             let r6 = r11.mul_add(u(23), r6);
-            block.put(0, i, r16);
-            block.put(1, i, r7);
-            block.put(2, i, r6);
+            put(2, i, r6);
         }
         },
     );
@@ -7085,7 +7318,9 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<23>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<27>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<7>(i);
@@ -7162,10 +7397,14 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(6) * r7;
             let r7 = r7.exp2();
             let r0 = samples(0);
+            let texels68 = cubes[0].footprint_at(r11, r13, r14);
+            let texels78 = cubes[0].footprint_at(r10, r12, r3);
+            let texels81 = cubes[1].footprint_at(r10, r12, r3);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r13, r14);
+            let at = texels68;
             let ([r5, r8, r1, _], [r2, r17, r18, _]) = cube.sample_with_slope(&at, cube.texels([r15, r16]));
             let r5 = r0 * r5;
+            put(15, i, r5);
             let r16 = kept(0);
             let r15 = samples(11);
             let r14 = lit(1.0) - r15;
@@ -7175,12 +7414,13 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = u(9) * r11;
             let r20 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r10, r12, r3);
+            let at = texels78;
             let ([r21, r22, r23, _], [r24, r25, r26, _]) = cube.sample_with_slope(&at, cube.texels([r9, r6]));
             let r21 = r20 * r21;
+            put(18, i, r21);
             let r27 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r10, r12, r3);
+            let at = texels81;
             let ([r28, r29, r30, _], [r31, r32, r33, _]) = cube.sample_with_slope(&at, cube.texels([r9, r6]));
             let r28 = r27 * r28;
             let r6 = r13.mul_add(u(10), u(11));
@@ -7189,10 +7429,13 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r3 = r21.mul_add(u(12), r3);
             let r3 = r16.mul_add(r19, r3);
             let r3 = r5.mul_add(u(13), r3);
+            put(0, i, r3);
             let r8 = r0 * r8;
+            put(16, i, r8);
             let r19 = kept(1);
             let r12 = r11 * u(14);
             let r22 = r20 * r22;
+            put(19, i, r22);
             let r10 = samples(16);
             let r29 = r10 * r29;
             let r34 = r13.mul_add(u(15), u(16));
@@ -7201,10 +7444,13 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r36 = r22.mul_add(u(17), r36);
             let r36 = r19.mul_add(r12, r36);
             let r36 = r8.mul_add(u(18), r36);
+            put(1, i, r36);
             let r1 = r0 * r1;
+            put(17, i, r1);
             let r12 = kept(2);
             let r37 = r11 * u(19);
             let r23 = r20 * r23;
+            put(20, i, r23);
             let r38 = samples(18);
             let r30 = r38 * r30;
             let r39 = r13.mul_add(u(20), u(21));
@@ -7213,12 +7459,19 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r41 = r23.mul_add(u(22), r41);
             let r41 = r12.mul_add(r37, r41);
             let r41 = r1.mul_add(u(23), r41);
+            put(2, i, r41);
             let r37 = r14 * r28;
+            put(3, i, r37);
             let r42 = r14 * r29;
+            put(4, i, r42);
             let r43 = r14 * r30;
+            put(5, i, r43);
             let r44 = r11 * r28;
+            put(6, i, r44);
             let r45 = r11 * r29;
+            put(7, i, r45);
             let r46 = r11 * r30;
+            put(8, i, r46);
             let r47 = kept(3);
             let r47 = r7 * r47;
             let r47 = select(r4.ge(lit(1.2e-38)), r47, lit(0.0));
@@ -7228,78 +7481,63 @@ fn listing_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r48 = u(9) * r7;
             let r48 = r16 * r48;
             let r48 = r28.mul_add(r4, r48);
+            put(9, i, r48);
             let r4 = u(15) * r47;
             let r4 = r14 * r4;
             let r49 = u(14) * r7;
             let r49 = r19 * r49;
             let r49 = r29.mul_add(r4, r49);
+            put(10, i, r49);
             let r47 = u(20) * r47;
             let r47 = r14 * r47;
             let r7 = u(19) * r7;
             let r7 = r12 * r7;
             let r7 = r30.mul_add(r47, r7);
+            put(11, i, r7);
             let r47 = r16 * r11;
+            put(12, i, r47);
             let r14 = r11 * r19;
+            put(13, i, r14);
             let r11 = r11 * r12;
+            put(14, i, r11);
             let r15 = r15 - lit(1.0);
             let r6 = r6 * r15;
             let r13 = r13 * r15;
             let r4 = u(9) * r13;
             let r4 = r16 * r4;
             let r4 = r28.mul_add(r6, r4);
+            put(21, i, r4);
             let r34 = r34 * r15;
             let r6 = u(14) * r13;
             let r6 = r19 * r6;
             let r6 = r29.mul_add(r34, r6);
+            put(22, i, r6);
             let r15 = r39 * r15;
             let r13 = u(19) * r13;
             let r13 = r12 * r13;
             let r13 = r30.mul_add(r15, r13);
+            put(23, i, r13);
             let r2 = r0 * r2;
             let r24 = r20 * r24;
             let r31 = r27 * r31;
             let r31 = r9 * r31;
             let r31 = u(12).mul_add(r24, r31);
             let r31 = u(13).mul_add(r2, r31);
+            put(24, i, r31);
             let r17 = r0 * r17;
             let r25 = r20 * r25;
             let r32 = r10 * r32;
             let r32 = r35 * r32;
             let r32 = u(17).mul_add(r25, r32);
             let r32 = u(18).mul_add(r17, r32);
+            put(25, i, r32);
             let r18 = r0 * r18;
             let r26 = r20 * r26;
             let r33 = r38 * r33;
             let r33 = r40 * r33;
             let r33 = u(22).mul_add(r26, r33);
             let r33 = u(23).mul_add(r18, r33);
-            block.put(0, i, r3);
-            block.put(1, i, r36);
-            block.put(2, i, r41);
-            block.put(3, i, r37);
-            block.put(4, i, r42);
-            block.put(5, i, r43);
-            block.put(6, i, r44);
-            block.put(7, i, r45);
-            block.put(8, i, r46);
-            block.put(9, i, r48);
-            block.put(10, i, r49);
-            block.put(11, i, r7);
-            block.put(12, i, r47);
-            block.put(13, i, r14);
-            block.put(14, i, r11);
-            block.put(15, i, r5);
-            block.put(16, i, r8);
-            block.put(17, i, r1);
-            block.put(18, i, r21);
-            block.put(19, i, r22);
-            block.put(20, i, r23);
-            block.put(21, i, r4);
-            block.put(22, i, r6);
-            block.put(23, i, r13);
-            block.put(24, i, r31);
-            block.put(25, i, r32);
-            block.put(26, i, r33);
+            put(26, i, r33);
         }
         },
     );
@@ -7315,7 +7553,9 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<23>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<30>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<7>(i);
@@ -7392,10 +7632,16 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r7 = u(6) * r7;
             let r7 = r7.exp2();
             let r0 = samples(0);
+            let texels68 = cubes[0].footprint_at(r11, r13, r14);
+            let texels78 = cubes[0].footprint_at(r10, r12, r3);
+            let texels81 = cubes[1].footprint_at(r10, r12, r3);
+            let texels173 = cubes[2].footprint_at(r11, r13, r14);
+            let texels175 = cubes[2].footprint_at(r10, r12, r3);
             let cube = cubes[0];
-            let at = cube.footprint_at(r11, r13, r14);
+            let at = texels68;
             let ([r5, r8, r1, _], [r2, r17, r18, _]) = cube.sample_with_slope(&at, cube.texels([r15, r16]));
             let r5 = r0 * r5;
+            put(15, i, r5);
             let r16 = kept(0);
             let r15 = samples(11);
             let r19 = lit(1.0) - r15;
@@ -7405,12 +7651,13 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r22 = u(9) * r21;
             let r23 = samples(14);
             let cube = cubes[0];
-            let at = cube.footprint_at(r10, r12, r3);
+            let at = texels78;
             let ([r24, r25, r26, _], [r27, r28, r29, _]) = cube.sample_with_slope(&at, cube.texels([r9, r6]));
             let r24 = r23 * r24;
+            put(18, i, r24);
             let r30 = samples(13);
             let cube = cubes[1];
-            let at = cube.footprint_at(r10, r12, r3);
+            let at = texels81;
             let ([r31, r32, r33, _], [r34, r35, r36, _]) = cube.sample_with_slope(&at, cube.texels([r9, r6]));
             let r31 = r30 * r31;
             let r6 = r20.mul_add(u(10), u(11));
@@ -7419,10 +7666,13 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r37 = r24.mul_add(u(12), r37);
             let r37 = r16.mul_add(r22, r37);
             let r37 = r5.mul_add(u(13), r37);
+            put(0, i, r37);
             let r8 = r0 * r8;
+            put(16, i, r8);
             let r22 = kept(1);
             let r38 = r21 * u(14);
             let r25 = r23 * r25;
+            put(19, i, r25);
             let r39 = samples(16);
             let r32 = r39 * r32;
             let r40 = r20.mul_add(u(15), u(16));
@@ -7431,10 +7681,13 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r42 = r25.mul_add(u(17), r42);
             let r42 = r22.mul_add(r38, r42);
             let r42 = r8.mul_add(u(18), r42);
+            put(1, i, r42);
             let r1 = r0 * r1;
+            put(17, i, r1);
             let r38 = kept(2);
             let r43 = r21 * u(19);
             let r26 = r23 * r26;
+            put(20, i, r26);
             let r44 = samples(18);
             let r33 = r44 * r33;
             let r45 = r20.mul_add(u(20), u(21));
@@ -7443,12 +7696,19 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r47 = r26.mul_add(u(22), r47);
             let r47 = r38.mul_add(r43, r47);
             let r47 = r1.mul_add(u(23), r47);
+            put(2, i, r47);
             let r43 = r19 * r31;
+            put(3, i, r43);
             let r48 = r19 * r32;
+            put(4, i, r48);
             let r49 = r19 * r33;
+            put(5, i, r49);
             let r50 = r21 * r31;
+            put(6, i, r50);
             let r51 = r21 * r32;
+            put(7, i, r51);
             let r52 = r21 * r33;
+            put(8, i, r52);
             let r53 = kept(3);
             let r53 = r7 * r53;
             let r53 = select(r4.ge(lit(1.2e-38)), r53, lit(0.0));
@@ -7458,99 +7718,84 @@ fn listing_strength_lobe_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r54 = u(9) * r7;
             let r54 = r16 * r54;
             let r54 = r31.mul_add(r4, r54);
+            put(9, i, r54);
             let r4 = u(15) * r53;
             let r4 = r19 * r4;
             let r55 = u(14) * r7;
             let r55 = r22 * r55;
             let r55 = r32.mul_add(r4, r55);
+            put(10, i, r55);
             let r53 = u(20) * r53;
             let r53 = r19 * r53;
             let r7 = u(19) * r7;
             let r7 = r38 * r7;
             let r7 = r33.mul_add(r53, r7);
+            put(11, i, r7);
             let r53 = r16 * r21;
+            put(12, i, r53);
             let r19 = r21 * r22;
+            put(13, i, r19);
             let r21 = r21 * r38;
+            put(14, i, r21);
             let r15 = r15 - lit(1.0);
             let r6 = r6 * r15;
             let r20 = r20 * r15;
             let r4 = u(9) * r20;
             let r4 = r16 * r4;
             let r4 = r31.mul_add(r6, r4);
+            put(21, i, r4);
             let r40 = r40 * r15;
             let r6 = u(14) * r20;
             let r6 = r22 * r6;
             let r6 = r32.mul_add(r40, r6);
+            put(22, i, r6);
             let r15 = r45 * r15;
             let r20 = u(19) * r20;
             let r20 = r38 * r20;
             let r20 = r33.mul_add(r15, r20);
+            put(23, i, r20);
             let r2 = r0 * r2;
             let r27 = r23 * r27;
             let r34 = r30 * r34;
             let r34 = r9 * r34;
             let r34 = u(12).mul_add(r27, r34);
             let r34 = u(13).mul_add(r2, r34);
+            put(24, i, r34);
             let r17 = r0 * r17;
             let r28 = r23 * r28;
             let r35 = r39 * r35;
             let r35 = r41 * r35;
             let r35 = u(17).mul_add(r28, r35);
             let r35 = u(18).mul_add(r17, r35);
+            put(25, i, r35);
             let r18 = r0 * r18;
             let r29 = r23 * r29;
             let r36 = r44 * r36;
             let r36 = r46 * r36;
             let r36 = u(22).mul_add(r29, r36);
             let r36 = u(23).mul_add(r18, r36);
+            put(26, i, r36);
             let cube = cubes[2];
-            let at = cube.footprint_at(r11, r13, r14);
+            let at = texels173;
             let [r18, r29, r46, _] = cube.sample_at(&at);
             let r18 = r0 * r18;
             let cube = cubes[2];
-            let at = cube.footprint_at(r10, r12, r3);
+            let at = texels175;
             let [r14, r13, r11, _] = cube.sample_at(&at);
             let r14 = r23 * r14;
             let r14 = u(12) * r14;
             let r14 = u(13).mul_add(r18, r14);
+            put(27, i, r14);
             let r29 = r0 * r29;
             let r13 = r23 * r13;
             let r13 = u(17) * r13;
             let r13 = u(18).mul_add(r29, r13);
+            put(28, i, r13);
             let r46 = r0 * r46;
             let r11 = r23 * r11;
             let r11 = u(22) * r11;
             let r11 = u(23).mul_add(r46, r11);
-            block.put(0, i, r37);
-            block.put(1, i, r42);
-            block.put(2, i, r47);
-            block.put(3, i, r43);
-            block.put(4, i, r48);
-            block.put(5, i, r49);
-            block.put(6, i, r50);
-            block.put(7, i, r51);
-            block.put(8, i, r52);
-            block.put(9, i, r54);
-            block.put(10, i, r55);
-            block.put(11, i, r7);
-            block.put(12, i, r53);
-            block.put(13, i, r19);
-            block.put(14, i, r21);
-            block.put(15, i, r5);
-            block.put(16, i, r8);
-            block.put(17, i, r1);
-            block.put(18, i, r24);
-            block.put(19, i, r25);
-            block.put(20, i, r26);
-            block.put(21, i, r4);
-            block.put(22, i, r6);
-            block.put(23, i, r20);
-            block.put(24, i, r34);
-            block.put(25, i, r35);
-            block.put(26, i, r36);
-            block.put(27, i, r14);
-            block.put(28, i, r13);
-            block.put(29, i, r11);
+            put(29, i, r11);
         }
         },
     );
@@ -7566,52 +7811,75 @@ fn lit_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<28>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<23>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let r0 = samples(6);
             let r1 = u(0) - r0;
+            put(0, i, r1);
             let r2 = samples(7);
             let r3 = u(1) - r2;
+            put(1, i, r3);
             let r4 = samples(8);
             let r5 = u(2) - r4;
+            put(2, i, r5);
             let r6 = r1 * r1;
             let r6 = r3.mul_add(r3, r6);
             let r6 = r5.mul_add(r5, r6);
+            put(3, i, r6);
             let r7 = r0 * r1;
             let r7 = r2.mul_add(r3, r7);
             let r7 = r4.mul_add(r5, r7);
+            put(4, i, r7);
             let r8 = u(3) - r0;
+            put(5, i, r8);
             let r9 = u(4) - r2;
+            put(6, i, r9);
             let r10 = u(5) - r4;
+            put(7, i, r10);
             let r11 = r8 * r8;
             let r11 = r9.mul_add(r9, r11);
             let r11 = r10.mul_add(r10, r11);
+            put(8, i, r11);
             let r12 = r0 * r8;
             let r12 = r2.mul_add(r9, r12);
             let r12 = r4.mul_add(r10, r12);
+            put(9, i, r12);
             let r13 = u(6) - r0;
+            put(10, i, r13);
             let r14 = u(7) - r2;
+            put(11, i, r14);
             let r15 = u(8) - r4;
+            put(12, i, r15);
             let r16 = r13 * r13;
             let r16 = r14.mul_add(r14, r16);
             let r16 = r15.mul_add(r15, r16);
+            put(13, i, r16);
             let r17 = r0 * r13;
             let r17 = r2.mul_add(r14, r17);
             let r17 = r4.mul_add(r15, r17);
+            put(14, i, r17);
             let r18 = u(9) - r0;
+            put(15, i, r18);
             let r19 = u(10) - r2;
+            put(16, i, r19);
             let r20 = u(11) - r4;
+            put(17, i, r20);
             let r21 = r18 * r18;
             let r21 = r19.mul_add(r19, r21);
             let r21 = r20.mul_add(r20, r21);
+            put(18, i, r21);
             let r0 = r0 * r18;
             let r0 = r2.mul_add(r19, r0);
             let r0 = r4.mul_add(r20, r0);
+            put(19, i, r0);
             let r4 = samples(10);
             let r4 = select(r4.ge(lit(1.2e-38)), r4, lit(1.0));
             let r4 = r4.log2();
             let r4 = r4 * lit(0.6931471805599453);
+            put(20, i, r4);
             let r2 = samples(21);
             let r22 = r2.abs();
             let r23 = samples(22);
@@ -7627,35 +7895,14 @@ fn lit_strength_keep<S: Simd>(simd: S, block: Block<'_>) {
             let r22 = r23 * r22;
             let r22 = select(r25.ge(lit(1e-37)), r22, lit(0.0));
             let r22 = select(r25.ge(lit(1e-37)), r22, lit(0.0));
+            put(21, i, r22);
             let r25 = select(r22.ge(lit(0.5)), r25, lit(1.0));
             let r23 = r25 * lit(1000000.0);
             let r2 = -r23;
             let r2 = lit(0.0).max(r2);
             let r2 = r23.min(r2);
             let r25 = r2 / r25;
-            block.put(0, i, r1);
-            block.put(1, i, r3);
-            block.put(2, i, r5);
-            block.put(3, i, r6);
-            block.put(4, i, r7);
-            block.put(5, i, r8);
-            block.put(6, i, r9);
-            block.put(7, i, r10);
-            block.put(8, i, r11);
-            block.put(9, i, r12);
-            block.put(10, i, r13);
-            block.put(11, i, r14);
-            block.put(12, i, r15);
-            block.put(13, i, r16);
-            block.put(14, i, r17);
-            block.put(15, i, r18);
-            block.put(16, i, r19);
-            block.put(17, i, r20);
-            block.put(18, i, r21);
-            block.put(19, i, r0);
-            block.put(20, i, r4);
-            block.put(21, i, r22);
-            block.put(22, i, r25);
+            put(22, i, r25);
         }
         },
     );
@@ -7671,7 +7918,9 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<51>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<3>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<23>(i);
@@ -8289,11 +8538,14 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r18 = r12 / r18;
             let r12 = lit(1.0) - r18;
             let r12 = r28 * r12;
+            let texels587 = cubes[2].footprint_at(r13, r14, r15);
+            let texels588 = cubes[1].footprint_at(r13, r14, r15);
+            let texels594 = cubes[0].footprint_at(r0, r2, r4);
             let cube = cubes[2];
-            let at = cube.footprint_at(r13, r14, r15);
+            let at = texels587;
             let [r45, r26, r25, _] = cube.sample_at(&at);
             let cube = cubes[1];
-            let at = cube.footprint_at(r13, r14, r15);
+            let at = texels588;
             let [r27, r31, r11, _] = cube.sample_at(&at);
             let r45 = r45 - r27;
             let r27 = r1.mul_add(r45, r27);
@@ -8301,7 +8553,7 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r27 = r27 * r18;
             let r27 = r42.mul_add(r12, r27);
             let cube = cubes[0];
-            let at = cube.footprint_at(r0, r2, r4);
+            let at = texels594;
             let [r42, r45, r15, _] = cube.sample_at(&at);
             let r42 = r24 * r42;
             let r24 = samples(36);
@@ -8318,6 +8570,7 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r24 = r22.mul_add(u(169), r24);
             let r24 = r29.mul_add(r35, r24);
             let r24 = r23.mul_add(u(170), r24);
+            put(0, i, r24);
             let r23 = r30 * u(171);
             let r35 = samples(42);
             let r29 = r19 * u(171);
@@ -8360,6 +8613,7 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r35 = r16.mul_add(u(184), r35);
             let r35 = r29.mul_add(r22, r35);
             let r35 = r23.mul_add(u(185), r35);
+            put(1, i, r35);
             let r30 = r30 * u(186);
             let r23 = samples(45);
             let r19 = r19 * u(186);
@@ -8402,9 +8656,7 @@ fn lit_strength_value<S: Simd>(simd: S, block: Block<'_>) {
             let r23 = r32.mul_add(u(199), r23);
             let r23 = r19.mul_add(r28, r23);
             let r23 = r30.mul_add(u(200), r23);
-            block.put(0, i, r24);
-            block.put(1, i, r35);
-            block.put(2, i, r23);
+            put(2, i, r23);
         }
         },
     );
@@ -8420,7 +8672,9 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
         let u = |k: usize| Lanes::splat(simd, numbers[k]);
         let fields = block.fields::<51>();
         let cubes = block.cubes;
-        for i in 0..block.count {
+        let Some(columns) = block.columns::<36>() else { return };
+        let put = |k: usize, i: usize, value| store(&columns[k][i], value);
+        for i in 0..block.count.min(BATCH) {
             let at = block.begin(i);
             let samples = |k: usize| block.number(simd, fields[k], at);
             let rows = block.kept::<23>(i);
@@ -8505,13 +8759,17 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let point = CubePoint::of_unit([r21, r5, r20]);
             let [r22, r23, r24] = point.place();
             let [r25, r26] = point.tangent([r7, r2, r19]);
+            let texels65 = cubes[4].footprint_at(r22, r23, r24);
+            let texels68 = cubes[3].footprint_at(r22, r23, r24);
+            let texels992 = cubes[2].footprint_at(r22, r23, r24);
+            let texels993 = cubes[1].footprint_at(r22, r23, r24);
             let cube = cubes[4];
-            let at = cube.footprint_at(r22, r23, r24);
+            let at = texels65;
             let [r19, r2, r7, _] = cube.sample_at(&at);
             let r20 = u(6) * r19;
             let r19 = r19 * u(7);
             let cube = cubes[3];
-            let at = cube.footprint_at(r22, r23, r24);
+            let at = texels68;
             let [r5, r21, r27, _] = cube.sample_at(&at);
             let r20 = r20 - r5;
             let r28 = u(6) * r2;
@@ -9449,10 +9707,10 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r260 = r259 * r252;
             let r260 = r260 * r253;
             let cube = cubes[2];
-            let at = cube.footprint_at(r22, r23, r24);
+            let at = texels992;
             let ([r261, r262, r263, _], [r264, r265, r266, _]) = cube.sample_with_slope(&at, cube.texels([r25, r26]));
             let cube = cubes[1];
-            let at = cube.footprint_at(r22, r23, r24);
+            let at = texels993;
             let ([r267, r268, r269, _], [r270, r271, r272, _]) = cube.sample_with_slope(&at, cube.texels([r25, r26]));
             let r261 = r261 - r267;
             let r262 = r262 - r268;
@@ -9510,6 +9768,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r22 = (-r81).mul_add(r146, r22);
             let r146 = u(28) * r79;
             let r22 = r146.mul_add(u(190), r22);
+            put(18, i, r22);
             let r279 = r273 * r150;
             let r279 = r14 * r279;
             let r279 = -r279;
@@ -9521,6 +9780,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r279 = (-r181).mul_add(r280, r279);
             let r150 = u(190) * r150;
             let r279 = (-r81).mul_add(r150, r279);
+            put(33, i, r279);
             let r150 = r149 * r148;
             let r280 = r150 * r273;
             let r281 = r14 * r280;
@@ -9538,6 +9798,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r281 = r81.mul_add(r278, r281);
             let r274 = r150 * r274;
             let r281 = r146.mul_add(u(194), r281);
+            put(0, i, r281);
             let r274 = r14 * r274;
             let r146 = samples(42);
             let r13 = r146 * r13;
@@ -9593,6 +9854,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r296 = (-r150).mul_add(r283, r296);
             let r283 = r79 * u(195);
             let r296 = r283.mul_add(u(207), r296);
+            put(19, i, r296);
             let r79 = r79 * u(209);
             let r300 = r295 * r286;
             let r300 = r13 * r300;
@@ -9605,6 +9867,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r300 = (-r287).mul_add(r301, r300);
             let r286 = u(207) * r286;
             let r300 = (-r150).mul_add(r286, r300);
+            put(34, i, r300);
             let r286 = r285 * r284;
             let r301 = r286 * r295;
             let r302 = r13 * r301;
@@ -9622,6 +9885,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r302 = r150.mul_add(r299, r302);
             let r294 = r286 * r294;
             let r302 = r283.mul_add(u(213), r302);
+            put(1, i, r302);
             let r294 = r13 * r294;
             let r283 = samples(45);
             let r12 = r283 * r12;
@@ -9670,6 +9934,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r314 = r180.mul_add(u(219), r314);
             let r314 = (-r286).mul_add(r304, r314);
             let r314 = r79.mul_add(u(220), r314);
+            put(20, i, r314);
             let r304 = r264 * r307;
             let r304 = r12 * r304;
             let r304 = -r304;
@@ -9681,6 +9946,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r304 = (-r308).mul_add(r315, r304);
             let r307 = u(220) * r307;
             let r304 = (-r286).mul_add(r307, r304);
+            put(35, i, r304);
             let r307 = r306 * r305;
             let r315 = r307 * r264;
             let r316 = r12 * r315;
@@ -9698,6 +9964,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r316 = r286.mul_add(r180, r316);
             let r26 = r307 * r26;
             let r316 = r79.mul_add(u(224), r316);
+            put(2, i, r316);
             let r26 = r12 * r26;
             let r79 = r149 * r273;
             let r79 = r14 * r79;
@@ -9709,6 +9976,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r79 = r181.mul_add(r307, r79);
             let r307 = u(190) * r149;
             let r79 = r81.mul_add(r307, r79);
+            put(3, i, r79);
             let r307 = r285 * r295;
             let r307 = r13 * r307;
             let r317 = r285 * u(202);
@@ -9719,6 +9987,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r307 = r287.mul_add(r317, r307);
             let r317 = u(207) * r285;
             let r307 = r150.mul_add(r317, r307);
+            put(4, i, r307);
             let r317 = r306 * r264;
             let r317 = r12 * r317;
             let r318 = r306 * u(217);
@@ -9729,6 +9998,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r317 = r308.mul_add(r318, r317);
             let r318 = u(220) * r306;
             let r317 = r286.mul_add(r318, r317);
+            put(5, i, r317);
             let r318 = r149 * r147;
             let r319 = r273 * r318;
             let r319 = r14 * r319;
@@ -9740,6 +10010,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r319 = r181.mul_add(r320, r319);
             let r318 = u(190) * r318;
             let r319 = r81.mul_add(r318, r319);
+            put(6, i, r319);
             let r318 = r147 * r285;
             let r147 = r147 * r306;
             let r320 = r295 * r318;
@@ -9752,6 +10023,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r320 = r287.mul_add(r321, r320);
             let r318 = u(207) * r318;
             let r320 = r150.mul_add(r318, r320);
+            put(7, i, r320);
             let r318 = r264 * r147;
             let r318 = r12 * r318;
             let r321 = u(217) * r147;
@@ -9762,6 +10034,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r318 = r308.mul_add(r321, r318);
             let r147 = u(220) * r147;
             let r318 = r286.mul_add(r147, r318);
+            put(8, i, r318);
             let r147 = kept(20);
             let r147 = r31 * r147;
             let r147 = select(r30.ge(lit(1.2e-38)), r147, lit(0.0));
@@ -9777,6 +10050,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r149 = r181.mul_add(r31, r149);
             let r30 = u(190) * r30;
             let r149 = r81.mul_add(r30, r149);
+            put(9, i, r149);
             let r30 = u(197) * r147;
             let r30 = r285 * r30;
             let r147 = u(215) * r147;
@@ -9791,6 +10065,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r306 = r287.mul_add(r285, r306);
             let r30 = u(207) * r30;
             let r306 = r150.mul_add(r30, r306);
+            put(10, i, r306);
             let r30 = r264 * r147;
             let r30 = r12 * r30;
             let r285 = u(217) * r147;
@@ -9801,6 +10076,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r30 = r308.mul_add(r285, r30);
             let r147 = u(220) * r147;
             let r30 = r286.mul_add(r147, r30);
+            put(11, i, r30);
             let r147 = binary(Binary::Less, lit(0.0), r243);
             let r285 = binary(Binary::Less, r243, lit(0.0));
             let r285 = r147 - r285;
@@ -9867,12 +10143,15 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r240 = r267 * r248;
             let r240 = (-r265).mul_add(r248, r240);
             let r274 = u(162).mul_add(r240, r274);
+            put(12, i, r274);
             let r240 = r268 * r248;
             let r240 = (-r291).mul_add(r248, r240);
             let r294 = u(196).mul_add(r240, r294);
+            put(13, i, r294);
             let r240 = r269 * r248;
             let r240 = (-r312).mul_add(r248, r240);
             let r26 = u(214).mul_add(r240, r26);
+            put(14, i, r26);
             let r240 = u(16) * r15;
             let r240 = u(17).mul_add(r16, r240);
             let r240 = u(18).mul_add(r17, r240);
@@ -9983,6 +10262,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r53 = u(28) * r78;
             let r58 = r53 * r57;
             let r263 = u(194).mul_add(r58, r263);
+            put(27, i, r263);
             let r58 = u(209) * r78;
             let r78 = u(195) * r78;
             let r60 = r58 * r57;
@@ -10008,6 +10288,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r32 = (-r81).mul_add(r61, r32);
             let r61 = r53 * r224;
             let r32 = u(194).mul_add(r61, r32);
+            put(30, i, r32);
             let r61 = r53 * r64;
             let r53 = r53 * r240;
             let r59 = r240 * r58;
@@ -10430,6 +10711,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r123 = u(193).mul_add(r55, r123);
             let r123 = (-r81).mul_add(r83, r123);
             let r123 = u(194).mul_add(r53, r123);
+            put(21, i, r123);
             let r53 = r20 * r56;
             let r20 = r20 * r44;
             let r83 = u(188) * r127;
@@ -10441,6 +10723,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r21 = u(193).mul_add(r173, r21);
             let r21 = (-r81).mul_add(r127, r21);
             let r21 = u(194).mul_add(r61, r21);
+            put(24, i, r21);
             let r61 = r44 * r29;
             let r127 = r56 * r28;
             let r28 = r44 * r28;
@@ -10592,6 +10875,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r275 = r148 + r275;
             let r148 = u(28) * r63;
             let r275 = u(194).mul_add(r148, r275);
+            put(15, i, r275);
             let r148 = r282 * r87;
             let r148 = u(163) * r148;
             let r87 = r303 * r87;
@@ -10612,6 +10896,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r5 = u(212).mul_add(r278, r5);
             let r5 = (-r150).mul_add(r148, r5);
             let r5 = u(213).mul_add(r240, r5);
+            put(22, i, r5);
             let r240 = r282 * r137;
             let r240 = u(163) * r240;
             let r137 = r303 * r137;
@@ -10632,6 +10917,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r19 = u(212).mul_add(r168, r19);
             let r19 = (-r150).mul_add(r240, r19);
             let r19 = u(213).mul_add(r72, r19);
+            put(25, i, r19);
             let r72 = r282 * r144;
             let r72 = u(163) * r72;
             let r144 = r303 * r144;
@@ -10652,6 +10938,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r292 = u(212).mul_add(r158, r292);
             let r292 = (-r150).mul_add(r72, r292);
             let r292 = u(213).mul_add(r57, r292);
+            put(28, i, r292);
             let r57 = r282 * r82;
             let r57 = u(163) * r57;
             let r282 = r125 * r282;
@@ -10678,6 +10965,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r290 = u(212).mul_add(r177, r290);
             let r290 = (-r150).mul_add(r57, r290);
             let r290 = u(213).mul_add(r224, r290);
+            put(31, i, r290);
             let r224 = u(195) * r37;
             let r224 = r146 * r224;
             let r37 = u(209) * r37;
@@ -10732,6 +11020,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r276 = r224 + r276;
             let r224 = u(195) * r63;
             let r276 = u(213).mul_add(r224, r276);
+            put(16, i, r276);
             let r63 = u(209) * r63;
             let r224 = r264 * r87;
             let r39 = (-r12).mul_add(r224, r39);
@@ -10747,6 +11036,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r39 = u(223).mul_add(r172, r39);
             let r39 = (-r286).mul_add(r87, r39);
             let r39 = u(224).mul_add(r59, r39);
+            put(23, i, r39);
             let r59 = r264 * r137;
             let r34 = (-r12).mul_add(r59, r34);
             let r59 = u(217) * r137;
@@ -10761,6 +11051,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r34 = u(223).mul_add(r165, r34);
             let r34 = (-r286).mul_add(r137, r34);
             let r34 = u(224).mul_add(r64, r34);
+            put(26, i, r34);
             let r64 = r264 * r144;
             let r313 = (-r12).mul_add(r64, r313);
             let r64 = u(217) * r144;
@@ -10775,6 +11066,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r313 = u(223).mul_add(r76, r313);
             let r313 = (-r286).mul_add(r144, r313);
             let r313 = u(224).mul_add(r60, r313);
+            put(29, i, r313);
             let r60 = r264 * r82;
             let r311 = (-r12).mul_add(r60, r311);
             let r60 = u(217) * r82;
@@ -10789,6 +11081,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r311 = u(223).mul_add(r171, r311);
             let r311 = (-r286).mul_add(r82, r311);
             let r311 = u(224).mul_add(r67, r311);
+            put(32, i, r311);
             let r67 = u(220) * r303;
             let r37 = (-r286).mul_add(r67, r37);
             let r67 = u(219) * r303;
@@ -10808,42 +11101,7 @@ fn lit_strength_moved<S: Simd>(simd: S, block: Block<'_>) {
             let r277 = u(223).mul_add(r164, r277);
             let r277 = r37 + r277;
             let r277 = u(224).mul_add(r63, r277);
-            block.put(0, i, r281);
-            block.put(1, i, r302);
-            block.put(2, i, r316);
-            block.put(3, i, r79);
-            block.put(4, i, r307);
-            block.put(5, i, r317);
-            block.put(6, i, r319);
-            block.put(7, i, r320);
-            block.put(8, i, r318);
-            block.put(9, i, r149);
-            block.put(10, i, r306);
-            block.put(11, i, r30);
-            block.put(12, i, r274);
-            block.put(13, i, r294);
-            block.put(14, i, r26);
-            block.put(15, i, r275);
-            block.put(16, i, r276);
-            block.put(17, i, r277);
-            block.put(18, i, r22);
-            block.put(19, i, r296);
-            block.put(20, i, r314);
-            block.put(21, i, r123);
-            block.put(22, i, r5);
-            block.put(23, i, r39);
-            block.put(24, i, r21);
-            block.put(25, i, r19);
-            block.put(26, i, r34);
-            block.put(27, i, r263);
-            block.put(28, i, r292);
-            block.put(29, i, r313);
-            block.put(30, i, r32);
-            block.put(31, i, r290);
-            block.put(32, i, r311);
-            block.put(33, i, r279);
-            block.put(34, i, r300);
-            block.put(35, i, r304);
+            put(17, i, r277);
         }
         },
     );

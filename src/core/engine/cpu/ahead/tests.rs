@@ -28,6 +28,7 @@ const HEAD: &str = "\
 // stored samples, `kept` numbers that no free parameter moves, `u` numbers that all samples share.
 
 use super::super::block::{Block, along};
+use super::super::streams::{BATCH, store};
 use crate::engine::lanes::Lanes;
 use crate::model::cube::CubePoint;
 use crate::model::real::{Real, select};
@@ -40,6 +41,7 @@ use crate::simd::Simd;
 /// A tape as a function.
 fn function(name: &str, tape: &Tape) -> String {
     let (statements, outputs, _) = printed(tape);
+    let outputs = outputs.len();
     let kept = tape.fields.iter().filter(|field| field.name == KEPT).map(|field| field.component + 1).max();
     let (fields, uniforms) = (tape.fields.len(), tape.uniform_values(|_| 0.0).len());
     let mut text = format!("\n#[inline(never)]\nfn {name}<S: Simd>(simd: S, block: Block<'_>) {{\n");
@@ -52,7 +54,9 @@ fn function(name: &str, tape: &Tape) -> String {
     line("let u = |k: usize| Lanes::splat(simd, numbers[k]);");
     line(&format!("let fields = block.fields::<{fields}>();"));
     line("let cubes = block.cubes;");
-    line("for i in 0..block.count {");
+    line(&format!("let Some(columns) = block.columns::<{outputs}>() else {{ return }};"));
+    line("let put = |k: usize, i: usize, value| store(&columns[k][i], value);");
+    line("for i in 0..block.count.min(BATCH) {");
     line("    let at = block.begin(i);");
     line("    let samples = |k: usize| block.number(simd, fields[k], at);");
     if let Some(kept) = kept {
@@ -60,9 +64,6 @@ fn function(name: &str, tape: &Tape) -> String {
         line("    let kept = |k: usize| Lanes::of_row(simd, &rows[k]);");
     }
     text.push_str(&statements);
-    for (k, output) in outputs.iter().enumerate() {
-        let _ = writeln!(text, "            block.put({k}, i, {output});");
-    }
     text.push_str("        }\n        },\n    );\n}\n");
     text
 }
