@@ -3,9 +3,6 @@
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{PoisonError, RwLock, RwLockWriteGuard, TryLockError};
-use std::time::Duration;
-
-use web_time::Instant;
 
 /// A file could not be written; nothing is left where it should have stood.
 #[derive(Debug, thiserror::Error)]
@@ -37,19 +34,14 @@ impl OutputError {
 /// Shared by those who write a file.
 static WRITING: RwLock<()> = RwLock::new(());
 
-/// For as long as the guard lives no file is begun: what is there can be removed before the program ends. Those that
-/// were begun are finished first; nothing, if that takes longer than `patience`.
+/// For as long as the guard lives no file is begun: what is there can be removed before the program ends. Nothing while one
+/// is being written: a writer may need another's file first, so nobody waits in line here.
 #[must_use]
-pub fn halt(patience: Duration) -> Option<RwLockWriteGuard<'static, ()>> {
-    let since = Instant::now();
-    loop {
-        // Not by waiting in line: a writer may need another's file first.
-        match WRITING.try_write() {
-            Ok(guard) => return Some(guard),
-            Err(TryLockError::Poisoned(guard)) => return Some(guard.into_inner()),
-            Err(TryLockError::WouldBlock) if since.elapsed() > patience => return None,
-            Err(TryLockError::WouldBlock) => std::thread::sleep(Duration::from_millis(2)),
-        }
+pub fn halt() -> Option<RwLockWriteGuard<'static, ()>> {
+    match WRITING.try_write() {
+        Ok(guard) => Some(guard),
+        Err(TryLockError::Poisoned(guard)) => Some(guard.into_inner()),
+        Err(TryLockError::WouldBlock) => None,
     }
 }
 

@@ -197,7 +197,7 @@ fn refusals_of_haze_name_the_file_and_the_remedy() {
     let cases: Vec<(Vec<u8>, &[&str])> = vec![
         (
             exr(4, 4, &["R", "G", "B"], |_, _| 1.0),
-            &["haze.exr", "no channel haze.Y", "it has B, G, R", "--layers"],
+            &["haze.exr", "no channel haze.Y", "it has B, G, R", "under the name haze.Y"],
         ),
         (exr(5, 4, &["haze.Y"], |_, _| 1.0), &["haze.exr", "5 x 4", "its view is 4 x 4"]),
         (exr(4, 4, &["haze.Y"], |_, i| if i == 5 { f32::NAN } else { 0.0 }), &["x = 1, y = 1", "NaN"]),

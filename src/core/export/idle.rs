@@ -3,6 +3,10 @@
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Param, Params};
 
+/// Effects of files that show nothing where one parameter is 0.
+const WEIGHTED_BY: [(&str, &str); 2] =
+    [("transmission", "transmission_weight"), ("light_specular", "specular_weight")];
+
 /// Those of `effects` whose terms have a weight of 0 in every channel: without them the image is the same. The haze
 /// stays: an alpha of 0 is not one of 1.
 pub(super) fn idle(effects: Effects, params: &Params) -> Effects {
@@ -16,7 +20,9 @@ pub(super) fn idle(effects: Effects, params: &Params) -> Effects {
         Effect::Hilite => zero(Param::Hilite),
         Effect::Reflection => zero(Param::Reflection),
         Effect::KeyLight => zero(Param::KeyColor),
-        added => added.name() == "transmission" && Param::from_name("transmission_weight").is_some_and(zero),
+        added => WEIGHTED_BY
+            .iter()
+            .any(|(name, weight)| added.name() == *name && Param::from_name(weight).is_some_and(zero)),
     };
     let idle: Effects = effects.iter().filter(|&effect| weightless(effect)).collect();
     // A shader of nothing at all reads nothing, which no language has a struct for.

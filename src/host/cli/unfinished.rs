@@ -90,6 +90,8 @@ pub(super) fn run(command: &mut Command) -> std::io::Result<ExitStatus> {
 
 /// How often it is asked whether a process has ended.
 const POLL: Duration = Duration::from_millis(10);
+/// How long files that are being written are waited for.
+const PATIENCE: Duration = Duration::from_secs(5);
 /// How long processes that were interrupted are waited for: they wait for a disk as long as this one does, and more.
 const LAST_WORDS: Duration = Duration::from_secs(6);
 
@@ -130,7 +132,12 @@ fn interrupted(unfinished: &mut Unfinished) {
     }
     unfinished.children.iter().for_each(|child| interrupt(child.id()));
     // A bake that is being kept would bring its folder back; a disk that does not answer is not waited for.
-    let _halted = output::halt(Duration::from_secs(5));
+    let since = Instant::now();
+    let mut halted = output::halt();
+    while halted.is_none() && since.elapsed() < PATIENCE {
+        std::thread::sleep(POLL);
+        halted = output::halt();
+    }
     let since = Instant::now();
     while unfinished.children.iter_mut().any(|child| matches!(child.try_wait(), Ok(None)))
         && since.elapsed() < LAST_WORDS

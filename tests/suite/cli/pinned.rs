@@ -25,15 +25,15 @@ struct Pin {
     samples: u64,
     /// Loss at the start and at the end.
     losses: [f64; 2],
-    /// Value and noise error (the standard error if residuals were independent) of each constant that the images
-    /// determine and no bound holds.
+    /// Value and noise error (the standard error if residuals were independent) of each constant and channel that the
+    /// images determine and no bound holds.
     constants: BTreeMap<String, [f64; 2]>,
-    /// By view, the mean radiance of each of 4 x 4 blocks of the picture, row by row.
+    /// By view, the mean radiance of each of 8 x 8 blocks of the picture, row by row.
     pictures: BTreeMap<String, Vec<[f64; 3]>>,
 }
 
 /// Blocks along a picture's side.
-const BLOCKS: usize = 4;
+const BLOCKS: usize = 8;
 
 /// The scanned head's and the posed head's scenes by the paper's model.
 const PLAIN: [&str; 5] = ["lps_forest", "lps_sunrise", "lps_studio", "lps_studio_dry", "mh_portrait"];
@@ -62,6 +62,14 @@ pub(super) fn scene_text(data: &Path, scene: &str) -> String {
     table.to_string()
 }
 
+/// A number, or one a channel.
+fn channels(value: &Value) -> Vec<f64> {
+    match value.as_array() {
+        Some(channels) => channels.iter().filter_map(Value::as_f64).collect(),
+        None => value.as_f64().into_iter().collect(),
+    }
+}
+
 /// What a fit finds.
 fn found(cache: &Path, arguments: &[&str]) -> Pin {
     let folder = tempfile::tempdir().unwrap();
@@ -70,16 +78,20 @@ fn found(cache: &Path, arguments: &[&str]) -> Pin {
     let ran = Ran::of(command.current_dir(folder.path()));
     assert_eq!(ran.code, Some(0), "{arguments:?}: {ran:?}");
     let report: Value = serde_json::from_str(&ran.out).unwrap();
-    let constants = report["params"].as_object().unwrap().iter().filter_map(|(name, found)| {
-        let determined = found["at_bound"] == false && !found["std_error"].is_null();
-        let numbers = [found["value"].as_f64()?, found["noise_error"].as_f64()?].map(short);
-        determined.then(|| (name.clone(), numbers))
-    });
+    let mut constants = BTreeMap::new();
+    for (name, found) in report["params"].as_object().unwrap() {
+        if found["at_bound"] == false && !found["std_error"].is_null() {
+            let (values, errors) = (channels(&found["value"]), channels(&found["noise_error"]));
+            for (c, (value, error)) in values.into_iter().zip(errors).enumerate() {
+                constants.insert(format!("{name}.{c}"), [short(value), short(error)]);
+            }
+        }
+    }
     let views = report["views"].as_object().unwrap().keys();
     Pin {
         samples: report["samples"].as_u64().unwrap(),
         losses: ["start", "end"].map(|end| short(report["loss"][end].as_f64().unwrap())),
-        constants: constants.collect(),
+        constants,
         pictures: views
             .map(|view| (view.clone(), blocks(&folder.path().join(format!("run/{view}_terms.exr")))))
             .collect(),
@@ -111,9 +123,9 @@ fn written(pins: &Pins) -> String {
     format!("{{\n{}\n}}\n", pins.iter().map(line).collect::<Vec<_>>().join(",\n"))
 }
 
-/// To nine digits, which say more than anybody compares.
+/// To eight digits, which say more than anybody compares.
 fn short(x: f64) -> f64 {
-    format!("{x:.8e}").parse().unwrap()
+    format!("{x:.7e}").parse().unwrap()
 }
 
 /// What differs from a pin.

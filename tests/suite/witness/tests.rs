@@ -604,8 +604,8 @@ fn gradients_are_the_slopes_of_the_evaluators_own_losses() {
 }
 
 #[test]
-fn the_witness_has_every_parameter_of_the_library() {
-    assert_eq!(evaluators::parameters(), NAMES, "the witness has to know what the library fits");
+fn the_witness_has_every_parameter_of_the_papers_model() {
+    assert_eq!(evaluators::parameters(), NAMES, "the witness has to know what the tables have");
 }
 
 /// Losses of a model's value at a target, as one works them out by hand from docs/scene-files.md.

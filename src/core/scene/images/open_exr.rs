@@ -23,7 +23,7 @@ pub(super) fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
 
 /// The haze in an EXR file, as a grey image.
 pub(super) fn decode_haze(opened: Opened<'_>) -> Result<Image, SceneError> {
-    let remedy = "Save the haze under the name haze.Y, as `skinfit render --layers` does";
+    let remedy = "Save the haze under the name haze.Y";
     decode_by(opened, haze, "has no channel haze.Y, and is not an image of Y alone", remedy)
 }
 

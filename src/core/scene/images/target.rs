@@ -62,7 +62,7 @@ pub(in crate::scene) fn haze(path: &Path, target: &Target, size: (u32, u32)) -> 
         [0x76, 0x2f, 0x31, 0x01, ..] => open_exr::decode_haze(opened),
         _ => Err(opened.error(
             "is no EXR file, and the haze is a number without bounds",
-            "Save it as an EXR with the channel haze.Y, as `skinfit render --layers` does",
+            "Save it as an EXR with the channel haze.Y",
         )),
     })?;
     let haze: Vec<f32> = image.rgb.iter().map(|rgb| rgb[0]).collect();
