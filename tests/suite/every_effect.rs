@@ -6,7 +6,7 @@ use skinfit::model::effects::{Effect, Effects};
 use skinfit::model::params::{Column, Param, Scale};
 use skinfit::prepare::{Baked, Loaded, PrepareOptions, Views};
 use skinfit::scene::Scene;
-use skinfit::shader::term::library;
+use skinfit::shader::term::{Term, library, terms};
 
 use crate::graphics::bench::cache;
 use crate::sky::{beside_a_lamp, brighter, on_cpu};
@@ -74,6 +74,30 @@ pub(crate) fn shown(effect: Effect, size: u32) -> Baked {
 
 /// As of engines elsewhere, but that an angle's degree moves little, and levels of an atlas round some tens of times more.
 const NEAR: Nearness = Nearness { step: 1e-4, difference: 1e-5, loss: 1e-5, slope: [1e-3, 1e-5] };
+
+/// Exports leave such an effect out.
+#[test]
+fn what_a_weight_of_0_leaves_is_what_is_there_without_its_effect() {
+    let all = every_effect();
+    let mut weights = 0;
+    for effect in all {
+        // The lamp is registered with the scene.
+        let baked = shown(effect, 16);
+        let of_scene = |term: &&Term| !term.is_by_file() && baked.scene.effects.has_any(term.effects);
+        let weighed: Vec<(Effect, Param)> =
+            terms().into_iter().filter(of_scene).flat_map(|term| term.weighed.iter().copied()).collect();
+        for (idle, weight) in weighed.into_iter().filter(|(idle, _)| baked.scene.effects.has(*idle)) {
+            let nothing = baked.clone().with_scene(|scene| scene.params.set(weight, 0.0));
+            let without = baked.clone().with_scene(|scene| scene.effects = scene.effects.without(idle));
+            let as_they_are = on_cpu(&baked);
+            let (nothing, without) = (on_cpu(&nothing), on_cpu(&without));
+            assert_eq!(nothing.rgb, without.rgb, "{} at {} = 0", idle.name(), weight.name());
+            assert_ne!(nothing.rgb, as_they_are.rgb, "{} shows nothing anyway", idle.name());
+            weights += 1;
+        }
+    }
+    assert!(weights >= 4, "{weights} weights were tried");
+}
 
 #[test]
 fn slopes_by_its_parameters_are_finite_differences_on_every_engine() {

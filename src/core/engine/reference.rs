@@ -79,7 +79,9 @@ impl<'a> Reference<'a> {
         Ok(Self { illumination, views, residuals, unknowns: unknowns.to_vec(), steps, free })
     }
 
-    fn cubes(&self, params: &Params) -> CubesAt<f64> {
+    /// What is looked up at some parameters.
+    #[must_use]
+    pub fn cubes(&self, params: &Params) -> CubesAt<f64> {
         CubesAt::new(self.illumination, params, f64::from)
     }
 
@@ -96,10 +98,21 @@ impl<'a> Reference<'a> {
     /// Value and columns of one pixel slot of a view: the means over its samples.
     #[must_use]
     pub fn pixel(&self, view: usize, slot: usize, params: &Params) -> PixelColumns {
-        let cubes = self.cubes(params);
-        let setting = self.steps.setting(params, &cubes, 0.0);
+        self.pixel_under(view, slot, params, &self.cubes(params))
+    }
+
+    /// The same under cubes of the caller's, which may be rounded.
+    #[must_use]
+    pub fn pixel_under(
+        &self,
+        view: usize,
+        slot: usize,
+        params: &Params,
+        cubes: &CubesAt<f64>,
+    ) -> PixelColumns {
+        let setting = self.steps.setting(params, cubes, 0.0);
         let group =
-            self.group(&self.at(view, &setting, (params, &cubes)), slot / LANES, &mut Registers::default());
+            self.group(&self.at(view, &setting, (params, cubes)), slot / LANES, &mut Registers::default());
         group[slot % LANES].clone()
     }
 

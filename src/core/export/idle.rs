@@ -2,15 +2,13 @@
 
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Param, Params};
-
-/// Effects of files that show nothing where one parameter is 0.
-const WEIGHTED_BY: [(&str, &str); 2] =
-    [("transmission", "transmission_weight"), ("light_specular", "specular_weight")];
+use crate::shader::term::terms;
 
 /// Those of `effects` whose terms have a weight of 0 in every channel: without them the image is the same. The haze
 /// stays: an alpha of 0 is not one of 1.
 pub(super) fn idle(effects: Effects, params: &Params) -> Effects {
     let zero = |param: Param| params.rgb(param) == [0.0; 3];
+    let weights: Vec<_> = terms().into_iter().flat_map(|term| term.weighed.iter().copied()).collect();
     let rim = !effects.has(Effect::Rim) || zero(Param::RimWeight);
     let weightless = |effect: Effect| match effect {
         Effect::Diffuse => zero(Param::BaseWeight) && rim,
@@ -20,9 +18,8 @@ pub(super) fn idle(effects: Effects, params: &Params) -> Effects {
         Effect::Hilite => zero(Param::Hilite),
         Effect::Reflection => zero(Param::Reflection),
         Effect::KeyLight => zero(Param::KeyColor),
-        added => WEIGHTED_BY
-            .iter()
-            .any(|(name, weight)| added.name() == *name && Param::from_name(weight).is_some_and(zero)),
+        // What its file says of it.
+        added => weights.iter().any(|&(effect, weight)| effect == added && zero(weight)),
     };
     let idle: Effects = effects.iter().filter(|&effect| weightless(effect)).collect();
     // A shader of nothing at all reads nothing, which no language has a struct for.

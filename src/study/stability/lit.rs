@@ -31,8 +31,10 @@ pub(super) const CASES: usize = 250;
 
 /// What f32 leaves of the split sum's fits, as a share of what a mirroring surface shows: a third of their own error.
 const FITTED: f64 = 1e-4;
+/// More roundings lie one behind the other than in the paper's model, for which the spread is.
+const LONGER: f64 = 1.5;
 /// At most so many: a long search of the other kind is not to take hours of this one.
-const MOST: usize = 64;
+const MOST: usize = 1024;
 
 /// How many batches stand beside so many cases of the other search.
 #[must_use]
@@ -184,7 +186,15 @@ fn wanted(batch: &LitBatch, moves: usize) -> Result<Vec<(Rgba, Rgba)>, String> {
     let views: Vec<ObservedView> = all.iter().flat_map(|task| task.views.iter().cloned()).collect();
     let exact = Reference::new(batch.setup, &batch.light, &views, batch.loss, &[]);
     let exact = exact.map_err(|error| error.to_string())?;
-    let colour = |view: usize, slot, params: &Params| exact.pixel(view, slot, params).map(|(value, _)| value);
+    // Of every move the blend of texels is rounded anew.
+    let mut cubes: Vec<_> = points.iter().map(|point| exact.cubes(&point.params)).collect();
+    for (number, cubes) in cubes.iter_mut().enumerate().skip(1) {
+        let mut texels = Moves::new(&mut rng, number);
+        *cubes = cubes.changed(|x| texels.texel(x));
+    }
+    let colour = |view: usize, slot, params: &Params| {
+        exact.pixel_under(view, slot, params, &cubes[view]).map(|(value, _)| value)
+    };
     // Where little is reflected that is the rest of a fit's sums which are as large as where much is: these are rounded.
     let mut mirroring = batch.params.clone();
     for (name, value) in [("f0", 0.2), ("f0_floor", 1.0)] {
@@ -199,7 +209,7 @@ fn wanted(batch: &LitBatch, moves: usize) -> Result<Vec<(Rgba, Rgba)>, String> {
         for (view, point) in points.iter().enumerate().skip(1) {
             let other = colour(view, slot, &point.params);
             for c in 0..4 {
-                allowed[c] = allowed[c].max(SPREAD * (other[c] - value[c]).abs() + summed[c]);
+                allowed[c] = allowed[c].max(LONGER * SPREAD * (other[c] - value[c]).abs() + summed[c]);
             }
         }
         (value, allowed)
@@ -218,5 +228,31 @@ fn finite_slopes(batch: &LitBatch) -> Result<(), String> {
     match gradient.iter().zip(&task.unknowns).find(|(x, _)| !x.is_finite()) {
         None => Ok(()),
         Some((x, unknown)) => Err(format!("in f64 the gradient by {} is {x}", unknown.name())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::case::FragmentInputs;
+    use super::super::objectives::Cpu;
+    use super::*;
+    use crate::model::choices::SpecularModel;
+
+    /// N.L and N.V below the smallest normal f32 are divided by what vanishes with them.
+    #[test]
+    fn light_and_eye_that_both_graze() {
+        let (probes, lights) = (Probes::new().unwrap(), LightBox::new(None));
+        let level = FragmentInputs {
+            texel: [0.5, 0.5, 1.0],
+            normal: [0.0, 1.0, f64::from(1e-40_f32)],
+            view: [1.0, 0.0, -0.7628754377365112],
+            ..FragmentInputs::ORDINARY
+        };
+        let toward = [-0.795_059_56, 0.0, 0.606_531_3];
+        for model in SpecularModel::ALL {
+            let batch = LitBatch::beside_lamps(&probes, &lights, (model, level, toward));
+            let (verdict, failed) = Tried::new(0, batch).verdict(&Cpu);
+            assert_eq!((failed, verdict.failure), (0, None), "{model:?}");
+        }
     }
 }

@@ -19,6 +19,7 @@ use crate::model::choices::{
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::Field;
+use crate::model::fragment::Fragment;
 use crate::model::params::{Param, Params};
 use crate::model::transmission::FARTHEST;
 use crate::model::vector::dot;
@@ -57,6 +58,8 @@ impl Probes {
 #[derive(Clone, Debug)]
 pub(super) struct LitFragment {
     inputs: FragmentInputs,
+    /// What samples hold of it.
+    held: Fragment<f32>,
     fields: Vec<[f32; 3]>,
 }
 
@@ -89,10 +92,8 @@ impl LitBatch {
         let fields: Vec<Field> = setup.needs().fields.iter().collect();
         let draw = |rng: &mut StdRng| {
             let inputs = fragment(rng);
-            LitFragment {
-                inputs,
-                fields: fields.iter().map(|field| found(field.name(), &inputs, rng)).collect(),
-            }
+            let fields = fields.iter().map(|field| found(field.name(), &inputs, rng)).collect();
+            LitFragment { inputs, held: inputs.fragment(setup, 0.0), fields }
         };
         let fragments = (0..count).map(|_| draw(rng)).collect();
         Self { setup, params, light, loss: one_of(rng, &Loss::ALL), fragments }
@@ -112,11 +113,17 @@ impl LitBatch {
         format!("{:?}, {:?}, {}", self.setup.form, self.setup.effects, named.join(", "))
     }
 
-    /// Every number moved as roundings may move it.
+    /// Every number moved as roundings may move it: what is given, and what samples hold of that. 1 - |n.V| feels the
+    /// last digit of n's length and of V's, which no move of what they are made from need change.
     pub(super) fn moved(&self, moves: &mut Moves<'_>) -> (Vec<LitFragment>, Params) {
-        let each = |fragment: &LitFragment, moves: &mut Moves<'_>| LitFragment {
-            inputs: moved(&fragment.inputs, moves),
-            fields: fragment.fields.iter().map(|numbers| moves.vector(*numbers)).collect(),
+        let each = |fragment: &LitFragment, moves: &mut Moves<'_>| {
+            let inputs = moved(&fragment.inputs, moves);
+            let mut held = inputs.fragment(self.setup, 0.0);
+            for vector in [&mut held.base, &mut held.bump, &mut held.normal, &mut held.view] {
+                *vector = moves.vector(*vector);
+            }
+            let fields = fragment.fields.iter().map(|numbers| moves.vector(*numbers)).collect();
+            LitFragment { inputs, held, fields }
         };
         let fragments = self.fragments.iter().map(|fragment| each(fragment, moves)).collect();
         let mut params = moved_params(&self.params, moves);
@@ -124,6 +131,8 @@ impl LitBatch {
         {
             params.set_rgb(param, self.params.rgb(param).map(|x| moves.number(x)));
         }
+        // Beside 1 a small part of what is not open is rounded as 1 is: 1 - occlusion (1 - O).
+        params.set(Param::Occlusion, moves.beside_one(params.scalar(Param::Occlusion)));
         (fragments, params)
     }
 
@@ -143,7 +152,7 @@ impl LitBatch {
         let (mut pixel, mut coverage) = (Vec::new(), Vec::new());
         for slot in 0..groups * LANES {
             let (fragment, number, share) = of_slot(slot);
-            surface.set(slot, &fragment.inputs.fragment(self.setup, 0.0_f32), share);
+            surface.set(slot, &fragment.held, share);
             pixel.push(number);
             coverage.push(share);
         }
@@ -270,4 +279,24 @@ fn direction(at: &FragmentInputs, rng: &mut StdRng) -> [f64; 3] {
     };
     let length = dot(d, d).sqrt();
     if length > 1e-6 { d.map(|x| x / length) } else { [0.0; 3] }
+}
+
+#[cfg(test)]
+impl LitBatch {
+    /// The fragment alone, lamps of white light along `toward`.
+    pub(super) fn beside_lamps(
+        probes: &Probes,
+        lights: &LightBox,
+        (model, inputs, toward): (SpecularModel, FragmentInputs, [f32; 3]),
+    ) -> Self {
+        let specular = Effect::from_name("light_specular").into_iter();
+        let effects = probes.0.iter().chain(specular).fold(EVERYTHING.with(Effect::Lights), Effects::with);
+        let setup = Setup::new(Form::Corrected, Silhouette::Bumped, effects.without(Effect::KeyLight));
+        let setup = Setup { choices: Choices { specular_model: model, ..setup.choices }, ..setup };
+        let numbers = |field: Field| if field.name().ends_with("_toward") { toward } else { [1.0; 3] };
+        let fields = setup.needs().fields.iter().map(numbers).collect();
+        let fragments = vec![LitFragment { inputs, held: inputs.fragment(setup, 0.0), fields }];
+        let light = Arc::clone(lights.of(LightKind::Dark));
+        Self { setup, params: Params::defaults(setup.form), light, loss: Loss::L2, fragments }
+    }
 }

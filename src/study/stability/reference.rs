@@ -143,7 +143,7 @@ impl Reference {
         let mut rng = StdRng::seed_from_u64(0);
         let mut rounded = || {
             let mut texels = Moves::new(&mut rng, 0);
-            cubes.changed(|x| x * (1.0 + ROUNDED * texels.step()))
+            cubes.changed(|x| texels.texel(x))
         };
         // With few of them the worst rounding of a difference of texels may not be among them.
         let others: Vec<_> = (0..(moves / 2).clamp(3, MOST_CUBES)).map(|_| rounded()).collect();
@@ -355,6 +355,16 @@ impl<'a> Moves<'a> {
     /// A number moved by what f32 rounds.
     pub(super) fn number(&mut self, x: f64) -> f64 {
         x * (1.0 + RADIUS * self.step())
+    }
+
+    /// A number moved by what f32 rounds of it where it is added to 1.
+    pub(super) fn beside_one(&mut self, x: f64) -> f64 {
+        x + RADIUS * x.abs().max(1.0) * self.step()
+    }
+
+    /// A texel moved by what a blend rounds.
+    pub(super) fn texel(&mut self, x: f64) -> f64 {
+        x * (1.0 + ROUNDED * self.step())
     }
 
     /// A vector's numbers moved by what f32 rounds of the largest; of nothing but zeros none.

@@ -157,7 +157,7 @@ struct Skinfit {
         return skinfit_rim_power(silhouette, rim_exponent);
     }
 
-    // hilite: a E_h(V) (docs/model.md section 3).
+    // The hilite: a E_h(V) (docs/model.md section 3).
     float3 skinfit_attenuated_hilite(float attenuator, float3 hilite_light) {
         return attenuator * hilite_light;
     }
@@ -188,7 +188,7 @@ struct Skinfit {
         return skinfit_specular_cube.sample(skinfit_cube_sampler, n_in_environment, level(0.0)).rgb;
     }
 
-    // diffuse: albedo E_d(n), before occlusion and weights (docs/model.md section 3).
+    // The diffuse light: albedo E_d(n), before occlusion and weights (docs/model.md section 3).
     float3 skinfit_albedo_times_irradiance(float3 albedo, float3 irradiance) {
         return albedo * irradiance;
     }
@@ -198,7 +198,7 @@ struct Skinfit {
         return skinfit_specular_cube.sample(skinfit_cube_sampler, reflected_in_environment, level(0.0)).rgba;
     }
 
-    // side: s E_s(n) (docs/model.md section 3).
+    // Light from the side: s E_s(n) (docs/model.md section 3).
     float3 skinfit_side_specular_term(float specular, float3 side_light) {
         return specular * side_light;
     }
@@ -208,7 +208,7 @@ struct Skinfit {
         return diffuse_term * (occ * (base_weight + rim * rim_weight));
     }
 
-    // reflection: dapple E_s(R).rgb (docs/model.md section 3).
+    // The mirrored light: dapple E_s(R).rgb (docs/model.md section 3).
     float3 skinfit_dappled_mirror(float dapple, float4 mirror_light) {
         return dapple * mirror_light.rgb;
     }

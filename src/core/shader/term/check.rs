@@ -220,9 +220,8 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
     let mut own = BTreeSet::new();
     for &(line, parameter) in &declaration.parameters {
         quantity_name(parameter.identifier, line)?;
-        if let Some(of) = parameter.of
-            && !declaration.effects.iter().any(|(_, effect)| effect.name == of)
-        {
+        let of_another = |name: &&str| !declaration.effects.iter().any(|(_, effect)| effect.name == *name);
+        if let Some(of) = parameter.of.iter().chain(parameter.weighs).copied().find(of_another) {
             let known = declaration.effects.iter().map(|(_, effect)| effect.name.to_owned()).collect();
             return Err(Problem::NotThere { key: "parameter", name: of.to_owned(), known }.at(line));
         }

@@ -52,6 +52,8 @@ pub(super) struct DeclaredParameter {
     pub(super) found: bool,
     /// The effect of the file's that asks for it, where not all do.
     pub(super) of: Option<&'static str>,
+    /// The effects that show nothing where it is 0 in every channel.
+    pub(super) weighs: &'static [&'static str],
     pub(super) meaning: &'static str,
     pub(super) source: &'static str,
 }
@@ -152,8 +154,9 @@ impl Declaration {
                 Some(&"domain") => domains = domains_of(value).map_err(|problem| problem.at(at))?,
                 Some(&key) => rule_line(&mut rule, key, value).map_err(|problem| problem.at(at))?,
                 None => {
-                    if let Some(&nearest) = KEYS.iter().find(|known| misspelt(key, known)) {
-                        return Err(Problem::Key { given: key.to_owned(), nearest }.at(at));
+                    if is_key(key) {
+                        let nearest = KEYS.iter().find(|known| misspelt(key, known)).copied();
+                        return Err(Problem::Key { given: key.to_owned(), nearest, known: &KEYS }.at(at));
                     }
                     if !words.is_empty() {
                         rule.about.push_str(if rule.about.is_empty() { "" } else { " " });
@@ -208,7 +211,7 @@ impl Declaration {
         if !self.rules.is_empty() {
             return Err(misplaced("parameter"));
         }
-        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene`, `, of EFFECT` or `, unit UNIT` where \
+        let wanted = "NAME = DEFAULT in [LOWER, UPPER], then `, rgb`, `, linear`, `, log`, `, scene`, `, of EFFECT`, `, weighs EFFECT` or `, unit UNIT` where \
                       they hold, then `; what it does; where it comes from`. The default lies within the bounds";
         let parameter = parameter(value)
             .ok_or_else(|| Problem::Value { key: "parameter", given: value.to_owned(), wanted }.at(line))?;
@@ -217,10 +220,14 @@ impl Declaration {
     }
 }
 
+/// Whether what stands before a colon is written as keys are: one word of small letters. Prose begins with a capital.
+fn is_key(word: &str) -> bool {
+    !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_')
+}
+
 /// Whether a word is nearly a key.
 fn misspelt(word: &str, key: &str) -> bool {
-    let lower = word.len() > 2 && word.bytes().all(|byte| byte.is_ascii_lowercase() || byte == b'_');
-    lower && strsim::damerau_levenshtein(word, key) == 1
+    word.len() > 2 && strsim::damerau_levenshtein(word, key) == 1
 }
 
 pub(super) fn list(value: &'static str) -> impl Iterator<Item = &'static str> {
@@ -324,6 +331,7 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
         held: false,
         found: false,
         of: None,
+        weighs: &[],
         meaning,
         source: parts.next().unwrap_or_default(),
     };
@@ -335,9 +343,13 @@ fn parameter(value: &'static str) -> Option<DeclaredParameter> {
             "scene" => parameter.owner = Owner::Scene,
             "held" => (parameter.held, parameter.owner) = (true, Owner::Scene),
             "found" => (parameter.found, parameter.owner) = (true, Owner::Scene),
-            other => match other.strip_prefix("of ") {
-                Some(effect) => parameter.of = Some(effect.trim()),
-                None => parameter.unit = other.strip_prefix("unit ")?.trim(),
+            other => match other.split_once(' ')? {
+                ("of", effect) => parameter.of = Some(effect.trim()),
+                ("weighs", effect) => {
+                    parameter.weighs = [parameter.weighs, &[effect.trim()]].concat().leak();
+                }
+                ("unit", unit) => parameter.unit = unit.trim(),
+                _ => return None,
             },
         }
     }
@@ -388,7 +400,11 @@ mod tests {
             read(&TEXT.replacen(old, new, 1)).unwrap_err()
         };
         assert_eq!(swap("cost: 12", "cost: much").line, 11);
-        assert!(matches!(swap("adds: sheen", "add: sheen").problem, Problem::Key { nearest: "adds", .. }));
+        assert!(matches!(
+            swap("adds: sheen", "add: sheen").problem,
+            Problem::Key { nearest: Some("adds"), .. }
+        ));
+        assert!(matches!(swap("adds: sheen", "resource: sheen").problem, Problem::Key { nearest: None, .. }));
         assert!(matches!(swap("// gives: sheen_part\n", "").problem, Problem::Lacks { key: "gives", .. }));
         assert!(matches!(swap("// cost: 3\n", "").problem, Problem::Lacks { key: "cost", .. }));
         assert_eq!(swap("-> vec2f {", "{").problem, Problem::Head);

@@ -21,7 +21,7 @@ pub enum Problem {
     #[error("the function's head is not `fn name(a: f32, b: vec3f) -> vec3f {{`")]
     Head,
     #[error("unknown key `{given}`")]
-    Key { given: String, nearest: &'static str },
+    Key { given: String, nearest: Option<&'static str>, known: &'static [&'static str] },
     #[error("`{key}: {given}` cannot be read")]
     Value { key: &'static str, given: String, wanted: &'static str },
     #[error("the function {function} has no `{key}:`")]
@@ -83,7 +83,10 @@ impl Problem {
             Self::Stray(_) => "Write declarations as comments above a function; constants belong into it".to_owned(),
             Self::Endless => "End it with a line that is `}`".to_owned(),
             Self::Head => "Write it so, each parameter named as the quantity that it is".to_owned(),
-            Self::Key { nearest, .. } => format!("Did you mean `{nearest}`"),
+            Self::Key { nearest: Some(nearest), .. } => format!("Did you mean `{nearest}`"),
+            Self::Key { known, .. } => {
+                format!("Keys are {}; prose has no single small word before a colon", known.join(", "))
+            }
             Self::Value { wanted, .. } => format!("Write {wanted}"),
             Self::Lacks { key, .. } => format!("Add a line `// {key}: ...` above it"),
             Self::Misplaced { .. } => "Write it once, above the first function".to_owned(),

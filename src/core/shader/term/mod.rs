@@ -66,6 +66,8 @@ pub struct Term {
     pub params: Vec<Param>,
     /// Numbers of vertices that it reads.
     pub fields: Fields,
+    /// Which of its effects show nothing where a parameter is 0 in every channel.
+    pub weighed: Vec<(Effect, Param)>,
     /// Its image layers.
     pub layers: Vec<TermName>,
     /// Its rules.
@@ -187,7 +189,7 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
     let line = declared.first().map_or(1, |(line, _)| *line);
     let effects: &'static [Effect] = effects.leak();
     let &effect = effects.first().ok_or(Problem::NoEffect.at(1))?;
-    let mut params = Vec::new();
+    let (mut params, mut weighed) = (Vec::new(), Vec::new());
     for (line, declared) in parameters {
         let row = ParamInfo {
             param: Param::BaseWeight,
@@ -209,7 +211,9 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
             source: declared.source,
             meaning: declared.meaning,
         };
-        params.push(Param::register(row).map_err(|error| problem(error).at(line))?);
+        let param = Param::register(row).map_err(|error| problem(error).at(line))?;
+        weighed.extend(declared.weighs.iter().filter_map(|name| Some((Effect::from_name(name)?, param))));
+        params.push(param);
     }
     let mut read = Vec::new();
     for (line, declared) in fields {
@@ -248,7 +252,8 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
             }
         }
     }
-    let term = Term { effect, effects, params, fields: Fields::of(read), layers, rules, text, origin };
+    let term =
+        Term { effect, effects, params, fields: Fields::of(read), weighed, layers, rules, text, origin };
     let never = || Problem::Full { kind: "term", most: 0 }.at(line);
     TERMS.add(|_| false, |_| false, |_| Ok(term), never)
 }

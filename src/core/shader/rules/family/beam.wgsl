@@ -1,7 +1,7 @@
 // Light from one direction, beside the environment (MODEL 8; glTF's KHR_lights_punctual).
 //
 // effect: light_NAME within lights, the light NAME
-// parameter: light.NAME.color = 1 in [0, inf), rgb, linear, scene; factor on the light's irradiance; KHR_lights_punctual
+// parameter: light.NAME.color = 1 in [0, inf), rgb, linear, scene, weighs light_NAME; factor on the light's irradiance; KHR_lights_punctual
 // parameter: light.NAME.irradiance = 0 in [0, inf), rgb, held; irradiance of a surface that faces it; KHR_lights_punctual
 // parameter: light.NAME.azimuth = 0 in [-inf, inf], unit degrees, found; where it comes from, from +Z towards +X; KHR_lights_punctual
 // parameter: light.NAME.elevation = 45 in [-90, 90], unit degrees, found; where it comes from, above the horizon; KHR_lights_punctual

@@ -1,7 +1,7 @@
 // Light of a lamp that stands somewhere, a point or a spot (MODEL 8; glTF's KHR_lights_punctual).
 //
 // effect: light_NAME within lights, the light NAME
-// parameter: light.NAME.color = 1 in [0, inf), rgb, linear, scene; factor on the light's intensity; KHR_lights_punctual
+// parameter: light.NAME.color = 1 in [0, inf), rgb, linear, scene, weighs light_NAME; factor on the light's intensity; KHR_lights_punctual
 // parameter: light.NAME.irradiance = 0 in [0, inf), rgb, held; irradiance of a facing surface at distance 1; KHR_lights_punctual
 // parameter: light.NAME.position = 0 in [-inf, inf], rgb, held; where it stands; KHR_lights_punctual
 // parameter: light.NAME.axis = 0 in [-1, 1], rgb, held; unit vector that a spot shines along; KHR_lights_punctual

@@ -1,4 +1,4 @@
-// diffuse: albedo E_d(n), before occlusion and weights (MODEL 3).
+// The diffuse light: albedo E_d(n), before occlusion and weights (MODEL 3).
 //
 // gives: diffuse_term
 // domain: texel, fragment

@@ -1,4 +1,4 @@
-// hilite: a E_h(V) (MODEL 3).
+// The hilite: a E_h(V) (MODEL 3).
 //
 // gives: hilite_term
 // cost: 3

@@ -1,4 +1,4 @@
-// reflection: dapple E_s(R).rgb (MODEL 3).
+// The mirrored light: dapple E_s(R).rgb (MODEL 3).
 //
 // gives: mirror_term
 // cost: 3

@@ -1,4 +1,4 @@
-// side: s E_s(n) (MODEL 3).
+// Light from the side: s E_s(n) (MODEL 3).
 //
 // gives: side_term
 // cost: 3

@@ -68,7 +68,8 @@ fn ggx_brdf(n: vec3f, view: vec3f, toward: vec3f, m: f32, f0: f32) -> f32 {
     let alpha: f32 = m * m;
     let a2: f32 = alpha * alpha;
     let spread: f32 = select(1.0, (dot(across, across) + a2 * (along * along)) / size, lit);
-    let masked: f32 = eye * sqrt(a2 + (1.0 - a2) * (light * light)) + light * sqrt(a2 + (1.0 - a2) * (eye * eye));
+    // Where both graze it vanishes, and what it divides with it; held at 1e-6 slopes and their squares stay within an f32.
+    let masked: f32 = max(eye * sqrt(a2 + (1.0 - a2) * (light * light)) + light * sqrt(a2 + (1.0 - a2) * (eye * eye)), 1e-6);
     let fresnel: f32 = dielectric_fresnel(select(1.0, -dot(h, view) / sqrt(size), lit), f0);
     return select(0.0, a2 / (3.1415927 * spread * spread) * (0.5 / masked) * fresnel, lit);
 }
