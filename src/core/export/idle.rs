@@ -47,4 +47,25 @@ mod tests {
         assert_eq!(idle(Effects::SURFACE, &params), diffuse);
         assert_eq!(idle(Effects::of(&[Effect::Diffuse, Effect::Haze]), &params), Effects::default());
     }
+
+    #[test]
+    fn an_effect_of_a_file_is_idle_where_the_parameter_that_weighs_it_is_nothing() {
+        let text = "// effect: idle_sheen, light of fine hair\n\
+            // parameter: idle_sheen_weight = 0.5 in [0, 1], rgb, linear, weighs idle_sheen; how much\n//\n\
+            // gives: idle_sheen_part\n// adds: idle_sheen\n// cost: 1\n\
+            fn idle_sheen(idle_sheen_weight: vec3f) -> vec3f {\n    return idle_sheen_weight;\n}\n";
+        let term = crate::shader::term::register("idle_sheen", text).unwrap();
+        let effects = Effects::SURFACE.with(term.effect);
+        let mut params = Params::defaults(Form::Corrected);
+        assert_eq!(idle(effects, &params), Effects::default());
+        params.set_rgb(term.params[0], [0.0, 0.0, 0.1]);
+        assert_eq!(idle(effects, &params), Effects::default());
+        params.set(term.params[0], 0.0);
+        assert_eq!(idle(effects, &params), Effects::of(&[term.effect]));
+        let other = text.replace("idle_sheen", "idle_other").replace("weighs idle_other", "weighs rim");
+        assert!(
+            crate::shader::term::register("idle_other", &other).is_err(),
+            "the rim is no effect of the file"
+        );
+    }
 }

@@ -2,7 +2,7 @@
 //! the kinds of numbers that they are computed in. The formulas themselves are the rules' (`shader/rules`).
 //!
 //! - [`params`]: the one table of parameters; `columns`: which of their channels are free together
-//! - [`readings`]: how the paper is read; [`effects`]: what can be switched on, and what each effect asks for;
+//! - [`readings`]: how the paper is read; [`effects`]: what can be switched on; [`needs`]: what each effect asks for;
 //!   [`terms`]: parts of the sum
 //! - [`choices`]: which way is taken where there are several
 //! - [`fields`]: numbers of vertices that rules read by name
@@ -29,6 +29,7 @@ pub mod fields;
 pub mod formats;
 pub mod fragment;
 pub mod key_light;
+pub mod needs;
 pub mod params;
 pub mod readings;
 pub mod real;

@@ -11,8 +11,9 @@ use super::gltf::{Ask, Document, Tangents, Uvs};
 use super::maps::Maps;
 use super::mesh::Mesh;
 use super::numbers::{interval, number, short};
-use crate::model::effects::{Effect, Effects, Form, Needs};
+use crate::model::effects::{Effect, Effects, Form};
 use crate::model::fields::Fields;
+use crate::model::needs::Needs;
 
 /// The mesh of a scene through its animation 0.
 pub struct Animation {

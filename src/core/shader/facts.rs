@@ -3,8 +3,9 @@
 use crate::model::choices::{Bounces, Choices, SkinReflection, SpecularVisibility, Visibility};
 use crate::model::dapple::Dapple;
 use crate::model::diffusion::Lookup;
-use crate::model::effects::{Effect, Effects, Form, Needs, Silhouette};
+use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::needs::Needs;
 use crate::model::shadow_filter::ShadowFilter;
 use crate::model::terms::TermName;
 use crate::model::texture_filter::TextureFilter;

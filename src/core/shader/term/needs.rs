@@ -4,9 +4,10 @@ use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex, PoisonError};
 
 use crate::model::choices::SpecularVisibility;
-use crate::model::effects::{Effect, Effects, Needs, Silhouette};
+use crate::model::effects::{Effect, Effects, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::{Field, Fields};
+use crate::model::needs::Needs;
 use crate::shader::domain::{CHART, Domain, UV};
 use crate::shader::emit::{SAMPLE, UNMADE, parts};
 use crate::shader::facts::{Facts, Source};

@@ -2,7 +2,8 @@
 
 use super::quality::{Swept, bake_seconds};
 use crate::StudyError;
-use crate::model::effects::{Effect, Effects, Needs};
+use crate::model::effects::{Effect, Effects};
+use crate::model::needs::Needs;
 use crate::tradeoff::axis::{Knob, Rates, SceneAxis, Sweep};
 use crate::tradeoff::bench::Bench;
 use crate::tradeoff::settings::Settings;
