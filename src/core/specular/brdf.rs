@@ -12,6 +12,10 @@ pub const SHORTEST_SQUARED: f64 = 1e-12;
 /// Beckmann's distribution is 0 at or below this cosine.
 pub const LEAST_COSINE: f64 = 1e-3;
 
+/// What a dielectric's g + u is held at: at u = 0 its reflectance would rise to 1 as soon as f0 leaves 0. Above f0 = 6e-6
+/// it is never met.
+const LEAST_SUM: f64 = 0.1;
+
 /// What the formulas take of three unit directions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Angles {
@@ -25,7 +29,7 @@ pub struct Angles {
     pub cosine_squared: f64,
     /// Squared sine of N and H.
     pub sine_squared: f64,
-    /// H.V'.
+    /// H.V', |L + V'| / 2.
     pub half_view: f64,
 }
 
@@ -44,7 +48,7 @@ impl Angles {
             half_squared,
             cosine_squared: dot(n, h).powi(2) / half_squared,
             sine_squared: dot(across, across) / half_squared,
-            half_view: -dot(h, view) / half_squared.sqrt(),
+            half_view: 0.5 * half_squared.sqrt(),
         })
     }
 }
@@ -85,7 +89,7 @@ pub fn schlick(u: f64, f0: f64) -> f64 {
 /// derivative by f0; 1 from f0 = 1 on.
 ///
 /// The factor f0 stands outside: with e = eta^2 - 1 = 4 q / (1 - q)^2, q = sqrt f0, and g = sqrt(u^2 + e), the usual g - u
-/// is e / (g + u). So value and derivative hold at f0 = 0 too.
+/// is e / (g + u). So value and derivative hold at f0 = 0 too. g + u is held at [`LEAST_SUM`].
 #[must_use]
 pub fn dielectric(u: f64, f0: f64) -> [f64; 2] {
     if f0 >= 1.0 {
@@ -94,15 +98,20 @@ pub fn dielectric(u: f64, f0: f64) -> [f64; 2] {
     // Below it q stands for 0: value and derivative are those of the limit.
     let q = f0.max(1e-24).sqrt();
     let rest = 1.0 - q;
-    let g = (u * u + 4.0 * q / (rest * rest)).sqrt();
-    let (sum, difference) = (g + u, 4.0 * q / (rest * rest) / (g + u));
+    let e = 4.0 * q / (rest * rest);
+    let g = (u * u + e).sqrt();
+    let held = g + u < LEAST_SUM;
+    let sum = (g + u).max(LEAST_SUM);
+    let difference = e / sum;
     let (above, below) = (u * sum - 1.0, u * difference + 1.0);
     let (scale, ratio) = (rest * sum, above / below);
     let factor = 8.0 / scale.powi(4) * (1.0 + ratio * ratio);
-    // g' by q; that of both sum and difference.
-    let slope = 2.0 * (1.0 + q) / (rest * rest * rest * g);
-    let scale_slope = rest * slope - sum;
-    let ratio_slope = u * slope * (below - above) / (below * below);
+    // By q: of e, of g + u and of g - u.
+    let e_slope = 4.0 * (1.0 + q) / (rest * rest * rest);
+    let g_slope = e_slope / (2.0 * g);
+    let (sum_slope, difference_slope) = if held { (0.0, e_slope / sum) } else { (g_slope, g_slope) };
+    let scale_slope = rest * sum_slope - sum;
+    let ratio_slope = u * (sum_slope * below - above * difference_slope) / (below * below);
     let factor_slope = -4.0 * factor * scale_slope / scale + 16.0 / scale.powi(4) * ratio * ratio_slope;
     [f0 * factor, factor + f0 * factor_slope / (2.0 * q)]
 }

@@ -2,8 +2,8 @@
 //!
 //! The coefficients are those of least squares with the denominator of the step before as weight (Sanathanan and
 //! Koerner, *Transfer function synthesis as a ratio of two complex polynomials*, IEEE Transactions on Automatic
-//! Control 8, 1963), weighted towards the largest error (Lawson's iteration). Variables lie in [-1, 1], so that f32
-//! holds the sums.
+//! Control 8, 1963), weighted towards the largest error (Lawson's iteration). Variables lie in [-1, 1]. In print some run
+//! from an end, so that f32 holds the sums where numerator and denominator are both small.
 
 use std::fmt::Write as _;
 
@@ -14,6 +14,47 @@ const STEPS: usize = 26;
 
 /// The variables' names in print.
 const VARIABLES: [&str; 3] = ["x", "y", "z"];
+
+/// Where a variable is 0 in print.
+#[derive(Clone, Copy)]
+pub(super) enum Origin {
+    /// At -1, and 1 at 1.
+    Low,
+    /// Where it is.
+    Middle,
+    /// At 1, and 1 at -1.
+    High,
+}
+
+impl Origin {
+    /// x of what is printed: the sum of the first, and of the second times it.
+    fn line(self) -> [f64; 2] {
+        match self {
+            Self::Low => [-1.0, 2.0],
+            Self::Middle => [0.0, 1.0],
+            Self::High => [1.0, -2.0],
+        }
+    }
+
+    /// What is printed, of x.
+    #[cfg(test)]
+    pub(super) fn of(self, x: f64) -> f64 {
+        let [start, scale] = self.line();
+        (x - start) / scale
+    }
+
+    /// x to a power, by the powers of what is printed.
+    fn power(self, power: usize) -> Vec<f64> {
+        let [start, scale] = self.line();
+        let mut own = vec![1.0];
+        for _ in 0..power {
+            let mut after: Vec<f64> = own.iter().map(|c| start * c).chain([0.0]).collect();
+            own.iter().enumerate().for_each(|(k, c)| after[k + 1] += scale * c);
+            own = after;
+        }
+        own
+    }
+}
 
 /// Powers of x, y and z.
 pub(super) type Term = [usize; 3];
@@ -87,6 +128,7 @@ impl Shape {
         assert!(best.0.is_finite(), "no step left a denominator without zeros");
         let (numerator, denominator) = best.1.split_at(above);
         let denominator = [&[1.0], denominator].concat();
+        let powers = |terms: &[Term], series: &[f64]| rewritten(terms, series, |_, i| chebyshev_powers(i));
         [powers(&self.numerator, numerator), powers(&self.denominator, &denominator)]
     }
 
@@ -101,8 +143,11 @@ impl Shape {
         value(&self.numerator, numerator) / value(&self.denominator, denominator)
     }
 
-    /// WGSL of the function, of as many variables as it has.
-    pub(super) fn print(&self, name: &str, [numerator, denominator]: &[Vec<f64>; 2]) -> String {
+    /// WGSL of the function, of as many variables as it has, each from its origin.
+    pub(super) fn print(&self, name: &str, found: &[Vec<f64>; 2], from: [Origin; 3]) -> String {
+        let moved = |terms: &[Term], series: &[f64]| rewritten(terms, series, |axis, i| from[axis].power(i));
+        let [numerator, denominator] =
+            [moved(&self.numerator, &found[0]), moved(&self.denominator, &found[1])];
         let all = || self.numerator.iter().chain(&self.denominator);
         let variables = if all().any(|term| term[2] > 0) { 3 } else { 2 };
         let arguments: Vec<String> = VARIABLES[..variables].iter().map(|v| format!("{v}: f32")).collect();
@@ -110,7 +155,7 @@ impl Shape {
         let scale = denominator[0];
         let mut quotient = Vec::new();
         for (letter, terms, series) in
-            [("n", &self.numerator, numerator), ("d", &self.denominator, denominator)]
+            [("n", &self.numerator, &numerator), ("d", &self.denominator, &denominator)]
         {
             let own: Vec<(Term, f64)> = terms.iter().copied().zip(series.iter().map(|c| c / scale)).collect();
             let parts = by_power(&own, 0);
@@ -134,11 +179,11 @@ fn product(term: Term, at: [f64; 3]) -> f64 {
     (0..3).map(|axis| chebyshev(term[axis], at[axis])).product()
 }
 
-/// A series of products of Chebyshev polynomials by its powers of the variables, in the terms' order.
-fn powers(terms: &[Term], series: &[f64]) -> Vec<f64> {
+/// A series of products, of a factor for each axis and power, by the powers of the factors' variables, in the terms' order.
+fn rewritten(terms: &[Term], series: &[f64], factor: impl Fn(usize, usize) -> Vec<f64>) -> Vec<f64> {
     let mut powers = vec![0.0; terms.len()];
     for (&term, c) in terms.iter().zip(series) {
-        let own = term.map(chebyshev_powers);
+        let own: [Vec<f64>; 3] = std::array::from_fn(|axis| factor(axis, term[axis]));
         for (power, to) in powers.iter_mut().zip(terms) {
             let shares = (0..3).map(|axis| own[axis].get(to[axis]).unwrap_or(&0.0));
             *power += c * shares.product::<f64>();

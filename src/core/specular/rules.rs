@@ -1,5 +1,6 @@
 //! The rules' functions evaluated as the f64 reference does: for tests.
 
+use crate::model::real::Real;
 use crate::program::graph::Graph;
 use crate::program::lower::{Natives, Source, Value};
 use crate::program::steps::{Rounding, Steps};
@@ -20,9 +21,18 @@ impl Function {
 
     /// Its value.
     pub(super) fn of(&self, numbers: &[f64]) -> Vec<f64> {
-        let setting = self.0.setting(0.0_f64, |_| 0.0, |name| panic!("it looks {name} up"));
+        self.run(0.0, numbers)
+    }
+
+    /// Its value where all is computed in f32.
+    pub(super) fn in_f32(&self, numbers: &[f32]) -> Vec<f32> {
+        self.run(0.0, numbers)
+    }
+
+    fn run<R: Real>(&self, zero: R, numbers: &[R]) -> Vec<R> {
+        let setting = self.0.setting(zero, |_| 0.0, |name| panic!("it looks {name} up"));
         let mut registers = Vec::new();
-        self.0.run(&setting, 0.0, &mut registers, |place| numbers[self.0.fields()[place].component]);
+        self.0.run(&setting, zero, &mut registers, |place| numbers[self.0.fields()[place].component]);
         self.0.outputs(&setting, &registers).collect()
     }
 }

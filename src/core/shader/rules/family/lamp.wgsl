@@ -59,12 +59,12 @@ fn light_NAME_attenuation(
     light_NAME_range: f32,
 ) -> f32 {
     let way: vec3f = light_NAME_position - vertex_position;
-    let square: f32 = max(dot(way, way), 1e-8);
+    let square: f32 = dot(way, way);
     let share: f32 = square / max(light_NAME_range * light_NAME_range, 1e-20);
     let fade: f32 = select(1.0, max(1.0 - share * share, 0.0), light_NAME_range > 0.0);
     let along: f32 = -dot(light_NAME_axis, light_NAME_toward);
     let edge: f32 = clamp((along - light_NAME_cone.y) / max(light_NAME_cone.x - light_NAME_cone.y, 1e-3), 0.0, 1.0);
-    return edge * edge * fade / square;
+    return edge * edge * fade / max(square, 1e-8);
 }
 
 // What arrives of it, shadows as vertices have them.

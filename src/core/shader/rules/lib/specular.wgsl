@@ -12,7 +12,9 @@ fn schlick_fresnel(cosine: f32, f0: f32) -> f32 {
 
 // The unpolarised Fresnel factor of a dielectric, eta = (1 + q) / (1 - q), q = sqrt f0, at the cosine u of (H, V'); 1 from
 // f0 = 1 on. With e = eta^2 - 1 = 4 q / (1 - q)^2 and g = sqrt(u^2 + e) the usual g - u is e / (g + u), and the factor f0
-// stands outside: value and derivative hold at f0 = 0 too, where 1e-24 stands under the root.
+// stands outside: value and derivative hold at f0 = 0 too, where 1e-24 stands under the root. g + u is held at 0.1: from
+// u = 0 the factor would rise to 1 as soon as f0 leaves 0; so its slope is 2e5 at most, and what reflects less than 6e-6
+// when facing reflects less where both graze, too.
 fn dielectric_fresnel(u: f32, f0: f32) -> f32 {
     let ok: bool = f0 < 1.0;
     let f: f32 = select(0.0, f0, ok);
@@ -20,7 +22,7 @@ fn dielectric_fresnel(u: f32, f0: f32) -> f32 {
     let rest: f32 = 1.0 - q;
     let e: f32 = 4.0 * q / (rest * rest);
     let g: f32 = sqrt(u * u + e);
-    let sum: f32 = g + u;
+    let sum: f32 = max(g + u, 0.1);
     let ratio: f32 = (u * sum - 1.0) / (u * (e / sum) + 1.0);
     let scale: f32 = rest * sum;
     let square: f32 = scale * scale;
@@ -37,8 +39,9 @@ fn beckmann(sine_squared: f32, cosine_squared: f32, m: f32) -> f32 {
 }
 
 // In the BRDFs n is the unit normal, `view` the unit vector from the eye to the surface, `toward` the unit vector towards
-// the light, h = L + V'. The squared sine of (N, H) is |N x h|^2 / |h|^2: 1 - (N.H)^2 would cancel. 0 where light or view
-// lie below the surface, or h is 0.
+// the light, h = L + V'. The squared sine of (N, H) is |N x h|^2 / |h|^2: 1 - (N.H)^2 would cancel. The cosine of (H, V')
+// is |h| / 2: H.V' would be what rounding leaves where L and V' are nearly opposite. 0 where light or view lie below the
+// surface, or h is 0.
 
 // The BRDF of Kelemen and Szirmay-Kalos (2001) over weight and s: PH F / (pi |h|^2), F Schlick's (MODEL 9).
 fn kelemen_brdf(n: vec3f, view: vec3f, toward: vec3f, m: f32, f0: f32) -> f32 {
@@ -49,7 +52,7 @@ fn kelemen_brdf(n: vec3f, view: vec3f, toward: vec3f, m: f32, f0: f32) -> f32 {
     let across: vec3f = cross(n, h);
     let along: f32 = dot(n, h);
     let ph: f32 = beckmann(dot(across, across) / size, along * along / size, m);
-    let fresnel: f32 = schlick_fresnel(-dot(h, view) / sqrt(size), f0);
+    let fresnel: f32 = schlick_fresnel(0.5 * sqrt(size), f0);
     return select(0.0, ph * fresnel / (3.1415927 * size), lit);
 }
 
@@ -70,7 +73,7 @@ fn ggx_brdf(n: vec3f, view: vec3f, toward: vec3f, m: f32, f0: f32) -> f32 {
     let spread: f32 = select(1.0, (dot(across, across) + a2 * (along * along)) / size, lit);
     // Where both graze it vanishes, and what it divides with it; held at 1e-6 slopes and their squares stay within an f32.
     let masked: f32 = max(eye * sqrt(a2 + (1.0 - a2) * (light * light)) + light * sqrt(a2 + (1.0 - a2) * (eye * eye)), 1e-6);
-    let fresnel: f32 = dielectric_fresnel(select(1.0, -dot(h, view) / sqrt(size), lit), f0);
+    let fresnel: f32 = dielectric_fresnel(select(1.0, 0.5 * sqrt(size), lit), f0);
     return select(0.0, a2 / (3.1415927 * spread * spread) * (0.5 / masked) * fresnel, lit);
 }
 
