@@ -32,8 +32,8 @@ pub(super) const CASES: usize = 250;
 /// What f32 leaves of the split sum's fits, as a share of what a mirroring surface shows, and as a share of their own: the
 /// fits' tests hold the one, a tenth of their own error; the other is as large where the share changes the fastest.
 const FITTED: f64 = 5e-5;
-/// More roundings lie one behind the other than in the paper's model, for which the spread is.
-const LONGER: f64 = 1.5;
+/// About twice as many roundings lie one behind the other as in the paper's model, for which the spread is.
+const LONGER: f64 = 2.0;
 /// At most so many: a long search of the other kind is not to take hours of this one.
 const MOST: usize = 1024;
 
