@@ -80,7 +80,7 @@ pub(super) fn map(resource: Resource, maps: &Maps, coarser: &[Maps]) -> Option<T
 /// One level of it.
 fn level(resource: Resource, maps: &Maps) -> Option<Texels> {
     use TextureFormat as F;
-    let Maps { color, normal, specular, attenuator } = maps;
+    let Maps { color, normal, specular, attenuator, .. } = maps;
     let linear = |x: f32| x;
     match resource {
         Resource::ColorTexels => color.as_ref().map(|map| rgba(map, None, F::Rgba32Float, float)),
@@ -102,6 +102,14 @@ fn level(resource: Resource, maps: &Maps) -> Option<Texels> {
             normal.as_ref().map(|map| rgba8(map, attenuator.as_ref(), F::Rgba8Unorm, linear))
         }
         Resource::SpecularMap => specular.as_ref().map(|map| single(map, F::R8Unorm, |x| [byte(x)])),
+        Resource::OwnTexels(field) => match field.info().numbers {
+            1 => maps.scalar(field).map(|map| single(map, F::R32Float, float)),
+            _ => maps.colored(field).map(|map| rgba(map, None, F::Rgba32Float, float)),
+        },
+        Resource::OwnMap(field) => match field.info().numbers {
+            1 => maps.scalar(field).map(|map| single(map, F::R8Unorm, |x| [byte(x)])),
+            _ => maps.colored(field).map(|map| rgba8(map, None, F::Rgba8UnormSrgb, srgb_encode)),
+        },
         Resource::AttenuatorMap => attenuator.as_ref().map(|map| single(map, F::R8Unorm, |x| [byte(x)])),
         _ => None,
     }

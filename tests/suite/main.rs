@@ -4,6 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a test that cannot go on should panic")]
 
 mod added_fields;
+mod added_maps;
 mod added_term;
 mod added_texels;
 mod animated;

@@ -222,6 +222,7 @@ fn shaders_of_every_combination_of_facts_validate() {
             color_specular: bit(bits, 0) && bit(bits, 2),
             normal_attenuator: bit(bits, 1) && bit(bits, 3),
             filter: TextureFilter::ALL[bits as usize % 3],
+            ..MapFacts::default()
         },
         faces: FaceSizes::default(),
         morphs: if bit(bits, 4) { 2 } else { 0 },

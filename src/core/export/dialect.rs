@@ -225,7 +225,12 @@ impl Dialect {
             Kind::Sampler => self.declarations[2],
             _ => self.declarations[0],
         };
-        let hint = if resource == Resource::ColorMap { self.colour_hint } else { "" };
+        let colored = match resource {
+            Resource::ColorMap => true,
+            Resource::OwnMap(field) => field.info().numbers == 3,
+            _ => false,
+        };
+        let hint = if colored { self.colour_hint } else { "" };
         let name = function(resource.name());
         text.replace("{n}", self.resource(&name)).replace("{b}", &binding.to_string()).replace("{h}", hint)
     }

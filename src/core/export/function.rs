@@ -142,6 +142,11 @@ fn what_to_bind(resource: Resource, params: &Params) -> Option<String> {
         Resource::NormalMap => "the scene's normal map as stored, +Y up".to_owned(),
         Resource::SpecularMap => "the scene's specular map, linear".to_owned(),
         Resource::AttenuatorMap => "the scene's attenuator map, linear".to_owned(),
+        Resource::OwnMap(field) => {
+            let stored =
+                if field.info().numbers == 1 { "first channel, linear" } else { "decoded from sRGB" };
+            format!("the scene's map {}, {stored}: {}", field.name(), field.info().meaning)
+        }
         _ => return None,
     };
     Some(words)

@@ -1,13 +1,14 @@
 //! Fields: numbers beside position, frame and maps that rules read by name.
 //!
-//! Those of vertices are interpolated where a fragment, a stored sample or a texel reads them; those of samples are
-//! found at each stored sample or texel by itself, as what reaches it of a light. Rows are added by files of rules.
+//! Those of vertices are interpolated where a fragment, a stored sample or a texel reads them; those of maps are looked up
+//! by its texture coordinates; those of samples are found at each stored sample or texel by itself, as what reaches it of
+//! a light. Rows are added by files of rules.
 
 use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::{Mutex, PoisonError};
 
-use super::registry::{Added, RegistryError};
+use super::registry::{Added, RegistryError, leaked};
 
 /// The most numbers that a field has.
 pub const MOST_NUMBERS: usize = 3;
@@ -17,13 +18,13 @@ pub const MOST_NUMBERS: usize = 3;
 pub struct FieldInfo {
     /// The name in rules.
     pub name: &'static str,
-    /// The name of the vertex attribute that holds it.
+    /// The name of the vertex attribute that holds it, where vertices do.
     pub attribute: &'static str,
     /// Where its numbers are found.
     pub of: Found,
     /// How many numbers it has, 1 to 3.
     pub numbers: usize,
-    /// What each of them is where a mesh lacks the field.
+    /// What each of them is where a mesh, or the scene's maps, lack the field.
     pub neutral: f32,
     /// What it is, in one line.
     pub meaning: &'static str,
@@ -36,6 +37,25 @@ pub enum Found {
     Vertices,
     /// At each stored sample or texel by itself. A rasteriser interpolates what is found so at the vertices.
     Samples,
+    /// In a map of the scene's.
+    Map(MapNames),
+}
+
+/// What shaders call the texels of a field's map.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapNames {
+    /// As 32-bit floats, which shaders filter.
+    pub texels: &'static str,
+    /// In 8 bits, which the hardware filters.
+    pub filtered: &'static str,
+}
+
+impl MapNames {
+    /// Those of the field of that name.
+    #[must_use]
+    pub fn of(field: &str) -> Self {
+        Self { texels: leaked(&format!("{field}_texels")), filtered: leaked(&format!("{field}_map")) }
+    }
 }
 
 /// A field: the place of its row.
@@ -76,6 +96,20 @@ impl Field {
     pub fn from_name(name: &str) -> Option<Self> {
         let place = ADDED.position(|row| row.name == name)?;
         u16::try_from(place).ok().map(Self)
+    }
+
+    /// Every field that was added.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (0..ADDED.len()).filter_map(|place| u16::try_from(place).ok().map(Self))
+    }
+
+    /// What shaders call its map, where it has one.
+    #[must_use]
+    pub fn map(self) -> Option<MapNames> {
+        match self.info().of {
+            Found::Map(names) => Some(names),
+            Found::Vertices | Found::Samples => None,
+        }
     }
 
     /// Whether vertices have it.
@@ -152,6 +186,18 @@ impl Fields {
     #[must_use]
     pub fn named(self, name: &str) -> Option<Field> {
         Field::from_name(name).filter(|field| self.0.contains(field))
+    }
+
+    /// Whether it is one of them.
+    #[must_use]
+    pub fn has(self, field: Field) -> bool {
+        self.0.contains(&field)
+    }
+
+    /// Those that are looked up in maps.
+    #[must_use]
+    pub fn of_maps(self) -> Self {
+        Self::of(self.iter().filter(|field| field.map().is_some()))
     }
 
     /// How many numbers they have altogether.

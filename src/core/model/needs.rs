@@ -68,8 +68,9 @@ impl Needs {
 
     /// Whether any map is sampled, and so texture coordinates are needed.
     #[must_use]
-    pub const fn maps(self) -> bool {
-        self.color_map || self.normal_map || self.specular_map || self.attenuator_map
+    pub fn maps(self) -> bool {
+        let own = || self.fields.iter().any(|field| field.map().is_some());
+        self.color_map || self.normal_map || self.specular_map || self.attenuator_map || own()
     }
 
     /// Whether any cube map is looked up, and so an environment is needed.

@@ -158,6 +158,19 @@ impl<'a> Surface<'a> {
 
     /// What there is of a field at each of the points, a row for each of its numbers.
     pub(super) fn field(&self, field: Field, points: &Points, rows: &mut [Row]) {
+        if field.map().is_some() {
+            return put_each(points, rows, |hit, numbers| {
+                let at = (hit.uv(self.mesh), self.footprints.as_ref().map(|footprints| footprints.at(hit)));
+                let neutral = field.info().neutral;
+                match numbers {
+                    [number] => [*number] = self.map(|maps| maps.scalar(field), [neutral], at),
+                    numbers => {
+                        let color = self.map(|maps| maps.colored(field), [neutral; 3], at);
+                        numbers.copy_from_slice(&color);
+                    }
+                }
+            });
+        }
         match self.posed.lobes.as_ref().filter(|lobes| lobes.finds(field)) {
             Some(lobes) => put_each(points, rows, |hit, numbers| {
                 lobes.find(field, (hit.triangle, hit.weights()), &self.at(hit).0, numbers);

@@ -66,6 +66,8 @@ enum Quantity {
     Declared(fields::Field),
     /// Of those, what is found at each texel by itself.
     Found(fields::Field),
+    /// Of those, what a map of theirs shows there.
+    Mapped(fields::Field),
 }
 
 impl Field {
@@ -86,6 +88,7 @@ impl Field {
             "normal_texel" if step.is_none() => Quantity::NormalMap,
             other => match fields::Field::from_name(other) {
                 Some(field) if field.is_of_vertices() => Quantity::Declared(field),
+                Some(field) if step.is_none() && field.map().is_some() => Quantity::Mapped(field),
                 Some(field) if step.is_none() => Quantity::Found(field),
                 _ => return Err(AtlasError::NotStored { quantity: name.to_owned() }),
             },
@@ -104,6 +107,13 @@ impl Field {
             Quantity::Specular => mesh.map(|maps| maps.specular.as_ref(), [1.0], uv())[0],
             Quantity::Attenuator => mesh.map(|maps| maps.attenuator.as_ref(), [1.0], uv())[0],
             Quantity::NormalMap => mesh.map(|maps| maps.normal.as_ref(), [0.5, 0.5, 1.0], uv())[c],
+            Quantity::Mapped(field) => {
+                let neutral = field.info().neutral;
+                match field.info().numbers {
+                    1 => mesh.map(|maps| maps.scalar(field), [neutral], uv())[0],
+                    _ => mesh.map(|maps| maps.colored(field), [neutral; 3], uv())[c],
+                }
+            }
             Quantity::Found(field) => {
                 let mut numbers = [0.0; fields::MOST_NUMBERS];
                 (mesh.find)(field, triangle.hit(weights), &mut numbers[..field.info().numbers]);

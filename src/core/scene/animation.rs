@@ -115,8 +115,9 @@ impl Pose {
 
 /// What the effects want of the mesh, `maps` being those that they look up.
 pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
-    let Maps { color, normal, specular, attenuator } = maps;
-    let looked_up = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
+    let Maps { color, normal, specular, attenuator, own } = maps;
+    let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
+    let looked_up = built_in || !own.is_empty();
     let uvs = match (needs.maps() || needs.atlas, looked_up || needs.atlas) {
         (false, _) => Uvs::None,
         (true, false) => Uvs::Optional,

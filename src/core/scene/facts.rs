@@ -3,6 +3,7 @@
 use super::mesh::Mesh;
 use super::{Scene, ShadowMaps};
 use crate::model::effects::Effect;
+use crate::model::fields::Fields;
 use crate::model::params::{Param, Params};
 use crate::model::shadow_filter::ShadowFilter;
 use crate::shader::domain::{Domain, Work};
@@ -30,6 +31,7 @@ impl Facts {
                 color_specular: same(color, specular),
                 normal_attenuator: same(normal, attenuator),
                 filter: scene.quality.texture_filter,
+                own: Fields::of(maps.own.iter().map(|(field, _)| *field)),
             },
             faces: FaceSizes::default(),
             morphs: mesh.morphs.iter().filter(|morph| morph.weight != 0.0).count() as u32,

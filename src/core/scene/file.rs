@@ -57,6 +57,9 @@ pub(super) struct MapsTable {
     pub specular: Option<PathBuf>,
     pub attenuator: Option<PathBuf>,
     pub normal_y: Option<Spanned<String>>,
+    /// Those that files of rules declare.
+    #[serde(default)]
+    pub own: BTreeMap<Spanned<String>, PathBuf>,
 }
 
 /// `[environment]`

@@ -9,10 +9,10 @@ use super::cameras::{self, ViewPlan};
 use super::dapple::dapple;
 use super::diffusion;
 use super::error::{SceneError, Warning, Warnings, warn};
-use super::file::{EnvironmentTable, SceneFile, Source};
+use super::file::{EnvironmentTable, MapsTable, SceneFile, Source};
 use super::gltf::{Ask, Document};
 use super::lit::{self, Lights};
-use super::maps::{Environment, Map, Maps};
+use super::maps::{Environment, Map, Maps, OwnMap};
 use super::numbers::{interval, number};
 use super::settings::{self, spots};
 use super::shadow_maps::shadow_maps;
@@ -24,6 +24,7 @@ use crate::model::choices::{Choices, SpecularVisibility};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects};
 use crate::model::evaluate::Setup;
+use crate::model::fields::Field;
 use crate::model::needs::Needs;
 use crate::model::params::Param;
 use crate::progress;
@@ -251,7 +252,42 @@ fn read_maps(
         (None, Some(path), Some(alpha)) => packed_specular(&path, alpha, warnings),
         (specular, ..) => specular,
     };
-    Ok(Maps { color, normal: normals.filter(|_| normal.is_some()), specular, attenuator })
+    let own = read_own_maps(source, maps, folder, needs)?;
+    Ok(Maps { color, normal: normals.filter(|_| normal.is_some()), specular, attenuator, own })
+}
+
+/// The maps of fields that the enabled effects ask for.
+fn read_own_maps(
+    source: &Source,
+    maps: &MapsTable,
+    folder: &Path,
+    needs: Needs,
+) -> Result<Vec<(Field, OwnMap)>, SceneError> {
+    let mut own = Vec::new();
+    for (name, path) in &maps.own {
+        let field = Field::from_name(name.get_ref()).filter(|field| field.map().is_some());
+        let Some(field) = field else {
+            let known: Vec<&str> =
+                Field::all().filter(|field| field.map().is_some()).map(Field::name).collect();
+            let what = format!("[maps.own] has {}, which no term of the scene declares", name.get_ref());
+            let remedy = match known.as_slice() {
+                [] => "Declare it in a file of `terms` by a line `// map: NAME: TYPE = NEUTRAL; what it is`"
+                    .to_owned(),
+                known => format!("The terms' maps are {}", known.join(", ")),
+            };
+            return Err(source.error(name, what, remedy));
+        };
+        if !needs.fields.has(field) {
+            continue;
+        }
+        let path = folder.join(path);
+        let map = match field.info().numbers {
+            1 => OwnMap::Scalar(images::scalar_map(&path)?),
+            _ => OwnMap::Color(images::color_map(&path)?),
+        };
+        own.push((field, map));
+    }
+    Ok(own)
 }
 
 /// The specular map that a normal map's alpha holds; none where that is 1 everywhere, as in files that only have

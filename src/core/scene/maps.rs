@@ -1,5 +1,7 @@
 //! Texture maps and the panorama, as linear numbers.
 
+use crate::model::fields::Field;
+
 /// An image of `C` linear channels, row by row from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map<const C: usize> {
@@ -53,6 +55,41 @@ pub struct Maps {
     pub specular: Option<Map<1>>,
     /// Hilite attenuator a (neutral: 1).
     pub attenuator: Option<Map<1>>,
+    /// Those of fields that files of rules declare.
+    pub own: Vec<(Field, OwnMap)>,
+}
+
+/// The map of a field.
+#[derive(Clone, Debug, PartialEq)]
+pub enum OwnMap {
+    /// Of one number: an image's first channel as it is stored.
+    Scalar(Map<1>),
+    /// Of three: an image's colour, linear Rec.709.
+    Color(Map<3>),
+}
+
+impl Maps {
+    /// The map of a field of one number.
+    #[must_use]
+    pub fn scalar(&self, field: Field) -> Option<&Map<1>> {
+        match self.of(field)? {
+            OwnMap::Scalar(map) => Some(map),
+            OwnMap::Color(_) => None,
+        }
+    }
+
+    /// The map of a field of three.
+    #[must_use]
+    pub fn colored(&self, field: Field) -> Option<&Map<3>> {
+        match self.of(field)? {
+            OwnMap::Color(map) => Some(map),
+            OwnMap::Scalar(_) => None,
+        }
+    }
+
+    fn of(&self, field: Field) -> Option<&OwnMap> {
+        self.own.iter().find(|(of, _)| *of == field).map(|(_, map)| map)
+    }
 }
 
 /// The environment of a scene.

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::maps::{Map, Maps};
+use super::maps::{Map, Maps, OwnMap};
 use crate::model::texture_filter::TextureFilter;
 
 /// The fewest rows that one task makes.
@@ -48,16 +48,25 @@ impl MipMaps {
 
 /// The next level; `None` where all maps are of one texel.
 fn halved(maps: &Maps) -> Option<Maps> {
-    let Maps { color, normal, specular, attenuator } = maps;
+    let Maps { color, normal, specular, attenuator, own } = maps;
     let next = Maps {
         color: color.as_ref().and_then(half),
         normal: normal.as_ref().and_then(half),
         specular: specular.as_ref().and_then(half),
         attenuator: attenuator.as_ref().and_then(half),
+        own: own.iter().filter_map(|(field, map)| Some((*field, half_of_own(map)?))).collect(),
     };
-    let Maps { color, normal, specular, attenuator } = &next;
-    let any = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
+    let Maps { color, normal, specular, attenuator, own } = &next;
+    let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
+    let any = built_in || !own.is_empty();
     any.then_some(next)
+}
+
+fn half_of_own(map: &OwnMap) -> Option<OwnMap> {
+    match map {
+        OwnMap::Scalar(map) => half(map).map(OwnMap::Scalar),
+        OwnMap::Color(map) => half(map).map(OwnMap::Color),
+    }
 }
 
 /// The level after that of a map; `None` after one texel.

@@ -92,7 +92,7 @@ pub(super) fn texel_fields(facts: &Facts) -> Fields {
     if stored { TEXEL.into_iter().chain(of_vertices(facts)).collect() } else { Fields::new() }
 }
 
-/// Numbers of vertices that files of rules have declared, of the effects that `facts` call for.
+/// What files of rules have declared of vertices and maps, of the effects that `facts` call for.
 pub(super) fn of_vertices(facts: &Facts) -> impl Iterator<Item = (&'static str, &'static str)> {
     term::fields(facts.setup.effects).iter().map(|field| (field.name(), field.wgsl()))
 }
@@ -252,7 +252,7 @@ impl Plan {
         Self {
             facts: *facts,
             attributes: Attribute::all(facts.setup.effects).filter(|a| needed(a.name())).collect(),
-            resources: Resource::ALL.into_iter().filter(|r| read(r.name())).collect(),
+            resources: Resource::all().filter(|r| read(r.name())).collect(),
             constants,
             varyings,
             levels,

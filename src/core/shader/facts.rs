@@ -5,6 +5,7 @@ use crate::model::dapple::Dapple;
 use crate::model::diffusion::Lookup;
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::fields::{Field, Fields};
 use crate::model::needs::Needs;
 use crate::model::shadow_filter::ShadowFilter;
 use crate::model::terms::TermName;
@@ -56,6 +57,8 @@ pub struct MapFacts {
     pub normal_attenuator: bool,
     /// How they are filtered.
     pub filter: TextureFilter,
+    /// Fields of files of rules that have a map.
+    pub own: Fields,
 }
 
 /// Texels along a side of the cubes' faces, where they are known when the shader is written: they stand in its text
@@ -160,6 +163,7 @@ impl Default for Facts {
             color_specular: true,
             normal_attenuator: true,
             filter: TextureFilter::Bilinear,
+            own: Fields::NONE,
         };
         Self {
             setup: Setup::new(Form::Corrected, Silhouette::Fragment, Effects::SURFACE),
@@ -297,6 +301,10 @@ impl Facts {
             "shadow_pcf" => self.shadow_filter() == Some(ShadowFilter::Pcf),
             "shadow_pcss" => self.shadow_filter() == Some(ShadowFilter::Pcss),
             "translucent_maps" => self.maps_depth(),
+            own if own.starts_with("has_") && own.ends_with("_map") => {
+                let field = own.strip_prefix("has_").and_then(|own| own.strip_suffix("_map"));
+                return field.and_then(Field::from_name).map(|field| self.maps.own.has(field));
+            }
             "atlas" => self.source != Source::Terms && self.atlas.is_some_and(|size| size > 0),
             // Last, as many may have been added.
             effect => return Effect::from_name(effect).map(|effect| setup.effects.has(effect)),

@@ -48,7 +48,8 @@ impl Attribute {
 
     /// The attributes that a vertex may have with these effects.
     pub fn all(effects: Effects) -> impl Iterator<Item = Self> {
-        Self::BUILT_IN.into_iter().chain(term::fields(effects).iter().map(Self::Field))
+        let of_vertices = term::fields(effects).iter().filter(|field| field.map().is_none());
+        Self::BUILT_IN.into_iter().chain(of_vertices.map(Self::Field))
     }
 
     /// The quantity's name in rules.
@@ -166,6 +167,10 @@ pub enum Resource {
     ShadowSampler,
     /// `array<vec4f>`: for each layer of the maps the rows that `rules/lib/shadow.wgsl` lists.
     ShadowViews,
+    /// The map of a field that a file of rules declares, linear, 32-bit float R or RGBA.
+    OwnTexels(Field),
+    /// The same in 8 bits: R, or sRGB RGBA.
+    OwnMap(Field),
 }
 
 /// How a resource is declared in WGSL.
@@ -208,8 +213,16 @@ impl Kind {
 }
 
 impl Resource {
-    /// Every resource.
-    pub const ALL: [Self; 32] = [
+    /// Every resource: the built-in ones, and the maps of fields that files of rules have declared.
+    pub fn all() -> impl Iterator<Item = Self> {
+        let mapped = Field::all().filter(|field| field.map().is_some());
+        Self::BUILT_IN
+            .into_iter()
+            .chain(mapped.flat_map(|field| [Self::OwnTexels(field), Self::OwnMap(field)]))
+    }
+
+    /// Those that every scene may have.
+    pub const BUILT_IN: [Self; 32] = [
         Self::IrradianceFaces,
         Self::SpecularFaces,
         Self::SpecularSlopeFaces,
@@ -246,8 +259,10 @@ impl Resource {
 
     /// Its name in WGSL.
     #[must_use]
-    pub const fn name(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
+            Self::OwnTexels(field) => field.map().map_or("", |names| names.texels),
+            Self::OwnMap(field) => field.map().map_or("", |names| names.filtered),
             Self::IrradianceFaces => "irradiance_faces",
             Self::SpecularFaces => "specular_faces",
             Self::SpecularSlopeFaces => "specular_slope_faces",
@@ -305,13 +320,15 @@ impl Resource {
             | Self::SpecularTexels
             | Self::AttenuatorTexels
             | Self::ColorSpecularTexels
-            | Self::NormalAttenuatorTexels => Kind::Texels,
+            | Self::NormalAttenuatorTexels
+            | Self::OwnTexels(_) => Kind::Texels,
             Self::ColorMap
             | Self::NormalMap
             | Self::SpecularMap
             | Self::AttenuatorMap
             | Self::ColorSpecularMap
-            | Self::NormalAttenuatorMap => Kind::Map,
+            | Self::NormalAttenuatorMap
+            | Self::OwnMap(_) => Kind::Map,
             Self::MapSampler | Self::CubeSampler => Kind::Sampler,
             Self::MorphDeltas | Self::Bones => Kind::Storage,
             Self::ShadowMaps => Kind::Depth,

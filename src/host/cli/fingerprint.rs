@@ -4,7 +4,7 @@
 use crate::fit::fingerprint::Fingerprint;
 use crate::model::effects::Effect;
 use crate::prepare::HeldOut;
-use crate::scene::maps::{Environment, Map, Maps};
+use crate::scene::maps::{Environment, Map, Maps, OwnMap};
 use crate::scene::mesh::Mesh;
 use crate::scene::view::Target;
 use crate::scene::{Quality, Scene};
@@ -15,7 +15,7 @@ const NONE: &str = "none";
 /// The fingerprint of a fit of `scene` without the views that are held out.
 pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
     let effects: Vec<&str> = scene.effects.iter().map(Effect::name).collect();
-    let Maps { color, normal, specular, attenuator } = &scene.maps;
+    let Maps { color, normal, specular, attenuator, own } = &scene.maps;
     let read = Fingerprint::default()
         .with("form", scene.form.name())
         .with("silhouette", scene.silhouette.name())
@@ -49,6 +49,13 @@ pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
             format!("rules of the effect {}", term.effect.name()),
             Hash::default().words(&term.text).done(),
         )
+    });
+    let all = own.iter().fold(all, |all, (field, texels)| {
+        let texels = match texels {
+            OwnMap::Scalar(texels) => map(Some(texels)),
+            OwnMap::Color(texels) => map(Some(texels)),
+        };
+        all.with(format!("map {}", field.name()), texels)
     });
     let held: Vec<&str> = held.views.iter().map(|view| view.name.as_str()).collect();
     let all = if held.is_empty() { all } else { all.with("list of held-out views", held.join(" ")) };

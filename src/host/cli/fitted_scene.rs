@@ -50,6 +50,10 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
             make_absolute(table, keys, folder);
         }
     }
+    if let Some(own) = own_maps(&mut scene) {
+        let names: Vec<String> = own.iter().map(|(name, _)| name.to_owned()).collect();
+        make_absolute(own, &names.iter().map(String::as_str).collect::<Vec<_>>(), folder);
+    }
     let model = scene.get_mut("model").and_then(Item::as_table_like_mut);
     if let Some(terms) = model.and_then(|model| model.get_mut("terms")).and_then(Item::as_array_mut) {
         for term in terms.iter_mut() {
@@ -107,6 +111,11 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
         }
     }
     Ok(scene.to_string())
+}
+
+/// The maps that files of rules declare.
+fn own_maps(scene: &mut DocumentMut) -> Option<&mut dyn TableLike> {
+    scene.get_mut("maps")?.as_table_like_mut()?.get_mut("own")?.as_table_like_mut()
 }
 
 /// The files that the text of a fitted scene names as its maps.

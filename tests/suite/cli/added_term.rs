@@ -1,7 +1,8 @@
 //! A scene that brings a term of its own: every command that a user would meet it in.
 
 use super::refusals::{Case, FIT, check};
-use super::sandbox::Sandbox;
+use super::sandbox::{Sandbox, TRUTH};
+use crate::added_maps::FRECKLES;
 use crate::added_term::FRESNEL;
 use crate::fixtures::read_exr;
 
@@ -37,6 +38,30 @@ fn its_parameters_are_listed_and_its_rules_are_in_the_shader_of_its_scene() {
     assert!(only.contains("fn schlick(") && !only.contains("hilite_faces"));
     let without = sandbox.run(&["shader", "scene.toml", "--effects", "diffuse"]).done().out;
     assert!(!without.contains("fn schlick("));
+}
+
+#[test]
+fn its_maps_are_found_from_the_folder_of_a_run() {
+    let sandbox = Sandbox::new();
+    sandbox.write("terms/freckles.wgsl", FRECKLES.as_bytes());
+    sandbox.edit(EFFECTS, "\"hilite\", \"reflection\", \"freckles\"]\nterms = [\"terms/freckles.wgsl\"]");
+    sandbox.edit("[environment]", "[maps.own]\nfreckle = \"specular.png\"\n[environment]");
+    sandbox.edit("\"specular_lobe\"]", "\"freckle_weight\"]");
+    sandbox.write("truth.toml", TRUTH.replace("[params]", "[params]\nfreckle_weight = 0.4").as_bytes());
+    sandbox
+        .run(&["render", "scene.toml", "--params", "truth.toml", "-o", "targets", "--engine", "cpu"])
+        .done();
+    sandbox.run(&["fit", "scene.toml", "-o", "run", "--engine", "cpu"]).done();
+    let own = sandbox.path("specular.png").display().to_string();
+    assert!(sandbox.text("run/scene.toml").contains(&format!("freckle = \"{own}\"")));
+    // Elsewhere than the scene that was fitted, the run's shows the same.
+    render("scene.toml", "run/params.toml", "front", "here.exr");
+    render("run/scene.toml", "run/params.toml", "front", "there.exr");
+    assert!(sandbox.read("here.exr") == sandbox.read("there.exr"));
+    // A fit of other maps is another fit.
+    sandbox.edit("freckle = \"specular.png\"", "freckle = \"attenuator.png\"");
+    let resumed = sandbox.run(&["fit", "scene.toml", "-o", "run", "--engine", "cpu", "--resume"]);
+    assert!(resumed.code == Some(2) && resumed.err.contains("map freckle"), "{resumed:?}");
 }
 
 #[test]

@@ -93,38 +93,46 @@ fn a_folder_that_cannot_be_had_is_refused_before_anything_is_studied() {
     assert_eq!(sandbox.read("file"), b"in the way");
 }
 
-/// A row a raw file, and a row a hard case, as the study's page has them.
-fn tables(results: &BTreeMap<String, Value>) -> [String; 2] {
+/// A row a raw file, the same of lights, and a row a hard case, as the study's page has them.
+fn tables(results: &BTreeMap<String, Value>) -> [String; 3] {
     let number = |verdict: &Value, key: &str| verdict[key].as_f64().unwrap();
     let deviation = |x: f64| if x == 0.0 { "0".to_owned() } else { format!("{x:.1e}") };
     let engine = |file: &Value, name: &str| -> Option<Value> {
         file["engines"].as_array().unwrap().iter().find(|engine| engine["name"] == name).cloned()
     };
     let shown = ["model f32", "CPU engine", "shader rules", "GPU engine"];
+    let cell = |search: Option<Value>| match search {
+        None => "-".to_owned(),
+        Some(search) => {
+            let worst = &search["worst"];
+            format!("{:.2} ({:.2})", number(worst, "deviation"), number(worst, "share_of_tolerance"))
+        }
+    };
     let mut searches = format!("| raw file | random cases | {} | failed |\n", shown.join(" | "));
     searches += &format!("|{}\n", " --- |".repeat(shown.len() + 3));
     for (name, file) in results {
         let random = |name| engine(file, name).map(|engine| engine["random"].clone());
-        let cell = |random: Option<Value>| match random {
-            None => "-".to_owned(),
-            Some(random) => {
-                let worst = &random["worst"];
-                format!("{:.2} ({:.2})", number(worst, "deviation"), number(worst, "share_of_tolerance"))
-            }
-        };
         let cells: Vec<String> = shown.iter().map(|name| cell(random(name))).collect();
         let tried = random("model f32").unwrap()["tried"].clone();
         let failed = &file["failed"];
         searches += &format!("| [{name}](results/{name}) | {tried} | {} | {failed} |\n", cells.join(" | "));
+    }
+    let lit = ["CPU engine", "GPU engine"];
+    let mut lights = format!("| raw file | fragments | {} |\n|{}\n", lit.join(" | "), " --- |".repeat(4));
+    for (name, file) in results {
+        let search = |name| engine(file, name).map(|engine| engine["lights"].clone());
+        let tried = search("CPU engine").unwrap()["tried"].clone();
+        let cells: Vec<String> = lit.iter().map(|name| cell(search(name))).collect();
+        lights += &format!("| [{name}](results/{name}) | {tried} | {} |\n", cells.join(" | "));
     }
     // The same cases on every machine: the worst of its kind for each column.
     let columns: [(&str, &str, &str); 6] = [
         ("model f32", "model f32", ""),
         ("CPU engine", "CPU engine", ""),
         ("shader rules, llvmpipe", "shader rules", "llvmpipe"),
-        ("shader rules, H200", "shader rules", "h200"),
+        ("shader rules, H100", "shader rules", "h100"),
         ("GPU engine, llvmpipe", "GPU engine", "llvmpipe"),
-        ("GPU engine, H200", "GPU engine", "h200"),
+        ("GPU engine, H100", "GPU engine", "h100"),
     ];
     let titles: Vec<&str> = columns.iter().map(|column| column.0).collect();
     let mut cases = format!("| case | {} |\n|{}\n", titles.join(" | "), " --- |".repeat(columns.len() + 1));
@@ -142,7 +150,7 @@ fn tables(results: &BTreeMap<String, Value>) -> [String; 2] {
         let cells = columns.map(worst).join(" | ");
         cases += &format!("| {} | {cells} |\n", case["name"].as_str().unwrap());
     }
-    [searches, cases]
+    [searches, lights, cases]
 }
 
 #[test]

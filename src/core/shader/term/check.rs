@@ -9,6 +9,7 @@ use super::there::{is_uniform, there};
 use super::{Origin, terms};
 use crate::model::choices::Choices;
 use crate::model::effects::Effect;
+use crate::model::fields::Found;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
 use crate::shader::emit::{SAMPLE, UNMADE};
@@ -208,7 +209,7 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
         .flat_map(|rule| rule.gives.iter().map(|(quantity, _)| *quantity))
         .chain(SAMPLE.iter().chain(&UNMADE).map(|(name, _)| *name))
         .chain(Attribute::BUILT_IN.iter().map(|attribute| attribute.name()))
-        .chain(Resource::ALL.iter().map(|resource| resource.name()))
+        .chain(Resource::all().map(Resource::name))
         .chain(Constant::OWN.iter().map(|constant| constant.name()))
         .chain(["vertex_index"])
         .collect();
@@ -233,8 +234,12 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
     }
     for &(line, field) in &declaration.fields {
         quantity_name(field.name, line)?;
-        let there = known.contains(field.name) || Param::from_identifier(field.name).is_some();
-        if there || !own.insert(field.name) {
+        let there = |name: &str| known.contains(name) || Param::from_identifier(name).is_some();
+        let mapped = match field.of {
+            Found::Map(names) => there(names.texels) || there(names.filtered),
+            Found::Vertices | Found::Samples => false,
+        };
+        if there(field.name) || mapped || !own.insert(field.name) {
             return taken("field or quantity", field.name, line);
         }
     }
@@ -328,8 +333,8 @@ fn references(rule: &Rule, declaration: &Declaration) -> Result<(), TermError> {
         }
     }
     for name in &rule.reads {
-        if !Resource::ALL.iter().any(|resource| resource.name() == *name) {
-            return missing("reads", name, Resource::ALL.map(|resource| resource.name().to_owned()).to_vec());
+        if !Resource::all().any(|resource| resource.name() == *name) {
+            return missing("reads", name, Resource::all().map(|known| known.name().to_owned()).collect());
         }
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use super::error::{Problem, TermError};
 use super::texels::{LEVEL_TYPES, blur, domains_of, kernel};
-use crate::model::fields::Found;
+use crate::model::fields::{Found, MapNames};
 use crate::model::params::{LARGEST, Owner, Scale};
 use crate::model::registry::leaked;
 use crate::shader::domain::Domain;
@@ -15,7 +15,7 @@ pub(crate) struct Declaration {
     pub(super) effects: Vec<(usize, DeclaredEffect)>,
     /// Its parameters, and their lines.
     pub(super) parameters: Vec<(usize, DeclaredParameter)>,
-    /// Numbers of vertices that it reads, and their lines.
+    /// Numbers of vertices, maps and samples that it reads, and their lines.
     pub(super) fields: Vec<(usize, DeclaredField)>,
     /// Its rules, in their order.
     pub(crate) rules: Vec<Rule>,
@@ -58,7 +58,7 @@ pub(super) struct DeclaredParameter {
     pub(super) source: &'static str,
 }
 
-/// `field: NAME: TYPE = NEUTRAL; what it is`
+/// `field: NAME: TYPE = NEUTRAL; what it is`, or `map:`
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredField {
     pub(super) name: &'static str,
@@ -69,10 +69,11 @@ pub(super) struct DeclaredField {
 }
 
 /// The keys that a header may have.
-const KEYS: [&str; 19] = [
+const KEYS: [&str; 20] = [
     "effect",
     "parameter",
     "field",
+    "map",
     "sample_field",
     "gives",
     "adds",
@@ -146,7 +147,7 @@ impl Declaration {
         for &(at, words) in header {
             let (key, value) = words.split_once(": ").map_or(("", words), |(key, value)| (key, value.trim()));
             match KEYS.iter().find(|known| **known == key) {
-                Some(&"effect" | &"parameter" | &"field" | &"sample_field") => {
+                Some(&"effect" | &"parameter" | &"field" | &"map" | &"sample_field") => {
                     self.declare(at, key, value)?;
                     // What stood before belongs to the file.
                     rule.about.clear();
@@ -193,18 +194,13 @@ impl Declaration {
             return Ok(());
         }
         let misplaced = |key| Problem::Misplaced { key }.at(line);
-        if let Some(of) = [("field", Found::Vertices), ("sample_field", Found::Samples)]
-            .into_iter()
-            .find(|(known, _)| *known == key)
-            .map(|(_, of)| of)
-        {
+        if let Some(key) = ["field", "sample_field", "map"].into_iter().find(|known| *known == key) {
             if !self.rules.is_empty() {
-                return Err(misplaced(if of == Found::Vertices { "field" } else { "sample_field" }));
+                return Err(misplaced(key));
             }
-            let wanted = "NAME: TYPE = NEUTRAL; what it is. The type is f32, vec2f or vec3f, and the number what stands \
-                          in for each of a mesh that lacks it";
-            let field = field(of, value)
-                .ok_or_else(|| Problem::Value { key: "field", given: value.to_owned(), wanted }.at(line))?;
+            let wanted = if key == "map" { MAP_LINE } else { FIELD_LINE };
+            let field = field(key, value)
+                .ok_or_else(|| Problem::Value { key, given: value.to_owned(), wanted }.at(line))?;
             self.fields.push((line, field));
             return Ok(());
         }
@@ -284,14 +280,28 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
     Ok(())
 }
 
-fn field(of: Found, value: &'static str) -> Option<DeclaredField> {
+/// How a field is declared.
+const FIELD_LINE: &str = "NAME: TYPE = NEUTRAL; what it is. The type is f32, vec2f or vec3f, and the number what stands in \
+                          for each of a mesh that lacks it";
+/// How a map is.
+const MAP_LINE: &str = "NAME: TYPE = NEUTRAL; what it is. The type is f32, an image's first channel, or vec3f, its colour, and \
+                        the number what stands in for each where the scene has none";
+
+fn field(key: &str, value: &'static str) -> Option<DeclaredField> {
     let (typed, meaning) = value.split_once(';')?;
     let (name, rest) = typed.split_once(':')?;
     let (wgsl, neutral) = rest.split_once('=')?;
     let (name, wgsl, meaning) = (name.trim(), wgsl.trim(), meaning.trim());
     let neutral = number(neutral)? as f32;
     let known = LEVEL_TYPES.contains(&wgsl) && neutral.is_finite() && !meaning.is_empty();
-    known.then_some(DeclaredField { name, of, wgsl, neutral, meaning })
+    let of = match key {
+        "map" => Found::Map(MapNames::of(name)),
+        "sample_field" => Found::Samples,
+        _ => Found::Vertices,
+    };
+    // Images have one channel or three.
+    let held = key != "map" || wgsl != "vec2f";
+    (known && held).then_some(DeclaredField { name, of, wgsl, neutral, meaning })
 }
 
 /// A number, or one a channel: `(0.2, 0.1, 0)`.

@@ -30,13 +30,14 @@
 //! - `declaration`: the file's text, `texels`: what it says of texels; [`error`]: what is wrong with it
 //! - `check`: whether its names and types fit the built-in rules, `there`: whether what it needs is there; `wgsl`:
 //!   whether its functions are valid and have derivatives
-//! - `needs`: what its effect asks for
+//! - `map`: the rules that look its maps up; `needs`: what its effect asks for
 //! - [`library`]: the files that come with the library
 
 mod check;
 pub(crate) mod declaration;
 pub mod error;
 pub mod library;
+mod map;
 mod needs;
 mod texels;
 mod there;
@@ -64,7 +65,7 @@ pub struct Term {
     pub effects: &'static [Effect],
     /// Its parameters.
     pub params: Vec<Param>,
-    /// Numbers of vertices that it reads.
+    /// Numbers of vertices, maps and samples that it reads.
     pub fields: Fields,
     /// Which of its effects show nothing where a parameter is 0 in every channel.
     pub weighed: Vec<(Effect, Param)>,
@@ -127,7 +128,7 @@ pub fn of_texels(effects: Effects) -> Option<Effect> {
     terms.find(|term| term.rules.iter().any(|rule| there_alone(term, rule))).map(|term| term.effect)
 }
 
-/// The fields that the rules of added effects read of vertices.
+/// The fields that the rules of added effects read.
 pub fn fields(effects: Effects) -> Fields {
     enabled(effects).fold(Fields::default(), |all, term| all.or(term.fields))
 }
@@ -221,7 +222,10 @@ fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result
         let attribute = leaked(&format!("rest_{name}"));
         let row = FieldInfo { name, attribute, of, numbers: components(wgsl), neutral, meaning };
         read.push(Field::register(row).map_err(|error| problem(error).at(line))?);
-        rules.extend(of_vertex(&declared, attribute, line));
+        match of {
+            Found::Map(_) => rules.extend(map::rules(&declared, line)?),
+            Found::Vertices | Found::Samples => rules.extend(of_vertex(&declared, attribute, line)),
+        }
     }
     let mut layers = Vec::new();
     for rule in &mut rules {

@@ -63,7 +63,7 @@ fn check_rule(rule: &Rule) -> Result<(), TermError> {
 /// What a rule's header brings into its module.
 fn surroundings(rule: &Rule) -> String {
     let mut text = String::new();
-    let resources = Resource::ALL.into_iter().filter(|resource| rule.reads.contains(&resource.name()));
+    let resources = Resource::all().filter(|resource| rule.reads.contains(&resource.name()));
     for (binding, resource) in resources.enumerate() {
         let ((space, kind), name) = (resource.kind().wgsl(), resource.name());
         let _ = writeln!(text, "@group(0) @binding({binding}) {space} {name}: {kind};");
