@@ -56,7 +56,8 @@
 //! What stands here are a few names of the members of the workspace, which follow the data's one way: `skinfit_core`
 //! (everything on the CPU), `skinfit_gpu` (the renderer and the engine on an adapter),
 //! `skinfit_tensor`, `skinfit_report` (metrics, pictures and pages), `skinfit_study`, and `skinfit_host`, the command
-//! line. Their modules are the interface for whoever needs more; it changes as they do.
+//! line. The names above are kept from version to version. **The modules below are not**: they are the members' own, for
+//! whoever needs more, as some of the examples do, and change as these do.
 
 pub use skinfit_core::demo::built_in_scene;
 pub use skinfit_core::engine::cpu::CpuEngine;
@@ -76,24 +77,23 @@ pub use skinfit_core::shader::term::{Term, register as register_term};
 pub use skinfit_gpu::engine::GpuEngine;
 pub use skinfit_gpu::{Gpu, RenderOptions, Renderer};
 
-// The members' modules under one name, for the tests and experiments of the project.
-#[doc(hidden)]
+// The members' modules under one name: not kept from version to version.
+#[doc(no_inline)]
 pub use skinfit_core::{
     bake, builtin, demo, export, fit, model, output, prepare, program, render, samples, scene, shader, simd,
 };
-#[doc(hidden)]
+#[doc(no_inline)]
 pub use skinfit_gpu as gpu;
-#[doc(hidden)]
+#[doc(no_inline)]
 pub use skinfit_report as report;
 #[cfg(feature = "host")]
-#[doc(hidden)]
+#[doc(no_inline)]
 pub use skinfit_study as study;
 #[cfg(feature = "burn")]
-#[doc(hidden)]
+#[doc(no_inline)]
 pub use skinfit_tensor::{self as tensor, maps};
 
-/// Loss, gradient and normal equations over samples, on the CPU and on an adapter.
-#[doc(hidden)]
+/// Loss, gradient and normal equations over samples, on the CPU and on an adapter; not kept from version to version.
 pub mod engine {
     pub use skinfit_core::engine::*;
     pub use skinfit_gpu::engine as gpu;

@@ -134,11 +134,11 @@ fn hlsl_shader(head: &str, facts: &Facts, exported: &str) -> String {
     )
 }
 
-fn compile_glsl(text: &str) -> Result<(), String> {
+pub(crate) fn compile_glsl(text: &str) -> Result<(), String> {
     compile("glslangValidator", &["-V", "-S", "frag"], "frag", text)
 }
 
-fn compile_hlsl(text: &str) -> Result<(), String> {
+pub(crate) fn compile_hlsl(text: &str) -> Result<(), String> {
     compile(
         "glslangValidator",
         &["-D", "-V", "-S", "frag", "-e", "main", "--auto-map-bindings"],

@@ -24,6 +24,7 @@ mod engine;
 mod evaluators;
 mod every_effect;
 mod examples;
+mod exported_passes;
 mod exports;
 mod figures;
 mod fits;

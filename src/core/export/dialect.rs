@@ -30,6 +30,8 @@ pub struct Dialect {
     pub mip_map_lookup: &'static str,
     /// A lookup of a cube.
     pub cube_lookup: &'static str,
+    /// A texel of a 2D texture at whole coordinates.
+    pub texel_load: &'static str,
     /// Declarations of a 2D map, a cube and a sampler: `{n}` name, `{b}` binding, `{h}` what a map of
     /// colours is marked with. Empty: none.
     pub declarations: [&'static str; 3],
@@ -55,6 +57,7 @@ const BASE: Dialect = Dialect {
     map_lookup: "textureLod({t}, {c}, 0.0)",
     mip_map_lookup: "texture({t}, {c})",
     cube_lookup: "textureLod({t}, {c}, 0.0)",
+    texel_load: "texelFetch({t}, {c}, 0)",
     declarations: [""; 3],
     colour_hint: "",
     samplers: ["skinfit_map_sampler", "skinfit_cube_sampler"],
@@ -113,6 +116,7 @@ pub const HLSL: Dialect = Dialect {
     map_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
     mip_map_lookup: "{t}.Sample({s}, {c})",
     cube_lookup: "{t}.SampleLevel({s}, {c}, 0.0)",
+    texel_load: "{t}.Load(int3({c}, 0))",
     declarations: [
         "Texture2D<float4> {n} : register(t{b});",
         "TextureCube<float4> {n} : register(t{b});",
@@ -137,6 +141,7 @@ pub const CG: Dialect = Dialect {
     map_lookup: "tex2Dlod({t}, float4({c}, 0.0, 0.0))",
     mip_map_lookup: "tex2D({t}, {c})",
     cube_lookup: "texCUBElod({t}, float4({c}, 0.0))",
+    texel_load: "tex2Dfetch({t}, int4({c}, 0, 0))",
     declarations: ["uniform sampler2D {n};", "uniform samplerCUBE {n};", ""],
     bits: "",
     ..HLSL
@@ -149,6 +154,7 @@ pub const MSL: Dialect = Dialect {
     map_lookup: "{t}.sample({s}, {c}, level(0.0))",
     mip_map_lookup: "{t}.sample({s}, {c})",
     cube_lookup: "{t}.sample({s}, {c}, level(0.0))",
+    texel_load: "{t}.read(uint2({c}), 0)",
     declarations: ["texture2d<float> {n};", "texturecube<float> {n};", "sampler {n};"],
     bits: "as_type<uint3>",
     prologue: "#include <metal_stdlib>\nusing namespace metal;\n",
@@ -161,11 +167,13 @@ impl Dialect {
     pub fn kind(&self, wgsl: &str) -> String {
         let words = match self.family {
             Family::Wgsl => return wgsl.to_owned(),
-            Family::Glsl => ["vec2", "vec3", "vec4", "uvec3"],
-            Family::Hlsl | Family::Msl => ["float2", "float3", "float4", "uint3"],
+            Family::Glsl => ["vec2", "vec3", "vec4", "uvec3", "ivec2"],
+            Family::Hlsl | Family::Msl => ["float2", "float3", "float4", "uint3", "int2"],
         };
         match wgsl {
             "f32" => "float".to_owned(),
+            "i32" => "int".to_owned(),
+            "vec2i" => words[4].to_owned(),
             "vec2f" => words[0].to_owned(),
             "vec3f" => words[1].to_owned(),
             "vec4f" => words[2].to_owned(),
@@ -180,6 +188,12 @@ impl Dialect {
         match (self.family, wgsl) {
             (Family::Hlsl, "mix") => "lerp",
             (Family::Hlsl, "fract") => "frac",
+            (Family::Glsl, "dpdx") => "dFdx",
+            (Family::Glsl, "dpdy") => "dFdy",
+            (Family::Hlsl, "dpdx") => "ddx",
+            (Family::Hlsl, "dpdy") => "ddy",
+            (Family::Msl, "dpdx") => "dfdx",
+            (Family::Msl, "dpdy") => "dfdy",
             _ => wgsl,
         }
     }
@@ -215,6 +229,13 @@ impl Dialect {
             Some((_, word)) if !word.is_empty() => text.replace(self.filters[0], word),
             _ => text.to_owned(),
         }
+    }
+
+    /// The declaration of a level of the UV atlas: a texture that is read texel by texel.
+    #[must_use]
+    pub fn level(&self, bound: &str, binding: usize) -> String {
+        let text = self.declarations[0].replace("{b}", &binding.to_string());
+        text.replace("{n}", &function(bound)).replace("{h}filter_linear, repeat_enable", "filter_nearest")
     }
 
     /// A resource's declaration; empty where it needs none.

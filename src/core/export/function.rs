@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 use super::dialect::{Dialect, Family};
 use super::idle::idle;
 use super::translate::translate;
-use super::{ExportError, Provenance, Target, names};
+use super::{ExportError, Provenance, Target, names, passes};
 use crate::model::effects::{Effect, Effects};
 use crate::model::evaluate::Setup;
 use crate::model::params::{Param, Params};
 use crate::shader::Resource;
+use crate::shader::atlas::Level;
 use crate::shader::quantity::Kind;
 use crate::shader::{Plan, facts::Facts, plan};
 
@@ -27,15 +28,11 @@ pub(super) fn text(
     };
     let idle = idle(facts.setup.effects, params);
     let effects = facts.setup.effects.iter().filter(|&effect| !idle.has(effect)).collect();
-    // Not every language has 16-bit numbers, nor every engine's adapter; one function draws no atlas; and an engine has
-    // shadow maps of its own, of which the function takes what they leave of each light.
-    let plan = plan(&Facts {
-        setup: Setup { effects, ..facts.setup },
-        f16: false,
-        atlas: None,
-        shadows: None,
-        ..*facts
-    })?;
+    // Not every language has 16-bit numbers, nor every engine's adapter; and an engine has shadow maps of its own, of which
+    // the functions take what they leave of each light.
+    let setup = Setup { effects, ..facts.setup };
+    let atlas = facts.atlas.filter(|_| setup.needs().atlas);
+    let plan = plan(&Facts { setup, f16: false, atlas, shadows: None, ..*facts })?;
     let mut text = header(&plan, idle, params, from);
     let _ = write!(text, "\n{}", dialect.prologue);
     let literals = plan.literals(params);
@@ -45,8 +42,12 @@ pub(super) fn text(
     let filter = plan.facts.maps.filter;
     let declared = dialect.filtering(&declarations(dialect, &plan), filter);
     let constants: Vec<String> = literals.into_iter().map(|(name, ..)| name).collect();
-    let resources: Vec<&str> = plan.resources.iter().map(|resource| resource.name()).collect();
-    let fields: Vec<&str> = plan.surface().iter().map(|(name, _)| *name).collect();
+    let levels: Vec<String> = plan.all_levels().iter().map(Level::bound).collect();
+    let merged = plan.merged();
+    let resources = merged.resources.iter().map(|resource| resource.name());
+    let resources: Vec<&str> = resources.chain(levels.iter().map(String::as_str)).collect();
+    let fields: Vec<&str> =
+        plan.surface().iter().chain(&plan.texel_surface()).map(|(name, _)| *name).collect();
     let wgsl = names::prefixed(&plan.function(), &constants, &resources, &fields);
     let functions = dialect.filtering(&translate(dialect, &names::cited(&wgsl)), filter);
     if dialect.family == Family::Msl {
@@ -77,8 +78,10 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
         "Comments cite the listings of GPU Gems, chapter 3, and sections of docs/model.md, a page of skinfit."
             .to_owned(),
         String::new(),
-        "Call skinfit_shade with what the vertex stage hands over, in world space:".to_owned(),
     ]);
+    lines.extend(passes::wiring(plan));
+    let what = "with what the vertex stage hands over, in world space:";
+    lines.push(format!("{} skinfit_shade {what}", if plan.passes.is_empty() { "Call" } else { "Then call" }));
     lines.extend(plan.surface().iter().map(|(name, _)| match *name {
         // Of the vertex stage, and so no constant of the function.
         "vertex_rim" => {
@@ -87,10 +90,11 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
         }
         name => format!("- {name}: {}", meaning(name)),
     }));
+    let merged = plan.merged();
     let bound = |resource: &Resource| {
         Some(format!("- {}: {}", names::function(resource.name()), what_to_bind(*resource, params)?))
     };
-    let bound: Vec<String> = plan.resources.iter().filter_map(bound).collect();
+    let bound: Vec<String> = merged.resources.iter().filter_map(bound).collect();
     if !bound.is_empty() {
         lines.extend([
             String::new(),
@@ -100,7 +104,7 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
         lines.extend(bound);
     }
     let filter = plan.facts.maps.filter;
-    if filter.reads_levels() && plan.resources.iter().any(|resource| resource.kind() == Kind::Map) {
+    if filter.reads_levels() && merged.resources.iter().any(|resource| resource.kind() == Kind::Map) {
         lines.extend([
             String::new(),
             format!("Maps are to have mip levels and a sampler that is {}, as where the constants were found. Which level a", filter.name()),
@@ -114,12 +118,18 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
 fn declarations(dialect: &Dialect, plan: &Plan) -> String {
     let mut text = String::new();
     // Storage is the vertex stage's: an engine brings its own.
-    let read = plan.resources.iter().filter(|resource| resource.kind() != Kind::Storage);
-    for (i, &resource) in read.enumerate() {
-        let declaration = dialect.declaration(resource, i + 1);
+    let merged = plan.merged();
+    let read = merged.resources.iter().filter(|resource| resource.kind() != Kind::Storage);
+    let mut next = 1;
+    for &resource in read {
+        let declaration = dialect.declaration(resource, next);
+        next += 1;
         if !declaration.is_empty() {
             let _ = writeln!(text, "{declaration}");
         }
+    }
+    for (i, level) in plan.all_levels().iter().enumerate() {
+        let _ = writeln!(text, "{}", dialect.level(&level.bound(), next + i));
     }
     text
 }
@@ -152,8 +162,8 @@ fn what_to_bind(resource: Resource, params: &Params) -> Option<String> {
     Some(words)
 }
 
-/// What a field of the function's input is.
-fn meaning(field: &str) -> &'static str {
+/// What a field of a function's input is.
+pub(super) fn meaning(field: &str) -> &'static str {
     match field {
         "vertex_position" => "position",
         "vertex_normal" => "normal, as interpolated",
@@ -161,6 +171,9 @@ fn meaning(field: &str) -> &'static str {
         "vertex_bitangent" => "bitangent w cross(N, T), as interpolated",
         "vertex_uv" => "texture coordinates, origin at the image's top left",
         "vertex_occlusion" => "open share of the hemisphere, 1 = unoccluded",
+        "vertex_chart" => {
+            "number of the vertex' connected piece of the UV atlas, counted from 1 (charts.csv of `skinfit bake --stages`)"
+        }
         "vertex_view" => "unit vector from the eye to the vertex, as interpolated",
         "vertex_silhouette" => "1 - |N.V| of the vertex, as interpolated",
         "eye" => "position of the eye",

@@ -6,7 +6,7 @@
 //! - [`provenance`]: where the constants come from
 //! - `names`: the prefix of all that an export defines, and its citations
 //! - `idle`: terms without a weight, which no shader need compute
-//! - `constants`, `function`: the texts
+//! - `constants`, `function`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
 //!
 //! The shader is written once, as the planner's rules; every exported function is a translation of them.
 
@@ -15,6 +15,7 @@ pub mod dialect;
 mod function;
 mod idle;
 mod names;
+mod passes;
 pub mod provenance;
 pub mod target;
 mod translate;

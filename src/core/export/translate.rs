@@ -120,6 +120,9 @@ impl<'a> Translation<'a> {
                 let lookup = self.dialect.mip_map_lookup;
                 lookup.replace("{t}", texture).replace("{s}", sampler).replace("{c}", at)
             }
+            ("textureLoad", [texture, at, _]) => {
+                self.dialect.texel_load.replace("{t}", texture).replace("{c}", at)
+            }
             // HLSL has no vector of one number repeated.
             ("vec3f" | "vec3u", [one]) if self.dialect.family == Family::Hlsl => {
                 format!("{}({one}, {one}, {one})", self.dialect.kind(function))

@@ -6,11 +6,11 @@ use std::fmt::Write as _;
 use super::atlas::stored;
 use super::atlas::text::{sample_level, sampled};
 use super::domain::Domain;
-use super::emit::{Plan, hazy, parts, sample_fields};
-use super::quantity::Constant;
+use super::emit::{Plan, Step, hazy, parts, sample_fields};
+use super::quantity::{Constant, Resource};
 use super::tangent::chain::Chain;
 use crate::model::key_light::KeyLight;
-use crate::model::params::Params;
+use crate::model::params::{Param, Params};
 use crate::model::turn::turn;
 
 impl Plan {
@@ -105,7 +105,8 @@ impl Plan {
     /// It names parameters in capitals ([`literals`](Self::literals)) and resources as they are.
     #[must_use]
     pub fn function(&self) -> String {
-        let mut wgsl = self.functions(&[Domain::Fragment]).trim_start().to_owned();
+        let mut wgsl = self.merged().functions(&[Domain::Texel, Domain::Fragment]).trim_start().to_owned();
+        wgsl.push_str(&self.pass_functions());
         let eye = self.in_fragment(Constant::Eye);
         wgsl.push_str(
             "\n// What the vertex stage hands over: world space, interpolated.\nstruct Surface {\n",
@@ -123,9 +124,28 @@ impl Plan {
             Constant::Eye if eye => "at.eye".to_owned(),
             other => literal_name(other),
         };
+        wgsl.push_str(&self.looked_up_lines());
         wgsl.push_str(&self.calls(Domain::Fragment, constant, |name| format!("at.{name}")));
         let _ = write!(wgsl, "    return vec4f({}, {alpha});\n}}\n", sum(&parts(&self.facts)));
         wgsl
+    }
+
+    /// The plan with the passes' rules among its own, each function once, and with what they read.
+    #[must_use]
+    pub fn merged(&self) -> Self {
+        let plans = || self.passes.iter().map(|pass| &pass.plan).chain([self]);
+        let mut steps: Vec<Step> = Vec::new();
+        for step in plans().flat_map(|plan| &plan.steps) {
+            if !steps.iter().any(|known| known.rule.function == step.rule.function) {
+                steps.push(*step);
+            }
+        }
+        let read = |resource: &Resource| plans().any(|plan| plan.resources.contains(resource));
+        let resources = Resource::all().filter(read).collect();
+        let asked = |constant: &Constant| plans().any(|plan| plan.constants.contains(constant));
+        let constants =
+            Constant::OWN.into_iter().chain(Param::all().map(Constant::Param)).filter(asked).collect();
+        Self { steps, resources, constants, ..self.clone() }
     }
 
     /// The fields of the function's `Surface`, with their WGSL types.
@@ -138,12 +158,19 @@ impl Plan {
     /// The constants of the function: name in capitals, WGSL type, and value.
     #[must_use]
     pub fn literals(&self, params: &Params) -> Vec<(String, &'static str, Vec<f64>)> {
-        let used = self.constants.iter().filter(|constant| self.in_fragment(**constant));
+        let merged = self.merged();
+        let used = merged.constants.iter().filter(|constant| merged.is_shading(**constant));
         used.filter_map(|&constant| {
             let (kind, value) = literal(constant, params)?;
             Some((literal_name(constant), kind, value))
         })
         .collect()
+    }
+
+    /// Whether a rule of fragments or texels reads a constant.
+    fn is_shading(&self, constant: Constant) -> bool {
+        let mut shading = self.steps.iter().filter(|step| step.rule.domain != Domain::Vertex);
+        shading.any(|step| step.rule.needs.iter().any(|(name, _)| *name == constant.name()))
     }
 
     /// Whether a rule of the fragment stage reads a constant.
@@ -154,7 +181,7 @@ impl Plan {
 }
 
 /// The name of a constant that is written into the text.
-fn literal_name(constant: Constant) -> String {
+pub(super) fn literal_name(constant: Constant) -> String {
     constant.name().to_uppercase()
 }
 

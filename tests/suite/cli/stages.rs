@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use super::sandbox::{Sandbox, files};
+use super::sandbox::{Sandbox, TRUTH, files};
 use crate::fixtures::read_exr;
 
 const ALL: [&str; 7] = ["diffuse", "normal_map", "occlusion", "rim", "side_specular", "hilite", "reflection"];
@@ -122,8 +122,26 @@ fn the_stages_of_diffusion_are_pictures_of_the_atlas() {
         assert!(sandbox.path(&format!("baked/{name}.png")).is_file(), "{name}");
     }
     let made = std::fs::read_dir(sandbox.path("baked")).unwrap().count();
-    // Beside these the irradiance (two files), the occlusion and the lock.
-    assert_eq!(made, 2 * 10 + 2 + 1 + 1);
+    // Beside these the irradiance (two files), the occlusion, the vertices' charts and the lock.
+    assert_eq!(made, 2 * 10 + 2 + 1 + 1 + 1);
+    // The ball is one piece.
+    let charts = sandbox.text("baked/charts.csv");
+    assert!(charts.starts_with("vertex,chart\n0,1\n1,1\n"), "{charts}");
+    // What an engine makes of them is exported with the shader.
+    sandbox.write("truth.toml", TRUTH.as_bytes());
+    sandbox.edit("\"reflection\"]", "\"reflection\", \"diffusion\"]");
+    let export = ["export", "truth.toml", "--scene", "scene.toml", "--to"];
+    for (target, load) in
+        [("glsl", "texelFetch("), ("unity", ".Load(int3("), ("msl", ".read(uint2("), ("cg", "tex2Dfetch(")]
+    {
+        let text = sandbox.run(&[&export[..], &[target]].concat()).done().out;
+        for part in ["into textures of 64 x 64 texels", "skinfit_diffusion_level_3_pass(", "charts.csv", load]
+        {
+            assert!(text.contains(part), "{target}: {part}");
+        }
+    }
+    sandbox.edit("light_map_size = 64", "light_map_size = 64\nseams = \"joined\"");
+    sandbox.run(&[&export[..], &["glsl"]].concat()).refused(&["across the seams", "seams = \"cut\""]);
 }
 
 #[test]

@@ -61,7 +61,7 @@ fn shader(plan: &Plan, params: &Params) -> String {
 }
 
 /// GLSL by way of glslang and SPIR-V as WGSL.
-fn as_wgsl(glsl: &str) -> String {
+pub(crate) fn as_wgsl(glsl: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
     let (file, spirv) = (folder.path().join("shader.frag"), folder.path().join("shader.spv"));
     std::fs::write(&file, glsl).unwrap();

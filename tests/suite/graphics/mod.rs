@@ -17,7 +17,7 @@
 
 mod accuracy;
 pub(crate) mod bench;
-mod exported;
+pub(crate) mod exported;
 mod faults;
 mod frames;
 mod fused;
@@ -25,6 +25,7 @@ mod levels;
 mod light_vectors;
 mod parity;
 mod pictures;
+pub(crate) mod raw;
 mod samples;
 mod shadow_maps;
 mod stability;

@@ -106,7 +106,7 @@ pub(super) fn taps(facts: &Facts, rule: &Rule, axis: Axis) -> Loop {
             let steps = "f32(i) / narrow";
             Loop {
                 before: before
-                    + "    let reach = i32(min(ceil(6.0 * deviation), f32(max(size.x, size.y))));\n    \
+                    + "    let reach: i32 = i32(min(ceil(6.0 * deviation), f32(max(size.x, size.y))));\n    \
                        let narrow: f32 = max(deviation, 1e-10);\n",
                 reach: "reach".to_owned(),
                 sides: 1,

@@ -11,13 +11,14 @@
 //!
 //! - this module: from the rules that a search has found to passes; `order`: which come before which; `level`: what
 //!   they leave
-//! - `text`: their WGSL; `kernel`: that of blurs
+//! - `text`: their WGSL; `kernel`: that of blurs; `function`: the same as functions for another engine
 //! - [`tangent`]: passes that leave how levels move; [`named`]: these beside the plan's
 //! - [`buffers`]: passes over stored texels as compute shaders, for the engine on an adapter (`layers`: where levels stand;
 //!   `columns`: what moves beside what is blurred)
 
 pub mod buffers;
 mod columns;
+mod function;
 mod kernel;
 mod layers;
 mod level;
@@ -28,6 +29,7 @@ pub mod tangent;
 mod tests;
 pub(super) mod text;
 
+pub use self::function::pass_function;
 pub use self::level::{Axis, Level};
 pub(super) use self::order::with_vertices;
 use self::order::{depths, in_levels, upstream};

@@ -212,7 +212,7 @@ fn texel_of(plan: &Plan, functions: &str, lines: &str, targets: &[(Level, String
 }
 
 /// A texel of a chart that holds a value of a level's type.
-fn texel(level: &Level, value: &str, chart: &str) -> String {
+pub(super) fn texel(level: &Level, value: &str, chart: &str) -> String {
     match level.kind {
         "f32" => format!("vec4f({value}, 0.0, 0.0, {chart})"),
         "vec2f" => format!("vec4f({value}, 0.0, {chart})"),

@@ -10,12 +10,15 @@ use crate::engine::levels::LevelMaker;
 use crate::engine::rules::sample_facts;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
+use crate::output;
 use crate::prepare::Baked;
 use crate::progress::bar;
 use crate::render::files::{ImageOptions, write_exr, write_png};
 use crate::render::image::Image;
 use crate::render::tonemap::ToneMap;
 use crate::samples::{Atlas, PosedSurface, atlas_of};
+use crate::scene::charts;
+use crate::scene::mesh::Mesh;
 use crate::shader::tangent::chain::Seed;
 use skinfit_core::program::lower::Natives;
 use skinfit_core::program::shading::Shading;
@@ -38,7 +41,11 @@ enum Shown {
 
 /// The stages of a scene's diffusion, by their files' names: the charts, the stretch map, the light map, each level, and for
 /// each parameter that is free in the scene's fit how light map and levels move along it.
-pub(super) struct Stages(Vec<(String, Image, Shown)>);
+pub(super) struct Stages {
+    pictures: Vec<(String, Image, Shown)>,
+    /// The chart of each vertex, counted from 1.
+    charts: Vec<u32>,
+}
 
 impl Stages {
     /// Make them.
@@ -72,21 +79,25 @@ impl Stages {
         let maker = LevelMaker::<f32>::new(shading.levels);
         let made =
             maker.make(&atlas, &scene.params, &CubesAt::new(&baked.illumination, &scene.params, |x| x)).all();
-        let mut pictures = vec![("charts".to_owned(), charts(&atlas), Shown::Light)];
+        let mut pictures = vec![("charts".to_owned(), picture_of_charts(&atlas), Shown::Light)];
         for (name, level) in &made {
             let Some((name, shown)) = file_of(name, &free) else { continue };
             pictures.push((name, picture(&atlas, |texel| level[texel]), shown));
         }
-        Ok(Self(pictures))
+        let Mesh { positions, uvs, triangles, .. } = &scene.mesh;
+        Ok(Self { pictures, charts: charts::charts(positions, uvs, triangles) })
     }
 
-    /// Write each as an EXR and a PNG file into `folder`; returns how many there are.
+    /// Write each as an EXR and a PNG file into `folder`, and the vertices' charts; returns how many there are.
     ///
     /// # Errors
     /// When a file cannot be written.
     pub(super) fn write(&self, folder: &Path) -> Result<usize, Refusal> {
-        let progress = bar("stages", 2 * self.0.len() as u64);
-        for (name, image, shown) in &self.0 {
+        let rows = self.charts.iter().enumerate().map(|(vertex, chart)| format!("{vertex},{chart}\n"));
+        let text = std::iter::once("vertex,chart\n".to_owned()).chain(rows).collect::<String>();
+        output::write(&folder.join("charts.csv"), text.as_bytes())?;
+        let progress = bar("stages", 2 * self.pictures.len() as u64);
+        for (name, image, shown) in &self.pictures {
             write_exr(&folder.join(format!("{name}.exr")), image, &ImageOptions::default())?;
             progress.inc(1);
             write_png(
@@ -98,7 +109,7 @@ impl Stages {
             progress.inc(1);
         }
         progress.finish_and_clear();
-        Ok(self.0.len())
+        Ok(self.pictures.len())
     }
 }
 
@@ -136,7 +147,7 @@ fn picture(atlas: &Atlas, value: impl Fn(usize) -> [f32; 3]) -> Image {
 }
 
 /// Each chart in a colour of its own: hues a golden section apart, so that neighbours in number differ most.
-fn charts(atlas: &Atlas) -> Image {
+fn picture_of_charts(atlas: &Atlas) -> Image {
     picture(atlas, |texel| {
         let hue = (f64::from(atlas.chart(texel)) * 0.618_033_988_75).fract();
         [0.0, 1.0 / 3.0, 2.0 / 3.0].map(|third| {
