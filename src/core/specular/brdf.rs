@@ -89,7 +89,7 @@ pub fn schlick(u: f64, f0: f64) -> f64 {
 /// derivative by f0; 1 from f0 = 1 on.
 ///
 /// The factor f0 stands outside: with e = eta^2 - 1 = 4 q / (1 - q)^2, q = sqrt f0, and g = sqrt(u^2 + e), the usual g - u
-/// is e / (g + u). So value and derivative hold at f0 = 0 too. g + u is held at [`LEAST_SUM`].
+/// is e / (g + u). So value and derivative hold at f0 = 0 too. g + u is held at 0.1.
 #[must_use]
 pub fn dielectric(u: f64, f0: f64) -> [f64; 2] {
     if f0 >= 1.0 {
