@@ -12,11 +12,11 @@ const VIEWS: [(&str, &str); 4] =
     [("front", "front"), ("threequarter", "three_quarter"), ("profile", "profile"), ("closeup", "closeup")];
 
 /// Effects of the scenes without what scatters, and without what comes through.
-const WITHOUT: &str = r#"["diffuse", "normal_map", "occlusion", "rim", "lights", "shadows", "light_specular", "fresnel", "directional_occlusion"]"#;
+pub(crate) const WITHOUT: &str = r#"["diffuse", "normal_map", "occlusion", "rim", "lights", "shadows", "light_specular", "fresnel", "directional_occlusion"]"#;
 const DIFFUSION: &str = r#"["diffuse", "normal_map", "occlusion", "rim", "lights", "shadows", "light_specular", "fresnel", "directional_occlusion", "diffusion"]"#;
 
 /// What is free then.
-const OTHERS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength"]"#;
+pub(crate) const OTHERS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength"]"#;
 const LEVELS: &str = r#"["base_weight", "rim_weight", "rim_exponent", "specular_weight", "roughness", "gloss", "f0", "normal_strength", "diffusion_weight_1", "diffusion_weight_2", "diffusion_weight_3", "diffusion_radius_1", "diffusion_radius_2", "diffusion_radius_3"]"#;
 
 /// What is fitted: its row's name, and settings of the scene file.

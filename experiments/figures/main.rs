@@ -11,6 +11,7 @@
 
 mod accuracy;
 mod builds;
+mod closeup;
 mod diffusion;
 mod lab;
 mod light;
@@ -39,6 +40,7 @@ const FILES: &[(&str, Measure)] = &[
     ("docs/diffusion.json", diffusion::measure),
     ("docs/accuracy.json", accuracy::tests),
     ("docs/noise.json", accuracy::noise),
+    ("docs/closeup.json", closeup::measure),
     ("experiments/ablation/results.json", studies::ablation),
     ("experiments/accuracy_vs_time/results.json", studies::tradeoff),
     ("experiments/accuracy_vs_time/light.json", ways::light),

@@ -107,12 +107,16 @@ fn level(resource: Resource, maps: &Maps) -> Option<Texels> {
             _ => maps.colored(field).map(|map| rgba(map, None, F::Rgba32Float, float)),
         },
         Resource::OwnMap(field) => match field.info().numbers {
-            1 => maps.scalar(field).map(|map| single(map, F::R8Unorm, |x| [byte(x)])),
-            _ => maps.colored(field).map(|map| rgba8(map, None, F::Rgba8UnormSrgb, srgb_encode)),
+            1 => maps.scalar(field).map(|map| single(map, F::R16Float, half)),
+            _ => maps.colored(field).map(|map| rgba(map, None, F::Rgba16Float, half)),
         },
         Resource::AttenuatorMap => attenuator.as_ref().map(|map| single(map, F::R8Unorm, |x| [byte(x)])),
         _ => None,
     }
+}
+
+fn half(x: f32) -> [u8; 2] {
+    f16::from_f32(x.clamp(-LARGEST_HALF, LARGEST_HALF)).to_bits().to_ne_bytes()
 }
 
 fn float(x: f32) -> [u8; 4] {
@@ -124,14 +128,19 @@ fn byte(x: f32) -> u8 {
 }
 
 /// Three channels and, in alpha, a map of the same size (or 1), each through `encode`.
-fn rgba(map: &Map<3>, alpha: Option<&Map<1>>, format: TextureFormat, encode: fn(f32) -> [u8; 4]) -> Texels {
+fn rgba<const N: usize>(
+    map: &Map<3>,
+    alpha: Option<&Map<1>>,
+    format: TextureFormat,
+    encode: fn(f32) -> [u8; N],
+) -> Texels {
     let texel = |i: usize| {
         let [r, g, b] = map.texels[i];
         let a = alpha.and_then(|map| map.texels.get(i)).map_or(1.0, |&[a]| a);
         [r, g, b, a].map(encode)
     };
-    let bytes: Vec<[[u8; 4]; 4]> = (0..map.texels.len()).into_par_iter().map(texel).collect();
-    plane(map, format, bytemuck::cast_slice(&bytes).to_vec())
+    let texels: Vec<[[u8; N]; 4]> = (0..map.texels.len()).into_par_iter().map(texel).collect();
+    plane(map, format, texels.as_flattened().as_flattened().to_vec())
 }
 
 /// The same in 8 bits; `encode` takes colour to what is stored, alpha is stored as it is.

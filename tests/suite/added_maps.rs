@@ -136,7 +136,7 @@ fn a_scenes_maps_reach_the_image_and_what_stands_in_where_it_has_none() {
             };
             assert_image(&draw(EXACT), (WEIGHT, mapped), ROUNDED, &format!("{filter}, the adapter"));
             let paper = RenderOptions { budget: Budget::Paper, ..EXACT };
-            // Images in 8 bits, and 8 bits of a fraction: what the rules say, twice.
+            // Images in 16 bits, and 8 bits of a fraction: what the rules say, twice.
             assert_image(&draw(paper), (WEIGHT, mapped), 0.008, &format!("{filter}, its hardware"));
         }
     }
@@ -187,6 +187,26 @@ fn levels_of_the_atlas_read_maps() {
     assert_image(&image, wanted, ROUNDED, "the adapter");
 }
 
+/// Maps are no colours of a screen: numbers beyond 1 and below 0 stay.
+#[test]
+fn numbers_of_any_size_reach_the_image_through_the_hardwares_filters_too() {
+    let folder = weighted(OWN, "");
+    folder.write("dense.exr", &exr(4, 4, &["R", "G", "B"], |_, _| 3.0));
+    folder.write("tint.png", &exr(2, 2, &["R", "G", "B"], |c, _| [2.0, -1.5, 0.0][c]));
+    let baked = baked(&folder);
+    let want = of_processor(&baked);
+    let largest = want.rgb.iter().flatten().fold(0.0_f32, |most, x| most.max(x.abs()));
+    assert!(want.rgb[5][0] > 1.0 && want.rgb[5][1] < -0.5, "{:?}", want.rgb[5]);
+    let Some(gpu) = gpu() else { return };
+    let options = RenderOptions { budget: Budget::Paper, ..EXACT };
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), options).unwrap();
+    let got = renderer.render(&baked.scene.views[0].camera, 1.0).unwrap().image;
+    for (got, want) in got.rgb.iter().zip(&want.rgb) {
+        // The albedo of the scene itself stands in 8 bits.
+        assert!((0..3).all(|c| (got[c] - want[c]).abs() < 1e-2 * largest), "{got:?} {want:?}");
+    }
+}
+
 #[test]
 fn an_export_declares_them_and_says_what_they_are() {
     let baked = baked(&weighted(OWN, ""));
@@ -232,6 +252,9 @@ fn what_is_wrong_with_a_map_is_told() {
         ),
         (odd.replace("map: odd: f32", "map: color: f32"), 5, "`color` is there already"),
         (odd.replace("map: odd:", "map: odd"), 5, "cannot be read"),
+        (odd.replace("map: odd_tint: vec3f", "map: odd_map: vec3f"), 6, "`odd_map` is there already"),
+        (odd.replace("fn odd_light(", "fn odd_neutral("), 11, "`odd_neutral`"),
+        (odd.replace("fn odd_light(", "fn odd_light_pass("), 11, "`odd_light_pass`"),
     ];
     for (text, line, words) in cases {
         let error = register("odd", &text).unwrap_err();

@@ -4,6 +4,7 @@
 use std::collections::HashMap;
 
 use glam::{DMat4, DVec4};
+use naga::valid::{Capabilities, ValidationFlags, Validator};
 use skinfit::export::{self, Target};
 use skinfit::gpu::RenderOptions;
 use skinfit::gpu::upload::Content;
@@ -17,7 +18,7 @@ use skinfit::scene::maps::Maps;
 use skinfit::shader::atlas::{Pass, PassKind, pass_function};
 use skinfit::shader::{Budget, Facts, Plan, plan};
 
-use crate::exports::{compile_glsl, compile_hlsl, provenance};
+use crate::exports::{CG_IN_HLSL, compile_glsl, compile_hlsl, godot_in_glsl, metal_in_hlsl, provenance};
 use crate::graphics::bench::{Difference, EXACT, gpu, keep, on_gpu, quantile};
 use crate::graphics::raw::{Drawn, Raw, Sampled};
 use crate::lit::param;
@@ -26,8 +27,6 @@ use crate::sky::{effect, head_changed};
 /// Texels along the light map's side, pixels along the image's: whole rows of 256 bytes.
 const TEXELS: u32 = 96;
 const PIXELS: u32 = 48;
-/// What an engine's export allows.
-const BUDGET: Budget = Budget::Within(0.05);
 
 /// The built-in head in scattered light of a lamp and the environment, without maps.
 fn head(change: impl FnOnce(&mut Scene)) -> Baked {
@@ -68,7 +67,7 @@ fn choices() -> [Named; 4] {
 
 /// What `skinfit export` calls for.
 fn engine_facts(baked: &Baked) -> Facts {
-    let facts = Facts::of_scene(&baked.scene, &baked.scene.params, BUDGET, false);
+    let facts = Facts::of_scene(&baked.scene, &baked.scene.params, export::BUDGET, false);
     Facts { tessellation: 1.0, shadows: None, ..facts }
 }
 
@@ -107,6 +106,24 @@ fn glsl_main(plan: &Plan, pass: Option<(&Pass, usize)>) -> String {
     )
 }
 
+/// What Godot's language has before a shader, in GLSL ES.
+const GODOT: &str = "#version 310 es\nprecision highp float;\nprecision highp int;";
+
+/// HLSL that calls a pass' function, or the last one.
+fn hlsl_main(part: Option<(&Pass, usize)>) -> String {
+    let call = match part {
+        Some((pass, leaf)) if pass.kind == PassKind::Draw => {
+            let function = pass_function(&pass.leaves[leaf]);
+            format!("SkinfitTexel at = (SkinfitTexel)0; return skinfit_{function}(at, int2(place.xy))")
+        }
+        Some((pass, leaf)) => {
+            format!("return skinfit_{}(int2(place.xy))", pass_function(&pass.leaves[leaf]))
+        }
+        None => "SkinfitSurface at = (SkinfitSurface)0; return skinfit_shade(at)".to_owned(),
+    };
+    format!("float4 main(float4 place : SV_Position) : SV_Target {{\n    {call};\n}}\n")
+}
+
 /// Each of the passes' functions in turn, then the image's.
 fn parts(plan: &Plan) -> Vec<Option<(&Pass, usize)>> {
     let passes =
@@ -138,25 +155,26 @@ fn exported_passes_are_taken_by_the_compilers_of_their_languages() {
         assert!(plan.passes.len() >= 7, "{name}");
         let glsl = exported(Target::Glsl, &baked);
         let hlsl = exported(Target::Hlsl, &baked);
+        // Siblings of HLSL, by the few words in which they differ.
+        let cg = format!("{CG_IN_HLSL}\n{}", exported(Target::Cg, &baked));
+        let metal = metal_in_hlsl(&exported(Target::Msl, &baked));
         for part in parts(&plan) {
-            let text = format!("#version 450\n{glsl}\n{}", glsl_main(&plan, part));
+            let main = glsl_main(&plan, part);
+            let text = format!("#version 450\n{glsl}\n{main}");
             compile_glsl(&text).unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
-            let call = match part {
-                Some((pass, leaf)) if pass.kind == PassKind::Draw => {
-                    format!(
-                        "SkinfitTexel at = (SkinfitTexel)0; return skinfit_{}(at, int2(place.xy))",
-                        pass_function(&pass.leaves[leaf])
-                    )
-                }
-                Some((pass, leaf)) => {
-                    format!("return skinfit_{}(int2(place.xy))", pass_function(&pass.leaves[leaf]))
-                }
-                None => "SkinfitSurface at = (SkinfitSurface)0; return skinfit_shade(at)".to_owned(),
-            };
-            let text =
-                format!("{hlsl}\nfloat4 main(float4 place : SV_Position) : SV_Target {{\n    {call};\n}}\n");
-            compile_hlsl(&text).unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
+            let text = format!("{GODOT}\n{}\n{main}", godot_in_glsl(&exported(Target::Godot, &baked)));
+            compile_glsl(&text).unwrap_or_else(|error| panic!("{name}, Godot: {error}\n{text}"));
+            for hlsl in [&hlsl, &cg, &metal] {
+                let text = format!("{hlsl}\n{}", hlsl_main(part));
+                compile_hlsl(&text).unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
+            }
         }
+        let wgsl = exported(Target::Wgsl, &baked);
+        let module = naga::front::wgsl::parse_str(&wgsl)
+            .unwrap_or_else(|error| panic!("{name}: {}\n{wgsl}", error.emit_to_string(&wgsl)));
+        Validator::new(ValidationFlags::all(), Capabilities::empty())
+            .validate(&module)
+            .unwrap_or_else(|error| panic!("{name}: {}\n{wgsl}", error.emit_to_string(&wgsl)));
         // The head says what to do, in order, and what of.
         for words in [
             "Before the image come passes over the UV atlas, into textures of 96 x 96 texels",
@@ -281,7 +299,7 @@ fn the_glsl_passes_make_the_renderers_levels_and_its_image() {
             near(&format!("{name}: {}", level.name), &got, &wanted[&level.name]);
         }
         let image = raw.read(&draw(&levels, None), PIXELS);
-        let options = RenderOptions { antialias: Antialias::Grid(1), budget: BUDGET, ..EXACT };
+        let options = RenderOptions { antialias: Antialias::Grid(1), budget: Budget::Within(0.05), ..EXACT };
         let drawn = on_gpu(gpu, &baked, options);
         let mut got = drawn.clone();
         for (i, rgb) in got.rgb.iter_mut().enumerate() {

@@ -12,7 +12,7 @@ use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Param, Params};
 use skinfit::model::texture_filter::TextureFilter;
 use skinfit::shader::facts::MapFacts;
-use skinfit::shader::{Budget, Facts, plan};
+use skinfit::shader::{Facts, plan};
 
 pub(crate) fn provenance() -> Provenance {
     Provenance {
@@ -28,7 +28,7 @@ pub(crate) fn provenance() -> Provenance {
 pub(crate) fn engine_facts() -> Facts {
     let maps =
         MapFacts { color: true, normal: true, specular: true, attenuator: true, ..MapFacts::default() };
-    Facts { maps, budget: Budget::Within(0.05), tessellation: 1.0, ..Facts::default() }
+    Facts { maps, budget: export::BUDGET, tessellation: 1.0, ..Facts::default() }
 }
 
 /// Scenes that differ in all that changes a fragment stage.
@@ -183,13 +183,14 @@ fn exported_hlsl_is_taken_by_glslang_and_its_code_is_valid_for_unity_too() {
 }
 
 /// What Cg is to HLSL: samplers that are one with their textures, and other names of lookups.
-const CG_IN_HLSL: &str = "SamplerState map_sampler;
+pub(crate) const CG_IN_HLSL: &str = "SamplerState map_sampler;
 SamplerState cube_sampler;
 #define sampler2D Texture2D<float4>
 #define samplerCUBE TextureCube<float4>
 #define tex2D(t, c) t.Sample(map_sampler, c)
 #define tex2Dlod(t, c) t.SampleLevel(map_sampler, (c).xy, (c).w)
-#define texCUBElod(t, c) t.SampleLevel(cube_sampler, (c).xyz, (c).w)";
+#define texCUBElod(t, c) t.SampleLevel(cube_sampler, (c).xyz, (c).w)
+#define tex2Dfetch(t, c) t.Load(int3((c).xy, (c).w))";
 
 #[test]
 fn exported_cg_is_hlsl_but_for_its_lookups() {
@@ -208,14 +209,15 @@ fn exported_cg_is_hlsl_but_for_its_lookups() {
 
 /// Godot's language in GLSL ES, which it is a dialect of and which converts as few types by itself: its uniforms have
 /// hints in place of bindings.
-fn godot_in_glsl(exported: &str) -> String {
+pub(crate) fn godot_in_glsl(exported: &str) -> String {
     let mut bindings = 0;
     let mut line = |line: &str| {
         let Some(declared) = line.strip_prefix("uniform ") else { return line.to_owned() + "\n" };
         let (what, hints) = declared.trim_end_matches(';').split_once(" : ").unwrap_or((declared, ""));
         for hint in hints.split(", ") {
             // Those of Godot 4's shading language.
-            const HINTS: [&str; 5] = [
+            const HINTS: [&str; 6] = [
+                "filter_nearest",
                 "source_color",
                 "filter_linear",
                 "filter_linear_mipmap",
@@ -254,7 +256,7 @@ fn exported_godot_is_glsl_es_but_for_its_hints() {
 }
 
 /// Metal's language in HLSL. There a struct holds the textures, of which HLSL has none: it is opened.
-fn metal_in_hlsl(exported: &str) -> String {
+pub(crate) fn metal_in_hlsl(exported: &str) -> String {
     let (before, inside) = exported.split_once("struct Skinfit {\n").expect("a struct of textures");
     let inside = inside.trim_end().strip_suffix("};").expect("the struct's end");
     let before = before.replace("#include <metal_stdlib>", "").replace("using namespace metal;", "");
@@ -272,6 +274,9 @@ fn metal_in_hlsl(exported: &str) -> String {
         ("level(x)", "x"),
         ("mix", "lerp"),
         ("fract", "frac"),
+        ("read(at, level)", "Load(int3(at, level))"),
+        ("dfdx", "ddx"),
+        ("dfdy", "ddy"),
     ];
     defined.iter().map(|(metal, hlsl)| format!("#define {metal} {hlsl}\n")).collect::<String>() + &text
 }

@@ -33,6 +33,10 @@ pub(super) fn text(
     let setup = Setup { effects, ..facts.setup };
     let atlas = facts.atlas.filter(|_| setup.needs().atlas);
     let plan = plan(&Facts { setup, f16: false, atlas, shadows: None, ..*facts })?;
+    let filtered = |resource: &&Resource| matches!(resource.kind(), Kind::Texels | Kind::Faces);
+    if let Some(resource) = plan.merged().resources.iter().find(filtered) {
+        return Err(ExportError::Filtered { resource: resource.name() });
+    }
     let mut text = header(&plan, idle, params, from);
     let _ = write!(text, "\n{}", dialect.prologue);
     let literals = plan.literals(params);
@@ -108,7 +112,8 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
         lines.extend([
             String::new(),
             format!("Maps are to have mip levels and a sampler that is {}, as where the constants were found. Which level a", filter.name()),
-            "fragment reads follows from its neighbours: call skinfit_shade in a fragment stage, outside of any branch.".to_owned(),
+            "fragment reads follows from its neighbours: call skinfit_shade, and what draws the mesh in texture space, in a".to_owned(),
+            "fragment stage, outside of any branch.".to_owned(),
         ]);
     }
     let comment = |line: String| if line.is_empty() { "//\n".to_owned() } else { format!("// {line}\n") };

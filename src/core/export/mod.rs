@@ -25,7 +25,11 @@ pub use target::Target;
 
 use crate::model::effects::{Effects, Form};
 use crate::model::params::Params;
-use crate::shader::{Facts, PlanError};
+use crate::shader::{Budget, Facts, PlanError};
+
+/// How far exports may be off: an engine's filtering is the hardware's, whatever its lookups' errors add up to. Its own mesh
+/// may be coarse, so that the facts say that silhouettes which are interpolated are off by 1.
+pub const BUDGET: Budget = Budget::Within(0.5);
 
 /// What cannot be exported.
 #[derive(Debug, thiserror::Error)]
@@ -39,6 +43,14 @@ pub enum ExportError {
         target: &'static str,
         /// Those that hold one.
         languages: String,
+    },
+    /// Lookups that the accuracy has the shader filter by itself.
+    #[error(
+        "within this accuracy the shader filters {resource} by itself, which no export does. Allow a greater error."
+    )]
+    Filtered {
+        /// What it reads.
+        resource: &'static str,
     },
     /// No shader within the accuracy.
     #[error(transparent)]

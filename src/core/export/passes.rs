@@ -15,12 +15,13 @@ pub(super) fn wiring(plan: &Plan) -> Vec<String> {
     let mut lines = vec![
         format!("Before the image come passes over the UV atlas, into textures of {size} x {size} texels of four 32-bit floats that"),
         "are black at first: in x, y and z a quantity, in w the chart that a texel lies on, 0 where there is none. They are made".to_owned(),
-        "anew when a light, the mesh or a constant has moved, whatever camera looks. `here` is the texel's column and row from".to_owned(),
-        "the image's top left. In this order:".to_owned(),
+        "anew when a light, the mesh or a constant has moved, whatever camera looks. `here` is the column and the row that the".to_owned(),
+        format!("pass' value is read back at: u = (column + 0.5) / {size}, v = (row + 0.5) / {size}. In this order:"),
     ];
     lines.extend(plan.passes.iter().enumerate().map(|(i, pass)| format!("{}. {}", i + 1, step(pass))));
-    lines.push("A draw is of the whole mesh, nothing culled, each vertex at its texture coordinates (x = 2 u - 1, y = 1 - 2 v of".to_owned());
-    lines.push("clip space, or what puts the image's top left at u = v = 0); it takes of the vertices, in world space:".to_owned());
+    lines.push("A draw is of the whole mesh, nothing culled, no depth, each vertex at its texture coordinates: in clip space x = 2 u - 1,".to_owned());
+    lines.push("and y = 2 v - 1 where y = -1 is row 0 of a texture (OpenGL, Vulkan), y = 1 - 2 v where y = 1 is (Direct3D, Metal,".to_owned());
+    lines.push("WebGPU). It takes of the vertices, in world space:".to_owned());
     lines.extend(plan.texel_surface().iter().map(|(name, _)| format!("- {name}: {}", meaning(name))));
     lines.push(String::new());
     lines

@@ -46,7 +46,7 @@ pub enum Found {
 pub struct MapNames {
     /// As 32-bit floats, which shaders filter.
     pub texels: &'static str,
-    /// In 8 bits, which the hardware filters.
+    /// In 16-bit floats, which the hardware filters.
     pub filtered: &'static str,
 }
 

@@ -24,7 +24,7 @@ use crate::model::choices::{Choices, SpecularVisibility};
 use crate::model::dapple::Dapple;
 use crate::model::effects::{Effect, Effects};
 use crate::model::evaluate::Setup;
-use crate::model::fields::Field;
+use crate::model::fields::{Field, Fields};
 use crate::model::needs::Needs;
 use crate::model::params::Param;
 use crate::progress;
@@ -114,7 +114,8 @@ impl Scene {
             warn(&mut warnings, &source.path, message);
         }
         check_lobe(&source, &file, &setup, &mut warnings);
-        let maps = read_maps(&source, &file, folder, needs, &mut warnings)?;
+        let declared = Fields::of(terms.iter().flat_map(|term| term.fields.iter())).of_maps();
+        let maps = read_maps(&source, &file, folder, (needs, declared), &mut warnings)?;
         bar.inc(1);
         let ask = Ask { clip: options.clip, ..ask(&maps, form, effects, needs, &pose) };
         let mesh = document.mesh(&ask, &mut warnings)?;
@@ -219,7 +220,7 @@ fn read_maps(
     source: &Source,
     file: &SceneFile,
     folder: &Path,
-    needs: Needs,
+    (needs, declared): (Needs, Fields),
     warnings: &mut Warnings,
 ) -> Result<Maps, SceneError> {
     let maps = &file.maps;
@@ -252,23 +253,21 @@ fn read_maps(
         (None, Some(path), Some(alpha)) => packed_specular(&path, alpha, warnings),
         (specular, ..) => specular,
     };
-    let own = read_own_maps(source, maps, folder, needs)?;
+    let own = read_own_maps(source, maps, folder, (needs, declared))?;
     Ok(Maps { color, normal: normals.filter(|_| normal.is_some()), specular, attenuator, own })
 }
 
-/// The maps of fields that the enabled effects ask for.
+/// The maps of fields that the scene's terms have `declared`, those alone that the enabled effects ask for.
 fn read_own_maps(
     source: &Source,
     maps: &MapsTable,
     folder: &Path,
-    needs: Needs,
+    (needs, declared): (Needs, Fields),
 ) -> Result<Vec<(Field, OwnMap)>, SceneError> {
     let mut own = Vec::new();
     for (name, path) in &maps.own {
-        let field = Field::from_name(name.get_ref()).filter(|field| field.map().is_some());
-        let Some(field) = field else {
-            let known: Vec<&str> =
-                Field::all().filter(|field| field.map().is_some()).map(Field::name).collect();
+        let Some(field) = declared.named(name.get_ref()) else {
+            let known: Vec<&str> = declared.iter().map(Field::name).collect();
             let what = format!("[maps.own] has {}, which no term of the scene declares", name.get_ref());
             let remedy = match known.as_slice() {
                 [] => "Declare it in a file of `terms` by a line `// map: NAME: TYPE = NEUTRAL; what it is`"

@@ -169,7 +169,7 @@ pub enum Resource {
     ShadowViews,
     /// The map of a field that a file of rules declares, linear, 32-bit float R or RGBA.
     OwnTexels(Field),
-    /// The same in 8 bits: R, or sRGB RGBA.
+    /// The same in 16-bit floats, filterable.
     OwnMap(Field),
 }
 

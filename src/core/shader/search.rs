@@ -21,6 +21,7 @@ use super::graph::{Graph, Means, Way};
 use super::rule::Rule;
 use super::term;
 use crate::model::effects::{Effect, Effects};
+use crate::model::fields::Field;
 
 /// Costs and errors in the search are whole numbers: so many to one.
 const COST_STEPS: f64 = 16.0;
@@ -69,6 +70,14 @@ pub enum PlanError {
         /// The level.
         level: String,
     },
+    /// Maps that samples made on an adapter do not read.
+    #[error(
+        "{field} is looked up in a map of its own, which samples made on an adapter do not read. Have the CPU make the samples."
+    )]
+    OfMap {
+        /// The field.
+        field: String,
+    },
     /// Quantities that the processor alone finds.
     #[error(
         "{field} is found at each sample by rays, which samples made on an adapter have none of. Have the CPU make the samples."
@@ -91,7 +100,9 @@ impl PlanError {
     /// That samples made on an adapter lack a field.
     #[must_use]
     pub fn not_found_on_adapters(field: &str) -> Self {
-        Self::OfRays { field: field.to_owned() }
+        let mapped = Field::from_name(field).is_some_and(|field| field.map().is_some());
+        let field = field.to_owned();
+        if mapped { Self::OfMap { field } } else { Self::OfRays { field } }
     }
 
     /// That there are no texels for the one of `effects` that is computed there.

@@ -10,8 +10,8 @@
 //! Each as the quotient of two polynomials in x and y, terms x^i y^j with i + j up to a degree. y goes with the
 //! roughness and x with the square root of mu (1 + l) / (mu + l), mu = N.V': at grazing views the integrals turn over
 //! within some l, which grows as the lobe's width does, like mu log mu. Both variables lie in [-1, 1]. In print y runs from
-//! the sharpest lobe on, and x mostly from a view along the normal: in f32 the quotients are off by 5e-6 at most, from the
-//! middle on it were 1e-4.
+//! the sharpest lobe on, and x mostly from a view along the normal: in f32 a and b are off by 1e-5 at most, with
+//! both from the middle on it were 1e-4.
 //!
 //! `rational` finds the coefficients. No exact text is asked of a fit: its last digits are the machine's.
 

@@ -9,7 +9,7 @@ use crate::fit::params_file::{Foreign, ParamsFile};
 use crate::model::params::Param;
 use crate::scene::load::LoadOptions;
 use crate::scene::{Loss, Scene, register_terms, suggestion};
-use crate::shader::{Budget, Facts};
+use crate::shader::Facts;
 
 /// Write tuned constants, alone or with their shader, for another engine
 #[derive(clap::Args)]
@@ -34,10 +34,6 @@ pub(super) struct Arguments {
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
-
-/// An engine's own mesh may be coarse and its filtering is the hardware's: errors up to the sum of all
-/// lookups' are allowed, but silhouettes are not interpolated.
-const ENGINE_BUDGET: Budget = Budget::Within(0.05);
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     arguments.set.values()?;
@@ -120,7 +116,7 @@ fn tell_foreign(arguments: &Arguments, path: &Path, scene: &Scene, file: &Params
 
 /// What the scene calls for in an engine: maps stay apart, the mesh is not known.
 fn facts(scene: &Scene, file: &ParamsFile) -> Facts {
-    let mut facts = Facts::of_scene(scene, &file.params, ENGINE_BUDGET, false);
+    let mut facts = Facts::of_scene(scene, &file.params, export::BUDGET, false);
     facts.maps.color_specular = false;
     facts.maps.normal_attenuator = false;
     facts.tessellation = 1.0;

@@ -13,6 +13,7 @@ use super::named::{Named, groups};
 use super::{APART, Axis, Level, MovingKernel, PassKind, TEXEL};
 use crate::model::diffusion::Lookup;
 use crate::shader::emit::Plan;
+use crate::shader::module::uniform;
 use crate::shader::quantity::Kind;
 use crate::shader::search::components;
 use crate::shader::tangent::chain::Chain;
@@ -206,7 +207,7 @@ impl Text<'_> {
         let (first, tangents) = (&group[0], &group[1..]);
         let plan = &first.pass.plan;
         let (rule, source) = (plan.steps[0].rule, &plan.levels[0]);
-        let Loop { before, reach, sides, tap, by_deviation } = taps(&plan.facts, rule, axis);
+        let Loop { before, reach, sides, tap, by_deviation } = taps(&plan.facts, rule, axis, uniform);
         let mut columns = Columns { by_deviation: by_deviation.is_some(), ..Columns::default() };
         let mut functions: Vec<&str> = Vec::new();
         let mut reads = vec![source.name.clone()];

@@ -37,7 +37,7 @@ pub(super) struct Slope {
 
 impl Slope {
     pub(super) fn call(&self, rule: &Rule, axis: Axis, tap: &str) -> String {
-        let mut given = arguments(rule, axis, tap);
+        let mut given = arguments(rule, axis, tap, uniform);
         given.extend(self.along.iter().cloned());
         format!("{}({})", self.name, given.join(", "))
     }
@@ -78,9 +78,12 @@ pub(super) struct Loop {
     pub(super) by_deviation: Option<String>,
 }
 
-/// The loop of a kernel.
-pub(super) fn taps(facts: &Facts, rule: &Rule, axis: Axis) -> Loop {
-    let value = || format!("{}({})", rule.function, arguments(rule, axis, TAP).join(", "));
+/// How a constant of that WGSL type stands in the text.
+pub(super) type Written = fn(Constant, &str) -> String;
+
+/// The loop of a kernel; `constant` writes what all texels share.
+pub(super) fn taps(facts: &Facts, rule: &Rule, axis: Axis, constant: Written) -> Loop {
+    let value = || format!("{}({})", rule.function, arguments(rule, axis, TAP, constant).join(", "));
     let kernel = rule.blur.as_ref().map_or(Kernel::Taps(1), |blur| blur.kernel);
     let counted = match kernel {
         Kernel::Taps(taps) => {
@@ -130,7 +133,7 @@ fn taps_of(plan: &Plan, rule: &Rule, axis: Axis, beside: &[Level], slope: Option
     let mut values = Vec::new();
     for tap in -reach..=reach {
         let tap = format!("{tap}.0");
-        values.push(format!("{}({})", rule.function, arguments(rule, axis, &tap).join(", ")));
+        values.push(format!("{}({})", rule.function, arguments(rule, axis, &tap, uniform).join(", ")));
         values.extend(slope.map(|slope| slope.call(rule, axis, &tap)));
     }
     wgsl.push_str("\nstruct Taps {\n");
@@ -151,7 +154,7 @@ fn filled(
     source: &Level,
     (beside, slope): (&[Level], Option<&Slope>),
 ) -> String {
-    let Loop { mut before, reach, sides, tap, by_deviation } = taps(&plan.facts, rule, axis);
+    let Loop { mut before, reach, sides, tap, by_deviation } = taps(&plan.facts, rule, axis, uniform);
     let moved = slope.map_or_else(String::new, |slope| slope.call(rule, axis, TAP));
     let slope = match by_deviation {
         Some(by_deviation) if slope.is_some() => {
@@ -192,11 +195,11 @@ pub(super) fn of_kernel(plan: &Plan, rule: &Rule) -> Vec<Level> {
 }
 
 /// What a kernel is called with.
-pub(super) fn arguments(rule: &Rule, axis: Axis, tap: &str) -> Vec<String> {
+pub(super) fn arguments(rule: &Rule, axis: Axis, tap: &str, written: Written) -> Vec<String> {
     let argument = |&(name, kind): &(&'static str, &'static str)| match (name, Constant::from_name(name)) {
         ("tap", _) => tap.to_owned(),
         ("axis", _) => format!("vec2f({})", axis.step()),
-        (_, Some(constant)) => uniform(constant, kind),
+        (_, Some(constant)) => written(constant, kind),
         (_, None) => name.to_owned(),
     };
     rule.parameters().iter().map(argument).collect()

@@ -263,7 +263,7 @@ pub fn stored(levels: &[Level]) -> String {
 
 /// A pass over neighbours.
 pub(super) fn neighbours(plan: &Plan, rule: &Rule, source: &Level) -> String {
-    let value = format!("{}({})", rule.function, arguments(rule, Axis::U, TAP).join(", "));
+    let value = format!("{}({})", rule.function, arguments(rule, Axis::U, TAP, uniform).join(", "));
     if plan.facts.source == Source::Raster {
         let leaf = Level { name: rule.gives[0].0.to_owned(), kind: rule.returns };
         let body = NEIGHBOURS

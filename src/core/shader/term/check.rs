@@ -236,7 +236,10 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
         quantity_name(field.name, line)?;
         let there = |name: &str| known.contains(name) || Param::from_identifier(name).is_some();
         let mapped = match field.of {
-            Found::Map(names) => there(names.texels) || there(names.filtered),
+            Found::Map(names) => {
+                let mut taken = |name: &'static str| there(name) || !own.insert(name);
+                taken(names.texels) || taken(names.filtered)
+            }
             Found::Vertices | Found::Samples => false,
         };
         if there(field.name) || mapped || !own.insert(field.name) {
@@ -273,6 +276,16 @@ fn names(origin: Origin, declaration: &Declaration) -> Result<(), TermError> {
             > 0;
         if library || twice || functions.any(|function| function == rule.function) {
             return taken("function", rule.function, rule.line);
+        }
+        // What exports call their passes and lookups, and what looks the file's own maps up.
+        let of_levels = ["_pass", "_level_at", "_level_near", "_level_around"];
+        let of_maps = ["_from_texels", "_from_map", "_from_mip_texels", "_from_mip_map", "_neutral"];
+        let mut maps = declaration.fields.iter().filter(|(_, field)| matches!(field.of, Found::Map(_)));
+        let of_maps = maps.any(|(_, field)| {
+            rule.function.strip_prefix(field.name).is_some_and(|ending| of_maps.contains(&ending))
+        });
+        if of_maps || of_levels.iter().any(|ending| rule.function.ends_with(ending)) {
+            return Err(Problem::Reserved(rule.function.to_owned()).at(rule.line));
         }
         if FUNCTIONS.contains(&rule.function) {
             return Err(Problem::Reserved(rule.function.to_owned()).at(rule.line));

@@ -3,6 +3,9 @@
 fn {name}_pass(here: vec2i) -> vec4f {
     let size: vec2i = vec2i({size}, {size});
     let middle: vec4f = {source}_near(here);
+    if (middle.w == 0.0) {
+        return vec4f(0.0, 0.0, 0.0, 0.0);
+    }
 {reads}{before}    var sum: vec4f = vec4f(0.0, 0.0, 0.0, 0.0);
     for (var i: i32 = -{reach}; i <= {reach}; i++) {
         let tap: vec2f = {kernel};

@@ -11,7 +11,7 @@ use super::text::{reads, texel};
 use super::{Axis, Level, Pass, PassKind};
 use crate::shader::domain::{CHART, Domain, UV};
 use crate::shader::emit::Plan;
-use crate::shader::module::{literal_name, uniform};
+use crate::shader::module::literal_name;
 use crate::shader::quantity::Constant;
 use crate::shader::rule::Rule;
 
@@ -85,7 +85,7 @@ impl Plan {
         for pass in &self.passes {
             for level in &pass.leaves {
                 let function = of_pass(pass, level).replace("{size}", &size);
-                let _ = write!(wgsl, "\n{}", without_block(function, &pass.plan));
+                let _ = write!(wgsl, "\n{function}");
             }
         }
         wgsl
@@ -111,7 +111,7 @@ fn of_pass(pass: &Pass, level: &Level) -> String {
         (PassKind::Draw, _) => return draw(plan, level),
         (PassKind::Blur(axis), Some(rule)) => blur(plan, rule, axis),
         (PassKind::Neighbours, Some(rule)) => {
-            let value = format!("{}({})", rule.function, arguments(rule, Axis::U, TAP).join(", "));
+            let value = format!("{}({})", rule.function, arguments(rule, Axis::U, TAP, literal).join(", "));
             NEIGHBOURS
                 .replace("{reads}", &reads(&of_kernel(plan, rule), "here"))
                 .replace("{value}", &texel(level, &value, "middle.w"))
@@ -123,8 +123,7 @@ fn of_pass(pass: &Pass, level: &Level) -> String {
 
 /// The rules of texels of what the mesh's vertices hand over.
 fn draw(plan: &Plan, level: &Level) -> String {
-    let constant = |constant: Constant, _: &str| literal_name(constant);
-    let calls = plan.calls(Domain::Texel, constant, |name| format!("at.{name}"));
+    let calls = plan.calls(Domain::Texel, literal, |name| format!("at.{name}"));
     format!(
         "// A texel of the mesh as it is drawn in texture space.\nfn {}(at: Texel, here: vec2i) -> vec4f {{\n{}{calls}    \
          return {};\n}}\n",
@@ -135,7 +134,7 @@ fn draw(plan: &Plan, level: &Level) -> String {
 }
 
 fn blur(plan: &Plan, rule: &Rule, axis: Axis) -> String {
-    let Loop { before, reach, sides, tap, .. } = taps(&plan.facts, rule, axis);
+    let Loop { before, reach, sides, tap, .. } = taps(&plan.facts, rule, axis, literal);
     BLUR.replace("{reads}", &reads(&of_kernel(plan, rule), "here"))
         .replace("{before}", &before)
         .replace("{reach}", &reach)
@@ -144,10 +143,57 @@ fn blur(plan: &Plan, rule: &Rule, axis: Axis) -> String {
         .replace("{axis}", axis.step())
 }
 
-/// A text in which constants stand for themselves, and are no members of a block.
-fn without_block(text: String, plan: &Plan) -> String {
-    let kinds = ["f32", "vec2f", "vec3f", "vec4f"];
-    plan.constants.iter().fold(text, |text, &constant| {
-        kinds.iter().fold(text, |text, kind| text.replace(&uniform(constant, kind), &literal_name(constant)))
-    })
+/// A constant stands for itself, and is no member of a block.
+fn literal(constant: Constant, _: &str) -> String {
+    literal_name(constant)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::model::effects::{Effects, Form, Silhouette};
+    use crate::model::evaluate::Setup;
+    use crate::shader::facts::Facts;
+    use crate::shader::plan;
+    use crate::shader::term::register;
+
+    /// A kernel of constants of any type, of which one's name begins as another's.
+    #[test]
+    fn constants_of_kernels_stand_in_the_text_whatever_their_type_and_name() {
+        let term = register(
+            "hazy",
+            "\
+// effect: hazy, a blur
+// parameter: hazy_spread = 1 in [0, 9]; how wide; a test
+// parameter: hazy_spread_tint = 1 in [0, 9], rgb; how wide a channel; a test
+//
+// gives: hazy_light
+// domain: texel
+// cost: 1
+fn hazy_map(albedo: vec3f) -> vec3f {
+    return albedo;
+}
+
+// gives: hazy_soft
+// domain: texel
+// pass: hazy_light: vec3f, 3 taps
+// sampled: 0
+// cost: 4
+fn hazy_kernel(tap: f32, hazy_spread: f32, hazy_spread_tint: vec3f) -> vec2f {
+    return vec2f(hazy_spread * tap, hazy_spread_tint.y);
+}
+
+// gives: hazy_part
+// adds: hazy
+// cost: 1
+fn hazy_shown(hazy_soft: vec3f) -> vec3f {
+    return hazy_soft;
+}
+",
+        );
+        let setup = Setup::new(Form::Corrected, Silhouette::Fragment, Effects::of(&[term.unwrap().effect]));
+        let planned = plan(&Facts { setup, atlas: Some(64), ..Facts::default() }).unwrap();
+        let text = planned.function();
+        assert!(text.contains("hazy_kernel(f32(i), HAZY_SPREAD, HAZY_SPREAD_TINT)"), "{text}");
+        assert!(!text.contains("constants."), "{text}");
+    }
 }

@@ -2,6 +2,9 @@
 // none (MODEL 6).
 fn {name}_pass(here: vec2i) -> vec4f {
     let middle: vec4f = {source}_near(here);
+    if (middle.w == 0.0) {
+        return vec4f(0.0, 0.0, 0.0, 0.0);
+    }
     let left: vec4f = {source}_near(here - vec2i(1, 0));
     let right: vec4f = {source}_near(here + vec2i(1, 0));
     let above: vec4f = {source}_near(here - vec2i(0, 1));

@@ -10,7 +10,7 @@ fn NAME_from_texels(vertex_uv: vec2f) -> TYPE {
     return sample_texels(NAME_texels, vertex_uv).CHANNELS;
 }
 
-// MEANING, filtered by the hardware; stored in 8 bits.
+// MEANING, filtered by the hardware; stored in 16 bits.
 //
 // gives: NAME
 // domain: texel, fragment
@@ -35,7 +35,7 @@ fn NAME_from_mip_texels(vertex_uv: vec2f, uv_steps: vec4f, texture_taps: f32) ->
     return sample_mip_texels(NAME_texels, vertex_uv, uv_steps, texture_taps).CHANNELS;
 }
 
-// MEANING, filtered to the fragment by the hardware; stored in 8 bits.
+// MEANING, filtered to the fragment by the hardware; stored in 16 bits.
 //
 // gives: NAME
 // domain: texel, fragment
