@@ -29,6 +29,9 @@ const ENDS: usize = 8;
 /// Millimetres a pixel on the cheek.
 const MILLIMETRES: f64 = 0.18;
 
+/// Of the path tracer's random walk in red, green and blue, in millimetres: what the scenes were rendered with.
+const MEAN_FREE_PATHS: [f64; 3] = [3.7, 1.4, 0.7];
+
 /// Linear radiance, row by row.
 struct Shown {
     width: usize,
@@ -53,7 +56,7 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         let [red, green, blue] = [0, 1, 2].map(|c| width(profile, c));
         json!({ "name": name, "psnr": psnr, "red": red, "green": green, "blue": blue, "profile": profile })
     });
-    Ok(json!({ "rows": rows.collect::<Vec<_>>() }))
+    Ok(json!({ "rows": rows.collect::<Vec<_>>(), "mean_free_paths": MEAN_FREE_PATHS }))
 }
 
 fn read(path: &Path) -> Result<Shown> {
