@@ -18,7 +18,9 @@ use skinfit::scene::maps::Maps;
 use skinfit::shader::atlas::{Pass, PassKind, pass_function};
 use skinfit::shader::{Budget, Facts, Plan, plan};
 
-use crate::exports::{CG_IN_HLSL, compile_glsl, compile_hlsl, godot_in_glsl, metal_in_hlsl, provenance};
+use crate::exports::{
+    CG_IN_HLSL, compile_glsl, compile_hlsl, glsl_kind, godot_in_glsl, metal_in_hlsl, provenance,
+};
 use crate::graphics::bench::{Difference, EXACT, gpu, keep, on_gpu, quantile};
 use crate::graphics::raw::{Drawn, Raw, Sampled};
 use crate::lit::param;
@@ -73,14 +75,6 @@ fn engine_facts(baked: &Baked) -> Facts {
 
 fn exported(target: Target, baked: &Baked) -> String {
     export::function(target, &engine_facts(baked), &baked.scene.params, &provenance()).unwrap()
-}
-
-const fn glsl_kind(wgsl: &str) -> &'static str {
-    match wgsl.as_bytes() {
-        b"f32" => "float",
-        b"vec2f" => "vec2",
-        _ => "vec3",
-    }
 }
 
 /// GLSL that calls a pass' function, or the last one, with what a vertex stage hands over.
@@ -175,6 +169,7 @@ fn exported_passes_are_taken_by_the_compilers_of_their_languages() {
         Validator::new(ValidationFlags::all(), Capabilities::empty())
             .validate(&module)
             .unwrap_or_else(|error| panic!("{name}: {}\n{wgsl}", error.emit_to_string(&wgsl)));
+        assert!(!glsl.contains("as the rule of that name gives it"), "{name}: {glsl}");
         // The head says what to do, in order, and what of.
         for words in [
             "Before the image come passes over the UV atlas, into textures of 96 x 96 texels",

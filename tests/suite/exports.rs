@@ -105,15 +105,20 @@ fn inputs(facts: &Facts, spell: impl Fn(usize, &str, &str) -> String) -> String 
     fields.iter().enumerate().map(|(i, (name, kind))| spell(i, name, kind)).collect()
 }
 
-/// A fragment shader in a sibling of GLSL that hands its inputs to the exported function.
-fn glsl_shader(head: &str, facts: &Facts, exported: &str) -> String {
-    let kind = |wgsl: &str| match wgsl {
+/// GLSL's name of a type.
+pub(crate) fn glsl_kind(wgsl: &str) -> &'static str {
+    match wgsl {
         "f32" => "float",
         "vec2f" => "vec2",
         _ => "vec3",
-    };
-    let declared =
-        inputs(facts, |i, field, wgsl| format!("layout(location = {i}) in {} in_{field};\n", kind(wgsl)));
+    }
+}
+
+/// A fragment shader in a sibling of GLSL that hands its inputs to the exported function.
+fn glsl_shader(head: &str, facts: &Facts, exported: &str) -> String {
+    let declared = inputs(facts, |i, field, wgsl| {
+        format!("layout(location = {i}) in {} in_{field};\n", glsl_kind(wgsl))
+    });
     let set = inputs(facts, |_, field, _| format!("    at.{field} = in_{field};\n"));
     format!(
         "{head}\n{exported}\n{declared}layout(location = 0) out vec4 color;\nvoid main() {{\n    SkinfitSurface at;\n{set}    color = skinfit_shade(at);\n}}\n"

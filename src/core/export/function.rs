@@ -8,6 +8,7 @@ use super::translate::translate;
 use super::{ExportError, Provenance, Target, names, passes};
 use crate::model::effects::{Effect, Effects};
 use crate::model::evaluate::Setup;
+use crate::model::fields::Field;
 use crate::model::params::{Param, Params};
 use crate::shader::Resource;
 use crate::shader::atlas::Level;
@@ -33,26 +34,27 @@ pub(super) fn text(
     let setup = Setup { effects, ..facts.setup };
     let atlas = facts.atlas.filter(|_| setup.needs().atlas);
     let plan = plan(&Facts { setup, f16: false, atlas, shadows: None, ..*facts })?;
+    // Of the passes and the image together.
+    let resources = plan.merged().resources;
     let filtered = |resource: &&Resource| matches!(resource.kind(), Kind::Texels | Kind::Faces);
-    if let Some(resource) = plan.merged().resources.iter().find(filtered) {
+    if let Some(resource) = resources.iter().find(filtered) {
         return Err(ExportError::Filtered { resource: resource.name() });
     }
-    let mut text = header(&plan, idle, params, from);
+    let mut text = header((&plan, &resources), idle, params, from);
     let _ = write!(text, "\n{}", dialect.prologue);
     let literals = plan.literals(params);
     for (name, kind, value) in &literals {
         let _ = writeln!(text, "{}", dialect.definition(&names::constant(name), kind, value));
     }
     let filter = plan.facts.maps.filter;
-    let declared = dialect.filtering(&declarations(dialect, &plan), filter);
-    let constants: Vec<String> = literals.into_iter().map(|(name, ..)| name).collect();
     let levels: Vec<String> = plan.all_levels().iter().map(Level::bound).collect();
-    let merged = plan.merged();
-    let resources = merged.resources.iter().map(|resource| resource.name());
-    let resources: Vec<&str> = resources.chain(levels.iter().map(String::as_str)).collect();
+    let declared = dialect.filtering(&declarations(dialect, &resources, &levels), filter);
+    let constants: Vec<String> = literals.into_iter().map(|(name, ..)| name).collect();
+    let read: Vec<&str> =
+        resources.iter().map(|resource| resource.name()).chain(levels.iter().map(String::as_str)).collect();
     let fields: Vec<&str> =
         plan.surface().iter().chain(&plan.texel_surface()).map(|(name, _)| *name).collect();
-    let wgsl = names::prefixed(&plan.function(), &constants, &resources, &fields);
+    let wgsl = names::prefixed(&plan.function(), &constants, &read, &fields);
     let functions = dialect.filtering(&translate(dialect, &names::cited(&wgsl)), filter);
     if dialect.family == Family::Msl {
         let body = indented(&format!("{declared}\n{functions}"));
@@ -68,7 +70,12 @@ pub(super) fn text(
 }
 
 /// What it is, what it is called with, and what it reads.
-fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> String {
+fn header(
+    (plan, resources): (&Plan, &[Resource]),
+    idle: Effects,
+    params: &Params,
+    from: &Provenance,
+) -> String {
     let mut lines = from.lines();
     if idle != Effects::default() {
         let names: Vec<&str> = idle.iter().map(Effect::name).collect();
@@ -92,13 +99,12 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
             let exponent = params.scalar(Param::RimExponent);
             format!("- {name}: (1 - |N.V|) ^ {exponent:?} of the vertex, as interpolated")
         }
-        name => format!("- {name}: {}", meaning(name)),
+        name => format!("- {name}: {}", meaning(plan, name)),
     }));
-    let merged = plan.merged();
     let bound = |resource: &Resource| {
         Some(format!("- {}: {}", names::function(resource.name()), what_to_bind(*resource, params)?))
     };
-    let bound: Vec<String> = merged.resources.iter().filter_map(bound).collect();
+    let bound: Vec<String> = resources.iter().filter_map(bound).collect();
     if !bound.is_empty() {
         lines.extend([
             String::new(),
@@ -108,7 +114,7 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
         lines.extend(bound);
     }
     let filter = plan.facts.maps.filter;
-    if filter.reads_levels() && merged.resources.iter().any(|resource| resource.kind() == Kind::Map) {
+    if filter.reads_levels() && resources.iter().any(|resource| resource.kind() == Kind::Map) {
         lines.extend([
             String::new(),
             format!("Maps are to have mip levels and a sampler that is {}, as where the constants were found. Which level a", filter.name()),
@@ -120,23 +126,13 @@ fn header(plan: &Plan, idle: Effects, params: &Params, from: &Provenance) -> Str
     lines.into_iter().map(comment).collect()
 }
 
-fn declarations(dialect: &Dialect, plan: &Plan) -> String {
-    let mut text = String::new();
+fn declarations(dialect: &Dialect, resources: &[Resource], levels: &[String]) -> String {
     // Storage is the vertex stage's: an engine brings its own.
-    let merged = plan.merged();
-    let read = merged.resources.iter().filter(|resource| resource.kind() != Kind::Storage);
-    let mut next = 1;
-    for &resource in read {
-        let declaration = dialect.declaration(resource, next);
-        next += 1;
-        if !declaration.is_empty() {
-            let _ = writeln!(text, "{declaration}");
-        }
-    }
-    for (i, level) in plan.all_levels().iter().enumerate() {
-        let _ = writeln!(text, "{}", dialect.level(&level.bound(), next + i));
-    }
-    text
+    let read: Vec<Resource> =
+        resources.iter().copied().filter(|resource| resource.kind() != Kind::Storage).collect();
+    let own = read.iter().zip(1..).map(|(&resource, binding)| dialect.declaration(resource, binding));
+    let levels = levels.iter().zip(1 + read.len()..).map(|(level, binding)| dialect.level(level, binding));
+    own.chain(levels).filter(|line| !line.is_empty()).map(|line| line + "\n").collect()
 }
 
 fn indented(text: &str) -> String {
@@ -167,9 +163,9 @@ fn what_to_bind(resource: Resource, params: &Params) -> Option<String> {
     Some(words)
 }
 
-/// What a field of a function's input is.
-pub(super) fn meaning(field: &str) -> &'static str {
-    match field {
+/// What a field of a function's input is: of those that vertices find of lights and sky what their files say.
+pub(super) fn meaning(plan: &Plan, field: &str) -> String {
+    let known = match field {
         "vertex_position" => "position",
         "vertex_normal" => "normal, as interpolated",
         "vertex_tangent" => "tangent, as interpolated",
@@ -182,6 +178,15 @@ pub(super) fn meaning(field: &str) -> &'static str {
         "vertex_view" => "unit vector from the eye to the vertex, as interpolated",
         "vertex_silhouette" => "1 - |N.V| of the vertex, as interpolated",
         "eye" => "position of the eye",
-        _ => "as the rule of that name gives it",
-    }
+        other => {
+            if let Some(field) = Field::from_name(other) {
+                return field.info().meaning.to_owned();
+            }
+            let steps = plan.all_steps();
+            let rule = steps.iter().map(|step| step.rule).find(|rule| rule.gives_quantity(other));
+            let about = rule.map_or("", |rule| rule.about.trim_end_matches('.'));
+            return if about.is_empty() { "as the rule of that name gives it" } else { about }.to_owned();
+        }
+    };
+    known.to_owned()
 }

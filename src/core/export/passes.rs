@@ -22,7 +22,7 @@ pub(super) fn wiring(plan: &Plan) -> Vec<String> {
     lines.push("A draw is of the whole mesh, nothing culled, no depth, each vertex at its texture coordinates: in clip space x = 2 u - 1,".to_owned());
     lines.push("and y = 2 v - 1 where y = -1 is row 0 of a texture (OpenGL, Vulkan), y = 1 - 2 v where y = 1 is (Direct3D, Metal,".to_owned());
     lines.push("WebGPU). It takes of the vertices, in world space:".to_owned());
-    lines.extend(plan.texel_surface().iter().map(|(name, _)| format!("- {name}: {}", meaning(name))));
+    lines.extend(plan.texel_surface().iter().map(|(name, _)| format!("- {name}: {}", meaning(plan, name))));
     lines.push(String::new());
     lines
 }

@@ -14,7 +14,7 @@ use crate::shader::Facts;
 /// Write tuned constants, alone or with their shader, for another engine
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot and unity hold the shader; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
+    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot and unity hold the shader, and of light that scatters the passes before it, with how to wire them in the head; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
 )]
 pub(super) struct Arguments {
     /// The parameters: params.toml of a run folder.

@@ -13,7 +13,7 @@ use skinfit::shader::quantity::Kind;
 use skinfit::shader::{Budget, Facts, Plan, plan};
 
 use super::bench::*;
-use crate::exports::provenance;
+use crate::exports::{glsl_kind, provenance};
 
 /// A fragment shader of exported GLSL for the renderer's bindings, which keep textures and samplers apart.
 fn shader(plan: &Plan, params: &Params) -> String {
@@ -42,14 +42,9 @@ fn shader(plan: &Plan, params: &Params) -> String {
     }
     let exported = export::function(Target::Glsl, &plan.facts, params, &provenance()).unwrap();
     text.extend(exported.lines().filter(|line| !line.starts_with("layout(")).map(|line| format!("{line}\n")));
-    let kind = |wgsl: &str| match wgsl {
-        "f32" => "float",
-        "vec2f" => "vec2",
-        _ => "vec3",
-    };
     let mut set = String::new();
     for (i, (name, wgsl)) in plan.varyings.iter().enumerate() {
-        text += &format!("layout(location = {i}) in {} in_{name};\n", kind(wgsl));
+        text += &format!("layout(location = {i}) in {} in_{name};\n", glsl_kind(wgsl));
         set += &format!("    at.{name} = in_{name};\n");
     }
     if plan.surface().iter().any(|(name, _)| *name == "eye") {
