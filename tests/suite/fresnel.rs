@@ -219,8 +219,9 @@ fn hard_cases_are_finite_in_value_and_slope() {
     ];
     for choices in CHOICES.into_iter().chain([TRACED]) {
         for params in hard {
-            let unknowns = moving(choices);
+            // A light's parameters are known once its scene was read.
             let observed = baked(&scene(choices, params)).sample().unwrap().observe().unwrap();
+            let unknowns = moving(choices);
             let task = Task { unknowns: unknowns.clone(), ..observed.task() };
             let point: Point = observed.start();
             let (loss, slopes) = CpuEngine::new(task).unwrap().gradient(&point);

@@ -136,6 +136,12 @@ fn no_damage_to_a_buffer_beside_its_mesh_makes_the_reader_panic_or_pass_what_is_
         folder.write("quad.bin", &damages.iter().fold(bytes, |bytes, damage| damage.apply(bytes)));
         check_all(folder.load())
     });
+    // What a morph target adds, near f32's end: twice it is beyond.
+    let mut bytes = whole.clone();
+    bytes[208..212].copy_from_slice(&1.95e38_f32.to_le_bytes());
+    folder.write("quad.bin", &bytes);
+    let error = folder.load().unwrap_err().to_string();
+    assert!(error.contains("morph target 0, vertex 1") && error.contains("beyond 1e15"), "{error}");
     folder.write("quad.bin", &whole);
     assert!(folder.load().is_ok());
     std::fs::remove_file(folder.path("quad.bin")).unwrap();

@@ -7,6 +7,7 @@ use json::validation::Checked;
 
 use super::document::Document;
 use super::nodes::{Local, unit};
+use super::primitive::LARGEST;
 use crate::scene::error::SceneError;
 
 /// Where a time lies between two keys.
@@ -139,7 +140,9 @@ impl Track<'_> {
             return Err(self.document.channel_error(self.channel, "has fewer values than keys"));
         }
         if !finite {
-            return Err(self.document.channel_error(self.channel, "has values that are not finite"));
+            return Err(self
+                .document
+                .channel_error(self.channel, "has values that are not finite, or beyond 1e15"));
         }
         Ok(())
     }
@@ -166,12 +169,12 @@ impl Track<'_> {
     }
 
     fn vector(&self, values: &[[f32; 3]]) -> Result<DVec3, SceneError> {
-        self.check(values.len(), 1, values.iter().flatten().all(|v| v.is_finite()))?;
+        self.check(values.len(), 1, values.iter().flatten().all(|v| v.abs() <= LARGEST))?;
         Ok(self.blend(|key, part| DVec3::from(values[key * self.stride() + part].map(f64::from))))
     }
 
     fn rotation(&self, values: &[[f32; 4]]) -> Result<DQuat, SceneError> {
-        self.check(values.len(), 1, values.iter().flatten().all(|v| v.is_finite()))?;
+        self.check(values.len(), 1, values.iter().flatten().all(|v| v.abs() <= LARGEST))?;
         if self.interpolation == Interpolation::Linear {
             let at = |key: usize| unit(values[key].map(f64::from));
             // On the sphere, the short way round.
@@ -183,7 +186,7 @@ impl Track<'_> {
 
     fn weights(&self, values: &[f32]) -> Result<Vec<f32>, SceneError> {
         let targets = values.len() / (self.keys * self.stride());
-        self.check(values.len(), targets.max(1), values.iter().all(|v| v.is_finite()))?;
+        self.check(values.len(), targets.max(1), values.iter().all(|v| v.abs() <= LARGEST))?;
         let at = |target: usize| {
             self.blend(|key, part| f64::from(values[(key * self.stride() + part) * targets + target])) as f32
         };

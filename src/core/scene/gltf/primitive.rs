@@ -14,6 +14,15 @@ use super::{Ask, Tangents, Uvs};
 use crate::model::fields::{Field, FieldInfo};
 use crate::scene::error::{SceneError, Warnings, warn};
 
+/// Places and what morph targets add to them are no larger: times weights, and squared, an f32 still holds them.
+pub(super) const LARGEST: f32 = 1e15;
+
+/// Whether a place, or what is added to one, can be computed with.
+fn is_sound(v: &Vec3) -> bool {
+    // A maximum may pass over NaN.
+    v.abs().max_element() <= LARGEST && v.is_finite()
+}
+
 /// A primitive in its node's space.
 pub(super) struct Part {
     pub positions: Vec<Vec3>,
@@ -95,10 +104,13 @@ impl Document {
         };
         let positions = self.vectors(positions)?;
         let count = positions.len();
-        if let Some(i) = positions.iter().position(|p| !p.is_finite()) {
+        if let Some(i) = positions.iter().position(|p| !is_sound(p)) {
             let [x, y, z] = positions[i].to_array();
             return Err(self
-                .error(format!("stands at ({x}, {y}, {z})"), "Repair the mesh: positions must be finite")
+                .error(
+                    format!("stands at ({x}, {y}, {z})"),
+                    "Repair the mesh: positions must be finite, at most 1e15 in size",
+                )
                 .at(format!("{place}, vertex {i}")));
         }
         let same = |length: usize, what: &str| {
@@ -127,9 +139,11 @@ impl Document {
             let target = Target { positions: read(target.positions)?, normals: read(target.normals)? };
             for deltas in [&target.positions, &target.normals].into_iter().flatten() {
                 same(deltas.len(), "morph deltas")?;
-                if let Some(i) = deltas.iter().position(|d| !d.is_finite()) {
+                if let Some(i) = deltas.iter().position(|d| !is_sound(d)) {
                     let place = format!("{place}, morph target {}, vertex {i}", targets.len());
-                    return Err(self.error("has a delta that is not finite", "Repair the mesh").at(place));
+                    return Err(self
+                        .error("has a delta that is not finite, or beyond 1e15", "Repair the mesh")
+                        .at(place));
                 }
             }
             targets.push(target);
