@@ -1,7 +1,7 @@
 //! Passes over stored texels, as operations on numbers: what draws leave, and the taps of blurs.
 
 use super::error::ShadingError;
-use super::graph::{Graph, Id, Input};
+use super::graph::{Graph, Id, Input, Node};
 pub use super::level_then::{BlurOf, GaussianColumn, GaussianOf, SurfaceOf, Then};
 use super::lower::{LowerError, Natives, STEP_ALONG_U, STEP_ALONG_V, Source, Value};
 use super::steps::{Rounding, Steps};
@@ -62,8 +62,22 @@ impl LevelProgram {
     fn add(&mut self, passes: &[Named<'_>]) -> Result<(), LowerError> {
         let first = self.passes.len();
         self.add_each(passes)?;
-        self.passes[first..].iter_mut().for_each(|added| added.moves = passes.len() > 1);
+        for at in first..self.passes.len() {
+            self.passes[at].moves = passes.len() > 1 && !self.stays(at);
+        }
         Ok(())
+    }
+
+    /// Whether a draw leaves the same whatever the parameters.
+    fn stays(&self, at: usize) -> bool {
+        let (before, pass) = (&self.passes[..at], &self.passes[at]);
+        let moves = |name: &str| {
+            before.iter().any(|pass| pass.moves && pass.leaves.iter().any(|(leaf, _)| leaf == name))
+        };
+        matches!(pass.then, Then::Leave)
+            && pass.steps.inputs().is_empty()
+            && pass.steps.resources().is_empty()
+            && !pass.steps.fields().iter().any(|field| moves(&field.name))
     }
 
     fn add_each(&mut self, passes: &[Named<'_>]) -> Result<(), LowerError> {
@@ -76,7 +90,7 @@ impl LevelProgram {
             PassKind::Blur(_) | PassKind::Surface | PassKind::Neighbours | PassKind::Dilate => None,
         };
         if let Some(then) = together {
-            self.passes.push(LevelPass::new(passes, then)?);
+            self.passes.extend(LevelPass::together(passes, &then)?);
             return Ok(());
         }
         for pass in passes {
@@ -183,8 +197,45 @@ fn gaussian(axis: Axis, passes: &[Named<'_>]) -> GaussianOf {
 }
 
 impl LevelPass {
-    /// Of passes whose steps are made together: what they have in common is computed once.
+    /// Of passes whose steps are made together: what they have in common is computed once. Of a draw what no parameter reaches
+    /// is a pass of its own, which runs once: the others' texels lie closer together without it.
+    fn together(passes: &[Named<'_>], then: &Then) -> Result<Vec<Self>, LowerError> {
+        let (graph, outputs, leaves) = Self::lowered(passes, then)?;
+        let of = |outputs: &[Id], leaves| {
+            let (graph, outputs) = graph.rebuilt(outputs, |_| None);
+            let steps = Steps::new(&graph, &outputs, |_| Rounding::Plain);
+            Self { steps, leaves, then: then.clone(), moves: false }
+        };
+        if !matches!(then, Then::Leave) {
+            return Ok(vec![of(&outputs, leaves)]);
+        }
+        let shared = |graph: &Graph, id: Id| {
+            matches!(graph.node(id), Node::Uniform(_)) || graph.looked_up(id).is_some()
+        };
+        let of_parameters = graph.made_of(shared);
+        let mut parts: [(Vec<Id>, Vec<(String, usize)>); 2] = Default::default();
+        let mut next = outputs.iter().copied();
+        for leaf in leaves {
+            let numbers: Vec<Id> = next.by_ref().take(leaf.1).collect();
+            let part = numbers.iter().any(|id| of_parameters[id.index()]);
+            parts[usize::from(part)].0.extend(numbers);
+            parts[usize::from(part)].1.push(leaf);
+        }
+        let parts = parts.into_iter().filter(|(_, leaves)| !leaves.is_empty());
+        Ok(parts.map(|(outputs, leaves)| of(&outputs, leaves)).collect())
+    }
+
+    /// Of passes that leave what they leave one after another.
     fn new(passes: &[Named<'_>], then: Then) -> Result<Self, LowerError> {
+        let (graph, outputs, leaves) = Self::lowered(passes, &then)?;
+        Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then, moves: false })
+    }
+
+    /// The passes' graph, its outputs, and what they leave.
+    fn lowered(
+        passes: &[Named<'_>],
+        then: &Then,
+    ) -> Result<(Graph, Vec<Id>, Vec<(String, usize)>), LowerError> {
         let mut graph = Graph::default();
         let mut outputs: Vec<Id> = Vec::new();
         let mut deviation = false;
@@ -202,8 +253,7 @@ impl LevelPass {
             }
         }
         let leaves = passes.iter().flat_map(|pass| pass.pass.leaves.iter().map(|leaf| level_of(pass, leaf)));
-        let leaves = leaves.collect();
-        Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then, moves: false })
+        Ok((graph, outputs, leaves.collect()))
     }
 
     /// The levels that it reads, and what it reads of a texel, by name.

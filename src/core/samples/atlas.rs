@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::LANES;
+use super::along::{Along, Sixteen, known};
 use super::dilation::Dilation;
 use super::posed::PosedSurface;
 use super::rows::Rows;
@@ -29,8 +30,8 @@ use crate::shader::facts::FaceSizes;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Atlas {
     size: u32,
-    /// For each texel, row by row, its place among those that are covered.
-    places: Vec<u32>,
+    /// For each texel, row by row, its place among those that are covered, and its chart; [`EMPTY`] and 0.
+    cells: Vec<[u32; 2]>,
     /// Which texel each covered one is.
     texels: Vec<u32>,
     /// The chart of each covered texel, counted from 1.
@@ -41,7 +42,7 @@ pub struct Atlas {
     /// Made where it is asked for.
     dilation: OnceLock<Dilation>,
     /// Along u and v.
-    room: OnceLock<[Vec<u8>; 2]>,
+    known: OnceLock<[Vec<Sixteen>; 2]>,
     margins: Margins,
 }
 
@@ -86,13 +87,13 @@ impl Atlas {
         let covered = texels.len();
         let mut atlas = Self {
             size,
-            places,
+            cells: cells(&places, &charts),
             texels,
             charts,
             inputs,
             rows,
             dilation: OnceLock::new(),
-            room: OnceLock::new(),
+            known: OnceLock::new(),
             margins: Margins::default(),
         };
         if setup.choices.diffusion.seams == Seams::Joined {
@@ -118,16 +119,17 @@ impl Atlas {
                 rows.record_mut(slot / LANES)[row][slot % LANES] = value(input, texel);
             }
         }
-        let charts = texels.iter().map(|&texel| charts[texel as usize]).collect();
-        let (dilation, room) = (OnceLock::new(), OnceLock::new());
-        Self { size, places, texels, charts, inputs, rows, dilation, room, margins: Margins::default() }
+        let charts: Vec<u32> = texels.iter().map(|&texel| charts[texel as usize]).collect();
+        let (dilation, known) = (OnceLock::new(), OnceLock::new());
+        let cells = cells(&places, &charts);
+        Self { size, cells, texels, charts, inputs, rows, dilation, known, margins: Margins::default() }
     }
 
     /// The same, but lookups by one fetch find in each empty texel what another shows, which is covered: pairs of texels,
     /// row by row.
     #[must_use]
     pub fn with_shown(mut self, shown: impl IntoIterator<Item = (u32, u32)>) -> Self {
-        let place = |texel: u32| Some(self.places[texel as usize]).filter(|&place| place != EMPTY);
+        let place = |texel: u32| Some(self.cells[texel as usize][0]).filter(|&place| place != EMPTY);
         let shown = shown.into_iter().filter(|&(texel, _)| place(texel).is_none());
         let shown = shown.filter_map(|(texel, of)| Some((texel, place(of)?)));
         self.dilation = OnceLock::from(Dilation::of_copies(shown));
@@ -193,14 +195,14 @@ impl Atlas {
         if !inside(column) || !inside(row) {
             return None;
         }
-        let place = self.places[row as usize * self.size as usize + column as usize];
+        let [place, _] = self.cells[row as usize * self.size as usize + column as usize];
         (place != EMPTY).then_some(place as usize)
     }
 
     /// The texels that are filled beyond those that are covered, for lookups by one fetch.
     #[must_use]
     pub fn dilation(&self) -> &Dilation {
-        let number = |texel: u32| Some(self.places[texel as usize]).filter(|&place| place != EMPTY);
+        let number = |texel: u32| Some(self.cells[texel as usize][0]).filter(|&place| place != EMPTY);
         self.dilation.get_or_init(|| Dilation::new(self.size, self.covered(), number))
     }
 
@@ -223,38 +225,23 @@ impl Atlas {
         self.margins.number(chart, texel)
     }
 
-    /// How many texels on either side of a covered one are of its chart, without a gap; 255 of more.
-    #[inline(always)]
+    /// The atlas along an axis.
     #[must_use]
-    pub fn room(&self, axis: Axis, place: usize) -> i32 {
-        let [along_u, along_v] = self.room.get_or_init(|| [Axis::U, Axis::V].map(|axis| room(self, axis)));
-        i32::from(match axis {
-            Axis::U => along_u[place],
-            Axis::V => along_v[place],
-        })
+    pub fn along(&self, axis: Axis) -> Along<'_> {
+        let [along_u, along_v] = self.known.get_or_init(|| [Axis::U, Axis::V].map(|axis| known(self, axis)));
+        Along::new(self, axis, if axis == Axis::U { along_u } else { along_v })
     }
 
-    /// The texel so many steps from a covered one, no further than it has [room](Self::room).
+    /// Which texel each covered one is, row by row.
     #[inline(always)]
-    #[must_use]
-    pub fn place_within(&self, axis: Axis, place: usize, step: i32) -> u32 {
-        match axis {
-            // Row by row.
-            Axis::U => (place as i32 + step) as u32,
-            Axis::V => self.places[(self.texels[place] as i32 + step * self.size as i32) as usize],
-        }
+    pub(super) fn texels(&self) -> &[u32] {
+        &self.texels
     }
 
-    /// The texel of the same chart so many steps from a covered one, [`Self::place_of_chart`].
+    /// For each texel, row by row, its place among those that are covered, and its chart; [`EMPTY`] and 0.
     #[inline(always)]
-    #[must_use]
-    pub fn place_along(&self, axis: Axis, place: usize, step: i64) -> Option<usize> {
-        let [column, row] = self.texel(place).map(i64::from);
-        let chart = self.charts[place];
-        match axis {
-            Axis::U => self.place_of_chart(chart, column.saturating_add(step), row),
-            Axis::V => self.place_of_chart(chart, column, row.saturating_add(step)),
-        }
+    pub(super) fn cells(&self) -> &[[u32; 2]] {
+        &self.cells
     }
 
     /// The row of a record that holds a number; `None` where it was not asked for.
@@ -280,22 +267,10 @@ impl Texels for Atlas {
     }
 }
 
-/// Each covered texel's room along an axis, as far as a byte goes.
-fn room(atlas: &Atlas, axis: Axis) -> Vec<u8> {
-    // In their order those before a texel are counted first, and against it those after.
-    let mut sides = [-1, 1].map(|side| (side, vec![0_u8; atlas.covered()]));
-    for (side, counts) in &mut sides {
-        let count = |at: usize, counts: &[u8]| {
-            let next = atlas.place_along(axis, at, *side).filter(|&next| next < counts.len());
-            next.map_or(0, |next| counts[next].saturating_add(1))
-        };
-        for k in 0..counts.len() {
-            let at = if *side < 0 { k } else { counts.len() - 1 - k };
-            counts[at] = count(at, counts);
-        }
-    }
-    let [(_, before), (_, after)] = sides;
-    before.into_iter().zip(after).map(|(before, after)| before.min(after)).collect()
+/// The places of texels with the charts of those that are covered.
+fn cells(places: &[u32], charts: &[u32]) -> Vec<[u32; 2]> {
+    let chart = |place: u32| charts.get(place as usize).copied().unwrap_or(0);
+    places.iter().map(|&place| [place, chart(place)]).collect()
 }
 
 /// Rings about a place in which a chart's nearest texel is looked for before all of them are.

@@ -18,10 +18,12 @@
 //! - [`surface_records`]: what the model reads of each sample, in rows
 //! - [`targets`]: what each pixel of a target asks
 //! - [`visibility`]: how much of a light reaches a place of the mesh
-//! - [`atlas`]: texels of the UV atlas, samples of the mesh as well; `texel_cover`: which are covered;
+//! - [`atlas`]: texels of the UV atlas, samples of the mesh as well; [`along`]: along one of its axes; `texel_cover`: which
+//!   are covered;
 //!   `texel_fields`: what they hold; `texel_error`: why there are none; `dilation`: empty ones that are filled;
 //!   `seams`: what lies beyond the borders of its charts
 
+pub mod along;
 pub mod atlas;
 mod bounced;
 pub mod covered;

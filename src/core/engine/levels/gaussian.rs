@@ -7,11 +7,12 @@
 use std::borrow::Cow;
 use std::f64::consts::LOG2_E;
 
-use super::records::{Made, Record, sixteen};
-use super::taps::Taps;
+use super::records::{Made, Record};
+use super::taps::{Taps, weight};
+use super::wide::Wide;
 use super::{Number, Texel};
-use crate::model::real::Real;
 use crate::program::levels::GaussianOf;
+use crate::samples::along::Along;
 use crate::samples::{Atlas, LANES};
 use crate::simd::Simd;
 
@@ -72,7 +73,7 @@ impl<'a, R: Number> Sources<'a, R> {
 /// A pass at work.
 pub(super) struct Gaussian<'a, R: Number> {
     pub(super) of: &'a GaussianOf,
-    pub(super) atlas: &'a Atlas,
+    along: Along<'a>,
     pub(super) sources: &'a Sources<'a, R>,
     /// For each leaf in the order in which they stand, which of the steps' numbers is how the deviation moves along its seed.
     pub(super) moved: Vec<Option<usize>>,
@@ -86,7 +87,7 @@ impl<'a, R: Number> Gaussian<'a, R> {
         sources: &'a Sources<'a, R>,
     ) -> Self {
         let moved = order.iter().map(|&column| of.columns[column].moved.map(|moved| 1 + moved)).collect();
-        Self { of, atlas, sources, moved }
+        Self { of, along: atlas.along(of.axis), sources, moved }
     }
 
     /// What the pass leaves of up to sixteen texels from `first` on, `stride` numbers each. `numbers` are their deviations,
@@ -134,41 +135,66 @@ impl<'a, R: Number> Gaussian<'a, R> {
         (leaves, stride): (&mut [R], usize),
         slopes: &mut [Texel<R>; LANES],
     ) {
-        let zero = R::splat(simd, R::from(0.0));
-        let taps = Taps::<R, REACH>::new::<S>(simd, deviations);
-        let Sources { stride: width, count, .. } = *self.sources;
-        let record = &*self.sources.record;
-        for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
-            let here = first + lane;
-            let near = taps.near(self.atlas, self.of.axis, here, lane);
-            let share = R::splat(simd, near.share);
-            for from in (0..3 * count).step_by(LANES) {
-                let own = R::load(simd, sixteen(record, here * width + from));
-                let (mut sum, mut change) = (zero, zero);
-                for k in 0..REACH {
-                    let [a, b, c, d] = near.texels[k];
-                    let a = R::load(simd, sixteen(record, a as usize * width + from));
-                    let b = R::load(simd, sixteen(record, b as usize * width + from));
-                    let c = R::load(simd, sixteen(record, c as usize * width + from));
-                    let d = R::load(simd, sixteen(record, d as usize * width + from));
-                    let [weight, slope] = taps.weight(k);
-                    let [before, after] = near.shares[k];
-                    let (down, up) = (b - a, d - c);
-                    let off = R::splat(simd, before).mul_add(down, (a - own) + (c - own));
-                    let off = R::splat(simd, after).mul_add(up, off);
-                    sum = R::splat(simd, weight).mul_add(off, sum);
-                    change = R::splat(simd, slope).mul_add(up - down, change);
-                }
-                let off = sum * share;
-                put(&R::array::<S>(own + off), &mut leaves[from..]);
-                // The level itself stands first.
-                if from == 0 {
-                    let change = (change - R::splat(simd, near.slopes) * off) * share;
-                    let change = R::array::<S>(change);
-                    slopes[lane] = [change[0], change[1], change[2]];
+        let of = self.along.sixteen(first);
+        let taps = Taps::<R, REACH>::new::<S>(simd, (self.along, of), deviations, self.sources.stride as u32);
+        let numbers = 3 * self.sources.count;
+        let moves = self.moved.iter().any(Option::is_some);
+        // What is written beyond a texel's own numbers is written over: texels are in their order.
+        if numbers <= R::Four::<S>::COUNT {
+            for (lane, slope) in slopes.iter_mut().enumerate().take(leaves.len() / stride) {
+                let slope = moves.then_some(slope);
+                let at = (of.places[lane] as usize, lane, 0);
+                self.weighed::<S, R::Four<S>, REACH>(simd, &taps, at, &mut leaves[lane * stride..], slope);
+                self.clear(&mut leaves[lane * stride..(lane + 1) * stride]);
+            }
+            return;
+        }
+        for (lane, slope) in slopes.iter_mut().enumerate().take(leaves.len() / stride) {
+            let at = |from| (of.places[lane] as usize, lane, from);
+            let first = &mut leaves[lane * stride..];
+            // The level itself stands first.
+            self.weighed::<S, R::Sixteen<S>, REACH>(simd, &taps, at(0), first, moves.then_some(slope));
+            for from in (LANES..numbers).step_by(LANES) {
+                let next = &mut leaves[lane * stride + from..];
+                if numbers - from <= R::Four::<S>::COUNT {
+                    self.weighed::<S, R::Four<S>, REACH>(simd, &taps, at(from), next, None);
+                } else {
+                    self.weighed::<S, R::Sixteen<S>, REACH>(simd, &taps, at(from), next, None);
                 }
             }
-            self.clear(leaves);
+            self.clear(&mut leaves[lane * stride..(lane + 1) * stride]);
+        }
+    }
+
+    /// Several numbers of a texel, weighed by its taps, and in `slope` how the first three move as the deviation does.
+    #[inline(always)]
+    fn weighed<S: Simd, W: Wide<R, S>, const REACH: usize>(
+        &self,
+        simd: S,
+        taps: &Taps<R, REACH>,
+        (here, lane, from): (usize, usize, usize),
+        leaves: &mut [R],
+        slope: Option<&mut Texel<R>>,
+    ) {
+        let record = &self.sources.record[from..];
+        let own = W::load(simd, record, here * self.sources.stride);
+        let (mut sum, mut change) = (W::splat(simd, R::from(0.0)), W::splat(simd, R::from(0.0)));
+        for k in 0..REACH {
+            let near = |i: usize| W::load(simd, record, taps.places[k][i][lane] as usize);
+            let share = |side: usize| W::splat(simd, taps.shares[k][side][lane]);
+            let [a, b, c, d] = [near(0), near(1), near(2), near(3)];
+            let [weight, slope] = weight(k);
+            let (down, up) = (b - a, d - c);
+            let off = share(0).times_plus(down, (a - own) + (c - own));
+            let off = share(1).times_plus(up, off);
+            sum = W::splat(simd, weight).times_plus(off, sum);
+            change = W::splat(simd, slope).times_plus(up - down, change);
+        }
+        let share = W::splat(simd, taps.share[lane]);
+        let off = sum * share;
+        (own + off).store(leaves);
+        if let Some(slope) = slope {
+            *slope = ((change - W::splat(simd, taps.slopes[lane]) * off) * share).three();
         }
     }
 
@@ -178,17 +204,17 @@ impl<'a, R: Number> Gaussian<'a, R> {
         let (zero, one) = (R::from(0.0), R::from(1.0));
         let own = self.sources.texel(here);
         let wide: f64 = deviation.into();
-        let reach = (6.0 * wide).ceil().min(f64::from(self.atlas.size())) as i64;
+        let reach = (6.0 * wide).ceil().min(f64::from(self.along.size())) as i32;
         let narrow = if one.lit(1e-10).lt(deviation) { deviation } else { one.lit(1e-10) };
         let (mut weights, mut slopes, mut change) = (zero, zero, [zero; 3]);
         let numbers = 3 * self.sources.count;
         leaves.fill(zero);
         for step in -reach..=reach {
-            let Some(place) = self.atlas.place_along(self.of.axis, here, step) else { continue };
-            let deviations = one.lit(step as f64) / narrow;
+            let Some(place) = self.along.place(here as u32, step) else { continue };
+            let deviations = one.lit(f64::from(step)) / narrow;
             // exp(-d^2 / 2).
             let weight = (one.lit(-0.5 * LOG2_E) * deviations * deviations).exp2();
-            let near = self.sources.texel(place);
+            let near = self.sources.texel(place as usize);
             weights = weights + weight;
             for k in 0..numbers {
                 leaves[k] = leaves[k] + weight * (near[k] - own[k]);
@@ -213,19 +239,5 @@ impl<'a, R: Number> Gaussian<'a, R> {
         if self.sources.count < self.moved.len() {
             leaves[3 * self.sources.count..].fill(R::from(0.0));
         }
-    }
-}
-
-/// The first of sixteen numbers, as many as there is room for: a multiple of four.
-#[inline(always)]
-pub(super) fn put<R: Copy>(numbers: &[R; LANES], room: &mut [R]) {
-    if let Some(room) = room.first_chunk_mut() {
-        *room = *numbers;
-        return;
-    }
-    let (numbers, _) = numbers.as_chunks::<4>();
-    let (room, _) = room.as_chunks_mut::<4>();
-    for (room, numbers) in room.iter_mut().zip(numbers) {
-        *room = *numbers;
     }
 }

@@ -5,7 +5,7 @@
 //! `shader/atlas/blur.wgsl`, `blur_tangent.wgsl` and `level.wgsl`. Texel by texel, so nothing depends on threads.
 //!
 //! - this module: [`LevelMaker`], which makes levels anew when a number changes that they are made with
-//! - `number`: what levels are made of; `records`: levels in memory
+//! - `number`: what levels are made of, `wide`: several at once; `records`: levels in memory
 //! - `again`: which passes have to run again, and whose memory they may have; `run`: a pass
 //! - `gaussian`: one direction of a Gaussian, of a level and of how it moves, by `taps`; `blur`: likewise by a rule's own;
 //!   `neighbours`: how far these lie apart; `surface`: sums by distance in space; `look_up`: what samples find
@@ -22,6 +22,7 @@ mod surface;
 mod taps;
 #[cfg(test)]
 mod tests;
+mod wide;
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -3,6 +3,7 @@
 use fearless_simd::prelude::*;
 use fearless_simd::{f32x16, i32x16};
 
+use super::wide::{Four, Wide};
 use crate::engine::lanes::Lanes;
 use crate::model::batch::Batch;
 use crate::model::real::Real;
@@ -12,7 +13,9 @@ use crate::simd::Simd;
 /// What levels are made of: f32 or f64.
 pub trait Number: Real<Texel = Self, Wide = Self, Mask = bool> + From<f32> + Into<f64> + Send + Sync {
     /// Sixteen of them.
-    type Sixteen<S: Simd>: Real<Texel = Self, Wide = Self::Sixteen<S>> + Send + Sync;
+    type Sixteen<S: Simd>: Real<Texel = Self, Wide = Self::Sixteen<S>> + Wide<Self, S> + Send + Sync;
+    /// Four of them.
+    type Four<S: Simd>: Wide<Self, S>;
 
     /// These sixteen.
     fn load<S: Simd>(simd: S, numbers: &[Self; LANES]) -> Self::Sixteen<S>;
@@ -35,6 +38,7 @@ pub trait Number: Real<Texel = Self, Wide = Self, Mask = bool> + From<f32> + Int
 
 impl Number for f32 {
     type Sixteen<S: Simd> = Lanes<S>;
+    type Four<S: Simd> = Four<S>;
 
     #[inline(always)]
     fn load<S: Simd>(simd: S, numbers: &[Self; LANES]) -> Lanes<S> {
@@ -85,6 +89,7 @@ fn turn<S: Simd>(simd: S, rows: &[Lanes<S>; LANES], turned: &mut [Lanes<S>; LANE
 
 impl Number for f64 {
     type Sixteen<S: Simd> = Batch<Self, LANES>;
+    type Four<S: Simd> = Batch<Self, 4>;
 
     #[inline(always)]
     fn load<S: Simd>(_: S, numbers: &[Self; LANES]) -> Batch<Self, LANES> {

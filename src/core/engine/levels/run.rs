@@ -6,10 +6,11 @@ use fearless_simd::Level as Instructions;
 use rayon::prelude::*;
 
 use super::blur::blurred;
-use super::gaussian::{Gaussian, Sources, ordered, put};
+use super::gaussian::{Gaussian, Sources, ordered};
 use super::neighbours::neighbours;
 use super::records::{Made, Record};
 use super::surface::means;
+use super::wide::Wide;
 use super::{Number, Texel};
 use crate::engine::cubes_at::CubesAt;
 use crate::model::params::Params;
@@ -166,7 +167,8 @@ impl<'a, R: Number> Run<'a, R> {
                 memory,
                 #[inline(always)]
                 |_, numbers, leaves, stride| {
-                    for (block, slots) in slots.chunks(LANES).enumerate() {
+                    // What is written beyond a texel's own numbers is written over: the last ones come first.
+                    for (block, slots) in slots.chunks(LANES).enumerate().rev() {
                         let mut rows = [nothing; LANES];
                         for (row, slot) in rows.iter_mut().zip(slots) {
                             if let Some(number) = *slot {
@@ -174,8 +176,8 @@ impl<'a, R: Number> Run<'a, R> {
                             }
                         }
                         R::transpose(simd, &mut rows);
-                        for (leaves, row) in leaves.chunks_mut(stride).zip(rows) {
-                            put(&R::array(row), &mut leaves[block * LANES..]);
+                        for lane in 0..leaves.len() / stride {
+                            rows[lane].store(&mut leaves[lane * stride + block * LANES..]);
                         }
                     }
                 },

@@ -6,105 +6,106 @@
 
 use super::Number;
 use crate::model::real::Real;
-use crate::samples::{Atlas, LANES};
-use crate::shader::atlas::Axis;
+use crate::samples::LANES;
+use crate::samples::along::{Along, Sixteen};
 use crate::simd::Simd;
 
-/// Where taps fall of sixteen texels, `REACH` to either side: those before each, and those after.
+/// What the taps of sixteen texels find, `REACH` to either side of each, tap by tap.
 pub(super) struct Taps<R, const REACH: usize> {
-    /// The first of the two texels, steps from the texel itself.
-    steps: [[[i32; LANES]; 2]; REACH],
-    /// What the second counts.
-    shares: [[[R; LANES]; 2]; REACH],
-    weights: [R; REACH],
+    /// The two texels about the tap before, and those about the one after, as where their numbers begin; the texel itself in
+    /// the place of what is not there.
+    pub(super) places: [[[u32; LANES]; 4]; REACH],
+    /// What the second of each two counts.
+    pub(super) shares: [[[R; LANES]; 2]; REACH],
+    /// One over the sum of the weights, 1 of the texel itself with them.
+    pub(super) share: [R; LANES],
+    /// How the sum of the weights moves as the deviation does.
+    pub(super) slopes: [R; LANES],
 }
 
-/// What a texel's taps find, tap by tap.
-pub(super) struct Near<R, const REACH: usize> {
-    /// The two texels about the tap before, and those about the one after; the texel itself in the place of what is not there.
-    pub(super) texels: [[u32; 4]; REACH],
-    /// What the second of each two counts.
-    pub(super) shares: [[R; 2]; REACH],
-    /// One over the sum of the weights, 1 of the texel itself with them.
-    pub(super) share: R,
-    /// How the sum of the weights moves as the deviation does.
-    pub(super) slopes: R,
-}
+/// Sixteen texels, and along what.
+type Of<'a> = (Along<'a>, &'a Sixteen);
+
+/// The first of each two texels, steps from the texel itself.
+type Steps<const REACH: usize> = [[[i32; LANES]; 2]; REACH];
 
 impl<R: Number, const REACH: usize> Taps<R, REACH> {
-    /// Of texels with these deviations.
+    /// Of sixteen texels with these deviations, `stride` numbers each.
     #[inline(always)]
-    pub(super) fn new<S: Simd>(simd: S, deviation: R::Sixteen<S>) -> Self {
-        let mut taps = Self {
-            steps: [[[0; LANES]; 2]; REACH],
-            shares: [[[R::from(0.0); LANES]; 2]; REACH],
-            weights: [R::from(0.0); REACH],
-        };
+    pub(super) fn new<S: Simd>(simd: S, of: Of<'_>, deviation: R::Sixteen<S>, stride: u32) -> Self {
+        let nothing = [R::from(0.0); LANES];
+        let (places, shares) = ([[[0; LANES]; 4]; REACH], [[nothing; 2]; REACH]);
+        let mut taps = Self { places, shares, share: nothing, slopes: nothing };
+        let mut steps = [[[0_i32; LANES]; 2]; REACH];
         for k in 0..REACH {
-            taps.weights[k] = weight(k);
             let after = R::splat(simd, R::from(k as f32 + 1.0)) * deviation;
             let before = -after;
             let lows = [before.floor(), after.floor()];
-            for (side, off) in [before - lows[0], after - lows[1]].into_iter().enumerate() {
-                taps.shares[k][side] = R::array::<S>(off);
-                taps.steps[k][side] = R::whole::<S>(lows[side]);
-            }
+            taps.shares[k] = [R::array::<S>(before - lows[0]), R::array::<S>(after - lows[1])];
+            steps[k] = [R::whole::<S>(lows[0]), R::whole::<S>(lows[1])];
+        }
+        if of.0.have_room(of.1, &steps[REACH - 1][1]) {
+            taps.find_all(of, &steps, stride);
+        } else {
+            taps.find_some(of, &steps, stride);
         }
         taps
     }
 
-    /// What tap k + 1 weighs, and how much of that goes from one of its two texels to the other as the deviation grows.
+    /// Every tap finds something.
     #[inline(always)]
-    pub(super) fn weight(&self, k: usize) -> [R; 2] {
-        [self.weights[k], self.weights[k] * R::from(k as f32 + 1.0)]
+    fn find_all(&mut self, of: Of<'_>, steps: &Steps<REACH>, stride: u32) {
+        let mut all = R::from(1.0);
+        for k in 0..REACH {
+            let [weight, _] = weight::<R>(k);
+            all = all + (weight + weight);
+            for i in 0..4 {
+                self.place(k, i, &of.0.within(of.1, &steps[k][i / 2], (i % 2) as i32), stride);
+            }
+        }
+        (self.share, self.slopes) = ([R::from(1.0) / all; LANES], [R::from(0.0); LANES]);
     }
 
-    /// What the taps of a texel find, `lane` of the sixteen.
+    /// Some of them may find nothing.
     #[inline(always)]
-    pub(super) fn near(&self, atlas: &Atlas, axis: Axis, here: usize, lane: usize) -> Near<R, REACH> {
-        let one = R::from(1.0);
-        let mut near = Near {
-            texels: [[here as u32; 4]; REACH],
-            shares: [[one; 2]; REACH],
-            share: one,
-            slopes: R::from(0.0),
-        };
-        let within = self.steps[REACH - 1][1][lane] < atlas.room(axis, here);
-        let mut weights = one;
+    fn find_some(&mut self, of: Of<'_>, steps: &Steps<REACH>, stride: u32) {
+        let (zero, one) = (R::from(0.0), R::from(1.0));
+        let (mut weights, mut slopes) = ([one; LANES], [zero; LANES]);
         for k in 0..REACH {
-            let [weight, slope] = self.weight(k);
-            let [before, after] = [self.steps[k][0][lane], self.steps[k][1][lane]];
-            let [b, d] = [self.shares[k][0][lane], self.shares[k][1][lane]];
-            near.shares[k] = [b, d];
-            if within {
-                near.texels[k] = [
-                    atlas.place_within(axis, here, before),
-                    atlas.place_within(axis, here, before + 1),
-                    atlas.place_within(axis, here, after),
-                    atlas.place_within(axis, here, after + 1),
-                ];
-                weights = weights + (weight + weight);
-                continue;
-            }
-            let steps = [before, before.saturating_add(1), after, after.saturating_add(1)];
-            let counted = [one - b, b, one - d, d];
-            let slopes = [slope, -slope, -slope, slope];
+            let [weight, slope] = weight::<R>(k);
             for i in 0..4 {
-                if let Some(texel) = atlas.place_along(axis, here, i64::from(steps[i])) {
-                    near.texels[k][i] = texel as u32;
-                    weights = weights + weight * counted[i];
-                    near.slopes = near.slopes + slopes[i];
+                let (side, second) = (i / 2, i % 2);
+                let [near, found] = of.0.near(of.1, &steps[k][side], second as i32);
+                self.place(k, i, &near, stride);
+                // The texel further off gains what the nearer one loses.
+                let slope = if second == side { slope } else { -slope };
+                for lane in 0..LANES {
+                    let share = self.shares[k][side][lane];
+                    let share = if second == 1 { share } else { one - share };
+                    let there = found[lane] == 1;
+                    weights[lane] = weights[lane] + if there { weight * share } else { zero };
+                    slopes[lane] = slopes[lane] + if there { slope } else { zero };
                 }
             }
         }
-        near.share = one / weights;
-        near
+        for lane in 0..LANES {
+            self.share[lane] = one / weights[lane];
+        }
+        self.slopes = slopes;
+    }
+
+    /// Put down where the numbers of texels begin.
+    #[inline(always)]
+    fn place(&mut self, k: usize, i: usize, texels: &[u32; LANES], stride: u32) {
+        for lane in 0..LANES {
+            self.places[k][i][lane] = texels[lane] * stride;
+        }
     }
 }
 
-/// What tap k + 1 weighs.
+/// What tap k + 1 weighs, and how much of that goes from one of its two texels to the other as the deviation grows.
 #[inline(always)]
-fn weight<R: Number>(k: usize) -> R {
+pub(super) fn weight<R: Number>(k: usize) -> [R; 2] {
     // exp(-1/2), exp(-2), exp(-9/2), exp(-8).
     const WEIGHTS: [f64; 4] = [
         0.606_530_659_712_633_4,
@@ -112,5 +113,6 @@ fn weight<R: Number>(k: usize) -> R {
         0.011_108_996_538_242_306,
         0.000_335_462_627_902_511_84,
     ];
-    R::from(0.0).lit(WEIGHTS[k])
+    let weight = R::from(0.0).lit(WEIGHTS[k]);
+    [weight, weight * R::from(k as f32 + 1.0)]
 }
