@@ -8,7 +8,7 @@ use naga::valid::{Capabilities, ValidationFlags, Validator};
 use skinfit::export::{self, Target};
 use skinfit::gpu::RenderOptions;
 use skinfit::gpu::upload::Content;
-use skinfit::model::diffusion::{Lookup, Stretch, Taps};
+use skinfit::model::diffusion::{Combined, Lookup, Stretch, Taps};
 use skinfit::model::effects::Effect;
 use skinfit::prepare::Baked;
 use skinfit::render::antialias::Antialias;
@@ -58,12 +58,13 @@ fn head_with(more: &[Effect], change: impl FnOnce(&mut Scene)) -> Baked {
 type Named = (&'static str, fn(&mut Scene));
 
 /// Named choices that change the passes.
-fn choices() -> [Named; 4] {
+fn choices() -> [Named; 5] {
     [
         ("five taps", |_| ()),
         ("taps a texel apart", |scene| scene.choices.diffusion.taps = Taps::Full),
         ("stretch by neighbours", |scene| scene.choices.diffusion.stretch = Stretch::Derivative),
         ("filled for one fetch", |scene| scene.choices.diffusion.lookup = Lookup::Dilated),
+        ("added up in texels", |scene| scene.choices.diffusion.combined = Combined::Map),
     ]
 }
 

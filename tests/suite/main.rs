@@ -14,6 +14,7 @@ mod builtin;
 mod by_rules;
 mod chain_rule;
 mod cli;
+mod combined;
 mod common;
 mod composed;
 mod damage;

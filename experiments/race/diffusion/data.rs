@@ -8,7 +8,7 @@ use std::sync::{Arc, OnceLock};
 use serde::Deserialize;
 use skinfit::engine::Unknown;
 use skinfit::engine::view::ObservedView;
-use skinfit::model::diffusion::{DiffusionChoices, Lookup, Method, Stretch, Taps};
+use skinfit::model::diffusion::{Combined, DiffusionChoices, Lookup, Method, Stretch, Taps};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::params::{Column, Param, Params};
@@ -74,6 +74,7 @@ pub(crate) fn setup() -> Result<Setup> {
         stretch: Stretch::Exact,
         lookup: Lookup::Dilated,
         method: Method::Separable,
+        combined: Combined::Map,
         ..DiffusionChoices::DEFAULT
     };
     Ok(setup)

@@ -8,27 +8,17 @@ use super::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Batch<R, const N: usize>(pub [R; N]);
 
-impl<R: Copy, const N: usize> Batch<R, N> {
-    #[inline(always)]
-    fn each(mut self, of: impl Fn(R) -> R) -> Self {
-        self.0.iter_mut().for_each(|x| *x = of(*x));
-        self
-    }
-
-    #[inline(always)]
-    fn both(mut self, other: Self, of: impl Fn(R, R) -> R) -> Self {
-        self.0.iter_mut().zip(other.0).for_each(|(x, y)| *x = of(*x, y));
-        self
-    }
-}
-
+// Loops, not closures over arrays: these are compiled without the instructions of who calls them.
 macro_rules! operator {
     ($trait:ident $method:ident) => {
         impl<R: Real, const N: usize> $trait for Batch<R, N> {
             type Output = Self;
             #[inline(always)]
-            fn $method(self, other: Self) -> Self {
-                self.both(other, R::$method)
+            fn $method(mut self, other: Self) -> Self {
+                for i in 0..N {
+                    self.0[i] = self.0[i].$method(other.0[i]);
+                }
+                self
             }
         }
     };
@@ -41,8 +31,11 @@ operator!(Div div);
 impl<R: Real, const N: usize> Neg for Batch<R, N> {
     type Output = Self;
     #[inline(always)]
-    fn neg(self) -> Self {
-        self.each(R::neg)
+    fn neg(mut self) -> Self {
+        for i in 0..N {
+            self.0[i] = -self.0[i];
+        }
+        self
     }
 }
 
@@ -50,12 +43,32 @@ impl<R: Real, const N: usize> Neg for Batch<R, N> {
 macro_rules! by_lanes {
     ([$($one:ident)*] [$($two:ident)*]) => {
         $(#[inline(always)]
-        fn $one(self) -> Self {
-            self.each(R::$one)
+        fn $one(mut self) -> Self {
+            for i in 0..N {
+                self.0[i] = self.0[i].$one();
+            }
+            self
         })*
         $(#[inline(always)]
-        fn $two(self, other: Self) -> Self {
-            self.both(other, R::$two)
+        fn $two(mut self, other: Self) -> Self {
+            for i in 0..N {
+                self.0[i] = self.0[i].$two(other.0[i]);
+            }
+            self
+        })*
+    };
+}
+
+/// What comparisons yield: of each number.
+macro_rules! masks {
+    ($($method:ident)*) => {
+        $(#[inline(always)]
+        fn $method(self, other: Self) -> Self::Mask {
+            let mut mask = [self.0[0].$method(other.0[0]); N];
+            for i in 1..N {
+                mask[i] = self.0[i].$method(other.0[i]);
+            }
+            mask
         })*
     };
 }
@@ -66,54 +79,73 @@ impl<R: Real, const N: usize> Real for Batch<R, N> {
     type Wide = Batch<R::Wide, N>;
 
     by_lanes!([half fixed recip sqrt abs floor log2 exp2] [min max]);
+    masks!(lt ge);
 
     #[inline(always)]
     fn widen(self) -> Self::Wide {
-        Batch(self.0.map(R::widen))
+        let mut wide = Batch([self.0[0].widen(); N]);
+        for i in 1..N {
+            wide.0[i] = self.0[i].widen();
+        }
+        wide
     }
     #[inline(always)]
     fn narrow(wide: Self::Wide) -> Self {
-        Self(wide.0.map(R::narrow))
+        let mut narrow = Self([R::narrow(wide.0[0]); N]);
+        for i in 1..N {
+            narrow.0[i] = R::narrow(wide.0[i]);
+        }
+        narrow
     }
     #[inline(always)]
     fn lit(self, value: f64) -> Self {
-        self.each(|x| x.lit(value))
+        Self([self.0[0].lit(value); N])
     }
     #[inline(always)]
     fn mul_add(mut self, a: Self, b: Self) -> Self {
-        self.0.iter_mut().zip(a.0).zip(b.0).for_each(|((x, a), b)| *x = x.mul_add(a, b));
+        for i in 0..N {
+            self.0[i] = self.0[i].mul_add(a.0[i], b.0[i]);
+        }
         self
     }
     #[inline(always)]
-    fn lt(self, other: Self) -> Self::Mask {
-        std::array::from_fn(|i| self.0[i].lt(other.0[i]))
-    }
-    #[inline(always)]
-    fn ge(self, other: Self) -> Self::Mask {
-        std::array::from_fn(|i| self.0[i].ge(other.0[i]))
-    }
-    #[inline(always)]
     fn is_finite(self) -> Self::Mask {
-        self.0.map(R::is_finite)
+        let mut mask = [self.0[0].is_finite(); N];
+        for i in 1..N {
+            mask[i] = self.0[i].is_finite();
+        }
+        mask
     }
     #[inline(always)]
-    fn and(a: Self::Mask, b: Self::Mask) -> Self::Mask {
-        std::array::from_fn(|i| R::and(a[i], b[i]))
+    fn and(mut a: Self::Mask, b: Self::Mask) -> Self::Mask {
+        for i in 0..N {
+            a[i] = R::and(a[i], b[i]);
+        }
+        a
     }
     #[inline(always)]
-    fn select(mask: Self::Mask, yes: Self, no: Self) -> Self {
-        Self(std::array::from_fn(|i| R::select(mask[i], yes.0[i], no.0[i])))
+    fn select(mask: Self::Mask, mut yes: Self, no: Self) -> Self {
+        for i in 0..N {
+            yes.0[i] = R::select(mask[i], yes.0[i], no.0[i]);
+        }
+        yes
     }
     #[inline(always)]
     fn all(mask: Self::Mask) -> bool {
-        mask.into_iter().all(R::all)
+        let mut all = true;
+        for i in 0..N {
+            all &= R::all(mask[i]);
+        }
+        all
     }
     #[inline(always)]
     fn bilinear(texels: &[[R::Texel; 4]], row: usize, index: Self, fx: Self, fy: Self) -> [Self; 4] {
         let mut out = [fx; 4];
         for i in 0..N {
             let found = R::bilinear(texels, row, index.0[i], fx.0[i], fy.0[i]);
-            (0..4).for_each(|c| out[c].0[i] = found[c]);
+            for c in 0..4 {
+                out[c].0[i] = found[c];
+            }
         }
         out
     }
@@ -127,9 +159,11 @@ impl<R: Real, const N: usize> Real for Batch<R, N> {
     ) -> ([Self; 4], [Self; 4]) {
         let mut out = ([index; 4], [index; 4]);
         for i in 0..N {
-            let (f, d) = (f.map(|f| f.0[i]), d.map(|d| d.0[i]));
+            let (f, d) = ([f[0].0[i], f[1].0[i]], [d[0].0[i], d[1].0[i]]);
             let (value, slope) = R::bilinear_with_slope(texels, row, index.0[i], f, d);
-            (0..4).for_each(|c| (out.0[c].0[i], out.1[c].0[i]) = (value[c], slope[c]));
+            for c in 0..4 {
+                (out.0[c].0[i], out.1[c].0[i]) = (value[c], slope[c]);
+            }
         }
         out
     }
@@ -142,9 +176,11 @@ impl<R: Real, const N: usize> Real for Batch<R, N> {
     ) -> [[Self; 4]; 3] {
         let mut out = [[index; 4]; 3];
         for i in 0..N {
-            let parts = R::bilinear_with_gradient(texels, row, index.0[i], f.map(|f| f.0[i]));
+            let parts = R::bilinear_with_gradient(texels, row, index.0[i], [f[0].0[i], f[1].0[i]]);
             for (out, part) in out.iter_mut().zip(parts) {
-                (0..4).for_each(|c| out[c].0[i] = part[c]);
+                for c in 0..4 {
+                    out[c].0[i] = part[c];
+                }
             }
         }
         out

@@ -274,8 +274,9 @@ impl SkinReflection {
 impl Choices {
     /// Those that a scene file names, each by its key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 16] {
-        let [method, taps, ambient_normal, stretch, seams, lookup, unblurred] = self.diffusion.named();
+    pub const fn named(&self) -> [(&'static str, &'static str); 17] {
+        let [method, taps, ambient_normal, stretch, seams, lookup, unblurred, combined] =
+            self.diffusion.named();
         let [through] = self.transmission.named();
         [
             ("specular_model", self.specular_model.name()),
@@ -293,6 +294,7 @@ impl Choices {
             seams,
             lookup,
             unblurred,
+            combined,
             through,
         ]
     }
@@ -320,7 +322,7 @@ impl Choices {
     }
 
     /// The conditions that [`Self::holds`] knows.
-    pub const CONDITIONS: [&'static str; 16] = [
+    pub const CONDITIONS: [&'static str; 17] = [
         "kelemen",
         "ggx",
         "exact_split_sum",
@@ -336,6 +338,7 @@ impl Choices {
         "bumped_ambient",
         "surface_levels",
         "unblurred_in_pixel",
+        "combined_in_map",
         "exact_stretch",
     ];
 }

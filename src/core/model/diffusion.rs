@@ -17,6 +17,8 @@ pub struct DiffusionChoices {
     pub lookup: Lookup,
     /// Where light is taken that no blur has moved.
     pub unblurred: Unblurred,
+    /// Where levels are weighed and added up.
+    pub combined: Combined,
 }
 
 impl DiffusionChoices {
@@ -29,6 +31,7 @@ impl DiffusionChoices {
         seams: Seams::Cut,
         lookup: Lookup::Chart,
         unblurred: Unblurred::Map,
+        combined: Combined::Pixel,
     };
 }
 
@@ -148,10 +151,20 @@ choice! {
     }
 }
 
+choice! {
+    /// Where levels are weighed and added up: lookups are linear, so that either shows the same.
+    Combined {
+        /// In the pixel, which looks each of them up: the article's. While nothing but weights is fitted, what was found stays.
+        Pixel = "pixel",
+        /// In texels: the sum alone is looked up, and (where radii are free, or much else) fewer numbers of how it moves.
+        Map = "map",
+    }
+}
+
 impl DiffusionChoices {
     /// Those that a scene file names, each by its table and key.
     #[must_use]
-    pub const fn named(&self) -> [(&'static str, &'static str); 7] {
+    pub const fn named(&self) -> [(&'static str, &'static str); 8] {
         [
             ("diffusion.method", self.method.name()),
             ("diffusion.taps", self.taps.name()),
@@ -160,6 +173,7 @@ impl DiffusionChoices {
             ("diffusion.seams", self.seams.name()),
             ("diffusion.lookup", self.lookup.name()),
             ("diffusion.unblurred", self.unblurred.name()),
+            ("diffusion.combined", self.combined.name()),
         ]
     }
 
@@ -170,6 +184,7 @@ impl DiffusionChoices {
             "bumped_ambient" => self.ambient_normal == AmbientNormal::Bumped,
             "surface_levels" => self.method == Method::Surface,
             "unblurred_in_pixel" => self.unblurred == Unblurred::Pixel,
+            "combined_in_map" => self.combined == Combined::Map,
             "exact_stretch" => self.stretch == Stretch::Exact,
             _ => return None,
         })

@@ -7,7 +7,7 @@ use super::error::SceneError;
 use super::file::{DiffusionTable, Source, TapsValue};
 use super::numbers::whole;
 use crate::model::diffusion::{
-    AmbientNormal, DiffusionChoices, Lookup, Method, Seams, Stretch, Taps, Unblurred,
+    AmbientNormal, Combined, DiffusionChoices, Lookup, Method, Seams, Stretch, Taps, Unblurred,
 };
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Param, Params};
@@ -107,7 +107,7 @@ pub(super) fn read(
         whole(source, table.light_map_size.as_ref(), "light_map_size", [64, 8192], default.light_map_size)?;
     let presets = (&Preset::ALL[..], Preset::name as fn(Preset) -> _);
     let preset = choice(source, "preset", table.preset.as_ref(), presets, default.preset)?;
-    let DiffusionChoices { method, ambient_normal, stretch, seams, lookup, unblurred, .. } =
+    let DiffusionChoices { method, ambient_normal, stretch, seams, lookup, unblurred, combined, .. } =
         DiffusionChoices::DEFAULT;
     let choices = DiffusionChoices {
         method: choice(source, "method", table.method.as_ref(), (Method::ALL, Method::name), method)?,
@@ -128,6 +128,13 @@ pub(super) fn read(
             table.unblurred.as_ref(),
             (Unblurred::ALL, Unblurred::name),
             unblurred,
+        )?,
+        combined: choice(
+            source,
+            "combined",
+            table.combined.as_ref(),
+            (Combined::ALL, Combined::name),
+            combined,
         )?,
     };
     Ok((Diffusion { light_map_size: size, preset }, choices))

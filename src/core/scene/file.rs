@@ -176,6 +176,7 @@ pub(super) struct DiffusionTable {
     pub seams: Option<Spanned<String>>,
     pub lookup: Option<Spanned<String>>,
     pub unblurred: Option<Spanned<String>>,
+    pub combined: Option<Spanned<String>>,
 }
 
 /// `[transmission]`

@@ -8,6 +8,7 @@ use std::borrow::Cow;
 use std::f64::consts::LOG2_E;
 
 use super::records::{Made, Record};
+use super::run::Yielded;
 use super::taps::{Taps, weight};
 use super::wide::Wide;
 use super::{Number, Texel};
@@ -90,26 +91,26 @@ impl<'a, R: Number> Gaussian<'a, R> {
         Self { of, along: atlas.along(of.axis), sources, moved }
     }
 
-    /// What the pass leaves of up to sixteen texels from `first` on, `stride` numbers each. `numbers` are their deviations,
+    /// What the pass leaves of up to sixteen texels from `first` on, `stride` numbers each. `yielded` are their deviations,
     /// and then how these move.
     #[inline(always)]
     pub(super) fn blur<S: Simd>(
         &self,
         simd: S,
         first: usize,
-        numbers: &[R::Sixteen<S>],
+        yielded: &Yielded<'_, R, S>,
         (leaves, stride): (&mut [R], usize),
     ) {
         // How the level itself moves as the deviation does.
         let mut slopes = [[R::from(0.0); 3]; LANES];
-        let of = (first, numbers[0]);
+        let of = (first, yielded.number(0));
         match self.of.reach {
             Some(1) => self.by_taps::<S, 1>(simd, of, (leaves, stride), &mut slopes),
             Some(2) => self.by_taps::<S, 2>(simd, of, (leaves, stride), &mut slopes),
             Some(3) => self.by_taps::<S, 3>(simd, of, (leaves, stride), &mut slopes),
             Some(_) => self.by_taps::<S, 4>(simd, of, (leaves, stride), &mut slopes),
             None => {
-                let deviations = R::array::<S>(numbers[0]);
+                let deviations = R::array::<S>(yielded.number(0));
                 for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
                     slopes[lane] = self.by_steps(first + lane, deviations[lane], leaves);
                 }
@@ -117,7 +118,7 @@ impl<'a, R: Number> Gaussian<'a, R> {
         }
         for (k, moved) in self.moved.iter().enumerate() {
             let Some(moved) = *moved else { continue };
-            let moved = R::array::<S>(numbers[moved]);
+            let moved = R::array::<S>(yielded.number(moved));
             for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
                 for c in 0..3 {
                     leaves[3 * k + c] = leaves[3 * k + c] + moved[lane] * slopes[lane][c];

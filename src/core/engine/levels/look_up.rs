@@ -5,6 +5,7 @@ use std::sync::Arc;
 use fearless_simd::Level as Instructions;
 use rayon::prelude::*;
 
+use super::block::Block;
 use super::{LevelMaker, Made, Number};
 use crate::engine::cubes_at::CubesAt;
 use crate::model::params::Params;
@@ -119,15 +120,6 @@ pub struct Finder<R> {
     empty: Vec<usize>,
 }
 
-/// Sixteen numbers of a record of levels, which are weighed at once.
-#[derive(Debug)]
-struct Block {
-    record: usize,
-    first: usize,
-    /// Which of them are looked up, and the row of each.
-    rows: Vec<(usize, usize)>,
-}
-
 impl<R: Number> Finder<R> {
     /// Of the levels that a maker has made.
     #[must_use]
@@ -140,18 +132,8 @@ impl<R: Number> Finder<R> {
             }
             row += count;
         }
-        numbers.sort_unstable();
         let empty = (0..row).filter(|row| !numbers.iter().any(|(.., found)| found == row)).collect();
-        let mut blocks: Vec<Block> = Vec::new();
-        for (record, offset, row) in numbers {
-            let there = |block: &&mut Block| {
-                block.record == record && (block.first..block.first + LANES).contains(&offset)
-            };
-            match blocks.last_mut().filter(there) {
-                Some(block) => block.rows.push((offset - block.first, row)),
-                None => blocks.push(Block { record, first: offset, rows: vec![(0, row)] }),
-            }
-        }
+        let blocks = Block::of(numbers);
         Self { made, blocks, rows: row, empty }
     }
 

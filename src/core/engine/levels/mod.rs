@@ -5,12 +5,13 @@
 //! `shader/atlas/blur.wgsl`, `blur_tangent.wgsl` and `level.wgsl`. Texel by texel, so nothing depends on threads.
 //!
 //! - this module: [`LevelMaker`], which makes levels anew when a number changes that they are made with
-//! - `number`: what levels are made of, `wide`: several at once; `records`: levels in memory
+//! - `number`: what levels are made of, `wide`: several at once; `records`: levels in memory, `block`: what of one is read together
 //! - `again`: which passes have to run again, and whose memory they may have; `run`: a pass
 //! - `gaussian`: one direction of a Gaussian, of a level and of how it moves, by `taps`; `blur`: likewise by a rule's own;
 //!   `neighbours`: how far these lie apart; `surface`: sums by distance in space; `look_up`: what samples find
 
 mod again;
+mod block;
 mod blur;
 mod gaussian;
 mod look_up;

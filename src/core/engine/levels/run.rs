@@ -1,10 +1,11 @@
-//! A pass over an atlas: its steps, sixteen texels at a time, and what is done with what they yield.
+//! A pass over an atlas: its steps, sixty-four texels at a time, and what is done with what they yield.
 
 use std::borrow::Cow;
 
 use fearless_simd::Level as Instructions;
 use rayon::prelude::*;
 
+use super::block::Block;
 use super::blur::blurred;
 use super::gaussian::{Gaussian, Sources, ordered};
 use super::neighbours::neighbours;
@@ -13,6 +14,7 @@ use super::surface::means;
 use super::wide::Wide;
 use super::{Number, Texel};
 use crate::engine::cubes_at::CubesAt;
+use crate::model::batch::Batch;
 use crate::model::params::Params;
 use crate::program::graph::Input;
 use crate::program::levels::{APART_FIELD, BlurOf, GaussianOf, LevelPass, SurfaceOf, Then};
@@ -24,6 +26,26 @@ use crate::with_simd;
 /// Records of texels that a thread takes at once.
 const CHUNK: usize = 64;
 
+/// Records that each step is made of at once: what it is, is found out once for all of them.
+const AT_ONCE: usize = 4;
+
+/// A number of each texel of those records.
+type Numbers<R, S> = Batch<<R as Number>::Sixteen<S>, AT_ONCE>;
+
+/// What a pass' steps yield of sixteen texels.
+pub(super) struct Yielded<'a, R: Number, S: Simd> {
+    numbers: &'a [Numbers<R, S>],
+    record: usize,
+}
+
+impl<R: Number, S: Simd> Yielded<'_, R, S> {
+    /// One of their numbers.
+    #[inline(always)]
+    pub(super) fn number(&self, at: usize) -> R::Sixteen<S> {
+        self.numbers[at].0[self.record]
+    }
+}
+
 /// A pass over an atlas, after those before it.
 pub(super) struct Run<'a, R: Number> {
     pass: &'a LevelPass,
@@ -32,6 +54,8 @@ pub(super) struct Run<'a, R: Number> {
     params: &'a Params,
     cubes: &'a CubesAt<R>,
     loads: Vec<Load>,
+    /// Of levels those that are read together.
+    blocks: Vec<Block>,
     /// The order in which the pass' leaves stand.
     order: Vec<usize>,
     /// How far each texel's neighbours lie apart, where the pass is over these.
@@ -44,6 +68,8 @@ enum Load {
     Row(usize),
     /// A number of a record of levels.
     Level(usize, usize),
+    /// One that is read together with others.
+    Together,
     /// How far neighbours lie apart.
     Apart(usize),
     /// Nothing is there.
@@ -56,6 +82,23 @@ pub(super) fn order<R: Number>(pass: &LevelPass, made: &Made<R>) -> Vec<usize> {
         Then::Gaussian(of) => ordered(of, |name| made.place(name)),
         _ => (0..pass.leaves.len()).collect(),
     }
+}
+
+/// Numbers of levels of which so many stand side by side are read together, not one by one.
+const TOGETHER: usize = 3;
+
+/// The blocks of fields that are read together.
+fn together(loads: &mut [Load]) -> Vec<Block> {
+    let number = |(at, load): (usize, &Load)| match *load {
+        Load::Level(record, offset) => Some((record, offset, at)),
+        _ => None,
+    };
+    let mut blocks = Block::of(loads.iter().enumerate().filter_map(number).collect());
+    blocks.retain(|block| block.rows.len() >= TOGETHER);
+    for &(_, at) in blocks.iter().flat_map(|block| &block.rows) {
+        loads[at] = Load::Together;
+    }
+    blocks
 }
 
 impl<'a, R: Number> Run<'a, R> {
@@ -76,9 +119,10 @@ impl<'a, R: Number> Run<'a, R> {
             (None, Some(row)) => Load::Row(row),
             (None, None) => Load::Nothing,
         };
-        let loads = pass.steps.fields().iter().map(load).collect();
+        let mut loads: Vec<Load> = pass.steps.fields().iter().map(load).collect();
+        let blocks = together(&mut loads);
         let order = order(pass, made);
-        Self { pass, atlas, made, params, cubes, loads, order, apart: apart.unwrap_or_default() }
+        Self { pass, atlas, made, params, cubes, loads, blocks, order, apart: apart.unwrap_or_default() }
     }
 
     /// What the pass leaves, in memory that others have left.
@@ -143,7 +187,7 @@ impl<'a, R: Number> Run<'a, R> {
                 simd,
                 memory,
                 #[inline(always)]
-                |first, numbers, leaves, stride| gaussian.blur(simd, first, numbers, (leaves, stride)),
+                |first, yielded, leaves, stride| gaussian.blur(simd, first, &yielded, (leaves, stride)),
             )
         })
     }
@@ -166,13 +210,13 @@ impl<'a, R: Number> Run<'a, R> {
                 simd,
                 memory,
                 #[inline(always)]
-                |_, numbers, leaves, stride| {
+                |_, yielded, leaves, stride| {
                     // What is written beyond a texel's own numbers is written over: the last ones come first.
                     for (block, slots) in slots.chunks(LANES).enumerate().rev() {
                         let mut rows = [nothing; LANES];
                         for (row, slot) in rows.iter_mut().zip(slots) {
-                            if let Some(number) = *slot {
-                                *row = numbers[number];
+                            if let Some(at) = *slot {
+                                *row = yielded.number(at);
                             }
                         }
                         R::transpose(simd, &mut rows);
@@ -188,8 +232,9 @@ impl<'a, R: Number> Run<'a, R> {
     /// The pass' record: `then` makes a texel's numbers of its place and what the steps yield in a lane.
     fn each(&self, memory: Vec<R>, then: impl Fn(usize, &[[R; LANES]], usize, &mut [R]) + Sync) -> Record<R> {
         with_simd!(Instructions::new(), simd => {
-            self.blocks(simd, memory, #[inline(always)] |first, numbers, leaves, stride| {
-                let numbers: Vec<[R; LANES]> = numbers.iter().map(|&numbers| R::array(numbers)).collect();
+            self.blocks(simd, memory, #[inline(always)] |first, yielded, leaves, stride| {
+                let numbers: Vec<[R; LANES]> =
+                    (0..yielded.numbers.len()).map(|at| R::array(yielded.number(at))).collect();
                 for (lane, leaves) in leaves.chunks_mut(stride).enumerate() {
                     then(first + lane, &numbers, lane, leaves);
                 }
@@ -204,29 +249,36 @@ impl<'a, R: Number> Run<'a, R> {
         &self,
         simd: S,
         memory: Vec<R>,
-        then: impl Fn(usize, &[R::Sixteen<S>], &mut [R], usize) + Sync,
+        then: impl Fn(usize, Yielded<'_, R, S>, &mut [R], usize) + Sync,
     ) -> Record<R> {
-        let like = R::splat(simd, R::from(0.0));
+        let like = Batch([R::splat(simd, R::from(0.0)); AT_ONCE]);
         let value = |input: &Input| constant(input, self.params).unwrap_or(0.0);
         let shared = self.pass.steps.setting(like, value, |name| self.cubes.named(name));
         let mut record = Record::within(memory, self.pass.leaves.len(), self.atlas.covered());
         let stride = record.stride;
         let chunks = record.of_texels().par_chunks_mut(stride * CHUNK * LANES).enumerate();
-        chunks.for_each_init(Memory::<R, S>::default, |Memory { registers, numbers }, (chunk, texels)| {
+        let memory = || Memory::<R, S> { read: vec![like; self.loads.len()], ..Memory::default() };
+        chunks.for_each_init(memory, |Memory { registers, numbers, read }, (chunk, texels)| {
             simd.vectorize(
                 #[inline(always)]
                 || {
-                    for (block, texels) in texels.chunks_mut(stride * LANES).enumerate() {
-                        let first = (chunk * CHUNK + block) * LANES;
+                    for (group, texels) in texels.chunks_mut(stride * LANES * AT_ONCE).enumerate() {
+                        let first = (chunk * CHUNK + group * AT_ONCE) * LANES;
+                        self.read(simd, first, read);
                         self.pass.steps.run(
                             &shared,
                             like,
                             registers,
                             #[inline(always)]
-                            |at| self.field(simd, at, first),
+                            |at| match self.loads[at] {
+                                Load::Together => read[at],
+                                _ => self.field(simd, at, first),
+                            },
                         );
                         self.pass.steps.put(&shared, registers, numbers);
-                        then(first, numbers, texels, stride);
+                        for (record, texels) in texels.chunks_mut(stride * LANES).enumerate() {
+                            then(first + record * LANES, Yielded { numbers, record }, texels, stride);
+                        }
                     }
                 },
             );
@@ -234,13 +286,45 @@ impl<'a, R: Number> Run<'a, R> {
         record
     }
 
-    /// A field of sixteen texels; beyond the last one, that one's.
+    /// Read together what stands side by side of sixteen texels: a row a texel, and then a row a number.
     #[inline(always)]
-    fn field<S: Simd>(&self, simd: S, at: usize, first: usize) -> R::Sixteen<S> {
+    fn read<S: Simd>(&self, simd: S, first: usize, read: &mut [Numbers<R, S>]) {
+        let last = self.atlas.covered() - 1;
+        for block in &self.blocks {
+            let record = self.made.record(block.record);
+            for k in 0..AT_ONCE {
+                let mut rows = [R::splat(simd, R::from(0.0)); LANES];
+                for (lane, row) in rows.iter_mut().enumerate() {
+                    let texel = (first + k * LANES + lane).min(last);
+                    *row = R::load(simd, record.sixteen(texel, block.first));
+                }
+                R::transpose(simd, &mut rows);
+                for &(number, at) in &block.rows {
+                    read[at].0[k] = rows[number];
+                }
+            }
+        }
+    }
+
+    /// A field of texels from `first` on; beyond the last one, that one's.
+    #[inline(always)]
+    fn field<S: Simd>(&self, simd: S, at: usize, first: usize) -> Numbers<R, S> {
+        let mut numbers = Batch([R::splat(simd, R::from(0.0)); AT_ONCE]);
+        for (k, sixteen) in numbers.0.iter_mut().enumerate() {
+            *sixteen = self.sixteen(simd, at, first + k * LANES);
+        }
+        numbers
+    }
+
+    /// A field of sixteen texels.
+    #[inline(always)]
+    fn sixteen<S: Simd>(&self, simd: S, at: usize, first: usize) -> R::Sixteen<S> {
         let last = self.atlas.covered() - 1;
         let mut lanes = [R::from(0.0); LANES];
         match self.loads[at] {
-            Load::Row(row) => return R::held(simd, &self.atlas.rows().record(first / LANES)[row]),
+            Load::Row(row) => {
+                return R::held(simd, &self.atlas.rows().record((first / LANES).min(last / LANES))[row]);
+            }
             Load::Level(record, offset) => {
                 let record = self.made.record(record);
                 for (lane, number) in lanes.iter_mut().enumerate() {
@@ -254,7 +338,7 @@ impl<'a, R: Number> Run<'a, R> {
                     }
                 }
             }
-            Load::Nothing => {}
+            Load::Together | Load::Nothing => {}
         }
         R::load(simd, &lanes)
     }
@@ -262,12 +346,14 @@ impl<'a, R: Number> Run<'a, R> {
 
 /// What a thread computes in.
 struct Memory<R: Number, S: Simd> {
-    registers: Vec<R::Sixteen<S>>,
-    numbers: Vec<R::Sixteen<S>>,
+    registers: Vec<Numbers<R, S>>,
+    numbers: Vec<Numbers<R, S>>,
+    /// What was read together.
+    read: Vec<Numbers<R, S>>,
 }
 
 impl<R: Number, S: Simd> Default for Memory<R, S> {
     fn default() -> Self {
-        Self { registers: Vec::new(), numbers: Vec::new() }
+        Self { registers: Vec::new(), numbers: Vec::new(), read: Vec::new() }
     }
 }

@@ -1,7 +1,7 @@
 //! Texture-space diffusion: each of its approximations beside the sum over the surface, all else as the scene has it.
 
 use super::ways::{Way, Ways};
-use crate::model::diffusion::{AmbientNormal, Method, Seams, Stretch, Taps, Unblurred};
+use crate::model::diffusion::{AmbientNormal, Combined, Method, Seams, Stretch, Taps, Unblurred};
 use crate::scene::Scene;
 use crate::scene::diffusion::Preset;
 
@@ -121,6 +121,25 @@ pub(super) const UNBLURRED: Ways = ways(
             scene.choices.diffusion.method = Method::Surface;
             scene.choices.diffusion.unblurred = Unblurred::Pixel;
         }),
+    ],
+);
+
+/// Where levels are weighed and added up.
+pub(super) const COMBINED: Ways = ways(
+    "combined",
+    "Where the levels are weighed and added up",
+    "Images with each level looked up by the pixel, and with their sum alone; levels by distance over the surface are the \
+     reference. Seconds are those of baking, tracing and one pass, nothing cached.",
+    &[
+        ("pixel", |scene| {
+            blurred(scene);
+            scene.choices.diffusion.combined = Combined::Pixel;
+        }),
+        ("map", |scene| {
+            blurred(scene);
+            scene.choices.diffusion.combined = Combined::Map;
+        }),
+        ("surface", |scene| scene.choices.diffusion.method = Method::Surface),
     ],
 );
 

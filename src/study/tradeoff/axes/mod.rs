@@ -42,6 +42,7 @@ pub fn all() -> Vec<&'static dyn Axis> {
         &diffusion::AMBIENT_NORMAL,
         &diffusion::STRETCH,
         &diffusion::UNBLURRED,
+        &diffusion::COMBINED,
         &diffusion::LEVELS,
         &samples::Samples,
         &textures::Textures,

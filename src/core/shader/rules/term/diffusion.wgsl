@@ -347,7 +347,7 @@ fn variance_5(
 // sum of w_k L_k, where w_0 is 1 less the others.
 //
 // gives: scattered_light
-// when: diffusion, !diffusion_five
+// when: diffusion, !diffusion_five, !combined_in_map
 // cost: 27
 fn scattered_of_three(
     diffusion_unblurred: vec3f,
@@ -367,7 +367,7 @@ fn scattered_of_three(
 // sum of w_k L_k, where w_0 is 1 less the others.
 //
 // gives: scattered_light
-// when: diffusion, diffusion_five
+// when: diffusion, diffusion_five, !combined_in_map
 // cost: 45
 fn scattered_of_five(
     diffusion_unblurred: vec3f,
@@ -388,6 +388,134 @@ fn scattered_of_five(
         + diffusion_weight_3 * (diffusion_level_3 - diffusion_unblurred)
         + diffusion_weight_4 * (diffusion_level_4 - diffusion_unblurred)
         + diffusion_weight_5 * (diffusion_level_5 - diffusion_unblurred);
+}
+
+// The same in texels: a lookup is linear, so that the sum's is the sum of the levels' lookups.
+//
+// gives: scattered_light
+// domain: texel
+// sampled: 0
+// when: diffusion, !diffusion_five, combined_in_map, !unblurred_in_pixel
+// cost: 27
+fn scattered_of_three_in_map(
+    diffusion_level_0: vec3f,
+    diffusion_level_1: vec3f,
+    diffusion_level_2: vec3f,
+    diffusion_level_3: vec3f,
+    diffusion_weight_1: vec3f,
+    diffusion_weight_2: vec3f,
+    diffusion_weight_3: vec3f,
+) -> vec3f {
+    return diffusion_level_0
+        + diffusion_weight_1 * (diffusion_level_1 - diffusion_level_0)
+        + diffusion_weight_2 * (diffusion_level_2 - diffusion_level_0)
+        + diffusion_weight_3 * (diffusion_level_3 - diffusion_level_0);
+}
+
+// The same in texels: a lookup is linear, so that the sum's is the sum of the levels' lookups.
+//
+// gives: scattered_light
+// domain: texel
+// sampled: 0
+// when: diffusion, diffusion_five, combined_in_map, !unblurred_in_pixel
+// cost: 45
+fn scattered_of_five_in_map(
+    diffusion_level_0: vec3f,
+    diffusion_level_1: vec3f,
+    diffusion_level_2: vec3f,
+    diffusion_level_3: vec3f,
+    diffusion_level_4: vec3f,
+    diffusion_level_5: vec3f,
+    diffusion_weight_1: vec3f,
+    diffusion_weight_2: vec3f,
+    diffusion_weight_3: vec3f,
+    diffusion_weight_4: vec3f,
+    diffusion_weight_5: vec3f,
+) -> vec3f {
+    return diffusion_level_0
+        + diffusion_weight_1 * (diffusion_level_1 - diffusion_level_0)
+        + diffusion_weight_2 * (diffusion_level_2 - diffusion_level_0)
+        + diffusion_weight_3 * (diffusion_level_3 - diffusion_level_0)
+        + diffusion_weight_4 * (diffusion_level_4 - diffusion_level_0)
+        + diffusion_weight_5 * (diffusion_level_5 - diffusion_level_0);
+}
+
+// What blurs have moved, in texels.
+//
+// gives: diffusion_moved
+// domain: texel
+// sampled: 0
+// when: diffusion, !diffusion_five, combined_in_map, unblurred_in_pixel
+// cost: 15
+fn moved_of_three_in_map(
+    diffusion_level_1: vec3f,
+    diffusion_level_2: vec3f,
+    diffusion_level_3: vec3f,
+    diffusion_weight_1: vec3f,
+    diffusion_weight_2: vec3f,
+    diffusion_weight_3: vec3f,
+) -> vec3f {
+    return diffusion_weight_1 * diffusion_level_1
+        + diffusion_weight_2 * diffusion_level_2
+        + diffusion_weight_3 * diffusion_level_3;
+}
+
+// What blurs have moved, in texels.
+//
+// gives: diffusion_moved
+// domain: texel
+// sampled: 0
+// when: diffusion, diffusion_five, combined_in_map, unblurred_in_pixel
+// cost: 27
+fn moved_of_five_in_map(
+    diffusion_level_1: vec3f,
+    diffusion_level_2: vec3f,
+    diffusion_level_3: vec3f,
+    diffusion_level_4: vec3f,
+    diffusion_level_5: vec3f,
+    diffusion_weight_1: vec3f,
+    diffusion_weight_2: vec3f,
+    diffusion_weight_3: vec3f,
+    diffusion_weight_4: vec3f,
+    diffusion_weight_5: vec3f,
+) -> vec3f {
+    return diffusion_weight_1 * diffusion_level_1
+        + diffusion_weight_2 * diffusion_level_2
+        + diffusion_weight_3 * diffusion_level_3
+        + diffusion_weight_4 * diffusion_level_4
+        + diffusion_weight_5 * diffusion_level_5;
+}
+
+// What no blur has moved counts w_0, 1 less the other weights.
+//
+// gives: scattered_light
+// when: diffusion, !diffusion_five, combined_in_map, unblurred_in_pixel
+// cost: 15
+fn scattered_beside_three(
+    diffusion_unblurred: vec3f,
+    diffusion_moved: vec3f,
+    diffusion_weight_1: vec3f,
+    diffusion_weight_2: vec3f,
+    diffusion_weight_3: vec3f,
+) -> vec3f {
+    return diffusion_moved + (vec3f(1.0) - diffusion_weight_1 - diffusion_weight_2 - diffusion_weight_3) * diffusion_unblurred;
+}
+
+// What no blur has moved counts w_0, 1 less the other weights.
+//
+// gives: scattered_light
+// when: diffusion, diffusion_five, combined_in_map, unblurred_in_pixel
+// cost: 21
+fn scattered_beside_five(
+    diffusion_unblurred: vec3f,
+    diffusion_moved: vec3f,
+    diffusion_weight_1: vec3f,
+    diffusion_weight_2: vec3f,
+    diffusion_weight_3: vec3f,
+    diffusion_weight_4: vec3f,
+    diffusion_weight_5: vec3f,
+) -> vec3f {
+    return diffusion_moved + (vec3f(1.0) - diffusion_weight_1 - diffusion_weight_2 - diffusion_weight_3 - diffusion_weight_4 - diffusion_weight_5) * diffusion_unblurred;
 }
 
 // c^(1 - m): the rest of the colour, over the blurs.

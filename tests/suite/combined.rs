@@ -1,0 +1,116 @@
+//! `[diffusion] combined`: levels weighed and added up in the pixel, or in texels, of which the sum is looked up. Lookups are
+//! linear, so that both show the same.
+
+use skinfit::engine::Unknown;
+use skinfit::gpu::Renderer;
+use skinfit::gpu::upload::Content;
+use skinfit::model::diffusion::{Combined, Lookup, Unblurred};
+use skinfit::model::effects::Effect;
+use skinfit::model::params::{Column, Param};
+use skinfit::prepare::Baked;
+use skinfit::shader::atlas::PassKind;
+use skinfit::shader::{Budget, Facts, plan};
+
+use crate::graphics::bench::{Difference, EXACT, gpu, quantile};
+use crate::sky::{brighter, effect, head_with, on_cpu};
+use crate::slopes;
+
+fn param(name: &str) -> Param {
+    Param::from_name(name).unwrap()
+}
+
+/// The built-in head with a lamp, in so many pixels a side, its light map of 128 texels; three blurs or five.
+fn head(combined: Combined, unblurred: Unblurred, five: bool, pixels: u32) -> Baked {
+    let mut more = vec![Effect::NormalMap, Effect::Lights, effect("fresnel"), effect("diffusion")];
+    more.extend(five.then(|| effect("diffusion_five")));
+    head_with(&more).with_scene(|scene| {
+        let camera = &mut scene.views[0].camera;
+        (camera.width, camera.height) = (pixels, pixels);
+        scene.diffusion.light_map_size = 128;
+        (scene.choices.diffusion.combined, scene.choices.diffusion.unblurred) = (combined, unblurred);
+        scene.metres_per_unit = 1.0;
+        for (level, weight) in [(1, 0.3), (2, 0.2), (3, 0.1), (4, 0.1), (5, 0.2)] {
+            scene.params.set(param(&format!("diffusion_weight_{level}")), weight);
+        }
+        scene.params.set(param("colour_mix"), 0.4);
+    })
+}
+
+/// Every way to have the levels, but for where they are combined.
+const WAYS: [(Unblurred, bool); 4] =
+    [(Unblurred::Map, false), (Unblurred::Map, true), (Unblurred::Pixel, false), (Unblurred::Pixel, true)];
+
+#[test]
+fn an_image_is_the_same_wherever_levels_are_combined() {
+    for (unblurred, five) in WAYS {
+        for lookup in [Lookup::Chart, Lookup::Dilated] {
+            let images = [Combined::Pixel, Combined::Map].map(|combined| {
+                on_cpu(&head(combined, unblurred, five, 32).with_scene(|scene| {
+                    scene.choices.diffusion.lookup = lookup;
+                }))
+            });
+            let [pixel, map] = &images;
+            let (mut most, mut light) = (0.0_f32, 0.0_f32);
+            for (a, b) in pixel.rgb.iter().zip(&map.rgb) {
+                for c in 0..3 {
+                    (most, light) = (most.max((a[c] - b[c]).abs()), light.max(a[c]));
+                }
+            }
+            // Some roundings of the brightest pixel's sums.
+            assert!(light > 0.1 && most < 2e-6 * light, "{unblurred:?} {five} {lookup:?}: {most} of {light}");
+        }
+    }
+}
+
+#[test]
+fn slopes_are_finite_differences_on_every_engine() {
+    for (unblurred, five) in WAYS {
+        let baked = head(Combined::Map, unblurred, five, 16);
+        let target = brighter(on_cpu(&baked));
+        let baked = baked.with_scene(|scene| scene.views[0].target = Some(target));
+        let observed = baked.sample().unwrap().observe().unwrap();
+        let columns = [
+            "base_weight",
+            "diffusion_weight_1",
+            "diffusion_weight_3",
+            "diffusion_radius_2",
+            "colour_mix",
+            "light.side.color",
+        ];
+        let unknowns: Vec<Unknown> =
+            columns.into_iter().map(|name| Unknown::Param(Column::tied(param(name)))).collect();
+        let what = format!("combined in the map, {unblurred:?}, five {five}");
+        slopes::assert_slopes(&observed, &unknowns, &slopes::EXACT, &what);
+    }
+}
+
+#[test]
+fn the_renderer_draws_what_the_processor_does() {
+    let Some(gpu) = gpu() else { return };
+    for (unblurred, five) in WAYS {
+        let baked = head(Combined::Map, unblurred, five, 48);
+        let want = on_cpu(&baked);
+        let camera = baked.scene.views[0].camera;
+        let got = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
+        let Difference { interior, .. } = Difference::new(&want, &got, 4);
+        // As without the choice: interpolation in f32 by vertices there, by rays here.
+        assert!(quantile(&interior, 0.5) < 1e-3, "{unblurred:?} {five}: {}", quantile(&interior, 0.5));
+    }
+}
+
+/// A pixel looks one level up in the place of four or six, and a draw is added.
+#[test]
+fn the_sum_alone_is_looked_up() {
+    for five in [false, true] {
+        let looked_up = |combined| {
+            let baked = head(combined, Unblurred::Map, five, 16);
+            let facts = Facts::of_scene(&baked.scene, &baked.scene.params, Budget::Exact, false);
+            let plan = plan(&facts).unwrap();
+            let draws = plan.passes.iter().filter(|pass| pass.kind == PassKind::Draw).count();
+            (plan.levels.len(), draws)
+        };
+        let ((each, draws), (sum, more)) = (looked_up(Combined::Pixel), looked_up(Combined::Map));
+        assert_eq!((each, sum), (if five { 6 } else { 4 }, 1));
+        assert_eq!(more, draws + 1);
+    }
+}
