@@ -10,37 +10,45 @@ use crate::lab::{Lab, Result, csv};
 use crate::studies::number;
 
 /// The last commit of which everything was one package.
-const ONE_PACKAGE: &str = "da7d59c";
+pub(crate) const ONE_PACKAGE: &str = "da7d59c";
 /// Sources that nobody writes.
 const PRINTED: [&str; 2] = ["engine/cpu/ahead/tapes.rs", "engine/loss/printed.rs"];
 /// How many of the longest compilations are named.
 const LONGEST: usize = 12;
 
-/// experiments/builds: this commit, and how the last one with a single package was divided.
+/// experiments/builds: the last commit with a single package, and this one.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let head = git(lab, &["rev-parse", "--short", "HEAD"])?.join("");
     let pages = lab.scratch.path();
     let mut command = Command::new("experiments/builds/run");
-    command.arg(pages).arg(&head);
+    command.arg(pages).args([ONE_PACKAGE, &head]);
     let rows = csv(&lab.run("builds from nothing", command, false)?)?;
+    let (then, now) = rows.split_at(rows.len() / 2);
+    let seconds = |rows: &[Value], what: &str| -> Result<Value> {
+        let row = rows.iter().find(|row| row["what"] == what);
+        Ok(row.ok_or(format!("no row of {what}"))?["seconds"].clone())
+    };
     let row = |(what, name): (&str, &str)| -> Result<Value> {
-        let row = rows.iter().find(|row| row["what"] == what).ok_or(format!("no row of {what}"))?;
-        Ok(json!({ "what": name, "seconds": row["seconds"] }))
+        Ok(json!({ "what": name, "then": seconds(then, what)?, "now": seconds(now, what)? }))
     };
     let built = [
         ("first", "the first command, from nothing"),
         ("command_line", "a new program after a line of the command line"),
         ("rule", "a new program after a rule"),
     ];
-    let mut longest = units(&pages.join(format!("{head}_first.html")))?;
-    let sum: f64 = longest.iter().map(|unit| number(&unit["seconds"])).sum();
-    longest.truncate(LONGEST);
+    let of = |commit: &str| -> Result<(Vec<Value>, f64)> {
+        let mut units = units(&pages.join(format!("{commit}_first.html")))?;
+        let sum = units.iter().map(|unit| number(&unit["seconds"])).sum();
+        units.truncate(LONGEST);
+        Ok((units, sum))
+    };
+    let ((longest_then, sum_then), (longest, sum)) = (of(ONE_PACKAGE)?, of(&head)?);
     // A parameter of the paper's effects, then and now; and one of an effect that a file of rules declares.
     let paper = "side_specular\\|SideSpecular";
     Ok(json!({
         "rows": built.into_iter().map(row).collect::<Result<Vec<Value>>>()?,
-        "sum": sum,
-        "longest": longest,
+        "sum": { "then": sum_then, "now": sum },
+        "longest": { "then": longest_then, "now": longest },
         "packages": { "then": packages(lab, ONE_PACKAGE)?, "now": packages(lab, &head)? },
         "files": {
             "side_specular": { "then": files_of(lab, ONE_PACKAGE, paper)?, "now": files_of(lab, &head, paper)? },

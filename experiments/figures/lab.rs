@@ -29,6 +29,8 @@ pub(crate) struct Lab {
     pub(crate) suite: Option<PathBuf>,
     /// A copy of what runs the race of other frameworks, with its data and its rows.
     pub(crate) race: Option<PathBuf>,
+    /// The program of the last commit with a single package, where it is built already.
+    pub(crate) before: Option<PathBuf>,
     /// A Python that has numpy and embreex.
     pub(crate) python: Option<PathBuf>,
 }
@@ -50,6 +52,7 @@ impl Lab {
             scratch: tempfile::tempdir()?,
             suite: None,
             race: None,
+            before: None,
             python: None,
         })
     }

@@ -21,6 +21,7 @@ mod results;
 mod strays;
 mod studies;
 mod timings;
+mod unchanged;
 mod ways;
 
 use std::path::{Path, PathBuf};
@@ -50,6 +51,7 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/rays/results.json", timings::rays),
     ("experiments/scaling/results.json", timings::scaling),
     ("experiments/builds/results.json", builds::measure),
+    ("experiments/unchanged/results.json", unchanged::measure),
     ("experiments/bench/results.json", timings::bench),
     ("experiments/network/results.json", timings::network),
     ("experiments/race/results.json", race::processor),
@@ -78,6 +80,9 @@ struct Arguments {
     /// A Python that has numpy and embreex.
     #[arg(long)]
     python: Option<PathBuf>,
+    /// The program of the last commit with a single package, where it is built already [default: it is built]
+    #[arg(long)]
+    before: Option<PathBuf>,
     /// A copy of what runs the race of other frameworks, with its data and its rows.
     #[arg(long)]
     race: Option<PathBuf>,
@@ -109,6 +114,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             lab.suite.clone_from(&arguments.suite);
             lab.race.clone_from(&arguments.race);
             lab.python.clone_from(&arguments.python);
+            lab.before.clone_from(&arguments.before);
             // One that cannot be measured leaves its file as it was, and the others go on.
             if let Err(error) = measured(&lab, file, *measure) {
                 eprintln!("figures: {file}: {error}");

@@ -1,0 +1,196 @@
+//! experiments/unchanged: fits by the paper's model, by the last program that was one package and by today's.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use serde_json::{Map, Value, json};
+use toml_edit::DocumentMut;
+
+use crate::builds::ONE_PACKAGE;
+use crate::lab::{Lab, Result};
+use crate::studies::number;
+
+/// The scenes by the paper's model: names, and folders of the data.
+const SCENES: [(&str, Option<&str>); 6] = [
+    ("built in", None),
+    ("forest", Some("lps_forest")),
+    ("sunrise", Some("lps_sunrise")),
+    ("studio", Some("lps_studio")),
+    ("studio, dry", Some("lps_studio_dry")),
+    ("posed head", Some("mh_portrait")),
+];
+
+/// What a fit found, and the folder that it left.
+struct Fit {
+    report: Value,
+    run: PathBuf,
+}
+
+/// How losses, constants and pictures differ, scene by scene, and term by term where the constants are the same.
+pub(crate) fn measure(lab: &Lab) -> Result<Value> {
+    let before = match &lab.before {
+        Some(program) => program.clone(),
+        None => built(lab)?,
+    };
+    let (mut rows, mut terms) = (Vec::new(), Vec::new());
+    for (name, folder) in SCENES {
+        let scene = folder.map(|folder| plain(lab, folder)).transpose()?;
+        let fit =
+            |program: &Path, when: &str| fitted(lab, program, &format!("{name}, {when}"), scene.as_deref());
+        let [then, now] = [fit(&before, "before")?, fit(lab.program(), "now")?];
+        let off = differences(&then, &now)?;
+        let mut row = row(name, &then.report, &now.report);
+        row["picture"] = off.get("").map_or(Value::Null, Off::told);
+        row["occlusion"] = occlusion(lab, [&before, lab.program()], name, scene.as_deref())?;
+        rows.push(row);
+        if folder.is_none() {
+            for (term, off) in &off {
+                let mut row = off.told();
+                row["term"] = if term.is_empty() { "the picture".into() } else { term.as_str().into() };
+                terms.push(row);
+            }
+        }
+    }
+    Ok(json!({ "before": ONE_PACKAGE, "rows": rows, "terms": terms }))
+}
+
+/// The program of the last commit with a single package.
+fn built(lab: &Lab) -> Result<PathBuf> {
+    let clone = lab.scratch.path().join("before");
+    let mut command = Command::new("git");
+    command.args(["clone", "--quiet", "."]).arg(&clone);
+    lab.run("the project as it was", command, false)?;
+    let mut command = Command::new("git");
+    command.arg("-C").arg(&clone).args(["checkout", "--quiet", "--detach", ONE_PACKAGE]);
+    lab.run("its commit", command, false)?;
+    let target = clone.join("target");
+    let mut command = Command::new("cargo");
+    command.args(["build", "--release", "--manifest-path"]).arg(clone.join("Cargo.toml"));
+    command.env("CARGO_TARGET_DIR", &target);
+    lab.run("its program", command, false)?;
+    Ok(target.join("release/skinfit"))
+}
+
+/// A scene by the paper's model alone: without lamps and materials, which the program before did not know.
+fn plain(lab: &Lab, folder: &str) -> Result<PathBuf> {
+    let whole = lab.scene(folder, &lab.data.join(folder).join("scene.toml"), &[])?;
+    let mut document: DocumentMut = std::fs::read_to_string(&whole)?.parse()?;
+    document.remove("light");
+    document["mesh"].as_table_mut().ok_or("a scene has a mesh")?.remove("skin");
+    let path = whole.with_extension("plain.toml");
+    std::fs::write(&path, document.to_string())?;
+    Ok(path)
+}
+
+fn fitted(lab: &Lab, program: &Path, what: &str, scene: Option<&Path>) -> Result<Fit> {
+    let run = lab.scratch.path().join(what.replace([' ', ','], "_"));
+    let mut command = Command::new(program);
+    command.arg("fit").args(scene).args(["--engine", "cpu", "--json", "--loss", "l2", "-o"]).arg(&run);
+    let report = serde_json::from_str(&lab.run(what, command, false)?)?;
+    Ok(Fit { report, run })
+}
+
+/// A scene's row: the losses before, how they differ as shares, the constant that has moved the most in standard errors as
+/// if residuals were independent.
+fn row(name: &str, then: &Value, now: &Value) -> Value {
+    let differs = |end: &str| number(&now["loss"][end]) / number(&then["loss"][end]) - 1.0;
+    let (mut most, mut which) = (0.0, String::new());
+    for (param, was) in then["params"].as_object().into_iter().flatten() {
+        let is = &now["params"][param];
+        if was["at_bound"] == true || was["std_error"].is_null() {
+            continue;
+        }
+        let errors = channels(&is["noise_error"]);
+        for ((was, is), error) in channels(&was["value"]).into_iter().zip(channels(&is["value"])).zip(errors)
+        {
+            // f32 holds no more of a constant than this, whatever its error.
+            let moved = ((was - is).abs() - 1e-7 * was.abs()).max(0.0) / error;
+            if moved > most {
+                (most, which) = (moved, param.clone());
+            }
+        }
+    }
+    json!({
+        "name": name, "start": then["loss"]["start"], "end": then["loss"]["end"],
+        "start_differs": differs("start"), "end_differs": differs("end"),
+        "constant": which, "errors": most,
+    })
+}
+
+/// A number, or one a channel.
+fn channels(value: &Value) -> Vec<f64> {
+    value.as_array().map_or_else(|| vec![number(value)], |channels| channels.iter().map(number).collect())
+}
+
+/// How numbers differ of a picture, or of a term in it, as shares of the picture's mean.
+#[derive(Default)]
+struct Off {
+    most: f64,
+    beyond: usize,
+    of: usize,
+}
+
+impl Off {
+    /// The share of numbers that differ by more than 1e-5, and the largest difference.
+    fn told(&self) -> Value {
+        json!({ "beyond": self.beyond as f64 / self.of.max(1) as f64, "most": self.most })
+    }
+}
+
+/// How the pictures of all views differ: of the picture (`""`), and of each term.
+fn differences(then: &Fit, now: &Fit) -> Result<BTreeMap<String, Off>> {
+    let mut all = BTreeMap::<String, Off>::new();
+    for view in then.report["views"].as_object().unwrap_or(&Map::new()).keys() {
+        let of_view = |fit: &Fit| planes(&fit.run.join(format!("{view}_terms.exr")));
+        let (then, now) = (of_view(then)?, of_view(now)?);
+        let picture: Vec<&f32> =
+            ["R", "G", "B"].iter().filter_map(|name| then.get(*name)).flatten().collect();
+        let mean = picture.iter().map(|&&x| f64::from(x)).sum::<f64>() / picture.len() as f64;
+        for (name, then) in &then {
+            let (term, channel) = name.rsplit_once('.').unwrap_or(("", name));
+            let Some(now) = now.get(name).filter(|_| ["R", "G", "B"].contains(&channel)) else { continue };
+            let off = all.entry(term.to_owned()).or_default();
+            for (a, b) in then.iter().zip(now) {
+                let by = f64::from((a - b).abs()) / mean;
+                off.most = off.most.max(by);
+                off.beyond += usize::from(by > 1e-5);
+            }
+            off.of += then.len();
+        }
+    }
+    Ok(all)
+}
+
+/// How many of the vertices' shares of open sky differ between two programs, and by how much at the most.
+fn occlusion(lab: &Lab, programs: [&Path; 2], name: &str, scene: Option<&Path>) -> Result<Value> {
+    let mut tables = Vec::new();
+    for (k, program) in programs.into_iter().enumerate() {
+        let folder = lab.scratch.path().join(format!("bake_{k}_{}", name.replace([' ', ','], "_")));
+        let mut command = Command::new(program);
+        command.arg("bake").args(scene).arg("-o").arg(&folder);
+        lab.run(&format!("{name}, bakes"), command, false)?;
+        tables.push(std::fs::read_to_string(folder.join("occlusion.csv"))?);
+    }
+    let open = |line: &str| line.split(',').nth(1).and_then(|open| open.parse::<f64>().ok());
+    let lines = tables[0].lines().zip(tables[1].lines()).skip(1);
+    let off: Vec<f64> = lines.filter_map(|(a, b)| Some((open(a)? - open(b)?).abs())).collect();
+    let most = off.iter().copied().fold(0.0, f64::max);
+    let differ = off.iter().filter(|off| **off > 1e-6).count();
+    Ok(json!({ "vertices": off.len(), "differ": differ, "most": most }))
+}
+
+/// The planes of an EXR file, by name.
+fn planes(path: &Path) -> Result<BTreeMap<String, Vec<f32>>> {
+    use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(|error| format!("{}: {error}", path.display()))?;
+    let planes = image.layer_data.channel_data.list.iter();
+    Ok(planes.map(|plane| (plane.name.to_string(), plane.sample_data.values_as_f32().collect())).collect())
+}
