@@ -11,8 +11,8 @@ const SCATTERING: [&str; 3] = ["forest", "sunrise", "studio"];
 
 const LIGHT: [&str; 7] =
     ["sky_lights", "visibility", "specular_visibility", "split_sum", "rays", "texture_filter", "shadows"];
-const DIFFUSION: [&str; 7] =
-    ["taps", "light_map_size", "seams", "ambient_normal", "stretch", "unblurred", "levels"];
+const DIFFUSION: [&str; 8] =
+    ["taps", "light_map_size", "seams", "ambient_normal", "stretch", "unblurred", "combined", "levels"];
 
 /// experiments/accuracy_vs_time/light.json.
 pub(crate) fn light(lab: &Lab) -> Result<Value> {

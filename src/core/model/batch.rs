@@ -8,7 +8,7 @@ use super::real::Real;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Batch<R, const N: usize>(pub [R; N]);
 
-// Loops, not closures over arrays: these are compiled without the instructions of who calls them.
+// Loops, not closures over arrays: a closure is compiled without the instructions of who calls it.
 macro_rules! operator {
     ($trait:ident $method:ident) => {
         impl<R: Real, const N: usize> $trait for Batch<R, N> {

@@ -152,11 +152,12 @@ choice! {
 }
 
 choice! {
-    /// Where levels are weighed and added up: lookups are linear, so that either shows the same.
+    /// Where levels are weighed and added up: lookups are linear, so that either shows the same but
+    /// for rounding.
     Combined {
         /// In the pixel, which looks each of them up: the article's. While nothing but weights is fitted, what was found stays.
         Pixel = "pixel",
-        /// In texels: the sum alone is looked up, and (where radii are free, or much else) fewer numbers of how it moves.
+        /// In texels: the sum is looked up, and with it how that moves, fewer numbers than of all levels.
         Map = "map",
     }
 }

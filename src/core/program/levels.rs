@@ -68,16 +68,18 @@ impl LevelProgram {
         Ok(())
     }
 
-    /// Whether a draw leaves the same whatever the parameters.
+    /// Whether a level of the passes so far moves.
+    fn moves(&self, name: &str) -> bool {
+        self.passes.iter().any(|pass| pass.moves && pass.leaves.iter().any(|(leaf, _)| leaf == name))
+    }
+
+    /// Whether a draw leaves the same whatever is free.
     fn stays(&self, at: usize) -> bool {
-        let (before, pass) = (&self.passes[..at], &self.passes[at]);
-        let moves = |name: &str| {
-            before.iter().any(|pass| pass.moves && pass.leaves.iter().any(|(leaf, _)| leaf == name))
-        };
+        let pass = &self.passes[at];
         matches!(pass.then, Then::Leave)
             && pass.steps.inputs().is_empty()
             && pass.steps.resources().is_empty()
-            && !pass.steps.fields().iter().any(|field| moves(&field.name))
+            && !pass.steps.fields().iter().any(|field| self.moves(&field.name))
     }
 
     fn add_each(&mut self, passes: &[Named<'_>]) -> Result<(), LowerError> {
@@ -90,7 +92,8 @@ impl LevelProgram {
             PassKind::Blur(_) | PassKind::Surface | PassKind::Neighbours | PassKind::Dilate => None,
         };
         if let Some(then) = together {
-            self.passes.extend(LevelPass::together(passes, &then)?);
+            let added = LevelPass::together(passes, &then, &|name| self.moves(name))?;
+            self.passes.extend(added);
             return Ok(());
         }
         for pass in passes {
@@ -199,8 +202,12 @@ fn gaussian(axis: Axis, passes: &[Named<'_>]) -> GaussianOf {
 impl LevelPass {
     /// Of passes whose steps are made together: what they have in common is computed once. Of a draw what no parameter reaches
     /// is a pass of its own, which runs once: the others' texels lie closer together without it.
-    fn together(passes: &[Named<'_>], then: &Then) -> Result<Vec<Self>, LowerError> {
-        let (graph, outputs, leaves) = Self::lowered(passes, then)?;
+    fn together(
+        passes: &[Named<'_>],
+        then: &Then,
+        moves: &dyn Fn(&str) -> bool,
+    ) -> Result<Vec<Self>, LowerError> {
+        let (graph, outputs, leaves) = Self::outputs(passes, then)?;
         let of = |outputs: &[Id], leaves| {
             let (graph, outputs) = graph.rebuilt(outputs, |_| None);
             let steps = Steps::new(&graph, &outputs, |_| Rounding::Plain);
@@ -209,8 +216,10 @@ impl LevelPass {
         if !matches!(then, Then::Leave) {
             return Ok(vec![of(&outputs, leaves)]);
         }
-        let shared = |graph: &Graph, id: Id| {
-            matches!(graph.node(id), Node::Uniform(_)) || graph.looked_up(id).is_some()
+        let shared = |graph: &Graph, id: Id| match graph.node(id) {
+            Node::Uniform(_) => true,
+            Node::Field(at) => moves(&graph.fields[at as usize].name),
+            _ => graph.looked_up(id).is_some(),
         };
         let of_parameters = graph.made_of(shared);
         let mut parts: [(Vec<Id>, Vec<(String, usize)>); 2] = Default::default();
@@ -227,12 +236,12 @@ impl LevelPass {
 
     /// Of passes that leave what they leave one after another.
     fn new(passes: &[Named<'_>], then: Then) -> Result<Self, LowerError> {
-        let (graph, outputs, leaves) = Self::lowered(passes, &then)?;
+        let (graph, outputs, leaves) = Self::outputs(passes, &then)?;
         Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then, moves: false })
     }
 
     /// The passes' graph, its outputs, and what they leave.
-    fn lowered(
+    fn outputs(
         passes: &[Named<'_>],
         then: &Then,
     ) -> Result<(Graph, Vec<Id>, Vec<(String, usize)>), LowerError> {

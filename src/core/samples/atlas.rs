@@ -8,7 +8,7 @@ use std::sync::OnceLock;
 use rayon::prelude::*;
 
 use super::LANES;
-use super::along::{Along, Sixteen, known};
+use super::along::{Along, SixteenTexels, known};
 use super::dilation::Dilation;
 use super::posed::PosedSurface;
 use super::rows::Rows;
@@ -41,8 +41,8 @@ pub struct Atlas {
     rows: Rows,
     /// Made where it is asked for.
     dilation: OnceLock<Dilation>,
-    /// Along u and v.
-    known: OnceLock<[Vec<Sixteen>; 2]>,
+    /// Likewise, for blurs.
+    known: OnceLock<Vec<SixteenTexels>>,
     margins: Margins,
 }
 
@@ -228,8 +228,7 @@ impl Atlas {
     /// The atlas along an axis.
     #[must_use]
     pub fn along(&self, axis: Axis) -> Along<'_> {
-        let [along_u, along_v] = self.known.get_or_init(|| [Axis::U, Axis::V].map(|axis| known(self, axis)));
-        Along::new(self, axis, if axis == Axis::U { along_u } else { along_v })
+        Along::new(self, axis, self.known.get_or_init(|| known(self)))
     }
 
     /// Which texel each covered one is, row by row.
@@ -267,7 +266,7 @@ impl Texels for Atlas {
     }
 }
 
-/// The places of texels with the charts of those that are covered.
+/// The places of texels with the charts of those that are covered, which count from 1: no empty texel is of a chart.
 fn cells(places: &[u32], charts: &[u32]) -> Vec<[u32; 2]> {
     let chart = |place: u32| charts.get(place as usize).copied().unwrap_or(0);
     places.iter().map(|&place| [place, chart(place)]).collect()

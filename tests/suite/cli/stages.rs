@@ -127,6 +127,14 @@ fn the_stages_of_diffusion_are_pictures_of_the_atlas() {
     // The ball is one piece.
     let charts = sandbox.text("baked/charts.csv");
     assert!(charts.starts_with("vertex,chart\n0,1\n1,1\n"), "{charts}");
+    // What pixels look up where levels are added up in texels.
+    sandbox.edit("light_map_size = 64", "light_map_size = 64\ncombined = \"map\"");
+    bake("diffuse,occlusion,diffusion", "added_up").done();
+    for name in ["sum", "sum_by_occlusion", "level_3"] {
+        let image = read_exr(&sandbox.path(&format!("added_up/{name}.exr")));
+        assert!(image.planes["R"].iter().any(|&red| red != 0.0), "{name}");
+    }
+    sandbox.edit("light_map_size = 64\ncombined = \"map\"", "light_map_size = 64");
     // What an engine makes of them is exported with the shader.
     sandbox.write("truth.toml", TRUTH.as_bytes());
     sandbox.edit("\"reflection\"]", "\"reflection\", \"diffusion\"]");

@@ -334,11 +334,12 @@ fn diffusion_is_measured_against_light_by_distance_over_the_surface() {
     // A ball as wide as a fist in few texels: the widest blur is of some of them.
     sandbox.edit("[mesh]\n", "[mesh]\nmetres_per_unit = 0.05\n");
     sandbox.edit("[quality]", "[diffusion]\nlight_map_size = 64\n[quality]");
-    let axes: [(&str, &[&str], &str); 4] = [
+    let axes: [(&str, &[&str], &str); 5] = [
         ("taps", &["5", "7", "9", "full", "surface"], "5"),
         ("seams", &["cut", "joined", "surface"], "cut"),
         ("stretch", &["derivative", "exact", "surface"], "exact"),
         ("levels", &["3", "5", "surface"], "3"),
+        ("combined", &["pixel", "map", "surface"], "pixel"),
     ];
     let options = axes.iter().flat_map(|(axis, ..)| ["--axis", axis]).collect::<Vec<_>>();
     done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &options].concat()));

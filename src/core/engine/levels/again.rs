@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::sync::{Arc, PoisonError};
 
-use super::records::Made;
+use super::records::{Made, Record};
 use super::run::{Run, order};
 use super::{LevelMaker, Number};
 use crate::bake::stacks::Stack;
@@ -95,7 +95,7 @@ impl<R: Number> LevelMaker<R> {
             let mut record = before.made_with(at, &with).map(Arc::clone).unwrap_or_default();
             if wanted[at] {
                 drop(record);
-                let memory = before.take(at).or_else(|| self.memory()).unwrap_or_default();
+                let memory = before.take(at).or_else(|| self.memory(pass, atlas)).unwrap_or_default();
                 let mut fresh = Run::new(pass, (atlas, &made), params, cubes).record(memory);
                 if self.program.dilated && self.flow.found[at] && !all {
                     fresh.fill(atlas.dilation());
@@ -111,9 +111,14 @@ impl<R: Number> LevelMaker<R> {
         made
     }
 
-    /// Memory that nothing stands in.
-    fn memory(&self) -> Option<Vec<R>> {
-        self.spare.lock().unwrap_or_else(PoisonError::into_inner).pop()
+    /// Memory that nothing stands in: the smallest with room for a pass' record, or the largest, which is given up.
+    fn memory(&self, pass: &LevelPass, atlas: &Atlas) -> Option<Vec<R>> {
+        let mut spare = self.spare.lock().unwrap_or_else(PoisonError::into_inner);
+        let count = Record::<R>::room(pass.leaves.len(), atlas.covered());
+        let has_room = (0..spare.len()).filter(|&at| spare[at].len() >= count);
+        let best = has_room.min_by_key(|&at| spare[at].len());
+        let best = best.or_else(|| (0..spare.len()).max_by_key(|&at| spare[at].len()))?;
+        Some(spare.swap_remove(best))
     }
 
     /// Give up what was read last by a pass, unless it is kept.

@@ -137,7 +137,7 @@ impl<'a, R: Number> Gaussian<'a, R> {
         slopes: &mut [Texel<R>; LANES],
     ) {
         let of = self.along.sixteen(first);
-        let taps = Taps::<R, REACH>::new::<S>(simd, (self.along, of), deviations, self.sources.stride as u32);
+        let taps = Taps::<R, REACH>::new::<S>(simd, (self.along, of), deviations);
         let numbers = 3 * self.sources.count;
         let moves = self.moved.iter().any(Option::is_some);
         // What is written beyond a texel's own numbers is written over: texels are in their order.
@@ -167,7 +167,7 @@ impl<'a, R: Number> Gaussian<'a, R> {
         }
     }
 
-    /// Several numbers of a texel, weighed by its taps, and in `slope` how the first three move as the deviation does.
+    /// Several numbers of a texel, weighed by its taps, and in `slopes` how the first three move as the deviation does.
     #[inline(always)]
     fn weighed<S: Simd, W: Wide<R, S>, const REACH: usize>(
         &self,
@@ -175,13 +175,14 @@ impl<'a, R: Number> Gaussian<'a, R> {
         taps: &Taps<R, REACH>,
         (here, lane, from): (usize, usize, usize),
         leaves: &mut [R],
-        slope: Option<&mut Texel<R>>,
+        slopes: Option<&mut Texel<R>>,
     ) {
         let record = &self.sources.record[from..];
-        let own = W::load(simd, record, here * self.sources.stride);
+        let stride = self.sources.stride;
+        let own = W::load(simd, record, here * stride);
         let (mut sum, mut change) = (W::splat(simd, R::from(0.0)), W::splat(simd, R::from(0.0)));
         for k in 0..REACH {
-            let near = |i: usize| W::load(simd, record, taps.places[k][i][lane] as usize);
+            let near = |i: usize| W::load(simd, record, taps.texels[k][i][lane] as usize * stride);
             let share = |side: usize| W::splat(simd, taps.shares[k][side][lane]);
             let [a, b, c, d] = [near(0), near(1), near(2), near(3)];
             let [weight, slope] = weight(k);
@@ -194,8 +195,8 @@ impl<'a, R: Number> Gaussian<'a, R> {
         let share = W::splat(simd, taps.share[lane]);
         let off = sum * share;
         (own + off).store(leaves);
-        if let Some(slope) = slope {
-            *slope = ((change - W::splat(simd, taps.slopes[lane]) * off) * share).three();
+        if let Some(slopes) = slopes {
+            *slopes = ((change - W::splat(simd, taps.slopes[lane]) * off) * share).three();
         }
     }
 

@@ -31,13 +31,22 @@ impl<R> Default for Record<R> {
 impl<R: Number> Record<R> {
     /// So many leaves of so many texels, in memory that others have left. What stands there is theirs.
     pub(super) fn within(mut memory: Vec<R>, leaves: usize, texels: usize) -> Self {
-        let stride = (3 * leaves).next_multiple_of(WIDE);
-        let count = stride * texels + LANES;
+        let (stride, count) = (Self::stride(leaves), Self::room(leaves, texels));
         if memory.len() < count {
             // Not a copy of what nobody reads.
             memory = vec![R::from(0.0); count];
         }
         Self { stride, texels, numbers: memory }
+    }
+
+    /// Numbers of a texel with so many leaves.
+    fn stride(leaves: usize) -> usize {
+        (3 * leaves).next_multiple_of(WIDE)
+    }
+
+    /// Numbers that a record of so many leaves of so many texels takes.
+    pub(super) fn room(leaves: usize, texels: usize) -> usize {
+        Self::stride(leaves) * texels + LANES
     }
 
     /// So many leaves of so many texels, all 0.

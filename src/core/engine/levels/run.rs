@@ -54,7 +54,7 @@ pub(super) struct Run<'a, R: Number> {
     params: &'a Params,
     cubes: &'a CubesAt<R>,
     loads: Vec<Load>,
-    /// Of levels those that are read together.
+    /// Levels' numbers that are read together.
     blocks: Vec<Block>,
     /// The order in which the pass' leaves stand.
     order: Vec<usize>,

@@ -3,8 +3,8 @@
 //! A *level* is a texture of the atlas' size, four 32-bit floats a texel: a quantity, and in w the texel's chart, counted
 //! from 1, 0 where the mesh has no surface. A *draw* evaluates the rules of texels in each that the mesh covers, and
 //! leaves the levels that a pass or a fragment reads. A *blur* reads a level and leaves another, along u
-//! or along v. Draws and blurs take turns where texels' rules need what was blurred; texels that need nothing of that are
-//! computed anew in each draw.
+//! or along v. Draws and blurs take turns where texels' rules need what was blurred; a later draw reads the levels of those
+//! before, and computes anew what stands in none.
 //!
 //! Beside stored samples stand stored texels: the same passes are functions of them ([`TEXEL`], [`TAPS`]), which the
 //! processor evaluates.
@@ -129,7 +129,12 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
         });
         let leaves: Vec<Level> = given.filter(|level| stored.contains(level.name.as_str())).collect();
         for leaves in leaves.chunks(LEVELS_A_DRAW) {
-            passes.push(draw(facts, found, &texels, leaves)?);
+            // What was blurred or drawn before stands in levels.
+            let stands = |rule: &Rule| {
+                let given = |(quantity, _): &(&str, _)| stored.contains(quantity);
+                rule.blur.is_some() || (depth(rule) < Some(layer) && rule.gives.iter().all(given))
+            };
+            passes.push(draw(facts, found, (&texels, &stands), leaves)?);
         }
         let blurs = texels.iter().filter(|rule| rule.blur.is_some() && depth(rule) == Some(layer + 1));
         passes.extend(blurs.flat_map(|rule| blurs_of(facts, rule)));
@@ -170,16 +175,22 @@ fn dilate(facts: &Facts, source: &Level) -> Pass {
 /// Texels around one.
 const NEIGHBOURS: f64 = 8.0;
 
-fn draw(facts: &Facts, found: &Found, texels: &[&'static Rule], leaves: &[Level]) -> Result<Pass, PlanError> {
+/// A draw by rules of texels; what some of them give stands in levels.
+fn draw(
+    facts: &Facts,
+    found: &Found,
+    (texels, stands): (&[&'static Rule], &dyn Fn(&Rule) -> bool),
+    leaves: &[Level],
+) -> Result<Pass, PlanError> {
     let goals: Vec<&str> = leaves.iter().map(|level| level.name.as_str()).collect();
-    let shading = upstream(texels, Domain::Texel, &goals, &|rule| rule.blur.is_some());
-    let blurred = texels.iter().filter(|rule| rule.blur.is_some());
-    let read = |rule: &Rule| {
-        let mut needs = shading.iter().flat_map(|shading| &shading.needs);
-        needs.any(|(need, _)| rule.gives_quantity(need))
-    };
-    let levels =
-        blurred.filter(|rule| read(rule)).map(|rule| Level::new(rule.gives[0].0, rule.returns)).collect();
+    let shading = upstream(texels, Domain::Texel, &goals, stands);
+    let needed =
+        |quantity: &str| shading.iter().any(|rule| rule.needs.iter().any(|(need, _)| *need == quantity));
+    let standing = texels.iter().filter(|rule| stands(rule));
+    let given = standing.flat_map(|rule| {
+        rule.gives.iter().map(|(quantity, swizzle)| Level::new(*quantity, rule.given_type(swizzle)))
+    });
+    let levels = given.filter(|level| needed(&level.name)).collect();
     let rules = with_vertices(found, Domain::Texel, &[UV, CHART], shading);
     let mut plan = Plan::of_rules(facts, &rules, &found.carried, levels);
     if facts.source == Source::Raster {

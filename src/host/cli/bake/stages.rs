@@ -26,6 +26,9 @@ use skinfit_core::program::shading::Shading;
 /// The light map, and the levels that are made of it.
 const LIGHT_MAP: &str = "diffusion_level_0";
 const LEVEL: &str = "diffusion_level_";
+/// What `combined = "map"` adds up in texels, and that of the blurs alone.
+const SUM: &str = "scattered_light";
+const MOVED: &str = "diffusion_moved";
 const STRETCH: &str = "diffusion_stretch";
 
 /// How a picture's numbers are shown on a screen; the EXR file has them as they are.
@@ -117,6 +120,7 @@ impl Stages {
 fn file_of(name: &str, free: &[Param]) -> Option<(String, Shown)> {
     let of = |name: &str| match name {
         LIGHT_MAP => Some("light_map".to_owned()),
+        SUM | MOVED => Some("sum".to_owned()),
         _ => {
             let k = name.strip_prefix(LEVEL)?;
             k.bytes().all(|digit| digit.is_ascii_digit()).then(|| format!("level_{k}"))

@@ -128,8 +128,8 @@ pub(super) const UNBLURRED: Ways = ways(
 pub(super) const COMBINED: Ways = ways(
     "combined",
     "Where the levels are weighed and added up",
-    "Images with each level looked up by the pixel, and with their sum alone; levels by distance over the surface are the \
-     reference. Seconds are those of baking, tracing and one pass, nothing cached.",
+    "Images with each level looked up by the pixel, and with their sum alone, which differ in time; levels by distance over the \
+     surface are the reference. Seconds are those of baking, tracing and one pass, nothing cached.",
     &[
         ("pixel", |scene| {
             blurred(scene);
@@ -139,7 +139,7 @@ pub(super) const COMBINED: Ways = ways(
             blurred(scene);
             scene.choices.diffusion.combined = Combined::Map;
         }),
-        ("surface", |scene| scene.choices.diffusion.method = Method::Surface),
+        SURFACE,
     ],
 );
 
