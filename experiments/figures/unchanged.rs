@@ -98,7 +98,8 @@ fn row(name: &str, then: &Value, now: &Value) -> Value {
     let (mut most, mut which) = (0.0, String::new());
     for (param, was) in then["params"].as_object().into_iter().flatten() {
         let is = &now["params"][param];
-        if was["at_bound"] == true || was["std_error"].is_null() {
+        let open = |found: &Value| found["at_bound"] == false && !found["std_error"].is_null();
+        if !open(was) || !open(is) {
             continue;
         }
         let errors = channels(&is["noise_error"]);
@@ -149,12 +150,17 @@ fn differences(then: &Fit, now: &Fit) -> Result<BTreeMap<String, Off>> {
         let mean = picture.iter().map(|&&x| f64::from(x)).sum::<f64>() / picture.len() as f64;
         for (name, then) in &then {
             let (term, channel) = name.rsplit_once('.').unwrap_or(("", name));
-            let Some(now) = now.get(name).filter(|_| ["R", "G", "B"].contains(&channel)) else { continue };
+            if !["R", "G", "B"].contains(&channel) {
+                continue;
+            }
+            let same = now.get(name).filter(|now| now.len() == then.len());
+            let now = same.ok_or(format!("{name} of {view} has no like"))?;
             let off = all.entry(term.to_owned()).or_default();
             for (a, b) in then.iter().zip(now) {
                 let by = f64::from((a - b).abs()) / mean;
-                off.most = off.most.max(by);
-                off.beyond += usize::from(by > 1e-5);
+                // NaN differs from all.
+                off.most = if by <= off.most { off.most } else { by };
+                off.beyond += usize::from(!(by <= 1e-5));
             }
             off.of += then.len();
         }
@@ -173,6 +179,9 @@ fn occlusion(lab: &Lab, programs: [&Path; 2], name: &str, scene: Option<&Path>) 
         tables.push(std::fs::read_to_string(folder.join("occlusion.csv"))?);
     }
     let open = |line: &str| line.split(',').nth(1).and_then(|open| open.parse::<f64>().ok());
+    if tables[0].lines().count() != tables[1].lines().count() {
+        return Err(format!("{name}: other vertices").into());
+    }
     let lines = tables[0].lines().zip(tables[1].lines()).skip(1);
     let off: Vec<f64> = lines.filter_map(|(a, b)| Some((open(a)? - open(b)?).abs())).collect();
     let most = off.iter().copied().fold(0.0, f64::max);
