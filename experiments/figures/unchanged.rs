@@ -160,7 +160,7 @@ fn differences(then: &Fit, now: &Fit) -> Result<BTreeMap<String, Off>> {
                 let by = f64::from((a - b).abs()) / mean;
                 // NaN differs from all.
                 off.most = if by <= off.most { off.most } else { by };
-                off.beyond += usize::from(!(by <= 1e-5));
+                off.beyond += usize::from(by.is_nan() || by > 1e-5);
             }
             off.of += then.len();
         }

@@ -51,10 +51,13 @@ fn assert_same([a, b]: &[Image; 2], share: f32, what: &str) {
     }
 }
 
+/// Another choice, by name.
+type Change = (&'static str, fn(&mut DiffusionChoices));
+
 #[test]
 fn an_image_is_the_same_wherever_levels_are_combined() {
     for (unblurred, five) in WAYS {
-        let changes: [(&str, fn(&mut DiffusionChoices)); 5] = [
+        let changes: [Change; 5] = [
             ("within charts", |_| ()),
             ("by one fetch", |choices| choices.lookup = Lookup::Dilated),
             ("seams joined", |choices| choices.seams = Seams::Joined),

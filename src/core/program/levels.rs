@@ -207,14 +207,13 @@ impl LevelPass {
         then: &Then,
         moves: &dyn Fn(&str) -> bool,
     ) -> Result<Vec<Self>, LowerError> {
-        let (graph, outputs, leaves) = Self::outputs(passes, then)?;
-        let of = |outputs: &[Id], leaves| {
-            let (graph, outputs) = graph.rebuilt(outputs, |_| None);
-            let steps = Steps::new(&graph, &outputs, |_| Rounding::Plain);
-            Self { steps, leaves, then: then.clone(), moves: false }
+        let (graph, whole) = Yielded::of(passes, then)?;
+        let of = |part: Yielded| {
+            let (graph, outputs) = graph.rebuilt(&part.outputs, |_| None);
+            part.pass(&graph, &outputs, then.clone())
         };
         if !matches!(then, Then::Leave) {
-            return Ok(vec![of(&outputs, leaves)]);
+            return Ok(vec![of(whole)]);
         }
         let shared = |graph: &Graph, id: Id| match graph.node(id) {
             Node::Uniform(_) => true,
@@ -222,47 +221,22 @@ impl LevelPass {
             _ => graph.looked_up(id).is_some(),
         };
         let of_parameters = graph.made_of(shared);
-        let mut parts: [(Vec<Id>, Vec<(String, usize)>); 2] = Default::default();
-        let mut next = outputs.iter().copied();
-        for leaf in leaves {
+        let mut parts = [Yielded::default(), Yielded::default()];
+        let mut next = whole.outputs.into_iter();
+        for leaf in whole.leaves {
             let numbers: Vec<Id> = next.by_ref().take(leaf.1).collect();
-            let part = numbers.iter().any(|id| of_parameters[id.index()]);
-            parts[usize::from(part)].0.extend(numbers);
-            parts[usize::from(part)].1.push(leaf);
+            let part = &mut parts[usize::from(numbers.iter().any(|id| of_parameters[id.index()]))];
+            part.outputs.extend(numbers);
+            part.leaves.push(leaf);
         }
-        let parts = parts.into_iter().filter(|(_, leaves)| !leaves.is_empty());
-        Ok(parts.map(|(outputs, leaves)| of(&outputs, leaves)).collect())
+        Ok(parts.into_iter().filter(|part| !part.leaves.is_empty()).map(of).collect())
     }
 
     /// Of passes that leave what they leave one after another.
     fn new(passes: &[Named<'_>], then: Then) -> Result<Self, LowerError> {
-        let (graph, outputs, leaves) = Self::outputs(passes, &then)?;
-        Ok(Self { steps: Steps::new(&graph, &outputs, |_| Rounding::Plain), leaves, then, moves: false })
-    }
-
-    /// The passes' graph, its outputs, and what they leave.
-    fn outputs(
-        passes: &[Named<'_>],
-        then: &Then,
-    ) -> Result<(Graph, Vec<Id>, Vec<(String, usize)>), LowerError> {
-        let mut graph = Graph::default();
-        let mut outputs: Vec<Id> = Vec::new();
-        let mut deviation = false;
-        for pass in passes {
-            let moves = pass.pass.moving.is_some();
-            let numbers = lowered(pass, &mut graph)?;
-            match then {
-                // The deviation once, and then how it moves.
-                Then::Gaussian(_) => {
-                    let own = usize::from(deviation);
-                    outputs.extend(&numbers[own..if moves { 2 } else { 1 }]);
-                    deviation = true;
-                }
-                _ => outputs.extend(numbers),
-            }
-        }
-        let leaves = passes.iter().flat_map(|pass| pass.pass.leaves.iter().map(|leaf| level_of(pass, leaf)));
-        Ok((graph, outputs, leaves.collect()))
+        let (graph, whole) = Yielded::of(passes, &then)?;
+        let outputs = whole.outputs.clone();
+        Ok(whole.pass(&graph, &outputs, then))
     }
 
     /// The levels that it reads, and what it reads of a texel, by name.
@@ -285,6 +259,44 @@ impl LevelPass {
             }
         }
         fields.chain(sources)
+    }
+}
+
+/// What passes yield.
+#[derive(Default)]
+struct Yielded {
+    outputs: Vec<Id>,
+    /// What they are of, each with how many of them.
+    leaves: Vec<(String, usize)>,
+}
+
+impl Yielded {
+    /// Of passes, and the graph that they are of.
+    fn of(passes: &[Named<'_>], then: &Then) -> Result<(Graph, Self), LowerError> {
+        let mut graph = Graph::default();
+        let mut outputs: Vec<Id> = Vec::new();
+        let mut deviation = false;
+        for pass in passes {
+            let moves = pass.pass.moving.is_some();
+            let numbers = lowered(pass, &mut graph)?;
+            match then {
+                // The deviation once, and then how it moves.
+                Then::Gaussian(_) => {
+                    let own = usize::from(deviation);
+                    outputs.extend(&numbers[own..if moves { 2 } else { 1 }]);
+                    deviation = true;
+                }
+                _ => outputs.extend(numbers),
+            }
+        }
+        let leaves = passes.iter().flat_map(|pass| pass.pass.leaves.iter().map(|leaf| level_of(pass, leaf)));
+        Ok((graph, Self { outputs, leaves: leaves.collect() }))
+    }
+
+    /// A pass that leaves this; its outputs in a graph.
+    fn pass(self, graph: &Graph, outputs: &[Id], then: Then) -> LevelPass {
+        let steps = Steps::new(graph, outputs, |_| Rounding::Plain);
+        LevelPass { steps, leaves: self.leaves, then, moves: false }
     }
 }
 

@@ -134,7 +134,7 @@ pub(super) fn passes(facts: &Facts, found: &Found) -> Result<Vec<Pass>, PlanErro
                 let given = |(quantity, _): &(&str, _)| stored.contains(quantity);
                 rule.blur.is_some() || (depth(rule) < Some(layer) && rule.gives.iter().all(given))
             };
-            passes.push(draw(facts, found, (&texels, &stands), leaves)?);
+            passes.push(draw(facts, found, &texels, &stands, leaves)?);
         }
         let blurs = texels.iter().filter(|rule| rule.blur.is_some() && depth(rule) == Some(layer + 1));
         passes.extend(blurs.flat_map(|rule| blurs_of(facts, rule)));
@@ -179,7 +179,8 @@ const NEIGHBOURS: f64 = 8.0;
 fn draw(
     facts: &Facts,
     found: &Found,
-    (texels, stands): (&[&'static Rule], &dyn Fn(&Rule) -> bool),
+    texels: &[&'static Rule],
+    stands: &dyn Fn(&Rule) -> bool,
     leaves: &[Level],
 ) -> Result<Pass, PlanError> {
     let goals: Vec<&str> = leaves.iter().map(|level| level.name.as_str()).collect();
