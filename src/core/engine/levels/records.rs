@@ -112,7 +112,7 @@ impl<R: Number> Record<R> {
 
 /// Sixteen numbers from a place on.
 #[inline(always)]
-pub(super) fn sixteen<R>(numbers: &[R], first: usize) -> &[R; LANES] {
+fn sixteen<R>(numbers: &[R], first: usize) -> &[R; LANES] {
     match numbers[first..].first_chunk() {
         Some(sixteen) => sixteen,
         None => unreachable!("sixteen numbers stand behind the last texel"),
