@@ -18,6 +18,7 @@ mod light;
 mod pages;
 mod race;
 mod results;
+mod speed;
 mod strays;
 mod studies;
 mod timings;
@@ -52,6 +53,8 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/scaling/results.json", timings::scaling),
     ("experiments/builds/results.json", builds::measure),
     ("experiments/unchanged/results.json", unchanged::measure),
+    ("experiments/unchanged/speed.json", speed::processor),
+    ("experiments/unchanged/card.json", speed::graphics_card),
     ("experiments/bench/results.json", timings::bench),
     ("experiments/network/results.json", timings::network),
     ("experiments/race/results.json", race::processor),
@@ -80,9 +83,13 @@ struct Arguments {
     /// A Python that has numpy and embreex.
     #[arg(long)]
     python: Option<PathBuf>,
-    /// The program of the last commit with a single package, where it is built already [default: it is built]
+    /// The program of the last commit with a single package, where it is built already, the race's in `examples` beside it
+    /// [default: both are built]
     #[arg(long)]
     before: Option<PathBuf>,
+    /// That program with `experiments/unchanged/limited_slopes.patch`, where it is built already [default: it is built]
+    #[arg(long)]
+    limited: Option<PathBuf>,
     /// A copy of what runs the race of other frameworks, with its data and its rows.
     #[arg(long)]
     race: Option<PathBuf>,
@@ -115,6 +122,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             lab.race.clone_from(&arguments.race);
             lab.python.clone_from(&arguments.python);
             lab.before.clone_from(&arguments.before);
+            lab.limited.clone_from(&arguments.limited);
             // One that cannot be measured leaves its file as it was, and the others go on.
             if let Err(error) = measured(&lab, file, *measure) {
                 eprintln!("figures: {file}: {error}");

@@ -29,19 +29,20 @@ struct Fit {
 
 /// How losses, constants and pictures differ, scene by scene, and term by term where the constants are the same.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
-    let before = match &lab.before {
-        Some(program) => program.clone(),
-        None => built(lab)?,
-    };
+    let (before, limited) = (program_before(lab)?, program_limited(lab)?);
     let (mut rows, mut terms) = (Vec::new(), Vec::new());
     for (name, folder) in SCENES {
         let scene = folder.map(|folder| plain(lab, folder)).transpose()?;
         let fit =
             |program: &Path, when: &str| fitted(lab, program, &format!("{name}, {when}"), scene.as_deref());
-        let [then, now] = [fit(&before, "before")?, fit(lab.program(), "now")?];
+        let [then, between, now] =
+            [fit(&before, "before")?, fit(&limited, "limited slopes")?, fit(lab.program(), "now")?];
         let off = differences(&then, &now)?;
+        let picture = |off: &BTreeMap<String, Off>| off.get("").map_or(Value::Null, Off::told);
         let mut row = row(name, &then.report, &now.report);
-        row["picture"] = off.get("").map_or(Value::Null, Off::told);
+        row["picture"] = picture(&off);
+        row["limited"] = self::row(name, &between.report, &now.report);
+        row["limited"]["picture"] = picture(&differences(&between, &now)?);
         row["occlusion"] = occlusion(lab, [&before, lab.program()], name, scene.as_deref())?;
         rows.push(row);
         if folder.is_none() {
@@ -55,21 +56,46 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     Ok(json!({ "before": ONE_PACKAGE, "rows": rows, "terms": terms }))
 }
 
-/// The program of the last commit with a single package.
-fn built(lab: &Lab) -> Result<PathBuf> {
-    let clone = lab.scratch.path().join("before");
+/// The program of the last commit with a single package, and the race's in `examples` beside it: built, where they are not.
+pub(crate) fn program_before(lab: &Lab) -> Result<PathBuf> {
+    if let Some(program) = &lab.before {
+        return Ok(program.clone());
+    }
+    built(lab, "before", None)
+}
+
+/// The same, its lobes interpolated with limited slopes, as today's program does it.
+fn program_limited(lab: &Lab) -> Result<PathBuf> {
+    match &lab.limited {
+        Some(program) => Ok(program.clone()),
+        None => built(lab, "limited", Some(&lab.root.join("experiments/unchanged/limited_slopes.patch"))),
+    }
+}
+
+/// The program of that commit, built in a folder of its own, with a patch.
+fn built(lab: &Lab, folder: &str, patch: Option<&Path>) -> Result<PathBuf> {
+    let clone = lab.scratch.path().join(folder);
+    let program = clone.join("target/release/skinfit");
+    if program.exists() {
+        return Ok(program);
+    }
     let mut command = Command::new("git");
     command.args(["clone", "--quiet", "."]).arg(&clone);
     lab.run("the project as it was", command, false)?;
     let mut command = Command::new("git");
     command.arg("-C").arg(&clone).args(["checkout", "--quiet", "--detach", ONE_PACKAGE]);
     lab.run("its commit", command, false)?;
+    if let Some(patch) = patch {
+        let mut command = Command::new("git");
+        command.arg("-C").arg(&clone).arg("apply").arg(patch);
+        lab.run("its patch", command, false)?;
+    }
     let target = clone.join("target");
     let mut command = Command::new("cargo");
-    command.args(["build", "--release", "--manifest-path"]).arg(clone.join("Cargo.toml"));
-    command.env("CARGO_TARGET_DIR", &target);
-    lab.run("its program", command, false)?;
-    Ok(target.join("release/skinfit"))
+    command.args(["build", "--release", "--bins", "--example", "race"]);
+    command.arg("--manifest-path").arg(clone.join("Cargo.toml")).env("CARGO_TARGET_DIR", &target);
+    lab.run("its programs", command, false)?;
+    Ok(program)
 }
 
 /// A scene by the paper's model alone: without lamps and materials, which the program before did not know.
@@ -92,30 +118,31 @@ fn fitted(lab: &Lab, program: &Path, what: &str, scene: Option<&Path>) -> Result
 }
 
 /// A scene's row: the losses before, how they differ as shares, the constant that has moved the most in standard errors as
-/// if residuals were independent.
+/// if residuals were independent, and the most that one has moved in those that reports give.
 fn row(name: &str, then: &Value, now: &Value) -> Value {
     let differs = |end: &str| number(&now["loss"][end]) / number(&then["loss"][end]) - 1.0;
-    let (mut most, mut which) = (0.0, String::new());
+    let (mut most, mut of_reported, mut which) = (0.0, 0.0_f64, String::new());
     for (param, was) in then["params"].as_object().into_iter().flatten() {
         let is = &now["params"][param];
         let open = |found: &Value| found["at_bound"] == false && !found["std_error"].is_null();
         if !open(was) || !open(is) {
             continue;
         }
-        let errors = channels(&is["noise_error"]);
-        for ((was, is), error) in channels(&was["value"]).into_iter().zip(channels(&is["value"])).zip(errors)
-        {
+        let values = channels(&was["value"]).into_iter().zip(channels(&is["value"]));
+        let errors = channels(&is["noise_error"]).into_iter().zip(channels(&is["std_error"]));
+        for ((was, is), (error, reported)) in values.zip(errors) {
             // f32 holds no more of a constant than this, whatever its error.
-            let moved = ((was - is).abs() - 1e-7 * was.abs()).max(0.0) / error;
-            if moved > most {
-                (most, which) = (moved, param.clone());
+            let moved = ((was - is).abs() - 1e-7 * was.abs()).max(0.0);
+            of_reported = of_reported.max(moved / reported);
+            if moved / error > most {
+                (most, which) = (moved / error, param.clone());
             }
         }
     }
     json!({
         "name": name, "start": then["loss"]["start"], "end": then["loss"]["end"],
         "start_differs": differs("start"), "end_differs": differs("end"),
-        "constant": which, "errors": most,
+        "constant": which, "errors": most, "reported_errors": of_reported,
     })
 }
 

@@ -31,12 +31,12 @@ pub enum StudyError {
     #[error("the axis {axis}: {why}. Leave it out, or name a scene that does.")]
     Idle { axis: &'static str, why: &'static str },
     /// An axis was named along which several scenes cannot be taken together.
-    #[error("--axis {axis}: {why}. Leave it out, or study the scenes one by one.")]
+    #[error("the axis {axis}: {why}. Leave it out, or study the scenes one by one.")]
     Apart { axis: &'static str, why: &'static str },
     /// Something is to be held out, and nothing is fitted.
     #[error(
-        "--hold-out: of the axes to be swept ({swept}) none fits anything that a view could be left out of. Name some of \
-         {fitting} with --axis, too, or leave --hold-out out."
+        "views are to be held out, but of the axes to be swept ({swept}) none fits anything that a view could be left out of. \
+         Sweep some of {fitting}, too, or hold none out."
     )]
     NothingFitted { swept: String, fitting: String },
     /// A goal, and no axis whose settings could meet it.

@@ -3,6 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use skinfit::model::effects::Effect;
+use skinfit::shader::term::register;
+
+use crate::every_effect::every_effect;
+
 #[path = "../../experiments/figures/pages.rs"]
 mod pages;
 #[path = "../../experiments/figures/strays.rs"]
@@ -24,6 +29,40 @@ fn the_page_of_parameters_holds_the_programs_table() {
         page.ends_with(&table),
         "docs/parameters.md has drifted from the table in src/core/model/params.rs"
     );
+}
+
+#[test]
+fn every_effect_stands_in_the_pages_that_list_them() {
+    let [model, scenes] = ["docs/model.md", "docs/scene-files.md"]
+        .map(|page| std::fs::read_to_string(root().join(page)).unwrap());
+    let switched = |effect: &Effect| effect.info().within.is_none();
+    for effect in every_effect().into_iter().filter(switched) {
+        let name = effect.name();
+        assert!(
+            model.contains(&format!("\n| `{name}` | ")),
+            "docs/model.md does not say what `{name}` asks for"
+        );
+        assert!(scenes.contains(&format!("`{name}`")), "docs/scene-files.md does not know `{name}`");
+    }
+}
+
+#[test]
+fn the_rules_that_the_page_of_shaders_shows_are_rules() {
+    let page = std::fs::read_to_string(root().join("docs/shaders.md")).unwrap();
+    let blocks = page.split("```wgsl\n").skip(1).map(|rest| rest.split_once("```").unwrap().0);
+    let [term, pass] = blocks.collect::<Vec<_>>()[..] else { panic!("the page shows other blocks") };
+    assert_eq!(term, include_str!("../../experiments/library/fresnel.wgsl"));
+    // What stands around the pass in a file. Other tests' terms have other names.
+    let pass = pass.replace("soft", "page_soft").replace("light_map", "page_light");
+    let text = format!(
+        "// effect: page_scatter, light that wanders\n\
+         // parameter: page_soft_radius = 1 in [0, 9]; how far; the page\n//\n\
+         // gives: page_light\n// domain: texel\n// cost: 1\n\
+         fn page_drawn(albedo: vec3f) -> vec3f {{\n    return albedo;\n}}\n\n{pass}\n\
+         // gives: page_part\n// adds: page_scatter\n// cost: 1\n\
+         fn page_shown(page_soft_light: vec3f) -> vec3f {{\n    return page_soft_light;\n}}\n"
+    );
+    register("page_scatter", &text).unwrap_or_else(|error| panic!("{error}\n{text}"));
 }
 
 /// The project's pages, by their paths in it.

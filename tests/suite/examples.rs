@@ -48,6 +48,15 @@ fn a_rendering() {
     );
 }
 
+/// It ends with an error unless it learns.
+#[cfg(feature = "burn")]
+#[test]
+fn a_network_learns_through_the_shader() {
+    if gpu().is_some() {
+        printed("network");
+    }
+}
+
 #[cfg(feature = "burn")]
 #[test]
 fn gradients_on_tensors() {

@@ -1,5 +1,5 @@
 //! The environment: a clearing in a wood, the low sun behind the trees. Lat-long, linear Rec.709,
-//! MODEL.md's orientation: the centre is -Z, the right quarter +X.
+//! the orientation of docs/model.md: the centre is -Z, the right quarter +X.
 
 use std::f64::consts::{PI, TAU};
 

@@ -46,6 +46,32 @@ impl Effect {
     pub const Shadows: Self = Self(13);
 }
 
+/// What a scene must have for an effect to show anything.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Prerequisite {
+    /// A normal map.
+    NormalMap,
+    /// Light of an environment.
+    Environment,
+    /// Lights beside it, or a panorama that they can be taken out of.
+    Lights,
+    /// A UV atlas that light can stand in.
+    Atlas,
+    /// Nothing: but what it shows is for the user to say, and nothing tries it by itself.
+    Hand,
+}
+
+impl Prerequisite {
+    /// Every one, by the name that files of rules write.
+    pub const NAMED: [(&'static str, Self); 5] = [
+        ("normal_map", Self::NormalMap),
+        ("environment", Self::Environment),
+        ("lights", Self::Lights),
+        ("atlas", Self::Atlas),
+        ("hand", Self::Hand),
+    ];
+}
+
 /// One row of the table of effects.
 #[derive(Clone, Copy, Debug)]
 pub struct EffectInfo {
@@ -58,73 +84,73 @@ pub struct EffectInfo {
     pub needs: Option<fn(Effect, &Setup) -> Needs>,
     /// The effect that switches it on and off with others of its kind.
     pub within: Option<Effect>,
+    /// The effect without which it does nothing.
+    pub upon: Option<Effect>,
+    /// What a scene must have for it.
+    pub asks: Option<Prerequisite>,
+    /// Whether it shares light out before it is diffuse.
+    pub shares_light: bool,
+    /// Whether the environment reaches it by what is baked of it, or along directions of its own.
+    pub bakes_environment: bool,
+}
+
+impl EffectInfo {
+    /// A row that says no more of itself.
+    #[must_use]
+    pub const fn new(name: &'static str, meaning: &'static str) -> Self {
+        Self {
+            name,
+            meaning,
+            needs: None,
+            within: None,
+            upon: None,
+            asks: None,
+            shares_light: false,
+            bakes_environment: false,
+        }
+    }
+
+    const fn asks(self, asked: Prerequisite) -> Self {
+        Self { asks: Some(asked), ..self }
+    }
+
+    const fn upon(self, effect: Effect) -> Self {
+        Self { upon: Some(effect), ..self }
+    }
 }
 
 const TABLE: [EffectInfo; Effect::BUILT_IN.len()] = [
-    EffectInfo { name: "diffuse", meaning: "Albedo times irradiance", needs: None, within: None },
-    EffectInfo {
-        name: "normal_map",
-        meaning: "Tangent-space normal map; without it n is the smooth normal",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "occlusion",
-        meaning: "Ambient occlusion; without it everything is open",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "rim",
-        meaning: "The diffuse rim weight; without it only `base_weight` is left of the diffuse factor",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "side_specular",
-        meaning: "Specular map times the specular cube along the normal",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "hilite",
-        meaning: "Back light seen through the rim: the hilite cube along the view vector",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "reflection",
-        meaning: "The specular cube along the reflection vector, dappled",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "haze",
-        meaning: "The reflection's alpha to the output alpha",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "bloom",
-        meaning: "A blur pass over alpha-weighted colour, driven by the haze",
-        needs: None,
-        within: None,
-    },
-    EffectInfo {
-        name: "key_light",
-        meaning: "The paper's second version: one key light gives the bump map's contribution",
-        needs: None,
-        within: None,
-    },
-    EffectInfo { name: "morph", meaning: "Morph targets", needs: None, within: None },
-    EffectInfo { name: "skin", meaning: "Skinning by bones", needs: None, within: None },
-    EffectInfo {
-        name: "lights",
-        meaning: "Lights beside the environment: the scene's own, and those that are taken out of it",
-        needs: None,
-        within: None,
-    },
-    EffectInfo { name: "shadows", meaning: "What stands in the lights' way", needs: None, within: None },
+    EffectInfo::new("diffuse", "Albedo times irradiance").asks(Prerequisite::Environment),
+    EffectInfo::new("normal_map", "Tangent-space normal map; without it n is the smooth normal")
+        .asks(Prerequisite::NormalMap),
+    EffectInfo::new("occlusion", "Ambient occlusion; without it everything is open"),
+    EffectInfo::new(
+        "rim",
+        "The diffuse rim weight; without it only `base_weight` is left of the diffuse factor",
+    ),
+    EffectInfo::new("side_specular", "Specular map times the specular cube along the normal")
+        .asks(Prerequisite::Environment),
+    EffectInfo::new("hilite", "Back light seen through the rim: the hilite cube along the view vector")
+        .asks(Prerequisite::Environment),
+    EffectInfo::new("reflection", "The specular cube along the reflection vector, dappled")
+        .asks(Prerequisite::Environment),
+    EffectInfo::new("haze", "The reflection's alpha to the output alpha"),
+    EffectInfo::new("bloom", "A blur pass over alpha-weighted colour, driven by the haze"),
+    EffectInfo::new(
+        "key_light",
+        "The paper's second version: one key light gives the bump map's contribution",
+    )
+    .asks(Prerequisite::Hand),
+    EffectInfo::new("morph", "Morph targets"),
+    EffectInfo::new("skin", "Skinning by bones"),
+    EffectInfo::new(
+        "lights",
+        "Lights beside the environment: the scene's own, and those that are taken out of it",
+    )
+    .asks(Prerequisite::Lights),
+    EffectInfo::new("shadows", "What stands in the lights' way")
+        .asks(Prerequisite::Lights)
+        .upon(Effect::Lights),
 ];
 
 /// What was added to the table.
@@ -266,12 +292,6 @@ impl Effects {
         effects.iter().any(|&effect| self.has(effect))
     }
 
-    /// Whether an effect is in both sets.
-    #[must_use]
-    pub fn overlaps(self, other: Self) -> bool {
-        self.0.iter().zip(other.0).any(|(bits, other)| bits & other != 0)
-    }
-
     /// This set and `effect`.
     #[must_use]
     pub const fn with(self, effect: Effect) -> Self {
@@ -307,6 +327,18 @@ impl Effects {
     /// Those of them that files have added.
     pub fn added(self) -> impl Iterator<Item = Effect> {
         self.iter().filter(|effect| !effect.is_built_in())
+    }
+
+    /// Whether one of them shares light out before it is diffuse.
+    #[must_use]
+    pub fn share_light(self) -> bool {
+        self.iter().any(|effect| effect.info().shares_light)
+    }
+
+    /// Those that do nothing for want of another one, and that.
+    pub fn idle(self) -> impl Iterator<Item = (Effect, Effect)> {
+        let lacking = move |effect: Effect| effect.info().upon.filter(|&other| !self.has(other));
+        self.iter().filter_map(move |effect| Some((effect, lacking(effect)?)))
     }
 
     /// What the enabled effects ask for, with the silhouette evaluated as `silhouette` says, in the paper's first

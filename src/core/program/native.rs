@@ -33,7 +33,7 @@ impl<R: Real> Unit<R> {
     #[inline(always)]
     pub fn new(v: V3<R>) -> Self {
         let one = v[0].lit(1.0);
-        let [low, high] = PLAIN_SQUARES.map(|bound| one.lit(bound));
+        let (low, high) = (one.lit(PLAIN_SQUARES[0]), one.lit(PLAIN_SQUARES[1]));
         let square = dot(v, v);
         // A NaN fails the comparisons.
         let plain = R::and(square.ge(low), high.ge(square));

@@ -12,7 +12,7 @@ use super::trace::Hit;
 use crate::model::effects::{Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::Field;
-use crate::model::fragment::{Fragment, decode_normal, guarded};
+use crate::model::fragment::{Fragment, decode_normal, guarded, unit_view};
 use crate::model::params::Param;
 use crate::model::vector::normalize_or;
 use crate::scene::Scene;
@@ -212,7 +212,6 @@ impl<'a> Surface<'a> {
     fn exact_view(&self, corners: [usize; 3], [u, v]: [f32; 2]) -> Vec3 {
         let [a, b, c] = corners.map(|i| self.mesh.positions[i].as_dvec3());
         let point = a + f64::from(u) * (b - a) + f64::from(v) * (c - a);
-        // An eye on the surface itself has no direction; the one straight ahead stands in.
-        (point - self.eye).try_normalize().unwrap_or(DVec3::NEG_Z).as_vec3()
+        DVec3::from(unit_view((point - self.eye).to_array())).as_vec3()
     }
 }

@@ -160,8 +160,7 @@ impl Diffusion {
     /// The effects, those of the preset's further blurs with them.
     pub(super) fn switched(&self, effects: Effects) -> Effects {
         let five = Effect::from_name(FIVE).filter(|_| self.preset == Preset::HumanHead);
-        let scatters = Effect::from_name("diffusion").is_some_and(|diffusion| effects.has(diffusion));
-        five.filter(|_| scatters).map_or(effects, |five| effects.with(five))
+        five.filter(|five| five.lacks(effects).is_none()).map_or(effects, |five| effects.with(five))
     }
 
     /// Set what the scene gives of the parameters, and the preset's, but for those that the file `gives`.

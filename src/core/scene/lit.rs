@@ -128,21 +128,14 @@ impl Lights {
         self.terms.iter().fold(effects, |effects, term| effects.with(term.effect))
     }
 
-    /// Say so where they do not shine, or an effect of theirs does nothing.
+    /// Say so where they do not shine.
     pub(super) fn idle(&self, path: &Path, effects: Effects, warnings: &mut Warnings) {
-        let (lights, shadows) = (effects.has(Effect::Lights), effects.has(Effect::Shadows));
+        let lights = effects.has(Effect::Lights);
         if !self.terms.is_empty() && !lights {
             warn(warnings, path, "has lights, but the effect `lights` is off: they do not shine");
         }
         if self.terms.is_empty() && lights {
             warn(warnings, path, "has no light: the effect `lights` does nothing");
-        }
-        if shadows && !lights {
-            warn(warnings, path, "the effect `shadows` does nothing without `lights`");
-        }
-        let glints = Effect::from_name("light_specular").is_some_and(|effect| effects.has(effect));
-        if glints && !lights {
-            warn(warnings, path, "the effect `light_specular` does nothing without `lights`");
         }
     }
 

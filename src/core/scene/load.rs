@@ -98,6 +98,14 @@ impl Scene {
         }
         let effects = diffusion.switched(lights.switched(effects));
         lights.idle(&source.path, effects, &mut warnings);
+        for (effect, other) in effects.idle() {
+            let (effect, other) = (effect.name(), other.name());
+            warn(
+                &mut warnings,
+                &source.path,
+                format!("the effect `{effect}` does nothing without `{other}`"),
+            );
+        }
         transmission::idle(&source, effects, (through, &shadow_maps), &mut warnings);
         let setup = Setup { lookups, dapple, choices, ..Setup::new(form, silhouette, effects) };
         let needs = setup.needs();
@@ -201,11 +209,11 @@ fn check_haze(
 
 /// What the user should know where the specular lobe is to be occluded by an open share that no effect finds.
 fn check_lobe(source: &Source, file: &SceneFile, setup: &Setup, warnings: &mut Warnings) {
-    let on = |name: &str| Effect::from_name(name).is_some_and(|effect| setup.effects.has(effect));
+    let effects = setup.effects;
     let visibility = setup.choices.specular_visibility;
     let by_share = matches!(visibility, SpecularVisibility::Lagarde | SpecularVisibility::Cone);
-    let wanted = file.model.specular_visibility.is_some() || on("directional_occlusion");
-    if on("fresnel") && by_share && wanted && !setup.effects.has(Effect::Occlusion) {
+    let wanted = file.model.specular_visibility.is_some() || library::sees_sky(effects);
+    if library::reflects(effects) && by_share && wanted && !effects.has(Effect::Occlusion) {
         let message = format!(
             "specular_visibility = \"{}\" in [model] goes by the open share that the effect `occlusion` finds, which \
              is off: the effect `fresnel` shows all of the environment. Add \"occlusion\" to the effects, or choose \

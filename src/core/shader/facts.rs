@@ -100,8 +100,9 @@ fn gathers(setup: &Setup) -> bool {
 /// Whether the skin shows in its own specular lobe.
 #[must_use]
 pub fn reflects_skin(setup: &Setup) -> bool {
-    let reflects = || Effect::from_name("fresnel").is_some_and(|effect| setup.effects.has(effect));
-    gathers(setup) && setup.choices.skin_reflection == SkinReflection::Gathered && reflects()
+    gathers(setup)
+        && setup.choices.skin_reflection == SkinReflection::Gathered
+        && library::reflects(setup.effects)
 }
 
 /// Shadow maps that fragments compare themselves with.
@@ -270,7 +271,7 @@ impl Facts {
             return Some(holds);
         }
         Some(match condition {
-            "layered" => library::layers(setup.effects),
+            "layered" => setup.effects.share_light(),
             "lights_bounce" => gathers(&setup),
             "raster" => self.source == Source::Raster,
             "traced_lobe" => self.traces_lobes(),

@@ -16,7 +16,7 @@ use crate::bake::reflected::ReflectedStack;
 use crate::model::choices::{
     Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
 };
-use crate::model::effects::{Effect, Effects, Form, Silhouette};
+use crate::model::effects::{Effect, Effects, Form, Prerequisite, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::Field;
 use crate::model::fragment::Fragment;
@@ -182,13 +182,16 @@ fn setup(probes: &Probes, rng: &mut StdRng) -> Setup {
     let drawn = |rng: &mut StdRng| rng.random_range(0..4) > 0;
     if drawn(rng) {
         effects = probes.0.iter().fold(effects.with(Effect::Lights), Effects::with);
-        for name in [Effect::Shadows.name(), "light_specular"] {
-            effects = Effect::from_name(name).filter(|_| drawn(rng)).into_iter().fold(effects, Effects::with);
-        }
+        let of_lights = Effect::offered().filter(|effect| effect.info().upon == Some(Effect::Lights));
+        effects = of_lights.filter(|_| drawn(rng)).fold(effects, Effects::with);
     }
-    for name in ["fresnel", "directional_occlusion", "transmission"] {
-        effects = Effect::from_name(name).filter(|_| drawn(rng)).into_iter().fold(effects, Effects::with);
-    }
+    // A fragment alone has no texels for light to scatter in.
+    let alone = |effect: &Effect| {
+        let row = effect.info();
+        row.upon.is_none() && row.within.is_none() && row.asks != Some(Prerequisite::Atlas)
+    };
+    let own = library::terms().iter().flat_map(|term| term.effects).copied();
+    effects = own.filter(alone).filter(|_| drawn(rng)).fold(effects, Effects::with);
     let setup = Setup::new(form, one_of(rng, &Silhouette::ALL), effects);
     let choices = Choices {
         specular_model: one_of(rng, &SpecularModel::ALL),

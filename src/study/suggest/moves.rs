@@ -1,7 +1,7 @@
 //! What may be added to a set of effects at once.
 
 use crate::model::diffusion::{DiffusionChoices, Method, Seams};
-use crate::model::effects::{Effect, Effects};
+use crate::model::effects::{Effect, Effects, Prerequisite};
 use crate::samples::atlas::overlap;
 use crate::scene::mesh::Mesh;
 use crate::scene::{Offers, Scene};
@@ -20,17 +20,14 @@ fn named(name: &str) -> Option<Effect> {
 
 /// Whether a scene has what an effect is about.
 fn is_possible(scene: &Scene, offers: Offers, effect: Effect) -> bool {
-    match effect.name() {
-        "normal_map" => offers.normal_map,
-        "side_specular" | "hilite" | "reflection" | "fresnel" | "directional_occlusion" | "diffuse" => {
-            offers.environment
-        }
-        "lights" | "shadows" | "light_specular" => offers.lights,
-        // It wants an atlas, and one that the renderer can draw is what its cost is told of.
-        "diffusion" => has_atlas(scene),
-        // Its direction is nobody's guess.
-        "key_light" => scene.effects.has(effect),
-        _ => true,
+    match effect.info().asks {
+        Some(Prerequisite::NormalMap) => offers.normal_map,
+        Some(Prerequisite::Environment) => offers.environment,
+        Some(Prerequisite::Lights) => offers.lights,
+        // One that the renderer can draw is what its cost is told of.
+        Some(Prerequisite::Atlas) => has_atlas(scene),
+        Some(Prerequisite::Hand) => scene.effects.has(effect),
+        None => true,
     }
 }
 
@@ -40,14 +37,6 @@ fn has_atlas(scene: &Scene) -> bool {
     let DiffusionChoices { method, seams, .. } = scene.choices.diffusion;
     let drawn = method == Method::Separable && seams == Seams::Cut;
     drawn && overlap(uvs, triangles, scene.diffusion.light_map_size).is_ok()
-}
-
-/// Whether an effect changes nothing without another.
-fn wants(effect: Effect) -> Option<&'static str> {
-    Some(match effect.name() {
-        "shadows" | "light_specular" => "lights",
-        _ => return None,
-    })
 }
 
 impl Move {
@@ -85,7 +74,7 @@ impl Move {
     #[must_use]
     pub fn onto(&self, set: Effects) -> Option<Effects> {
         let with = self.0.iter().fold(set, |set, &effect| set.with(effect));
-        let idle = |effect: &Effect| wants(*effect).and_then(named).is_some_and(|wanted| !with.has(wanted));
+        let idle = |effect: &Effect| effect.info().upon.is_some_and(|other| !with.has(other));
         let known = self.0.iter().any(|effect| set.has(*effect)) && self.0.len() > 1;
         (with != set && !known && !self.0.iter().any(idle)).then_some(with)
     }
@@ -101,6 +90,6 @@ impl Move {
 #[must_use]
 pub fn can_go(set: Effects, effect: Effect) -> bool {
     let shows = [Effect::Diffuse, Effect::Lights].iter().any(|&other| other != effect && set.has(other));
-    let wanted = set.iter().any(|other| wants(other) == Some(effect.name()));
+    let wanted = set.iter().any(|other| other.info().upon == Some(effect));
     !OTHERS.contains(&effect) && effect.info().within.is_none() && shows && !wanted
 }

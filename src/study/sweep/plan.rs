@@ -167,7 +167,7 @@ impl Plan {
         number.parse().ok().and_then(|index: usize| self.jobs.get(index)).ok_or_else(|| {
             let what = format!("there is no job `{name}`");
             let last = self.jobs.len() - 1;
-            SceneError::new(&self.path, what, format!("Its jobs are 0 to {last}; --list shows them"))
+            SceneError::new(&self.path, what, format!("Its jobs are 0 to {last}"))
         })
     }
 }

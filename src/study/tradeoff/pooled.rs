@@ -114,7 +114,7 @@ mod tests {
         assert_eq!(found, [(4.0, 20.0, true, false), (6.0, 30.0, true, true)]);
         assert!(both.method.contains("Scenes: noon, night."));
         let apart = pooled(&[("noon", one), ("night", sweep([1.0, 2.0], "other"))]).unwrap_err();
-        assert!(apart.to_string().contains("--axis rays: the scenes have different settings"), "{apart}");
+        assert!(apart.to_string().contains("the axis rays: the scenes have different settings"), "{apart}");
     }
 
     #[test]

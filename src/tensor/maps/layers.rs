@@ -11,7 +11,6 @@ use crate::engine::Point;
 use crate::engine::view::ObservedView;
 use crate::footprint::{cube_border, cube_pairs, edges, texel_pairs, texels, vertices};
 use crate::model::cube::Cube;
-use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::samples::{Hit, sample_hits};
 use crate::scene::MapKind;
@@ -37,12 +36,10 @@ pub fn layers(
     let hits: Vec<Hit> =
         scene.views.iter().flat_map(|view| sample_hits(scene, task.posed, &rays, &view.camera)).collect();
     let mut layers = Vec::new();
-    // They see the environment by bakes that are no layers, or along another direction than layers are looked up.
-    let beside = ["fresnel", "directional_occlusion", "transmission"]
-        .into_iter()
-        .find(|name| Effect::from_name(name).is_some_and(|effect| scene.effects.has(effect)));
+    // Its bakes are no layers, and layers are looked up along the model's own directions.
+    let beside = scene.effects.iter().find(|effect| effect.info().bakes_environment);
     if let Some(effect) = beside.filter(|_| task.kinds.contains(&MapKind::Environment)) {
-        return Err(MapError::Beside { map: MapKind::Environment.name(), effect });
+        return Err(MapError::Beside { map: MapKind::Environment.name(), effect: effect.name() });
     }
     for &kind in &task.kinds {
         let parts = parts(task, kind, &hits, lobe);

@@ -52,9 +52,10 @@ impl<'a> Block<'a> {
     #[inline(always)]
     pub(super) fn fields<const N: usize>(&self) -> [&'a [Row]; N] {
         let stride = self.stride();
-        std::array::from_fn(|k| {
-            let (stream, place) = self.loads[k];
-            match stream {
+        let mut fields: [&[Row]; N] = [&[]; N];
+        // In a loop: what a function calls that makes arrays is not made part of this one.
+        for (field, &(stream, place)) in fields.iter_mut().zip(self.loads) {
+            *field = match stream {
                 StreamOf::Samples => &self.stream(stream).rows[self.first * stride + place..],
                 StreamOf::Neutral => {
                     let rows = self.stream(stream).rows;
@@ -62,8 +63,9 @@ impl<'a> Block<'a> {
                 }
                 // They are read by [`Self::kept`], and by no tape; no effect that is compiled ahead has texels.
                 StreamOf::Kept | StreamOf::Targets | StreamOf::Levels => &[],
-            }
-        })
+            };
+        }
+        fields
     }
 
     /// The kept numbers of record `i` of the block. Asks for a later record's as well.
@@ -91,5 +93,7 @@ impl<'a> Block<'a> {
 /// How a lookup moves that is `ds` and `dt` texels further.
 #[inline(always)]
 pub(super) fn along<R: Real>([ds, dt]: [R; 2], across: [R; 4], down: [R; 4]) -> [R; 4] {
-    std::array::from_fn(|c| ds.mul_add(across[c], dt * down[c]))
+    let ([a, b, c, d], [e, f, g, h]) = (across, down);
+    // A closure would be compiled without the instructions of the function around it.
+    [ds.mul_add(a, dt * e), ds.mul_add(b, dt * f), ds.mul_add(c, dt * g), ds.mul_add(d, dt * h)]
 }

@@ -21,6 +21,9 @@ use crate::samples::rows::Row;
 use crate::scene::Loss;
 use crate::simd::Simd;
 
+/// Columns whose slopes are summed up side by side: each addition waits for the one before it.
+const TILE: usize = 4;
+
 /// What the blocks of a view read in one pass.
 pub(super) struct ViewPass<'a> {
     pub(super) view: &'a ObservedView,
@@ -397,18 +400,51 @@ impl ViewPass<'_> {
         let mut squares = Lanes::of_row(simd, &sums[last]);
         for i in 0..count {
             let residual = load(simd, &compared.residual[i]);
-            let scaled = residual * load(simd, &compared.scale[i]);
-            factors[i] = if self.is_plain() { residual } else { scaled };
+            factors[i] = if self.is_plain() { residual } else { residual * load(simd, &compared.scale[i]) };
             squares = residual.mul_add(residual, squares);
         }
         squares.store(&mut sums[last]);
-        for ((&tangent, unknown), sum) in channel.tangents.iter().zip(&channel.unknowns).zip(sums) {
-            let mut slope = Lanes::splat(simd, 0.0);
-            for i in 0..count {
-                slope = load(simd, &shown[tangent][i]).mul_add(factors[i], slope);
+        let factors = &factors[..count];
+        let (tiles, rest) = channel.tangents.as_chunks::<TILE>();
+        for (k, tile) in tiles.iter().enumerate() {
+            let slopes = slopes(simd, shown, tile, factors);
+            for (j, &slope) in slopes.iter().enumerate() {
+                self.add_to(simd, channel.unknowns[TILE * k + j], slope, &mut sums[TILE * k + j]);
             }
-            let gain = Lanes::splat(simd, self.gain_of(*unknown));
-            gain.mul_add(slope, Lanes::of_row(simd, sum)).store(sum);
+        }
+        let first = TILE * tiles.len();
+        for (j, &tangent) in rest.iter().enumerate() {
+            let [slope] = slopes(simd, shown, &[tangent], factors);
+            self.add_to(simd, channel.unknowns[first + j], slope, &mut sums[first + j]);
         }
     }
+
+    /// Add to the sum of an unknown's slope, times what multiplies its column.
+    #[inline(always)]
+    fn add_to<S: Simd>(&self, simd: S, unknown: Option<usize>, slope: Lanes<S>, sum: &mut Row) {
+        let gain = Lanes::splat(simd, self.gain_of(unknown));
+        gain.mul_add(slope, Lanes::of_row(simd, sum)).store(sum);
+    }
+}
+
+/// The sums of some columns times factors.
+#[inline(always)]
+fn slopes<S: Simd, const N: usize>(
+    simd: S,
+    shown: &[Column],
+    tangents: &[usize; N],
+    factors: &[Lanes<S>],
+) -> [Lanes<S>; N] {
+    let mut columns = [&shown[0]; N];
+    // Loops by index: closures over arrays are compiled without the instructions of the function around.
+    for k in 0..N {
+        columns[k] = &shown[tangents[k]];
+    }
+    let mut slopes = [Lanes::splat(simd, 0.0); N];
+    for (i, &factor) in factors.iter().enumerate() {
+        for k in 0..N {
+            slopes[k] = load(simd, &columns[k][i]).mul_add(factor, slopes[k]);
+        }
+    }
+    slopes
 }

@@ -184,9 +184,10 @@ fn effect_name(
     }
     let own = |name: &str| before.iter().any(|(_, effect)| effect.name == name);
     let known = |name: &str| own(name) || Effect::from_name(name).is_some();
-    if let Some(within) = effect.within.filter(|within| !known(within)) {
+    let mut others = [effect.within, effect.upon].into_iter().flatten();
+    if let Some(other) = others.find(|other| !known(other)) {
         let known = Effect::all().map(|effect| effect.name().to_owned()).collect();
-        return Err(Problem::NotThere { key: "effect", name: within.to_owned(), known }.at(line));
+        return Err(Problem::NotThere { key: "effect", name: other.to_owned(), known }.at(line));
     }
     if Facts::default().holds(effect.name).is_some() {
         let name = effect.name.to_owned();

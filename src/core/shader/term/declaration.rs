@@ -2,6 +2,7 @@
 
 use super::error::{Problem, TermError};
 use super::texels::{LEVEL_TYPES, blur, domains_of, kernel};
+use crate::model::effects::Prerequisite;
 use crate::model::fields::{Found, MapNames};
 use crate::model::params::{LARGEST, Owner, Scale};
 use crate::model::registry::leaked;
@@ -21,12 +22,17 @@ pub(crate) struct Declaration {
     pub(crate) rules: Vec<Rule>,
 }
 
-/// `effect: NAME, what it shows`
+/// `effect: NAME, what it shows`; after the name what it says of itself, two words each: `upon lights`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct DeclaredEffect {
     pub(super) name: &'static str,
     /// The effect that switches it.
     pub(super) within: Option<&'static str>,
+    /// The effect without which it does nothing.
+    pub(super) upon: Option<&'static str>,
+    pub(super) asks: Option<Prerequisite>,
+    pub(super) shares_light: bool,
+    pub(super) bakes_environment: bool,
     pub(super) meaning: &'static str,
 }
 
@@ -187,10 +193,10 @@ impl Declaration {
             if !early {
                 return Err(Problem::Misplaced { key: "effect" }.at(line));
             }
-            let (name, meaning) = value.split_once(',').unwrap_or((value, ""));
-            let (name, within) = name.split_once(" within ").unwrap_or((name, ""));
-            let within = Some(within.trim()).filter(|within| !within.is_empty());
-            self.effects.push((line, DeclaredEffect { name: name.trim(), within, meaning: meaning.trim() }));
+            let wanted = EFFECT_LINE;
+            let effect = effect(value)
+                .ok_or_else(|| Problem::Value { key: "effect", given: value.to_owned(), wanted }.at(line))?;
+            self.effects.push((line, effect));
             return Ok(());
         }
         let misplaced = |key| Problem::Misplaced { key }.at(line);
@@ -278,6 +284,38 @@ fn rule_line(rule: &mut Rule, key: &'static str, value: &'static str) -> Result<
         }
     }
     Ok(())
+}
+
+/// How an effect is declared.
+const EFFECT_LINE: &str = "NAME, then two words each where they hold: `within EFFECT`, `upon EFFECT`, `asks normal_map`, \
+                           `asks environment`, `asks lights`, `asks atlas`, `asks hand`, `shares light`, \
+                           `bakes environment`; then `, what it shows`";
+
+fn effect(value: &'static str) -> Option<DeclaredEffect> {
+    let (head, meaning) = value.split_once(',').unwrap_or((value, ""));
+    let mut words = head.split_whitespace();
+    let mut effect = DeclaredEffect {
+        name: words.next().unwrap_or_default(),
+        within: None,
+        upon: None,
+        asks: None,
+        shares_light: false,
+        bakes_environment: false,
+        meaning: meaning.trim(),
+    };
+    while let Some(word) = words.next() {
+        match (word, words.next()?) {
+            ("within", whole) => effect.within = Some(whole),
+            ("upon", other) => effect.upon = Some(other),
+            ("asks", name) if effect.asks.is_none() => {
+                effect.asks = Some(Prerequisite::NAMED.into_iter().find(|(known, _)| *known == name)?.1);
+            }
+            ("shares", "light") => effect.shares_light = true,
+            ("bakes", "environment") => effect.bakes_environment = true,
+            _ => return None,
+        }
+    }
+    Some(effect)
 }
 
 /// How a field is declared.
@@ -389,10 +427,7 @@ mod tests {
     #[test]
     fn effects_parameters_and_several_rules_are_read() {
         let read = read(TEXT).unwrap();
-        assert_eq!(
-            read.effects,
-            [(3, DeclaredEffect { name: "sheen", within: None, meaning: "light of fine hair" })]
-        );
+        assert_eq!(read.effects, [(3, effect("sheen, light of fine hair").unwrap())]);
         let [(4, weight), (5, width)] = read.parameters.as_slice() else { panic!("{:?}", read.parameters) };
         assert!(weight.rgb && weight.linear && weight.upper == f64::INFINITY && weight.source == "a paper");
         assert!(width.scale == Scale::Log && width.unit == "degrees" && width.default == 20.0);
@@ -401,6 +436,33 @@ mod tests {
         assert_eq!((sheen.adds.as_slice(), sheen.needs.len()), (&["sheen"][..], 2));
         assert_eq!(both.gives, [("sheen_a", "x"), ("sheen_b", "y")]);
         assert!(both.body.starts_with("fn both") && both.body.ends_with("}\n"));
+    }
+
+    #[test]
+    fn an_effect_says_what_it_asks_for() {
+        let read = effect("glints within all upon lights asks lights shares light bakes environment, spots")
+            .unwrap();
+        let (within, upon) = (Some("all"), Some("lights"));
+        let asks = Some(Prerequisite::Lights);
+        let (name, meaning) = ("glints", "spots");
+        let wanted =
+            DeclaredEffect { name, within, upon, asks, shares_light: true, bakes_environment: true, meaning };
+        assert_eq!(read, wanted);
+        let plain = DeclaredEffect { name, within: None, upon: None, asks: None, meaning: "", ..wanted };
+        let plain = DeclaredEffect { shares_light: false, bakes_environment: false, ..plain };
+        assert_eq!(effect("glints"), Some(plain));
+        for wrong in [
+            "a within",
+            "a upon",
+            "a asks sun",
+            "a asks lights asks atlas",
+            "a shares",
+            "a shares heat",
+            "a b c",
+            "a b",
+        ] {
+            assert_eq!(effect(wrong), None, "{wrong}");
+        }
     }
 
     #[test]

@@ -15,13 +15,6 @@ const FILES: [(&str, &str); 4] = [
     ("transmission", include_str!("../rules/term/transmission.wgsl")),
 ];
 
-/// Effects that share light out before it is diffuse: the sky's by what a point sees of it, all by what is reflected above
-/// the skin, or by how far it wanders within.
-const LAYERED: [&str; 3] = [SKY, "fresnel", "diffusion"];
-
-/// The effect of what a point sees of the sky.
-const SKY: &str = "directional_occlusion";
-
 static TERMS: OnceLock<Vec<&'static Term>> = OnceLock::new();
 
 /// The library's terms, made known to this process.
@@ -49,27 +42,33 @@ pub fn is_own(effect: Effect) -> bool {
     terms().iter().any(|term| term.effects.contains(&effect))
 }
 
-/// Whether one of a set shares light out before it is diffuse.
-pub fn layers(effects: Effects) -> bool {
-    static SET: OnceLock<Effects> = OnceLock::new();
-    any(effects, &SET, &LAYERED)
-}
-
 /// Whether one of a set knows what a point sees of the sky.
 pub fn sees_sky(effects: Effects) -> bool {
-    static SET: OnceLock<Effects> = OnceLock::new();
-    any(effects, &SET, &[SKY])
+    static EFFECT: OnceLock<Option<Effect>> = OnceLock::new();
+    has(effects, &EFFECT, "directional_occlusion")
+}
+
+/// Whether the environment shows in the specular lobe by one of a set.
+pub fn reflects(effects: Effects) -> bool {
+    static EFFECT: OnceLock<Option<Effect>> = OnceLock::new();
+    has(effects, &EFFECT, "fresnel")
+}
+
+/// Whether light scatters within the skin by one of a set.
+pub fn scatters(effects: Effects) -> bool {
+    static EFFECT: OnceLock<Option<Effect>> = OnceLock::new();
+    has(effects, &EFFECT, "diffusion")
 }
 
 /// Whether light comes through the skin by one of a set.
 pub fn transmits(effects: Effects) -> bool {
-    static SET: OnceLock<Effects> = OnceLock::new();
-    any(effects, &SET, &["transmission"])
+    static EFFECT: OnceLock<Option<Effect>> = OnceLock::new();
+    has(effects, &EFFECT, "transmission")
 }
 
-/// Whether an effect of these names is in a set; before they are known, none is.
-fn any(effects: Effects, known: &OnceLock<Effects>, names: &[&str]) -> bool {
+/// Whether the effect of a name is in a set; before it is known, it is not.
+fn has(effects: Effects, known: &OnceLock<Option<Effect>>, name: &str) -> bool {
     // Conditions of rules are asked thousands of times: names are looked up once.
-    let found = || names.iter().filter_map(|name| Effect::from_name(name)).collect();
-    TERMS.get().is_some() && effects.overlaps(*known.get_or_init(found))
+    TERMS.get().is_some()
+        && known.get_or_init(|| Effect::from_name(name)).is_some_and(|effect| effects.has(effect))
 }

@@ -18,6 +18,9 @@
 //! }
 //! ```
 //!
+//! After its name an effect may say of itself what `suggest` and warnings go by: `upon lights` (without which it does
+//! nothing), `asks atlas` (what a scene must have for it), `bakes environment` (a panorama cannot be fitted beside it).
+//!
 //! Each rule of the file holds only where its effect is enabled; of a file with several effects, where one of them is,
 //! or those that its `when` line names. What `adds` is a part of the radiance, and an image
 //! layer of that name. What the effect asks of the stages before (maps, cubes, fields of samples) follows from what
@@ -182,9 +185,20 @@ pub(crate) fn register_from(origin: Origin, name: &str, text: &str) -> Result<&'
 fn enter(origin: Origin, declaration: Declaration, text: &'static str) -> Result<&'static Term, TermError> {
     let Declaration { effects: declared, parameters, fields, mut rules } = declaration;
     let mut effects = Vec::new();
-    for &(line, DeclaredEffect { name, within, meaning }) in &declared {
-        let within = within.and_then(Effect::from_name);
-        let row = EffectInfo { name, meaning, needs: Some(needs::of_effect), within };
+    for &(line, DeclaredEffect { name, within, upon, asks, shares_light, bakes_environment, meaning }) in
+        &declared
+    {
+        let (within, upon) = (within.and_then(Effect::from_name), upon.and_then(Effect::from_name));
+        let row = EffectInfo {
+            name,
+            meaning,
+            needs: Some(needs::of_effect),
+            within,
+            upon,
+            asks,
+            shares_light,
+            bakes_environment,
+        };
         effects.push(Effect::register(row).map_err(|error| problem(error).at(line))?);
     }
     let line = declared.first().map_or(1, |(line, _)| *line);

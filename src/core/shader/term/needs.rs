@@ -33,7 +33,7 @@ pub(super) fn of_effect(effect: Effect, setup: &Setup) -> Needs {
         !rule.adds.is_empty() && conditions.all(|effect| setup.effects.has(effect))
     };
     let mut goals: Vec<&'static str> = own.filter(on).map(|rule| rule.gives[0].0).collect();
-    if library::layers(Effects::of(&[effect])) {
+    if effect.info().shares_light {
         // It changes what other effects' rules read.
         goals.extend(parts(&Facts { setup: *setup, source: Source::Samples, ..Facts::default() }));
     }

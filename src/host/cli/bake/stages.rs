@@ -8,7 +8,6 @@ use crate::engine::Unknown;
 use crate::engine::cubes_at::CubesAt;
 use crate::engine::levels::LevelMaker;
 use crate::engine::rules::sample_facts;
-use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::output;
 use crate::prepare::Baked;
@@ -20,6 +19,7 @@ use crate::samples::{Atlas, PosedSurface, atlas_of};
 use crate::scene::charts;
 use crate::scene::mesh::Mesh;
 use crate::shader::tangent::chain::Seed;
+use crate::shader::term::library;
 use skinfit_core::program::lower::Natives;
 use skinfit_core::program::shading::Shading;
 
@@ -57,7 +57,7 @@ impl Stages {
     /// When the scene has no diffusion, or its mesh no atlas for it.
     pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
         let (scene, setup) = (&*baked.scene, baked.setup());
-        let scatters = Effect::from_name("diffusion").is_some_and(|diffusion| setup.effects.has(diffusion));
+        let scatters = library::scatters(setup.effects);
         let none = || {
             Refusal::new(format!(
                 "{}: --stages shows what texture-space diffusion makes, which is off. Enable the effect `diffusion`, or leave \

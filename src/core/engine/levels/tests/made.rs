@@ -3,6 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::*;
+use crate::model::diffusion::Taps;
 use crate::program::lower::Natives;
 use crate::program::shading::Shading;
 use crate::shader::Facts;
@@ -128,5 +129,71 @@ fn the_levels_of_an_earlier_frame_go() {
         let atlas = atlas(&setup);
         assert!(Arc::ptr_eq(&made(&atlas), &made(&atlas)));
         assert_eq!((maker.count(), maker.last.lock().unwrap().len()), (frame, 1));
+    }
+}
+
+/// A light map that eleven parameters move, each in its own way, and a Gaussian of it.
+fn ridges() -> &'static Term {
+    static TERM: OnceLock<&'static Term> = OnceLock::new();
+    TERM.get_or_init(|| {
+        let (mut declared, mut heads, mut sum) = (String::new(), String::new(), String::new());
+        for k in 0..RIDGES {
+            declared += &format!("// parameter: ridges_{k} = 0.{k}5 in [0, 2]; how high; a test\n");
+            heads += &format!(", ridges_{k}: f32");
+            sum += &format!(" + ridges_{k} * vec3f(fract({k}.5 * u), fract({k}.7 * v), fract(u * {k}.0 + v))");
+        }
+        let text = format!(
+            "// effect: ridges, light of many heights\n{declared}\
+             // parameter: ridges_radius = 1.7 in [0, 30], unit texels; how far it wandered; a test\n//\n\
+             // gives: ridges_light\n// domain: texel\n// cost: 9\n\
+             fn ridges_map(vertex_uv: vec2f{heads}) -> vec3f {{\n    let u: f32 = 5.0 * vertex_uv.x;\n    \
+             let v: f32 = 5.0 * vertex_uv.y;\n    return vec3f(0.1){sum};\n}}\n\n\
+             // gives: ridges_soft\n// domain: texel\n// pass: ridges_light: vec3f, gaussian\n// sampled: 0\n// cost: 8\n\
+             fn ridges_kernel(axis: vec2f, ridges_radius: f32) -> f32 {{\n    return ridges_radius;\n}}\n\n\
+             // gives: ridges_part\n// adds: ridges\n// cost: 1\n\
+             fn ridges_shown(ridges_soft: vec3f) -> vec3f {{\n    return ridges_soft;\n}}\n"
+        );
+        register("ridges", &text).unwrap_or_else(|error| panic!("{error}"))
+    })
+}
+
+/// How many of them: several registers of sixteen numbers, three a leaf.
+const RIDGES: usize = 11;
+
+#[test]
+fn a_level_moves_along_each_of_many_parameters_as_along_that_one_alone() {
+    let term = ridges();
+    let (radius, heights) = (term.params[RIDGES], &term.params[..RIDGES]);
+    for taps in [Taps::Five, Taps::Seven, Taps::Nine, Taps::Full] {
+        let mut setup = setup(&[term]);
+        setup.choices.diffusion.taps = taps;
+        let atlas = atlas(&setup);
+        let moved = |free: &[Param], by: f64| {
+            let params = start(&[(radius, by)]).params;
+            maker::<f32>(&setup, free).make(&atlas, &params, &CubesAt::dark(|x| x)).all()
+        };
+        // As wide as a head at the most, where every tap of most texels is off the chart.
+        for by in [0.0, 1.7, 29.0] {
+            // The radius moves the level by itself, the heights move what is blurred.
+            let alone: Vec<_> = heights.iter().map(|&height| moved(&[height], by)).collect();
+            let of_radius = moved(&[radius], by);
+            for count in [1, 4, 5, 6, 7, RIDGES] {
+                let free: Vec<Param> = heights[..count].iter().copied().chain([radius]).collect();
+                let levels = moved(&free, by);
+                assert_eq!(levels["ridges_soft"], of_radius["ridges_soft"], "{taps:?} {by} {count}");
+                assert_eq!(
+                    levels[&format!("d{count}_ridges_soft")],
+                    of_radius["d0_ridges_soft"],
+                    "{taps:?} {by} {count}"
+                );
+                for (k, alone) in alone.iter().enumerate().take(count) {
+                    assert_eq!(
+                        levels[&format!("d{k}_ridges_soft")],
+                        alone["d0_ridges_soft"],
+                        "{taps:?} {by} {k} of {count}"
+                    );
+                }
+            }
+        }
     }
 }

@@ -1,7 +1,7 @@
 // Texture-space diffusion: the light of the skin stands in a map over its UV atlas, is blurred there as far as light wanders
 // under the surface, and looked up again (MODEL 6; GPU Gems 3, chapter 14).
 //
-// effect: diffusion, light that scatters within the skin
+// effect: diffusion asks atlas shares light, light that scatters within the skin
 // effect: diffusion_five within diffusion, two blurs more, as the human head demo has five
 // parameter: diffusion_weight_1 = (0.23, 0.21, 0.01) in [0, 1], rgb, linear; share of the light in level 1; GPU Gems 3, chapter 14
 // parameter: diffusion_weight_2 = (0.36, 0, 0) in [0, 1], rgb, linear; share of the light in level 2; GPU Gems 3, chapter 14

@@ -1,6 +1,6 @@
 // The sky that a point sees: occlusion that knows which part of the environment is hidden (MODEL 10).
 //
-// effect: directional_occlusion, light of the part of the sky that a point sees, and what the skin throws back
+// effect: directional_occlusion asks environment shares light bakes environment, light of the part of the sky that a point sees, and what the skin throws back
 // sample_field: sky_ratio: vec3f = 1; light that arrives of the environment, as a share of what an open point receives
 // sample_field: sky_cosine: vec3f = 0; how that moves with the cosine of the environment's turn
 // sample_field: sky_sine: vec3f = 0; how it moves with the sine

@@ -1,8 +1,8 @@
 // Specular light with a Fresnel term, of lamps and of the environment, and what it leaves for the diffuse light
 // (MODEL 9 and 12).
 //
-// effect: fresnel, the environment and the skin itself in the skin's specular lobe; what it reflects the diffuse light lacks
-// effect: light_specular, the lights in the skin's specular lobe
+// effect: fresnel asks environment shares light bakes environment, the environment and the skin itself in the skin's specular lobe; what it reflects the diffuse light lacks
+// effect: light_specular upon lights asks lights, the lights in the skin's specular lobe
 // parameter: specular_weight = 1 in [0, inf), rgb, linear, weighs fresnel, weighs light_specular; weight of specular light; Kelemen and Szirmay-Kalos 2001
 // parameter: roughness = 0.35 in [0.05, 1]; root mean square slope of the surface; Beckmann and Spizzichino 1963
 // parameter: gloss = 0 in [0, 0.9]; how much the specular map lowers the roughness; MODEL 9
