@@ -43,7 +43,11 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         row["picture"] = picture(&off);
         row["limited"] = self::row(name, &between.report, &now.report);
         row["limited"]["picture"] = picture(&differences(&between, &now)?);
-        row["occlusion"] = occlusion(lab, [&before, lab.program()], name, scene.as_deref())?;
+        let baked =
+            |program: &Path, when: &str| bake(lab, program, &format!("{name}, {when}"), scene.as_deref());
+        let bakes = [baked(&before, "before")?, baked(lab.program(), "now")?];
+        row["occlusion"] = occlusion(&bakes).ok_or(format!("{name}: other vertices"))?;
+        row["cubes"] = cubes(&bakes)?;
         rows.push(row);
         if folder.is_none() {
             for (term, off) in &off {
@@ -160,6 +164,25 @@ struct Off {
 }
 
 impl Off {
+    /// Add what colours differ by in the planes that are `named`.
+    fn add(&mut self, then: &Planes, now: &Planes, named: impl Fn(&str) -> bool) -> Result<()> {
+        let picture: Vec<&f32> =
+            ["R", "G", "B"].iter().filter_map(|name| then.get(*name)).flatten().collect();
+        let mean = picture.iter().map(|&&x| f64::from(x)).sum::<f64>() / picture.len() as f64;
+        let coloured = |name: &str| ["R", "G", "B"].contains(&name.rsplit('.').next().unwrap_or(name));
+        for (name, then) in then.iter().filter(|(name, _)| coloured(name) && named(name)) {
+            let same = now.get(name).filter(|now| now.len() == then.len());
+            for (a, b) in then.iter().zip(same.ok_or(format!("{name} has no like"))?) {
+                let by = f64::from((a - b).abs()) / mean;
+                // NaN differs from all.
+                self.most = if by <= self.most { self.most } else { by };
+                self.beyond += usize::from(by.is_nan() || by > 1e-5);
+            }
+            self.of += then.len();
+        }
+        Ok(())
+    }
+
     /// The share of numbers that differ by more than 1e-5, and the largest difference.
     fn told(&self) -> Value {
         json!({ "beyond": self.beyond as f64 / self.of.max(1) as f64, "most": self.most })
@@ -172,52 +195,60 @@ fn differences(then: &Fit, now: &Fit) -> Result<BTreeMap<String, Off>> {
     for view in then.report["views"].as_object().unwrap_or(&Map::new()).keys() {
         let of_view = |fit: &Fit| planes(&fit.run.join(format!("{view}_terms.exr")));
         let (then, now) = (of_view(then)?, of_view(now)?);
-        let picture: Vec<&f32> =
-            ["R", "G", "B"].iter().filter_map(|name| then.get(*name)).flatten().collect();
-        let mean = picture.iter().map(|&&x| f64::from(x)).sum::<f64>() / picture.len() as f64;
-        for (name, then) in &then {
+        let terms = then.keys().filter_map(|name| {
             let (term, channel) = name.rsplit_once('.').unwrap_or(("", name));
-            if !["R", "G", "B"].contains(&channel) {
-                continue;
-            }
-            let same = now.get(name).filter(|now| now.len() == then.len());
-            let now = same.ok_or(format!("{name} of {view} has no like"))?;
-            let off = all.entry(term.to_owned()).or_default();
-            for (a, b) in then.iter().zip(now) {
-                let by = f64::from((a - b).abs()) / mean;
-                // NaN differs from all.
-                off.most = if by <= off.most { off.most } else { by };
-                off.beyond += usize::from(by.is_nan() || by > 1e-5);
-            }
-            off.of += then.len();
+            (channel == "R").then(|| term.to_owned())
+        });
+        for term in terms {
+            let of_term = |name: &str| name.rsplit_once('.').map_or("", |(term, _)| term) == term;
+            all.entry(term.clone()).or_default().add(&then, &now, of_term)?;
         }
     }
     Ok(all)
 }
 
-/// How many of the vertices' shares of open sky differ between two programs, and by how much at the most.
-fn occlusion(lab: &Lab, programs: [&Path; 2], name: &str, scene: Option<&Path>) -> Result<Value> {
-    let mut tables = Vec::new();
-    for (k, program) in programs.into_iter().enumerate() {
-        let folder = lab.scratch.path().join(format!("bake_{k}_{}", name.replace([' ', ','], "_")));
-        let mut command = Command::new(program);
-        command.arg("bake").args(scene).arg("-o").arg(&folder);
-        lab.run(&format!("{name}, bakes"), command, false)?;
-        tables.push(std::fs::read_to_string(folder.join("occlusion.csv"))?);
-    }
+/// What a program bakes, in a folder.
+fn bake(lab: &Lab, program: &Path, what: &str, scene: Option<&Path>) -> Result<PathBuf> {
+    let folder = lab.scratch.path().join(format!("bakes_{}", what.replace([' ', ','], "_")));
+    let mut command = Command::new(program);
+    command.arg("bake").args(scene).arg("-o").arg(&folder);
+    lab.run(&format!("bakes of {what}"), command, false)?;
+    Ok(folder)
+}
+
+/// How many of the vertices' shares of open sky differ, and by how much at the most.
+fn occlusion(bakes: &[PathBuf; 2]) -> Option<Value> {
+    let table = |folder: &PathBuf| std::fs::read_to_string(folder.join("occlusion.csv")).ok();
+    let (then, now) = (table(&bakes[0])?, table(&bakes[1])?);
     let open = |line: &str| line.split(',').nth(1).and_then(|open| open.parse::<f64>().ok());
-    if tables[0].lines().count() != tables[1].lines().count() {
-        return Err(format!("{name}: other vertices").into());
+    if then.lines().count() != now.lines().count() {
+        return None;
     }
-    let lines = tables[0].lines().zip(tables[1].lines()).skip(1);
+    let lines = then.lines().zip(now.lines()).skip(1);
     let off: Vec<f64> = lines.filter_map(|(a, b)| Some((open(a)? - open(b)?).abs())).collect();
     let most = off.iter().copied().fold(0.0, f64::max);
     let differ = off.iter().filter(|off| **off > 1e-6).count();
-    Ok(json!({ "vertices": off.len(), "differ": differ, "most": most }))
+    Some(json!({ "vertices": off.len(), "differ": differ, "most": most }))
+}
+
+/// How the cubes differ, as shares of each one's mean: irradiance, hilite, and the lobe that stands in the stack.
+fn cubes([then, now]: &[PathBuf; 2]) -> Result<Value> {
+    let mut told = json!({});
+    for entry in std::fs::read_dir(then)? {
+        let file = entry?.file_name();
+        let name = file.to_string_lossy();
+        let Some(cube) = name.strip_suffix(".exr") else { continue };
+        let mut off = Off::default();
+        off.add(&planes(&then.join(&file))?, &planes(&now.join(&file))?, |_| true)?;
+        told[cube.split('_').next().unwrap_or(cube)] = off.told();
+    }
+    Ok(told)
 }
 
 /// The planes of an EXR file, by name.
-fn planes(path: &Path) -> Result<BTreeMap<String, Vec<f32>>> {
+type Planes = BTreeMap<String, Vec<f32>>;
+
+fn planes(path: &Path) -> Result<Planes> {
     use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
     let image = read()
         .no_deep_data()
