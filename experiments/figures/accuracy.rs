@@ -13,12 +13,13 @@ use crate::lab::{Lab, Result};
 use crate::studies::number;
 
 /// The tests that measure something that a page quotes.
-const TESTS: [&str; 7] = [
+const TESTS: [&str; 8] = [
     "bakes::",
     "samples::",
     "occlusion::",
     "meshes::",
     "built_in::",
+    "lights::",
     "graphics::parity::",
     "graphics::fused::",
 ];

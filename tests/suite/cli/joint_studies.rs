@@ -190,8 +190,8 @@ fn no_fit_of_a_tradeoff_sees_what_is_held_out_and_what_makes_no_sense_is_refused
     let all = whole.as_array().unwrap().last().unwrap();
     assert_ne!(last(&all["counts"]), last(&before.last().unwrap().2));
     sandbox.run(&[&held[..], &["deep/run", "--axis", "rays"]].concat()).refused(&[
-        "--hold-out: of the axes to be swept (rays) none fits anything",
-        "Name some of pixels, solver with --axis, too, or leave --hold-out out",
+        "of the axes to be swept (rays) none fits anything",
+        "Sweep some of pixels, solver, too, or hold none out",
     ]);
     // Silhouettes are measured by how fine one mesh is.
     sandbox
@@ -200,7 +200,7 @@ fn no_fit_of_a_tradeoff_sees_what_is_held_out_and_what_makes_no_sense_is_refused
     sandbox.write("other.toml", other.as_bytes());
     let apart = ["tradeoff", "noon.toml", "other.toml", "-o", "deep/run", "--axis", "silhouette"];
     sandbox.run(&apart).refused(&[
-        "--axis silhouette: ",
+        "the axis silhouette: ",
         "the scenes' meshes differ",
         "study the scenes one by one",
     ]);
