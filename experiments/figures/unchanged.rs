@@ -245,9 +245,10 @@ fn cubes([then, now]: &[PathBuf; 2]) -> Result<Value> {
     Ok(told)
 }
 
-/// The planes of an EXR file, by name.
+/// The planes of an image, by name.
 type Planes = BTreeMap<String, Vec<f32>>;
 
+/// Those of an EXR file.
 fn planes(path: &Path) -> Result<Planes> {
     use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
     let image = read()

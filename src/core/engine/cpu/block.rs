@@ -94,6 +94,5 @@ impl<'a> Block<'a> {
 #[inline(always)]
 pub(super) fn along<R: Real>([ds, dt]: [R; 2], across: [R; 4], down: [R; 4]) -> [R; 4] {
     let ([a, b, c, d], [e, f, g, h]) = (across, down);
-    // A closure would be compiled without the instructions of the function around it.
     [ds.mul_add(a, dt * e), ds.mul_add(b, dt * f), ds.mul_add(c, dt * g), ds.mul_add(d, dt * h)]
 }

@@ -436,7 +436,6 @@ fn slopes<S: Simd, const N: usize>(
     factors: &[Lanes<S>],
 ) -> [Lanes<S>; N] {
     let mut columns = [&shown[0]; N];
-    // Loops by index: closures over arrays are compiled without the instructions of the function around.
     for k in 0..N {
         columns[k] = &shown[tangents[k]];
     }
