@@ -1,25 +1,17 @@
 //! docs/closeup.json, and the pictures beside it: skin at close range, path traced, fitted with light that scatters, and without.
 
-use std::path::Path;
-
-use exr::prelude::read_first_rgba_layer_from_file;
-use image::imageops::{FilterType, crop_imm, replace, resize};
-use image::{Rgb, RgbImage};
 use serde_json::{Value, json};
-use skinfit::render::tonemap::ToneMap;
 use skinfit::report::plot::{Dot, Joined, Plot};
 
 use crate::diffusion::{OTHERS, WITHOUT};
 use crate::lab::{Lab, Result};
+use crate::squares::{Place, Shown, drawn, side_by_side, traced};
 
 /// The best of docs/diffusion.json's choices close up.
 const DIFFUSION: &str = r#"{ unblurred = "pixel", light_map_size = 1024, ambient_normal = "bumped" }"#;
-/// What is shown: the view, and the square of it in pixels.
-const SHOWN: [(&str, [u32; 3]); 3] =
+/// What is shown.
+const SHOWN: [Place; 3] =
     [("closeup", [120, 150, 130]), ("closeup", [190, 240, 130]), ("threequarter", [218, 150, 84])];
-/// Pixels of each square's side, and between two.
-const SIDE: u32 = 260;
-const GAP: u32 = 6;
 
 /// Across the edge of the nose's shadow on the cheek, from light to dark: rows that are averaged, and columns.
 const ROWS: std::ops::Range<usize> = 205..215;
@@ -32,24 +24,19 @@ const MILLIMETRES: f64 = 0.18;
 /// Of the path tracer's random walk in red, green and blue, in millimetres: what the scenes were rendered with.
 const MEAN_FREE_PATHS: [f64; 3] = [3.7, 1.4, 0.7];
 
-/// Linear radiance, row by row.
-struct Shown {
-    width: usize,
-    pixels: Vec<[f32; 3]>,
-}
-
 /// The fits' figures, the profile across the shadow's edge, and how wide the edge is in each channel.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let full = lab.head_scene("studio", "full.toml");
     let with = lab.scene("scattered", &full, &[("diffusion", DIFFUSION)])?;
     let without = lab.scene("unscattered", &full, &[("model.effects", WITHOUT), ("fit.free", OTHERS)])?;
-    let (mut columns, mut rows) = (vec![traced(lab)?], vec![("path traced".to_owned(), Value::Null)]);
+    let (mut columns, mut rows) =
+        (vec![traced(lab, "studio", &SHOWN)?], vec![("path traced".to_owned(), Value::Null)]);
     for (name, scene) in [("with diffusion", with), ("without", without)] {
         let (report, run) = lab.fit(name, Some(&scene), &[])?;
         rows.push((name.to_owned(), report["views"]["closeup"]["psnr"].clone()));
-        columns.push(drawn(lab, &run)?);
+        columns.push(drawn(lab, &run, &SHOWN)?);
     }
-    pictures(&columns)?;
+    side_by_side(&columns, &SHOWN, "docs/images/closeup.png")?;
     let profiles: Vec<Vec<[f64; 3]>> = columns.iter().map(|views| profile(&views[0])).collect();
     plot(&rows.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>(), &profiles)?;
     let rows = rows.into_iter().zip(&profiles).map(|((name, psnr), profile)| {
@@ -57,54 +44,6 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         json!({ "name": name, "psnr": psnr, "red": red, "green": green, "blue": blue, "profile": profile })
     });
     Ok(json!({ "rows": rows.collect::<Vec<_>>(), "mean_free_paths": MEAN_FREE_PATHS }))
-}
-
-fn read(path: &Path) -> Result<Shown> {
-    let image = read_first_rgba_layer_from_file(
-        path,
-        |size, _| Shown { width: size.width(), pixels: vec![[0.0; 3]; size.area()] },
-        |shown, place, (r, g, b, _): (f32, f32, f32, f32)| {
-            shown.pixels[place.y() * shown.width + place.x()] = [r, g, b];
-        },
-    );
-    Ok(image.map_err(|error| format!("{}: {error}", path.display()))?.layer_data.channel_data.pixels)
-}
-
-fn traced(lab: &Lab) -> Result<Vec<Shown>> {
-    let of = |(view, _): &(&str, [u32; 3])| read(&lab.data.join(format!("targets/studio_{view}.exr")));
-    SHOWN.iter().map(of).collect()
-}
-
-fn drawn(lab: &Lab, run: &Path) -> Result<Vec<Shown>> {
-    let of = |(view, _): &(&str, [u32; 3])| {
-        let image = run.join(format!("{view}.exr")).display().to_string();
-        let [scene, params] = ["scene.toml", "params.toml"].map(|name| run.join(name).display().to_string());
-        let draw = ["render", &scene, "--params", &params, "--view", view, "--engine", "cpu", "-o", &image];
-        lab.skinfit(&format!("{view} of {}", run.display()), &draw, false)?;
-        read(Path::new(&image))
-    };
-    SHOWN.iter().map(of).collect()
-}
-
-/// Squares side by side: a column an image, a row a place.
-fn pictures(columns: &[Vec<Shown>]) -> Result<()> {
-    let [across, down] = [columns.len(), SHOWN.len()].map(|count| count as u32 * (SIDE + GAP) - GAP);
-    let mut all = RgbImage::from_pixel(across, down, Rgb([24; 3]));
-    for (i, views) in columns.iter().enumerate() {
-        for (k, (shown, (_, [x, y, side]))) in views.iter().zip(&SHOWN).enumerate() {
-            let pixel = |column: u32, row: u32| {
-                let linear = shown.pixels[row as usize * shown.width + column as usize];
-                Rgb(ToneMap::default().encode_bytes(linear))
-            };
-            let height = (shown.pixels.len() / shown.width) as u32;
-            let image = RgbImage::from_fn(shown.width as u32, height, pixel);
-            let square = crop_imm(&image, *x, *y, *side, *side).to_image();
-            let square = resize(&square, SIDE, SIDE, FilterType::CatmullRom);
-            let [left, top] = [i, k].map(|place| place as i64 * i64::from(SIDE + GAP));
-            replace(&mut all, &square, left, top);
-        }
-    }
-    Ok(all.save("docs/images/closeup.png")?)
 }
 
 /// Mean radiance of the rows, pixel by pixel.

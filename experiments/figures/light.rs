@@ -1,10 +1,9 @@
 //! docs/light.json: the scanned head under lamps and skies that it casts shadows in, fitted with each choice of its light.
 
-use std::time::Instant;
-
 use serde_json::{Value, json};
 
 use crate::lab::{Choice, Lab, Result};
+use crate::squares::{Place, drawn, side_by_side, traced};
 use crate::studies::number;
 
 /// The scenes. The studio has lamps of its own and no scattering below the skin.
@@ -14,16 +13,22 @@ const SCENES: [&str; 3] = ["forest", "sunrise", "studio_dry"];
 const FILE: &str = "light.toml";
 
 /// What is fitted: its row's name, and settings of the scene file.
-const CHOICES: [Choice; 9] = [
+const CHOICES: [Choice; 15] = [
     ("as the scene has it", &[]),
     ("`skin_reflection = \"none\"`", &[("model.skin_reflection", "\"none\"")]),
     ("`bounces = \"none\"`", &[("model.bounces", "\"none\"")]),
     ("`visibility = \"scalar\"`", &[("model.visibility", "\"scalar\"")]),
     ("`specular_visibility = \"lagarde\"`", &[("model.specular_visibility", "\"lagarde\"")]),
+    ("`lobe_lookup = \"off_peak\"`", &[("model.lobe_lookup", "\"off_peak\"")]),
+    ("`split_sum = \"exact\"`", &[("model.split_sum", "\"exact\"")]),
+    ("`specular_model = \"kelemen\"`", &[("model.specular_model", "\"kelemen\"")]),
+    ("`specular_map = \"weight\"`", &[("model.specular_map", "\"weight\"")]),
     ("16 lights, `visibility = \"sh6\"`", &[("environment.lights", "16"), ("model.visibility", "\"sh6\"")]),
     ("16 lights, both by rays", RAYS),
-    ("`texture_filter = \"trilinear\"`", &[("quality", "{ texture_filter = \"trilinear\" }")]),
-    ("`texture_filter = \"anisotropic\"`", &[("quality", "{ texture_filter = \"anisotropic\" }")]),
+    ("`texture_filter = \"trilinear\"`", &[TRILINEAR]),
+    ("`texture_filter = \"anisotropic\"`", &[ANISOTROPIC]),
+    ("16 lights, both by rays, `trilinear`", &[RAYS[0], RAYS[1], RAYS[2], TRILINEAR]),
+    ("16 lights, both by rays, `anisotropic`", &[RAYS[0], RAYS[1], RAYS[2], ANISOTROPIC]),
 ];
 
 const RAYS: &[(&str, &str)] = &[
@@ -31,49 +36,22 @@ const RAYS: &[(&str, &str)] = &[
     ("model.visibility", "\"rays\""),
     ("model.specular_visibility", "\"rays\""),
 ];
+const TRILINEAR: (&str, &str) = ("quality", "{ texture_filter = \"trilinear\" }");
+const ANISOTROPIC: (&str, &str) = ("quality", "{ texture_filter = \"anisotropic\" }");
+
+/// What the pictures show of the sunrise: the nose, an ear, a temple.
+const SHOWN: [Place; 3] =
+    [("front", [150, 150, 90]), ("profile", [190, 150, 90]), ("threequarter", [218, 100, 84])];
+
+/// The lamps of the studio.
+const LAMPS: [&str; 3] = ["key", "warm_spot", "ear_point"];
 
 /// All of them, as docs/results.md has them in a table.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let choices = lab.choices(&CHOICES, &SCENES, FILE, fitted)?;
-    Ok(json!({ "choices": choices, "held_out": held_out(lab)?, "passes": passes(lab)?, "runs": runs(lab)? }))
-}
-
-/// What a pass takes with the paper's effects and with those of light, of the same pixels and samples.
-fn passes(lab: &Lab) -> Result<Vec<Value>> {
-    let files = [("the paper's effects", "scene.toml"), ("light, shadows, Fresnel and the sky", FILE)];
-    let mut rows = Vec::new();
-    for (name, file) in files {
-        // Many passes, all of them over all pixels.
-        let options = ["--solver", "lm", "--starts", "8", "--seed", "1"];
-        let (report, _) =
-            lab.fit(&format!("passes of {file}"), Some(&lab.head_scene("forest", file)), &options)?;
-        let evaluations = number(&report["evaluations"]);
-        rows.push(json!({
-            "name": name,
-            "passes": evaluations,
-            "milliseconds": 1e3 * number(&report["seconds"]["fit"]) / evaluations,
-        }));
-    }
-    Ok(rows)
-}
-
-/// Whole runs of the forest, as the command line has them: with nothing baked, and the best of five with all baked.
-fn runs(lab: &Lab) -> Result<Vec<Value>> {
-    let cache = lab.scratch.path().join("cache").display().to_string();
-    let scene = lab.head_scene("forest", FILE);
-    let run = |what: &str| -> Result<Value> {
-        let start = Instant::now();
-        let (report, _) = lab.fit(what, Some(&scene), &["--cache", &cache])?;
-        let mut seconds = report["seconds"].clone();
-        seconds["whole"] = start.elapsed().as_secs_f64().into();
-        seconds["name"] = what.into();
-        Ok(seconds)
-    };
-    let cold = run("nothing baked")?;
-    let mut warm = (0..5).map(|_| run("all baked")).collect::<Result<Vec<Value>>>()?;
-    warm.sort_by(|a, b| number(&a["whole"]).total_cmp(&number(&b["whole"])));
-    warm.truncate(1);
-    Ok([vec![cold], warm].concat())
+    let (held_out, mean) = held_out(lab)?;
+    pictures(lab)?;
+    Ok(json!({ "choices": choices, "held_out": held_out, "held_out_mean": mean, "lamps": lamps(lab)? }))
 }
 
 /// A row's figures of a fit of one scene.
@@ -88,8 +66,39 @@ fn fitted(report: &Value) -> Value {
     })
 }
 
-/// One skin for all scenes, each scored by a fit of the others.
-fn held_out(lab: &Lab) -> Result<Value> {
+/// The nose, an ear and a temple in the sunrise: path traced, by the paper's effects, as the scene has it, and by rays.
+fn pictures(lab: &Lab) -> Result<()> {
+    let scene = |file: &str| lab.head_scene("sunrise", file);
+    let by_rays = lab.scene("pictures by rays", &scene(FILE), RAYS)?;
+    let mut columns = vec![traced(lab, "sunrise", &SHOWN)?];
+    for (name, scene) in [("paper", scene("scene.toml")), ("light", scene(FILE)), ("rays", by_rays)] {
+        let (_, run) = lab.fit(&format!("pictures, {name}"), Some(&scene), &[])?;
+        columns.push(drawn(lab, &run, &SHOWN)?);
+    }
+    side_by_side(&columns, &SHOWN, "docs/images/sunrise.png")
+}
+
+/// The colours of the studio's lamps as a fit finds them that holds the base weight; the path tracer's are 1.
+fn lamps(lab: &Lab) -> Result<Vec<Value>> {
+    let colours = LAMPS.map(|lamp| format!("\"light.{lamp}.color\"")).join(", ");
+    let free = format!(
+        "[{colours}, \"rim_weight\", \"rim_exponent\", \"specular_weight\", \"roughness\", \"gloss\", \"f0\", \
+         \"normal_strength\"]"
+    );
+    let each = format!("[{colours}, \"rim_weight\"]");
+    let settings = [("fit.free", free.as_str()), ("fit.per_channel", each.as_str())];
+    let scene = lab.scene("lamps", &lab.head_scene("studio_dry", FILE), &settings)?;
+    let (report, _) = lab.fit("lamps", Some(&scene), &[])?;
+    let row = |lamp: &str| {
+        let found = &report["params"][format!("light.{lamp}.color")]["value"];
+        json!({ "name": lamp, "red": found[0], "green": found[1], "blue": found[2] })
+    };
+    Ok(LAMPS.map(row).to_vec())
+}
+
+/// One skin for all scenes, each scored by a fit of the others; and the mean over the scenes of what those score that
+/// were left out.
+fn held_out(lab: &Lab) -> Result<(Vec<Value>, f64)> {
     let files: Vec<String> =
         SCENES.iter().map(|scene| lab.head_scene(scene, FILE).display().to_string()).collect();
     let mut rows = Vec::new();
@@ -103,5 +112,6 @@ fn held_out(lab: &Lab) -> Result<Value> {
         let report: Value = serde_json::from_str(&text)?;
         rows.push(json!({ "name": scene, "scores": report["scores"] }));
     }
-    Ok(Value::Array(rows))
+    let scores: Vec<f64> = rows.iter().map(|row| number(&row["scores"]["held_out"]["psnr"])).collect();
+    Ok((rows, scores.iter().sum::<f64>() / scores.len() as f64))
 }

@@ -15,12 +15,16 @@ mod closeup;
 mod diffusion;
 mod lab;
 mod light;
+mod lobes;
 mod pages;
+mod passes;
 mod race;
 mod results;
 mod speed;
+mod squares;
 mod strays;
 mod studies;
+mod suggested;
 mod timings;
 mod unchanged;
 mod ways;
@@ -39,6 +43,7 @@ type Measure = fn(&Lab) -> Result<Value>;
 const FILES: &[(&str, Measure)] = &[
     ("docs/results.json", results::measure),
     ("docs/light.json", light::measure),
+    ("docs/suggest.json", suggested::measure),
     ("docs/diffusion.json", diffusion::measure),
     ("docs/accuracy.json", accuracy::tests),
     ("docs/noise.json", accuracy::noise),
@@ -49,6 +54,8 @@ const FILES: &[(&str, Measure)] = &[
     ("experiments/accuracy_vs_time/diffusion.json", ways::diffusion),
     ("experiments/effects_cost/results.json", timings::effects_cost),
     ("experiments/effects_cost/card.json", timings::effects_cost_on_a_card),
+    ("experiments/effects_cost/passes.json", passes::processor),
+    ("experiments/effects_cost/passes_card.json", passes::graphics_card),
     ("experiments/rays/results.json", timings::rays),
     ("experiments/scaling/results.json", timings::scaling),
     ("experiments/builds/results.json", builds::measure),

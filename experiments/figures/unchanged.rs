@@ -9,6 +9,7 @@ use toml_edit::DocumentMut;
 
 use crate::builds::ONE_PACKAGE;
 use crate::lab::{Lab, Result};
+use crate::lobes::beside_brute_force;
 use crate::studies::number;
 
 /// The scenes by the paper's model: names, and folders of the data.
@@ -48,6 +49,8 @@ pub(crate) fn measure(lab: &Lab) -> Result<Value> {
         let bakes = [baked(&before, "before")?, baked(lab.program(), "now")?];
         row["occlusion"] = occlusion(&bakes).ok_or(format!("{name}: other vertices"))?;
         row["cubes"] = cubes(&bakes)?;
+        let built_in = || skinfit::built_in_scene(&lab.scratch.path().join("built_in"));
+        row["lobes"] = beside_brute_force(&bakes, &scene.map_or_else(built_in, Ok)?)?;
         rows.push(row);
         if folder.is_none() {
             for (term, off) in &off {
@@ -65,19 +68,21 @@ pub(crate) fn program_before(lab: &Lab) -> Result<PathBuf> {
     if let Some(program) = &lab.before {
         return Ok(program.clone());
     }
-    built(lab, "before", None)
+    built(lab, "before", None, &["--example", "race"])
 }
 
 /// The same, its lobes interpolated with limited slopes, as today's program does it.
 fn program_limited(lab: &Lab) -> Result<PathBuf> {
     match &lab.limited {
         Some(program) => Ok(program.clone()),
-        None => built(lab, "limited", Some(&lab.root.join("experiments/unchanged/limited_slopes.patch"))),
+        None => {
+            built(lab, "limited", Some(&lab.root.join("experiments/unchanged/limited_slopes.patch")), &[])
+        }
     }
 }
 
-/// The program of that commit, built in a folder of its own, with a patch.
-fn built(lab: &Lab, folder: &str, patch: Option<&Path>) -> Result<PathBuf> {
+/// The program of that commit, built in a folder of its own, with a patch, and what is `beside` it.
+fn built(lab: &Lab, folder: &str, patch: Option<&Path>, beside: &[&str]) -> Result<PathBuf> {
     let clone = lab.scratch.path().join(folder);
     let program = clone.join("target/release/skinfit");
     if program.exists() {
@@ -96,7 +101,7 @@ fn built(lab: &Lab, folder: &str, patch: Option<&Path>) -> Result<PathBuf> {
     }
     let target = clone.join("target");
     let mut command = Command::new("cargo");
-    command.args(["build", "--release", "--bins", "--example", "race"]);
+    command.args(["build", "--release", "--bins"]).args(beside);
     command.arg("--manifest-path").arg(clone.join("Cargo.toml")).env("CARGO_TARGET_DIR", &target);
     lab.run("its programs", command, false)?;
     Ok(program)
@@ -246,10 +251,10 @@ fn cubes([then, now]: &[PathBuf; 2]) -> Result<Value> {
 }
 
 /// The planes of an image, by name.
-type Planes = BTreeMap<String, Vec<f32>>;
+pub(crate) type Planes = BTreeMap<String, Vec<f32>>;
 
 /// Those of an EXR file.
-fn planes(path: &Path) -> Result<Planes> {
+pub(crate) fn planes(path: &Path) -> Result<Planes> {
     use exr::prelude::{ReadChannels as _, ReadLayers as _, read};
     let image = read()
         .no_deep_data()

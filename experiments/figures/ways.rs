@@ -9,8 +9,18 @@ use crate::studies::{number, study_of};
 const LIT: [&str; 2] = ["forest", "sunrise"];
 const SCATTERING: [&str; 3] = ["forest", "sunrise", "studio"];
 
-const LIGHT: [&str; 7] =
-    ["sky_lights", "visibility", "specular_visibility", "split_sum", "rays", "texture_filter", "shadows"];
+const LIGHT: [&str; 10] = [
+    "sky_lights",
+    "visibility",
+    "specular_visibility",
+    "split_sum",
+    "lobe_lookup",
+    "skin_reflection",
+    "bounces",
+    "rays",
+    "texture_filter",
+    "shadows",
+];
 const DIFFUSION: [&str; 8] =
     ["taps", "light_map_size", "seams", "ambient_normal", "stretch", "unblurred", "combined", "levels"];
 
@@ -38,7 +48,7 @@ fn swept(lab: &Lab, file: &str, scenes: &[&str], axes: &[&str]) -> Result<Value>
             let found = json!({
                 "percent": 100.0 * number(&row["relative_rms"]),
                 "flip": row["flip"],
-                "ms": 1e3 * number(&row["seconds"]),
+                "ms": (row["unit"] == "seconds").then(|| 1e3 * number(&row["cost"])),
                 "front": row["pareto"],
             });
             put(&mut raw[axis], &row, scene, found);
@@ -52,7 +62,8 @@ fn put(table: &mut Value, row: &Value, scene: &str, found: Value) {
     if !table.is_array() {
         *table = json!([]);
     }
-    let name = row["setting"].as_str().map_or_else(|| row["setting"].to_string(), str::to_owned);
+    let setting = &row["setting"];
+    let name = setting.as_str().map_or_else(|| number(setting).to_string(), str::to_owned);
     let Some(rows) = table.as_array_mut() else { return };
     match rows.iter_mut().find(|row| row["name"] == name) {
         Some(row) => row[scene] = found,

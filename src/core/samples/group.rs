@@ -13,12 +13,17 @@ const CHUNK: usize = 64;
 /// The pixels that show the mesh, row by row: each one's index in the image, and where its hits start and end.
 pub(super) type Pixels = [(u32, std::ops::Range<u32>)];
 
-/// Pack the hits of a view of `width` pixels with `per_pixel` samples a pixel.
-pub(super) fn pack(hits: &Hits, surface: &Surface<'_>, width: u32, per_pixel: u32) -> ViewSamples {
+/// Pack the hits of a view of `width` pixels with `per_pixel` samples a pixel; `done` is told of so many more pixels.
+pub(super) fn pack(
+    hits: &Hits,
+    surface: &Surface<'_>,
+    (width, per_pixel): (u32, u32),
+    done: impl Fn(u64) + Sync,
+) -> ViewSamples {
     let order = order(&hits.pixels, width);
     let mut samples = groups(&hits.pixels, &order, per_pixel);
     samples.surface = SurfaceRecords::new(surface.asked(), samples.records());
-    fill(hits, surface, &order, &samples.group_start, &mut samples.surface);
+    fill(hits, surface, (&order, &samples.group_start), &mut samples.surface, done);
     samples
 }
 
@@ -81,7 +86,13 @@ pub(super) fn hit(pixels: &Pixels, group: &[u32], lane: usize, record: usize) ->
 }
 
 /// Fill each group's records.
-fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], into: &mut SurfaceRecords) {
+fn fill(
+    hits: &Hits,
+    surface: &Surface<'_>,
+    (order, group_start): (&[u32], &[u32]),
+    into: &mut SurfaceRecords,
+    done: impl Fn(u64) + Sync,
+) {
     let (places, stride) = (*into.places(), into.rows().stride());
     let declared = places.declared();
     let mut rest = into.rows_mut().all_mut();
@@ -103,6 +114,7 @@ fn fill(hits: &Hits, surface: &Surface<'_>, order: &[u32], group_start: &[u32], 
                 surface.field(*field, &points, &mut rows[at.clone()]);
             }
         }
+        done(group.len() as u64);
     });
 }
 

@@ -245,11 +245,13 @@ pub fn sample_these(
     let rays = RayMesh::new(&posed.positions, &posed.triangles);
     let posed = PosedSurface::new(scene, posed, &rays, &scene.mesh.morphs, bakes)?;
     let atlas = atlas_of(scene, &posed)?;
-    let bar = progress::bar("samples", views.len() as u64);
+    let pixels = |view: &View| u64::from(view.camera.width) * u64::from(view.camera.height);
+    let bar = progress::bar("samples", views.iter().map(pixels).sum());
     let views = views.iter().map(|view| {
-        let mut samples = sample_view(scene, &posed, &view.camera);
+        let mut samples = sampled(scene, &posed, &view.camera, |pixels| bar.inc(pixels));
         samples.atlas.clone_from(&atlas);
-        bar.inc(1);
+        let covered = samples.pixel.iter().filter(|&&pixel| pixel != u32::MAX).count();
+        bar.inc(pixels(view) - covered as u64);
         if samples.pixel.is_empty() { Err(nothing_visible(scene, view)) } else { Ok(samples) }
     });
     let views = views.collect();
@@ -312,10 +314,20 @@ pub fn atlas_of(scene: &Scene, posed: &PosedSurface<'_>) -> Result<Option<Arc<At
 /// threads.
 #[must_use]
 pub fn sample_view(scene: &Scene, posed: &PosedSurface<'_>, camera: &Camera) -> ViewSamples {
+    sampled(scene, posed, camera, |_| {})
+}
+
+/// As [`sample_view`]; `done` is told of so many more pixels that are covered.
+fn sampled(
+    scene: &Scene,
+    posed: &PosedSurface<'_>,
+    camera: &Camera,
+    done: impl Fn(u64) + Sync,
+) -> ViewSamples {
     let n = scene.quality.samples_per_axis.max(1);
     let hits = trace::trace(posed.rays, posed.mesh, camera, n);
     let surface = surface::Surface::new(scene, posed, camera);
-    group::pack(&hits, &surface, camera.width, n * n)
+    group::pack(&hits, &surface, (camera.width, n * n), done)
 }
 
 /// So many records of what the effects of `scene` ask for, all zero.

@@ -141,6 +141,12 @@ impl<'a> PosedSurface<'a> {
         Self { charts, ..self }
     }
 
+    /// Whether a field is found at vertices: what rays into the lobes of samples find is not.
+    #[must_use]
+    pub fn finds_at_vertices(&self, field: Field) -> bool {
+        self.lobes.as_ref().is_none_or(|lobes| !lobes.finds(field))
+    }
+
     /// What there is of a field at each vertex, its numbers one after the other; a vertex that is of no triangle has what
     /// stands in for them. All cores.
     #[must_use]

@@ -1,6 +1,7 @@
 //! `skinfit bake`: what a scene's effects ask to be baked, as files to look at.
 
 mod stages;
+mod vertices;
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -22,7 +23,7 @@ use crate::render::image::Image;
 /// Bake a scene's cube maps and ambient occlusion into files
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at) and occlusion.csv (a row a vertex: the open share of its hemisphere). With --stages also charts, stretch, light_map, level_1 and on, and how light map and levels move along each free parameter, light_map_by_<parameter> and so on, each as .exr and .png: texels of the UV atlas, stretch in the scene's unit a texel; and charts.csv (a row a vertex: the chart that it lies on). Beside them an empty .lock, which keeps two commands from writing there at once.\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
+    after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at) occlusion.csv (a row a vertex: the open share of its hemisphere) and vertices.csv (a row a vertex, a column for each number of each field that rays find there: the sky that it sees, bent normals, light that the skin throws back, shadows, depths). With --stages also charts, stretch, light_map, level_1 and on, and how light map and levels move along each free parameter, light_map_by_<parameter> and so on, each as .exr and .png: texels of the UV atlas, stretch in the scene's unit a texel; and charts.csv (a row a vertex: the chart that it lies on). Beside them an empty .lock, which keeps two commands from writing there at once.\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -54,7 +55,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let baked = Baked::new(&path, &options)?;
     tell_warnings(&baked.warnings);
     let cubes = cubes(&baked.illumination, &baked.scene.params);
-    let written = cubes.len() + usize::from(baked.occlusion.is_some());
+    let vertices = vertices::table(&baked)?;
+    let written = cubes.len() + usize::from(baked.occlusion.is_some()) + usize::from(vertices.is_some());
     // Before anything is written: it may be refused.
     let stages = if arguments.stages { Some(Stages::new(&baked)?) } else { None };
     if written > 0 || stages.is_some() {
@@ -66,6 +68,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     }
     if let Some(occlusion) = &baked.occlusion {
         output::write(&folder.join("occlusion.csv"), occlusion_csv(occlusion).as_bytes())?;
+    }
+    if let Some(vertices) = vertices {
+        output::write(&folder.join("vertices.csv"), vertices.as_bytes())?;
     }
     for row in &baked.stats.rows {
         let from = if row.cached { "kept from an earlier run" } else { "baked" };

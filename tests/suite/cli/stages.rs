@@ -90,10 +90,46 @@ fn an_effect_that_is_off_is_not_baked() {
         ("reflection", &["lobe"]),
         ("occlusion,side_specular", &["lobe"]),
         ("key_light,normal_map", &[]),
+        ("directional_occlusion", &["vertices"]),
+        // Without directional_occlusion nothing asks for the sky at vertices.
+        ("fresnel", &["lobe", "occlusion"]),
     ] {
         let bakes: BTreeSet<String> = bakes.iter().map(|&name| name.to_owned()).collect();
         assert_eq!(baked(&sandbox, effects), bakes, "{effects}");
     }
+}
+
+#[test]
+fn what_vertices_see_of_the_sky_is_a_table() {
+    let sandbox = Sandbox::new();
+    sandbox.edit("[model.params]", "specular_visibility = \"cone\"\n[model.params]");
+    let effects = "diffuse,directional_occlusion,fresnel";
+    sandbox.run(&["bake", "scene.toml", "--effects", effects, "-o", "baked"]).done();
+    let text = sandbox.text("baked/vertices.csv");
+    let mut lines = text.lines();
+    let columns: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let at = |name: &str| {
+        columns.iter().position(|column| *column == name).unwrap_or_else(|| panic!("{name}: {columns:?}"))
+    };
+    let rows: Vec<Vec<f64>> =
+        lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
+    let open = sandbox.text("baked/occlusion.csv");
+    assert_eq!(rows.len(), open.lines().count() - 1);
+    let [bent, ratio] = ["bent_normal_1", "sky_ratio_1"].map(at);
+    let (mut hidden, mut whole) = (0, 0);
+    for (vertex, row) in rows.iter().enumerate() {
+        assert_eq!(row.len(), columns.len());
+        assert_eq!(row[0], vertex as f64);
+        let length = row[bent..bent + 3].iter().map(|x| x * x).sum::<f64>().sqrt();
+        // f32, as a decimal of as many digits as tell it from its neighbours.
+        assert!((length - 1.0).abs() < 1e-6, "vertex {vertex}: {row:?}");
+        let ratio = &row[ratio..ratio + 3];
+        assert!(ratio.iter().all(|x| *x >= 0.0), "vertex {vertex}: {row:?}");
+        hidden += usize::from(ratio.iter().all(|x| *x < 0.95));
+        whole += usize::from(ratio.iter().all(|x| (x - 1.0).abs() < 1e-3));
+    }
+    // The brow hides some of the sky from what is below it, and nothing from the back of the ball.
+    assert!(hidden > 0 && whole > 0, "{hidden} vertices in the shade, {whole} see all");
 }
 
 #[test]

@@ -283,11 +283,16 @@ fn ways_to_the_skys_light_are_measured_beside_rays() {
     let sandbox = Sandbox::new();
     sandbox.edit("\"reflection\"]", "\"reflection\", \"fresnel\", \"directional_occlusion\"]");
     sandbox.edit("occlusion_rays = 32", "occlusion_rays = 256\nlobe_rays = 32");
-    let axes = ["--axis", "visibility", "--axis", "specular_visibility"];
-    done(sandbox.run(&[&["tradeoff", "scene.toml", "-o", "cost"][..], &axes].concat()));
-    for (axis, reference, present) in
-        [("visibility", "rays", "sh4"), ("specular_visibility", "rays", "lagarde")]
-    {
+    let ways = [
+        ("visibility", "rays", "sh4"),
+        ("specular_visibility", "rays", "lagarde"),
+        ("lobe_lookup", "rays", "mirror"),
+        ("skin_reflection", "rays", "gathered"),
+        ("bounces", "gathered", "gathered"),
+    ];
+    let axes = ways.iter().flat_map(|(axis, ..)| ["--axis", axis]);
+    done(sandbox.run(&["tradeoff", "scene.toml", "-o", "cost"].into_iter().chain(axes).collect::<Vec<_>>()));
+    for (axis, reference, present) in ways {
         let settings = settings(&sandbox, "cost", axis);
         let of = |key: &str| -> Vec<&str> {
             settings.iter().filter(|s| s[key] == true).map(|s| s["name"].as_str().unwrap()).collect()

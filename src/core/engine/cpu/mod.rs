@@ -47,7 +47,7 @@ use self::lobe::Lobes;
 use self::looked_up::LookedUp;
 use self::pass::{Pass, Reading};
 use self::program::Bound;
-use self::streams::{Stream, neutral_rows};
+use self::streams::{Stream, StreamOf, neutral_rows};
 use self::sums::{CHUNK, by_chunk};
 use self::view_pass::{Beside, ViewPass, streams, with_scratch};
 use super::view::ObservedView;
@@ -216,6 +216,19 @@ impl CpuEngine {
         };
         self.pass_for(self.turned(point))
             .is_ok_and(|pass| [&pass.keep, &pass.value, &pass.moved].into_iter().all(is_compiled))
+    }
+
+    /// Bytes of a sample that each pass at `point` reads: the numbers that are kept of it, the fields that are not, its
+    /// target and what its pixel counts.
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for.
+    pub fn bytes_a_sample(&self, point: &Point) -> Result<usize, ShadingError> {
+        let pass = self.pass_for(self.turned(point))?;
+        let loads = pass.moved.loads.iter().filter(|(stream, _)| *stream != StreamOf::Neutral).count();
+        let observed =
+            self.views.iter().map(|view| view.target.stride() + usize::from(!view.weight.is_empty()));
+        Ok(size_of::<f32>() * (loads + observed.max().unwrap_or(0)))
     }
 
     fn pass_for(&self, turned: bool) -> Result<Arc<Pass>, ShadingError> {

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use crate::StudyError;
 use crate::engine::{Objective, Point};
-use crate::model::choices::{SpecularVisibility, SplitSum, Visibility};
+use crate::model::choices::{Bounces, LobeLookup, SkinReflection, SpecularVisibility, SplitSum, Visibility};
 use crate::model::effects::Effect;
 use crate::reference::Difference;
 use crate::render::image::Image;
@@ -73,6 +73,51 @@ pub(super) const SPLIT_SUM: Ways = Ways {
     ways: &[
         ("schlick", |scene| scene.choices.split_sum = SplitSum::Schlick),
         ("exact", |scene| scene.choices.split_sum = SplitSum::Exact),
+    ],
+};
+
+/// Where the environment is looked up for the specular lobe.
+pub(super) const LOOKUP: Ways = Ways {
+    axis: "lobe_lookup",
+    title: "Where the environment is looked up for the specular lobe",
+    method: "Images with the prefiltered environment looked up along the mirrored view and off the lobe's peak; the reference has the \
+             lobe's light itself, by rays. Seconds are those of baking, tracing and one pass, nothing cached.",
+    effect: "fresnel",
+    idle: "the effect fresnel is off",
+    ways: &[
+        ("mirror", |scene| scene.choices.lobe_lookup = LobeLookup::Mirror),
+        ("off_peak", |scene| scene.choices.lobe_lookup = LobeLookup::OffPeak),
+        ("rays", |scene| scene.choices.specular_visibility = SpecularVisibility::Rays),
+    ],
+};
+
+/// Light that the skin throws back at itself.
+pub(super) const BOUNCES: Ways = Ways {
+    axis: "bounces",
+    title: "Light that the skin throws back at itself",
+    method: "Images without that light, with it by a polynomial of the open share and the albedo, and gathered over the mesh, which is \
+             the reference. Seconds are those of baking, tracing and one pass, nothing cached.",
+    effect: "directional_occlusion",
+    idle: "the effect directional_occlusion is off",
+    ways: &[
+        ("none", |scene| scene.choices.bounces = Bounces::None),
+        ("polynomial", |scene| scene.choices.bounces = Bounces::Polynomial),
+        ("gathered", |scene| scene.choices.bounces = Bounces::Gathered),
+    ],
+};
+
+/// What the specular lobe sees where it does not see the sky.
+pub(super) const REFLECTION: Ways = Ways {
+    axis: "skin_reflection",
+    title: "What the specular lobe sees where it does not see the sky",
+    method: "Images with nothing there, and with the skin that the point sees on average; the reference has the lobe's light itself, by \
+             rays, which meet the skin. Seconds are those of baking, tracing and one pass, nothing cached.",
+    effect: "fresnel",
+    idle: "the effect fresnel is off",
+    ways: &[
+        ("none", |scene| scene.choices.skin_reflection = SkinReflection::None),
+        ("gathered", |scene| scene.choices.skin_reflection = SkinReflection::Gathered),
+        ("rays", |scene| scene.choices.specular_visibility = SpecularVisibility::Rays),
     ],
 };
 
