@@ -40,8 +40,7 @@ const TRILINEAR: (&str, &str) = ("quality", "{ texture_filter = \"trilinear\" }"
 const ANISOTROPIC: (&str, &str) = ("quality", "{ texture_filter = \"anisotropic\" }");
 
 /// What the pictures show of the sunrise: the nose, an ear, a temple.
-const SHOWN: [Place; 3] =
-    [("front", [150, 150, 90]), ("profile", [190, 150, 90]), ("threequarter", [218, 100, 84])];
+const SHOWN: [Place; 3] = [("front", [147, 155, 90]), ("front", [225, 145, 90]), ("front", [200, 65, 90])];
 
 /// The lamps of the studio.
 const LAMPS: [&str; 3] = ["key", "warm_spot", "ear_point"];

@@ -10,6 +10,8 @@ pub const KEPT: &str = "kept";
 
 /// Operations up to which a number of one field is computed anew in each pass.
 const CHEAP: usize = 3;
+/// And of fields that a pass reads anyway.
+const CHEAP_OF_READ: usize = 6;
 
 /// A graph in two parts.
 #[derive(Debug)]
@@ -46,19 +48,31 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
     // Without lookups of its own a pass need not read samples at all.
     let looks_up =
         (0..graph.len()).any(|at| reached[at] && live[at] && graph.looked_up(Id(at as u32)).is_some());
+    // What such a pass reads and computes for its own sake is there for other numbers, too.
+    let mut there = vec![false; graph.len()];
+    let computed = |id: Id, there: &mut [bool]| {
+        let reached = graph.reached(&[id]);
+        reached.iter().zip(there).for_each(|(reached, there)| *there |= reached);
+    };
+    if looks_up {
+        let cheap: Vec<Id> =
+            graph.ids().filter(|id| edge[id.index()] && is_cheap(graph, *id, &varies, &there)).collect();
+        cheap.into_iter().for_each(|id| computed(id, &mut there));
+    }
     let mut kept = Vec::new();
     for at in 0..graph.len() {
         let id = Id(at as u32);
         if !edge[at] && !seldom[at] {
             continue;
         }
-        if !edge[at] || is_cheap(graph, id) {
-            let leaves = leaves(graph, id);
-            if !looks_up {
-                for leaf in leaves {
-                    if !kept.contains(&leaf) {
-                        kept.push(leaf);
-                    }
+        if !edge[at] || is_cheap(graph, id, &varies, &there) {
+            if looks_up {
+                computed(id, &mut there);
+                continue;
+            }
+            for leaf in leaves(graph, id) {
+                if !kept.contains(&leaf) {
+                    kept.push(leaf);
                 }
             }
         } else if !kept.contains(&id) && !is_one_operation_on(graph, id, &kept, &varies) {
@@ -81,20 +95,24 @@ fn is_one_operation_on(graph: &Graph, id: Id, kept: &[Id], varies: &[bool]) -> b
     plain && graph.operands(id).into_iter().all(|operand| !varies[operand.index()] || kept.contains(&operand))
 }
 
-/// Whether a number is a field, or a few operations on one.
-fn is_cheap(graph: &Graph, id: Id) -> bool {
-    let reached = graph.reached(&[id]);
-    let nodes = (0..=id.index()).filter(|&at| reached[at]).map(|at| graph.node(Id(at as u32)));
+/// Whether a number is a field, or a few operations on one, and on what is `there` anyway.
+fn is_cheap(graph: &Graph, id: Id, varies: &[bool], there: &[bool]) -> bool {
     let (mut fields, mut operations) = (0, 0);
-    for node in nodes {
-        match node {
+    let (mut open, mut seen) = (vec![id], vec![false; id.index() + 1]);
+    while let Some(id) = open.pop() {
+        // What all samples share is computed once.
+        if !varies[id.index()] || there[id.index()] || std::mem::replace(&mut seen[id.index()], true) {
+            continue;
+        }
+        match graph.node(id) {
             Node::Field(_) => fields += 1,
             Node::Constant(_) | Node::Uniform(_) => {}
             Node::Call(_) | Node::Part(..) => return false,
             Node::Unary(..) | Node::Binary(..) | Node::Select { .. } => operations += 1,
         }
+        open.extend(graph.operands(id));
     }
-    fields <= 1 && operations <= CHEAP
+    fields == 0 && operations <= CHEAP_OF_READ || fields <= 1 && operations <= CHEAP
 }
 
 /// The fields that a number is made of.
@@ -102,4 +120,51 @@ fn leaves(graph: &Graph, id: Id) -> Vec<Id> {
     let reached = graph.reached(&[id]);
     let ids = (0..=id.index()).filter(|&at| reached[at]).map(|at| Id(at as u32));
     ids.filter(|&id| matches!(graph.node(id), Node::Field(_))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::program::graph::Native;
+
+    /// How many numbers are kept of a fixed vector less the view, and so many `other` fields less, whose components and
+    /// square are needed beside a lookup along what the uniform `free` makes of the view.
+    fn kept_of(other: usize) -> usize {
+        let mut graph = Graph::default();
+        let (free, angle) = (graph.uniform("free", 0), graph.uniform("angle", 0));
+        // What all samples share, in many operations.
+        let fixed = (0..9).fold(angle, |all, _| graph.binary(Binary::Multiply, all, angle));
+        let view = [0, 1, 2].map(|c| graph.field("view", c));
+        let along = view.map(|v| graph.binary(Binary::Add, v, free));
+        let faces = graph.resource("faces");
+        let [mut sum, ..] = graph.call(Native::Lookup(faces), along.to_vec(), Vec::new())[..] else {
+            return 0;
+        };
+        let mut square = graph.constant(0.0);
+        for v in view {
+            let mut half = graph.binary(Binary::Subtract, fixed, v);
+            for k in 0..other {
+                let more = graph.field("other", k);
+                half = graph.binary(Binary::Subtract, half, more);
+            }
+            let squared = graph.binary(Binary::Multiply, half, half);
+            square = graph.binary(Binary::Add, square, squared);
+            let moved = graph.binary(Binary::Multiply, half, free);
+            sum = graph.binary(Binary::Add, sum, moved);
+        }
+        let output = graph.binary(Binary::Multiply, sum, square);
+        let moves = |graph: &Graph, id: Id| match graph.node(id) {
+            Node::Uniform(at) => graph.uniforms[at as usize].name == "free",
+            _ => false,
+        };
+        cut(&graph, &[output], moves).kept.len()
+    }
+
+    #[test]
+    fn what_a_few_operations_make_of_numbers_that_are_read_anyway_is_not_kept() {
+        assert_eq!(kept_of(0), 0);
+        assert_eq!(kept_of(1), 0);
+        // Two more fields to read, for each of three numbers; the square takes five operations on them.
+        assert_eq!(kept_of(2), 3);
+    }
 }

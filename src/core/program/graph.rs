@@ -4,8 +4,10 @@
 //! constant, and leave out what changes nothing (`x + 0`, `1 x`). So two rules, or a rule and its tangent, that
 //! compute the same number share it without a word in either.
 //!
-//! `node`: what a graph consists of; `simplify`: its operations; `rebuilt`: parts of it as a graph of their own.
+//! `node`: what a graph consists of; `simplify`: its operations; `rebuilt`: parts of it as a graph of their own;
+//! `factored`: sums of products with what they have in common taken out.
 
+mod factored;
 mod node;
 mod rebuilt;
 mod simplify;
@@ -232,6 +234,12 @@ mod tests {
         assert_eq!(graph.binary(Binary::Multiply, x, zero), zero);
         assert_eq!(graph.select(one, x, zero), x);
         assert_eq!(graph.len(), before);
+        let y = graph.field("y", 0);
+        let holds = graph.binary(Binary::Less, x, y);
+        let once = graph.select(holds, x, zero);
+        assert_eq!(graph.select(holds, once, zero), once);
+        let otherwise = graph.select(holds, y, once);
+        assert_eq!(otherwise, graph.select(holds, y, zero));
     }
 
     #[test]

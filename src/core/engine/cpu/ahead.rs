@@ -40,11 +40,16 @@ pub(super) struct Plan {
     effects: Effects,
     /// Effects that became known later, by their names.
     added: &'static [&'static str],
+    /// Parameters that fits seldom free, by their names: held here, so that no pass computes how anything moves with them.
+    held: &'static [&'static str],
     choices: Choices,
     /// Those of [`MOVING`] that are free.
     moving: &'static [Param],
     /// Whether what does not move is kept from pass to pass.
     keeps: bool,
+    /// Whether fits that hold some of `moving` run it, too: so much moves with what lights show that computing all of it anew
+    /// takes less than reading what could be kept.
+    serves_held: bool,
 }
 
 const fn plan(
@@ -55,7 +60,18 @@ const fn plan(
     moving: &'static [Param],
 ) -> Plan {
     let choices = Setup::new(form, silhouette, effects).choices;
-    Plan { name, form, silhouette, effects, added: &[], choices, moving, keeps: true }
+    Plan {
+        name,
+        form,
+        silhouette,
+        effects,
+        added: &[],
+        held: &[],
+        choices,
+        moving,
+        keeps: true,
+        serves_held: false,
+    }
 }
 
 /// The paper's effects and its haze, as scenes and the race beside other programs have them.
@@ -88,6 +104,7 @@ const LIT_TOO: [&str; 7] = [
     "light_sky_3",
     "light_sky_4",
 ];
+const LIT_HELD: [&str; 3] = ["occlusion", "f0_floor", "fresnel_loss"];
 const LIT_BY: Choices = Choices {
     specular_model: SpecularModel::Ggx,
     specular_visibility: SpecularVisibility::Cone,
@@ -133,12 +150,19 @@ static PLANS: [Plan; 26] = [
     plan("listing_lobe", Listing, Vertex, Effects::SURFACE, &[P::SpecularLobe]),
     plan("listing_strength", Listing, Vertex, Effects::SURFACE, &[P::NormalStrength]),
     plan("listing_strength_lobe", Listing, Vertex, Effects::SURFACE, STRENGTH_AND_LOBE),
-    plan("lit_strength", Corrected, Fragment, LIT, &[P::NormalStrength]).with(&LIT_TOO, LIT_BY),
+    plan("lit_strength", Corrected, Fragment, LIT, &[P::NormalStrength])
+        .with(&LIT_TOO, LIT_BY)
+        .lit(&LIT_HELD),
 ];
 
 impl Plan {
     const fn keeping_nothing(self) -> Self {
         Self { keeps: false, ..self }
+    }
+
+    /// Of lit skin: `held` are not free in it.
+    const fn lit(self, held: &'static [&'static str]) -> Self {
+        Self { held, serves_held: true, ..self }
     }
 
     const fn with(self, added: &'static [&'static str], choices: Choices) -> Self {
@@ -159,7 +183,9 @@ impl Plan {
     pub(super) fn free(&self) -> Vec<Param> {
         let effects = self.setup().map_or(self.effects, |setup| setup.effects);
         let free = |param: &Param| {
-            (!MOVING.contains(param) || self.moving.contains(param)) && !param.name().starts_with("light.")
+            (!MOVING.contains(param) || self.moving.contains(param))
+                && !param.name().starts_with("light.")
+                && !self.held.contains(&param.name())
         };
         Param::all().filter(|param| param.asked_for(effects)).filter(free).collect()
     }
@@ -196,7 +222,7 @@ pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<
         plan.keeps == fitted.keep && plan.channels() >= fitted.channels
             && plan.turned() == turned
             // Else lookups would be made anew that could be kept.
-            && plan.moving.iter().all(|param| free.contains(param))
+            && (plan.serves_held || plan.moving.iter().all(|param| free.contains(param)))
             && free.iter().all(|param| yielded.contains(param))
     };
     PLANS.iter().find(yields)

@@ -130,7 +130,8 @@ impl Tapes {
                     _ => graph.looked_up(id).is_some_and(|name| names.iter().any(|known| known == name)),
                 }
         };
-        let cut = cut(&shading.graph, &outputs, moves);
+        let (graph, outputs) = shading.graph.factored(&outputs, moves);
+        let cut = cut(&graph, &outputs, moves);
         let mut moved = cut.outputs[..channels].to_vec();
         let mut columns = Vec::new();
         for tangent in cut.outputs[channels..].chunks(channels) {
@@ -144,7 +145,7 @@ impl Tapes {
             columns.push(tangent.iter().map(&mut column).collect());
         }
         Ok(Self {
-            keep: tape(&shading.graph, &cut.kept),
+            keep: tape(&graph, &cut.kept),
             value: tape(&cut.graph, &moved[..channels]),
             moved: tape(&cut.graph, &moved),
             columns,

@@ -14,7 +14,8 @@ impl Graph {
         (graph, outputs)
     }
 
-    fn copy(
+    /// A node's like in another graph; `moved` tells where what it is made of stands there.
+    pub(super) fn copy(
         &self,
         id: Id,
         graph: &mut Self,

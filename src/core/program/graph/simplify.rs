@@ -65,6 +65,8 @@ impl Graph {
         if let Some(value) = self.value(condition) {
             return if value == 0.0 { no } else { yes };
         }
+        // Where a condition holds already, it holds.
+        let (yes, no) = (self.under(condition, true, yes), self.under(condition, false, no));
         if yes == no {
             return yes;
         }
@@ -72,6 +74,16 @@ impl Graph {
             Some(opposite) => self.select(opposite, no, yes),
             None => self.add(Node::Select { condition, yes, no }),
         }
+    }
+
+    /// What a number is where a condition is known to hold, or not to.
+    fn under(&self, known: Id, holds: bool, mut number: Id) -> Id {
+        while let Node::Select { condition, yes, no } = self.node(number)
+            && condition == known
+        {
+            number = if holds { yes } else { no };
+        }
+        number
     }
 
     /// What a condition is the negation of.

@@ -1,0 +1,229 @@
+//! Sums of products with what they have in common taken out: `a x + b x` as `(a + b) x`.
+//!
+//! Each light adds its own product of albedo, weight and what arrives of it, and each parameter moves them all. Written so,
+//! the sum over lights is a number of its own, which value and slopes share.
+
+use super::{Binary, Graph, Id, Node, Unary};
+
+/// A product, added or taken away.
+#[derive(Clone, Debug)]
+struct Addend {
+    negative: bool,
+    /// Numbers of the sample, in the order of their places; one may be there twice.
+    factors: Vec<Id>,
+    /// The product of those that all samples share.
+    shared: Id,
+}
+
+/// A graph that is being made of another one.
+struct Factoring<'a, M> {
+    old: &'a Graph,
+    new: Graph,
+    /// Where the old graph's nodes stand in the new one.
+    moved: Vec<Option<Id>>,
+    /// How often each is an operand or an output.
+    uses: Vec<usize>,
+    /// Which of the new graph's nodes differ between samples, and which of them between passes.
+    made_of: Vec<MadeOf>,
+    moves: M,
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct MadeOf {
+    varies: bool,
+    moves: bool,
+}
+
+impl Graph {
+    /// The same numbers with common factors taken out of sums, rounded otherwise; and the outputs there. `moves` says which
+    /// inputs and lookups differ between passes: the others' products are numbers of their own, which can be kept.
+    #[must_use]
+    pub fn factored(&self, outputs: &[Id], moves: impl Fn(&Self, Id) -> bool) -> (Self, Vec<Id>) {
+        let mut uses = vec![0; self.len()];
+        let reached = self.reached(outputs);
+        for id in self.ids().filter(|id| reached[id.index()]) {
+            self.operands(id).iter().for_each(|operand| uses[operand.index()] += 1);
+        }
+        outputs.iter().for_each(|id| uses[id.index()] += 1);
+        let moved = vec![None; self.len()];
+        let mut factoring =
+            Factoring { old: self, new: Self::default(), moved, uses, made_of: Vec::new(), moves };
+        // Operands stand before what they are operands of: nothing is deep.
+        for id in self.ids().filter(|id| reached[id.index()]) {
+            factoring.carry(id);
+        }
+        let outputs = outputs.iter().filter_map(|id| factoring.moved[id.index()]).collect();
+        (factoring.new, outputs)
+    }
+}
+
+impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
+    /// Make a node's like.
+    fn carry(&mut self, id: Id) {
+        let made = if self.is_sum(id) {
+            let mut addends = Vec::new();
+            self.flatten(id, false, &mut addends);
+            self.sum(addends)
+        } else {
+            self.old.copy(id, &mut self.new, &mut self.moved, &|_| None)
+        };
+        self.moved[id.index()] = Some(made);
+    }
+
+    fn is_sum(&self, id: Id) -> bool {
+        matches!(self.old.node(id), Node::Binary(Binary::Add | Binary::Subtract, ..))
+    }
+
+    /// The products that a sum adds up. A sum within it that is asked for elsewhere too is one number.
+    fn flatten(&mut self, id: Id, negative: bool, addends: &mut Vec<Addend>) {
+        let root = self.moved[id.index()].is_none();
+        match self.old.node(id) {
+            Node::Binary(op @ (Binary::Add | Binary::Subtract), a, b)
+                if root || self.uses[id.index()] == 1 =>
+            {
+                self.flatten(a, negative, addends);
+                self.flatten(b, negative ^ (op == Binary::Subtract), addends);
+            }
+            _ => {
+                let one = self.new.constant(1.0);
+                let mut addend = Addend { negative, factors: Vec::new(), shared: one };
+                self.multiply(id, &mut addend);
+                addend.factors.sort_unstable();
+                addends.push(addend);
+            }
+        }
+    }
+
+    /// The factors of a product.
+    fn multiply(&mut self, id: Id, addend: &mut Addend) {
+        match self.old.node(id) {
+            Node::Unary(Unary::Negate, a) => {
+                addend.negative ^= true;
+                self.multiply(a, addend);
+            }
+            Node::Binary(Binary::Multiply, a, b) => {
+                self.multiply(a, addend);
+                self.multiply(b, addend);
+            }
+            _ => {
+                let Some(factor) = self.moved[id.index()] else { return };
+                if self.made_of(factor).varies {
+                    addend.factors.push(factor);
+                } else {
+                    addend.shared = self.new.binary(Binary::Multiply, addend.shared, factor);
+                }
+            }
+        }
+    }
+
+    /// What a node of the new graph is made of.
+    fn made_of(&mut self, id: Id) -> MadeOf {
+        for at in self.made_of.len()..self.new.len() {
+            let (graph, of) = (&self.new, Id(at as u32));
+            let mut made = MadeOf { varies: false, moves: (self.moves)(graph, of) };
+            made.varies = matches!(graph.node(of), Node::Field(_)) || graph.looked_up(of).is_some();
+            for operand in graph.operands(of) {
+                let operand = self.made_of[operand.index()];
+                made.varies |= operand.varies;
+                made.moves |= operand.moves;
+            }
+            self.made_of.push(made);
+        }
+        self.made_of[id.index()]
+    }
+
+    /// Add products up, the factor first that most of them have.
+    fn sum(&mut self, addends: Vec<Addend>) -> Id {
+        let Some(factor) = most_common(&addends) else {
+            return self.added(addends);
+        };
+        let (mut with, without): (Vec<Addend>, Vec<Addend>) =
+            addends.into_iter().partition(|addend| addend.factors.contains(&factor));
+        let mut common: Vec<Id> = Vec::new();
+        for candidate in with[0].factors.clone() {
+            if with.iter().all(|addend| addend.factors.contains(&candidate)) {
+                for addend in &mut with {
+                    let at = addend.factors.iter().position(|own| *own == candidate);
+                    at.map(|at| addend.factors.remove(at));
+                }
+                common.push(candidate);
+            }
+        }
+        let inner = self.sum(with);
+        common.push(inner);
+        let product = self.product(&common);
+        if without.is_empty() {
+            return product;
+        }
+        let rest = self.sum(without);
+        self.new.binary(Binary::Add, rest, product)
+    }
+
+    /// Add products up that have nothing in common.
+    fn added(&mut self, addends: Vec<Addend>) -> Id {
+        let mut sum = self.new.constant(0.0);
+        for Addend { negative, factors, shared } in addends {
+            let product = self.product(&factors);
+            let product = self.new.binary(Binary::Multiply, shared, product);
+            let op = if negative { Binary::Subtract } else { Binary::Add };
+            sum = self.new.binary(op, sum, product);
+        }
+        sum
+    }
+
+    /// A product; that of what stays between passes is a number of its own.
+    fn product(&mut self, factors: &[Id]) -> Id {
+        let one = self.new.constant(1.0);
+        let mut products = [one; 2];
+        for &factor in factors {
+            let product = &mut products[usize::from(self.made_of(factor).moves)];
+            *product = self.new.binary(Binary::Multiply, *product, factor);
+        }
+        self.new.binary(Binary::Multiply, products[0], products[1])
+    }
+}
+
+/// The factor that the most products have, if two have one; of several the first.
+fn most_common(addends: &[Addend]) -> Option<Id> {
+    let mut best: Option<(usize, Id)> = None;
+    for addend in addends {
+        for &factor in &addend.factors {
+            let count = addends.iter().filter(|other| other.factors.contains(&factor)).count();
+            let better = |(most, id): (usize, Id)| count > most || count == most && factor < id;
+            if count > 1 && best.is_none_or(better) {
+                best = Some((count, factor));
+            }
+        }
+    }
+    best.map(|(_, factor)| factor)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_products_have_in_common_is_taken_out_and_shared() {
+        let mut graph = Graph::default();
+        let [x, y, a, b] = ["x", "y", "a", "b"].map(|name| graph.field(name, 0));
+        let u = graph.uniform("u", 0);
+        let mut times = |p, q| graph.binary(Binary::Multiply, p, q);
+        let (xa, xb, ya, yb) = (times(x, a), times(x, b), times(y, a), times(y, b));
+        let (xua, yua) = (times(u, xa), times(u, ya));
+        // x (u a - b), y (u a - b)
+        let outputs = [graph.binary(Binary::Subtract, xua, xb), graph.binary(Binary::Subtract, yua, yb)];
+        let (found, outputs) = graph.factored(&outputs, |_, _| false);
+        let factors = outputs.map_operands(&found);
+        assert!(factors[0].iter().any(|id| factors[1].contains(id)), "{found:?}");
+    }
+
+    trait Operands {
+        fn map_operands(&self, graph: &Graph) -> Vec<Vec<Id>>;
+    }
+
+    impl Operands for Vec<Id> {
+        fn map_operands(&self, graph: &Graph) -> Vec<Vec<Id>> {
+            self.iter().map(|&id| graph.operands(id)).collect()
+        }
+    }
+}
