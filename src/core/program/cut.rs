@@ -77,6 +77,7 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
             }
         } else if !kept.contains(&id) && !is_one_operation_on(graph, id, &kept, &varies) {
             kept.push(id);
+            there[at] |= looks_up;
         }
     }
     let place = |id: Id| kept.iter().position(|&k| k == id);
