@@ -12,9 +12,11 @@ const SCENES: [&str; 3] = ["forest", "sunrise", "studio_dry"];
 /// The file of each that asks for lights.
 const FILE: &str = "light.toml";
 
+const AS_IT_IS: &str = "as the scene has it";
+
 /// What is fitted: its row's name, and settings of the scene file.
 const CHOICES: [Choice; 15] = [
-    ("as the scene has it", &[]),
+    (AS_IT_IS, &[]),
     ("`skin_reflection = \"none\"`", &[("model.skin_reflection", "\"none\"")]),
     ("`bounces = \"none\"`", &[("model.bounces", "\"none\"")]),
     ("`visibility = \"scalar\"`", &[("model.visibility", "\"scalar\"")]),
@@ -48,9 +50,25 @@ const LAMPS: [&str; 3] = ["key", "warm_spot", "ear_point"];
 /// All of them, as docs/results.md has them in a table.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
     let choices = lab.choices(&CHOICES, &SCENES, FILE, fitted)?;
-    let (held_out, mean) = held_out(lab)?;
+    let (held_out, held_out_mean) = held_out(lab)?;
     pictures(lab)?;
-    Ok(json!({ "choices": choices, "held_out": held_out, "held_out_mean": mean, "lamps": lamps(lab)? }))
+    let mean = |choice: &str| mean(&choices, choice);
+    let less = |choice: &str| {
+        let front = |choice: &str| {
+            of_choice(&choices, choice).map_or(f64::NAN, |row| number(&row["sunrise"]["front"]))
+        };
+        front(AS_IT_IS) - front(choice)
+    };
+    let gain = |with: &str, without: &str| mean(with) - mean(without);
+    Ok(json!({
+        "filters": {
+            "cheap": gain("`texture_filter = \"trilinear\"`", AS_IT_IS),
+            "rays": gain("16 lights, both by rays, `trilinear`", "16 lights, both by rays"),
+        },
+        "specular_map_cost": less("`specular_map = \"weight\"`"),
+        "kelemen_cost": less("`specular_model = \"kelemen\"`"),
+        "choices": choices, "held_out": held_out, "held_out_mean": held_out_mean, "lamps": lamps(lab)?,
+    }))
 }
 
 /// A row's figures of a fit of one scene.
@@ -63,6 +81,20 @@ fn fitted(report: &Value) -> Value {
         "loss": report["loss"]["end"],
         "params": report["params"],
     })
+}
+
+/// A choice's row.
+fn of_choice<'a>(choices: &'a [Value], name: &str) -> Option<&'a Value> {
+    choices.iter().find(|row| row["name"] == name)
+}
+
+/// The mean PSNR of all views of all scenes, with a choice.
+fn mean(choices: &[Value], name: &str) -> f64 {
+    let Some(row) = of_choice(choices, name) else { return f64::NAN };
+    let views =
+        SCENES.iter().flat_map(|scene| ["front", "three_quarter", "profile"].map(|view| &row[scene][view]));
+    let psnr: Vec<f64> = views.map(number).collect();
+    psnr.iter().sum::<f64>() / psnr.len() as f64
 }
 
 /// The nose, an ear and a temple in the sunrise: path traced, by the paper's effects, as the scene has it, and by rays.

@@ -24,9 +24,17 @@ const LIGHT: [&str; 10] = [
 const DIFFUSION: [&str; 8] =
     ["taps", "light_map_size", "seams", "ambient_normal", "stretch", "unblurred", "combined", "levels"];
 
-/// experiments/accuracy_vs_time/light.json.
+/// Plots of the forest that the page shows.
+const PLOTS: [&str; 2] = ["sky_lights", "visibility"];
+
+/// experiments/accuracy_vs_time/light.json, and plots beside it.
 pub(crate) fn light(lab: &Lab) -> Result<Value> {
-    swept(lab, "light.toml", &LIT, &LIGHT)
+    let raw = swept(lab, "light.toml", &LIT, &LIGHT)?;
+    for plot in PLOTS {
+        let from = lab.scratch.path().join(format!("tradeoff_forest/{plot}.svg"));
+        std::fs::copy(from, lab.root.join(format!("experiments/accuracy_vs_time/light_{plot}.svg")))?;
+    }
+    Ok(raw)
 }
 
 /// experiments/accuracy_vs_time/diffusion.json.
