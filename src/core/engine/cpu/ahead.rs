@@ -47,7 +47,7 @@ pub(super) struct Plan {
     moving: &'static [Param],
     /// Whether what does not move is kept from pass to pass.
     keeps: bool,
-    /// Whether fits that hold some of `moving` run it, too: so much moves with what lights show that computing all of it anew
+    /// Whether fits that hold some of `moving`, but free the lobe's width, run it, too: so much moves with that width that computing all of it anew
     /// takes less than reading what could be kept.
     serves_held: bool,
 }
@@ -160,7 +160,7 @@ impl Plan {
         Self { keeps: false, ..self }
     }
 
-    /// Of lit skin: `held` are not free in it.
+    /// Of lit skin: `held` are not free in it, and fits that hold what moves run it, too.
     const fn lit(self, held: &'static [&'static str]) -> Self {
         Self { held, serves_held: true, ..self }
     }
@@ -214,6 +214,8 @@ impl Plan {
 pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<&'static Plan> {
     let effects = ELSEWHERE.into_iter().fold(fitted.setup.effects, Effects::without);
     let setup = Setup { effects, ..fitted.setup };
+    // What moves the lobe's width moves most of what lights show.
+    let widens = free.iter().any(|param| ["roughness", "gloss"].contains(&param.name()));
     let yields = |plan: &&Plan| {
         if plan.setup() != Some(setup) {
             return false;
@@ -222,7 +224,7 @@ pub(super) fn plan_for(fitted: &Fitted, free: &[Param], turned: bool) -> Option<
         plan.keeps == fitted.keep && plan.channels() >= fitted.channels
             && plan.turned() == turned
             // Else lookups would be made anew that could be kept.
-            && (plan.serves_held || plan.moving.iter().all(|param| free.contains(param)))
+            && (plan.moving.iter().all(|param| free.contains(param)) || plan.serves_held && widens)
             && free.iter().all(|param| yielded.contains(param))
     };
     PLANS.iter().find(yields)
