@@ -125,7 +125,7 @@ fn what_vertices_see_of_the_sky_is_a_table() {
             lone += 1;
             continue;
         }
-        // A mean of directions, as long as they agree; f32 rounds it.
+        // As long as its share of the hemisphere, which is 1 at the most; f32 rounds it.
         assert!(length < 1.0 + 1e-6, "vertex {vertex}: {row:?}");
         let ratio = &row[ratio..ratio + 3];
         assert!(ratio.iter().all(|x| *x >= 0.0), "vertex {vertex}: {row:?}");

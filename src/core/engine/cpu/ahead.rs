@@ -26,8 +26,8 @@ use crate::shader::facts::{FaceSizes, Facts};
 use crate::simd::{Level, Simd};
 use crate::with_simd;
 
-/// Parameters that move what is looked up. The others cost a product or two, and are free in every plan; roughness and
-/// gloss, which move lookups too, are free where there is a lobe. Lights' own numbers are held.
+/// Parameters that move what is looked up. The others cost a product or two, and are free in every plan that does not hold
+/// them; roughness and gloss, which move lookups too, are free where there is a lobe. Lights' own numbers are held.
 const MOVING: [Param; 3] = [Param::NormalStrength, Param::SpecularLobe, Param::EnvironmentRotation];
 
 /// A plan that is compiled ahead.
@@ -47,8 +47,8 @@ pub(super) struct Plan {
     moving: &'static [Param],
     /// Whether what does not move is kept from pass to pass.
     keeps: bool,
-    /// Whether fits that hold some of `moving`, but free the lobe's width, run it, too: so much moves with that width that computing all of it anew
-    /// takes less than reading what could be kept.
+    /// Whether fits that hold some of `moving`, but free the lobe's width, run it, too: so much moves with that width that
+    /// computing all of it anew takes less than reading what could be kept.
     serves_held: bool,
 }
 
