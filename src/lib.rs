@@ -5,8 +5,8 @@
 //! built-in scene, reads a constant with its standard error, renders a view and exports the constants:
 //!
 //! ```
-//! use skinfit::{Constants, ExportTarget, FitOptions, Observed, PrepareOptions, Shader};
-//! use skinfit::{built_in_scene, export_constants, fit, write_exr};
+//! use skinfit::export::{self, Constants, Target};
+//! use skinfit::{FitOptions, Observed, PrepareOptions, Shader, built_in_scene, fit, write_exr};
 //!
 //! fn main() -> Result<(), Box<dyn std::error::Error>> {
 //!     let folder = std::env::temp_dir().join("skinfit-example");
@@ -27,21 +27,22 @@
 //!     write_exr(&folder.join("front.exr"), &image, &Default::default())?;
 //!
 //!     let constants = Constants::new(scene.form, scene.effects, &outcome.end.params);
-//!     println!("{}", export_constants(ExportTarget::Glsl, constants, &Default::default()));
+//!     println!("{}", export::constants(Target::Glsl, constants, &Default::default()));
 //!     Ok(())
 //! }
 //! ```
 //!
 //! | to | |
 //! | --- | --- |
-//! | read, bake and sample a scene | [`Loaded`], [`Baked`], [`Sampled`], [`Observed`], each made from the one before or, by [`PrepareOptions`], from a file; [`built_in_scene`] writes one |
-//! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`]: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] |
-//! | fit several scenes as one skin | the same over a [`Joint`] of their engines; [`HeldOut`] views score a fit |
-//! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name |
-//! | render | [`Shader`] on the CPU, [`Renderer`] on a graphics adapter; [`write_exr`] |
-//! | take it to another engine | [`export_constants`] of [`Constants`], [`export_function`] |
+//! | read, bake and sample a scene | [`Observed`], by [`PrepareOptions`]; [`prepare`] has the steps to it, [`Loaded`](prepare::Loaded), [`Baked`](prepare::Baked) and [`Sampled`](prepare::Sampled); [`built_in_scene`] writes a scene |
+//! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`](engine::Objective) of [`Unknown`](engine::Unknown)s: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] |
+//! | fit several scenes as one skin | the same over a [`Joint`](engine::joint::Joint) of their engines; [`HeldOut`](prepare::HeldOut) views score a fit |
+//! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name, in a [`Point`](engine::Point) |
+//! | render | [`Shader`] on the CPU, [`Renderer`] with [`RenderOptions`](gpu::RenderOptions) on a graphics adapter; [`write_exr`] |
+//! | take it to another engine | [`export::constants`] of [`Constants`](export::Constants), or [`export::function`], for a [`Target`](export::Target) |
 //! | add a [`Term`] of your own | [`register_term`], or `[model] terms` of a scene file |
 //! | differentiate it on burn's tensors | `skinfit_tensor::Shade` (feature `burn`) |
+//! | see how far long work is | [`progress`] |
 //!
 //! `experiments/library` has runnable programs: a fit, a rendering, a term of one's own, gradients on tensors.
 //!
@@ -56,28 +57,24 @@
 //! What stands here are a few names of the members of the workspace, which follow the data's one way: `skinfit_core`
 //! (everything on the CPU), `skinfit_gpu` (the renderer and the engine on an adapter),
 //! `skinfit_tensor`, `skinfit_report` (metrics, pictures and pages), `skinfit_study`, and `skinfit_host`, the command
-//! line. The names above are kept from version to version. **The modules below are not**: they are the members' own, for
-//! whoever needs more, as some of the examples do, and change as these do.
+//! line. The names at the root are kept from version to version, and so are those that the table above takes from modules.
+//! **Nothing else of the modules is**: they are the members' own, for whoever needs more, as some of the examples do, and
+//! change as these do.
 
 pub use skinfit_core::demo::built_in_scene;
 pub use skinfit_core::engine::cpu::CpuEngine;
-pub use skinfit_core::engine::joint::Joint;
-pub use skinfit_core::engine::{Objective, Point, Unknown};
-pub use skinfit_core::export::{
-    Constants, Target as ExportTarget, constants as export_constants, function as export_function,
-};
 pub use skinfit_core::fit::outcome::Outcome;
 pub use skinfit_core::fit::{FitOptions, fit};
 pub use skinfit_core::model::params::{Param, Params};
-pub use skinfit_core::prepare::{Baked, HeldOut, Loaded, Observed, PrepareOptions, Sampled};
+pub use skinfit_core::prepare::{Observed, PrepareOptions};
 pub use skinfit_core::progress;
 pub use skinfit_core::render::files::write_exr;
 pub use skinfit_core::render::shade::Shader;
 pub use skinfit_core::shader::term::{Term, register as register_term};
 pub use skinfit_gpu::engine::GpuEngine;
-pub use skinfit_gpu::{Gpu, RenderOptions, Renderer};
+pub use skinfit_gpu::{Gpu, Renderer};
 
-// The members' modules under one name: not kept from version to version.
+// The members' modules under one name: not kept from version to version, but for what the table above names.
 #[doc(no_inline)]
 pub use skinfit_core::{
     bake, builtin, demo, export, fit, model, output, prepare, program, render, samples, scene, shader, simd,
@@ -93,7 +90,7 @@ pub use skinfit_study as study;
 #[doc(no_inline)]
 pub use skinfit_tensor::{self as tensor, maps};
 
-/// Loss, gradient and normal equations over samples, on the CPU and on an adapter; not kept from version to version.
+/// Loss, gradient and normal equations over samples, on the CPU and on an adapter; kept from version to version is what the root's table names.
 pub mod engine {
     pub use skinfit_core::engine::*;
     pub use skinfit_gpu::engine as gpu;

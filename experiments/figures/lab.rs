@@ -31,8 +31,8 @@ pub(crate) struct Lab {
     pub(crate) race: Option<PathBuf>,
     /// The program of the last commit with a single package, where it is built already.
     pub(crate) before: Option<PathBuf>,
-    /// That program with `experiments/unchanged/limited_slopes.patch`, where it is built already.
-    pub(crate) limited: Option<PathBuf>,
+    /// That program with `experiments/unchanged/as_today.patch`, where it is built already.
+    pub(crate) patched: Option<PathBuf>,
     /// A Python that has numpy and embreex.
     pub(crate) python: Option<PathBuf>,
 }
@@ -55,7 +55,7 @@ impl Lab {
             suite: None,
             race: None,
             before: None,
-            limited: None,
+            patched: None,
             python: None,
         })
     }

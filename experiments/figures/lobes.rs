@@ -1,5 +1,6 @@
 //! experiments/unchanged: the lobes that both programs bake, beside the filter by brute force.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
@@ -27,15 +28,20 @@ pub(crate) fn beside_brute_force([then, now]: &[PathBuf; 2], scene: &Path) -> Re
     let radiance = Radiance::new(environment);
     let source = radiance.to_cube((radiance.width() / 2).next_power_of_two().clamp(16, SOURCE));
     let (mut before, mut after) = (Errors::default(), Errors::default());
-    for entry in std::fs::read_dir(then)? {
-        let file = entry?.file_name();
-        let name = file.to_string_lossy().into_owned();
+    let mut files: Vec<OsString> =
+        std::fs::read_dir(then)?.map(|entry| Ok(entry?.file_name())).collect::<Result<_>>()?;
+    files.sort();
+    for file in files {
+        let name = file.to_string_lossy();
         let of_lobe = name.strip_prefix("lobe_").and_then(|name| name.strip_suffix(".exr"));
         let Some(exponent) = of_lobe else { continue };
         let cubes = [planes(&then.join(&file))?, planes(&now.join(&file))?];
         let texels = exact(&source, exponent.parse()?, cubes[0]["R"].len());
         before.add(&cubes[0], &texels);
         after.add(&cubes[1], &texels);
+    }
+    if before.of == 0 {
+        return Err(format!("{}: no lobe was baked", then.display()).into());
     }
     Ok(json!({ "before": before.told(), "now": after.told() }))
 }
@@ -76,6 +82,6 @@ impl Errors {
     }
 
     fn told(&self) -> Value {
-        json!({ "rms": (self.squares / self.of.max(1) as f64).sqrt(), "most": self.most })
+        json!({ "rms": (self.squares / self.of as f64).sqrt(), "most": self.most })
     }
 }

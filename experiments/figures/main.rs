@@ -94,9 +94,9 @@ struct Arguments {
     /// [default: both are built]
     #[arg(long)]
     before: Option<PathBuf>,
-    /// That program with `experiments/unchanged/limited_slopes.patch`, where it is built already [default: it is built]
+    /// That program with `experiments/unchanged/as_today.patch`, where it is built already [default: it is built]
     #[arg(long)]
-    limited: Option<PathBuf>,
+    patched: Option<PathBuf>,
     /// A copy of what runs the race of other frameworks, with its data and its rows.
     #[arg(long)]
     race: Option<PathBuf>,
@@ -129,7 +129,7 @@ fn run(arguments: &Arguments) -> Result<()> {
             lab.race.clone_from(&arguments.race);
             lab.python.clone_from(&arguments.python);
             lab.before.clone_from(&arguments.before);
-            lab.limited.clone_from(&arguments.limited);
+            lab.patched.clone_from(&arguments.patched);
             // One that cannot be measured leaves its file as it was, and the others go on.
             if let Err(error) = measured(&lab, file, *measure) {
                 eprintln!("figures: {file}: {error}");

@@ -30,20 +30,20 @@ struct Fit {
 
 /// How losses, constants and pictures differ, scene by scene, and term by term where the constants are the same.
 pub(crate) fn measure(lab: &Lab) -> Result<Value> {
-    let (before, limited) = (program_before(lab)?, program_limited(lab)?);
+    let (before, patched) = (program_before(lab)?, program_patched(lab)?);
     let (mut rows, mut terms) = (Vec::new(), Vec::new());
     for (name, folder) in SCENES {
         let scene = folder.map(|folder| plain(lab, folder)).transpose()?;
         let fit =
             |program: &Path, when: &str| fitted(lab, program, &format!("{name}, {when}"), scene.as_deref());
         let [then, between, now] =
-            [fit(&before, "before")?, fit(&limited, "limited slopes")?, fit(lab.program(), "now")?];
+            [fit(&before, "before")?, fit(&patched, "as today")?, fit(lab.program(), "now")?];
         let off = differences(&then, &now)?;
         let picture = |off: &BTreeMap<String, Off>| off.get("").map_or(Value::Null, Off::told);
         let mut row = row(name, &then.report, &now.report);
         row["picture"] = picture(&off);
-        row["limited"] = self::row(name, &between.report, &now.report);
-        row["limited"]["picture"] = picture(&differences(&between, &now)?);
+        row["patched"] = self::row(name, &between.report, &now.report);
+        row["patched"]["picture"] = picture(&differences(&between, &now)?);
         let baked =
             |program: &Path, when: &str| bake(lab, program, &format!("{name}, {when}"), scene.as_deref());
         let bakes = [baked(&before, "before")?, baked(lab.program(), "now")?];
@@ -71,13 +71,11 @@ pub(crate) fn program_before(lab: &Lab) -> Result<PathBuf> {
     built(lab, "before", None, &["--example", "race"])
 }
 
-/// The same, its lobes interpolated with limited slopes, as today's program does it.
-fn program_limited(lab: &Lab) -> Result<PathBuf> {
-    match &lab.limited {
+/// The same, what it bakes made as today's program makes it.
+fn program_patched(lab: &Lab) -> Result<PathBuf> {
+    match &lab.patched {
         Some(program) => Ok(program.clone()),
-        None => {
-            built(lab, "limited", Some(&lab.root.join("experiments/unchanged/limited_slopes.patch")), &[])
-        }
+        None => built(lab, "patched", Some(&lab.root.join("experiments/unchanged/as_today.patch")), &[]),
     }
 }
 
@@ -122,6 +120,8 @@ fn fitted(lab: &Lab, program: &Path, what: &str, scene: Option<&Path>) -> Result
     let run = lab.scratch.path().join(what.replace([' ', ','], "_"));
     let mut command = Command::new(program);
     command.arg("fit").args(scene).args(["--engine", "cpu", "--json", "--loss", "l2", "-o"]).arg(&run);
+    // What one program has baked is not the other's.
+    command.arg("--no-cache");
     let report = serde_json::from_str(&lab.run(what, command, false)?)?;
     Ok(Fit { report, run })
 }
@@ -216,7 +216,7 @@ fn differences(then: &Fit, now: &Fit) -> Result<BTreeMap<String, Off>> {
 fn bake(lab: &Lab, program: &Path, what: &str, scene: Option<&Path>) -> Result<PathBuf> {
     let folder = lab.scratch.path().join(format!("bakes_{}", what.replace([' ', ','], "_")));
     let mut command = Command::new(program);
-    command.arg("bake").args(scene).arg("-o").arg(&folder);
+    command.args(["bake", "--no-cache"]).args(scene).arg("-o").arg(&folder);
     lab.run(&format!("bakes of {what}"), command, false)?;
     Ok(folder)
 }

@@ -8,8 +8,9 @@ use std::error::Error;
 use burn::tensor::{Tensor, TensorData};
 use skinfit::gpu::Choice;
 use skinfit::model::params::Column;
+use skinfit::prepare::Sampled;
 use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
-use skinfit::{Param, PrepareOptions, Sampled, built_in_scene};
+use skinfit::{Param, PrepareOptions, built_in_scene};
 
 /// The free constants, and how far apart the loss is taken for a difference: the loss is a sum of f32, good to some
 /// 1e-6 of itself, and the differences of what is linear or square in a constant have no other error.

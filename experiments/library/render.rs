@@ -5,11 +5,13 @@ use std::error::Error;
 use std::path::{Path, PathBuf};
 
 use skinfit::gpu::Choice;
+use skinfit::gpu::RenderOptions;
 use skinfit::gpu::upload::Content;
+use skinfit::prepare::Sampled;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::shading::Shading;
 use skinfit::shader::Budget;
-use skinfit::{Gpu, PrepareOptions, RenderOptions, Renderer, Sampled, Shader, built_in_scene, write_exr};
+use skinfit::{Gpu, PrepareOptions, Renderer, Shader, built_in_scene, write_exr};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let cache = std::env::temp_dir().join("skinfit-library");

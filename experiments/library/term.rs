@@ -6,13 +6,14 @@
 
 use std::error::Error;
 
+use skinfit::export;
 use skinfit::export::Provenance;
 use skinfit::model::params::Column;
+use skinfit::prepare::Loaded;
 use skinfit::samples::ViewSamples;
 use skinfit::scene::view::{Target, View};
 use skinfit::shader::{Budget, Facts};
-use skinfit::{ExportTarget, FitOptions, Loaded, PrepareOptions, Shader};
-use skinfit::{built_in_scene, export_function, fit, register_term};
+use skinfit::{FitOptions, PrepareOptions, Shader, built_in_scene, fit, register_term};
 
 /// What the images are made with.
 const WEIGHT: [f64; 3] = [0.9, 0.6, 0.4];
@@ -53,7 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}: {:.4} of {F0}", f0.name(), found.1);
 
     let facts = Facts::of_scene(&observed.scene, &outcome.end.params, Budget::Within(0.05), false);
-    let text = export_function(ExportTarget::Glsl, &facts, &outcome.end.params, &Provenance::default())?;
+    let text = export::function(export::Target::Glsl, &facts, &outcome.end.params, &Provenance::default())?;
     std::fs::write("library_term.glsl", text)?;
     println!("the shader: library_term.glsl");
 

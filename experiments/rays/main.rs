@@ -14,11 +14,12 @@ use std::time::Instant;
 
 use clap::Parser;
 use serde_json::{Value, json};
+use skinfit::PrepareOptions;
 use skinfit::bake::harmonics::Order;
 use skinfit::bake::interreflection::Albedo;
 use skinfit::bake::transfer::bake_transfer;
+use skinfit::prepare::Loaded;
 use skinfit::scene::mesh::PosedMesh;
-use skinfit::{Loaded, PrepareOptions};
 
 const RAYS: u32 = 256;
 const ROUNDS: usize = 5;

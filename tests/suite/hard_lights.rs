@@ -1,5 +1,5 @@
 //! Hard cases of lights, of their mirror images and of the sky that a point sees (MODEL 7 and 8): image, loss and
-//! gradient are finite in the f64 reference, on both engines and in the renderer.
+//! gradient are finite in the f64 reference, on both engines, on tensors and in the renderer.
 
 use serde_json::json;
 use skinfit::engine::cpu::CpuEngine;
@@ -85,7 +85,7 @@ fn assert_finite(baked: &Baked, what: &str) {
     let effects = baked.scene.effects;
     let known = FREE.iter().filter_map(|name| Param::from_name(name));
     let asked = known.filter(|param| param.asked_for(effects)).map(Column::tied);
-    let unknowns: Vec<Unknown> = asked.map(Unknown::Param).collect();
+    let unknowns: Vec<Unknown> = asked.clone().map(Unknown::Param).collect();
     assert!(unknowns.len() > 12, "{what}: {unknowns:?}");
     let point = observed.start();
     let task = || Task { unknowns: unknowns.clone(), ..observed.task() };
@@ -103,6 +103,13 @@ fn assert_finite(baked: &Baked, what: &str) {
     check(&CpuEngine::new(task()).unwrap(), "cpu");
     let Some(gpu) = gpu() else { return };
     check(&GpuEngine::new(gpu, task(), &point, Memory::default()).unwrap(), "gpu");
+    #[cfg(feature = "burn")]
+    {
+        // No tensor moves the lobe's width.
+        let moved = |column: &Column| !["roughness", "gloss"].contains(&column.param.name());
+        let columns: Vec<Column> = asked.filter(moved).collect();
+        crate::tensors::bench::finite_slopes(&observed, &columns, what);
+    }
     let camera = baked.scene.views[0].camera;
     let drawn = Renderer::new(gpu, Content::of(baked), EXACT).unwrap().render(&camera, 1.0).unwrap().image;
     assert!(finite(&drawn.rgb), "{what}: drawn");

@@ -252,32 +252,12 @@ fn parts_of_no_thickness_and_of_no_end_and_lengths_at_their_bounds() {
 
 #[cfg(feature = "burn")]
 mod tensors {
-    use burn::tensor::Tensor;
-    use skinfit::samples::ViewSamples;
-    use skinfit::tensor::{Inputs, Scatter, Shade, Shaded};
-
     use super::*;
-    use crate::tensors::bench::shared;
+    use crate::tensors::bench::finite_slopes;
 
     /// Image and slopes of its sum are finite on tensors, too.
     pub(super) fn check(observed: &Observed, columns: &[Column], engines: &Engines<'_>, depth: f32) {
-        let Some(shared) = shared() else { return };
-        let task = observed.task();
-        let views: Vec<&ViewSamples> = task.views.iter().map(|view| &view.samples).collect();
-        let params = observed.start().params;
-        let shaded = Shaded { setup: task.setup, params: &params, columns, illumination: &task.illumination };
-        let (shade, inputs) = Shade::new(shared, &shaded, &views, Scatter::Exact).unwrap();
-        let numbers = |tensor: Tensor<1>| tensor.into_data().try_to_vec::<f32>().unwrap();
-        let free = inputs.columns.clone().autodiff().require_grad();
-        let image = shade.image(Inputs { columns: free.clone(), ..inputs }).unwrap();
-        let sum = image.clone().sum();
-        let gradients = sum.clone().backward();
-        let slopes = numbers(free.grad(&gradients).unwrap());
-        let shown = numbers(sum.inner());
-        assert!(
-            shown[0].is_finite() && slopes.iter().all(|x| x.is_finite()),
-            "{depth}: {shown:?} {slopes:?}"
-        );
+        let Some(slopes) = finite_slopes(observed, columns, &depth.to_string()) else { return };
         // The second column is the length.
         assert_eq!(
             engines.unknowns[1],

@@ -104,7 +104,7 @@ fn sums_over_scenes_are_those_of_all_their_residuals() {
         free(&format!("{turned}[fit]{}", rest.split_once("[fit]").unwrap().1))
     });
     let (joint, start) = joint(&[&noon, &night]);
-    let names: Vec<String> = joint.unknowns().iter().map(skinfit::Unknown::name).collect();
+    let names: Vec<String> = joint.unknowns().iter().map(skinfit::engine::Unknown::name).collect();
     let own = ["0/environment_rotation", "1/environment_rotation", "gain.1"];
     assert_eq!(names[8..], own, "{names:?}");
     assert_eq!(start.gains.len(), 3);

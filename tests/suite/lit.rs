@@ -169,6 +169,41 @@ fn slopes_along_a_lights_numbers_are_finite_differences_on_every_engine() {
     slopes::assert_slopes(&observed, &unknowns, &slopes::EXACT, "lights");
 }
 
+/// Whatever of it is free: what moves lookups too, and what such plans hold although it could move them.
+#[test]
+fn lit_skin_is_compiled_ahead_and_moves_as_the_rules_say() {
+    let effects = "\"diffuse\", \"normal_map\", \"occlusion\", \"rim\", \"lights\", \"shadows\", \"light_specular\", \
+                   \"fresnel\", \"directional_occlusion\"";
+    let folder = quad(effects, "lights = 4");
+    // Four suns in the place of one, and no lamps beside them.
+    let sun = |i: usize| {
+        let (x, y) = (i % 256, i / 256);
+        [(20, 20), (60, 30), (100, 25), (140, 40)]
+            .iter()
+            .position(|&(left, top)| (left..left + 3).contains(&x) && (top..top + 3).contains(&y))
+    };
+    let light = |c: usize, i: usize| sun(i).map_or(0.2, |k| 300.0 + (20 * k + c) as f32);
+    folder.write("env.exr", &exr(256, 128, &["R", "G", "B"], light));
+    let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
+    let (scene, _lamps) = text.split_once("[[light]]").unwrap();
+    let choices = "specular_model = \"ggx\"\nspecular_visibility = \"cone\"\nspecular_map = \"f0\"\n";
+    let scene = scene
+        .replace("[model]\n", &format!("[model]\n{choices}"))
+        .replace("[model.params]\n", "[model.params]\ngloss = 0.3\n");
+    folder.write("scene.toml", scene.as_bytes());
+    let observed = baked(&folder).sample().unwrap().observe().unwrap();
+    let weights = ["base_weight", "rim_weight", "rim_exponent", "specular_weight", "f0"];
+    let free: [&[&str]; 3] =
+        [&["normal_strength"], &["normal_strength", "roughness", "gloss"], &["roughness", "gloss"]];
+    for moving in free {
+        let names = weights.iter().chain(moving);
+        let unknowns: Vec<Unknown> = names.map(|name| Unknown::Param(Column::tied(param(name)))).collect();
+        let task = Task { unknowns: unknowns.clone(), ..observed.task() };
+        assert!(CpuEngine::new(task).unwrap().is_compiled_ahead(&observed.start()), "{moving:?}");
+        slopes::assert_slopes(&observed, &unknowns, &slopes::EXACT, "lit skin");
+    }
+}
+
 #[test]
 fn the_renderer_draws_what_the_processor_does() {
     let baked = baked(&quad(&format!("\"diffuse\", {ALL}"), "lights = 1"));

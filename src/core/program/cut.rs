@@ -67,7 +67,9 @@ pub fn cut(graph: &Graph, outputs: &[Id], moves: impl Fn(&Graph, Id) -> bool) ->
         }
         if !edge[at] || is_cheap(graph, id, &varies, &there) {
             if looks_up {
-                computed(id, &mut there);
+                if edge[at] {
+                    computed(id, &mut there);
+                }
                 continue;
             }
             for leaf in leaves(graph, id) {

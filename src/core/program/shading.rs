@@ -13,7 +13,7 @@ use crate::model::terms::TermName;
 use crate::model::turn::turn;
 use crate::shader::Domain;
 use crate::shader::atlas::stored;
-use crate::shader::emit::{Plan, hazy, parts, sample_fields};
+use crate::shader::emit::{Plan, sample_fields, shown, with_haze};
 use crate::shader::module::{sample_struct, uniform};
 use crate::shader::search::components;
 use crate::shader::tangent::chain::{Chain, Seed};
@@ -227,15 +227,11 @@ fn module(plan: &Plan, chain: &Chain, listed: &Listed) -> String {
     let mut wgsl = with_slopes.declarations(true);
     wgsl.push_str(&chain.functions);
     wgsl.push_str(&sample_struct(&plan.sample_inputs(chain)));
-    let parts = parts(&plan.facts);
-    let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
-    let haze = if hazy(&plan.facts) { "haze" } else { "0.0" };
     // A member's name, its type, and what it is.
-    let mut members = vec![("value".to_owned(), "vec4f", format!("vec4f({radiance}, {haze})"))];
+    let mut members = vec![("value".to_owned(), "vec4f", shown(&plan.facts))];
     for k in 0..chain.lines.len() {
-        let radiance = chain.radiance[k].as_deref().unwrap_or("vec3f()");
-        let haze = chain.haze[k].as_deref().unwrap_or("0.0");
-        members.push((format!("d{k}"), "vec4f", format!("vec4f({radiance}, {haze})")));
+        let moved = with_haze(chain.radiance[k].as_deref(), chain.haze[k].as_deref());
+        members.push((format!("d{k}"), "vec4f", moved));
     }
     members.extend(listed.given.iter().map(|&(name, kind)| (format!("of_{name}"), kind, name.to_owned())));
     for (k, moved) in listed.moved.iter().enumerate() {

@@ -160,6 +160,22 @@ pub fn hazy(facts: &Facts) -> bool {
     facts.needs().haze && facts.output.is_none()
 }
 
+/// Radiance and haze, or how they move, as one vector. Of neither a zero by itself: naga makes a constant of
+/// `vec4f(vec3f(), 0.0)` whose constituents are not scalars, which SPIR-V does not allow (OpConstantComposite) and drivers
+/// refuse.
+pub fn with_haze(radiance: Option<&str>, haze: Option<&str>) -> String {
+    match (radiance, haze) {
+        (None, None) => "vec4f()".to_owned(),
+        _ => format!("vec4f({}, {})", radiance.unwrap_or("vec3f()"), haze.unwrap_or("0.0")),
+    }
+}
+
+/// What a plan shows as one vector: the sum of its parts, and the haze.
+pub fn shown(facts: &Facts) -> String {
+    let sum = parts(facts).join(" + ");
+    with_haze((!sum.is_empty()).then_some(&*sum), hazy(facts).then_some("haze"))
+}
+
 /// The parts that add up to the output, in the order of their terms.
 pub fn parts(facts: &Facts) -> Vec<&'static str> {
     let terms = TermName::of(facts.setup.effects);

@@ -11,6 +11,7 @@ use self::stages::Stages;
 use super::run_folder::RunFolder;
 use super::scene::{SceneArguments, parse_effects};
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
+use crate::bake::rays::RayMesh;
 use crate::bake::{Illumination, VertexOcclusion};
 use crate::model::cube::Cube;
 use crate::model::effects::Effects;
@@ -19,8 +20,9 @@ use crate::output;
 use crate::prepare::{Baked, PrepareOptions};
 use crate::render::files::{ImageOptions, write_image};
 use crate::render::image::Image;
+use crate::samples::PosedSurface;
 
-/// Bake a scene's cube maps and ambient occlusion into files
+/// Bake what a scene's effects ask for into files: cube maps, and what rays find at vertices
 #[derive(clap::Args)]
 #[command(
     after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at), occlusion.csv (a row a vertex: the open share of its hemisphere) and vertices.csv (a row a vertex, a column for each number of each field that rays find there: the sky that it sees, bent normals, light that the skin throws back, shadows, depths). With --stages also charts, stretch, light_map, level_1 and on, and how light map and levels move along each free parameter, light_map_by_<parameter> and so on, each as .exr and .png: texels of the UV atlas, stretch in the scene's unit a texel; and charts.csv (a row a vertex: the chart that it lies on). Beside them an empty .lock, which keeps two commands from writing there at once.\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
@@ -55,10 +57,26 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let baked = Baked::new(&path, &options)?;
     tell_warnings(&baked.warnings);
     let cubes = cubes(&baked.illumination, &baked.scene.params);
-    let vertices = vertices::table(&baked)?;
+    let scene = &*baked.scene;
+    // What rays find at vertices and in texels is of one posed surface.
+    let posed = (arguments.stages || vertices::are_asked_for(scene)).then(|| {
+        let mesh = scene.mesh.pose();
+        let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+        (mesh, rays)
+    });
+    let surface = match &posed {
+        Some((mesh, rays)) => {
+            Some(PosedSurface::new(scene, mesh, rays, &scene.mesh.morphs, baked.surface_bakes())?)
+        }
+        None => None,
+    };
+    let vertices = surface.as_ref().and_then(|surface| vertices::table(scene, surface));
     let written = cubes.len() + usize::from(baked.occlusion.is_some()) + usize::from(vertices.is_some());
     // Before anything is written: it may be refused.
-    let stages = if arguments.stages { Some(Stages::new(&baked)?) } else { None };
+    let stages = match &surface {
+        Some(surface) if arguments.stages => Some(Stages::new(&baked, surface)?),
+        _ => None,
+    };
     if written > 0 || stages.is_some() {
         folder.keep_results();
     }

@@ -13,6 +13,7 @@ use rayon::prelude::*;
 use super::check::{Number, Verdict};
 use super::engine_factory::EngineFactory;
 use super::evaluate::{Evaluators, Rgba, TARGET};
+use super::hard::HardLight;
 use super::lights::LightBox;
 use super::lit_case::{LitBatch, LitFragment, Probes};
 use super::objectives::{targets, weights};
@@ -21,6 +22,7 @@ use super::search::Tally;
 use crate::engine::reference::Reference;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
+use crate::model::choices::SpecularModel;
 use crate::model::params::{Column, Param, Params};
 use crate::samples::ViewSamples;
 
@@ -80,6 +82,25 @@ pub fn search(
         }
     }
     tallies
+}
+
+/// How each engine does in a named case, in the order of the evaluators; `None` where one is no engine.
+#[must_use]
+pub fn hard(evaluators: &Evaluators, lights: &LightBox, case: &HardLight) -> Vec<Option<Verdict>> {
+    let probes = match Probes::new() {
+        Ok(probes) => probes,
+        Err(error) => {
+            let failed = || Some(Verdict::failed(error.to_string()));
+            return evaluators.iter().map(|evaluator| evaluator.engine().and_then(|_| failed())).collect();
+        }
+    };
+    let tried = SpecularModel::ALL.map(|model| Tried::new(0, LitBatch::hard(&probes, lights, model, case)));
+    let verdict = |engine: &dyn EngineFactory| {
+        let mut all = Verdict::default();
+        tried.iter().for_each(|tried| all.merge(tried.verdict(engine).0));
+        all
+    };
+    evaluators.iter().map(|evaluator| evaluator.engine().map(verdict)).collect()
 }
 
 /// A batch, and what an engine may make of it.
@@ -243,7 +264,7 @@ mod tests {
     use super::super::case::FragmentInputs;
     use super::super::objectives::Cpu;
     use super::*;
-    use crate::model::choices::{SpecularMap, SpecularModel};
+    use crate::model::choices::SpecularMap;
 
     /// N.L and N.V below the smallest normal f32 are divided by what vanishes with them.
     #[test]

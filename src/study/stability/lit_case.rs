@@ -8,14 +8,16 @@ use rand::RngExt;
 use rand::rngs::StdRng;
 
 use super::case::{EVERYTHING, FragmentInputs};
+use super::hard::{HardLight, Place, Sky};
 use super::lights::{LightBox, LightKind};
 use super::random::{fragment, one_of, parameter, share, unit};
 use super::reference::{Moves, moved, moved_params};
-use crate::bake::Illumination;
 use crate::bake::reflected::ReflectedStack;
+use crate::bake::{Illumination, LobeStack};
 use crate::model::choices::{
     Bounces, Choices, LobeLookup, SkinReflection, SpecularMap, SpecularModel, SpecularVisibility, SplitSum,
 };
+use crate::model::cube::Cube;
 use crate::model::effects::{Effect, Effects, Form, Prerequisite, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fields::Field;
@@ -185,13 +187,7 @@ fn setup(probes: &Probes, rng: &mut StdRng) -> Setup {
         let of_lights = Effect::offered().filter(|effect| effect.info().upon == Some(Effect::Lights));
         effects = of_lights.filter(|_| drawn(rng)).fold(effects, Effects::with);
     }
-    // A fragment alone has no texels for light to scatter in.
-    let alone = |effect: &Effect| {
-        let row = effect.info();
-        row.upon.is_none() && row.within.is_none() && row.asks != Some(Prerequisite::Atlas)
-    };
-    let own = library::terms().iter().flat_map(|term| term.effects).copied();
-    effects = own.filter(alone).filter(|_| drawn(rng)).fold(effects, Effects::with);
+    effects = alone().filter(|_| drawn(rng)).fold(effects, Effects::with);
     let setup = Setup::new(form, one_of(rng, &Silhouette::ALL), effects);
     let choices = Choices {
         specular_model: one_of(rng, &SpecularModel::ALL),
@@ -209,6 +205,15 @@ fn setup(probes: &Probes, rng: &mut StdRng) -> Setup {
     Setup { choices, ..setup }
 }
 
+/// The library's effects that are no other's. A fragment alone has no texels for light to scatter in.
+fn alone() -> impl Iterator<Item = Effect> {
+    let alone = |effect: &Effect| {
+        let row = effect.info();
+        row.upon.is_none() && row.within.is_none() && row.asks != Some(Prerequisite::Atlas)
+    };
+    library::terms().iter().flat_map(|term| term.effects).copied().filter(alone)
+}
+
 /// Products of four of these, squared, stay below f32's 3.4e38.
 const BRIGHTEST: f64 = 100.0;
 
@@ -216,16 +221,36 @@ fn number(param: Param, form: Form, rng: &mut StdRng) -> f64 {
     parameter(param, form, rng).clamp(-BRIGHTEST, BRIGHTEST.max(param.info().corrected))
 }
 
-/// An ordinary light or darkness, with cubes of the specular lobe.
+/// An ordinary light or darkness.
 fn light(lights: &LightBox, model: SpecularModel, rng: &mut StdRng) -> Arc<Illumination> {
     let own = lights.of(one_of(rng, &[LightKind::Wavy, LightKind::Wavy, LightKind::Dark]));
-    let mut light = Illumination::clone(own);
+    Arc::new(mirrored(own, model))
+}
+
+/// A light with cubes of the specular lobe.
+fn mirrored(own: &Illumination, model: SpecularModel) -> Illumination {
+    let mut light = own.clone();
     let of = light.lobes.as_ref().map(|lobes| lobes.cubes[1].clone());
     // Brighter as it is sharper, so that the stack has a slope.
-    let cube =
-        |cube: &crate::model::cube::Cube<f32>, m: f64| cube.map(|texel| texel.map(|x| x * (1.5 - m) as f32));
+    let cube = |cube: &Cube<f32>, m: f64| cube.map(|texel| texel.map(|x| x * (1.5 - m) as f32));
     light.reflected = of.map(|of| ReflectedStack::new(model, &(0.25..=1.0), 1, |m| cube(&of, m)));
-    Arc::new(light)
+    light
+}
+
+/// The same with texels of 1.
+fn constant(own: &Illumination, model: SpecularModel) -> Illumination {
+    let even = |cube: &Cube<f32>| cube.map(|texel| texel.map(|_| 1.0));
+    let lobes = own.lobes.as_ref().map(|lobes| LobeStack {
+        exponents: lobes.exponents.clone(),
+        cubes: lobes.cubes.iter().map(even).collect(),
+    });
+    let of = lobes.as_ref().map(|lobes| lobes.cubes[1].clone());
+    Illumination {
+        irradiance: own.irradiance.as_ref().map(even),
+        hilite: own.hilite.as_ref().map(even),
+        reflected: of.map(|of| ReflectedStack::new(model, &(0.25..=1.0), 1, |_| of.clone())),
+        lobes,
+    }
 }
 
 /// What a sample may hold of a field, by its name.
@@ -282,6 +307,47 @@ fn direction(at: &FragmentInputs, rng: &mut StdRng) -> [f64; 3] {
     };
     let length = dot(d, d).sqrt();
     if length > 1e-6 { d.map(|x| x / length) } else { [0.0; 3] }
+}
+
+impl LitBatch {
+    /// A hard case under a specular model, everything on that a fragment alone can have.
+    pub(super) fn hard(probes: &Probes, lights: &LightBox, model: SpecularModel, case: &HardLight) -> Self {
+        library::register_all();
+        let of_lights = Effect::offered().filter(|effect| effect.info().upon == Some(Effect::Lights));
+        let effects = probes
+            .0
+            .iter()
+            .chain(of_lights)
+            .chain(alone())
+            .fold(EVERYTHING.with(Effect::Lights), Effects::with);
+        let setup = Setup::new(Form::Corrected, Silhouette::Fragment, effects.without(Effect::KeyLight));
+        let choices = Choices {
+            specular_model: model,
+            specular_map: SpecularMap::F0,
+            specular_visibility: SpecularVisibility::Cone,
+            glossy: true,
+            ..setup.choices
+        };
+        let setup = Setup { choices, ..setup };
+        let mut params = Params::defaults(setup.form);
+        for &(name, value) in &case.params {
+            if let Some(param) = Param::from_identifier(name) {
+                params.set(param, value);
+            }
+        }
+        let own = lights.of(match case.sky {
+            Sky::Wavy | Sky::Constant => LightKind::Wavy,
+            Sky::Dark => LightKind::Dark,
+            Sky::Glaring => LightKind::Glaring,
+        });
+        let light = if case.sky == Sky::Constant { constant(own, model) } else { mirrored(own, model) };
+        let shaded = |place: &Place| {
+            let fields = setup.needs().fields.iter().map(|field| place.field(field.name())).collect();
+            LitFragment { inputs: place.surface, held: place.surface.fragment(setup, 0.0), fields }
+        };
+        let fragments = case.places.iter().map(shaded).collect();
+        Self { setup, params, light: Arc::new(light), loss: Loss::L2, fragments }
+    }
 }
 
 #[cfg(test)]

@@ -45,6 +45,8 @@ use report::Report;
 use scene::SweptScene;
 use search::Hunt;
 
+use crate::model::choices::SpecularModel;
+
 /// What is studied.
 #[derive(Debug)]
 pub struct Study {
@@ -76,6 +78,7 @@ impl Study {
     pub fn steps(&self) -> usize {
         hard::cases().len()
             + hard::frames().len()
+            + hard::lights().len()
             + DEMANDS.len()
             + self.kept.iter().map(|case| self.lights_of(case).len()).sum::<usize>()
             + self.scenes.iter().map(|scene| scene.batches.len()).sum::<usize>()
@@ -96,6 +99,11 @@ impl Study {
         for frame in hard::frames() {
             let verdicts = evaluators.iter().map(|evaluator| check_frame(evaluator, frame.vertex)).collect();
             report.add((frame.name, "any unit frame, the same on every evaluator"), 1, verdicts);
+            progress(1);
+        }
+        for case in hard::lights() {
+            let verdicts = lit::hard(evaluators, &self.lights, &case);
+            report.add((case.name, case.hard), case.places.len() * SpecularModel::ALL.len(), verdicts);
             progress(1);
         }
         let given = Circumstances { lights: &self.lights, pixels: self.pixels };

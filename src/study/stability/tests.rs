@@ -344,6 +344,7 @@ fn any_number_of_threads_finds_the_same_and_tells_of_every_case() {
 fn every_row_of_the_models_table_of_hard_cases_has_a_case() {
     let mut names: Vec<&str> = cases().iter().map(|case| case.name).collect();
     names.extend(hard::frames().iter().map(|frame| frame.name));
+    names.extend(hard::lights().iter().map(|case| case.name));
     names.extend(DEMANDS.iter().map(|demand| demand.name));
     for name in [
         "facing",
@@ -365,6 +366,12 @@ fn every_row_of_the_models_table_of_hard_cases_has_a_case() {
         "all-zero target",
         "one pixel",
         "many pixels",
+        "light that grazes",
+        "view that grazes",
+        "lobes and reflectances at their bounds",
+        "light on the surface",
+        "light that brings nothing, or a glare",
+        "an environment of one constant, of none, of a glare",
     ] {
         assert!(names.contains(&name), "{name}");
     }

@@ -6,6 +6,7 @@ use super::text::{HEAD, Text};
 use super::{Adjoint, AdjointError, Binding, Input, LOOKUPS, Module, WORKGROUP};
 use crate::model::params::{Channels, Param};
 use crate::shader::Domain;
+use crate::shader::emit::with_haze;
 use crate::shader::module::uniform;
 use crate::shader::tangent::chain::{Chain, Seed};
 
@@ -108,7 +109,7 @@ impl Adjoint {
 
     /// The line that takes a tangent to where it is wanted.
     fn gain(&self, wgsl: &mut String, gain: Gain, radiance: Option<&str>, haze: Option<&str>) {
-        let moved = format!("vec4f({}, {})", radiance.unwrap_or("vec3f()"), haze.unwrap_or("0.0"));
+        let moved = with_haze(radiance, haze);
         let _ = match gain {
             Gain::Column(k) => match self.columns[k].channels {
                 Channels::Tied => writeln!(wgsl, "        sum{k} += dot(adjoint, {moved});"),

@@ -21,7 +21,7 @@ use crate::model::evaluate::Setup;
 use crate::model::params::{Column, Param};
 use crate::shader::Domain;
 use crate::shader::PlanError;
-use crate::shader::emit::{Plan, hazy, parts, plan, sample_fields};
+use crate::shader::emit::{Plan, plan, sample_fields, shown};
 use crate::shader::facts::{Budget, Facts, MapFacts, Source};
 use crate::shader::module::uniform;
 use crate::shader::quantity::Constant;
@@ -189,19 +189,12 @@ impl Adjoint {
         wgsl.push_str("    if (slot >= part.slots) {\n        return;\n    }\n    var shown = vec4f();\n");
         wgsl.push_str(&text.record());
         wgsl.push_str(&self.plan.calls(Domain::Fragment, uniform, |name| format!("at.{name}")));
-        let _ = writeln!(wgsl, "        shown += share * {};", self.shown());
+        let _ = writeln!(wgsl, "        shown += share * {};", shown(&self.plan.facts));
         wgsl.push_str("    }\n");
         for c in 0..4 {
             let _ = writeln!(wgsl, "    image[4u * slot + {c}u] = shown[{c}];");
         }
         wgsl.push_str("}\n");
         Module { wgsl, bindings: text.bindings }
-    }
-
-    /// Radiance and haze of a sample.
-    fn shown(&self) -> String {
-        let parts = parts(&self.plan.facts);
-        let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
-        format!("vec4f({radiance}, {})", if hazy(&self.plan.facts) { "haze" } else { "0.0" })
     }
 }

@@ -4,7 +4,10 @@ use std::sync::OnceLock;
 
 use burn::tensor::{Tensor, TensorData};
 use skinfit::gpu::Choice;
-use skinfit::tensor::SharedDevice;
+use skinfit::model::params::Column;
+use skinfit::prepare::Observed;
+use skinfit::samples::ViewSamples;
+use skinfit::tensor::{Inputs, Scatter, Shade, Shaded, SharedDevice};
 
 /// The device that all tests share; `None`, and each test says so, where `SKINFIT_NO_GPU_TESTS` allows it.
 pub(crate) fn shared() -> Option<&'static SharedDevice> {
@@ -19,6 +22,23 @@ pub(crate) fn shared() -> Option<&'static SharedDevice> {
         crate::common::not_checked(&format!("SKINFIT_NO_GPU_TESTS is set: {error}"));
     };
     opened.as_ref().map_err(excused).ok()
+}
+
+/// The slopes of the sum of an observed scene's image by each column, which are finite, as the image is; `None` without an
+/// adapter.
+pub(crate) fn finite_slopes(observed: &Observed, columns: &[Column], what: &str) -> Option<Vec<f32>> {
+    let task = observed.task();
+    let views: Vec<&ViewSamples> = task.views.iter().map(|view| &view.samples).collect();
+    let params = observed.start().params;
+    let shaded = Shaded { setup: task.setup, params: &params, columns, illumination: &task.illumination };
+    let (shade, inputs) = Shade::new(shared()?, &shaded, &views, Scatter::Exact).unwrap();
+    let free = inputs.columns.clone().autodiff().require_grad();
+    let image = shade.image(Inputs { columns: free.clone(), ..inputs }).unwrap();
+    let gradients = image.clone().sum().backward();
+    let slopes = numbers(free.grad(&gradients).unwrap());
+    let finite = |numbers: &[f32]| numbers.iter().all(|x| x.is_finite());
+    assert!(finite(&numbers(image.inner())) && finite(&slopes), "{what}: on tensors: {slopes:?}");
+    Some(slopes)
 }
 
 /// Numbers in [0, 1) that look random and are the same every time (xorshift).

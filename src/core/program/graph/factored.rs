@@ -3,6 +3,9 @@
 //! Each light adds its own product of albedo, weight and what arrives of it, and each parameter moves them all. Written so,
 //! the sum over lights is a number of its own, which value and slopes share.
 
+use std::cmp::Reverse;
+use std::collections::BTreeMap;
+
 use super::{Binary, Graph, Id, Node, Unary};
 
 /// A product, added or taken away.
@@ -21,8 +24,8 @@ struct Factoring<'a, M> {
     new: Graph,
     /// Where the old graph's nodes stand in the new one.
     moved: Vec<Option<Id>>,
-    /// How often each is an operand or an output.
-    uses: Vec<usize>,
+    /// Which of them are sums that one other sum asks for alone: their products are that one's.
+    within: Vec<bool>,
     /// Which of the new graph's nodes differ between samples, and which of them between passes.
     made_of: Vec<MadeOf>,
     moves: M,
@@ -39,15 +42,11 @@ impl Graph {
     /// inputs and lookups differ between passes: the others' products are numbers of their own, which can be kept.
     #[must_use]
     pub fn factored(&self, outputs: &[Id], moves: impl Fn(&Self, Id) -> bool) -> (Self, Vec<Id>) {
-        let mut uses = vec![0; self.len()];
         let reached = self.reached(outputs);
-        for id in self.ids().filter(|id| reached[id.index()]) {
-            self.operands(id).iter().for_each(|operand| uses[operand.index()] += 1);
-        }
-        outputs.iter().for_each(|id| uses[id.index()] += 1);
+        let within = self.sums_within(outputs, &reached);
         let moved = vec![None; self.len()];
         let mut factoring =
-            Factoring { old: self, new: Self::default(), moved, uses, made_of: Vec::new(), moves };
+            Factoring { old: self, new: Self::default(), moved, within, made_of: Vec::new(), moves };
         // Operands stand before what they are operands of: nothing is deep.
         for id in self.ids().filter(|id| reached[id.index()]) {
             factoring.carry(id);
@@ -55,14 +54,34 @@ impl Graph {
         let outputs = outputs.iter().filter_map(|id| factoring.moved[id.index()]).collect();
         (factoring.new, outputs)
     }
+
+    /// Which sums are operands of one other sum and of nothing else.
+    fn sums_within(&self, outputs: &[Id], reached: &[bool]) -> Vec<bool> {
+        let (mut uses, mut of_sums) = (vec![0; self.len()], vec![0; self.len()]);
+        for id in self.ids().filter(|id| reached[id.index()]) {
+            for operand in self.operands(id) {
+                uses[operand.index()] += 1;
+                of_sums[operand.index()] += usize::from(self.is_sum(id));
+            }
+        }
+        outputs.iter().for_each(|id| uses[id.index()] += 1);
+        let within = |id: Id| self.is_sum(id) && uses[id.index()] == 1 && of_sums[id.index()] == 1;
+        self.ids().map(within).collect()
+    }
+
+    fn is_sum(&self, id: Id) -> bool {
+        matches!(self.node(id), Node::Binary(Binary::Add | Binary::Subtract, ..))
+    }
 }
 
 impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
     /// Make a node's like.
     fn carry(&mut self, id: Id) {
-        let made = if self.is_sum(id) {
-            let mut addends = Vec::new();
-            self.flatten(id, false, &mut addends);
+        if self.within[id.index()] {
+            return;
+        }
+        let made = if self.old.is_sum(id) {
+            let addends = self.addends(id);
             self.sum(addends)
         } else {
             self.old.copy(id, &mut self.new, &mut self.moved, &|_| None)
@@ -70,50 +89,45 @@ impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
         self.moved[id.index()] = Some(made);
     }
 
-    fn is_sum(&self, id: Id) -> bool {
-        matches!(self.old.node(id), Node::Binary(Binary::Add | Binary::Subtract, ..))
-    }
-
-    /// The products that a sum adds up. A sum within it that is asked for elsewhere too is one number.
-    fn flatten(&mut self, id: Id, negative: bool, addends: &mut Vec<Addend>) {
-        let root = self.moved[id.index()].is_none();
-        match self.old.node(id) {
-            Node::Binary(op @ (Binary::Add | Binary::Subtract), a, b)
-                if root || self.uses[id.index()] == 1 =>
-            {
-                self.flatten(a, negative, addends);
-                self.flatten(b, negative ^ (op == Binary::Subtract), addends);
-            }
-            _ => {
-                let one = self.new.constant(1.0);
-                let mut addend = Addend { negative, factors: Vec::new(), shared: one };
-                self.multiply(id, &mut addend);
-                addend.factors.sort_unstable();
-                addends.push(addend);
+    /// The products that a sum adds up, in their order. A sum within it that is asked for elsewhere too is one number.
+    fn addends(&mut self, sum: Id) -> Vec<Addend> {
+        let (mut addends, mut open) = (Vec::new(), vec![(sum, false)]);
+        while let Some((id, negative)) = open.pop() {
+            match self.old.node(id) {
+                Node::Binary(op @ (Binary::Add | Binary::Subtract), a, b)
+                    if id == sum || self.within[id.index()] =>
+                {
+                    open.extend([(b, negative ^ (op == Binary::Subtract)), (a, negative)]);
+                }
+                _ => addends.push(self.addend(id, negative)),
             }
         }
+        addends
     }
 
-    /// The factors of a product.
-    fn multiply(&mut self, id: Id, addend: &mut Addend) {
-        match self.old.node(id) {
-            Node::Unary(Unary::Negate, a) => {
-                addend.negative ^= true;
-                self.multiply(a, addend);
-            }
-            Node::Binary(Binary::Multiply, a, b) => {
-                self.multiply(a, addend);
-                self.multiply(b, addend);
-            }
-            _ => {
-                let Some(factor) = self.moved[id.index()] else { return };
-                if self.made_of(factor).varies {
-                    addend.factors.push(factor);
-                } else {
-                    addend.shared = self.new.binary(Binary::Multiply, addend.shared, factor);
+    /// A product's factors. A square is one: what is raised to a power is multiplied no more often than it was.
+    fn addend(&mut self, product: Id, negative: bool) -> Addend {
+        let shared = self.new.constant(1.0);
+        let (mut addend, mut open) = (Addend { negative, factors: Vec::new(), shared }, vec![product]);
+        while let Some(id) = open.pop() {
+            match self.old.node(id) {
+                Node::Unary(Unary::Negate, a) => {
+                    addend.negative ^= true;
+                    open.push(a);
+                }
+                Node::Binary(Binary::Multiply, a, b) if a != b => open.extend([b, a]),
+                _ => {
+                    let factor = self.old.copy(id, &mut self.new, &mut self.moved, &|_| None);
+                    if self.made_of(factor).varies {
+                        addend.factors.push(factor);
+                    } else {
+                        addend.shared = self.new.binary(Binary::Multiply, addend.shared, factor);
+                    }
                 }
             }
         }
+        addend.factors.sort_unstable();
+        addend
     }
 
     /// What a node of the new graph is made of.
@@ -185,17 +199,14 @@ impl<M: Fn(&Graph, Id) -> bool> Factoring<'_, M> {
 
 /// The factor that the most products have, if two have one; of several the first.
 fn most_common(addends: &[Addend]) -> Option<Id> {
-    let mut best: Option<(usize, Id)> = None;
+    let mut counts: BTreeMap<Id, usize> = BTreeMap::new();
     for addend in addends {
-        for &factor in &addend.factors {
-            let count = addends.iter().filter(|other| other.factors.contains(&factor)).count();
-            let better = |(most, id): (usize, Id)| count > most || count == most && factor < id;
-            if count > 1 && best.is_none_or(better) {
-                best = Some((count, factor));
-            }
+        for of_one in addend.factors.chunk_by(|a, b| a == b) {
+            *counts.entry(of_one[0]).or_default() += 1;
         }
     }
-    best.map(|(_, factor)| factor)
+    let shared = counts.into_iter().filter(|&(_, count)| count > 1);
+    shared.max_by_key(|&(id, count)| (count, Reverse(id))).map(|(id, _)| id)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::reduce::{functions, reduction};
 use super::{ColumnOf, Fused, Moved, Sum, WORKGROUP};
 use crate::shader::Domain;
 use crate::shader::atlas::stored;
-use crate::shader::emit::{hazy, parts};
+use crate::shader::emit::{shown, with_haze};
 use crate::shader::module::{sample_struct, uniform};
 use skinfit_core::engine::residual::loss_text;
 
@@ -101,19 +101,15 @@ impl Fused {
             wgsl.push_str(&self.chain.shared);
         }
         seeds.iter().for_each(|&seed| wgsl.push_str(&self.chain.lines[seed]));
-        let parts = parts(&self.plan.facts);
-        let radiance = if parts.is_empty() { "vec3f()".to_owned() } else { parts.join(" + ") };
-        let haze = if hazy(&self.plan.facts) { "haze" } else { "0.0" };
         let add = match (self.fitted.several, self.fitted.layout.share) {
             (true, _) => "+= share *",
             (false, Some(_)) => "= share *",
             (false, None) => "=",
         };
-        let _ = writeln!(wgsl, "    shown {add} vec4f({radiance}, {haze});");
+        let _ = writeln!(wgsl, "    shown {add} {};", shown(&self.plan.facts));
         for &seed in seeds {
-            let radiance = self.chain.radiance[seed].as_deref().unwrap_or("vec3f()");
-            let haze = self.chain.haze[seed].as_deref().unwrap_or("0.0");
-            let _ = writeln!(wgsl, "    d{seed} {add} vec4f({radiance}, {haze});");
+            let moved = with_haze(self.chain.radiance[seed].as_deref(), self.chain.haze[seed].as_deref());
+            let _ = writeln!(wgsl, "    d{seed} {add} {moved};");
         }
         wgsl.push_str("        }\n");
         wgsl

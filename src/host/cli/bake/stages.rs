@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use super::super::Refusal;
-use crate::bake::rays::RayMesh;
 use crate::engine::Unknown;
 use crate::engine::cubes_at::CubesAt;
 use crate::engine::levels::LevelMaker;
@@ -51,11 +50,11 @@ pub(super) struct Stages {
 }
 
 impl Stages {
-    /// Make them.
+    /// Make them of the surface at rest.
     ///
     /// # Errors
     /// When the scene has no diffusion, or its mesh no atlas for it.
-    pub(super) fn new(baked: &Baked) -> Result<Self, Refusal> {
+    pub(super) fn new(baked: &Baked, surface: &PosedSurface<'_>) -> Result<Self, Refusal> {
         let (scene, setup) = (&*baked.scene, baked.setup());
         let scatters = library::scatters(setup.effects);
         let none = || {
@@ -65,10 +64,7 @@ impl Stages {
                 scene.path.display()
             ))
         };
-        let posed = scene.mesh.pose();
-        let rays = RayMesh::new(&posed.positions, &posed.triangles);
-        let surface = PosedSurface::new(scene, &posed, &rays, &scene.mesh.morphs, baked.surface_bakes())?;
-        let atlas = atlas_of(scene, &surface)?.filter(|_| scatters).ok_or_else(none)?;
+        let atlas = atlas_of(scene, surface)?.filter(|_| scatters).ok_or_else(none)?;
         let mut free: Vec<Param> = Vec::new();
         for unknown in baked.unknowns() {
             let Unknown::Param(column) = unknown else { continue };

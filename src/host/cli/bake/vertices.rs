@@ -2,32 +2,25 @@
 
 use std::fmt::Write as _;
 
-use super::super::Refusal;
-use crate::bake::rays::RayMesh;
 use crate::model::fields::Field;
-use crate::prepare::Baked;
 use crate::samples::PosedSurface;
+use crate::scene::Scene;
 
-/// The table: a column for each number of each field, a row a vertex; none where no effect asks for a field of vertices.
-///
-/// # Errors
-/// When the mesh lacks what the effects ask for.
-pub(super) fn table(baked: &Baked) -> Result<Option<String>, Refusal> {
-    let scene = &*baked.scene;
+/// Whether an effect asks for a field of vertices.
+pub(super) fn are_asked_for(scene: &Scene) -> bool {
+    scene.needs().fields.iter().any(|field| field.map().is_none())
+}
+
+/// The table: a column for each number of each field, a row a vertex; none where rays find none of the fields.
+pub(super) fn table(scene: &Scene, surface: &PosedSurface<'_>) -> Option<String> {
     let fields = scene.needs().fields;
-    if fields.iter().all(|field| field.map().is_some()) {
-        return Ok(None);
-    }
-    let posed = scene.mesh.pose();
-    let rays = RayMesh::new(&posed.positions, &posed.triangles);
-    let surface = PosedSurface::new(scene, &posed, &rays, &scene.mesh.morphs, baked.surface_bakes())?;
     let columns: Vec<(Field, Vec<f32>)> = fields
         .iter()
         .filter(|&field| field.map().is_none() && surface.finds_at_vertices(field))
         .map(|field| (field, surface.field_of_vertices(field)))
         .collect();
     if columns.is_empty() {
-        return Ok(None);
+        return None;
     }
     let mut text = "vertex".to_owned();
     for (field, _) in &columns {
@@ -37,7 +30,7 @@ pub(super) fn table(baked: &Baked) -> Result<Option<String>, Refusal> {
         }
     }
     text.push('\n');
-    for vertex in 0..posed.positions.len() {
+    for vertex in 0..scene.mesh.positions.len() {
         let _ = write!(text, "{vertex}");
         for (field, numbers) in &columns {
             for number in numbers.chunks(field.info().numbers).nth(vertex).unwrap_or_default() {
@@ -46,5 +39,5 @@ pub(super) fn table(baked: &Baked) -> Result<Option<String>, Refusal> {
         }
         text.push('\n');
     }
-    Ok(Some(text))
+    Some(text)
 }

@@ -1,14 +1,17 @@
 //! The hard cases of MODEL 7, a declaration each: what is hard, the numbers, and what must hold.
 //!
-//! Of fragments: `rims`, `normals`, `lookups`, `bounds`; of vertices: `frames`.
+//! Of fragments: `rims`, `normals`, `lookups`, `bounds`; of vertices: `frames`; of lights and the sky (MODEL 8 to 10): `lights`.
 
 mod bounds;
 mod frames;
+mod lights;
 mod lookups;
 mod normals;
 mod rims;
 
 pub use frames::{HardFrame, frames};
+pub use lights::{HardLight, lights};
+pub(super) use lights::{Place, Sky};
 
 use super::case::{Batch, FragmentInputs, Setting};
 use crate::model::effects::{Effect, Effects};
