@@ -49,8 +49,22 @@ pub struct Bench<'a> {
     last: RefCell<Option<(Traced, Surfaces)>>,
     /// The points that its samples show, once some were made again with another occlusion.
     hits: RefCell<Option<Arc<Vec<Vec<Hit>>>>>,
+    /// References that took long to make: axes of one effect have one and the same.
+    references: RefCell<Vec<(Scene, Arc<Shown>)>>,
     cache: Option<PathBuf>,
 }
+
+/// A scene by other named choices.
+#[derive(Debug)]
+pub struct Shown {
+    /// Seconds from nothing to a pass over the samples.
+    pub seconds: f64,
+    /// An image a view.
+    pub images: Vec<Image>,
+}
+
+/// How many references are kept: images of all views are a good part of the memory.
+const REFERENCES: usize = 3;
 
 /// Seconds of what sweeps are made of, measured on the scene as it stands.
 #[derive(Clone, Copy, Debug)]
@@ -103,8 +117,9 @@ impl<'a> Bench<'a> {
         let Sampled { baked, samples } = loaded.bake()?.sample()?;
         let surfaces = Arc::new(samples);
         let (last, hits) = (RefCell::default(), RefCell::default());
-        let cache = cache.map(Path::to_owned);
-        let mut bench = Self { name, path, baked, params, all: Vec::new(), surfaces, last, hits, cache };
+        let (references, cache) = (RefCell::default(), cache.map(Path::to_owned));
+        let mut bench =
+            Self { name, path, baked, params, all: Vec::new(), surfaces, last, hits, references, cache };
         bench.all = vec![bench.settings()];
         Ok(bench)
     }
@@ -115,7 +130,41 @@ impl<'a> Bench<'a> {
         let baked = self.baked.clone().with_scene(|scene| scene.params = params);
         let (surfaces, last, hits) = (Arc::clone(&self.surfaces), RefCell::default(), RefCell::default());
         let (name, all, cache) = (self.name.clone(), self.all.clone(), self.cache.clone());
-        Self { name, all, baked, surfaces, last, hits, cache, ..*self }
+        Self { name, all, baked, surfaces, last, hits, references: RefCell::default(), cache, ..*self }
+    }
+
+    /// Bake, sample and shade the scene by other named choices, nothing cached.
+    ///
+    /// # Errors
+    /// When a stage refuses its input.
+    pub fn way(&self, scene: Scene) -> Result<Shown, StudyError> {
+        let since = Instant::now();
+        // A way may bring constants of its own, as a preset does.
+        let point = Point { params: scene.params.clone(), ..self.point() };
+        let evaluated = Evaluated::anew(scene)?;
+        evaluated.live_engine()?.loss(&point);
+        Ok(Shown { seconds: since.elapsed().as_secs_f64(), images: evaluated.images(&point)? })
+    }
+
+    /// The same of what other ways are measured against, which the axis before may have made.
+    ///
+    /// # Errors
+    /// As [`Self::way`].
+    pub fn reference(&self, scene: Scene) -> Result<Arc<Shown>, StudyError> {
+        let same = |of: &Scene| {
+            (of.choices, of.diffusion, of.effects, &of.params)
+                == (scene.choices, scene.diffusion, scene.effects, &scene.params)
+        };
+        if let Some((_, way)) = self.references.borrow().iter().find(|(of, _)| same(of)) {
+            return Ok(Arc::clone(way));
+        }
+        let way = Arc::new(self.way(scene.clone())?);
+        let mut known = self.references.borrow_mut();
+        if known.len() == REFERENCES {
+            known.remove(0);
+        }
+        known.push((scene, Arc::clone(&way)));
+        Ok(way)
     }
 
     /// What its sweeps are made of, measured.

@@ -1,16 +1,14 @@
 //! Named choices of the model: several ways to one quantity, each beside the reference.
 
-use std::time::Instant;
+use std::sync::Arc;
 
 use crate::StudyError;
-use crate::engine::{Objective, Point};
 use crate::model::choices::{Bounces, LobeLookup, SkinReflection, SpecularVisibility, SplitSum, Visibility};
 use crate::model::effects::Effect;
 use crate::reference::Difference;
-use crate::render::image::Image;
 use crate::scene::Scene;
 use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Evaluated};
+use crate::tradeoff::bench::{Bench, Shown};
 
 /// A way, by its name in scene files, and what it changes of a scene.
 pub(super) type Way = (&'static str, fn(&mut Scene));
@@ -140,35 +138,30 @@ impl SceneAxis for Ways {
 
     fn sweep(&self, bench: &Bench<'_>) -> Result<Sweep, StudyError> {
         let own = &bench.baked.scene;
-        let mut found: Vec<(&str, bool, f64, Vec<Image>)> = Vec::new();
-        for &(name, way) in self.ways {
+        let last = self.ways.len().saturating_sub(1);
+        let mut found = Vec::new();
+        for (i, &(name, way)) in self.ways.iter().enumerate() {
             let mut scene = Scene::clone(own);
             way(&mut scene);
             let kept = (scene.choices, scene.diffusion, scene.effects);
             let present = kept == (own.choices, own.diffusion, own.effects);
-            let since = Instant::now();
-            // A way may bring constants of its own, as a preset does.
-            let point = Point { params: scene.params.clone(), ..bench.point() };
-            let evaluated = Evaluated::anew(scene)?;
-            evaluated.live_engine()?.loss(&point);
-            let seconds = since.elapsed().as_secs_f64();
-            found.push((name, present, seconds, evaluated.images(&point)?));
+            let way = if i == last { bench.reference(scene)? } else { Arc::new(bench.way(scene)?) };
+            found.push((name, present, way));
         }
-        let exact = found.last().map(|(.., images)| images.clone()).unwrap_or_default();
-        let last = found.len().saturating_sub(1);
-        let setting =
-            |(i, (name, present, seconds, images)): (usize, (&str, bool, f64, Vec<Image>))| Setting {
-                name: name.to_owned(),
-                choose: None,
-                error: Difference::of_all(&exact, &images),
-                cost: seconds,
-                time: None,
-                counts: Vec::new(),
-                reference: i == last,
-                present,
-                pareto: false,
-            };
-        let mut settings: Vec<Setting> = found.into_iter().enumerate().map(setting).collect();
+        let exact = found.last().map(|(.., way)| Arc::clone(way));
+        let exact = exact.as_ref().map_or(&[][..], |way| &way.images);
+        let setting = |(i, (name, present, way)): (usize, &(&str, bool, Arc<Shown>))| Setting {
+            name: (*name).to_owned(),
+            choose: None,
+            error: Difference::of_all(exact, &way.images),
+            cost: way.seconds,
+            time: None,
+            counts: Vec::new(),
+            reference: i == last,
+            present: *present,
+            pareto: false,
+        };
+        let mut settings: Vec<Setting> = found.iter().enumerate().map(setting).collect();
         mark_pareto(&mut settings);
         let method = self.method.to_owned();
         Ok(Sweep {
