@@ -35,7 +35,7 @@
 //! | to | |
 //! | --- | --- |
 //! | read, bake and sample a scene | [`Observed`], by [`PrepareOptions`]; [`prepare`] has the steps to it, [`Loaded`](prepare::Loaded), [`Baked`](prepare::Baked) and [`Sampled`](prepare::Sampled); [`built_in_scene`] writes a scene |
-//! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`](engine::Objective) of [`Unknown`](engine::Unknown)s: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] |
+//! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`](engine::Objective), made of a [`Task`](engine::Task) with its [`Unknown`](engine::Unknown)s: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] with its [`Memory`](engine::gpu::Memory) |
 //! | fit several scenes as one skin | the same over a [`Joint`](engine::joint::Joint) of their engines; [`HeldOut`](prepare::HeldOut) views score a fit |
 //! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name, in a [`Point`](engine::Point) |
 //! | render | [`Shader`] on the CPU, [`Renderer`] with [`RenderOptions`](gpu::RenderOptions) on a graphics adapter; [`write_exr`] |
@@ -57,7 +57,7 @@
 //! What stands here are a few names of the members of the workspace, which follow the data's one way: `skinfit_core`
 //! (everything on the CPU), `skinfit_gpu` (the renderer and the engine on an adapter),
 //! `skinfit_tensor`, `skinfit_report` (metrics, pictures and pages), `skinfit_study`, and `skinfit_host`, the command
-//! line. The names at the root are kept from version to version, and so are those that the table above takes from modules.
+//! line. The types and functions at the root are kept from version to version, and so are those that the table above takes from modules.
 //! **Nothing else of the modules is**: they are the members' own, for whoever needs more, as some of the examples do, and
 //! change as these do.
 
@@ -90,7 +90,9 @@ pub use skinfit_study as study;
 #[doc(no_inline)]
 pub use skinfit_tensor::{self as tensor, maps};
 
-/// Loss, gradient and normal equations over samples, on the CPU and on an adapter; kept from version to version is what the root's table names.
+/// Loss, gradient and normal equations over samples, on the CPU and on an adapter.
+///
+/// What the root's table names of it is kept from version to version, the rest is not.
 pub mod engine {
     pub use skinfit_core::engine::*;
     pub use skinfit_gpu::engine as gpu;

@@ -187,6 +187,7 @@ fn lit_skin_is_compiled_ahead_and_moves_as_the_rules_say() {
     let text = std::fs::read_to_string(folder.path("scene.toml")).unwrap();
     let (scene, _lamps) = text.split_once("[[light]]").unwrap();
     let choices = "specular_model = \"ggx\"\nspecular_visibility = \"cone\"\nspecular_map = \"f0\"\n";
+    assert!(scene.contains("[model]\n") && scene.contains("[model.params]\n"), "{scene}");
     let scene = scene
         .replace("[model]\n", &format!("[model]\n{choices}"))
         .replace("[model.params]\n", "[model.params]\ngloss = 0.3\n");

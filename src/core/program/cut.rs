@@ -131,16 +131,22 @@ mod tests {
     use crate::program::graph::Native;
 
     /// How many numbers are kept of a fixed vector less the view, and so many `other` fields less, whose components and
-    /// square are needed beside a lookup along what the uniform `free` makes of the view.
-    fn kept_of(other: usize) -> usize {
+    /// square are needed beside a lookup along what the uniform `free` makes of the view: along a unit vector whose
+    /// fallback is made of these fields, if `falls_back`.
+    fn kept_of(other: usize, falls_back: bool) -> usize {
         let mut graph = Graph::default();
         let (free, angle) = (graph.uniform("free", 0), graph.uniform("angle", 0));
         // What all samples share, in many operations.
         let fixed = (0..9).fold(angle, |all, _| graph.binary(Binary::Multiply, all, angle));
         let view = [0, 1, 2].map(|c| graph.field("view", c));
-        let along = view.map(|v| graph.binary(Binary::Add, v, free));
+        let mut along = view.map(|v| graph.binary(Binary::Add, v, free)).to_vec();
+        if falls_back {
+            let others: Vec<Id> = (0..other).map(|k| graph.field("other", k)).collect();
+            let fallback = others.iter().fold(fixed, |sum, other| graph.binary(Binary::Add, sum, *other));
+            along = graph.call(Native::Unit, [along, vec![fallback; 3]].concat(), Vec::new());
+        }
         let faces = graph.resource("faces");
-        let [mut sum, ..] = graph.call(Native::Lookup(faces), along.to_vec(), Vec::new())[..] else {
+        let [mut sum, ..] = graph.call(Native::Lookup(faces), along, Vec::new())[..] else {
             return 0;
         };
         let mut square = graph.constant(0.0);
@@ -165,9 +171,11 @@ mod tests {
 
     #[test]
     fn what_a_few_operations_make_of_numbers_that_are_read_anyway_is_not_kept() {
-        assert_eq!(kept_of(0), 0);
-        assert_eq!(kept_of(1), 0);
+        assert_eq!(kept_of(0, false), 0);
+        assert_eq!(kept_of(1, false), 0);
         // Two more fields to read, for each of three numbers; the square takes five operations on them.
-        assert_eq!(kept_of(2), 3);
+        assert_eq!(kept_of(2, false), 3);
+        // What a fallback alone would read is not there.
+        assert_eq!(kept_of(2, true), 3);
     }
 }

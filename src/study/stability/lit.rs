@@ -65,7 +65,10 @@ pub fn search(
     let engines: Vec<_> = evaluators.shared.iter().map(|shared| &**shared).collect();
     let ask = |index: usize| {
         let mut rng = StdRng::seed_from_u64(seed ^ 0x11 ^ (index as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let tried = Tried::new(index, LitBatch::random(&probes, lights, &mut rng, BATCH));
+        let tried = Tried::new(
+            format!("batch {index} of lights"),
+            LitBatch::random(&probes, lights, &mut rng, BATCH),
+        );
         let verdicts: Vec<_> =
             engines.iter().map(|shared| shared.engine().map(|engine| tried.verdict(engine))).collect();
         progress(1);
@@ -87,17 +90,19 @@ pub fn search(
 /// How each engine does in a named case, in the order of the evaluators; `None` where one is no engine.
 #[must_use]
 pub fn hard(evaluators: &Evaluators, lights: &LightBox, case: &HardLight) -> Vec<Option<Verdict>> {
-    let probes = match Probes::new() {
-        Ok(probes) => probes,
-        Err(error) => {
-            let failed = || Some(Verdict::failed(error.to_string()));
-            return evaluators.iter().map(|evaluator| evaluator.engine().and_then(|_| failed())).collect();
-        }
+    let batches = || -> Result<Vec<LitBatch>, String> {
+        let probes = Probes::new().map_err(|error| error.to_string())?;
+        SpecularModel::ALL.iter().map(|&model| LitBatch::hard(&probes, lights, model, case)).collect()
     };
-    let tried = SpecularModel::ALL.map(|model| Tried::new(0, LitBatch::hard(&probes, lights, model, case)));
+    let what = format!("{:?} environment, {:?}", case.sky, case.params);
+    let tried = batches()
+        .map(|batches| batches.into_iter().map(|batch| Tried::new(what.clone(), batch)).collect::<Vec<_>>());
     let verdict = |engine: &dyn EngineFactory| {
         let mut all = Verdict::default();
-        tried.iter().for_each(|tried| all.merge(tried.verdict(engine).0));
+        match &tried {
+            Ok(tried) => tried.iter().for_each(|tried| all.merge(tried.verdict(engine).0)),
+            Err(words) => all = Verdict::failed(words.clone()),
+        }
         all
     };
     evaluators.iter().map(|evaluator| evaluator.engine().map(verdict)).collect()
@@ -105,16 +110,17 @@ pub fn hard(evaluators: &Evaluators, lights: &LightBox, case: &HardLight) -> Vec
 
 /// A batch, and what an engine may make of it.
 struct Tried {
-    index: usize,
+    /// What it is called where it fails.
+    what: String,
     batch: LitBatch,
     /// Of each fragment: the value in f64, and how far an engine may be off.
     wanted: Result<Vec<(Rgba, Rgba)>, String>,
 }
 
 impl Tried {
-    fn new(index: usize, batch: LitBatch) -> Self {
+    fn new(what: String, batch: LitBatch) -> Self {
         let wanted = wanted(&batch, FEW).and_then(|wanted| finite_slopes(&batch).map(|()| wanted));
-        Self { index, batch, wanted }
+        Self { what, batch, wanted }
     }
 
     /// How an engine does, and of how many fragments it fails: of all where it answers for none, and of one where only
@@ -123,7 +129,7 @@ impl Tried {
         let (verdict, failed) = self
             .compared(engine)
             .unwrap_or_else(|words| (Verdict::failed(words), self.batch.fragments.len()));
-        let told = |words| format!("batch {} of lights, {}: {words}", self.index, self.batch.words());
+        let told = |words| format!("{}, {}: {words}", self.what, self.batch.words());
         let failed = failed.max(usize::from(verdict.failure.is_some()));
         (Verdict { failure: verdict.failure.map(told), ..verdict }, failed)
     }
@@ -279,7 +285,7 @@ mod tests {
         let toward = [-0.795_059_56, 0.0, 0.606_531_3];
         for model in SpecularModel::ALL {
             let batch = LitBatch::beside_lamps(&probes, &lights, (model, level, toward));
-            let (verdict, failed) = Tried::new(0, batch).verdict(&Cpu);
+            let (verdict, failed) = Tried::new(String::new(), batch).verdict(&Cpu);
             assert_eq!((failed, verdict.failure), (0, None), "{model:?}");
         }
     }
@@ -303,7 +309,7 @@ mod tests {
             for (name, value) in [("f0_floor", 0.0), ("roughness", 0.05)] {
                 batch.params.set(Param::from_identifier(name).unwrap(), value);
             }
-            let (verdict, failed) = Tried::new(0, batch).verdict(&Cpu);
+            let (verdict, failed) = Tried::new(String::new(), batch).verdict(&Cpu);
             assert_eq!((failed, verdict.failure), (0, None), "{model:?}");
         }
     }

@@ -311,7 +311,12 @@ fn direction(at: &FragmentInputs, rng: &mut StdRng) -> [f64; 3] {
 
 impl LitBatch {
     /// A hard case under a specular model, everything on that a fragment alone can have.
-    pub(super) fn hard(probes: &Probes, lights: &LightBox, model: SpecularModel, case: &HardLight) -> Self {
+    pub(super) fn hard(
+        probes: &Probes,
+        lights: &LightBox,
+        model: SpecularModel,
+        case: &HardLight,
+    ) -> Result<Self, String> {
         library::register_all();
         let of_lights = Effect::offered().filter(|effect| effect.info().upon == Some(Effect::Lights));
         let effects = probes
@@ -331,9 +336,9 @@ impl LitBatch {
         let setup = Setup { choices, ..setup };
         let mut params = Params::defaults(setup.form);
         for &(name, value) in &case.params {
-            if let Some(param) = Param::from_identifier(name) {
-                params.set(param, value);
-            }
+            let param =
+                Param::from_identifier(name).ok_or_else(|| format!("there is no parameter {name}"))?;
+            params.set(param, value);
         }
         let own = lights.of(match case.sky {
             Sky::Wavy | Sky::Constant => LightKind::Wavy,
@@ -346,7 +351,7 @@ impl LitBatch {
             LitFragment { inputs: place.surface, held: place.surface.fragment(setup, 0.0), fields }
         };
         let fragments = case.places.iter().map(shaded).collect();
-        Self { setup, params, light: Arc::new(light), loss: Loss::L2, fragments }
+        Ok(Self { setup, params, light: Arc::new(light), loss: Loss::L2, fragments })
     }
 }
 

@@ -91,6 +91,22 @@ fn an_engine_whose_lights_are_dim_is_told_and_the_same_seed_tells_the_same() {
     assert_ne!(search(6), failure);
 }
 
+#[test]
+fn dim_lights_and_parameters_that_there_are_not_fail_a_named_case() {
+    let (dim, sound) = (only(EngineEvaluator(Dim)), only(EngineEvaluator(Cpu)));
+    let lights = LightBox::new(None);
+    let failure = |evaluators: &Evaluators, case: &hard::HardLight| {
+        let [Some(verdict)] = &lit::hard(evaluators, &lights, case)[..] else { panic!("one engine") };
+        verdict.failure.clone()
+    };
+    let named = |name: &str| hard::lights().into_iter().find(|case| case.name == name).unwrap();
+    let mut case = named("light that grazes");
+    assert_eq!(failure(&sound, &case), None);
+    assert!(failure(&dim, &case).unwrap().contains("rounding explains"));
+    case.params.push(("no_such_parameter", 1.0));
+    assert_eq!(failure(&sound, &case).unwrap(), "there is no parameter no_such_parameter");
+}
+
 /// What of an answer is tampered with.
 #[derive(Clone, Copy, Debug)]
 enum Part {

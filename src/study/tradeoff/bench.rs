@@ -13,6 +13,8 @@ use crate::bake::{self, Illumination, Ranges};
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::engine::{Objective, Point, Task};
+use crate::model::choices::Choices;
+use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
 use crate::model::params::Params;
 use crate::prepare::{Baked, Loaded, NamedScene, PrepareError, PrepareOptions, Sampled};
@@ -22,6 +24,7 @@ use crate::render::image::Image;
 use crate::render::shade::Shader;
 use crate::samples::rows::Rows;
 use crate::samples::{self, Atlas, Hit, PosedSurface, SampleError, SurfaceBakes, ViewSamples, sample_hits};
+use crate::scene::diffusion::Diffusion;
 use crate::scene::names::names_of;
 use crate::scene::view::View;
 use crate::scene::{Loss, Scene};
@@ -50,13 +53,16 @@ pub struct Bench<'a> {
     /// The points that its samples show, once some were made again with another occlusion.
     hits: RefCell<Option<Arc<Vec<Vec<Hit>>>>>,
     /// References that took long to make: axes of one effect have one and the same.
-    references: RefCell<Vec<(Scene, Arc<Shown>)>>,
+    references: RefCell<Vec<(Chosen, Arc<TimedImages>)>>,
     cache: Option<PathBuf>,
 }
 
+/// All that a way to a quantity changes of a scene.
+type Chosen = (Choices, Diffusion, Effects, Params);
+
 /// A scene by other named choices.
 #[derive(Debug)]
-pub struct Shown {
+pub struct TimedImages {
     /// Seconds from nothing to a pass over the samples.
     pub seconds: f64,
     /// An image a view.
@@ -137,34 +143,31 @@ impl<'a> Bench<'a> {
     ///
     /// # Errors
     /// When a stage refuses its input.
-    pub fn way(&self, scene: Scene) -> Result<Shown, StudyError> {
+    pub fn way(&self, scene: Scene) -> Result<TimedImages, StudyError> {
         let since = Instant::now();
         // A way may bring constants of its own, as a preset does.
         let point = Point { params: scene.params.clone(), ..self.point() };
         let evaluated = Evaluated::anew(scene)?;
         evaluated.live_engine()?.loss(&point);
-        Ok(Shown { seconds: since.elapsed().as_secs_f64(), images: evaluated.images(&point)? })
+        Ok(TimedImages { seconds: since.elapsed().as_secs_f64(), images: evaluated.images(&point)? })
     }
 
-    /// The same of what other ways are measured against, which the axis before may have made.
+    /// The same of what other ways are measured against. Where an earlier axis made it, its images and seconds are those.
     ///
     /// # Errors
     /// As [`Self::way`].
-    pub fn reference(&self, scene: Scene) -> Result<Arc<Shown>, StudyError> {
-        let same = |of: &Scene| {
-            (of.choices, of.diffusion, of.effects, &of.params)
-                == (scene.choices, scene.diffusion, scene.effects, &scene.params)
-        };
-        if let Some((_, way)) = self.references.borrow().iter().find(|(of, _)| same(of)) {
-            return Ok(Arc::clone(way));
+    pub fn reference(&self, scene: Scene) -> Result<Arc<TimedImages>, StudyError> {
+        let chosen = (scene.choices, scene.diffusion, scene.effects, scene.params.clone());
+        if let Some((_, made)) = self.references.borrow().iter().find(|(of, _)| *of == chosen) {
+            return Ok(Arc::clone(made));
         }
-        let way = Arc::new(self.way(scene.clone())?);
+        let made = Arc::new(self.way(scene)?);
         let mut known = self.references.borrow_mut();
         if known.len() == REFERENCES {
             known.remove(0);
         }
-        known.push((scene, Arc::clone(&way)));
-        Ok(way)
+        known.push((chosen, Arc::clone(&made)));
+        Ok(made)
     }
 
     /// What its sweeps are made of, measured.

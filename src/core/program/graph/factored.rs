@@ -211,6 +211,7 @@ fn most_common(addends: &[Addend]) -> Option<Id> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{apply_binary, apply_unary};
     use super::*;
 
     #[test]
@@ -226,6 +227,54 @@ mod tests {
         let (found, outputs) = graph.factored(&outputs, |_, _| false);
         let factors = outputs.map_operands(&found);
         assert!(factors[0].iter().any(|id| factors[1].contains(id)), "{found:?}");
+    }
+
+    /// A node's value where each field is its component and the uniform is 0.75.
+    fn value(graph: &Graph, id: Id) -> f64 {
+        match graph.node(id) {
+            Node::Constant(bits) => f64::from_bits(bits),
+            Node::Field(at) => graph.fields[at as usize].component as f64,
+            Node::Uniform(_) => 0.75,
+            Node::Unary(op, a) => apply_unary(op, value(graph, a)),
+            Node::Binary(op, a, b) => apply_binary(op, value(graph, a), value(graph, b)),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn sums_keep_their_values() {
+        let mut graph = Graph::default();
+        let [a, b, c, d, x] = [2, 3, 5, 7, 11].map(|component| graph.field("x", component));
+        let u = graph.uniform("u", 0);
+        let mut of = |op, p, q| graph.binary(op, p, q);
+        use Binary::{Add, Multiply, Subtract};
+        // a - (b - (c - d))
+        let inner = of(Subtract, c, d);
+        let middle = of(Subtract, b, inner);
+        let signs = of(Subtract, a, middle);
+        // A sum twice, which is an output, too.
+        let [xa, xb] = [a, b].map(|p| of(Multiply, x, p));
+        let sum = of(Add, xa, xb);
+        let twice = of(Add, sum, sum);
+        // x x a - x b + u x
+        let square = of(Multiply, x, x);
+        let [cubic, shared] = [of(Multiply, square, a), of(Multiply, u, x)];
+        let less = of(Subtract, cubic, xb);
+        let powers = of(Add, less, shared);
+        // Nothing in common, and nothing left.
+        let nothing = of(Subtract, xa, xa);
+        let negative = graph.unary(Unary::Negate, xa);
+        let added = graph.binary(Add, negative, u);
+        let outputs = [signs, sum, twice, powers, nothing, added];
+        let want = [-3.0, 55.0, 110.0, 217.25, 0.0, -21.25];
+        assert_eq!(outputs.map(|id| value(&graph, id)), want);
+        for moving in [false, true] {
+            let (found, outputs) =
+                graph.factored(&outputs, |graph, id| moving && graph.node(id) == Node::Field(0));
+            let values: Vec<f64> = outputs.iter().map(|&id| value(&found, id)).collect();
+            // Whole numbers and quarters: nothing is rounded.
+            assert_eq!(values, want, "{found:?}");
+        }
     }
 
     trait Operands {

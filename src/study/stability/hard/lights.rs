@@ -39,7 +39,7 @@ pub(in crate::stability) struct Place {
     toward: [f64; 3],
     /// Irradiance of each lamp, square to its direction.
     arriving: f32,
-    /// The share of lamps, sky and lobe that is seen.
+    /// The share of lamps, sky and lobe that is seen; whatever else samples hold is the same number.
     seen: f32,
     /// The length of the bent normal.
     agreement: f32,

@@ -8,9 +8,10 @@ use crate::model::effects::Effect;
 use crate::reference::Difference;
 use crate::scene::Scene;
 use crate::tradeoff::axis::{Rates, SceneAxis, Setting, Sweep, mark_pareto};
-use crate::tradeoff::bench::{Bench, Shown};
+use crate::tradeoff::bench::{Bench, TimedImages};
 
-/// A way, by its name in scene files, and what it changes of a scene.
+/// A way, by its name in scene files, and what it changes of a scene: choices, effects, `[diffusion]`, parameters, no more
+/// (`Bench::reference`).
 pub(super) type Way = (&'static str, fn(&mut Scene));
 
 /// The ways to a quantity. The last one is the reference.
@@ -145,16 +146,16 @@ impl SceneAxis for Ways {
             way(&mut scene);
             let kept = (scene.choices, scene.diffusion, scene.effects);
             let present = kept == (own.choices, own.diffusion, own.effects);
-            let way = if i == last { bench.reference(scene)? } else { Arc::new(bench.way(scene)?) };
-            found.push((name, present, way));
+            let made = if i == last { bench.reference(scene)? } else { Arc::new(bench.way(scene)?) };
+            found.push((name, present, made));
         }
-        let exact = found.last().map(|(.., way)| Arc::clone(way));
-        let exact = exact.as_ref().map_or(&[][..], |way| &way.images);
-        let setting = |(i, (name, present, way)): (usize, &(&str, bool, Arc<Shown>))| Setting {
+        let exact = found.last().map(|(.., made)| Arc::clone(made));
+        let exact = exact.as_ref().map_or(&[][..], |made| &made.images);
+        let setting = |(i, (name, present, made)): (usize, &(&str, bool, Arc<TimedImages>))| Setting {
             name: (*name).to_owned(),
             choose: None,
-            error: Difference::of_all(exact, &way.images),
-            cost: way.seconds,
+            error: Difference::of_all(exact, &made.images),
+            cost: made.seconds,
             time: None,
             counts: Vec::new(),
             reference: i == last,
