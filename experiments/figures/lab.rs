@@ -202,8 +202,10 @@ impl Lab {
         }
         let run = Command::new("date").args(["-u", "+%Y-%m-%d"]).output()?;
         let info: Value = serde_json::from_str(&self.skinfit("the machine", &["info", "--json"], false)?)?;
+        // Only with it the network's example is built.
+        let features = if name.starts_with("experiments/network/") { "--features burn " } else { "" };
         let head = json!({
-            "command": format!("cargo run --release --example figures -- {name}"),
+            "command": format!("cargo run --release {features}--example figures -- {name}"),
             "commit": commit,
             "date": String::from_utf8(run.stdout)?.trim(),
             "machine": {
