@@ -38,10 +38,10 @@
 //! | fit it | [`fit`()] with [`FitOptions`] over an [`Objective`](engine::Objective), made of a [`Task`](engine::Task) with its [`Unknown`](engine::Unknown)s: the [`CpuEngine`], or a [`GpuEngine`] on a [`Gpu`] with its [`Memory`](engine::gpu::Memory) |
 //! | fit several scenes as one skin | the same over a [`Joint`](engine::joint::Joint) of their engines; [`HeldOut`](prepare::HeldOut) views score a fit |
 //! | read what was found | [`Outcome`]; [`Param`] and [`Params`] are the constants by name, in a [`Point`](engine::Point) |
-//! | render | [`Shader`] on the CPU, [`Renderer`] with [`RenderOptions`](gpu::RenderOptions) on a graphics adapter; [`write_exr`] |
+//! | render | [`Shader`] on the CPU, [`Renderer`] of a [`Content`](gpu::upload::Content) with [`RenderOptions`](gpu::RenderOptions) (their [`Antialias`](render::antialias::Antialias), [`Shading`](render::shading::Shading) and [`Budget`](shader::Budget)) on a graphics adapter, seen by a [`Camera`](scene::view::Camera); [`write_exr`] |
 //! | take it to another engine | [`export::constants`] of [`Constants`](export::Constants), or [`export::function`], for a [`Target`](export::Target) |
-//! | add a [`Term`] of your own | [`register_term`], or `[model] terms` of a scene file |
-//! | differentiate it on burn's tensors | `skinfit_tensor::Shade` (feature `burn`) |
+//! | add a [`Term`] of your own | [`register_term`] (its [`Facts`](shader::Facts) say what can be planned, a [`Column`](model::params::Column) what of it is free), or `[model] terms` of a scene file |
+//! | differentiate it on burn's tensors | `tensor::Shade` (feature `burn`) |
 //! | see how far long work is | [`progress`] |
 //!
 //! `experiments/library` has runnable programs: a fit, a rendering, a term of one's own, gradients on tensors.

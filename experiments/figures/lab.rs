@@ -202,8 +202,12 @@ impl Lab {
         }
         let run = Command::new("date").args(["-u", "+%Y-%m-%d"]).output()?;
         let info: Value = serde_json::from_str(&self.skinfit("the machine", &["info", "--json"], false)?)?;
-        // Only with it the network's example is built.
-        let features = if name.starts_with("experiments/network/") { "--features burn " } else { "" };
+        // Only with them the network's example is built, and there is a window.
+        let features = match name {
+            _ if name.starts_with("experiments/network/") => "--features burn ",
+            _ if name.starts_with("docs/window") => "--features view ",
+            _ => "",
+        };
         let head = json!({
             "command": format!("cargo run --release {features}--example figures -- {name}"),
             "commit": commit,

@@ -28,6 +28,7 @@ mod suggested;
 mod timings;
 mod unchanged;
 mod ways;
+mod window;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -48,6 +49,8 @@ const FILES: &[(&str, Measure)] = &[
     ("docs/accuracy.json", accuracy::tests),
     ("docs/noise.json", accuracy::noise),
     ("docs/closeup.json", closeup::measure),
+    ("docs/window.json", window::software),
+    ("docs/window_card.json", window::graphics_card),
     ("experiments/ablation/results.json", studies::ablation),
     ("experiments/accuracy_vs_time/results.json", studies::tradeoff),
     ("experiments/accuracy_vs_time/light.json", ways::light),

@@ -98,7 +98,7 @@ pub(crate) const DEFINITIONS: &[(&str, &str, &str)] = &[
     ("docs/accuracy.md", "every roughness from 0.05 on", "where the bound holds"),
     ("docs/accuracy.md", "within 0.0005 from f0 = 0.002 on", "a bound that tests hold, and where"),
     ("docs/accuracy.md", "A pixel is 0.018 units", "of the scene"),
-    ("docs/accuracy.md", "over 1.5 pixels", "Mitsuba's renderer"),
+    ("docs/accuracy.md", "over 1.5 pixels", "the path tracer's pixel filter"),
     ("docs/accuracy.md", "5 beyond 2, and 0.3 beyond 3", "the normal distribution"),
     ("docs/dependencies.md", "glTF 2.0", "a version"),
     ("docs/dependencies.md", "(0.22.1: ", "a version"),

@@ -141,7 +141,7 @@ fn fits(arguments: &Arguments, manifest: &Manifest, start: &Point) -> Result<Val
     let mut fits = serde_json::Map::new();
     for which in ["clean", "noisy"] {
         let mut engine = engine(arguments, manifest, which, true)?;
-        // The first pass makes the kept terms (mode `pre`: what peers are given in files).
+        // The first pass makes the kept terms (mode `pre`: what other frameworks are given in files).
         engine.normal_equations(start);
         let (mut seconds, mut evaluations, mut best) = (Vec::new(), 0.0, 0.0);
         let runs = arguments.reps.max(5);
@@ -173,7 +173,7 @@ fn run(arguments: &Arguments) -> Result<Value> {
     }
     let before = peak_rss_mb();
     // In mode `sampled` every lookup is done anew; in mode `pre` what the bump strength decides is
-    // kept from the first (untimed) pass, as the peers are given it in files.
+    // kept from the first (untimed) pass, as other frameworks are given it in files.
     let engine = engine(arguments, &manifest, "clean", pre)?;
     let inputs = peak_rss_mb();
     let first = Instant::now();

@@ -18,6 +18,7 @@
 //! - [`timing`]: GPU time by pass; [`bandwidth`]: how fast the adapter's memory is
 //! - [`renderer`]: all of it: from a scene and a camera to an image; `stage`: the targets of one size, and what is drawn
 //!   into them
+//! - [`painter`]: the renderer or the CPU engine, behind one interface
 //! - [`engine`]: loss, gradient and normal equations over samples
 //! - [`error`]: what is refused
 //!
@@ -38,6 +39,7 @@ pub mod error;
 mod filter;
 mod formats;
 pub(crate) mod geometry;
+pub mod painter;
 mod pipeline;
 pub mod probe;
 mod program;

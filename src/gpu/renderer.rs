@@ -11,6 +11,7 @@ use super::stage::Stage;
 use super::timing::PassTime;
 use super::upload::{Content, Uploads};
 use crate::bake::PoseBake;
+use crate::model::params::Params;
 use crate::model::terms::TermName;
 use crate::render::antialias::Antialias;
 use crate::render::backdrop::Backdrop;
@@ -169,6 +170,37 @@ impl Renderer {
         self.programs.iter().for_each(Program::forget);
         let weights = mesh.morphs.iter().map(|morph| morph.weight);
         self.morph_weights.iter_mut().zip(weights).for_each(|(old, new)| *old = new);
+        Ok(())
+    }
+
+    /// Shade `per_axis` samples along a pixel's side in the images to come; not where the hardware multisamples.
+    pub fn set_grid(&mut self, per_axis: u32) {
+        if let Antialias::Grid(samples) = &mut self.options.antialias
+            && *samples != per_axis
+        {
+            *samples = per_axis;
+            self.backdrop = None;
+        }
+    }
+
+    /// Take other constants, for images at the scene's own pose. Where they change neither the plan nor what it reads,
+    /// the next frame reads them from the uniform block, and levels of the UV atlas are made anew; otherwise, as where
+    /// a light moves or a lobe's exponent changes, the renderer is made anew.
+    ///
+    /// # Errors
+    /// As of [`Self::new`].
+    pub fn set_params(&mut self, params: &Params) -> Result<(), GpuError> {
+        let content = Content { params: params.clone(), ..self.uploads.content().clone() };
+        let Facts { morphs, faces, .. } = self.facts;
+        let facts = Facts::of_scene(&content.scene, params, self.options.budget, self.gpu.f16());
+        if (Facts { morphs, faces, ..facts }) == self.facts && self.uploads.set_params(params) {
+            self.programs.iter().for_each(Program::forget);
+        } else {
+            let background = self.background;
+            *self = Self::new(&self.gpu, content, self.options)?;
+            self.background = background;
+        }
+        self.backdrop = None;
         Ok(())
     }
 

@@ -161,6 +161,21 @@ impl Uploads {
         &self.content
     }
 
+    /// Take other constants, where what was uploaded holds for them, too: whether it does.
+    pub(super) fn set_params(&mut self, params: &Params) -> bool {
+        let Content { scene, params: before, .. } = &self.content;
+        let mapped = shadow::mapped(scene, params);
+        let params = shadow::with_layers(params.clone(), &mapped);
+        let same = mapped == self.mapped
+            // What vertices see of a light goes by where it is.
+            && scene.lights_at(&params) == scene.lights_at(before)
+            && Stack::ALL.into_iter().all(|stack| stack.place(&params) == stack.place(before));
+        if same {
+            self.content.params = params;
+        }
+        same
+    }
+
     pub(super) const fn indices(&self) -> &Buffer {
         &self.indices
     }

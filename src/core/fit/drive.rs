@@ -28,6 +28,7 @@ use super::state::{Run, Saved, StateError};
 use super::transform::Transform;
 use super::unbounded::Unbounded;
 use super::varpro::Elimination;
+use crate::engine::Point;
 
 /// How often the state is written.
 const WRITE_EVERY: Duration = Duration::from_secs(1);
@@ -45,12 +46,15 @@ const LEFT_TO_GAIN: f64 = 1e-3;
 /// share of the first residual to go.
 const GRADIENT_TOLERANCE: f64 = 1e-7;
 
+/// Is told of each iteration, and where it has led.
+pub(super) type Watch<'a> = dyn FnMut(&Iteration, &Point) + 'a;
+
 /// What is written down as solvers run.
 pub(super) struct Log<'a> {
     pub(super) saved: Saved,
     passes: &'a Passes<'a>,
     options: &'a FitOptions,
-    progress: &'a mut dyn FnMut(&Iteration),
+    progress: &'a mut Watch<'a>,
     clock: Instant,
     seconds_before: f64,
     written: Option<Instant>,
@@ -61,7 +65,7 @@ impl<'a> Log<'a> {
         saved: Saved,
         passes: &'a Passes<'a>,
         options: &'a FitOptions,
-        progress: &'a mut dyn FnMut(&Iteration),
+        progress: &'a mut Watch<'a>,
         clock: Instant,
     ) -> Self {
         let seconds_before = saved.seconds;
@@ -88,7 +92,8 @@ impl<'a> Log<'a> {
         let (evaluations, seconds) = (self.saved.evaluations, self.saved.seconds);
         let entry = Iteration { iteration, evaluations, loss, seconds };
         self.run().history.push(entry);
-        (self.progress)(&entry);
+        let point = self.passes.coordinates().point(&self.run().at);
+        (self.progress)(&entry, &point);
         match self.written {
             Some(then) if then.elapsed() < WRITE_EVERY => Ok(()),
             _ => Ok(self.write()?),

@@ -72,6 +72,19 @@ pub fn fit(
     options: &FitOptions,
     progress: &mut dyn FnMut(&Iteration),
 ) -> Result<Outcome, FitError> {
+    fit_watched(objective, start, options, &mut |iteration, _| progress(iteration))
+}
+
+/// As [`fit`]; `watch` is told the point that each iteration has led to, too. The fit goes on when it returns.
+///
+/// # Errors
+/// As of [`fit`].
+pub fn fit_watched(
+    objective: &dyn Objective,
+    start: &Point,
+    options: &FitOptions,
+    watch: &mut dyn FnMut(&Iteration, &Point),
+) -> Result<Outcome, FitError> {
     let clock = Instant::now();
     check_bounds(objective, start)?;
     let coordinates = Coordinates::new(objective.unknowns(), start);
@@ -80,7 +93,7 @@ pub fn fit(
         None => begin(objective, start, options, &coordinates)?,
     };
     let passes = Passes::new(objective, &coordinates, saved.evaluations);
-    let mut log = Log::new(saved, &passes, options, progress, clock);
+    let mut log = Log::new(saved, &passes, options, watch, clock);
     for index in 0..options.starts.max(1) {
         if index > 0 && log.interrupted() {
             break;

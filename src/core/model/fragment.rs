@@ -56,7 +56,7 @@ impl<R: Real> Fragment<R> {
 /// The two parts of the shading normal from a normal map's texel in [0, 1] and the rows of the
 /// tangent-to-world matrix: n is the direction of `base + normal_strength bump`.
 ///
-/// `listing` takes the texel as it is (oddity 5), `corrected` decodes it; one that is not finite or is nothing then
+/// `listing` takes the texel as it is (as printed), `corrected` decodes it; one that is not finite or is nothing then
 /// gives the smooth normal, and a positive z never vanishes (MODEL 7).
 #[inline(always)]
 pub fn decode_normal<R: Real>(form: Form, texel: V3<R>, t: V3<R>, b: V3<R>, n: V3<R>) -> (V3<R>, V3<R>) {

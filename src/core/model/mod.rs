@@ -4,7 +4,7 @@
 //! - [`params`]: the one table of parameters; `columns`: which of their channels are free together
 //! - [`readings`]: how the paper is read; [`effects`]: what can be switched on; [`needs`]: what each effect asks for;
 //!   [`terms`]: parts of the sum
-//! - [`choices`]: which way is taken where there are several
+//! - [`choices`]: which way is taken where there are several; [`diffusion`], [`transmission`]: those of light that scatters
 //! - [`fields`]: numbers of vertices that rules read by name
 //! - [`registry`]: how tables of parameters, effects, terms and fields grow
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands;

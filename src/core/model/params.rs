@@ -1,5 +1,5 @@
 //! The one table of the model's parameters. Command line, documents, solvers and exporters
-//! derive from it; nothing about a parameter is written anywhere else.
+//! derive from it; what a parameter does to the image is the rules'.
 //!
 //! Its first rows are built in ([`TABLE`]); terms and scenes add others ([`Param::register`]), which stay for as long
 //! as the process runs.

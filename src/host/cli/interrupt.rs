@@ -10,6 +10,12 @@ use super::unfinished;
 pub(super) struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
+    /// One that something else may set, too.
+    #[cfg(feature = "view")]
+    pub(super) fn of(flag: &Arc<AtomicBool>) -> Self {
+        Self(Arc::clone(flag))
+    }
+
     /// Watch for Ctrl-C from now on: the flag that it sets.
     pub(super) fn watch(&self) -> Arc<AtomicBool> {
         unfinished::asked_through(&self.0);

@@ -1,7 +1,7 @@
 //! The command line: a file or folder a command. Every command ends with an [`Exit`].
 //!
-//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `stability`,
-//!   `sweep`, `collect`: the commands
+//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `suggest`, `stability`,
+//!   `view`, `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit; `fingerprint`: what its state belongs to
 //! - `graphics`: what to do about an adapter that cannot; `machine`: what a report says of its making
 //! - `compared`: what of a view is compared
@@ -35,6 +35,7 @@ mod suggest;
 mod sweep;
 mod tradeoff;
 mod unfinished;
+mod view;
 
 use std::io::Write as _;
 use std::path::Path;
@@ -129,6 +130,7 @@ enum Command {
     Export(export::Arguments),
     Info(info::Arguments),
     Stability(stability::Arguments),
+    View(view::Arguments),
     Sweep(sweep::SweepArguments),
     Collect(sweep::CollectArguments),
 }
@@ -139,7 +141,10 @@ pub fn main() -> ExitCode {
     know_terms();
     // A word that is not understood ends here, with exit code 2.
     let arguments = Arguments::parse();
-    progress::show();
+    // A window shows progress itself.
+    if !matches!(arguments.command, Command::View(_)) {
+        progress::show();
+    }
     let done = match arguments.command {
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Ablate(arguments) => ablate::run(&arguments),
@@ -153,6 +158,7 @@ pub fn main() -> ExitCode {
         Command::Export(arguments) => export::run(&arguments),
         Command::Info(arguments) => info::run(&arguments),
         Command::Stability(arguments) => stability::run(&arguments),
+        Command::View(arguments) => view::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Collect(arguments) => sweep::run_collect(&arguments),
     };

@@ -142,20 +142,25 @@ impl RunFolder {
         file: &str,
         changes: Changes<'_>,
     ) -> Result<Vec<PathBuf>, Refusal> {
-        let refused = |reason: String| {
-            Refusal::new(format!(
-                "{}: changed while it was fitted: {reason}. Run the fit again.",
-                scene.display()
-            ))
-        };
-        let text = std::fs::read_to_string(scene).map_err(|e| refused(e.to_string()))?;
-        let absolute = std::path::absolute(scene).map_err(|e| refused(e.to_string()))?;
-        let folder = absolute.parent().unwrap_or(Path::new("/"));
-        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
-        let text = as_fitted(&text, &folder, changes).map_err(|e| refused(e.message().to_owned()))?;
+        let text = scene_text(scene, changes)?;
         output::write(&self.path.join(file), text.as_bytes())?;
         Ok(named_maps(&text))
     }
+}
+
+/// The text of a scene file with `changes` in the place of its own words, and absolute paths.
+pub(super) fn scene_text(scene: &Path, changes: Changes<'_>) -> Result<String, Refusal> {
+    let refused = |reason: String| {
+        Refusal::new(format!(
+            "{}: changed while it was fitted: {reason}. Run the fit again.",
+            scene.display()
+        ))
+    };
+    let text = std::fs::read_to_string(scene).map_err(|e| refused(e.to_string()))?;
+    let absolute = std::path::absolute(scene).map_err(|e| refused(e.to_string()))?;
+    let folder = absolute.parent().unwrap_or(Path::new("/"));
+    let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+    as_fitted(&text, &folder, changes).map_err(|e| refused(e.message().to_owned()))
 }
 
 impl Drop for RunFolder {
@@ -170,7 +175,7 @@ impl Drop for RunFolder {
 
 /// `runs/<the name of the scene's folder>`, with the file's own name after a full stop unless it is `scene.toml`; the
 /// built-in scene's is `runs/builtin`, and that of several `runs/<these names with + between them>`.
-fn default_folder(scenes: &[PathBuf]) -> PathBuf {
+pub(super) fn default_folder(scenes: &[PathBuf]) -> PathBuf {
     let named = scenes.iter().map(|scene| {
         let absolute = std::path::absolute(scene).unwrap_or_else(|_| scene.clone());
         let words = |part: Option<&std::ffi::OsStr>| part.map(|name| name.to_string_lossy().into_owned());

@@ -265,7 +265,7 @@ pub(crate) fn shade(
     let along = if variant.smooth_lookups { f.normal } else { n };
     let facing = dot(along, v);
     let reflection = match form {
-        // Oddity 3: the listing scales V, not n.
+        // As printed: the listing scales V, not n.
         Form::Listing => sum(scaled(facing, v), scaled(-2.0, along)),
         Form::Corrected => sum(v, scaled(-2.0 * facing, along)),
     };

@@ -21,6 +21,8 @@ use super::run_folder::RunFolder;
 use super::scene::{HoldOutArguments, ScenesArguments};
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, unfinished};
+use crate::engine::Point;
+use crate::fit::outcome::{Iteration, Outcome};
 use crate::model::params::Param;
 use crate::scene::suggestion;
 use conclude::{Fitted, conclude};
@@ -79,7 +81,19 @@ pub(super) struct Arguments {
     json: bool,
 }
 
+/// Is told of each iteration, and where it has led; the fit goes on when it returns.
+pub(super) type Watch<'a> = dyn FnMut(&Iteration, &Point) + 'a;
+
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    run_watched(arguments, &Interrupt::default(), &mut |_, _| {}).map(|(exit, _)| exit)
+}
+
+/// As [`run`], watched: how it ended, and what was found.
+pub(super) fn run_watched(
+    arguments: &Arguments,
+    interrupt: &Interrupt,
+    watch: &mut Watch<'_>,
+) -> Result<(Exit, Outcome), Refusal> {
     let begun = Instant::now();
     arguments.check()?;
     if arguments.engine.may_be_gpu() {
@@ -91,13 +105,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let mut folder = RunFolder::open(arguments.output.as_deref(), &arguments.scenes.named)?;
     let loaded = scenes::read(arguments, folder.path())?;
     let solving = Solving::of(arguments, folder.path())?;
-    let interrupt = Interrupt::default();
-    let (scenes, maps) = Scenes::ready(arguments, loaded, &interrupt)?;
-    let outcome = solve(arguments, solving, &folder, &scenes, &interrupt)?;
+    let (scenes, maps) = Scenes::ready(arguments, loaded, interrupt)?;
+    let outcome = solve(arguments, solving, &folder, &scenes, interrupt, watch)?;
     folder.keep();
     let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
     let fitted = Fitted { scenes: &scenes, maps: maps.as_ref(), begun };
-    conclude(arguments, solving, &folder, fitted, &outcome)
+    let exit = conclude(arguments, solving, &folder, fitted, &outcome)?;
+    Ok((exit, outcome))
+}
+
+/// A run folder, locked for a fit.
+#[cfg(feature = "view")]
+pub(super) fn folder(run: &std::path::Path) -> Result<RunFolder, Refusal> {
+    RunFolder::open(Some(run), &[])
 }
 
 impl Arguments {

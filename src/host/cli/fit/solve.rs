@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::Arguments;
+use super::Watch;
 use super::scenes::Scenes;
 use crate::cli::Refusal;
 use crate::cli::fingerprint::fingerprint;
@@ -51,6 +52,7 @@ pub(super) fn solve(
     folder: &RunFolder,
     scenes: &Scenes,
     interrupt: &Interrupt,
+    watch: &mut Watch<'_>,
 ) -> Result<Outcome, Refusal> {
     let state = folder.path().join(STATE);
     let maps = arguments.maps.any();
@@ -77,7 +79,8 @@ pub(super) fn solve(
         ..FitOptions::default()
     };
     let bar = progress::spinner("fit");
-    let outcome = fit::fit(&scenes.joint, &scenes.start, &options, &mut |iteration| {
+    let outcome = fit::fit_watched(&scenes.joint, &scenes.start, &options, &mut |iteration, point| {
+        watch(iteration, point);
         bar.set_position(iteration.iteration);
         bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
     });

@@ -1,11 +1,11 @@
 //! Which engine draws, and its options.
 
 use super::Refusal;
-use super::painter::{CpuPainter, GpuPainter, Painter};
 use crate::cli::graphics::Task;
 use crate::cli::shader::parse_budget;
 use crate::cli::tell;
 use crate::gpu::error::SOFTWARE_DRIVER;
+use crate::gpu::painter::{CpuPainter, GpuPainter, Painter};
 use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
 use crate::prepare::Baked;
 use crate::render::antialias::Antialias;
@@ -87,7 +87,7 @@ impl EngineArguments {
                  render on an adapter.",
             ));
         };
-        Ok(Box::new(CpuPainter::new(baked)?))
+        Ok(Box::new(CpuPainter::new(baked).map_err(super::refused)?))
     }
 
     /// The adapter's device; none where `auto` finds no adapter that works, which it says.

@@ -1,20 +1,20 @@
 //! `skinfit render`: a view as an image, or as a sequence of images.
 //!
 //! - `engine`: which engine draws, and its options
-//! - `painter`: both engines behind one interface
 //! - `frames`: which frames a sequence has, and their files
 
 mod engine;
 mod frames;
-mod painter;
 
 use std::path::{Path, PathBuf};
 
+use super::graphics::Task;
 use super::scene::{SceneArguments, parse_effects};
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell_warnings};
 use crate::bake::{self, PoseBake, SkyLight};
 use crate::fit::params_file::Foreign;
+use crate::gpu::painter::{Beside, PaintError, Painter, Picture};
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{LARGEST, Param, Params};
 use crate::prepare::{Baked, ClipOcclusion, Loaded, PrepareOptions, Views};
@@ -27,7 +27,6 @@ use crate::scene::animation::Animation;
 use crate::scene::mesh::Mesh;
 use crate::scene::view::Background;
 use frames::Frame;
-use painter::{Beside, Painter};
 
 /// Render a view of a scene with the model
 #[derive(clap::Args)]
@@ -131,9 +130,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
             let mesh = animation.mesh(time)?;
             let own = frame_bake(arguments, &baked, &mesh, light.as_ref());
             light = light.or_else(|| own.as_ref()?.sky.as_ref()?.light.clone());
-            painter.set_mesh(&mesh, own)?;
+            painter.set_mesh(&mesh, own).map_err(refused)?;
         }
-        let picture = painter.paint(&frame.camera, baked.gains[0], beside)?;
+        let picture = painter.paint(&frame.camera, baked.gains[0], beside).map_err(refused)?;
         if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
             return Err(samples::nothing_visible(&baked.scene, &baked.scene.views[0]).into());
         }
@@ -185,7 +184,7 @@ fn write(
     arguments: &Arguments,
     scene: &Path,
     frame: &Frame,
-    picture: &painter::Picture,
+    picture: &Picture,
     params: &Params,
 ) -> Result<(), Refusal> {
     let options = ImageOptions {
@@ -233,6 +232,14 @@ fn frame_bake(
     Some(own)
 }
 
+/// Why an image could not be drawn; of an adapter, with what to do about it.
+fn refused(error: PaintError) -> Refusal {
+    match error {
+        PaintError::Gpu(error) => Task::Render.refusal(&error),
+        error => error.into(),
+    }
+}
+
 fn tell_done(
     arguments: &Arguments,
     baked: &Baked,
@@ -277,7 +284,7 @@ fn parse_background(text: &str) -> Result<Background, String> {
 }
 
 /// `1920x1080`
-fn parse_size(text: &str) -> Result<(u32, u32), String> {
+pub(super) fn parse_size(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once(['x', 'X']).map(|(width, height)| (width.parse(), height.parse()));
     let Some((Ok(width), Ok(height))) = sides else {
         return Err("give pixels across and down, such as 1920x1080".to_owned());

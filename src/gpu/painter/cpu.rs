@@ -1,0 +1,162 @@
+//! The CPU engine: rays through the samples' positions, the model in f64.
+
+use std::sync::Arc;
+
+use web_time::Instant;
+
+use super::{BACKGROUND, Beside, PaintError, Painter, Picture};
+use crate::bake::interreflection::VertexGather;
+use crate::bake::lobe_sky::LobeSky;
+use crate::bake::rays::RayMesh;
+use crate::bake::sky::traces_lobes;
+use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion, VertexThickness};
+use crate::model::effects::Effect;
+use crate::model::params::Params;
+use crate::prepare::Baked;
+use crate::render::backdrop::Backdrop;
+use crate::render::bloom::add_bloom;
+use crate::render::image::Image;
+use crate::render::shade::Shader;
+use crate::samples::{Atlas, PosedSurface, SurfaceBakes, ViewSamples, atlas_of, gather_of, sample_view};
+use crate::scene::Scene;
+use crate::scene::mesh::{Mesh, Morph, PosedMesh};
+use crate::scene::mip_maps::MipMaps;
+use crate::scene::view::Camera;
+
+/// The CPU engine: rays through the samples' positions, the model in f64.
+pub struct CpuPainter {
+    scene: Arc<Scene>,
+    illumination: Arc<Illumination>,
+    params: Params,
+    occlusion: Option<Arc<VertexOcclusion>>,
+    sky: Option<Arc<SkyBake>>,
+    thickness: Option<Arc<VertexThickness>>,
+    lobe_sky: Option<Arc<LobeSky>>,
+    mip_maps: Option<Arc<MipMaps>>,
+    shader: Shader,
+    pose: Pose,
+    atlas: Option<Arc<Atlas>>,
+    /// What the last camera saw: other constants need no other samples.
+    seen: Option<(Camera, ViewSamples)>,
+    seconds: f64,
+}
+
+impl CpuPainter {
+    /// Of a scene at its own pose.
+    ///
+    /// # Errors
+    /// When no rules yield what the effects call for, or something was baked for another mesh.
+    pub fn new(baked: &Baked) -> Result<Self, PaintError> {
+        let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
+        let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
+        let (pose, sky, thickness) =
+            (Pose::of(&scene, &scene.mesh, None), baked.sky.clone(), baked.thickness.clone());
+        let mip_maps = MipMaps::new(&scene.maps, scene.quality.texture_filter).map(Arc::new);
+        let traced = traces_lobes(&scene, scene.needs().fields);
+        let lobe_sky = if traced { LobeSky::of_scene(&scene).map(Arc::new) } else { None };
+        let mut painter = Self {
+            scene,
+            illumination: Arc::clone(&baked.illumination),
+            params: baked.scene.params.clone(),
+            occlusion,
+            sky,
+            thickness,
+            lobe_sky,
+            mip_maps,
+            shader,
+            pose,
+            atlas: None,
+            seen: None,
+            seconds: 0.0,
+        };
+        let atlas = atlas_of(&painter.scene, &painter.surface()?)?;
+        painter.atlas = atlas;
+        Ok(painter)
+    }
+
+    /// The mesh as it is posed, with what is baked of it.
+    fn surface(&self) -> Result<PosedSurface<'_>, PaintError> {
+        let Pose { mesh, rays, morphs, own, gather } = &self.pose;
+        let bakes = SurfaceBakes {
+            occlusion: own.occlusion.as_ref().or(self.occlusion.as_deref()),
+            sky: own.sky.as_ref().or(self.sky.as_deref()),
+            thickness: own.thickness.as_ref().or(self.thickness.as_deref()),
+            gather: gather.as_ref(),
+            lobe_sky: self.lobe_sky.as_ref(),
+            mip_maps: self.mip_maps.as_ref(),
+        };
+        Ok(PosedSurface::new(&self.scene, mesh, rays, morphs, bakes)?)
+    }
+}
+
+/// The mesh in the world, as rays see it; its targets at their weights, and what is baked of this pose alone.
+struct Pose {
+    mesh: PosedMesh,
+    rays: RayMesh,
+    morphs: Vec<Morph>,
+    own: PoseBake,
+    gather: Option<VertexGather>,
+}
+
+impl Pose {
+    fn of(scene: &Scene, mesh: &Mesh, own: Option<PoseBake>) -> Self {
+        let posed = mesh.pose();
+        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        let gather = gather_of(scene, &posed);
+        let (morphs, own) = (mesh.morphs.clone(), own.unwrap_or_default());
+        Self { mesh: posed, rays, morphs, own, gather }
+    }
+}
+
+impl Painter for CpuPainter {
+    fn name(&self) -> String {
+        "cpu".to_owned()
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), PaintError> {
+        self.pose = Pose::of(&self.scene, mesh, own);
+        let atlas = atlas_of(&self.scene, &self.surface()?)?;
+        (self.atlas, self.seen) = (atlas, None);
+        Ok(())
+    }
+
+    fn set_params(&mut self, params: &Params) -> Result<(), PaintError> {
+        self.shader = Shader::new(self.scene.setup(), &self.illumination, params)?;
+        self.params = params.clone();
+        Ok(())
+    }
+
+    fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, PaintError> {
+        let start = Instant::now();
+        let samples = match self.seen.take() {
+            Some((seen, samples)) if seen == *camera => samples,
+            _ => {
+                let mut samples = sample_view(&self.scene, &self.surface()?, camera);
+                samples.atlas.clone_from(&self.atlas);
+                samples
+            }
+        };
+        let mut shaded = self.shader.shade(&samples, camera, gain);
+        self.seen = Some((*camera, samples));
+        let scene = &*self.scene;
+        let mut layers: Vec<(String, Image)> =
+            shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image)).collect();
+        let background = scene.views[0].background;
+        let n = scene.quality.samples_per_axis;
+        if let Some(backdrop) = Backdrop::new(scene, &self.params, background, camera, n) {
+            layers.push((BACKGROUND.to_owned(), backdrop.layer(&shaded.image, gain)));
+            backdrop.put_behind(&mut shaded.image, &mut shaded.glow, gain);
+        }
+        if scene.effects.has(Effect::Bloom) {
+            add_bloom(&mut shaded.image, &shaded.glow, scene.bloom.sigma);
+        }
+        self.seconds = start.elapsed().as_secs_f64();
+        let layers = if beside.layers { layers } else { Vec::new() };
+        let haze = if beside.haze { shaded.haze } else { Vec::new() };
+        Ok(Picture { image: shaded.image, layers, haze, warnings: Vec::new() })
+    }
+
+    fn stats(&self) -> Vec<String> {
+        vec![format!("{:>16}  {:9.3} ms", "samples, shading", 1e3 * self.seconds)]
+    }
+}

@@ -1,0 +1,144 @@
+//! The production renderer.
+
+use std::sync::Arc;
+
+use super::{BACKGROUND, Beside, PaintError, Painter, Picture};
+use crate::bake::PoseBake;
+use crate::model::params::Params;
+use crate::model::terms::TermName;
+use crate::prepare::Baked;
+use crate::render::backdrop::Backdrop;
+use crate::render::image::Image;
+use crate::scene::Scene;
+use crate::scene::mesh::Mesh;
+use crate::scene::view::Camera;
+use crate::timing::PassTime;
+use crate::upload::Content;
+use crate::{Gpu, GpuError, RenderOptions, Renderer};
+
+/// The production renderer.
+pub struct GpuPainter {
+    gpu: Gpu,
+    renderer: Renderer,
+    scene: Arc<Scene>,
+    params: Params,
+    terms: Vec<TermName>,
+    times: Vec<PassTime>,
+    /// Whether what the user should know of the uploads was told.
+    told: bool,
+}
+
+impl GpuPainter {
+    /// Of a scene, on an adapter's device.
+    ///
+    /// # Errors
+    /// As of [`Renderer::new`].
+    pub fn new(gpu: Gpu, baked: &Baked, options: RenderOptions) -> Result<Self, GpuError> {
+        let mut renderer = Renderer::new(&gpu, Content::of(baked), options)?;
+        renderer.set_background(baked.scene.views[0].background);
+        let terms = TermName::of(baked.scene.effects);
+        let scene = Arc::clone(&baked.scene);
+        let params = baked.scene.params.clone();
+        Ok(Self { gpu, renderer, scene, params, terms, times: Vec::new(), told: false })
+    }
+
+    /// The layers of a frame: terms, and what stands behind the mesh.
+    fn layers(&mut self, camera: &Camera, gain: f64) -> Result<Vec<(String, Image)>, GpuError> {
+        let mut layers = Vec::new();
+        let mut last = None;
+        for &name in &self.terms {
+            let image = self.renderer.render_term(name, camera, gain)?;
+            last = Some(Image { rgb: Vec::new(), ..image.clone() });
+            layers.push((name.name().to_owned(), image));
+        }
+        let (scene, n) = (&*self.scene, self.renderer.backdrop_samples());
+        let background = scene.views[0].background;
+        if let Some(coverage) = last
+            && let Some(backdrop) = Backdrop::new(scene, &self.params, background, camera, n)
+        {
+            layers.push((BACKGROUND.to_owned(), backdrop.layer(&coverage, gain)));
+        }
+        Ok(layers)
+    }
+
+    /// What the user should know of a frame.
+    fn warnings(&mut self, clipped: usize) -> Vec<String> {
+        let mut warnings = Vec::new();
+        let texels = self.renderer.clipped_texels();
+        if texels > 0 && !std::mem::replace(&mut self.told, true) {
+            warnings.push(format!(
+                "{texels} texels of the environment's cubes are brighter than 65504, the end of 16-bit textures' \
+                 range, and are cut there. Use --accuracy exact to have them whole."
+            ));
+        }
+        if clipped > 0 {
+            warnings.push(format!(
+                "{clipped} pixels are brighter than 65504, the end of the 16-bit targets' range, and were cut \
+                 there. Use --accuracy exact and no msaa4 to have them whole."
+            ));
+        }
+        warnings
+    }
+}
+
+impl Painter for GpuPainter {
+    fn name(&self) -> String {
+        let kind = if self.gpu.is_software() { " (software)" } else { "" };
+        format!("gpu: {}{kind}", self.gpu.name())
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), PaintError> {
+        Ok(self.renderer.set_mesh(mesh, own.as_ref())?)
+    }
+
+    fn set_params(&mut self, params: &Params) -> Result<(), PaintError> {
+        self.renderer.set_params(params)?;
+        self.params = params.clone();
+        Ok(())
+    }
+
+    fn set_samples(&mut self, per_axis: u32) {
+        self.renderer.set_grid(per_axis);
+    }
+
+    fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, PaintError> {
+        let frame = self.renderer.render(camera, gain)?;
+        self.times = frame.times;
+        let layers = if beside.layers { self.layers(camera, gain)? } else { Vec::new() };
+        let haze = match beside.haze {
+            true => self.renderer.render_haze(camera, gain)?,
+            false => Vec::new(),
+        };
+        Ok(Picture { image: frame.image, layers, haze, warnings: self.warnings(frame.clipped) })
+    }
+
+    fn uploaded_bytes(&self) -> u64 {
+        self.renderer.uploaded_bytes()
+    }
+
+    fn stats(&self) -> Vec<String> {
+        let plan = self.renderer.plan();
+        let mut lines: Vec<String> =
+            self.times.iter().map(|t| format!("{:>16}  {:9.3} ms", t.pass, t.milliseconds)).collect();
+        if !self.gpu.timestamps() {
+            lines.push(format!("{:>16}  the adapter has no timestamps", "GPU time"));
+        }
+        let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+        let atlas = self.renderer.atlas_traffic();
+        if atlas.passes > 0 {
+            let (moved, passes) = (mebibytes(atlas.bytes), atlas.passes);
+            lines.push(format!(
+                "{:>16}  {passes:9} over the UV atlas, {moved:.3} MiB read and left",
+                "passes"
+            ));
+        }
+        let mebibytes = mebibytes(self.renderer.uploaded_bytes());
+        lines.push(format!("{:>16}  {mebibytes:9.3} MiB", "uploaded"));
+        lines.push(format!("{:>16}  {:9} of 16-bit cubes", "texels cut", self.renderer.clipped_texels()));
+        let names = plan.resources.iter().map(|r| r.name()).collect::<Vec<_>>().join(", ");
+        lines.push(format!("{:>16}  {:9} ({names})", "bindings", plan.resources.len()));
+        let names = plan.attributes.iter().map(|a| a.name()).collect::<Vec<_>>().join(", ");
+        lines.push(format!("{:>16}  {:9} ({names})", "vertex buffers", plan.attributes.len()));
+        lines
+    }
+}

@@ -1,0 +1,72 @@
+//! `skinfit view`: a window in which a fit is seen and touched.
+//!
+//! - `absent`: what stands in where the program is built without it
+//! - `window`: the window, for the command's arguments; `fits`: what it asks of the command line
+
+#[cfg(not(feature = "view"))]
+mod absent;
+#[cfg(feature = "view")]
+mod fits;
+#[cfg(test)]
+#[cfg(feature = "view")]
+mod tests;
+#[cfg(feature = "view")]
+mod window;
+
+use std::path::PathBuf;
+
+use super::scene::BakeArguments;
+#[cfg(not(feature = "view"))]
+pub(super) use absent::run;
+#[cfg(feature = "view")]
+pub(super) use window::run;
+
+/// See a scene or a run in a window, move its constants, watch a fit find them
+#[derive(clap::Args)]
+#[command(
+    after_help = super::with_exit_codes("The window needs a build of its own: `cargo run --release --features view -- view`. F1 lists its keys. Fits that it makes are the command line's, from where the sliders stand; their run folders hold what those of `skinfit fit` do, and one that was stopped is resumed by either.\n\nExamples:\n  skinfit view                              the built-in scene\n  skinfit view scene.toml\n  skinfit view runs/a                       a run: its scene, its constants, its start\n  skinfit view runs/a --compare runs/b      beside those of another\n  skinfit view scene.toml --screenshot window.png    the window as an image, without a display\n  skinfit view scene.toml --bench           how fast sliders and frames are, as JSON")
+)]
+#[cfg_attr(not(feature = "view"), allow(dead_code, reason = "there is no window"))]
+pub(super) struct Arguments {
+    /// The scene file, or the run folder of a fit; the built-in scene when left out.
+    #[arg(value_name = "SCENE|RUN")]
+    scene: Option<PathBuf>,
+    #[command(flatten)]
+    bakes: BakeArguments,
+    /// Begin with these constants, instead of the scene's start values.
+    #[arg(long, value_name = "FILE")]
+    params: Option<PathBuf>,
+    /// Constants of another run beside them.
+    #[arg(long, value_name = "RUN")]
+    compare: Option<PathBuf>,
+    /// Where fits of the window are left [default: that of `skinfit fit`, with `.window` after it].
+    #[arg(short, long, value_name = "RUN")]
+    output: Option<PathBuf>,
+    /// What draws the images: `auto`, a graphics adapter where there is one, or the `cpu`.
+    #[arg(long, value_name = "ENGINE", default_value = "auto", value_parser = ["auto", "cpu"])]
+    engine: String,
+    /// Part of the name of the graphics adapter that draws them [default: $WGPU_ADAPTER_NAME, or the fastest kind].
+    #[arg(long, value_name = "NAME")]
+    adapter: Option<String>,
+    /// Leave the window as a PNG, once it is complete, in the place of opening it; no display is needed.
+    #[arg(long, value_name = "FILE", help_heading = "Without a display")]
+    screenshot: Option<PathBuf>,
+    /// Print how long a slider and frames take, as JSON; it makes a fit.
+    #[arg(long, conflicts_with = "screenshot", help_heading = "Without a display")]
+    bench: bool,
+    /// Size of the window in pixels.
+    #[arg(long, value_name = "WxH", value_parser = super::render::parse_size, default_value = "1440x900", help_heading = "Without a display")]
+    size: (u32, u32),
+    /// Pixels a point: 2 makes everything twice as large.
+    #[arg(long, value_name = "FACTOR", default_value_t = 1.0, help_heading = "Without a display")]
+    scale: f32,
+    /// Show the terms of the image, too.
+    #[arg(long, help_heading = "Without a display")]
+    terms: bool,
+    /// Have the probe look at this pixel.
+    #[arg(long, value_name = "X,Y", value_delimiter = ',', num_args = 1, help_heading = "Without a display")]
+    probe: Vec<u32>,
+    /// Fit before the screenshot is taken.
+    #[arg(long, requires = "screenshot", help_heading = "Without a display")]
+    fit: bool,
+}

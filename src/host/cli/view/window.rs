@@ -1,0 +1,99 @@
+//! The window, for the command's arguments.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use skinfit_view::bench::measure;
+use skinfit_view::offscreen::Offscreen;
+use skinfit_view::opened::Reading;
+use skinfit_view::paint::Engine;
+use skinfit_view::session::watch_progress;
+use skinfit_view::{Start, open_window};
+
+use super::Arguments;
+use super::fits::CommandLine;
+use crate::cli::run_folder::default_folder;
+use crate::cli::{Exit, Refusal, quieten_graphics, say};
+
+/// The files of a run folder that the window reads.
+const SCENE: &str = "scene.toml";
+const PARAMS: &str = "params.toml";
+
+/// Open the window, or leave what it shows.
+pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
+    quieten_graphics();
+    watch_progress();
+    let start = start(arguments)?;
+    let host = Arc::new(CommandLine { bakes: arguments.bakes.words() });
+    let name = arguments
+        .scene
+        .as_ref()
+        .map_or_else(|| "the built-in scene".to_owned(), |path| path.display().to_string());
+    let (width, height) = arguments.size;
+    let size = [width, height];
+    if let Some(file) = &arguments.screenshot {
+        let mut window = Offscreen::new(host, start, size, arguments.scale)?;
+        window.window.session.terms = arguments.terms;
+        if let [x, y] = arguments.probe[..] {
+            window.window.point_at([x, y]);
+        }
+        if arguments.fit {
+            window.settle()?;
+            window.window.session.begin_fit(false);
+        }
+        window.screenshot(file)?;
+        say(&format!("wrote {}", file.display()))?;
+    } else if arguments.bench {
+        let mut window = Offscreen::new(host, start, size, arguments.scale)?;
+        let speed = measure(&mut window, size)?;
+        say(&serde_json::to_string_pretty(&speed)?)?;
+    } else {
+        open_window(host, start, &format!("skinfit: {name}"))?;
+    }
+    Ok(Exit::Done)
+}
+
+fn start(arguments: &Arguments) -> Result<Start, Refusal> {
+    let run = arguments.scene.as_deref().filter(|path| path.is_dir());
+    let (scene, fitted) = match run {
+        Some(run) => (Some(file_of(run, SCENE)?), Some(file_of(run, PARAMS)?)),
+        None => (arguments.scene.clone(), None),
+    };
+    let other = arguments.compare.as_deref().map(|run| match run.is_dir() {
+        true => file_of(run, PARAMS),
+        false => Ok(run.to_owned()),
+    });
+    let path = arguments.bakes.kept_path(scene.as_deref(), Path::new(""))?;
+    let output = arguments.output.clone().unwrap_or_else(|| {
+        let folder = match run {
+            Some(run) => run.to_owned(),
+            None => default_folder(&scene.into_iter().collect::<Vec<_>>()),
+        };
+        PathBuf::from(format!("{}.window", folder.display()))
+    });
+    Ok(Start {
+        reading: Reading {
+            scene: path,
+            params: arguments.params.clone(),
+            cache: arguments.bakes.cache(),
+            ..Reading::default()
+        },
+        fitted,
+        other: other.transpose()?,
+        run: output,
+        engine: Engine { cpu: arguments.engine == "cpu", adapter: arguments.adapter.clone() },
+    })
+}
+
+/// A file of a run folder.
+fn file_of(run: &Path, name: &str) -> Result<PathBuf, Refusal> {
+    let file = run.join(name);
+    if file.is_file() {
+        return Ok(file);
+    }
+    Err(Refusal::new(format!(
+        "{}: this folder holds no {name}: it is not that of a fit of one scene. Name the run folder of one, or a scene \
+         file.",
+        run.display()
+    )))
+}

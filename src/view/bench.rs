@@ -1,0 +1,118 @@
+//! How fast the window is: from a slider that moves to its image in the window, and frames while nothing or a fit is
+//! under way; measured on a window without a display.
+
+use web_time::Instant;
+
+use crate::host::ViewError;
+use crate::model::params::Scale;
+use crate::offscreen::Offscreen;
+use crate::paint::Slot;
+
+/// Moves of the slider.
+const MOVES: usize = 60;
+/// Frames of each kind at the least, and seconds.
+const FRAMES: usize = 120;
+const SECONDS: f64 = 2.0;
+
+/// What was measured, milliseconds.
+#[derive(Clone, Debug, serde::Serialize)]
+pub struct Speed {
+    /// What draws the images.
+    pub engine: String,
+    /// Width and height of the images.
+    pub image: [u32; 2],
+    /// Width and height of the window.
+    pub window: [u32; 2],
+    /// From a slider's move to the frame that shows its image: median and 95th percentile.
+    pub slider_median: f64,
+    /// Its 95th percentile.
+    pub slider_95: f64,
+    /// A frame of the window in which nothing changes: median and 95th percentile.
+    pub frame_median: f64,
+    /// Its 95th percentile.
+    pub frame_95: f64,
+    /// A frame while a fit runs, and with it images are drawn.
+    pub fitting_median: f64,
+    /// Its 95th percentile.
+    pub fitting_95: f64,
+    /// Frames of which that is.
+    pub fitting_frames: usize,
+}
+
+/// Measure a window; its fit goes to its run folder.
+///
+/// # Errors
+/// When the window cannot be drawn, or its scene was refused.
+pub fn measure(offscreen: &mut Offscreen, window: [u32; 2]) -> Result<Speed, ViewError> {
+    offscreen.settle()?;
+    let slider = slider(offscreen)?;
+    offscreen.settle()?;
+    let frame = frames(offscreen, |_| true)?;
+    offscreen.window.session.begin_fit(false);
+    let fitting = frames(offscreen, |offscreen| offscreen.window.session.fitting().is_some())?;
+    offscreen.settle()?;
+    let session = &offscreen.window.session;
+    let image = session.camera().map_or([0; 2], |camera| [camera.width, camera.height]);
+    Ok(Speed {
+        engine: session.engine().to_owned(),
+        image,
+        window,
+        slider_median: at(&slider, 0.5),
+        slider_95: at(&slider, 0.95),
+        frame_median: at(&frame, 0.5),
+        frame_95: at(&frame, 0.95),
+        fitting_median: at(&fitting, 0.5),
+        fitting_95: at(&fitting, 0.95),
+        fitting_frames: fitting.len(),
+    })
+}
+
+/// Milliseconds from each move of the first slider to the frame with its image.
+fn slider(offscreen: &mut Offscreen) -> Result<Vec<f64>, ViewError> {
+    let mut times = Vec::new();
+    for i in 0..MOVES {
+        let session = &mut offscreen.window.session;
+        let before = session.image(Slot::Now).map(|now| std::sync::Arc::clone(&now.image));
+        let start = Instant::now();
+        if let Some(history) = session.history() {
+            history.edit(|values| {
+                let linear = |param: &crate::model::params::Param| param.info().scale == Scale::Linear;
+                if let Some(param) = values.rows().into_iter().find(linear) {
+                    values.params.set(param, 0.5 + 0.005 * i as f64);
+                }
+            });
+        }
+        loop {
+            offscreen.frame()?;
+            let now = offscreen.window.session.image(Slot::Now).map(|now| &now.image);
+            let fresh = match (now, &before) {
+                (Some(now), Some(before)) => !std::sync::Arc::ptr_eq(now, before),
+                (now, _) => now.is_some(),
+            };
+            if fresh {
+                break;
+            }
+        }
+        times.push(1e3 * start.elapsed().as_secs_f64());
+    }
+    Ok(times)
+}
+
+/// Milliseconds of frames, while `go_on`.
+fn frames(offscreen: &mut Offscreen, go_on: impl Fn(&Offscreen) -> bool) -> Result<Vec<f64>, ViewError> {
+    let (mut times, whole) = (Vec::new(), Instant::now());
+    while go_on(offscreen) && (times.len() < FRAMES || whole.elapsed().as_secs_f64() < SECONDS) {
+        let start = Instant::now();
+        offscreen.frame()?;
+        times.push(1e3 * start.elapsed().as_secs_f64());
+    }
+    Ok(times)
+}
+
+/// The number below which a share of them lies; 0 of none.
+fn at(times: &[f64], share: f64) -> f64 {
+    let mut sorted = times.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let place = (share * (sorted.len().max(1) - 1) as f64).round() as usize;
+    sorted.get(place).copied().unwrap_or(0.0)
+}

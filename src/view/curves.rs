@@ -1,0 +1,53 @@
+//! The fit as it goes: its loss, and how far each constant has come.
+
+use eframe::egui::Ui;
+use egui_plot::{Legend, Line, Plot, PlotPoints};
+
+use crate::fitting::Step;
+use crate::model::params::Column;
+
+/// Two plots side by side, `height` points high.
+pub(crate) fn show(ui: &mut Ui, path: &[Step], free: &[Column], height: f32) {
+    if path.is_empty() {
+        ui.weak("The loss and the constants are plotted here while a fit runs.");
+        return;
+    }
+    let losses: Vec<[f64; 2]> = path
+        .iter()
+        .enumerate()
+        .map(|(i, step)| [i as f64, step.iteration.loss.max(1e-300).log10()])
+        .collect();
+    ui.columns(2, |columns| {
+        plot("loss", height).y_axis_label("lg loss").x_axis_label("iteration").show(
+            &mut columns[0],
+            |plot| {
+                plot.line(Line::new("loss", PlotPoints::from(losses)));
+            },
+        );
+        let names = plot("constants", height).legend(Legend::default());
+        names.y_axis_label("share of the way").x_axis_label("iteration").show(&mut columns[1], |plot| {
+            for column in free {
+                plot.line(Line::new(column.name(), PlotPoints::from(shares(path, *column))));
+            }
+        });
+    });
+}
+
+fn plot(name: &str, height: f32) -> Plot<'_> {
+    Plot::new(name)
+        .height(height)
+        .allow_scroll(false)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+}
+
+/// How far a constant has come of its way from the first step to the last; all 0 where it did not move.
+fn shares(path: &[Step], column: Column) -> Vec<[f64; 2]> {
+    let value = |step: &Step| column.get(&step.point.params);
+    let (Some(first), Some(last)) = (path.first().map(value), path.last().map(value)) else {
+        return Vec::new();
+    };
+    let way = if last == first { 1.0 } else { last - first };
+    path.iter().enumerate().map(|(i, step)| [i as f64, (value(step) - first) / way]).collect()
+}

@@ -1,0 +1,94 @@
+//! Everything that a key does: one table, which the window reads and the list on F1 shows.
+
+use eframe::egui::{self, Key, KeyboardShortcut, Modifiers};
+
+/// What can be asked of the window by a key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Action {
+    Help,
+    Undo,
+    Redo,
+    Fit,
+    Resume,
+    Pause,
+    Stop,
+    NextView,
+    Layout,
+    Flip,
+    Error,
+    Terms,
+    Brighter,
+    Darker,
+    FalseColour,
+    WholeImage,
+    Home,
+    Screenshot,
+}
+
+const NONE: Modifiers = Modifiers::NONE;
+const COMMAND: Modifiers = Modifiers::COMMAND;
+
+/// The keys, what they do, and how the list says it.
+pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 19] = [
+    (NONE, Key::F1, Action::Help, "this list"),
+    (COMMAND, Key::Z, Action::Undo, "undo"),
+    (COMMAND.plus(Modifiers::SHIFT), Key::Z, Action::Redo, "redo"),
+    (COMMAND, Key::Y, Action::Redo, "redo"),
+    (COMMAND, Key::Enter, Action::Fit, "fit from where the sliders stand"),
+    (COMMAND, Key::R, Action::Resume, "go on with the fit that was stopped"),
+    (NONE, Key::P, Action::Pause, "pause the fit, or let it go on"),
+    (NONE, Key::Escape, Action::Stop, "stop the fit; what it has found stays"),
+    (NONE, Key::V, Action::NextView, "next view"),
+    (NONE, Key::L, Action::Layout, "side by side, wipe, or flip"),
+    (NONE, Key::F, Action::Flip, "flip between the first two panes"),
+    (NONE, Key::E, Action::Error, "error: FLIP, signed, relative"),
+    (NONE, Key::T, Action::Terms, "terms of the image, or none"),
+    (NONE, Key::Plus, Action::Brighter, "half a stop brighter"),
+    (NONE, Key::Minus, Action::Darker, "half a stop darker"),
+    (NONE, Key::C, Action::FalseColour, "luminance as a colour"),
+    (NONE, Key::W, Action::WholeImage, "whole image"),
+    (NONE, Key::H, Action::Home, "the view's own camera"),
+    (COMMAND, Key::S, Action::Screenshot, "leave the window as an image in the run folder"),
+];
+
+/// What the mouse does, for the list.
+pub(crate) const MOUSE: [(&str, &str); 7] = [
+    ("drag", "turn the camera about the mesh"),
+    ("Shift and drag", "turn the environment's light"),
+    ("right button and drag", "move the image"),
+    ("right button", "save a pane's image in the run folder"),
+    ("wheel", "zoom to a pixel; with Ctrl nearer or farther"),
+    ("double click", "whole image, the view's own camera"),
+    ("double click on a name", "reset the parameter to where it began"),
+];
+
+/// What was asked for by keys since the last frame; letters are not taken from a field that is being written in.
+pub(crate) fn asked(ctx: &egui::Context) -> Vec<Action> {
+    let writing = ctx.egui_wants_keyboard_input();
+    ctx.input_mut(|input| {
+        let pressed = |(modifiers, key, action, _): &(Modifiers, Key, Action, &str)| {
+            let letter = *modifiers == NONE && *key != Key::F1 && *key != Key::Escape;
+            (!(writing && letter) && input.consume_shortcut(&KeyboardShortcut::new(*modifiers, *key)))
+                .then_some(*action)
+        };
+        // Those with more modifiers first: Ctrl+Z is part of Ctrl+Shift+Z.
+        let mut keys = KEYS;
+        keys.sort_by_key(|(modifiers, ..)| !modifiers.shift);
+        keys.iter().filter_map(pressed).collect()
+    })
+}
+
+/// The list of keys.
+pub(crate) fn list(ui: &mut egui::Ui) {
+    egui::Grid::new("keys").num_columns(2).striped(true).show(ui, |ui| {
+        let keys = KEYS.iter().map(|(modifiers, key, _, words)| {
+            (ui.ctx().format_shortcut(&KeyboardShortcut::new(*modifiers, *key)), *words)
+        });
+        let mouse = MOUSE.iter().map(|(what, words)| ((*what).to_owned(), *words));
+        for (what, words) in keys.chain(mouse).collect::<Vec<_>>() {
+            ui.strong(what);
+            ui.label(words);
+            ui.end_row();
+        }
+    });
+}

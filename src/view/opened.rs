@@ -1,0 +1,146 @@
+//! A scene that is looked at.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{DVec3, Vec3};
+
+use crate::bake::rays::RayMesh;
+use crate::model::effects::Effects;
+use crate::prepare::{Baked, PrepareOptions};
+use crate::render::image::Image;
+use crate::scene::mesh::PosedMesh;
+use crate::scene::view::{Camera, View};
+
+/// How a scene is read.
+#[derive(Clone, Debug, Default)]
+pub struct Reading {
+    /// Its file.
+    pub scene: PathBuf,
+    /// Instead of its effects.
+    pub effects: Option<Effects>,
+    /// Constants instead of its start values.
+    pub params: Option<PathBuf>,
+    /// Where bakes are kept.
+    pub cache: Option<PathBuf>,
+}
+
+/// A scene with its bakes, and what a probe asks of it.
+pub struct Opened {
+    /// The scene and its bakes.
+    pub baked: Baked,
+    /// The targets of its views, in front of nothing.
+    pub targets: Vec<Option<Arc<Image>>>,
+    /// The centre of the mesh, and the radius of a sphere about it.
+    pub extent: (DVec3, f64),
+    mesh: PosedMesh,
+    rays: RayMesh,
+}
+
+impl std::fmt::Debug for Opened {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Opened").field("scene", &self.path()).finish_non_exhaustive()
+    }
+}
+
+/// A place on the surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// In the world, scene units.
+    pub position: Vec3,
+    /// Of the mesh, unit.
+    pub normal: Vec3,
+    /// Texture coordinates, where the mesh has some.
+    pub uv: Option<[f32; 2]>,
+}
+
+impl Opened {
+    /// Read and bake a scene.
+    ///
+    /// # Errors
+    /// What is wrong with it, as the command line says it.
+    pub fn read(reading: &Reading) -> Result<Self, String> {
+        let options = PrepareOptions {
+            effects: reading.effects,
+            fit: true,
+            params: reading.params.clone(),
+            cache: reading.cache.clone(),
+            ..PrepareOptions::default()
+        };
+        let baked = Baked::new(&reading.scene, &options).map_err(|error| error.to_string())?;
+        let mesh = baked.scene.mesh.pose();
+        let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+        let targets = baked.scene.views.iter().map(|view| target(view).map(Arc::new)).collect();
+        let extent = extent(&mesh);
+        Ok(Self { baked, targets, extent, mesh, rays })
+    }
+
+    /// The scene's file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.baked.scene.path
+    }
+
+    /// Its views.
+    #[must_use]
+    pub fn views(&self) -> &[View] {
+        &self.baked.scene.views
+    }
+
+    /// What the middle of a pixel shows.
+    #[must_use]
+    pub fn place(&self, camera: &Camera, x: u32, y: u32) -> Option<Place> {
+        let direction = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5).as_vec3();
+        let eye = camera.eye().as_vec3();
+        let corners =
+            |triangle: u32| self.mesh.triangles[triangle as usize].map(|i| self.mesh.positions[i as usize]);
+        let met = |triangle: u32| met(corners(triangle), eye, direction);
+        let hit = self.rays.nearest(eye.into(), direction.into(), |triangle| {
+            met(triangle).map_or(f32::INFINITY, |(distance, _)| distance)
+        })?;
+        let (distance, weights) = met(hit)?;
+        let triangle = self.mesh.triangles[hit as usize];
+        let normal: Vec3 = (0..3).map(|k| weights[k] * self.mesh.normals[triangle[k] as usize]).sum();
+        let uv = (!self.mesh.uvs.is_empty()).then(|| {
+            let uv: glam::Vec2 = (0..3).map(|k| weights[k] * self.mesh.uvs[triangle[k] as usize]).sum();
+            uv.to_array()
+        });
+        Some(Place { position: eye + distance * direction, normal: normal.normalize_or_zero(), uv })
+    }
+}
+
+fn extent(mesh: &PosedMesh) -> (DVec3, f64) {
+    let (low, high) = mesh
+        .positions
+        .iter()
+        .fold((Vec3::splat(f32::INFINITY), Vec3::splat(f32::NEG_INFINITY)), |(low, high), &p| {
+            (low.min(p), high.max(p))
+        });
+    let (low, high) = (low.as_dvec3(), high.as_dvec3());
+    (0.5 * (low + high), (0.5 * (high - low).length()).max(1e-6))
+}
+
+/// The distance at which a ray meets a triangle from either side, and the weights of its corners there (Möller and
+/// Trumbore 1997, "Fast, minimum storage ray-triangle intersection").
+fn met([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Option<(f32, [f32; 3])> {
+    let (e, f) = (b - a, c - a);
+    let p = direction.cross(f);
+    let determinant = e.dot(p);
+    if determinant == 0.0 {
+        return None;
+    }
+    let from = origin - a;
+    let u = from.dot(p) / determinant;
+    let q = from.cross(e);
+    let v = direction.dot(q) / determinant;
+    let distance = f.dot(q) / determinant;
+    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some((distance, [1.0 - u - v, u, v]))
+}
+
+/// A view's target as an image.
+fn target(view: &View) -> Option<Image> {
+    let target = view.target.as_ref()?;
+    let (width, height) = (view.camera.width as usize, view.camera.height as usize);
+    let alpha = target.alpha.clone().unwrap_or_else(|| vec![1.0; width * height]);
+    Some(Image { width, height, rgb: target.rgb.clone(), alpha })
+}

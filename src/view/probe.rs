@@ -1,0 +1,65 @@
+//! One pixel, as all panes have it.
+
+use std::sync::Arc;
+
+use eframe::egui::{self, Ui};
+
+use crate::look::Pane;
+use crate::panes;
+use crate::render::image::Image;
+use crate::session::Session;
+
+/// What a pixel is, as rows of names and numbers.
+pub(crate) fn rows(session: &Session, [x, y]: [u32; 2]) -> Vec<(String, String)> {
+    let mut rows = vec![("pixel".to_owned(), format!("{x}, {y}"))];
+    if let (Some(opened), Some(camera)) = (session.opened(), session.camera())
+        && let Some(place) = opened.place(&camera, x, y)
+    {
+        let three = |v: [f32; 3]| format!("{:.4} {:.4} {:.4}", v[0], v[1], v[2]);
+        rows.push(("position".to_owned(), three(place.position.to_array())));
+        rows.push(("normal".to_owned(), three(place.normal.to_array())));
+        if let Some([u, v]) = place.uv {
+            rows.push(("uv".to_owned(), format!("{u:.5} {v:.5}")));
+        }
+    }
+    let value = |image: &Arc<Image>| {
+        let i = y as usize * image.width + x as usize;
+        image.rgb.get(i).filter(|_| (x as usize) < image.width).copied()
+    };
+    let three = |rgb: [f32; 3]| format!("{:.5} {:.5} {:.5}", rgb[0], rgb[1], rgb[2]);
+    for pane in [Pane::Target, Pane::Now, Pane::Start, Pane::Fit, Pane::Other] {
+        if let Some(rgb) = panes::image(session, pane).as_ref().and_then(value) {
+            rows.push((panes::name(pane).to_owned(), three(rgb)));
+        }
+    }
+    let now = panes::image(session, Pane::Now).as_ref().and_then(value);
+    let target = panes::image(session, Pane::Target).as_ref().and_then(value);
+    if let (Some(now), Some(target)) = (now, target) {
+        rows.push(("residual".to_owned(), three([0, 1, 2].map(|c| now[c] - target[c]))));
+    }
+    if let Some(map) = session.image(crate::paint::Slot::Now).and_then(|now| now.compared.as_ref()) {
+        rows.extend(value(&map.map).map(|flip| ("FLIP".to_owned(), format!("{:.4}", flip[0]))));
+    }
+    for term in panes::terms(session) {
+        if let Some(rgb) = panes::image(session, Pane::Term(term)).as_ref().and_then(value) {
+            rows.push((term.name().to_owned(), three(rgb)));
+        }
+    }
+    rows
+}
+
+/// The table of a pixel.
+pub(crate) fn show(ui: &mut Ui, session: &Session, pixel: Option<[u32; 2]>) {
+    ui.strong("Probe");
+    let Some(pixel) = pixel else {
+        ui.weak("Point at an image: linear radiance of all panes, red, green and blue.");
+        return;
+    };
+    egui::Grid::new("probe").num_columns(2).striped(true).show(ui, |ui| {
+        for (name, value) in rows(session, pixel) {
+            ui.label(name);
+            ui.monospace(value);
+            ui.end_row();
+        }
+    });
+}

@@ -1,0 +1,122 @@
+//! What one edits: the constants, what a fit may move, which effects are on, which views it leaves out.
+
+use crate::model::effects::{Effect, Effects, Form};
+use crate::model::params::{Channels, Column, Param, Params};
+use crate::prepare::Baked;
+
+/// Every state of these is a step of the history.
+#[derive(Clone, Debug)]
+pub struct Values {
+    /// The form that the constants are of.
+    pub form: Form,
+    /// The constants.
+    pub params: Params,
+    /// A factor on each view's image.
+    pub gains: Vec<f64>,
+    /// What a fit moves.
+    pub free: Vec<Column>,
+    /// Which effects are on.
+    pub effects: Effects,
+    /// Views by name that a fit leaves out, and scores all the same.
+    pub hold_out: Vec<String>,
+}
+
+/// What a fit may do to a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Freedom {
+    /// It stays.
+    Fixed,
+    /// It moves, in all channels together.
+    Tied,
+    /// Each of its channels moves.
+    PerChannel,
+}
+
+impl Values {
+    /// A scene's own.
+    #[must_use]
+    pub fn of(baked: &Baked) -> Self {
+        let scene = &*baked.scene;
+        Self {
+            form: scene.form,
+            params: scene.params.clone(),
+            gains: baked.gains.clone(),
+            free: scene.fit.free.clone(),
+            effects: scene.effects,
+            hold_out: Vec::new(),
+        }
+    }
+
+    /// The parameters that the enabled effects ask for, in the order of the table.
+    #[must_use]
+    pub fn rows(&self) -> Vec<Param> {
+        Param::of(self.effects).filter(|param| param.asked_for(self.effects) && !param.info().held).collect()
+    }
+
+    /// What a fit may do to a parameter.
+    #[must_use]
+    pub fn freedom(&self, param: Param) -> Freedom {
+        match self.free.iter().find(|column| column.param == param).map(|column| column.channels) {
+            None => Freedom::Fixed,
+            Some(Channels::Tied) => Freedom::Tied,
+            Some(Channels::One(_)) => Freedom::PerChannel,
+        }
+    }
+
+    /// Say what a fit may do to a parameter. One that becomes tied takes the mean of its channels.
+    pub fn set_freedom(&mut self, param: Param, freedom: Freedom) {
+        let at = self.free.iter().position(|column| column.param == param).unwrap_or(self.free.len());
+        self.free.retain(|column| column.param != param);
+        let columns = match freedom {
+            Freedom::Fixed => Vec::new(),
+            Freedom::Tied => vec![Column::tied(param)],
+            Freedom::PerChannel => Column::per_channel(param).to_vec(),
+        };
+        self.free.splice(at..at, columns);
+        if freedom == Freedom::Tied {
+            let rgb = self.params.rgb(param);
+            self.params.set(param, rgb.iter().sum::<f64>() / 3.0);
+        }
+    }
+
+    /// Whether a parameter shows a value a channel: where it has three, or is free in each.
+    #[must_use]
+    pub fn by_channel(&self, param: Param) -> bool {
+        let rgb = self.params.rgb(param);
+        self.freedom(param) == Freedom::PerChannel || rgb != [rgb[0]; 3]
+    }
+
+    /// Turn an effect on or off; parts that ask for it go with it, and what it is a part of comes with it.
+    pub fn set_effect(&mut self, effect: Effect, on: bool) {
+        self.effects = if on { self.effects.with(effect) } else { self.effects.without(effect) };
+        if let Some(whole) = effect.lacks(self.effects).filter(|_| on) {
+            self.effects = self.effects.with(whole);
+        }
+        while let Some(part) = self.effects.iter().find(|part| part.lacks(self.effects).is_some()) {
+            self.effects = self.effects.without(part);
+        }
+        self.free.retain(|column| column.param.asked_for(self.effects));
+    }
+
+    /// Leave a view out of fits, or take it in again.
+    pub fn set_held_out(&mut self, view: &str, out: bool) {
+        self.hold_out.retain(|name| name != view);
+        if out {
+            self.hold_out.push(view.to_owned());
+        }
+    }
+
+    /// Whether two show the same image.
+    #[must_use]
+    pub fn look_alike(&self, other: &Self) -> bool {
+        self.effects == other.effects
+            && self.gains == other.gains
+            && Param::all().all(|param| self.params.rgb(param) == other.params.rgb(param))
+    }
+}
+
+impl PartialEq for Values {
+    fn eq(&self, other: &Self) -> bool {
+        self.free == other.free && self.hold_out == other.hold_out && self.look_alike(other)
+    }
+}
