@@ -8,11 +8,9 @@ use crate::timings::card;
 /// Sizes of the window.
 const SIZES: [&str; 2] = ["640x640", "1440x900"];
 
-/// On the adapter that is here, and by the CPU engine; and a picture of it.
+/// On the adapter that is here, and by the CPU engine; and a picture of it, whose fit goes to `runs`.
 pub(crate) fn software(lab: &Lab) -> Result<Value> {
-    let run = lab.scratch.path().join("window").display().to_string();
-    let picture =
-        ["view", "--screenshot", "docs/images/window.png", "--fit", "--probe", "160,150", "-o", &run];
+    let picture = ["view", "--screenshot", "docs/images/window.png", "--fit", "--probe", "160,150"];
     lab.skinfit("the window's picture", &picture, false)?;
     rows(lab, &["auto", "cpu"])
 }

@@ -191,9 +191,7 @@ impl Renderer {
     /// As of [`Self::new`].
     pub fn set_params(&mut self, params: &Params) -> Result<(), GpuError> {
         let content = Content { params: params.clone(), ..self.uploads.content().clone() };
-        let Facts { morphs, faces, .. } = self.facts;
-        let facts = Facts::of_scene(&content.scene, params, self.options.budget, self.gpu.f16());
-        if (Facts { morphs, faces, ..facts }) == self.facts && self.uploads.set_params(params) {
+        if self.facts.at(params) == self.facts && self.uploads.set_params(params) {
             self.programs.iter().for_each(Program::forget);
         } else {
             let background = self.background;

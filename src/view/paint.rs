@@ -267,13 +267,16 @@ impl Work {
     }
 
     fn follow(&mut self, slot: Slot, job: &Job, mut painted: Painted) {
-        if painted.quick || job.terms {
-            match self.picture(job, job.terms, false) {
-                Ok((layers, whole)) => {
-                    let named =
-                        |(name, image): (String, Image)| Some((TermName::from_name(&name)?, Arc::new(image)));
-                    painted = Painted { terms: layers.into_iter().filter_map(named).collect(), ..whole };
-                }
+        if painted.quick {
+            match self.picture(job, false, false) {
+                Ok((_, whole)) => painted = whole,
+                Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
+            }
+        }
+        if job.terms {
+            let named = |(name, image): (String, Image)| Some((TermName::from_name(&name)?, Arc::new(image)));
+            match self.picture(job, true, false) {
+                Ok((layers, _)) => painted.terms = layers.into_iter().filter_map(named).collect(),
                 Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
             }
         }

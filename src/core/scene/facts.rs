@@ -36,8 +36,8 @@ impl Facts {
             faces: FaceSizes::default(),
             morphs: mesh.morphs.iter().filter(|morph| morph.weight != 0.0).count() as u32,
             bones: !mesh.bones.is_empty() && !mesh.joints.is_empty(),
-            turned: params.scalar(Param::EnvironmentRotation) != 0.0,
-            square_rim: params.scalar(Param::RimExponent) == 2.0,
+            turned: false,
+            square_rim: false,
             f16,
             tessellation: tessellation_error(scene),
             atlas: atlas.then_some(scene.diffusion.light_map_size),
@@ -46,6 +46,17 @@ impl Facts {
             work: if atlas { work(scene) } else { Work::default() },
             budget,
             output: None,
+        }
+        .at(params)
+    }
+
+    /// The same at other constants; all else that is known of a scene stays.
+    #[must_use]
+    pub fn at(self, params: &Params) -> Self {
+        Self {
+            turned: params.scalar(Param::EnvironmentRotation) != 0.0,
+            square_rim: params.scalar(Param::RimExponent) == 2.0,
+            ..self
         }
     }
 }

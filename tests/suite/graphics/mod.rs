@@ -3,6 +3,7 @@
 //! - `bench`: an adapter, scenes, and images of both engines
 //! - `parity`: both engines show the same
 //! - `accuracy`: what a looser budget and multisampling may change
+//! - `constants`: constants that are taken later
 //! - `frames`: tiles, sequences, layers
 //! - `pictures`: backdrops, bloom, haze
 //! - `faults`: what is refused, and lost devices
@@ -17,6 +18,7 @@
 
 mod accuracy;
 pub(crate) mod bench;
+mod constants;
 pub(crate) mod exported;
 mod faults;
 mod frames;
