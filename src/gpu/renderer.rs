@@ -3,6 +3,8 @@
 mod frames;
 mod made;
 
+use std::sync::Arc;
+
 use super::atlas::AtlasTraffic;
 use super::device::Gpu;
 use super::error::GpuError;
@@ -11,7 +13,7 @@ use super::stage::Stage;
 use super::timing::PassTime;
 use super::upload::{Content, Uploads};
 use crate::bake::PoseBake;
-use crate::model::params::Params;
+use crate::model::params::{Param, Params};
 use crate::model::terms::TermName;
 use crate::render::antialias::Antialias;
 use crate::render::backdrop::Backdrop;
@@ -185,20 +187,24 @@ impl Renderer {
 
     /// Take other constants, for images at the scene's own pose. Where they change neither the plan nor what it reads,
     /// the next frame reads them from the uniform block, and levels of the UV atlas are made anew; otherwise, as where
-    /// a light moves or a lobe's exponent changes, the renderer is made anew.
+    /// a light moves or a lobe's exponent changes, the renderer is made anew, of a scene that has them.
     ///
     /// # Errors
     /// As of [`Self::new`].
     pub fn set_params(&mut self, params: &Params) -> Result<(), GpuError> {
-        let content = Content { params: params.clone(), ..self.uploads.content().clone() };
+        let turned = self.uploads.content().params.scalar(Param::EnvironmentRotation);
         if self.facts.at(params) == self.facts && self.uploads.set_params(params) {
             self.programs.iter().for_each(Program::forget);
         } else {
-            let background = self.background;
+            let (background, mut content) = (self.background, self.uploads.content().clone());
+            Arc::make_mut(&mut content.scene).params = params.clone();
+            content.params = params.clone();
             *self = Self::new(&self.gpu, content, self.options)?;
             self.background = background;
         }
-        self.backdrop = None;
+        if params.scalar(Param::EnvironmentRotation) != turned {
+            self.backdrop = None;
+        }
         Ok(())
     }
 

@@ -166,8 +166,11 @@ impl Uploads {
         let Content { scene, params: before, .. } = &self.content;
         let mapped = shadow::mapped(scene, params);
         let params = shadow::with_layers(params.clone(), &mapped);
-        let same = mapped == self.mapped
-            // What vertices see of a light goes by where it is.
+        // What rays have found of vertices may go by anything that is no weight: where a light is, how the sky is
+        // turned, how rough the skin is.
+        let found = self.found.is_empty() || params.differ_in_weights_alone(before);
+        let same = found
+            && mapped == self.mapped
             && scene.lights_at(&params) == scene.lights_at(before)
             && Stack::ALL.into_iter().all(|stack| stack.place(&params) == stack.place(before));
         if same {
@@ -266,7 +269,7 @@ impl Uploads {
             return Ok(());
         }
         let scene = Arc::clone(&self.content.scene);
-        let lights = std::mem::take(&mut self.mapped);
+        let lights = self.mapped.clone();
         let mut maps = shadow::Maps::new(gpu, facts, lights, scene.shadow_maps, self)?;
         maps.set_pose(gpu, &scene.mesh.pose().positions);
         self.bytes += maps.bytes();

@@ -68,7 +68,12 @@ pub fn open_window(host: Arc<dyn Host>, start: Start, title: &str) -> Result<(),
     );
     made.map_err(|error| match error {
         eframe::Error::Wgpu(error) => ViewError::NoAdapter(error.to_string()),
-        error => ViewError::NoWindow(error.to_string()),
+        error => {
+            // Without the place in winit's sources that its words begin with.
+            let words = error.to_string();
+            let reason = words.rsplit(": ").next().unwrap_or(&words);
+            ViewError::NoWindow(reason.trim_end_matches('.').to_owned())
+        }
     })
 }
 

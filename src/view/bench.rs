@@ -1,18 +1,22 @@
 //! How fast the window is: from a slider that moves to its image in the window, and frames while nothing or a fit is
 //! under way; measured on a window without a display.
 
+use std::time::Duration;
+
 use web_time::Instant;
 
 use crate::host::ViewError;
-use crate::model::params::Scale;
 use crate::offscreen::Offscreen;
 use crate::paint::Slot;
+use crate::values::Values;
 
 /// Moves of the slider.
 const MOVES: usize = 60;
 /// Frames of each kind at the least, and seconds.
 const FRAMES: usize = 120;
 const SECONDS: f64 = 2.0;
+/// How long an image is waited for.
+const PATIENCE: Duration = Duration::from_secs(60);
 
 /// What was measured, milliseconds.
 #[derive(Clone, Debug, serde::Serialize)]
@@ -72,25 +76,21 @@ fn slider(offscreen: &mut Offscreen) -> Result<Vec<f64>, ViewError> {
     let mut times = Vec::new();
     for i in 0..MOVES {
         let session = &mut offscreen.window.session;
-        let before = session.image(Slot::Now).map(|now| std::sync::Arc::clone(&now.image));
+        let rows = session.values().map(Values::rows).unwrap_or_default();
+        let Some(param) = rows.into_iter().find(|param| param.info().linear) else { break };
+        let value = 0.5 + 0.005 * i as f64;
         let start = Instant::now();
         if let Some(history) = session.history() {
-            history.edit(|values| {
-                let linear = |param: &crate::model::params::Param| param.info().scale == Scale::Linear;
-                if let Some(param) = values.rows().into_iter().find(linear) {
-                    values.params.set(param, 0.5 + 0.005 * i as f64);
-                }
-            });
+            history.edit(|values| values.params.set(param, value));
         }
         loop {
             offscreen.frame()?;
-            let now = offscreen.window.session.image(Slot::Now).map(|now| &now.image);
-            let fresh = match (now, &before) {
-                (Some(now), Some(before)) => !std::sync::Arc::ptr_eq(now, before),
-                (now, _) => now.is_some(),
-            };
-            if fresh {
+            let now = offscreen.window.session.image(Slot::Now);
+            if now.is_some_and(|now| now.params.scalar(param) == value) {
                 break;
+            }
+            if start.elapsed() > PATIENCE {
+                return Err(ViewError::Scene(offscreen.window.session.told().join("\n")));
             }
         }
         times.push(1e3 * start.elapsed().as_secs_f64());

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
@@ -88,9 +88,22 @@ impl Fitting {
         Self { run, messages, interrupt, pause, thread: thread.spawn(work).ok() }
     }
 
-    /// What it said since.
-    pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
-        self.messages.try_iter()
+    /// What it said since. A thread that ended without a word is told as a fit that failed.
+    pub fn messages(&self) -> Vec<Message> {
+        let mut messages: Vec<Message> = self.messages.try_iter().collect();
+        let over = |message: &Message| matches!(message, Message::Done(_));
+        let gone = match self.messages.try_recv() {
+            Ok(message) => {
+                messages.push(message);
+                false
+            }
+            Err(error) => error == TryRecvError::Disconnected,
+        };
+        if gone && !messages.iter().any(over) {
+            let words = "the fit ended by a fault of skinfit's, told on standard error. Please report it.";
+            messages.push(Message::Done(Box::new(Err(words.to_owned()))));
+        }
+        messages
     }
 
     /// Have it wait after the iteration that it is at, or go on.

@@ -68,6 +68,16 @@ impl<T: Clone + PartialEq> History<T> {
         }
     }
 
+    /// Take the last step back for good, and those before it that are not `good` either: what it led to cannot be shown.
+    pub fn refuse(&mut self, good: impl Fn(&T) -> bool) {
+        self.settle();
+        while !good(&self.now) {
+            let Some(before) = self.past.pop() else { return };
+            self.now = before;
+        }
+        self.future.clear();
+    }
+
     /// Whether there is a step back.
     #[must_use]
     pub fn can_undo(&self) -> bool {
@@ -98,6 +108,17 @@ mod tests {
         history.redo();
         history.redo();
         assert_eq!((*history.now(), history.can_redo()), (9, false));
+    }
+
+    #[test]
+    fn a_step_that_is_refused_leaves_no_way_back_to_it() {
+        let mut history = History::new(1);
+        history.edit(|now| *now = 2);
+        history.edit(|now| *now = 30);
+        history.refuse(|now| *now < 10);
+        assert_eq!((*history.now(), history.can_redo()), (2, false));
+        history.undo();
+        assert_eq!(*history.now(), 1);
     }
 
     #[test]

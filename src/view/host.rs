@@ -75,9 +75,7 @@ pub trait Host: Send + Sync {
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// There is no display.
-    #[error(
-        "no window can be opened: {0}. Without a display, `--screenshot FILE` leaves what it would show as an image."
-    )]
+    #[error("no window can be opened: {0}. It needs a display.")]
     NoWindow(String),
     /// No adapter draws it.
     #[error(

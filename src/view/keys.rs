@@ -62,13 +62,13 @@ pub(crate) const MOUSE: [(&str, &str); 7] = [
     ("double click on a name", "reset the parameter to where it began"),
 ];
 
-/// What was asked for by keys since the last frame; letters are not taken from a field that is being written in.
+/// What was asked for by keys since the last frame; but for a few, none is taken from a field that is being written in.
 pub(crate) fn asked(ctx: &egui::Context) -> Vec<Action> {
-    let writing = ctx.egui_wants_keyboard_input();
+    let writing = ctx.text_edit_focused();
     ctx.input_mut(|input| {
         let pressed = |(modifiers, key, action, _): &(Modifiers, Key, Action, &str)| {
-            let letter = *modifiers == NONE && *key != Key::F1 && *key != Key::Escape;
-            (!(writing && letter) && input.consume_shortcut(&KeyboardShortcut::new(*modifiers, *key)))
+            let everywhere = matches!(action, Action::Help | Action::Fit);
+            ((everywhere || !writing) && input.consume_shortcut(&KeyboardShortcut::new(*modifiers, *key)))
                 .then_some(*action)
         };
         // Those with more modifiers first: Ctrl+Z is part of Ctrl+Shift+Z.

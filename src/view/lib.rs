@@ -9,7 +9,7 @@
 //! - without a display: [`offscreen`] (the window as an image), [`bench`] (how fast it is)
 //!
 //! Images are drawn by the production renderer's planned shaders, or by the CPU engine where no adapter works; fits are
-//! the command line's. Nothing in a frame waits for either.
+//! the command line's. No frame waits for either.
 
 // What other members of the workspace hold stands under the names that it has there.
 use skinfit_core::{bake, engine, fit, model, prepare, render, scene};

@@ -6,11 +6,13 @@ use std::sync::Arc;
 use glam::{DVec3, Vec3};
 
 use crate::bake::rays::RayMesh;
+use crate::bake::stacks::Stack;
 use crate::model::effects::Effects;
-use crate::prepare::{Baked, PrepareOptions};
+use crate::model::params::{Column, Param, Params};
+use crate::prepare::{Baked, Loaded, PrepareError, PrepareOptions};
 use crate::render::image::Image;
 use crate::scene::mesh::PosedMesh;
-use crate::scene::view::{Camera, View};
+use crate::scene::view::{Background, Camera, View};
 
 /// How a scene is read.
 #[derive(Clone, Debug, Default)]
@@ -65,9 +67,11 @@ impl Opened {
             fit: true,
             params: reading.params.clone(),
             cache: reading.cache.clone(),
+            // Targets show nothing behind the mesh.
+            background: Some(Background::None),
             ..PrepareOptions::default()
         };
-        let baked = Baked::new(&reading.scene, &options).map_err(|error| error.to_string())?;
+        let baked = baked(&reading.scene, &options).map_err(|error| error.to_string())?;
         let mesh = baked.scene.mesh.pose();
         let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
         let targets = baked.scene.views.iter().map(|view| target(view).map(Arc::new)).collect();
@@ -107,6 +111,28 @@ impl Opened {
         });
         Some(Place { position: eye + distance * direction, normal: normal.normalize_or_zero(), uv })
     }
+}
+
+/// A scene with lobes of every sharpness and roughness that a slider may ask for.
+fn baked(scene: &Path, options: &PrepareOptions) -> Result<Baked, PrepareError> {
+    let mut loaded = Loaded::read(scene, options)?;
+    let free = loaded.scene.fit.free.clone();
+    let (params, effects) = (&loaded.scene.params, loaded.scene.effects);
+    let places = |params: &Params| Stack::ALL.map(|stack| stack.place(params));
+    let looked_up = |param: &Param| {
+        let mut moved = params.clone();
+        let (lower, upper) = param.info().range();
+        moved.set(
+            *param,
+            0.5 * (params.scalar(*param) + if params.scalar(*param) == lower { upper } else { lower }),
+        );
+        param.asked_for(effects) && places(&moved) != places(params)
+    };
+    let slid: Vec<Column> = Param::of(effects).filter(looked_up).map(Column::tied).collect();
+    let fixed = slid.into_iter().filter(|slid| free.iter().all(|column| column.param != slid.param));
+    loaded.scene.fit.free.extend(fixed.collect::<Vec<_>>());
+    // What is free is the scene's own again: nobody shares it yet.
+    Ok(loaded.bake()?.with_scene(|scene| scene.fit.free = free))
 }
 
 fn extent(mesh: &PosedMesh) -> (DVec3, f64) {

@@ -14,6 +14,7 @@ use web_time::Instant;
 
 use crate::gpu::painter::{Beside, CpuPainter, GpuPainter, PaintError, Painter, Picture};
 use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
+use crate::model::effects::Effects;
 use crate::model::params::Params;
 use crate::model::terms::TermName;
 use crate::opened::Opened;
@@ -64,6 +65,12 @@ pub struct Painted {
     pub compared: Option<Compared>,
     /// How long it took, read back.
     pub seconds: f64,
+    /// At these constants.
+    pub params: Params,
+    /// From here.
+    pub camera: Camera,
+    /// With these effects.
+    pub effects: Effects,
     /// Whether it has a sample a pixel until one with all of the scene's follows.
     pub quick: bool,
     /// Bytes of the scene on the adapter; 0 of the CPU engine.
@@ -181,6 +188,10 @@ impl PaintWorker {
     /// Whether everything that was asked for is answered.
     #[must_use]
     pub fn is_idle(&self) -> bool {
+        // What a thread that has ended was asked for never comes.
+        if self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
+            return true;
+        }
         let wanted = self.shared.wanted();
         wanted.jobs.is_empty() && wanted.follow.is_empty() && !wanted.under_way
     }
@@ -219,7 +230,7 @@ type Layers = Vec<(String, Image)>;
 /// What is done next.
 enum Next {
     Paint(Slot, Job),
-    Follow(Slot, Job, Painted),
+    Follow(Slot, Box<(Job, Painted)>),
 }
 
 impl Work {
@@ -230,7 +241,8 @@ impl Work {
             }
             let follow = match next {
                 Next::Paint(slot, job) => self.paint(slot, job),
-                Next::Follow(slot, job, painted) => {
+                Next::Follow(slot, what) => {
+                    let (job, painted) = *what;
                     self.follow(slot, &job, painted);
                     None
                 }
@@ -305,6 +317,8 @@ impl Work {
         }
         let Some((_, painter)) = &mut self.scene else { return Err(GpuError::NoAdapter.into()) };
         let samples = job.opened.baked.scene.quality.samples_per_axis;
+        // The CPU engine keeps its samples: it has no use for fewer.
+        let quick = quick && !self.engine.cpu;
         painter.set_samples(if quick { 1 } else { samples });
         painter.set_params(&job.params)?;
         let start = Instant::now();
@@ -316,7 +330,18 @@ impl Work {
         }
         let uploaded = painter.uploaded_bytes();
         let image = Arc::new(image);
-        Ok((layers, Painted { image, terms: Vec::new(), compared: None, seconds, uploaded, quick }))
+        let painted = Painted {
+            image,
+            terms: Vec::new(),
+            compared: None,
+            seconds,
+            uploaded,
+            params: job.params.clone(),
+            camera: job.camera,
+            effects: job.opened.baked.scene.effects,
+            quick,
+        };
+        Ok((layers, painted))
     }
 
     fn painter(&mut self, opened: &Opened) -> Result<Box<dyn Painter>, PaintError> {
@@ -348,9 +373,7 @@ fn next(shared: &Shared) -> Option<(Next, bool)> {
         }
         let next = match wanted.jobs.pop_first() {
             Some((slot, job)) => Some(Next::Paint(slot, job)),
-            None if quiet => {
-                wanted.follow.pop_first().map(|(slot, (job, painted))| Next::Follow(slot, job, painted))
-            }
+            None if quiet => wanted.follow.pop_first().map(|(slot, what)| Next::Follow(slot, Box::new(what))),
             None => None,
         };
         if let Some(next) = next {

@@ -58,6 +58,11 @@ pub(crate) fn image(session: &Session, pane: Pane) -> Option<Arc<Image>> {
     }
 }
 
+/// The target that the image of the sliders may be compared with: from a view's own camera.
+pub(crate) fn compared(session: &Session) -> Option<Arc<Image>> {
+    session.is_at_home().then(|| image(session, Pane::Target)).flatten()
+}
+
 /// The terms that there are images of.
 pub(crate) fn terms(session: &Session) -> Vec<TermName> {
     session.image(Slot::Now).map_or_else(Vec::new, |now| now.terms.iter().map(|(term, _)| *term).collect())
@@ -204,7 +209,7 @@ impl One {
                     let compared = session.image(Slot::Now).and_then(|now| now.compared.as_ref());
                     compared.map(|compared| [Arc::clone(&compared.map), Arc::clone(&compared.map)])
                 }
-                _ => image(session, Pane::Now).zip(image(session, Pane::Target)).map(<[_; 2]>::from),
+                _ => image(session, Pane::Now).zip(compared(session)).map(<[_; 2]>::from),
             },
             (pane, Layout::Wipe) => {
                 let beside = look.panes.get(1).copied().unwrap_or(Pane::Now);

@@ -23,7 +23,7 @@ use crate::report::pictures::{BACKGROUND, magma};
 use crate::report::signed::diverging;
 
 /// Textures that are kept; the one that was shown longest ago goes.
-const MOST: usize = 40;
+const MOST: usize = 16;
 
 /// What a pane shows.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -33,7 +33,7 @@ pub(crate) fn rows(session: &Session, [x, y]: [u32; 2]) -> Vec<(String, String)>
         }
     }
     let now = panes::image(session, Pane::Now).as_ref().and_then(value);
-    let target = panes::image(session, Pane::Target).as_ref().and_then(value);
+    let target = panes::compared(session).as_ref().and_then(value);
     if let (Some(now), Some(target)) = (now, target) {
         rows.push(("residual".to_owned(), three([0, 1, 2].map(|c| now[c] - target[c]))));
     }

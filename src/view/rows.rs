@@ -15,6 +15,8 @@ enum Edit {
     /// All channels, as a step.
     Reset(Param, [f64; 3]),
     Freedom(Param, Freedom),
+    /// A value for each channel, or one for all.
+    Apart(Param, bool),
     /// A drag is over.
     Settled,
 }
@@ -35,6 +37,7 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
             Edit::Value(column, value) => history.drag(|values| column.set(&mut values.params, value)),
             Edit::Reset(param, rgb) => history.edit(|values| values.params.set_rgb(param, rgb)),
             Edit::Freedom(param, freedom) => history.edit(|values| values.set_freedom(param, freedom)),
+            Edit::Apart(param, apart) => history.edit(|values| values.set_apart(param, apart)),
             Edit::Settled => history.settle(),
         }
     }
@@ -77,7 +80,7 @@ impl Row<'_> {
                     .response
                     .accessible_name(format!("reset {}", info.name));
                 if info.rgb {
-                    self.channels(ui, freedom, edits);
+                    self.channels(ui, edits);
                 }
             });
         });
@@ -118,24 +121,13 @@ impl Row<'_> {
     }
 
     /// Whether its channels move together.
-    fn channels(&self, ui: &mut Ui, freedom: Freedom, edits: &mut Vec<Edit>) {
+    fn channels(&self, ui: &mut Ui, edits: &mut Vec<Edit>) {
         let by_channel = self.values.by_channel(self.param);
         let mut apart = by_channel;
         let name = format!("channels of {}", self.param.name());
-        if ui
-            .toggle_value(&mut apart, "rgb")
-            .on_hover_text("A value for each channel, or one for all")
-            .accessible_name(name)
-            .changed()
-        {
-            let free = freedom != Freedom::Fixed;
-            if apart {
-                edits.push(Edit::Freedom(self.param, Freedom::PerChannel));
-            } else {
-                let rgb = self.values.params.rgb(self.param);
-                edits.push(Edit::Reset(self.param, [rgb.iter().sum::<f64>() / 3.0; 3]));
-                edits.push(Edit::Freedom(self.param, if free { Freedom::Tied } else { Freedom::Fixed }));
-            }
+        let words = "A value for each channel, or one for all";
+        if ui.toggle_value(&mut apart, "rgb").on_hover_text(words).accessible_name(name).changed() {
+            edits.push(Edit::Apart(self.param, apart));
         }
     }
 
@@ -153,6 +145,8 @@ impl Row<'_> {
                 .clamping(SliderClamping::Never)
                 .logarithmic(info.scale == Scale::Log)
                 .suffix(if info.unit == "degrees" { "°" } else { "" })
+                // A typed number counts once it is there.
+                .update_while_editing(false)
                 .max_decimals(5);
             let response = ui.add(slider).accessible_name(format!("{channel}{}", info.name));
             value = value.clamp(lower, upper);

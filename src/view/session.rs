@@ -7,7 +7,7 @@ mod progress;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 pub use camera::Orbit;
 pub use progress::watch_progress;
@@ -66,8 +66,6 @@ pub struct Session {
     start: Start,
     wake: Wake,
     opening: Option<Receiver<Result<Opened, String>>>,
-    /// What of the values is to be the scene's, once it is opened.
-    take_params: bool,
     opened: Option<Arc<Opened>>,
     values: Option<History<Values>>,
     first: Option<Values>,
@@ -108,7 +106,6 @@ impl Session {
             start,
             wake,
             opening: None,
-            take_params: true,
             opened: None,
             values: None,
             first: None,
@@ -150,27 +147,36 @@ impl Session {
 
     /// Take in what was answered, and ask for what is to be shown.
     pub fn poll(&mut self) {
-        if let Some(opening) = &self.opening
-            && let Ok(opened) = opening.try_recv()
-        {
-            self.opening = None;
-            match opened {
-                Ok(opened) => self.take(opened),
-                Err(error) => {
-                    self.told.push(error);
-                    // What is shown stays; so do its effects.
-                    if let (Some(history), Some(opened)) = (&mut self.values, &self.opened) {
-                        let effects = opened.baked.scene.effects;
-                        history.edit(|values| values.effects = effects);
-                    }
-                }
-            }
-        }
+        self.follow_opening();
         for answer in self.painter.answers().collect::<Vec<_>>() {
             self.painted(answer);
         }
         self.follow_fit();
         self.ask();
+    }
+
+    fn follow_opening(&mut self) {
+        let Some(opening) = &self.opening else { return };
+        let opened = match opening.try_recv() {
+            Ok(opened) => opened,
+            Err(TryRecvError::Empty) => return,
+            Err(TryRecvError::Disconnected) => {
+                Err("the scene could not be read by a fault of skinfit's, told on standard error. Please report it."
+                    .to_owned())
+            }
+        };
+        self.opening = None;
+        match opened {
+            Ok(opened) => self.take(opened),
+            Err(error) => {
+                self.told.push(error);
+                // What is shown stays, with its effects: the step to others is taken back.
+                if let (Some(history), Some(opened)) = (&mut self.values, &self.opened) {
+                    let effects = opened.baked.scene.effects;
+                    history.refuse(|values| values.effects == effects);
+                }
+            }
+        }
     }
 
     fn take(&mut self, opened: Opened) {
@@ -185,17 +191,7 @@ impl Session {
                 .collect::<Vec<_>>(),
         );
         let scene = Values::of(&opened.baked);
-        match &mut self.values {
-            None => {
-                self.first = Some(scene.clone());
-                self.values = Some(History::new(scene));
-            }
-            Some(history) if self.take_params => {
-                history.edit(|values| (values.params, values.gains) = (scene.params, scene.gains));
-            }
-            Some(_) => {}
-        }
-        self.take_params = false;
+        let first = self.values.is_none().then_some(scene);
         let params = |file: &Option<PathBuf>| -> Option<Result<Params, String>> {
             let (scene, file) = (&opened.baked.scene, file.as_ref()?);
             let read = ParamsFile::read(file, scene.form, &scene.params);
@@ -209,6 +205,12 @@ impl Session {
                 _ => {}
             }
         }
+        if let Some(scene) = first {
+            // A run's sliders stand where its fit ended.
+            let params = self.fitted.clone().unwrap_or_else(|| scene.params.clone());
+            self.values = Some(History::new(Values { params, ..scene.clone() }));
+            self.first = Some(scene);
+        }
         self.view = self.view.min(opened.views().len().saturating_sub(1));
         self.opened = Some(opened);
         self.asked.clear();
@@ -217,13 +219,21 @@ impl Session {
     fn painted(&mut self, answer: Answer) {
         match answer {
             Answer::Painted(slot, mut painted) => {
-                if let Some(before) = self.images.remove(&slot) {
+                if !self.is_asked(slot, &painted) {
+                    return;
+                }
+                if let Some(before) =
+                    self.images.remove(&slot).filter(|before| before.camera == painted.camera)
+                {
                     // Until its own are there, those of the image before are shown.
                     (painted.terms, painted.compared) = (before.terms, before.compared);
                 }
                 self.images.insert(slot, painted);
             }
             Answer::Whole(slot, painted) => {
+                if !self.is_asked(slot, &painted) {
+                    return;
+                }
                 self.images.insert(slot, painted);
                 if slot == Slot::Now {
                     self.weigh();
@@ -238,11 +248,18 @@ impl Session {
         }
     }
 
+    /// Whether an image is of the scene and the camera that are shown now.
+    fn is_asked(&self, slot: Slot, painted: &Painted) -> bool {
+        self.asked.get(&slot).is_some_and(|asked| {
+            asked.camera == painted.camera && asked.opened.baked.scene.effects == painted.effects
+        })
+    }
+
     /// What the effect that was switched has changed, once its image is there.
     fn weigh(&mut self) {
-        let current = self.opened.as_ref().map(|opened| opened.baked.scene.effects);
+        let drawn = self.images.get(&Slot::Now).map(|now| now.effects);
         let wanted = self.values.as_ref().map(|values| values.now().effects);
-        if current != wanted {
+        if drawn != wanted {
             return;
         }
         if let (Some(before), Some(now)) = (self.switched.take(), self.images.get(&Slot::Now)) {
@@ -258,15 +275,12 @@ impl Session {
 
     fn follow_fit(&mut self) {
         let Some(fitting) = &self.fitting else { return };
-        let messages: Vec<Message> = fitting.messages().collect();
-        for message in messages {
+        let views = self.opened.as_ref().map(|opened| opened.views().to_vec()).unwrap_or_default();
+        for message in fitting.messages() {
             match message {
                 Message::Step(step) => {
                     if let Some(history) = &mut self.values {
-                        history.drag(|values| {
-                            values.params = step.point.params.clone();
-                            values.gains = step.point.gains.clone();
-                        });
+                        history.drag(|values| values.take(&step.point, &views));
                     }
                     self.path.push(*step);
                 }
@@ -288,10 +302,8 @@ impl Session {
     fn fitted_to(&mut self, Fitted { outcome, views }: Fitted) {
         self.scores = views;
         if let Some(history) = &mut self.values {
-            history.drag(|values| {
-                values.params = outcome.end.params.clone();
-                values.gains.clone_from(&outcome.end.gains);
-            });
+            let views = self.opened.as_ref().map_or(&[][..], |opened| opened.views());
+            history.drag(|values| values.take(&outcome.end, views));
         }
         if outcome.ending != Ending::Converged {
             self.told.push(format!(
@@ -326,7 +338,7 @@ impl Session {
             (Slot::Start, first),
             (Slot::Other, self.other.as_ref()),
         ];
-        let at_home = self.orbit == Orbit::default();
+        let at_home = self.is_at_home();
         for (slot, params) in wanted {
             let Some(params) = params else { continue };
             let job = Job {
@@ -350,6 +362,12 @@ impl Session {
         let opened = self.opened.as_ref()?;
         let view = opened.views().get(self.view)?;
         Some(self.orbit.turned(&view.camera, opened.extent.0))
+    }
+
+    /// Whether images are seen from the view's own camera.
+    #[must_use]
+    pub fn is_at_home(&self) -> bool {
+        self.orbit == Orbit::default()
     }
 
     /// The scene, once it is opened.
@@ -490,7 +508,10 @@ impl Session {
 
     /// Fit from where the sliders stand; `resume`: go on with the fit that was stopped.
     pub fn begin_fit(&mut self, resume: bool) {
-        let (Some(opened), Some(values), None) = (&self.opened, &self.values, &self.fitting) else { return };
+        let (Some(opened), Some(values), None) = (&self.opened, &mut self.values, &self.fitting) else {
+            return;
+        };
+        values.settle();
         let request = FitRequest {
             scene: opened.path().to_owned(),
             values: values.now().clone(),
@@ -511,7 +532,16 @@ impl Session {
             match ParamsFile::read(file, scene.form, &history.now().params) {
                 Ok(read) => {
                     let read = read.of_scene(&scene.path);
-                    history.edit(|values| values.params = read.params);
+                    let names: Vec<String> = opened.views().iter().map(|view| view.name.clone()).collect();
+                    history.edit(|values| {
+                        values.params = read.params;
+                        for (name, gain) in &read.gains {
+                            let place = names.iter().position(|other| other == name);
+                            if let Some(own) = place.and_then(|place| values.gains.get_mut(place)) {
+                                *own = *gain;
+                            }
+                        }
+                    });
                 }
                 Err(error) => self.told.push(error.to_string()),
             }

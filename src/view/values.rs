@@ -1,8 +1,10 @@
 //! What one edits: the constants, what a fit may move, which effects are on, which views it leaves out.
 
+use crate::engine::Point;
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::prepare::Baked;
+use crate::scene::view::View;
 
 /// Every state of these is a step of the history.
 #[derive(Clone, Debug)]
@@ -15,6 +17,8 @@ pub struct Values {
     pub gains: Vec<f64>,
     /// What a fit moves.
     pub free: Vec<Column>,
+    /// What shows a value a channel, whether or not a fit moves it.
+    pub apart: Vec<Param>,
     /// Which effects are on.
     pub effects: Effects,
     /// Views by name that a fit leaves out, and scores all the same.
@@ -42,6 +46,7 @@ impl Values {
             params: scene.params.clone(),
             gains: baked.gains.clone(),
             free: scene.fit.free.clone(),
+            apart: Vec::new(),
             effects: scene.effects,
             hold_out: Vec::new(),
         }
@@ -83,7 +88,34 @@ impl Values {
     #[must_use]
     pub fn by_channel(&self, param: Param) -> bool {
         let rgb = self.params.rgb(param);
-        self.freedom(param) == Freedom::PerChannel || rgb != [rgb[0]; 3]
+        self.apart.contains(&param) || self.freedom(param) == Freedom::PerChannel || rgb != [rgb[0]; 3]
+    }
+
+    /// Show a value a channel, or one for all, which is their mean. A fit moves no more and no less than before.
+    pub fn set_apart(&mut self, param: Param, apart: bool) {
+        self.apart.retain(|other| *other != param);
+        let free = self.freedom(param) != Freedom::Fixed;
+        if apart {
+            self.apart.push(param);
+        } else {
+            let rgb = self.params.rgb(param);
+            self.params.set(param, rgb.iter().sum::<f64>() / 3.0);
+        }
+        if free {
+            self.set_freedom(param, if apart { Freedom::PerChannel } else { Freedom::Tied });
+        }
+    }
+
+    /// Take the constants of a fit; its gains are of the views that it has seen.
+    pub fn take(&mut self, point: &Point, views: &[View]) {
+        self.params = point.params.clone();
+        let seen = |view: &View| view.target.is_some() && !self.hold_out.contains(&view.name);
+        let places: Vec<usize> = (0..views.len()).filter(|&i| seen(&views[i])).collect();
+        for (place, gain) in places.into_iter().zip(&point.gains) {
+            if let Some(own) = self.gains.get_mut(place) {
+                *own = *gain;
+            }
+        }
     }
 
     /// Turn an effect on or off; parts that ask for it go with it, and what it is a part of comes with it.
@@ -117,6 +149,9 @@ impl Values {
 
 impl PartialEq for Values {
     fn eq(&self, other: &Self) -> bool {
-        self.free == other.free && self.hold_out == other.hold_out && self.look_alike(other)
+        self.free == other.free
+            && self.hold_out == other.hold_out
+            && self.apart == other.apart
+            && self.look_alike(other)
     }
 }

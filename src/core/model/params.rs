@@ -373,6 +373,15 @@ impl Params {
         params
     }
 
+    /// Whether all that differs are weights of the skin's: numbers that the image is linear in, and that no light, no
+    /// bake and no ray depends on.
+    #[must_use]
+    pub fn differ_in_weights_alone(&self, other: &Self) -> bool {
+        let weight = |param: Param| param.info().linear && param.info().owner == Owner::Skin;
+        self.own == other.own
+            && Param::all().all(|param| weight(param) || self.rgb(param) == other.rgb(param))
+    }
+
     /// What scenes have of their own, in their order.
     pub fn own(&self) -> impl Iterator<Item = (usize, Param, [f64; 3])> {
         self.own.iter().map(|(&(scene, param), &value)| (scene, param, value))

@@ -4,12 +4,12 @@ use std::sync::Arc;
 
 use web_time::Instant;
 
-use super::{BACKGROUND, Beside, PaintError, Painter, Picture};
+use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Picture};
 use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::traces_lobes;
-use crate::bake::{Illumination, PoseBake, SkyBake, VertexOcclusion, VertexThickness};
+use crate::bake::{PoseBake, SkyBake, VertexOcclusion, VertexThickness};
 use crate::model::effects::Effect;
 use crate::model::params::Params;
 use crate::prepare::Baked;
@@ -26,7 +26,7 @@ use crate::scene::view::Camera;
 /// The CPU engine: rays through the samples' positions, the model in f64.
 pub struct CpuPainter {
     scene: Arc<Scene>,
-    illumination: Arc<Illumination>,
+    baked: Baked,
     params: Params,
     occlusion: Option<Arc<VertexOcclusion>>,
     sky: Option<Arc<SkyBake>>,
@@ -36,7 +36,7 @@ pub struct CpuPainter {
     shader: Shader,
     pose: Pose,
     atlas: Option<Arc<Atlas>>,
-    /// What the last camera saw: other constants need no other samples.
+    /// What the last camera saw: other weights need no other samples.
     seen: Option<(Camera, ViewSamples)>,
     seconds: f64,
 }
@@ -56,7 +56,7 @@ impl CpuPainter {
         let lobe_sky = if traced { LobeSky::of_scene(&scene).map(Arc::new) } else { None };
         let mut painter = Self {
             scene,
-            illumination: Arc::clone(&baked.illumination),
+            baked: baked.clone(),
             params: baked.scene.params.clone(),
             occlusion,
             sky,
@@ -121,8 +121,13 @@ impl Painter for CpuPainter {
     }
 
     fn set_params(&mut self, params: &Params) -> Result<(), PaintError> {
-        self.shader = Shader::new(self.scene.setup(), &self.illumination, params)?;
-        self.params = params.clone();
+        if params.differ_in_weights_alone(&self.params) {
+            self.shader = Shader::new(self.baked.setup(), &self.baked.illumination, params)?;
+            self.params = params.clone();
+        } else if *params != self.params {
+            // What samples hold may go by it: where a light is, how the sky is turned, how rough the skin is.
+            *self = Self::new(&self.baked.clone().with_scene(|scene| scene.params = params.clone()))?;
+        }
         Ok(())
     }
 
@@ -153,7 +158,7 @@ impl Painter for CpuPainter {
         self.seconds = start.elapsed().as_secs_f64();
         let layers = if beside.layers { layers } else { Vec::new() };
         let haze = if beside.haze { shaded.haze } else { Vec::new() };
-        Ok(Picture { image: shaded.image, layers, haze, warnings: Vec::new() })
+        Ok(Picture { image: shaded.image, layers, haze, cut: Cut::default() })
     }
 
     fn stats(&self) -> Vec<String> {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BACKGROUND, Beside, PaintError, Painter, Picture};
+use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Picture};
 use crate::bake::PoseBake;
 use crate::model::params::Params;
 use crate::model::terms::TermName;
@@ -61,23 +61,10 @@ impl GpuPainter {
         Ok(layers)
     }
 
-    /// What the user should know of a frame.
-    fn warnings(&mut self, clipped: usize) -> Vec<String> {
-        let mut warnings = Vec::new();
-        let texels = self.renderer.clipped_texels();
-        if texels > 0 && !std::mem::replace(&mut self.told, true) {
-            warnings.push(format!(
-                "{texels} texels of the environment's cubes are brighter than 65504, the end of 16-bit textures' \
-                 range, and are cut there. Use --accuracy exact to have them whole."
-            ));
-        }
-        if clipped > 0 {
-            warnings.push(format!(
-                "{clipped} pixels are brighter than 65504, the end of the 16-bit targets' range, and were cut \
-                 there. Use --accuracy exact and no msaa4 to have them whole."
-            ));
-        }
-        warnings
+    /// What of a frame was cut; of texels once.
+    fn cut(&mut self, pixels: usize) -> Cut {
+        let told = std::mem::replace(&mut self.told, true);
+        Cut { texels: if told { 0 } else { self.renderer.clipped_texels() }, pixels }
     }
 }
 
@@ -109,7 +96,7 @@ impl Painter for GpuPainter {
             true => self.renderer.render_haze(camera, gain)?,
             false => Vec::new(),
         };
-        Ok(Picture { image: frame.image, layers, haze, warnings: self.warnings(frame.clipped) })
+        Ok(Picture { image: frame.image, layers, haze, cut: self.cut(frame.clipped) })
     }
 
     fn uploaded_bytes(&self) -> u64 {

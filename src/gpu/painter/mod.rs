@@ -41,8 +41,17 @@ pub struct Picture {
     pub layers: Vec<(String, Image)>,
     /// The haze of each pixel, where it is asked for and an effect makes one.
     pub haze: Vec<f32>,
-    /// What the user should know.
-    pub warnings: Vec<String>,
+    /// What was brighter than 16-bit formats hold.
+    pub cut: Cut,
+}
+
+/// What was cut at 65504, the end of the range of 16-bit formats.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cut {
+    /// Texels of the environment's cubes, told with the first image.
+    pub texels: usize,
+    /// Pixels of the image.
+    pub pixels: usize,
 }
 
 /// What a picture is to hold beside the image.

@@ -23,7 +23,7 @@ const NEAREST: f64 = 1e-3;
 const PAD: f64 = 1e-3;
 
 /// A light that has a map, and its first layer.
-#[derive(PartialEq)]
+#[derive(Clone, PartialEq)]
 pub(crate) struct Mapped {
     pub(super) light: Light,
     pub(super) first: usize,

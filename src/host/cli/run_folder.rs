@@ -69,6 +69,12 @@ impl RunFolder {
         Ok(folder.unfinished())
     }
 
+    /// Refuse a folder that another run writes to, or that holds results of another command; what was made goes again.
+    #[cfg(feature = "view")]
+    pub(super) fn check_free(output: &Path) -> Result<(), Refusal> {
+        Self::locked(output.to_owned())?.check(Work::Fit)
+    }
+
     /// Make and lock `output` for a study, which begins anew when it is interrupted.
     pub(super) fn of_study(output: &Path, work: Work) -> Result<Self, Refusal> {
         let folder = Self::locked(output.to_owned())?;

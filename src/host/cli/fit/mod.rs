@@ -114,12 +114,6 @@ pub(super) fn run_watched(
     Ok((exit, outcome))
 }
 
-/// A run folder, locked for a fit.
-#[cfg(feature = "view")]
-pub(super) fn folder(run: &std::path::Path) -> Result<RunFolder, Refusal> {
-    RunFolder::open(Some(run), &[])
-}
-
 impl Arguments {
     /// Refuse what cannot be together.
     fn check(&self) -> Result<(), Refusal> {

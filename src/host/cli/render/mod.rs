@@ -14,7 +14,7 @@ use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell_warnings};
 use crate::bake::{self, PoseBake, SkyLight};
 use crate::fit::params_file::Foreign;
-use crate::gpu::painter::{Beside, PaintError, Painter, Picture};
+use crate::gpu::painter::{Beside, Cut, PaintError, Painter, Picture};
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{LARGEST, Param, Params};
 use crate::prepare::{Baked, ClipOcclusion, Loaded, PrepareOptions, Views};
@@ -136,7 +136,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         if !sequence && picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
             return Err(samples::nothing_visible(&baked.scene, &baked.scene.views[0]).into());
         }
-        bar.suspend(|| tell_warnings(&picture.warnings));
+        bar.suspend(|| tell_warnings(&cut_words(picture.cut)));
         write(arguments, &path, frame, &picture, &baked.scene.params)?;
         bar.inc(1);
     }
@@ -230,6 +230,24 @@ fn frame_bake(
         wanted.then(|| bake::bake_pose(&baked.scene, &mesh.pose(), light, cache.as_deref()))?;
     tell_warnings(&stats.warnings);
     Some(own)
+}
+
+/// What was cut, and what to do about it.
+fn cut_words(Cut { texels, pixels }: Cut) -> Vec<String> {
+    let mut words = Vec::new();
+    if texels > 0 {
+        words.push(format!(
+            "{texels} texels of the environment's cubes are brighter than 65504, the end of 16-bit textures' range, and \
+             are cut there. Use --accuracy exact to have them whole."
+        ));
+    }
+    if pixels > 0 {
+        words.push(format!(
+            "{pixels} pixels are brighter than 65504, the end of the 16-bit targets' range, and were cut there. Use \
+             --accuracy exact and no msaa4 to have them whole."
+        ));
+    }
+    words
 }
 
 /// Why an image could not be drawn; of an adapter, with what to do about it.

@@ -13,7 +13,7 @@ use skinfit_view::{FitRequest, Host};
 use crate::cli::fit;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::interrupt::Interrupt;
-use crate::cli::run_folder::scene_text;
+use crate::cli::run_folder::{RunFolder, scene_text};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::output;
@@ -52,7 +52,7 @@ impl Host for CommandLine {
             words.push("--resume".to_owned());
         } else {
             // Only a folder that no other run writes to is changed.
-            drop(fit::folder(&request.run).map_err(|refusal| refusal.words)?);
+            RunFolder::check_free(&request.run).map_err(|refusal| refusal.words)?;
             self.save_scene(&request.scene, &request.values, &scene)?;
         }
         words.extend(request.values.hold_out.iter().map(|view| format!("--hold-out={view}")));

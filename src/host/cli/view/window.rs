@@ -8,12 +8,12 @@ use skinfit_view::offscreen::Offscreen;
 use skinfit_view::opened::Reading;
 use skinfit_view::paint::Engine;
 use skinfit_view::session::watch_progress;
-use skinfit_view::{Start, open_window};
+use skinfit_view::{Start, ViewError, open_window};
 
 use super::Arguments;
 use super::fits::CommandLine;
 use crate::cli::run_folder::default_folder;
-use crate::cli::{Exit, Refusal, quieten_graphics, say};
+use crate::cli::{Exit, Refusal, quieten_graphics, say, unfinished};
 
 /// The files of a run folder that the window reads.
 const SCENE: &str = "scene.toml";
@@ -23,7 +23,12 @@ const PARAMS: &str = "params.toml";
 pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     quieten_graphics();
     watch_progress();
-    let start = start(arguments)?;
+    // Without a cache the built-in scene lives in a folder of its own that goes with the window.
+    let scratch = match arguments.bakes.cache() {
+        Some(_) => None,
+        None => Some(unfinished::scratch()?),
+    };
+    let start = start(arguments, scratch.as_ref().map_or(Path::new(""), |scratch| scratch.path()))?;
     let host = Arc::new(CommandLine { bakes: arguments.bakes.words() });
     let name = arguments
         .scene
@@ -34,8 +39,8 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     if let Some(file) = &arguments.screenshot {
         let mut window = Offscreen::new(host, start, size, arguments.scale)?;
         window.window.session.terms = arguments.terms;
-        if let [x, y] = arguments.probe[..] {
-            window.window.point_at([x, y]);
+        if let Some(pixel) = arguments.probe {
+            window.window.point_at(pixel);
         }
         if arguments.fit {
             window.settle()?;
@@ -48,12 +53,22 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         let speed = measure(&mut window, size)?;
         say(&serde_json::to_string_pretty(&speed)?)?;
     } else {
-        open_window(host, start, &format!("skinfit: {name}"))?;
+        open_window(host, start, &format!("skinfit: {name}")).map_err(without_a_display)?;
     }
     Ok(Exit::Done)
 }
 
-fn start(arguments: &Arguments) -> Result<Start, Refusal> {
+/// Why no window was opened, and what shows it all the same.
+fn without_a_display(error: ViewError) -> Refusal {
+    match error {
+        ViewError::NoWindow(_) => Refusal::new(format!(
+            "{error} Without one, --screenshot FILE leaves what the window would show as an image."
+        )),
+        error => error.into(),
+    }
+}
+
+fn start(arguments: &Arguments, scratch: &Path) -> Result<Start, Refusal> {
     let run = arguments.scene.as_deref().filter(|path| path.is_dir());
     let (scene, fitted) = match run {
         Some(run) => (Some(file_of(run, SCENE)?), Some(file_of(run, PARAMS)?)),
@@ -63,7 +78,7 @@ fn start(arguments: &Arguments) -> Result<Start, Refusal> {
         true => file_of(run, PARAMS),
         false => Ok(run.to_owned()),
     });
-    let path = arguments.bakes.kept_path(scene.as_deref(), Path::new(""))?;
+    let path = arguments.bakes.kept_path(scene.as_deref(), scratch)?;
     let output = arguments.output.clone().unwrap_or_else(|| {
         let folder = match run {
             Some(run) => run.to_owned(),
