@@ -229,7 +229,7 @@ type Layers = Vec<(String, Image)>;
 
 /// What is done next.
 enum Next {
-    Paint(Slot, Job),
+    Paint(Slot, Box<Job>),
     Follow(Slot, Box<(Job, Painted)>),
 }
 
@@ -240,7 +240,7 @@ impl Work {
                 gpu.close();
             }
             let follow = match next {
-                Next::Paint(slot, job) => self.paint(slot, job),
+                Next::Paint(slot, job) => self.paint(slot, *job),
                 Next::Follow(slot, what) => {
                     let (job, painted) = *what;
                     self.follow(slot, &job, painted);
@@ -372,7 +372,7 @@ fn next(shared: &Shared) -> Option<(Next, bool)> {
             return None;
         }
         let next = match wanted.jobs.pop_first() {
-            Some((slot, job)) => Some(Next::Paint(slot, job)),
+            Some((slot, job)) => Some(Next::Paint(slot, Box::new(job))),
             None if quiet => wanted.follow.pop_first().map(|(slot, what)| Next::Follow(slot, Box::new(what))),
             None => None,
         };
