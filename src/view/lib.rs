@@ -6,7 +6,7 @@
 //! - work beside the window, whose answers the session polls: [`paint`] (images and their scores), [`fitting`]
 //! - widgets: [`app`] (the window), `rows` (parameters), `effects`, `panes` over `picture` (images on the adapter),
 //!   `probe`, `curves`, `keys`
-//! - without a display: [`offscreen`] (the window as an image), [`bench`] (how fast it is)
+//! - without a display: [`offscreen`] (the window as an image), [`mod@bench`] (how fast it is)
 //!
 //! Images are drawn by the production renderer's planned shaders, or by the CPU engine where no adapter works; fits are
 //! the command line's. No frame waits for either.

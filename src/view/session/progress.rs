@@ -41,7 +41,7 @@ impl Drop for Under {
     }
 }
 
-/// Watch the library's work from now on, for [`words`]; the first watcher of a process stays.
+/// Watch the library's work from now on, for the status line; the first watcher of a process stays.
 pub fn watch_progress() {
     WATCHED.get_or_init(|| {
         let _ = watch(Watcher);
