@@ -1,18 +1,22 @@
 //! The window: bars, lists and panes about a [`Session`].
+//!
+//! - `bar`: what is shown and how; `fits`: the panel of the fit
+
+mod bar;
+mod fits;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 
-use eframe::egui::{self, CentralPanel, ComboBox, Panel, ScrollArea, Ui};
+use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 
-use crate::host::{Host, ViewError, ViewScore};
+use crate::host::{Host, ViewError};
 use crate::keys::{self, Action};
 use crate::look::{ErrorKind, Layout, Look, Pane};
 use crate::paint::Slot;
-use crate::render::tonemap::Operator;
 use crate::session::{Orbit, Session, Start, progress_words};
-use crate::{curves, effects, offscreen, panes, picture, probe, rows};
+use crate::{effects, offscreen, panes, picture, probe, rows};
 
 /// Where the look is kept from window to window.
 const LOOK: &str = "look";
@@ -202,97 +206,6 @@ impl Window {
         }
     }
 
-    /// Views, panes, and how they are shown.
-    fn bar(&mut self, ui: &mut Ui) {
-        self.keep_screenshot();
-        ui.horizontal_wrapped(|ui| {
-            let (can_undo, can_redo) = self
-                .session
-                .history()
-                .map_or((false, false), |history| (history.can_undo(), history.can_redo()));
-            for (can, words, action) in [(can_undo, "undo", Action::Undo), (can_redo, "redo", Action::Redo)] {
-                if ui.add_enabled(can, egui::Button::new(words)).clicked() {
-                    self.act(action, ui.ctx());
-                }
-            }
-            ui.separator();
-            self.views(ui);
-            ui.separator();
-            let shown = [Pane::Target, Pane::Now, Pane::Start, Pane::Fit, Pane::Other, Pane::Error];
-            for pane in shown {
-                if pane == Pane::Other && self.session.other().is_none() {
-                    continue;
-                }
-                let mut on = self.look.panes.contains(&pane);
-                let name = format!("pane {}", panes::name(pane));
-                if ui.toggle_value(&mut on, panes::name(pane)).accessible_name(name).changed() {
-                    self.look.set_pane(pane, on);
-                }
-            }
-            ui.toggle_value(&mut self.session.terms, "terms").accessible_name("pane terms");
-            ui.separator();
-            let look = &mut self.look;
-            let layout =
-                Layout::ALL.iter().find(|(layout, _)| *layout == look.layout).map_or("", |(_, name)| name);
-            let combo = ComboBox::from_id_salt("layout").selected_text(layout).show_ui(ui, |ui| {
-                for (layout, name) in Layout::ALL {
-                    ui.selectable_value(&mut look.layout, layout, name);
-                }
-            });
-            combo.response.accessible_name("layout");
-            let combo = ComboBox::from_id_salt("error").selected_text(look.error.name()).width(70.0).show_ui(
-                ui,
-                |ui| {
-                    for kind in ErrorKind::ALL {
-                        ui.selectable_value(&mut look.error, kind, kind.name());
-                    }
-                },
-            );
-            combo.response.accessible_name("error");
-            let drag =
-                egui::DragValue::new(&mut look.exposure).speed(0.05).range(-16.0..=16.0).suffix(" stops");
-            ui.add(drag).on_hover_text("Exposure of the images").accessible_name("exposure");
-            let mut operator = look.operator();
-            let combo =
-                ComboBox::from_id_salt("tone").selected_text(operator.name()).width(70.0).show_ui(ui, |ui| {
-                    for other in Operator::ALL {
-                        ui.selectable_value(&mut operator, other, other.name());
-                    }
-                });
-            combo.response.accessible_name("tone mapping");
-            look.set_operator(operator);
-            ui.toggle_value(&mut look.false_colour, "false colour");
-            ui.separator();
-            if ui.button("keys").on_hover_text("F1").clicked() {
-                self.help = !self.help;
-            }
-            let dark = ui.visuals().dark_mode;
-            if ui.button(if dark { "light" } else { "dark" }).on_hover_text("Dark or light window").clicked()
-            {
-                ui.ctx().set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
-            }
-        });
-    }
-
-    /// Which view is looked at.
-    fn views(&mut self, ui: &mut Ui) {
-        let Some(opened) = self.session.opened().cloned() else { return };
-        for (i, view) in opened.views().iter().enumerate() {
-            if ui
-                .selectable_label(self.session.view == i, &view.name)
-                .accessible_name(format!("view {}", view.name))
-                .clicked()
-            {
-                self.session.view = i;
-            }
-        }
-        if self.session.orbit != Orbit::default()
-            && ui.button("home").on_hover_text("The view's own camera").clicked()
-        {
-            self.session.orbit = Orbit::default();
-        }
-    }
-
     fn parameters(&mut self, ui: &mut Ui) {
         ScrollArea::vertical().show(ui, |ui| {
             ui.collapsing("Effects", |ui| effects::show(ui, &mut self.session));
@@ -325,74 +238,6 @@ impl Window {
                 self.session.save_scene(&file);
             }
         });
-    }
-
-    fn fit(&mut self, ui: &mut Ui) {
-        ui.horizontal_wrapped(|ui| {
-            let paused = self.session.fitting().map(crate::fitting::Fitting::is_paused);
-            let idle = paused.is_none() && self.session.opened().is_some();
-            for (enabled, words, action) in [
-                (idle, "fit", Action::Fit),
-                (idle, "resume", Action::Resume),
-                (paused.is_some(), if paused == Some(true) { "go on" } else { "pause" }, Action::Pause),
-                (paused.is_some(), "stop", Action::Stop),
-            ] {
-                if ui.add_enabled(enabled, egui::Button::new(words)).clicked() {
-                    self.act(action, ui.ctx());
-                }
-            }
-            ui.label("run folder");
-            let field = egui::TextEdit::singleline(&mut self.run).desired_width(180.0);
-            if ui.add_enabled(idle, field).accessible_name("run folder").changed() {
-                self.session.set_run_folder(PathBuf::from(&self.run));
-            }
-            self.held_out(ui, idle);
-            if let Some(outcome) = self.session.outcome() {
-                ui.strong(outcome.ending.words());
-                ui.label(format!(
-                    "loss {:.6e}, {} iterations, {} passes, {:.2} s",
-                    outcome.loss_end, outcome.iterations, outcome.evaluations, outcome.seconds
-                ));
-            } else if let Some(step) = self.session.path().last().filter(|_| !idle) {
-                ui.label(format!("iteration {}, loss {:.6e}", step.iteration.iteration, step.iteration.loss));
-            }
-        });
-        if !self.session.scores().is_empty() {
-            ui.horizontal_wrapped(|ui| {
-                for score in self.session.scores() {
-                    let ViewScore { view, held_out, psnr, ssim, flip } = score;
-                    let seen = if *held_out { " (held out)" } else { "" };
-                    ui.label(format!("{view}{seen}: {psnr:.2} dB, SSIM {ssim:.4}, FLIP {flip:.4}"));
-                    ui.separator();
-                }
-            });
-        }
-        let free = self.session.values().map(|values| values.free.clone()).unwrap_or_default();
-        let height = (ui.available_height() - 4.0).max(60.0);
-        curves::show(ui, self.session.path(), &free, height);
-        // The panel stays as high as it was made.
-        ui.take_available_space();
-    }
-
-    /// Which views a fit leaves out.
-    fn held_out(&mut self, ui: &mut Ui, idle: bool) {
-        let Some(opened) = self.session.opened().cloned() else { return };
-        ui.separator();
-        ui.label("fitted views");
-        for view in opened.views().iter().filter(|view| view.target.is_some()) {
-            let Some(values) = self.session.values() else { return };
-            let mut fitted = !values.hold_out.contains(&view.name);
-            let name = format!("fit view {}", view.name);
-            if ui
-                .add_enabled(idle, egui::Checkbox::new(&mut fitted, &view.name))
-                .accessible_name(name)
-                .changed()
-                && let Some(history) = self.session.history()
-            {
-                history.edit(|values| values.set_held_out(&view.name, !fitted));
-            }
-        }
-        ui.separator();
     }
 
     /// What draws and how fast, what is under way, what the user should know.

@@ -86,7 +86,7 @@ fn slider(offscreen: &mut Offscreen) -> Result<Vec<f64>, ViewError> {
         loop {
             offscreen.frame()?;
             let now = offscreen.window.session.image(Slot::Now);
-            if now.is_some_and(|now| now.params.scalar(param) == value) {
+            if now.is_some_and(|now| now.job.params.scalar(param) == value) {
                 break;
             }
             if start.elapsed() > PATIENCE {

@@ -12,7 +12,7 @@
 //! the command line's. No frame waits for either.
 
 // What other members of the workspace hold stands under the names that it has there.
-use skinfit_core::{bake, engine, fit, model, prepare, render, scene};
+use skinfit_core::{bake, engine, fit, model, prepare, render, samples, scene};
 use skinfit_gpu as gpu;
 use skinfit_report as report;
 

@@ -11,6 +11,7 @@ use crate::model::effects::Effects;
 use crate::model::params::{Column, Param, Params};
 use crate::prepare::{Baked, Loaded, PrepareError, PrepareOptions};
 use crate::render::image::Image;
+use crate::samples::hit_at;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::{Background, Camera, View};
 
@@ -94,22 +95,15 @@ impl Opened {
     /// What the middle of a pixel shows.
     #[must_use]
     pub fn place(&self, camera: &Camera, x: u32, y: u32) -> Option<Place> {
-        let direction = camera.direction(f64::from(x) + 0.5, f64::from(y) + 0.5).as_vec3();
-        let eye = camera.eye().as_vec3();
-        let corners =
-            |triangle: u32| self.mesh.triangles[triangle as usize].map(|i| self.mesh.positions[i as usize]);
-        let met = |triangle: u32| met(corners(triangle), eye, direction);
-        let hit = self.rays.nearest(eye.into(), direction.into(), |triangle| {
-            met(triangle).map_or(f32::INFINITY, |(distance, _)| distance)
-        })?;
-        let (distance, weights) = met(hit)?;
-        let triangle = self.mesh.triangles[hit as usize];
-        let normal: Vec3 = (0..3).map(|k| weights[k] * self.mesh.normals[triangle[k] as usize]).sum();
-        let uv = (!self.mesh.uvs.is_empty()).then(|| {
-            let uv: glam::Vec2 = (0..3).map(|k| weights[k] * self.mesh.uvs[triangle[k] as usize]).sum();
-            uv.to_array()
-        });
-        Some(Place { position: eye + distance * direction, normal: normal.normalize_or_zero(), uv })
+        let Self { mesh, rays, .. } = self;
+        let hit = hit_at(rays, mesh, camera, f64::from(x) + 0.5, f64::from(y) + 0.5)?;
+        let corners = mesh.triangles[hit.triangle as usize];
+        let mean = |of: &[Vec3]| -> Vec3 {
+            hit.weights().into_iter().zip(corners).map(|(weight, i)| weight * of[i as usize]).sum()
+        };
+        let uv = (!mesh.uvs.is_empty()).then(|| hit.uv(mesh).to_array());
+        let (position, normal) = (mean(&mesh.positions), mean(&mesh.normals).normalize_or_zero());
+        Some(Place { position, normal, uv })
     }
 }
 
@@ -128,7 +122,7 @@ fn baked(scene: &Path, options: &PrepareOptions) -> Result<Baked, PrepareError> 
         );
         param.asked_for(effects) && places(&moved) != places(params)
     };
-    let slid: Vec<Column> = Param::of(effects).filter(looked_up).map(Column::tied).collect();
+    let slid: Vec<Column> = Param::all().filter(looked_up).map(Column::tied).collect();
     let fixed = slid.into_iter().filter(|slid| free.iter().all(|column| column.param != slid.param));
     loaded.scene.fit.free.extend(fixed.collect::<Vec<_>>());
     // What is free is the scene's own again: nobody shares it yet.
@@ -144,23 +138,6 @@ fn extent(mesh: &PosedMesh) -> (DVec3, f64) {
         });
     let (low, high) = (low.as_dvec3(), high.as_dvec3());
     (0.5 * (low + high), (0.5 * (high - low).length()).max(1e-6))
-}
-
-/// The distance at which a ray meets a triangle from either side, and the weights of its corners there (Möller and
-/// Trumbore 1997, "Fast, minimum storage ray-triangle intersection").
-fn met([a, b, c]: [Vec3; 3], origin: Vec3, direction: Vec3) -> Option<(f32, [f32; 3])> {
-    let (e, f) = (b - a, c - a);
-    let p = direction.cross(f);
-    let determinant = e.dot(p);
-    if determinant == 0.0 {
-        return None;
-    }
-    let from = origin - a;
-    let u = from.dot(p) / determinant;
-    let q = from.cross(e);
-    let v = direction.dot(q) / determinant;
-    let distance = f.dot(q) / determinant;
-    (u >= 0.0 && v >= 0.0 && u + v <= 1.0 && distance > 0.0).then_some((distance, [1.0 - u - v, u, v]))
 }
 
 /// A view's target as an image.

@@ -1,7 +1,13 @@
 //! All that the window holds, without a widget: the scene, the values that one edits, the images that are asked for, the
 //! fit that runs.
+//!
+//! - `images`: which are asked for, and what effects change in them; `camera`: where they are seen from
+//! - `fits`: the fit beside the window; `files`: constants and scenes as files; `progress`: how far long work is
 
 mod camera;
+mod files;
+mod fits;
+mod images;
 mod progress;
 
 use std::collections::BTreeMap;
@@ -10,18 +16,20 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
 pub use camera::Orbit;
+use images::Before;
+pub use images::Change;
 pub use progress::watch_progress;
 pub(crate) use progress::words as progress_words;
 
-use crate::fit::outcome::{Ending, Outcome};
-use crate::fit::params_file::{Origin, ParamsFile};
-use crate::fitting::{Fitting, Message, Step};
+use crate::fit::outcome::Outcome;
+use crate::fit::params_file::ParamsFile;
+use crate::fitting::{Fitting, Step};
 use crate::history::History;
-use crate::host::{FitRequest, Fitted, Host, ViewScore};
+use crate::host::{Host, ViewScore};
 use crate::model::effects::Effect;
-use crate::model::params::{Param, Params};
+use crate::model::params::Params;
 use crate::opened::{Opened, Reading};
-use crate::paint::{Answer, Engine, Job, PaintWorker, Painted, Slot, Wake};
+use crate::paint::{Engine, Job, PaintWorker, Painted, Slot, Wake};
 use crate::scene::view::Camera;
 use crate::values::Values;
 
@@ -40,26 +48,6 @@ pub struct Start {
     pub engine: Engine,
 }
 
-/// What an effect brought when it was turned on, or took when it was turned off.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Change {
-    /// Seconds a frame.
-    pub seconds: f64,
-    /// Bytes on the adapter.
-    pub bytes: i64,
-    /// dB of the view that is shown, where it has a target.
-    pub psnr: Option<f64>,
-}
-
-/// What was known of the image before an effect was switched.
-#[derive(Clone, Copy, Debug)]
-struct Before {
-    effect: Effect,
-    seconds: f64,
-    uploaded: u64,
-    psnr: Option<f64>,
-}
-
 /// The window's state.
 pub struct Session {
     host: Arc<dyn Host>,
@@ -75,7 +63,7 @@ pub struct Session {
     scores: Vec<ViewScore>,
     painter: PaintWorker,
     images: BTreeMap<Slot, Painted>,
-    asked: BTreeMap<Slot, Job>,
+    asked: BTreeMap<Slot, Arc<Job>>,
     engine: String,
     switched: Option<Before>,
     changes: BTreeMap<&'static str, Change>,
@@ -181,15 +169,11 @@ impl Session {
 
     fn take(&mut self, opened: Opened) {
         let opened = Arc::new(opened);
-        self.told.extend(
-            opened
-                .baked
-                .warnings
-                .iter()
-                .filter(|words| !self.told.contains(words))
-                .cloned()
-                .collect::<Vec<_>>(),
-        );
+        for words in &opened.baked.warnings {
+            if !self.told.contains(words) {
+                self.told.push(words.clone());
+            }
+        }
         let scene = Values::of(&opened.baked);
         let first = self.values.is_none().then_some(scene);
         let params = |file: &Option<PathBuf>| -> Option<Result<Params, String>> {
@@ -214,146 +198,6 @@ impl Session {
         self.view = self.view.min(opened.views().len().saturating_sub(1));
         self.opened = Some(opened);
         self.asked.clear();
-    }
-
-    fn painted(&mut self, answer: Answer) {
-        match answer {
-            Answer::Painted(slot, mut painted) => {
-                if !self.is_asked(slot, &painted) {
-                    return;
-                }
-                if let Some(before) =
-                    self.images.remove(&slot).filter(|before| before.camera == painted.camera)
-                {
-                    // Until its own are there, those of the image before are shown.
-                    (painted.terms, painted.compared) = (before.terms, before.compared);
-                }
-                self.images.insert(slot, painted);
-            }
-            Answer::Whole(slot, painted) => {
-                if !self.is_asked(slot, &painted) {
-                    return;
-                }
-                self.images.insert(slot, painted);
-                if slot == Slot::Now {
-                    self.weigh();
-                }
-            }
-            Answer::Failed(slot, words) => {
-                self.images.remove(&slot);
-                self.told.push(words);
-            }
-            Answer::Engine(name) => self.engine = name,
-            Answer::Told(words) => self.told.push(words),
-        }
-    }
-
-    /// Whether an image is of the scene and the camera that are shown now.
-    fn is_asked(&self, slot: Slot, painted: &Painted) -> bool {
-        self.asked.get(&slot).is_some_and(|asked| {
-            asked.camera == painted.camera && asked.opened.baked.scene.effects == painted.effects
-        })
-    }
-
-    /// What the effect that was switched has changed, once its image is there.
-    fn weigh(&mut self) {
-        let drawn = self.images.get(&Slot::Now).map(|now| now.effects);
-        let wanted = self.values.as_ref().map(|values| values.now().effects);
-        if drawn != wanted {
-            return;
-        }
-        if let (Some(before), Some(now)) = (self.switched.take(), self.images.get(&Slot::Now)) {
-            let psnr = now.compared.as_ref().map(|compared| compared.psnr);
-            let change = Change {
-                seconds: now.seconds - before.seconds,
-                bytes: now.uploaded as i64 - before.uploaded as i64,
-                psnr: psnr.zip(before.psnr).map(|(now, before)| now - before),
-            };
-            self.changes.insert(before.effect.name(), change);
-        }
-    }
-
-    fn follow_fit(&mut self) {
-        let Some(fitting) = &self.fitting else { return };
-        let views = self.opened.as_ref().map(|opened| opened.views().to_vec()).unwrap_or_default();
-        for message in fitting.messages() {
-            match message {
-                Message::Step(step) => {
-                    if let Some(history) = &mut self.values {
-                        history.drag(|values| values.take(&step.point, &views));
-                    }
-                    self.path.push(*step);
-                }
-                Message::Done(done) => {
-                    self.fitting = None;
-                    match *done {
-                        Ok(fitted) => self.fitted_to(fitted),
-                        Err(error) => self.told.push(error),
-                    }
-                    if let Some(history) = &mut self.values {
-                        history.settle();
-                    }
-                    return;
-                }
-            }
-        }
-    }
-
-    fn fitted_to(&mut self, Fitted { outcome, views }: Fitted) {
-        self.scores = views;
-        if let Some(history) = &mut self.values {
-            let views = self.opened.as_ref().map_or(&[][..], |opened| opened.views());
-            history.drag(|values| values.take(&outcome.end, views));
-        }
-        if outcome.ending != Ending::Converged {
-            self.told.push(format!(
-                "the fit {}.",
-                match outcome.ending {
-                    Ending::Interrupted => "was stopped",
-                    ending => ending.words(),
-                }
-            ));
-        }
-        self.fitted = Some(outcome.end.params.clone());
-        self.outcome = Some(outcome);
-    }
-
-    /// Ask for every image that is not the one that would be drawn now.
-    fn ask(&mut self) {
-        let (Some(opened), Some(values), Some(camera)) = (&self.opened, &self.values, self.camera()) else {
-            return;
-        };
-        let values = values.now();
-        if values.effects != opened.baked.scene.effects {
-            if self.opening.is_none() {
-                let effects = Some(values.effects);
-                self.read(Reading { effects, params: None, ..self.start.reading.clone() });
-            }
-            return;
-        }
-        let first = self.first.as_ref().map(|first| &first.params);
-        let wanted = [
-            (Slot::Now, Some(&values.params)),
-            (Slot::Fit, self.fitted.as_ref()),
-            (Slot::Start, first),
-            (Slot::Other, self.other.as_ref()),
-        ];
-        let at_home = self.is_at_home();
-        for (slot, params) in wanted {
-            let Some(params) = params else { continue };
-            let job = Job {
-                opened: Arc::clone(opened),
-                params: params.clone(),
-                gain: values.gains.get(self.view).copied().unwrap_or(1.0),
-                camera,
-                target: opened.targets.get(self.view).cloned().flatten().filter(|_| at_home),
-                terms: self.terms && slot == Slot::Now,
-            };
-            if self.asked.get(&slot).is_none_or(|asked| !same(asked, &job)) {
-                self.asked.insert(slot, job.clone());
-                self.painter.ask(slot, job);
-            }
-        }
     }
 
     /// The camera that images are seen from.
@@ -491,103 +335,4 @@ impl Session {
         self.painter.lose_device();
         self.asked.clear();
     }
-
-    /// Turn an effect on or off: a step of the history. What that changes is told once its image is there.
-    pub fn set_effect(&mut self, effect: Effect, on: bool) {
-        let now = self.images.get(&Slot::Now);
-        self.switched = now.map(|now| Before {
-            effect,
-            seconds: now.seconds,
-            uploaded: now.uploaded,
-            psnr: now.compared.as_ref().map(|compared| compared.psnr),
-        });
-        if let Some(history) = self.history() {
-            history.edit(|values| values.set_effect(effect, on));
-        }
-    }
-
-    /// Fit from where the sliders stand; `resume`: go on with the fit that was stopped.
-    pub fn begin_fit(&mut self, resume: bool) {
-        let (Some(opened), Some(values), None) = (&self.opened, &mut self.values, &self.fitting) else {
-            return;
-        };
-        values.settle();
-        let request = FitRequest {
-            scene: opened.path().to_owned(),
-            values: values.now().clone(),
-            run: self.start.run.clone(),
-            resume,
-        };
-        if !resume {
-            self.path.clear();
-        }
-        (self.outcome, self.scores) = (None, Vec::new());
-        self.fitting = Some(Fitting::begin(Arc::clone(&self.host), request, Arc::clone(&self.wake)));
-    }
-
-    /// Take the constants of a `params.toml`: a step of the history.
-    pub fn load_params(&mut self, file: &Path) {
-        if let (Some(opened), Some(history), None) = (&self.opened, &mut self.values, &self.fitting) {
-            let scene = &opened.baked.scene;
-            match ParamsFile::read(file, scene.form, &history.now().params) {
-                Ok(read) => {
-                    let read = read.of_scene(&scene.path);
-                    let names: Vec<String> = opened.views().iter().map(|view| view.name.clone()).collect();
-                    history.edit(|values| {
-                        values.params = read.params;
-                        for (name, gain) in &read.gains {
-                            let place = names.iter().position(|other| other == name);
-                            if let Some(own) = place.and_then(|place| values.gains.get_mut(place)) {
-                                *own = *gain;
-                            }
-                        }
-                    });
-                }
-                Err(error) => self.told.push(error.to_string()),
-            }
-        }
-    }
-
-    /// Leave the constants as a `params.toml`.
-    pub fn save_params(&mut self, file: &Path) {
-        let (Some(opened), Some(values)) = (&self.opened, self.values()) else { return };
-        let scene = &opened.baked.scene;
-        let names = scene.views.iter().map(|view| view.name.clone());
-        let saved = ParamsFile {
-            form: scene.form,
-            effects: Some(values.effects),
-            loss: None,
-            params: values.params.clone(),
-            gains: names.zip(values.gains.iter().copied()).collect(),
-            scenes: Vec::new(),
-        };
-        let origin = Origin { scene: &scene.path, outcome: None, set: &[], numbers: &[] };
-        let done = saved.write(file, origin);
-        self.told.push(match done {
-            Ok(()) => format!("wrote {}", file.display()),
-            Err(error) => error.to_string(),
-        });
-    }
-
-    /// Leave the scene with the window's values as a scene file.
-    pub fn save_scene(&mut self, file: &Path) {
-        let (Some(opened), Some(values)) = (&self.opened, &self.values) else { return };
-        let done = self.host.save_scene(opened.path(), values.now(), file);
-        self.told.push(match done {
-            Ok(()) => format!("wrote {}", file.display()),
-            Err(error) => error,
-        });
-    }
-}
-
-/// Whether two jobs draw the same.
-fn same(a: &Job, b: &Job) -> bool {
-    let target = match (&a.target, &b.target) {
-        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-        (a, b) => a.is_none() && b.is_none(),
-    };
-    Arc::ptr_eq(&a.opened, &b.opened)
-        && (a.gain, a.camera, a.terms) == (b.gain, b.camera, b.terms)
-        && target
-        && Param::all().all(|param| a.params.rgb(param) == b.params.rgb(param))
 }

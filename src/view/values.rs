@@ -7,7 +7,7 @@ use crate::prepare::Baked;
 use crate::scene::view::View;
 
 /// Every state of these is a step of the history.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Values {
     /// The form that the constants are of.
     pub form: Form,
@@ -55,7 +55,7 @@ impl Values {
     /// The parameters that the enabled effects ask for, in the order of the table.
     #[must_use]
     pub fn rows(&self) -> Vec<Param> {
-        Param::of(self.effects).filter(|param| param.asked_for(self.effects) && !param.info().held).collect()
+        Param::all().filter(|param| param.asked_for(self.effects) && !param.info().held).collect()
     }
 
     /// What a fit may do to a parameter.
@@ -79,9 +79,13 @@ impl Values {
         };
         self.free.splice(at..at, columns);
         if freedom == Freedom::Tied {
-            let rgb = self.params.rgb(param);
-            self.params.set(param, rgb.iter().sum::<f64>() / 3.0);
+            self.tie(param);
         }
+    }
+
+    fn tie(&mut self, param: Param) {
+        let rgb = self.params.rgb(param);
+        self.params.set(param, rgb.iter().sum::<f64>() / 3.0);
     }
 
     /// Whether a parameter shows a value a channel: where it has three, or is free in each.
@@ -94,14 +98,12 @@ impl Values {
     /// Show a value a channel, or one for all, which is their mean. A fit moves no more and no less than before.
     pub fn set_apart(&mut self, param: Param, apart: bool) {
         self.apart.retain(|other| *other != param);
-        let free = self.freedom(param) != Freedom::Fixed;
         if apart {
             self.apart.push(param);
         } else {
-            let rgb = self.params.rgb(param);
-            self.params.set(param, rgb.iter().sum::<f64>() / 3.0);
+            self.tie(param);
         }
-        if free {
+        if self.freedom(param) != Freedom::Fixed {
             self.set_freedom(param, if apart { Freedom::PerChannel } else { Freedom::Tied });
         }
     }
@@ -136,22 +138,5 @@ impl Values {
         if out {
             self.hold_out.push(view.to_owned());
         }
-    }
-
-    /// Whether two show the same image.
-    #[must_use]
-    pub fn look_alike(&self, other: &Self) -> bool {
-        self.effects == other.effects
-            && self.gains == other.gains
-            && Param::all().all(|param| self.params.rgb(param) == other.params.rgb(param))
-    }
-}
-
-impl PartialEq for Values {
-    fn eq(&self, other: &Self) -> bool {
-        self.free == other.free
-            && self.hold_out == other.hold_out
-            && self.apart == other.apart
-            && self.look_alike(other)
     }
 }

@@ -69,7 +69,7 @@ pub use group::z_order;
 pub use posed::{PosedSurface, SurfaceBakes};
 pub use surface_records::SurfaceRecords;
 pub use targets::TargetRows;
-pub use trace::Hit;
+pub use trace::{Hit, hit_at};
 
 /// Pixels in a group: the widest vector of 32-bit floats on today's processors.
 pub const LANES: usize = 16;

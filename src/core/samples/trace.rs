@@ -122,7 +122,8 @@ pub(super) fn trace(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -
                 for i in 0..n * n {
                     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
                     let d = lens.direction(f64::from(x) + at(i % n), f64::from(y) + at(i / n));
-                    part.hits.extend(nearest(rays, &seen, lens.eye, d));
+                    part.hits
+                        .extend(nearest(rays, lens.eye, d, |triangle, d| seen[triangle as usize].hit(d)));
                 }
                 let end = part.hits.len() as u32;
                 if end > start {
@@ -143,13 +144,28 @@ pub(super) fn trace(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -
     all
 }
 
-fn nearest(rays: &RayMesh, seen: &[Seen], eye: DVec3, d: DVec3) -> Option<Hit> {
+/// What the point (x, y) of an image shows, in pixels from the upper left corner.
+#[must_use]
+pub fn hit_at(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, x: f64, y: f64) -> Option<Hit> {
+    let lens = Lens::new(camera);
+    nearest(rays, lens.eye, lens.direction(x, y), |triangle, d| {
+        Seen::new(mesh, mesh.triangles[triangle as usize], lens.eye).hit(d)
+    })
+}
+
+/// The nearest triangle from `eye` along `d`, by what `hit` says of a triangle and a unit direction.
+fn nearest(
+    rays: &RayMesh,
+    eye: DVec3,
+    d: DVec3,
+    hit: impl Fn(u32, DVec3) -> Option<(f64, [f64; 3])>,
+) -> Option<Hit> {
     let d = d.normalize();
     let (origin, direction) = (Vec3A::from(eye.as_vec3()), Vec3A::from(d.as_vec3()));
     let triangle = rays.nearest(origin, direction, |triangle| {
-        seen[triangle as usize].hit(d).map_or(f32::INFINITY, |(distance, _)| distance as f32)
+        hit(triangle, d).map_or(f32::INFINITY, |(distance, _)| distance as f32)
     })?;
-    let (_, [_, u, v]) = seen[triangle as usize].hit(d)?;
+    let (_, [_, u, v]) = hit(triangle, d)?;
     Some(Hit { triangle, barycentric: [u as f32, v as f32] })
 }
 
@@ -213,6 +229,19 @@ mod tests {
             assert!(error.length() < 1e-15, "{error}");
         }
         assert!((lens.eye - camera.eye()).length() < 1e-15);
+    }
+
+    #[test]
+    fn a_point_of_the_image_shows_what_its_sample_sees() {
+        let (mesh, camera) = (sphere(20), camera(24));
+        let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+        let hits = trace(&rays, &mesh, &camera, 1);
+        assert!(hits.pixels.len() > 100);
+        for (pixel, range) in &hits.pixels {
+            let (x, y) = (f64::from(pixel % camera.width) + 0.5, f64::from(pixel / camera.width) + 0.5);
+            assert_eq!(hit_at(&rays, &mesh, &camera, x, y), Some(hits.hits[range.start as usize]));
+        }
+        assert_eq!(hit_at(&rays, &mesh, &camera, 0.5, 0.5), None);
     }
 
     #[test]

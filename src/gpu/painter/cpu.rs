@@ -5,11 +5,11 @@ use std::sync::Arc;
 use web_time::Instant;
 
 use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Picture};
+use crate::bake::PoseBake;
 use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::traces_lobes;
-use crate::bake::{PoseBake, SkyBake, VertexOcclusion, VertexThickness};
 use crate::model::effects::Effect;
 use crate::model::params::Params;
 use crate::prepare::Baked;
@@ -25,12 +25,8 @@ use crate::scene::view::Camera;
 
 /// The CPU engine: rays through the samples' positions, the model in f64.
 pub struct CpuPainter {
-    scene: Arc<Scene>,
     baked: Baked,
     params: Params,
-    occlusion: Option<Arc<VertexOcclusion>>,
-    sky: Option<Arc<SkyBake>>,
-    thickness: Option<Arc<VertexThickness>>,
     lobe_sky: Option<Arc<LobeSky>>,
     mip_maps: Option<Arc<MipMaps>>,
     shader: Shader,
@@ -48,19 +44,14 @@ impl CpuPainter {
     /// When no rules yield what the effects call for, or something was baked for another mesh.
     pub fn new(baked: &Baked) -> Result<Self, PaintError> {
         let shader = Shader::new(baked.setup(), &baked.illumination, &baked.scene.params)?;
-        let (scene, occlusion) = (Arc::clone(&baked.scene), baked.occlusion.clone());
-        let (pose, sky, thickness) =
-            (Pose::of(&scene, &scene.mesh, None), baked.sky.clone(), baked.thickness.clone());
+        let scene = &*baked.scene;
+        let pose = Pose::of(scene, &scene.mesh, None);
         let mip_maps = MipMaps::new(&scene.maps, scene.quality.texture_filter).map(Arc::new);
-        let traced = traces_lobes(&scene, scene.needs().fields);
-        let lobe_sky = if traced { LobeSky::of_scene(&scene).map(Arc::new) } else { None };
+        let traced = traces_lobes(scene, scene.needs().fields);
+        let lobe_sky = if traced { LobeSky::of_scene(scene).map(Arc::new) } else { None };
         let mut painter = Self {
-            scene,
             baked: baked.clone(),
             params: baked.scene.params.clone(),
-            occlusion,
-            sky,
-            thickness,
             lobe_sky,
             mip_maps,
             shader,
@@ -69,7 +60,7 @@ impl CpuPainter {
             seen: None,
             seconds: 0.0,
         };
-        let atlas = atlas_of(&painter.scene, &painter.surface()?)?;
+        let atlas = atlas_of(&painter.baked.scene, &painter.surface()?)?;
         painter.atlas = atlas;
         Ok(painter)
     }
@@ -78,14 +69,14 @@ impl CpuPainter {
     fn surface(&self) -> Result<PosedSurface<'_>, PaintError> {
         let Pose { mesh, rays, morphs, own, gather } = &self.pose;
         let bakes = SurfaceBakes {
-            occlusion: own.occlusion.as_ref().or(self.occlusion.as_deref()),
-            sky: own.sky.as_ref().or(self.sky.as_deref()),
-            thickness: own.thickness.as_ref().or(self.thickness.as_deref()),
+            occlusion: own.occlusion.as_ref().or(self.baked.occlusion.as_deref()),
+            sky: own.sky.as_ref().or(self.baked.sky.as_deref()),
+            thickness: own.thickness.as_ref().or(self.baked.thickness.as_deref()),
             gather: gather.as_ref(),
             lobe_sky: self.lobe_sky.as_ref(),
             mip_maps: self.mip_maps.as_ref(),
         };
-        Ok(PosedSurface::new(&self.scene, mesh, rays, morphs, bakes)?)
+        Ok(PosedSurface::new(&self.baked.scene, mesh, rays, morphs, bakes)?)
     }
 }
 
@@ -114,8 +105,8 @@ impl Painter for CpuPainter {
     }
 
     fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), PaintError> {
-        self.pose = Pose::of(&self.scene, mesh, own);
-        let atlas = atlas_of(&self.scene, &self.surface()?)?;
+        self.pose = Pose::of(&self.baked.scene, mesh, own);
+        let atlas = atlas_of(&self.baked.scene, &self.surface()?)?;
         (self.atlas, self.seen) = (atlas, None);
         Ok(())
     }
@@ -136,14 +127,14 @@ impl Painter for CpuPainter {
         let samples = match self.seen.take() {
             Some((seen, samples)) if seen == *camera => samples,
             _ => {
-                let mut samples = sample_view(&self.scene, &self.surface()?, camera);
+                let mut samples = sample_view(&self.baked.scene, &self.surface()?, camera);
                 samples.atlas.clone_from(&self.atlas);
                 samples
             }
         };
         let mut shaded = self.shader.shade(&samples, camera, gain);
         self.seen = Some((*camera, samples));
-        let scene = &*self.scene;
+        let scene = &*self.baked.scene;
         let mut layers: Vec<(String, Image)> =
             shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image)).collect();
         let background = scene.views[0].background;

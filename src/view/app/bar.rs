@@ -1,0 +1,103 @@
+//! The bar above the panes: steps back, views, panes, and how they are shown.
+
+use eframe::egui::{self, ComboBox, Ui};
+
+use super::Window;
+use crate::keys::Action;
+use crate::look::{ErrorKind, Layout, Pane};
+use crate::panes;
+use crate::render::tonemap::Operator;
+use crate::session::Orbit;
+
+impl Window {
+    /// Views, panes, and how they are shown.
+    pub(super) fn bar(&mut self, ui: &mut Ui) {
+        self.keep_screenshot();
+        ui.horizontal_wrapped(|ui| {
+            let (can_undo, can_redo) = self
+                .session
+                .history()
+                .map_or((false, false), |history| (history.can_undo(), history.can_redo()));
+            for (can, words, action) in [(can_undo, "undo", Action::Undo), (can_redo, "redo", Action::Redo)] {
+                if ui.add_enabled(can, egui::Button::new(words)).clicked() {
+                    self.act(action, ui.ctx());
+                }
+            }
+            ui.separator();
+            self.views(ui);
+            ui.separator();
+            let shown = [Pane::Target, Pane::Now, Pane::Start, Pane::Fit, Pane::Other, Pane::Error];
+            for pane in shown {
+                if pane == Pane::Other && self.session.other().is_none() {
+                    continue;
+                }
+                let mut on = self.look.panes.contains(&pane);
+                let name = format!("pane {}", panes::name(pane));
+                if ui.toggle_value(&mut on, panes::name(pane)).accessible_name(name).changed() {
+                    self.look.set_pane(pane, on);
+                }
+            }
+            ui.toggle_value(&mut self.session.terms, "terms").accessible_name("pane terms");
+            ui.separator();
+            let look = &mut self.look;
+            let layout =
+                Layout::ALL.iter().find(|(layout, _)| *layout == look.layout).map_or("", |(_, name)| name);
+            let combo = ComboBox::from_id_salt("layout").selected_text(layout).show_ui(ui, |ui| {
+                for (layout, name) in Layout::ALL {
+                    ui.selectable_value(&mut look.layout, layout, name);
+                }
+            });
+            combo.response.accessible_name("layout");
+            let combo = ComboBox::from_id_salt("error").selected_text(look.error.name()).width(70.0).show_ui(
+                ui,
+                |ui| {
+                    for kind in ErrorKind::ALL {
+                        ui.selectable_value(&mut look.error, kind, kind.name());
+                    }
+                },
+            );
+            combo.response.accessible_name("error");
+            let drag =
+                egui::DragValue::new(&mut look.exposure).speed(0.05).range(-16.0..=16.0).suffix(" stops");
+            ui.add(drag).on_hover_text("Exposure of the images").accessible_name("exposure");
+            let mut operator = look.operator();
+            let combo =
+                ComboBox::from_id_salt("tone").selected_text(operator.name()).width(70.0).show_ui(ui, |ui| {
+                    for other in Operator::ALL {
+                        ui.selectable_value(&mut operator, other, other.name());
+                    }
+                });
+            combo.response.accessible_name("tone mapping");
+            look.set_operator(operator);
+            ui.toggle_value(&mut look.false_colour, "false colour");
+            ui.separator();
+            if ui.button("keys").on_hover_text("F1").clicked() {
+                self.help = !self.help;
+            }
+            let dark = ui.visuals().dark_mode;
+            if ui.button(if dark { "light" } else { "dark" }).on_hover_text("Dark or light window").clicked()
+            {
+                ui.ctx().set_theme(if dark { egui::Theme::Light } else { egui::Theme::Dark });
+            }
+        });
+    }
+
+    /// Which view is looked at.
+    fn views(&mut self, ui: &mut Ui) {
+        let Some(opened) = self.session.opened().cloned() else { return };
+        for (i, view) in opened.views().iter().enumerate() {
+            if ui
+                .selectable_label(self.session.view == i, &view.name)
+                .accessible_name(format!("view {}", view.name))
+                .clicked()
+            {
+                self.session.view = i;
+            }
+        }
+        if self.session.orbit != Orbit::default()
+            && ui.button("home").on_hover_text("The view's own camera").clicked()
+        {
+            self.session.orbit = Orbit::default();
+        }
+    }
+}

@@ -1,0 +1,81 @@
+//! The panel below: a fit's buttons, its run folder, the views that it sees, and how it goes.
+
+use std::path::PathBuf;
+
+use eframe::egui::{self, Ui};
+
+use super::Window;
+use crate::curves;
+use crate::fitting::Fitting;
+use crate::host::ViewScore;
+use crate::keys::Action;
+
+impl Window {
+    pub(super) fn fit(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            let paused = self.session.fitting().map(Fitting::is_paused);
+            let idle = paused.is_none() && self.session.opened().is_some();
+            for (enabled, words, action) in [
+                (idle, "fit", Action::Fit),
+                (idle, "resume", Action::Resume),
+                (paused.is_some(), if paused == Some(true) { "go on" } else { "pause" }, Action::Pause),
+                (paused.is_some(), "stop", Action::Stop),
+            ] {
+                if ui.add_enabled(enabled, egui::Button::new(words)).clicked() {
+                    self.act(action, ui.ctx());
+                }
+            }
+            ui.label("run folder");
+            let field = egui::TextEdit::singleline(&mut self.run).desired_width(180.0);
+            if ui.add_enabled(idle, field).accessible_name("run folder").changed() {
+                self.session.set_run_folder(PathBuf::from(&self.run));
+            }
+            self.held_out(ui, idle);
+            if let Some(outcome) = self.session.outcome() {
+                ui.strong(outcome.ending.words());
+                ui.label(format!(
+                    "loss {:.6e}, {} iterations, {} passes, {:.2} s",
+                    outcome.loss_end, outcome.iterations, outcome.evaluations, outcome.seconds
+                ));
+            } else if let Some(step) = self.session.path().last().filter(|_| !idle) {
+                ui.label(format!("iteration {}, loss {:.6e}", step.iteration.iteration, step.iteration.loss));
+            }
+        });
+        if !self.session.scores().is_empty() {
+            ui.horizontal_wrapped(|ui| {
+                for score in self.session.scores() {
+                    let ViewScore { view, held_out, psnr, ssim, flip } = score;
+                    let seen = if *held_out { " (held out)" } else { "" };
+                    ui.label(format!("{view}{seen}: {psnr:.2} dB, SSIM {ssim:.4}, FLIP {flip:.4}"));
+                    ui.separator();
+                }
+            });
+        }
+        let free = self.session.values().map(|values| values.free.clone()).unwrap_or_default();
+        let height = (ui.available_height() - 4.0).max(60.0);
+        curves::show(ui, self.session.path(), &free, height);
+        // The panel stays as high as it was made.
+        ui.take_available_space();
+    }
+
+    /// Which views a fit leaves out.
+    fn held_out(&mut self, ui: &mut Ui, idle: bool) {
+        let Some(opened) = self.session.opened().cloned() else { return };
+        ui.separator();
+        ui.label("fitted views");
+        for view in opened.views().iter().filter(|view| view.target.is_some()) {
+            let Some(values) = self.session.values() else { return };
+            let mut fitted = !values.hold_out.contains(&view.name);
+            let name = format!("fit view {}", view.name);
+            if ui
+                .add_enabled(idle, egui::Checkbox::new(&mut fitted, &view.name))
+                .accessible_name(name)
+                .changed()
+                && let Some(history) = self.session.history()
+            {
+                history.edit(|values| values.set_held_out(&view.name, !fitted));
+            }
+        }
+        ui.separator();
+    }
+}

@@ -1,0 +1,226 @@
+//! The thread that draws: what is asked for first, then scores and terms of what was drawn.
+
+use std::sync::mpsc::Sender;
+use std::sync::{Arc, PoisonError};
+use std::time::Duration;
+
+use skinfit_core::shader::Budget;
+use web_time::Instant;
+
+use super::{Answer, Compared, Engine, Job, Painted, Shared, Slot, Wake};
+use crate::gpu::painter::{Beside, CpuPainter, GpuPainter, PaintError, Painter, Picture};
+use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
+use crate::model::terms::TermName;
+use crate::opened::Opened;
+use crate::render::antialias::Antialias;
+use crate::render::image::Image;
+use crate::render::shading::Shading;
+use crate::report::metrics::Comparison;
+
+/// How long a whole image may take before those that are soon replaced have a sample a pixel: a frame's time on a card.
+const LONG: f64 = 0.016;
+/// How long nothing is asked for before scores and terms follow: a slider that is moved comes first.
+const QUIET: Duration = Duration::from_millis(60);
+
+/// The worker's own.
+pub(super) struct Work {
+    engine: Engine,
+    send: Sender<Answer>,
+    wake: Wake,
+    gpu: Option<Gpu>,
+    /// Whether a whole image takes long.
+    slow: bool,
+    scene: Option<(Arc<Opened>, Box<dyn Painter>)>,
+}
+
+/// Layers by their names.
+type Layers = Vec<(String, Image)>;
+
+/// What is done next.
+enum Next {
+    Paint(Arc<Job>),
+    Follow(Box<Painted>),
+}
+
+impl Work {
+    pub(super) const fn new(engine: Engine, send: Sender<Answer>, wake: Wake) -> Self {
+        Self { engine, send, wake, gpu: None, slow: false, scene: None }
+    }
+
+    /// Draw what is asked for until it is over.
+    pub(super) fn run(mut self, shared: &Shared) {
+        while let Some((slot, next, lose)) = next(shared) {
+            if lose && let Some(gpu) = &self.gpu {
+                gpu.close();
+            }
+            let follow = match next {
+                Next::Paint(job) => self.paint(slot, &job),
+                Next::Follow(painted) => {
+                    self.follow(slot, *painted);
+                    None
+                }
+            };
+            let mut wanted = shared.wanted();
+            if let Some(painted) = follow
+                && !wanted.jobs.contains_key(&slot)
+            {
+                wanted.follow.insert(slot, painted);
+            }
+            wanted.under_way = false;
+            drop(wanted);
+            (self.wake)();
+        }
+    }
+
+    fn answer(&self, answer: Answer) {
+        // The window may be gone.
+        let _ = self.send.send(answer);
+        (self.wake)();
+    }
+
+    fn paint(&mut self, slot: Slot, job: &Arc<Job>) -> Option<Painted> {
+        match self.picture(job, false, self.slow) {
+            Ok((_, painted)) => {
+                self.answer(Answer::Painted(slot, painted.clone()));
+                Some(painted)
+            }
+            Err(error) => {
+                self.answer(Answer::Failed(slot, error.to_string()));
+                None
+            }
+        }
+    }
+
+    fn follow(&mut self, slot: Slot, mut painted: Painted) {
+        let job = Arc::clone(&painted.job);
+        if painted.quick {
+            match self.picture(&job, false, false) {
+                Ok((_, whole)) => painted = whole,
+                Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
+            }
+        }
+        if job.terms {
+            let named = |(name, image): (String, Image)| Some((TermName::from_name(&name)?, Arc::new(image)));
+            match self.picture(&job, true, false) {
+                Ok((layers, _)) => painted.terms = layers.into_iter().filter_map(named).collect(),
+                Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
+            }
+        }
+        painted.compared = job.target.as_ref().and_then(|target| compared(target, &painted.image));
+        self.answer(Answer::Whole(slot, painted));
+    }
+
+    /// An image, and its layers where they are wanted. Where the device fails, the CPU engine draws from now on.
+    fn picture(
+        &mut self,
+        job: &Arc<Job>,
+        layers: bool,
+        quick: bool,
+    ) -> Result<(Layers, Painted), PaintError> {
+        match self.drawn(job, layers, quick) {
+            Err(PaintError::Gpu(error)) => {
+                self.answer(Answer::Told(format!("{error} The CPU engine draws from now on.")));
+                (self.engine.cpu, self.gpu, self.scene) = (true, None, None);
+                self.drawn(job, layers, quick)
+            }
+            done => done,
+        }
+    }
+
+    fn drawn(&mut self, job: &Arc<Job>, layers: bool, quick: bool) -> Result<(Layers, Painted), PaintError> {
+        if self.scene.as_ref().is_none_or(|(opened, _)| !Arc::ptr_eq(opened, &job.opened)) {
+            self.scene = None;
+            let painter = self.painter(&job.opened)?;
+            self.answer(Answer::Engine(painter.name()));
+            self.scene = Some((Arc::clone(&job.opened), painter));
+        }
+        let Some((_, painter)) = &mut self.scene else { return Err(GpuError::NoAdapter.into()) };
+        let samples = job.opened.baked.scene.quality.samples_per_axis;
+        // The CPU engine keeps its samples: it has no use for fewer.
+        let quick = quick && !self.engine.cpu;
+        painter.set_samples(if quick { 1 } else { samples });
+        painter.set_params(&job.params)?;
+        let start = Instant::now();
+        let Picture { image, layers, .. } =
+            painter.paint(&job.camera, job.gain, Beside { layers, haze: false })?;
+        let seconds = start.elapsed().as_secs_f64();
+        if !quick && layers.is_empty() {
+            self.slow = seconds > LONG && samples > 1;
+        }
+        let uploaded = painter.uploaded_bytes();
+        let image = Arc::new(image);
+        let painted = Painted {
+            image,
+            terms: Vec::new(),
+            compared: None,
+            seconds,
+            uploaded,
+            job: Arc::clone(job),
+            quick,
+        };
+        Ok((layers, painted))
+    }
+
+    fn painter(&mut self, opened: &Opened) -> Result<Box<dyn Painter>, PaintError> {
+        if !self.engine.cpu && self.gpu.is_none() {
+            let choice = Choice { name: self.engine.adapter.clone(), ..Choice::default() };
+            self.gpu = Some(Gpu::open(&choice)?);
+        }
+        let Some(gpu) = self.gpu.as_ref().filter(|_| !self.engine.cpu) else {
+            return Ok(Box::new(CpuPainter::new(&opened.baked)?));
+        };
+        let options = RenderOptions {
+            antialias: Antialias::Grid(opened.baked.scene.quality.samples_per_axis),
+            shading: Shading::default(),
+            budget: Budget::Exact,
+            timed: false,
+            animated: false,
+        };
+        Ok(Box::new(GpuPainter::new(gpu.clone(), &opened.baked, options)?))
+    }
+}
+
+/// Wait for something to do, and whether the device is to be given up first; `None` when it is over.
+fn next(shared: &Shared) -> Option<(Slot, Next, bool)> {
+    let mut wanted = shared.wanted();
+    let mut quiet = false;
+    loop {
+        if wanted.over {
+            return None;
+        }
+        let next = match wanted.jobs.pop_first() {
+            Some((slot, job)) => Some((slot, Next::Paint(job))),
+            None if quiet => {
+                wanted.follow.pop_first().map(|(slot, painted)| (slot, Next::Follow(Box::new(painted))))
+            }
+            None => None,
+        };
+        if let Some((slot, next)) = next {
+            wanted.under_way = true;
+            return Some((slot, next, std::mem::take(&mut wanted.lose)));
+        }
+        if wanted.follow.is_empty() {
+            wanted = shared.changed.wait(wanted).unwrap_or_else(PoisonError::into_inner);
+        } else {
+            let (woken, waited) =
+                shared.changed.wait_timeout(wanted, QUIET).unwrap_or_else(PoisonError::into_inner);
+            (wanted, quiet) = (woken, waited.timed_out());
+        }
+    }
+}
+
+/// How far an image is from its target; `None` where it covers no pixel.
+fn compared(target: &Image, image: &Image) -> Option<Compared> {
+    if target.rgb.len() != image.rgb.len() {
+        return None;
+    }
+    let comparison = Comparison::new(target, image, &image.alpha);
+    let scores = comparison.scores()?;
+    let map = Image {
+        width: image.width,
+        height: image.height,
+        rgb: comparison.flip_map().iter().map(|&error| [error; 3]).collect(),
+        alpha: comparison.covered().iter().map(|&covered| f32::from(u8::from(covered))).collect(),
+    };
+    Some(Compared { psnr: scores.psnr, flip: scores.flip, map: Arc::new(map) })
+}

@@ -1,0 +1,153 @@
+//! Images: which are asked for, which are shown, and what an effect changed in them.
+
+use std::sync::Arc;
+
+use super::Session;
+use crate::model::effects::Effect;
+use crate::opened::Reading;
+use crate::paint::{Answer, Job, Painted, Slot};
+
+/// What an effect brought when it was turned on, or took when it was turned off.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Change {
+    /// Seconds a frame.
+    pub seconds: f64,
+    /// Bytes on the adapter.
+    pub bytes: i64,
+    /// dB of the view that is shown, where it has a target.
+    pub psnr: Option<f64>,
+}
+
+/// What was known of the image before an effect was switched.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Before {
+    effect: Effect,
+    seconds: f64,
+    uploaded: u64,
+    psnr: Option<f64>,
+}
+
+impl Session {
+    /// Ask for every image that is not the one that would be drawn now.
+    pub(super) fn ask(&mut self) {
+        let (Some(opened), Some(values), Some(camera)) = (&self.opened, &self.values, self.camera()) else {
+            return;
+        };
+        let values = values.now();
+        if values.effects != opened.baked.scene.effects {
+            if self.opening.is_none() {
+                let effects = Some(values.effects);
+                self.read(Reading { effects, params: None, ..self.start.reading.clone() });
+            }
+            return;
+        }
+        let first = self.first.as_ref().map(|first| &first.params);
+        let wanted = [
+            (Slot::Now, Some(&values.params)),
+            (Slot::Fit, self.fitted.as_ref()),
+            (Slot::Start, first),
+            (Slot::Other, self.other.as_ref()),
+        ];
+        let at_home = self.is_at_home();
+        for (slot, params) in wanted {
+            let Some(params) = params else { continue };
+            let job = Job {
+                opened: Arc::clone(opened),
+                params: params.clone(),
+                gain: values.gains.get(self.view).copied().unwrap_or(1.0),
+                camera,
+                target: opened.targets.get(self.view).cloned().flatten().filter(|_| at_home),
+                terms: self.terms && slot == Slot::Now,
+            };
+            if self.asked.get(&slot).is_none_or(|asked| !same(asked, &job)) {
+                let job = Arc::new(job);
+                self.asked.insert(slot, Arc::clone(&job));
+                self.painter.ask(slot, job);
+            }
+        }
+    }
+
+    /// Take in what the worker has said.
+    pub(super) fn painted(&mut self, answer: Answer) {
+        match answer {
+            Answer::Painted(slot, mut painted) => {
+                if !self.is_asked(slot, &painted) {
+                    return;
+                }
+                if let Some(before) =
+                    self.images.remove(&slot).filter(|before| before.job.camera == painted.job.camera)
+                {
+                    // Until its own are there, those of the image before are shown.
+                    (painted.terms, painted.compared) = (before.terms, before.compared);
+                }
+                self.images.insert(slot, painted);
+            }
+            Answer::Whole(slot, painted) => {
+                if !self.is_asked(slot, &painted) {
+                    return;
+                }
+                self.images.insert(slot, painted);
+                if slot == Slot::Now {
+                    self.weigh();
+                }
+            }
+            Answer::Failed(slot, words) => {
+                self.images.remove(&slot);
+                self.told.push(words);
+            }
+            Answer::Engine(name) => self.engine = name,
+            Answer::Told(words) => self.told.push(words),
+        }
+    }
+
+    /// Whether an image is of the scene and the camera that are shown now.
+    fn is_asked(&self, slot: Slot, painted: &Painted) -> bool {
+        self.asked.get(&slot).is_some_and(|asked| {
+            asked.camera == painted.job.camera && Arc::ptr_eq(&asked.opened, &painted.job.opened)
+        })
+    }
+
+    /// What the effect that was switched has changed, once its image is there.
+    fn weigh(&mut self) {
+        let drawn = self.images.get(&Slot::Now).map(|now| now.job.opened.baked.scene.effects);
+        let wanted = self.values.as_ref().map(|values| values.now().effects);
+        if drawn != wanted {
+            return;
+        }
+        if let (Some(before), Some(now)) = (self.switched.take(), self.images.get(&Slot::Now)) {
+            let psnr = now.compared.as_ref().map(|compared| compared.psnr);
+            let change = Change {
+                seconds: now.seconds - before.seconds,
+                bytes: now.uploaded as i64 - before.uploaded as i64,
+                psnr: psnr.zip(before.psnr).map(|(now, before)| now - before),
+            };
+            self.changes.insert(before.effect.name(), change);
+        }
+    }
+
+    /// Turn an effect on or off: a step of the history. What that changes is told once its image is there.
+    pub fn set_effect(&mut self, effect: Effect, on: bool) {
+        let now = self.images.get(&Slot::Now);
+        self.switched = now.map(|now| Before {
+            effect,
+            seconds: now.seconds,
+            uploaded: now.uploaded,
+            psnr: now.compared.as_ref().map(|compared| compared.psnr),
+        });
+        if let Some(history) = self.history() {
+            history.edit(|values| values.set_effect(effect, on));
+        }
+    }
+}
+
+/// Whether two jobs draw the same.
+fn same(a: &Job, b: &Job) -> bool {
+    let target = match (&a.target, &b.target) {
+        (Some(a), Some(b)) => Arc::ptr_eq(a, b),
+        (a, b) => a.is_none() && b.is_none(),
+    };
+    Arc::ptr_eq(&a.opened, &b.opened)
+        && (a.gain, a.camera, a.terms) == (b.gain, b.camera, b.terms)
+        && target
+        && a.params == b.params
+}
