@@ -16,6 +16,7 @@ use skinfit::model::transmission::FARTHEST;
 use skinfit::scene::light::{Beam, Cone, Lamp};
 use skinfit::scene::{Light, LightKind};
 use skinfit::shader::probe::Probe;
+use skinfit::shader::term::library;
 use skinfit::shader::{Domain, Facts};
 
 use super::bench;
@@ -81,6 +82,8 @@ fn read() -> Vectors {
 
 /// Lights of each kind, by the names of their effects.
 fn known(name: &str, kind: LightKind) -> Effect {
+    // A light's rules name effects of the library's own files.
+    library::register_all();
     Light { name: name.to_owned(), kind }.effect().unwrap()
 }
 
