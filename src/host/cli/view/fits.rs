@@ -20,7 +20,7 @@ use crate::output;
 use crate::study::suggest::names;
 
 /// The scene's file as it is fitted, in the run folder: what `skinfit fit` leaves there, too.
-const SCENE: &str = "scene.toml";
+pub(super) const SCENE: &str = "scene.toml";
 
 /// The report's numbers.
 const REPORT: &str = "report.json";

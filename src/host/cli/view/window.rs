@@ -11,12 +11,11 @@ use skinfit_view::session::watch_progress;
 use skinfit_view::{Start, ViewError, open_window};
 
 use super::Arguments;
-use super::fits::CommandLine;
+use super::fits::{CommandLine, SCENE};
 use crate::cli::run_folder::default_folder;
 use crate::cli::{Exit, Refusal, quieten_graphics, say, unfinished};
 
-/// The files of a run folder that the window reads.
-const SCENE: &str = "scene.toml";
+/// What a fit has found, in its run folder.
 const PARAMS: &str = "params.toml";
 
 /// Open the window, or leave what it shows.
@@ -24,10 +23,8 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     quieten_graphics();
     watch_progress();
     // Without a cache the built-in scene lives in a folder of its own that goes with the window.
-    let scratch = match arguments.bakes.cache() {
-        Some(_) => None,
-        None => Some(unfinished::scratch()?),
-    };
+    let homeless = arguments.scene.is_none() && arguments.bakes.cache().is_none();
+    let scratch = homeless.then(unfinished::scratch).transpose()?;
     let start = start(arguments, scratch.as_ref().map_or(Path::new(""), |scratch| scratch.path()))?;
     let host = Arc::new(CommandLine { bakes: arguments.bakes.words() });
     let name = arguments
