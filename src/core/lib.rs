@@ -17,7 +17,7 @@
 //! - [`program`]: planned rules as arithmetic on numbers, for the processor.
 //! - [`export`]: constants and shaders as text for other engines.
 //! - [`specular`]: the specular BRDFs in f64, their integrals, and the rational functions that the rules take for these.
-//! - [`output`], [`progress`], [`simd`]: files written whole or not at all; who is told how far long work is; which
+//! - [`files`], [`output`], [`progress`], [`simd`]: files read from disk or memory; written whole or not at all; who is told how far long work is; which
 //!   SIMD instructions there are.
 
 pub mod bake;
@@ -25,6 +25,7 @@ pub mod builtin;
 pub mod demo;
 pub mod engine;
 pub mod export;
+pub mod files;
 pub mod fit;
 pub mod model;
 pub mod output;

@@ -4,6 +4,8 @@ use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{PoisonError, RwLock, RwLockWriteGuard, TryLockError};
 
+use crate::files;
+
 /// A file could not be written; nothing is left where it should have stood.
 #[derive(Debug, thiserror::Error)]
 #[error(
@@ -92,11 +94,14 @@ fn is_special(path: &Path) -> bool {
     std::fs::metadata(path).is_ok_and(|found| !found.is_file() && !found.is_dir())
 }
 
-/// Write `bytes` as a file; folders on the way are made.
+/// Write `bytes` as a file; folders on the way are made. In memory, where [`files`] are.
 ///
 /// # Errors
 /// As [`write_with`].
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), OutputError> {
+    if files::keep(path, bytes) {
+        return Ok(());
+    }
     write_with(path, |file| file.write_all(bytes))
 }
 

@@ -225,13 +225,58 @@ impl Renderer {
     /// As of [`Self::render`].
     pub async fn render_async(&mut self, camera: &Camera, gain: f64) -> Result<Frame, GpuError> {
         self.show_behind(camera);
-        let (stage, copies) = self.submit(None, camera, gain, true, None)?;
+        let (stage, planes) = self.draw_async(None, camera, gain, true).await?;
+        let (image, clipped) = self.stages[stage].finished_image(&planes, gain);
+        Ok(Frame { image, clipped, times: Vec::new() })
+    }
+
+    /// As [`Self::render_term`], without waiting.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub async fn render_term_async(
+        &mut self,
+        term: TermName,
+        camera: &Camera,
+        gain: f64,
+    ) -> Result<Image, GpuError> {
+        let (stage, planes) = self.draw_async(Some(term), camera, gain, false).await?;
+        Ok(self.stages[stage].image(&planes, gain as f32).0)
+    }
+
+    /// As [`Self::render_haze`], without waiting.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub async fn render_haze_async(&mut self, camera: &Camera, gain: f64) -> Result<Vec<f32>, GpuError> {
+        if !hazy(self.plan()) {
+            return Ok(Vec::new());
+        }
+        let (stage, planes) = self.draw_async(None, camera, gain, false).await?;
+        Ok(self.haze(stage, &planes, gain))
+    }
+
+    /// Submit, and the planes of the stage once they are there.
+    async fn draw_async(
+        &mut self,
+        output: Option<TermName>,
+        camera: &Camera,
+        gain: f64,
+        finished: bool,
+    ) -> Result<(usize, Vec<Vec<f32>>), GpuError> {
+        let (stage, copies) = self.submit(output, camera, gain, finished, None)?;
         let mut planes = Vec::with_capacity(copies.len());
         for copy in &copies {
             planes.push(copy.arrived(&self.gpu).await?);
         }
-        let (image, clipped) = self.stages[stage].finished_image(&planes, gain);
-        Ok(Frame { image, clipped, times: Vec::new() })
+        Ok((stage, planes))
+    }
+
+    /// The haze that a stage's first plane holds as alpha.
+    fn haze(&self, stage: usize, planes: &[Vec<f32>], gain: f64) -> Vec<f32> {
+        let largest = self.stages[stage].targets.key.precision.largest();
+        let haze = planes[0].chunks_exact(4).map(|texel| texel[3].clamp(-largest, largest));
+        haze.map(|haze| gain as f32 * haze).collect()
     }
 
     /// One term of the image alone, without bloom and backdrop; the terms add up to the image without them.
@@ -252,9 +297,7 @@ impl Renderer {
             return Ok(Vec::new());
         }
         let drawn = self.draw(None, camera, gain, false)?;
-        let largest = self.stages[drawn.stage].targets.key.precision.largest();
-        let haze = drawn.planes[0].chunks_exact(4).map(|texel| texel[3].clamp(-largest, largest));
-        Ok(haze.map(|haze| gain as f32 * haze).collect())
+        Ok(self.haze(drawn.stage, &drawn.planes, gain))
     }
 
     /// What stands behind the mesh for `camera`, made anew when that has moved.

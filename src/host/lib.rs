@@ -5,7 +5,7 @@ mod progress;
 
 // What other members of the workspace hold stands under the names that it has there.
 use skinfit_core::{
-    bake, demo, engine, export, fit, model, output, prepare, render, samples, scene, shader, simd,
+    bake, demo, engine, export, files, fit, model, output, prepare, render, samples, scene, shader, simd,
 };
 use skinfit_gpu as gpu;
 use skinfit_report as report;

@@ -1,6 +1,6 @@
 //! Metrics, pictures and pages that show how good a fit is.
 //!
-//! - [`metrics`], [`flip`]: PSNR, SSIM and FLIP of a view
+//! - [`compared`]: what of a view is compared; [`metrics`], [`flip`]: PSNR, SSIM and FLIP of a view
 //! - [`json`]: the file `report.json`; [`errors`]: what its standard errors rest on
 //! - [`misfit`]: what a fit gets wrong as a whole, and where; [`signed`]: its signed error as a picture
 //! - [`pictures`]: target | fit | error side by side
@@ -11,6 +11,7 @@
 //! [`write_run`] leaves all of it in a run's folder, with an EXR of the terms for each view.
 
 mod charts;
+pub mod compared;
 pub mod errors;
 pub mod figures;
 mod filter;

@@ -1,15 +1,22 @@
 //! A fit that runs beside the window, and can be paused.
+//!
+//! - `thread`: one on a thread of this process
 
+#[cfg(not(target_family = "wasm"))]
+mod thread;
+
+use std::fmt;
 use std::path::PathBuf;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
 
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::host::{FitRequest, Fitted, Host};
+use crate::model::params::Column;
 use crate::paint::Wake;
+#[cfg(not(target_family = "wasm"))]
+pub use thread::on_a_thread;
 
 /// An iteration, and where it has led.
 #[derive(Clone, Debug)]
@@ -29,66 +36,57 @@ pub enum Message {
     Done(Box<Result<Fitted, String>>),
 }
 
-/// A fit under way. Dropped, it is interrupted and waited for: its run folder can be resumed.
+/// Where a fit says it.
+#[derive(Clone)]
+pub struct Tell {
+    send: Sender<Message>,
+    wake: Wake,
+}
+
+impl fmt::Debug for Tell {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Tell").finish_non_exhaustive()
+    }
+}
+
+impl Tell {
+    /// Say it, and wake whoever listens.
+    pub fn say(&self, message: Message) {
+        // The window may be gone.
+        let _ = self.send.send(message);
+        (self.wake)();
+    }
+}
+
+/// A fit under way, from beside it. Dropped, it is stopped, and waited for where it leaves files.
+pub trait FitControl: fmt::Debug {
+    /// Have it wait after the iteration that it is at, or go on.
+    fn set_paused(&mut self, paused: bool);
+    /// Whether it is to wait.
+    fn is_paused(&self) -> bool;
+    /// Have it end soon, with what it has found.
+    fn stop(&mut self);
+}
+
+/// A fit under way.
 #[derive(Debug)]
 pub struct Fitting {
     /// The run folder.
     pub run: PathBuf,
     messages: Receiver<Message>,
-    interrupt: Arc<AtomicBool>,
-    pause: Arc<Pause>,
-    thread: Option<JoinHandle<()>>,
-}
-
-/// Whether it is to wait, and who waits for that to change.
-#[derive(Debug, Default)]
-struct Pause {
-    paused: Mutex<bool>,
-    changed: Condvar,
-}
-
-impl Pause {
-    fn set(&self, paused: bool) {
-        *self.paused.lock().unwrap_or_else(PoisonError::into_inner) = paused;
-        self.changed.notify_all();
-    }
-
-    fn get(&self) -> bool {
-        *self.paused.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// Wait for as long as it is paused.
-    fn wait(&self) {
-        let paused = self.paused.lock().unwrap_or_else(PoisonError::into_inner);
-        drop(self.changed.wait_while(paused, |paused| *paused));
-    }
+    control: Box<dyn FitControl>,
 }
 
 impl Fitting {
     /// Begin.
     #[must_use]
-    pub fn begin(host: Arc<dyn Host>, request: FitRequest, wake: Wake) -> Self {
+    pub fn begin(host: &Arc<dyn Host>, request: FitRequest, wake: Wake) -> Self {
         let (send, messages) = channel();
-        let (interrupt, pause) = (Arc::new(AtomicBool::new(false)), Arc::new(Pause::default()));
         let run = request.run.clone();
-        let (stop, theirs) = (Arc::clone(&interrupt), Arc::clone(&pause));
-        let thread = std::thread::Builder::new().name("fit".to_owned());
-        let work = move || {
-            let mut watch = |iteration: &Iteration, point: &Point| {
-                // The window may be gone.
-                let _ =
-                    send.send(Message::Step(Box::new(Step { iteration: *iteration, point: point.clone() })));
-                wake();
-                theirs.wait();
-            };
-            let done = host.fit(&request, &mut watch, &stop);
-            let _ = send.send(Message::Done(Box::new(done)));
-            wake();
-        };
-        Self { run, messages, interrupt, pause, thread: thread.spawn(work).ok() }
+        Self { run, messages, control: host.begin_fit(request, Tell { send, wake }) }
     }
 
-    /// What it said since. A thread that ended without a word is told as a fit that failed.
+    /// What it said since. One that ended without a word is told as a fit that failed.
     pub fn messages(&self) -> Vec<Message> {
         let mut messages: Vec<Message> = self.messages.try_iter().collect();
         let over = |message: &Message| matches!(message, Message::Done(_));
@@ -107,29 +105,29 @@ impl Fitting {
     }
 
     /// Have it wait after the iteration that it is at, or go on.
-    pub fn set_paused(&self, paused: bool) {
-        self.pause.set(paused);
+    pub fn set_paused(&mut self, paused: bool) {
+        self.control.set_paused(paused);
     }
 
     /// Whether it is to wait.
     #[must_use]
     pub fn is_paused(&self) -> bool {
-        self.pause.get()
+        self.control.is_paused()
     }
 
     /// Have it end soon, with what it has found.
-    pub fn stop(&self) {
-        self.interrupt.store(true, Ordering::SeqCst);
-        self.pause.set(false);
+    pub fn stop(&mut self) {
+        self.control.stop();
     }
 }
 
-impl Drop for Fitting {
-    fn drop(&mut self) {
-        self.stop();
-        if let Some(thread) = self.thread.take() {
-            // A panic of the fit's has been told on standard error.
-            let _ = thread.join();
-        }
-    }
+/// How far a constant has come of its way from the first step to the last; all 0 where it did not move.
+#[must_use]
+pub fn shares(path: &[Step], column: Column) -> Vec<[f64; 2]> {
+    let value = |step: &Step| column.get(&step.point.params);
+    let (Some(first), Some(last)) = (path.first().map(value), path.last().map(value)) else {
+        return Vec::new();
+    };
+    let way = if last == first { 1.0 } else { last - first };
+    path.iter().enumerate().map(|(i, step)| [i as f64, (value(step) - first) / way]).collect()
 }

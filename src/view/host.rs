@@ -1,11 +1,12 @@
 //! What the program around the window does for it.
 
 use std::path::PathBuf;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
+
+use serde::{Deserialize, Serialize};
 
 use crate::engine::Point;
-use crate::fit::outcome::{Iteration, Outcome};
+use crate::fit::outcome::{Ending, Outcome};
+use crate::fitting::{FitControl, Tell};
 use crate::values::Values;
 
 /// A fit that the window asks for: of its scene's file, with what was changed in it.
@@ -25,13 +26,73 @@ pub struct FitRequest {
 #[derive(Clone, Debug)]
 pub struct Fitted {
     /// The constants, with what is known of them.
-    pub outcome: Outcome,
+    pub found: Found,
     /// How good each view is, as the report says.
     pub views: Vec<ViewScore>,
 }
 
-/// How good a view is.
+/// What a fit has found, as far as it is shown.
 #[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// The constants.
+    pub end: Point,
+    /// What is known of each that was free, by its name.
+    pub known: Vec<Known>,
+    /// How it ended.
+    pub ending: Ending,
+    /// The loss at the end.
+    pub loss: f64,
+    /// The loss at the start, and after each iteration.
+    pub losses: Vec<f64>,
+    /// Iterations.
+    pub iterations: u64,
+    /// Passes over the samples.
+    pub evaluations: u64,
+    /// Seconds spent.
+    pub seconds: f64,
+}
+
+/// What is known of a constant that was free.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Known {
+    /// Its name, as reports have it.
+    pub name: String,
+    /// One standard error; `None` at a bound or when unidentifiable.
+    pub std_error: Option<f64>,
+    /// Whether it ended on a bound.
+    pub at_bound: bool,
+}
+
+impl Found {
+    /// Of what a fit yields.
+    #[must_use]
+    pub fn of(outcome: &Outcome) -> Self {
+        let known = outcome.unknowns.iter().map(|unknown| Known {
+            name: unknown.unknown.name(),
+            std_error: unknown.std_error,
+            at_bound: unknown.at_bound,
+        });
+        Self {
+            end: outcome.end.clone(),
+            known: known.collect(),
+            ending: outcome.ending,
+            loss: outcome.loss_end,
+            losses: outcome.history.iter().map(|iteration| iteration.loss).collect(),
+            iterations: outcome.iterations,
+            evaluations: outcome.evaluations,
+            seconds: outcome.seconds,
+        }
+    }
+
+    /// What is known of the constant of that name.
+    #[must_use]
+    pub fn constant(&self, name: &str) -> Option<&Known> {
+        self.known.iter().find(|known| known.name == name)
+    }
+}
+
+/// How good a view is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViewScore {
     /// Its name.
     pub view: String,
@@ -47,17 +108,9 @@ pub struct ViewScore {
 
 /// Fits, as the command line does them, and files that it reads.
 pub trait Host: Send + Sync {
-    /// Fit, and leave the run folder that the command line leaves. `watch` is told of each iteration, and the fit goes
-    /// on when it returns; it ends soon after `interrupt` is set, with a state to be resumed.
-    ///
-    /// # Errors
-    /// What the command line would say.
-    fn fit(
-        &self,
-        request: &FitRequest,
-        watch: &mut dyn FnMut(&Iteration, &Point),
-        interrupt: &Arc<AtomicBool>,
-    ) -> Result<Fitted, String>;
+    /// Begin a fit beside the window, as the command line would fit, and with its run folder where there are folders.
+    /// `tell` hears of each iteration, and of the end.
+    fn begin_fit(&self, request: FitRequest, tell: Tell) -> Box<dyn FitControl>;
 
     /// Leave the scene's file with what was changed in it as `file`, which any command reads.
     ///

@@ -1,12 +1,12 @@
-//! The window: a fit that is seen and touched.
+//! A fit that is seen and touched: what the window and the page hold, and the window itself.
 //!
-//! - [`host`]: what the program around the window does for it
+//! - [`host`]: what the program around them does for them
 //! - state, which knows no widgets: [`values`] (what one edits), [`history`] (undo and redo), [`opened`] (a scene that
-//!   is looked at), [`look`] (how images are shown), [`session`] (all of it)
-//! - work beside the window, whose answers the session polls: [`paint`] (images and their scores), [`fitting`]
-//! - widgets: [`app`] (the window), `rows` (parameters), `effects`, `panes` over `picture` (images on the adapter),
-//!   `probe`, `curves`, `keys`
-//! - without a display: [`offscreen`] (the window as an image), [`mod@bench`] (how fast it is)
+//!   is looked at), [`look`] (how images are shown), [`shown`] (what panes show), [`pixels`] (a pane in 8 bits),
+//!   [`probe`] (one pixel), [`reported`] (what a run's report says), [`session`] (all of it)
+//! - work beside them, whose answers the session polls: [`paint`] (images and their scores), [`fitting`]
+//! - [`archive`]: the scene that a page holds
+//! - [`window`]: widgets over all that (feature `window`); the page has its own in HTML
 //!
 //! Images are drawn by the production renderer's planned shaders, or by the CPU engine where no adapter works; fits are
 //! the command line's. No frame waits for either.
@@ -16,26 +16,25 @@ use skinfit_core::{bake, engine, fit, model, prepare, render, samples, scene};
 use skinfit_gpu as gpu;
 use skinfit_report as report;
 
-pub mod app;
-pub mod bench;
-mod curves;
-mod effects;
+pub mod archive;
 pub mod fitting;
 pub mod history;
 pub mod host;
-mod keys;
 pub mod look;
-pub mod offscreen;
 pub mod opened;
 pub mod paint;
-mod panes;
-mod picture;
-mod probe;
-mod rows;
+pub mod pixels;
+pub mod probe;
+pub mod reported;
 pub mod session;
+pub mod shown;
 pub mod values;
+#[cfg(feature = "window")]
+pub mod window;
 
-pub use app::{Window, open_window};
+#[cfg(feature = "window")]
 pub use eframe::egui;
 pub use host::{FitRequest, Host, ViewError};
 pub use session::{Session, Start};
+#[cfg(feature = "window")]
+pub use window::{Window, open_window};

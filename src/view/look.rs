@@ -24,6 +24,17 @@ pub enum Pane {
     Term(TermName),
 }
 
+impl Pane {
+    /// Those that are of no term.
+    pub const OFFERED: [Self; 6] =
+        [Self::Target, Self::Now, Self::Start, Self::Fit, Self::Other, Self::Error];
+
+    /// Every pane.
+    pub fn all() -> impl Iterator<Item = Self> {
+        Self::OFFERED.into_iter().chain(TermName::all().map(Self::Term))
+    }
+}
+
 /// How errors are shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ErrorKind {
@@ -126,6 +137,12 @@ impl Look {
     /// Choose another.
     pub fn set_operator(&mut self, operator: Operator) {
         operator.name().clone_into(&mut self.operator);
+    }
+
+    /// Take all of another look but its panes.
+    pub fn take(&mut self, other: Self) {
+        let panes = std::mem::take(&mut self.panes);
+        *self = Self { panes, ..other };
     }
 
     /// Show a pane after the others, or take it away.

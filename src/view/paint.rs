@@ -2,20 +2,29 @@
 //!
 //! Of each slot the latest request wins: what was asked for before it is not drawn any more. An image is answered as soon
 //! as it is there; its scores and terms follow when nothing else waits.
+//!
+//! - `work`: what is done; `thread`: on a thread; `browser`: between the events of a browser's worker
 
+#[cfg(target_family = "wasm")]
+mod browser;
+#[cfg(not(target_family = "wasm"))]
+mod thread;
 mod work;
 
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use crate::model::params::Params;
 use crate::model::terms::TermName;
 use crate::opened::Opened;
 use crate::render::image::Image;
 use crate::scene::view::Camera;
-use work::Work;
+#[cfg(target_family = "wasm")]
+use browser::{Changed, Task};
+#[cfg(not(target_family = "wasm"))]
+use thread::{Changed, Task};
+use work::{Next, Piece, Work};
 
 /// What an image is for; the first are drawn first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -104,17 +113,20 @@ pub struct Engine {
 /// Is called when there is an answer.
 pub type Wake = Arc<dyn Fn() + Send + Sync>;
 
+/// How long nothing is asked for before scores and terms follow, milliseconds: a slider that is moved comes first.
+const QUIET: u32 = 60;
+
 /// The worker.
 pub struct PaintWorker {
     shared: Arc<Shared>,
     answers: Receiver<Answer>,
-    thread: Option<JoinHandle<()>>,
+    task: Task,
 }
 
 #[derive(Default)]
 struct Shared {
     wanted: Mutex<Wanted>,
-    changed: Condvar,
+    changed: Changed,
 }
 
 #[derive(Default)]
@@ -135,6 +147,22 @@ impl Shared {
     }
 }
 
+impl Wanted {
+    /// What is done next: what is asked for, or after a `quiet` time what follows; `None` when there is nothing.
+    fn next(&mut self, quiet: bool) -> Option<Piece> {
+        let (slot, next) = match self.jobs.pop_first() {
+            Some((slot, job)) => (slot, Next::Paint(job)),
+            None if quiet => {
+                let (slot, painted) = self.follow.pop_first()?;
+                (slot, Next::Follow(Box::new(painted)))
+            }
+            None => return None,
+        };
+        self.under_way = true;
+        Some(Piece { slot, next, lose: std::mem::take(&mut self.lose) })
+    }
+}
+
 impl std::fmt::Debug for PaintWorker {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("PaintWorker").field("idle", &self.is_idle()).finish()
@@ -147,10 +175,8 @@ impl PaintWorker {
     pub fn new(engine: Engine, wake: Wake) -> Self {
         let shared = Arc::new(Shared::default());
         let (send, answers) = channel();
-        let theirs = Arc::clone(&shared);
-        let thread = std::thread::Builder::new().name("paint".to_owned());
-        let thread = thread.spawn(move || Work::new(engine, send, wake).run(&theirs)).ok();
-        Self { shared, answers, thread }
+        let task = Task::begin(Arc::clone(&shared), move || Work::new(engine, send, wake));
+        Self { shared, answers, task }
     }
 
     /// Have an image drawn, in the place of the one that was asked for in this slot.
@@ -158,7 +184,8 @@ impl PaintWorker {
         let mut wanted = self.shared.wanted();
         wanted.follow.remove(&slot);
         wanted.jobs.insert(slot, job);
-        self.shared.changed.notify_one();
+        drop(wanted);
+        self.shared.changed.tell();
     }
 
     /// What was answered since.
@@ -169,8 +196,8 @@ impl PaintWorker {
     /// Whether everything that was asked for is answered.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        // What a thread that has ended was asked for never comes.
-        if self.thread.as_ref().is_none_or(JoinHandle::is_finished) {
+        // What a worker that has ended was asked for never comes.
+        if self.task.is_over() {
             return true;
         }
         let wanted = self.shared.wanted();
@@ -186,10 +213,7 @@ impl PaintWorker {
 impl Drop for PaintWorker {
     fn drop(&mut self) {
         self.shared.wanted().over = true;
-        self.shared.changed.notify_one();
-        if let Some(thread) = self.thread.take() {
-            // A panic of the worker's has been told on standard error.
-            let _ = thread.join();
-        }
+        self.shared.changed.tell();
+        self.task.end();
     }
 }

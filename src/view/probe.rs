@@ -2,15 +2,14 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{self, Ui};
-
 use crate::look::Pane;
-use crate::panes;
 use crate::render::image::Image;
 use crate::session::Session;
+use crate::shown;
 
 /// What a pixel is, as rows of names and numbers.
-pub(crate) fn rows(session: &Session, [x, y]: [u32; 2]) -> Vec<(String, String)> {
+#[must_use]
+pub fn rows(session: &Session, [x, y]: [u32; 2]) -> Vec<(String, String)> {
     let mut rows = vec![("pixel".to_owned(), format!("{x}, {y}"))];
     if let (Some(opened), Some(camera)) = (session.opened(), session.camera())
         && let Some(place) = opened.place(&camera, x, y)
@@ -28,38 +27,22 @@ pub(crate) fn rows(session: &Session, [x, y]: [u32; 2]) -> Vec<(String, String)>
     };
     let three = |rgb: [f32; 3]| format!("{:.5} {:.5} {:.5}", rgb[0], rgb[1], rgb[2]);
     for pane in [Pane::Target, Pane::Now, Pane::Start, Pane::Fit, Pane::Other] {
-        if let Some(rgb) = panes::image(session, pane).as_ref().and_then(value) {
-            rows.push((panes::name(pane).to_owned(), three(rgb)));
+        if let Some(rgb) = shown::image(session, pane).as_ref().and_then(value) {
+            rows.push((shown::name(pane).to_owned(), three(rgb)));
         }
     }
-    let now = panes::image(session, Pane::Now).as_ref().and_then(value);
-    let target = panes::compared(session).as_ref().and_then(value);
+    let now = shown::image(session, Pane::Now).as_ref().and_then(value);
+    let target = shown::compared(session).as_ref().and_then(value);
     if let (Some(now), Some(target)) = (now, target) {
         rows.push(("residual".to_owned(), three([0, 1, 2].map(|c| now[c] - target[c]))));
     }
     if let Some(map) = session.image(crate::paint::Slot::Now).and_then(|now| now.compared.as_ref()) {
         rows.extend(value(&map.map).map(|flip| ("FLIP".to_owned(), format!("{:.4}", flip[0]))));
     }
-    for term in panes::terms(session) {
-        if let Some(rgb) = panes::image(session, Pane::Term(term)).as_ref().and_then(value) {
+    for term in shown::terms(session) {
+        if let Some(rgb) = shown::image(session, Pane::Term(term)).as_ref().and_then(value) {
             rows.push((term.name().to_owned(), three(rgb)));
         }
     }
     rows
-}
-
-/// The table of a pixel.
-pub(crate) fn show(ui: &mut Ui, session: &Session, pixel: Option<[u32; 2]>) {
-    ui.strong("Probe");
-    let Some(pixel) = pixel else {
-        ui.weak("Point at an image: linear radiance of all panes, red, green and blue.");
-        return;
-    };
-    egui::Grid::new("probe").num_columns(2).striped(true).show(ui, |ui| {
-        for (name, value) in rows(session, pixel) {
-            ui.label(name);
-            ui.monospace(value);
-            ui.end_row();
-        }
-    });
 }

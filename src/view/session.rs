@@ -2,13 +2,14 @@
 //! fit that runs.
 //!
 //! - `images`: which are asked for, and what effects change in them; `camera`: where they are seen from
-//! - `fits`: the fit beside the window; `files`: constants and scenes as files; `progress`: how far long work is
+//! - `known`: what is known of a parameter beside its value
+//! - `fits`: the fit beside the window; `files`: constants and scenes as files
 
 mod camera;
 mod files;
 mod fits;
 mod images;
-mod progress;
+mod known;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,18 +19,17 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 pub use camera::Orbit;
 use images::Before;
 pub use images::Change;
-pub use progress::watch_progress;
-pub(crate) use progress::words as progress_words;
 
-use crate::fit::outcome::Outcome;
+use crate::engine::Point;
 use crate::fit::params_file::ParamsFile;
 use crate::fitting::{Fitting, Step};
 use crate::history::History;
-use crate::host::{Host, ViewScore};
+use crate::host::{Fitted, Found, Host, ViewScore};
 use crate::model::effects::Effect;
-use crate::model::params::Params;
+use crate::model::params::{Param, Params};
 use crate::opened::{Opened, Reading};
 use crate::paint::{Engine, Job, PaintWorker, Painted, Slot, Wake};
+use crate::reported::reported;
 use crate::scene::view::Camera;
 use crate::values::Values;
 
@@ -40,6 +40,8 @@ pub struct Start {
     pub reading: Reading,
     /// Constants that were fitted to it, as `params.toml`.
     pub fitted: Option<PathBuf>,
+    /// What is known of these, and how good they are, as `report.json`.
+    pub report: Option<PathBuf>,
     /// Constants of another run, to be compared.
     pub other: Option<PathBuf>,
     /// Where fits are left.
@@ -59,7 +61,7 @@ pub struct Session {
     first: Option<Values>,
     fitted: Option<Params>,
     other: Option<Params>,
-    outcome: Option<Outcome>,
+    found: Option<Found>,
     scores: Vec<ViewScore>,
     painter: PaintWorker,
     images: BTreeMap<Slot, Painted>,
@@ -99,7 +101,7 @@ impl Session {
             first: None,
             fitted: None,
             other: None,
-            outcome: None,
+            found: None,
             scores: Vec::new(),
             painter,
             images: BTreeMap::new(),
@@ -121,13 +123,12 @@ impl Session {
     fn read(&mut self, reading: Reading) {
         let (send, opening) = channel();
         let wake = Arc::clone(&self.wake);
-        let thread = std::thread::Builder::new().name("open".to_owned());
         let work = move || {
             // The window may be gone.
             let _ = send.send(Opened::read(&reading));
             wake();
         };
-        if let Err(error) = thread.spawn(work) {
+        if let Err(error) = aside(work) {
             self.told.push(format!("no thread can be had: {error}"));
         }
         self.opening = Some(opening);
@@ -175,7 +176,7 @@ impl Session {
             }
         }
         let scene = Values::of(&opened.baked);
-        let first = self.values.is_none().then_some(scene);
+        let first = self.values.is_none().then(|| scene.clone());
         let params = |file: &Option<PathBuf>| -> Option<Result<Params, String>> {
             let (scene, file) = (&opened.baked.scene, file.as_ref()?);
             let read = ParamsFile::read(file, scene.form, &scene.params);
@@ -187,6 +188,14 @@ impl Session {
                 Some(Ok(params)) if place.is_none() => *place = Some(params),
                 Some(Err(error)) if !self.told.contains(&error) => self.told.push(error),
                 _ => {}
+            }
+        }
+        if first.is_some()
+            && let (Some(report), Some(params)) = (&self.start.report, &self.fitted)
+        {
+            match reported(report, Point { params: params.clone(), gains: scene.gains.clone() }) {
+                Ok(Fitted { found, views }) => (self.found, self.scores) = (Some(found), views),
+                Err(error) => self.told.push(error),
             }
         }
         if let Some(scene) = first {
@@ -231,6 +240,23 @@ impl Session {
         if self.fitting.is_some() { None } else { self.values.as_mut() }
     }
 
+    /// Whether there is a step back, and one forward.
+    #[must_use]
+    pub fn steps(&self) -> (bool, bool) {
+        let idle = self.values.as_ref().filter(|_| self.fitting.is_none());
+        idle.map_or((false, false), |history| (history.can_undo(), history.can_redo()))
+    }
+
+    /// Turn the environment's light by so many degrees, as part of a drag.
+    pub fn turn_light(&mut self, degrees: f64) {
+        if let Some(history) = self.history() {
+            history.drag(|values| {
+                let at = values.params.scalar(Param::EnvironmentRotation) + degrees;
+                values.params.set(Param::EnvironmentRotation, (at + 540.0).rem_euclid(360.0) - 180.0);
+            });
+        }
+    }
+
     /// Where the sliders began.
     #[must_use]
     pub const fn first(&self) -> Option<&Values> {
@@ -251,8 +277,8 @@ impl Session {
 
     /// What is known of the last fit of this window.
     #[must_use]
-    pub const fn outcome(&self) -> Option<&Outcome> {
-        self.outcome.as_ref()
+    pub const fn found(&self) -> Option<&Found> {
+        self.found.as_ref()
     }
 
     /// How good the last fit of this window is in each view.
@@ -285,10 +311,24 @@ impl Session {
         self.fitting.as_ref()
     }
 
+    /// The same, to pause or stop it.
+    pub const fn fitting_mut(&mut self) -> Option<&mut Fitting> {
+        self.fitting.as_mut()
+    }
+
     /// The steps of the fit that runs, or of the last one.
     #[must_use]
     pub fn path(&self) -> &[Step] {
         &self.path
+    }
+
+    /// The loss at the start and after each iteration, of the fit that runs or of the last one.
+    #[must_use]
+    pub fn losses(&self) -> Vec<f64> {
+        match (self.path.is_empty(), &self.found) {
+            (true, Some(found)) => found.losses.clone(),
+            _ => self.path.iter().map(|step| step.iteration.loss).collect(),
+        }
     }
 
     /// Where fits are left.
@@ -335,4 +375,13 @@ impl Session {
         self.painter.lose_device();
         self.asked.clear();
     }
+}
+
+/// Do long work on a thread of its own; in a browser's worker, which is one, at once.
+fn aside(work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
+    #[cfg(target_family = "wasm")]
+    work();
+    #[cfg(not(target_family = "wasm"))]
+    std::thread::Builder::new().name("open".to_owned()).spawn(work)?;
+    Ok(())
 }

@@ -15,6 +15,7 @@ mod joint_studies;
 mod lit;
 mod maps;
 mod outputs;
+mod page;
 mod pinned;
 mod refusals;
 mod refused_files;

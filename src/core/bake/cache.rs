@@ -7,7 +7,7 @@ use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::LazyLock;
 
-use crate::output;
+use crate::{files, output};
 
 /// All that makes bakes of their inputs: another text may make others, so that old files are left alone.
 const SOURCES: [&str; 27] = [
@@ -101,7 +101,7 @@ fn path(folder: &Path, kind: &str, key: &Key) -> PathBuf {
 /// Read the bake of `key`, which must hold `count` numbers.
 pub(super) fn read(folder: &Path, kind: &str, key: &Key, count: usize) -> Found {
     let path = path(folder, kind, key);
-    let bytes = match std::fs::read(&path) {
+    let bytes = match files::read(&path) {
         Ok(bytes) => bytes,
         // A folder that is none will be said when the bake cannot be written there.
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
@@ -118,6 +118,7 @@ pub(super) fn read(folder: &Path, kind: &str, key: &Key, count: usize) -> Found 
 /// Write the bake of `key`; what went wrong, if anything, is only worth a warning.
 pub(super) fn write(folder: &Path, kind: &str, key: &Key, floats: &[f32]) -> Result<(), String> {
     let path = path(folder, kind, key);
+    files::note(&path);
     output::write(&path, &encode(key, floats)).map_err(|error| format!("{error} The bake is not kept."))
 }
 

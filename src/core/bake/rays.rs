@@ -6,8 +6,10 @@ use std::sync::OnceLock;
 
 use glam::{Vec3, Vec3A};
 use obvhs::BvhBuildParams;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
 use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh_from_tris;
+use obvhs::cwbvh::bvh2_to_cwbvh::bvh2_to_cwbvh;
+use obvhs::ploc::PlocBuilder;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 
@@ -71,6 +73,20 @@ fn ray(origin: Vec3A, direction: Vec3A) -> Ray {
     Ray { origin, direction, inv_direction, tmin: 0.0, tmax: f32::INFINITY }
 }
 
+/// As obvhs' `build_cwbvh_from_tris`, which asks for the time, and a browser's standard library panics then.
+fn hierarchy(triangles: &[Triangle]) -> CwBvh {
+    let parameters = BvhBuildParams::medium_build();
+    let mut binary = PlocBuilder::with_capacity(triangles.len()).build(
+        parameters.ploc_search_distance,
+        triangles,
+        (0..triangles.len() as u32).collect(),
+        parameters.sort_precision,
+        parameters.search_depth_threshold,
+    );
+    ReinsertionOptimizer::default().run(&mut binary, parameters.reinsertion_batch_ratio, None);
+    bvh2_to_cwbvh(&binary, parameters.max_prims_per_leaf.clamp(1, 3), true, false)
+}
+
 impl RayMesh {
     /// The hierarchy over `triangles` (indices into `positions`). Deterministic.
     #[must_use]
@@ -82,11 +98,7 @@ impl RayMesh {
             Triangle { v0, v1, v2 }
         };
         let triangles: Vec<Triangle> = index.iter().map(triangle).collect();
-        let build = || {
-            let parameters = BvhBuildParams::medium_build();
-            build_cwbvh_from_tris(&triangles, parameters, &mut std::time::Duration::default())
-        };
-        let bvh = (!triangles.is_empty()).then(build);
+        let bvh = (!triangles.is_empty()).then(|| hierarchy(&triangles));
         Self { bvh, triangles, index, wide: OnceLock::new() }
     }
 

@@ -41,6 +41,7 @@ pub use foreign::Foreign;
 use parse::{Problem, parse};
 
 use crate::engine::Unknown;
+use crate::files;
 use crate::fit::outcome::{Outcome, UnknownOutcome};
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Channels, Param, Params};
@@ -203,7 +204,7 @@ impl ParamsFile {
 
     fn parsed(path: &Path, scene: Option<(Form, &Params)>) -> Result<Self, ParamsFileError> {
         let error = |line, problem| ParamsFileError { path: path.to_owned(), line, problem };
-        let text = std::fs::read_to_string(path).map_err(|e| {
+        let text = files::read_to_string(path).map_err(|e| {
             error(
                 None,
                 format!("the parameters cannot be read: {e}. Name a params.toml that a fit has left."),

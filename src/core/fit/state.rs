@@ -15,6 +15,7 @@ use super::memory::Memory;
 use super::options::{FitOptions, SolverKind};
 use super::outcome::{Ending, Iteration};
 use crate::engine::{Point, Unknown};
+use crate::files;
 use crate::model::effects::Form;
 use crate::model::params::Param;
 use crate::output::{self, OutputError};
@@ -196,7 +197,8 @@ impl Saved {
     /// # Errors
     /// When the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), StateError> {
-        Ok(output::write_with(path, |file| serde_json::to_writer(file, self))?)
+        let text = serde_json::to_vec(self).map_err(|error| OutputError::new(path, &error))?;
+        Ok(output::write(path, &text)?)
     }
 
     /// Read the state of a fit of `unknowns` from `start` with `options`.
@@ -220,7 +222,7 @@ impl Saved {
         let unreadable =
             |e: std::io::Error| StateError::Unreadable { path: path.to_owned(), reason: e.to_string() };
         let corrupt = |reason: String| StateError::Corrupt { path: path.to_owned(), reason };
-        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let bytes = files::read(path).map_err(unreadable)?;
         if let Ok(Versioned { format }) = serde_json::from_slice(&bytes)
             && format != FORMAT
         {

@@ -6,6 +6,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Once;
 
+use crate::files;
+
 /// An input was refused: which file, where in it, what is wrong, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SceneError {
@@ -112,24 +114,23 @@ pub(super) fn guarded<T>(
 /// The whole of a regular file, refused above `limit` bytes.
 pub(super) fn read_bytes(path: &Path, limit: u64) -> Result<Vec<u8>, SceneError> {
     let refuse = |what: String, remedy: &str| SceneError::new(path, what, remedy);
-    let metadata = std::fs::metadata(path).map_err(|e| match e.kind() {
+    let length = files::length(path).map_err(|e| match e.kind() {
         std::io::ErrorKind::NotFound => refuse(
             "there is no such file".into(),
             "Correct the path (a path in a scene file is relative to that file)",
         ),
         _ => refuse(format!("cannot be read: {e}"), "Check the path and its permissions"),
     })?;
-    if !metadata.is_file() {
+    let Some(size) = length else {
         return Err(refuse("is not a file".into(), "Name a file, not a folder or a device"));
-    }
-    if metadata.len() > limit {
-        let size = metadata.len();
+    };
+    if size > limit {
         return Err(refuse(
             format!("has {size} bytes, more than the {limit} that are read"),
             "Use a smaller file",
         ));
     }
-    std::fs::read(path)
+    files::read(path)
         .map_err(|e| refuse(format!("cannot be read: {e}"), "Check the path and its permissions"))
 }
 

@@ -1,10 +1,11 @@
 //! The CPU engine: rays through the samples' positions, the model in f64.
 
+use std::future::ready;
 use std::sync::Arc;
 
 use web_time::Instant;
 
-use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Picture};
+use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Painting, Picture};
 use crate::bake::PoseBake;
 use crate::bake::interreflection::VertexGather;
 use crate::bake::lobe_sky::LobeSky;
@@ -150,6 +151,11 @@ impl Painter for CpuPainter {
         let layers = if beside.layers { layers } else { Vec::new() };
         let haze = if beside.haze { shaded.haze } else { Vec::new() };
         Ok(Picture { image: shaded.image, layers, haze, cut: Cut::default() })
+    }
+
+    /// Computed at once: nothing is waited for.
+    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: f64, beside: Beside) -> Painting<'a> {
+        Box::pin(ready(self.paint(camera, gain, beside)))
     }
 
     fn stats(&self) -> Vec<String> {

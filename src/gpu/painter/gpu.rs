@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Picture};
+use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Painting, Picture};
 use crate::bake::PoseBake;
 use crate::model::params::Params;
 use crate::model::terms::TermName;
@@ -44,21 +44,28 @@ impl GpuPainter {
 
     /// The layers of a frame: terms, and what stands behind the mesh.
     fn layers(&mut self, camera: &Camera, gain: f64) -> Result<Vec<(String, Image)>, GpuError> {
-        let mut layers = Vec::new();
-        let mut last = None;
+        let mut terms = Vec::new();
         for &name in &self.terms {
-            let image = self.renderer.render_term(name, camera, gain)?;
-            last = Some(Image { rgb: Vec::new(), ..image.clone() });
-            layers.push((name.name().to_owned(), image));
+            terms.push((name, self.renderer.render_term(name, camera, gain)?));
         }
+        Ok(self.with_background(terms, camera, gain))
+    }
+
+    /// Terms by their names, and what stands behind them.
+    fn with_background(
+        &self,
+        terms: Vec<(TermName, Image)>,
+        camera: &Camera,
+        gain: f64,
+    ) -> Vec<(String, Image)> {
         let (scene, n) = (&*self.scene, self.renderer.backdrop_samples());
         let background = scene.views[0].background;
-        if let Some(coverage) = last
-            && let Some(backdrop) = Backdrop::new(scene, &self.params, background, camera, n)
-        {
-            layers.push((BACKGROUND.to_owned(), backdrop.layer(&coverage, gain)));
-        }
-        Ok(layers)
+        let behind = terms.last().and_then(|(_, image)| {
+            let backdrop = Backdrop::new(scene, &self.params, background, camera, n)?;
+            Some((BACKGROUND.to_owned(), backdrop.layer(image, gain)))
+        });
+        let named = terms.into_iter().map(|(name, image)| (name.name().to_owned(), image));
+        named.chain(behind).collect()
     }
 
     /// What of a frame was cut; of texels once.
@@ -71,7 +78,9 @@ impl GpuPainter {
 impl Painter for GpuPainter {
     fn name(&self) -> String {
         let kind = if self.gpu.is_software() { " (software)" } else { "" };
-        format!("gpu: {}{kind}", self.gpu.name())
+        // A browser may keep it to itself.
+        let name = if self.gpu.name().is_empty() { "WebGPU" } else { self.gpu.name() };
+        format!("gpu: {name}{kind}")
     }
 
     fn set_mesh(&mut self, mesh: &Mesh, own: Option<PoseBake>) -> Result<(), PaintError> {
@@ -97,6 +106,25 @@ impl Painter for GpuPainter {
             false => Vec::new(),
         };
         Ok(Picture { image: frame.image, layers, haze, cut: self.cut(frame.clipped) })
+    }
+
+    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: f64, beside: Beside) -> Painting<'a> {
+        Box::pin(async move {
+            let frame = self.renderer.render_async(camera, gain).await?;
+            let mut layers = Vec::new();
+            if beside.layers {
+                for name in self.terms.clone() {
+                    layers.push((name, self.renderer.render_term_async(name, camera, gain).await?));
+                }
+            }
+            let layers = self.with_background(layers, camera, gain);
+            let haze = match beside.haze {
+                true => self.renderer.render_haze_async(camera, gain).await?,
+                false => Vec::new(),
+            };
+            self.times = Vec::new();
+            Ok(Picture { image: frame.image, layers, haze, cut: self.cut(frame.clipped) })
+        })
     }
 
     fn uploaded_bytes(&self) -> u64 {

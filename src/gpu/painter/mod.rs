@@ -9,6 +9,8 @@ mod gpu;
 pub use cpu::CpuPainter;
 pub use gpu::GpuPainter;
 
+use std::pin::Pin;
+
 use skinfit_core::program::shading::ShadingError;
 
 use super::GpuError;
@@ -63,6 +65,9 @@ pub struct Beside {
     pub haze: bool,
 }
 
+/// A picture to come.
+pub type Painting<'a> = Pin<Box<dyn Future<Output = Result<Picture, PaintError>> + 'a>>;
+
 /// An engine with a scene in it, which draws wherever it was made.
 pub trait Painter {
     /// The engine, in words.
@@ -85,6 +90,8 @@ pub trait Painter {
     /// # Errors
     /// When the device fails, or the scene cannot be sampled.
     fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, PaintError>;
+    /// As [`paint`](Self::paint), without waiting and without times, as a browser wants it.
+    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: f64, beside: Beside) -> Painting<'a>;
     /// Bytes of mesh, maps and cubes on the adapter; 0 of the CPU engine.
     fn uploaded_bytes(&self) -> u64 {
         0

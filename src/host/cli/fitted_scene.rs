@@ -44,37 +44,7 @@ pub(super) struct Start<'a> {
 /// When it is not TOML.
 pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Result<String, TomlError> {
     let mut scene: DocumentMut = text.parse()?;
-    let files = [("mesh", &["file"][..]), ("environment", &["file"]), ("maps", &MAPS)];
-    for (name, keys) in files {
-        if let Some(table) = scene.get_mut(name).and_then(Item::as_table_like_mut) {
-            make_absolute(table, keys, folder);
-        }
-    }
-    if let Some(own) = own_maps(&mut scene) {
-        let names: Vec<String> = own.iter().map(|(name, _)| name.to_owned()).collect();
-        make_absolute(own, &names.iter().map(String::as_str).collect::<Vec<_>>(), folder);
-    }
-    let model = scene.get_mut("model").and_then(Item::as_table_like_mut);
-    if let Some(terms) = model.and_then(|model| model.get_mut("terms")).and_then(Item::as_array_mut) {
-        for term in terms.iter_mut() {
-            if let Some(path) = term.as_str() {
-                *term = folder.join(path).display().to_string().into();
-            } else if let Some(family) = term.as_inline_table_mut() {
-                make_absolute(family, &["file"], folder);
-            }
-        }
-    }
-    let keys = ["target", "mask", "haze"];
-    match scene.get_mut("view") {
-        Some(Item::ArrayOfTables(views)) => {
-            views.iter_mut().for_each(|view| make_absolute(view, &keys, folder));
-        }
-        Some(Item::Value(Value::Array(views))) => {
-            let views = views.iter_mut().filter_map(Value::as_inline_table_mut);
-            views.for_each(|view| make_absolute(view, &keys, folder));
-        }
-        _ => {}
-    }
+    place_files(&mut scene, &mut |path| folder.join(path).display().to_string());
     if !changes.maps.is_empty()
         && let Some(maps) = section(scene.as_table_mut(), "maps")
     {
@@ -113,6 +83,51 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
     Ok(scene.to_string())
 }
 
+/// The text of a scene file whose files stand elsewhere: `place` gives the new path of each.
+///
+/// # Errors
+/// When it is not TOML.
+pub(super) fn with_files(text: &str, place: &mut dyn FnMut(&str) -> String) -> Result<String, TomlError> {
+    let mut scene: DocumentMut = text.parse()?;
+    place_files(&mut scene, place);
+    Ok(scene.to_string())
+}
+
+/// Have `place` give the path of each file that a scene names.
+fn place_files(scene: &mut DocumentMut, place: &mut dyn FnMut(&str) -> String) {
+    let files = [("mesh", &["file"][..]), ("environment", &["file"]), ("maps", &MAPS)];
+    for (name, keys) in files {
+        if let Some(table) = scene.get_mut(name).and_then(Item::as_table_like_mut) {
+            place_in(table, keys, place);
+        }
+    }
+    if let Some(own) = own_maps(scene) {
+        let names: Vec<String> = own.iter().map(|(name, _)| name.to_owned()).collect();
+        place_in(own, &names.iter().map(String::as_str).collect::<Vec<_>>(), place);
+    }
+    let model = scene.get_mut("model").and_then(Item::as_table_like_mut);
+    if let Some(terms) = model.and_then(|model| model.get_mut("terms")).and_then(Item::as_array_mut) {
+        for term in terms.iter_mut() {
+            if let Some(path) = term.as_str() {
+                *term = place(path).into();
+            } else if let Some(family) = term.as_inline_table_mut() {
+                place_in(family, &["file"], place);
+            }
+        }
+    }
+    let keys = ["target", "mask", "haze"];
+    match scene.get_mut("view") {
+        Some(Item::ArrayOfTables(views)) => {
+            views.iter_mut().for_each(|view| place_in(view, &keys, place));
+        }
+        Some(Item::Value(Value::Array(views))) => {
+            let views = views.iter_mut().filter_map(Value::as_inline_table_mut);
+            views.for_each(|view| place_in(view, &keys, place));
+        }
+        _ => {}
+    }
+}
+
 /// The maps that files of rules declare.
 fn own_maps(scene: &mut DocumentMut) -> Option<&mut dyn TableLike> {
     scene.get_mut("maps")?.as_table_like_mut()?.get_mut("own")?.as_table_like_mut()
@@ -126,10 +141,10 @@ pub(super) fn named_maps(text: &str) -> Vec<PathBuf> {
     paths.map(PathBuf::from).collect()
 }
 
-fn make_absolute(table: &mut dyn TableLike, keys: &[&str], folder: &Path) {
+fn place_in(table: &mut dyn TableLike, keys: &[&str], place: &mut dyn FnMut(&str) -> String) {
     for key in keys {
         if let Some(path) = table.get(key).and_then(Item::as_str) {
-            let path = folder.join(path).display().to_string();
+            let path = place(path);
             set(table, key, path.into());
         }
     }

@@ -1,10 +1,10 @@
 //! The command line: a file or folder a command. Every command ends with an [`Exit`].
 //!
 //! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `suggest`, `stability`,
-//!   `view`, `sweep`, `collect`: the commands
+//!   `view`, `page`, `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit; `fingerprint`: what its state belongs to
 //! - `graphics`: what to do about an adapter that cannot; `machine`: what a report says of its making
-//! - `compared`: what of a view is compared
+//! - `opened`: a scene or a run folder, to be looked at
 //! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
@@ -12,7 +12,6 @@
 
 mod ablate;
 mod bake;
-mod compared;
 mod demo;
 mod export;
 mod fingerprint;
@@ -24,6 +23,8 @@ mod info;
 mod interrupt;
 mod machine;
 mod maps;
+mod opened;
+mod page;
 mod params;
 mod render;
 mod run_folder;
@@ -131,6 +132,7 @@ enum Command {
     Info(info::Arguments),
     Stability(stability::Arguments),
     View(view::Arguments),
+    Page(page::Arguments),
     Sweep(sweep::SweepArguments),
     Collect(sweep::CollectArguments),
 }
@@ -159,6 +161,7 @@ pub fn main() -> ExitCode {
         Command::Info(arguments) => info::run(&arguments),
         Command::Stability(arguments) => stability::run(&arguments),
         Command::View(arguments) => view::run(&arguments),
+        Command::Page(arguments) => page::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Collect(arguments) => sweep::run_collect(&arguments),
     };

@@ -1,8 +1,7 @@
-//! The thread that draws: what is asked for first, then scores and terms of what was drawn.
+//! What the worker does: what is asked for first, then scores and terms of what was drawn.
 
+use std::sync::Arc;
 use std::sync::mpsc::Sender;
-use std::sync::{Arc, PoisonError};
-use std::time::Duration;
 
 use skinfit_core::shader::Budget;
 use web_time::Instant;
@@ -16,11 +15,10 @@ use crate::render::antialias::Antialias;
 use crate::render::image::Image;
 use crate::render::shading::Shading;
 use crate::report::metrics::Comparison;
+use crate::scene::view::Camera;
 
 /// How long a whole image may take before those that are soon replaced have a sample a pixel: a frame's time on a card.
 const LONG: f64 = 0.016;
-/// How long nothing is asked for before scores and terms follow: a slider that is moved comes first.
-const QUIET: Duration = Duration::from_millis(60);
 
 /// The worker's own.
 pub(super) struct Work {
@@ -36,8 +34,15 @@ pub(super) struct Work {
 /// Layers by their names.
 type Layers = Vec<(String, Image)>;
 
-/// What is done next.
-enum Next {
+/// What is done next, and whether the device is to be given up first.
+pub(super) struct Piece {
+    pub(super) slot: Slot,
+    pub(super) next: Next,
+    pub(super) lose: bool,
+}
+
+/// An image, or what follows it.
+pub(super) enum Next {
     Paint(Arc<Job>),
     Follow(Box<Painted>),
 }
@@ -47,29 +52,27 @@ impl Work {
         Self { engine, send, wake, gpu: None, slow: false, scene: None }
     }
 
-    /// Draw what is asked for until it is over.
-    pub(super) fn run(mut self, shared: &Shared) {
-        while let Some((slot, next, lose)) = next(shared) {
-            if lose && let Some(gpu) = &self.gpu {
-                gpu.close();
-            }
-            let follow = match next {
-                Next::Paint(job) => self.paint(slot, &job),
-                Next::Follow(painted) => {
-                    self.follow(slot, *painted);
-                    None
-                }
-            };
-            let mut wanted = shared.wanted();
-            if let Some(painted) = follow
-                && !wanted.jobs.contains_key(&slot)
-            {
-                wanted.follow.insert(slot, painted);
-            }
-            wanted.under_way = false;
-            drop(wanted);
-            (self.wake)();
+    /// Do what is next.
+    pub(super) async fn step(&mut self, Piece { slot, next, lose }: Piece, shared: &Shared) {
+        if lose && let Some(gpu) = &self.gpu {
+            gpu.close();
         }
+        let follow = match next {
+            Next::Paint(job) => self.paint(slot, &job).await,
+            Next::Follow(painted) => {
+                self.follow(slot, *painted).await;
+                None
+            }
+        };
+        let mut wanted = shared.wanted();
+        if let Some(painted) = follow
+            && !wanted.jobs.contains_key(&slot)
+        {
+            wanted.follow.insert(slot, painted);
+        }
+        wanted.under_way = false;
+        drop(wanted);
+        (self.wake)();
     }
 
     fn answer(&self, answer: Answer) {
@@ -78,8 +81,8 @@ impl Work {
         (self.wake)();
     }
 
-    fn paint(&mut self, slot: Slot, job: &Arc<Job>) -> Option<Painted> {
-        match self.picture(job, false, self.slow) {
+    async fn paint(&mut self, slot: Slot, job: &Arc<Job>) -> Option<Painted> {
+        match self.picture(job, false, self.slow).await {
             Ok((_, painted)) => {
                 self.answer(Answer::Painted(slot, painted.clone()));
                 Some(painted)
@@ -91,17 +94,17 @@ impl Work {
         }
     }
 
-    fn follow(&mut self, slot: Slot, mut painted: Painted) {
+    async fn follow(&mut self, slot: Slot, mut painted: Painted) {
         let job = Arc::clone(&painted.job);
         if painted.quick {
-            match self.picture(&job, false, false) {
+            match self.picture(&job, false, false).await {
                 Ok((_, whole)) => painted = whole,
                 Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
             }
         }
         if job.terms {
             let named = |(name, image): (String, Image)| Some((TermName::from_name(&name)?, Arc::new(image)));
-            match self.picture(&job, true, false) {
+            match self.picture(&job, true, false).await {
                 Ok((layers, _)) => painted.terms = layers.into_iter().filter_map(named).collect(),
                 Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
             }
@@ -111,26 +114,31 @@ impl Work {
     }
 
     /// An image, and its layers where they are wanted. Where the device fails, the CPU engine draws from now on.
-    fn picture(
+    async fn picture(
         &mut self,
         job: &Arc<Job>,
         layers: bool,
         quick: bool,
     ) -> Result<(Layers, Painted), PaintError> {
-        match self.drawn(job, layers, quick) {
+        match self.drawn(job, layers, quick).await {
             Err(PaintError::Gpu(error)) => {
                 self.answer(Answer::Told(format!("{error} The CPU engine draws from now on.")));
                 (self.engine.cpu, self.gpu, self.scene) = (true, None, None);
-                self.drawn(job, layers, quick)
+                self.drawn(job, layers, quick).await
             }
             done => done,
         }
     }
 
-    fn drawn(&mut self, job: &Arc<Job>, layers: bool, quick: bool) -> Result<(Layers, Painted), PaintError> {
+    async fn drawn(
+        &mut self,
+        job: &Arc<Job>,
+        layers: bool,
+        quick: bool,
+    ) -> Result<(Layers, Painted), PaintError> {
         if self.scene.as_ref().is_none_or(|(opened, _)| !Arc::ptr_eq(opened, &job.opened)) {
             self.scene = None;
-            let painter = self.painter(&job.opened)?;
+            let painter = self.painter(&job.opened).await?;
             self.answer(Answer::Engine(painter.name()));
             self.scene = Some((Arc::clone(&job.opened), painter));
         }
@@ -142,7 +150,7 @@ impl Work {
         painter.set_params(&job.params)?;
         let start = Instant::now();
         let Picture { image, layers, .. } =
-            painter.paint(&job.camera, job.gain, Beside { layers, haze: false })?;
+            drawn_by(&mut **painter, &job.camera, job.gain, Beside { layers, haze: false }).await?;
         let seconds = start.elapsed().as_secs_f64();
         if !quick && layers.is_empty() {
             self.slow = seconds > LONG && samples > 1;
@@ -161,10 +169,10 @@ impl Work {
         Ok((layers, painted))
     }
 
-    fn painter(&mut self, opened: &Opened) -> Result<Box<dyn Painter>, PaintError> {
+    async fn painter(&mut self, opened: &Opened) -> Result<Box<dyn Painter>, PaintError> {
         if !self.engine.cpu && self.gpu.is_none() {
             let choice = Choice { name: self.engine.adapter.clone(), ..Choice::default() };
-            self.gpu = Some(Gpu::open(&choice)?);
+            self.gpu = Some(Gpu::request(&choice).await?);
         }
         let Some(gpu) = self.gpu.as_ref().filter(|_| !self.engine.cpu) else {
             return Ok(Box::new(CpuPainter::new(&opened.baked)?));
@@ -180,33 +188,17 @@ impl Work {
     }
 }
 
-/// Wait for something to do, and whether the device is to be given up first; `None` when it is over.
-fn next(shared: &Shared) -> Option<(Slot, Next, bool)> {
-    let mut wanted = shared.wanted();
-    let mut quiet = false;
-    loop {
-        if wanted.over {
-            return None;
-        }
-        let next = match wanted.jobs.pop_first() {
-            Some((slot, job)) => Some((slot, Next::Paint(job))),
-            None if quiet => {
-                wanted.follow.pop_first().map(|(slot, painted)| (slot, Next::Follow(Box::new(painted))))
-            }
-            None => None,
-        };
-        if let Some((slot, next)) = next {
-            wanted.under_way = true;
-            return Some((slot, next, std::mem::take(&mut wanted.lose)));
-        }
-        if wanted.follow.is_empty() {
-            wanted = shared.changed.wait(wanted).unwrap_or_else(PoisonError::into_inner);
-        } else {
-            let (woken, waited) =
-                shared.changed.wait_timeout(wanted, QUIET).unwrap_or_else(PoisonError::into_inner);
-            (wanted, quiet) = (woken, waited.timed_out());
-        }
-    }
+/// A picture; waited for where one may wait.
+async fn drawn_by(
+    painter: &mut dyn Painter,
+    camera: &Camera,
+    gain: f64,
+    beside: Beside,
+) -> Result<Picture, PaintError> {
+    #[cfg(target_family = "wasm")]
+    return painter.paint_async(camera, gain, beside).await;
+    #[cfg(not(target_family = "wasm"))]
+    painter.paint(camera, gain, beside)
 }
 
 /// How far an image is from its target; `None` where it covers no pixel.

@@ -22,6 +22,13 @@ impl Default for Orbit {
 }
 
 impl Orbit {
+    /// Turn by so many radians, and take so many times the distance.
+    pub fn turn(&mut self, yaw: f64, pitch: f64, distance: f64) {
+        self.yaw += yaw;
+        self.pitch = (self.pitch + pitch).clamp(-1.5, 1.5);
+        self.distance = (self.distance * distance).clamp(0.05, 20.0);
+    }
+
     /// A view's camera, turned about `centre`.
     #[must_use]
     pub fn turned(&self, camera: &Camera, centre: DVec3) -> Camera {

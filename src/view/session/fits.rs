@@ -23,8 +23,8 @@ impl Session {
         if !resume {
             self.path.clear();
         }
-        (self.outcome, self.scores) = (None, Vec::new());
-        self.fitting = Some(Fitting::begin(Arc::clone(&self.host), request, Arc::clone(&self.wake)));
+        (self.found, self.scores) = (None, Vec::new());
+        self.fitting = Some(Fitting::begin(&self.host, request, Arc::clone(&self.wake)));
     }
 
     /// Take in what the fit has said.
@@ -53,21 +53,21 @@ impl Session {
         }
     }
 
-    fn fitted_to(&mut self, Fitted { outcome, views }: Fitted) {
+    fn fitted_to(&mut self, Fitted { found, views }: Fitted) {
         self.scores = views;
         if let (Some(history), Some(opened)) = (&mut self.values, &self.opened) {
-            history.drag(|values| values.take(&outcome.end, opened.views()));
+            history.drag(|values| values.take(&found.end, opened.views()));
         }
-        if outcome.ending != Ending::Converged {
+        if found.ending != Ending::Converged {
             self.told.push(format!(
                 "the fit {}.",
-                match outcome.ending {
+                match found.ending {
                     Ending::Interrupted => "was stopped",
                     ending => ending.words(),
                 }
             ));
         }
-        self.fitted = Some(outcome.end.params.clone());
-        self.outcome = Some(outcome);
+        self.fitted = Some(found.end.params.clone());
+        self.found = Some(found);
     }
 }

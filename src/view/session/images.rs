@@ -18,6 +18,16 @@ pub struct Change {
     pub psnr: Option<f64>,
 }
 
+impl Change {
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let Self { seconds, bytes, psnr } = self;
+        let psnr = psnr.map_or_else(String::new, |psnr| format!(", {psnr:+.2} dB"));
+        format!("{:+.1} ms, {:+.2} MB{psnr}", 1e3 * seconds, *bytes as f64 / 1e6)
+    }
+}
+
 /// What was known of the image before an effect was switched.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Before {

@@ -11,7 +11,7 @@ use super::sandbox::Sandbox;
 use super::tradeoffs::{AXES, done};
 
 /// The browser; none, said loudly, where it is left out on purpose.
-fn browser() -> Option<&'static str> {
+pub(super) fn browser() -> Option<&'static str> {
     if std::env::var_os("SKINFIT_NO_BROWSER_TESTS").is_some() {
         crate::common::not_checked("SKINFIT_NO_BROWSER_TESTS is set, so no page was opened in a browser");
         return None;

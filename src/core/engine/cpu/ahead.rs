@@ -249,11 +249,12 @@ pub(super) fn find(tape: &Tape) -> Option<usize> {
 }
 
 /// Whether functions are compiled for `S`: not for SSE2, as that would be half as many again for processors without AVX2,
-/// whose tapes run on the machine.
+/// whose tapes run on the machine; nor for a browser, which would have to load them.
 struct Functions<S>(PhantomData<S>);
 
 impl<S: Simd> Functions<S> {
-    const COMPILED: bool = !cfg!(target_arch = "x86_64") || <S::f32s as SimdBase<S>>::LEN > 4;
+    const COMPILED: bool =
+        !cfg!(any(target_arch = "x86_64", target_family = "wasm")) || <S::f32s as SimdBase<S>>::LEN > 4;
 }
 
 /// Whether functions are compiled for the instructions of `level`.

@@ -2,7 +2,6 @@
 
 use super::scenes::Scenes;
 use crate::cli::Refusal;
-use crate::cli::compared::compared;
 use crate::cli::fit_engine::surfaced_views;
 use crate::engine::Point;
 use crate::engine::view::ObservedView;
@@ -12,6 +11,7 @@ use crate::progress;
 use crate::render::places::places;
 use crate::render::shade::Shader;
 use crate::report::ViewEvidence;
+use crate::report::compared::compared;
 use crate::scene::view::View;
 
 /// For each view the target, the fit and its terms: those that were fitted, scene by scene, then those that were held

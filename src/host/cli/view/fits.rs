@@ -5,27 +5,24 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
-use serde_json::Value;
-use skinfit_view::host::{Fitted, ViewScore};
+use skinfit_view::fitting::{FitControl, Tell, on_a_thread};
+use skinfit_view::host::Fitted;
+use skinfit_view::reported::reported;
 use skinfit_view::values::Values;
 use skinfit_view::{FitRequest, Host};
 
 use crate::cli::fit;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::interrupt::Interrupt;
+use crate::cli::opened::{REPORT, SCENE};
 use crate::cli::run_folder::{RunFolder, scene_text};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::output;
 use crate::study::suggest::names;
 
-/// The scene's file as it is fitted, in the run folder: what `skinfit fit` leaves there, too.
-pub(super) const SCENE: &str = "scene.toml";
-
-/// The report's numbers.
-const REPORT: &str = "report.json";
-
 /// Fits as `skinfit fit` does.
+#[derive(Clone)]
 pub(super) struct CommandLine {
     /// Words of the command line that say where bakes are kept.
     pub(super) bakes: Vec<String>,
@@ -38,7 +35,9 @@ struct Line {
     arguments: fit::Arguments,
 }
 
-impl Host for CommandLine {
+impl CommandLine {
+    /// Fit, and leave the run folder that `skinfit fit` leaves. `watch` is told of each iteration, and the fit goes on when
+    /// it returns; it ends soon after `interrupt` is set, with a state to be resumed.
     fn fit(
         &self,
         request: &FitRequest,
@@ -60,7 +59,14 @@ impl Host for CommandLine {
         let line = Line::try_parse_from(words).map_err(|error| error.to_string())?;
         let done = fit::run_watched(&line.arguments, &Interrupt::of(interrupt), watch);
         let (_, outcome) = done.map_err(|refusal| refusal.words)?;
-        Ok(Fitted { outcome, views: scores(&request.run.join(REPORT))? })
+        reported(&request.run.join(REPORT), outcome.end)
+    }
+}
+
+impl Host for CommandLine {
+    fn begin_fit(&self, request: FitRequest, tell: Tell) -> Box<dyn FitControl> {
+        let host = self.clone();
+        on_a_thread(tell, move |watch, interrupt| host.fit(&request, watch, interrupt))
     }
 
     fn save_scene(&self, scene: &Path, values: &Values, file: &Path) -> Result<(), String> {
@@ -74,21 +80,4 @@ impl Host for CommandLine {
         let text = scene_text(scene, changes).map_err(|refusal| refusal.words)?;
         output::write(file, text.as_bytes()).map_err(|error| error.to_string())
     }
-}
-
-/// How good each view is, as a report says.
-fn scores(report: &Path) -> Result<Vec<ViewScore>, String> {
-    let unreadable = |reason: String| format!("{}: {reason}. Fit again.", report.display());
-    let bytes = std::fs::read(report).map_err(|error| unreadable(error.to_string()))?;
-    let report: Value = serde_json::from_slice(&bytes).map_err(|error| unreadable(error.to_string()))?;
-    let views = report["views"].as_object().ok_or_else(|| unreadable("it lists no views".to_owned()))?;
-    let number = |view: &Value, key: &str| view[key].as_f64().unwrap_or(f64::NAN);
-    let score = |(name, view): (&String, &Value)| ViewScore {
-        view: name.clone(),
-        held_out: view["held_out"].as_bool().unwrap_or(false),
-        psnr: number(view, "psnr"),
-        ssim: number(view, "ssim"),
-        flip: number(view, "flip"),
-    };
-    Ok(views.iter().map(score).collect())
 }

@@ -3,20 +3,17 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use skinfit_view::bench::measure;
-use skinfit_view::offscreen::Offscreen;
 use skinfit_view::opened::Reading;
 use skinfit_view::paint::Engine;
-use skinfit_view::session::watch_progress;
+use skinfit_view::window::bench::measure;
+use skinfit_view::window::offscreen::Offscreen;
+use skinfit_view::window::watch_progress;
 use skinfit_view::{Start, ViewError, open_window};
 
 use super::Arguments;
-use super::fits::{CommandLine, SCENE};
-use crate::cli::run_folder::default_folder;
+use super::fits::CommandLine;
+use crate::cli::opened::{SceneOrRun, params_of};
 use crate::cli::{Exit, Refusal, quieten_graphics, say, unfinished};
-
-/// What a fit has found, in its run folder.
-const PARAMS: &str = "params.toml";
 
 /// Open the window, or leave what it shows.
 pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
@@ -66,23 +63,12 @@ fn without_a_display(error: ViewError) -> Refusal {
 }
 
 fn start(arguments: &Arguments, scratch: &Path) -> Result<Start, Refusal> {
-    let run = arguments.scene.as_deref().filter(|path| path.is_dir());
-    let (scene, fitted) = match run {
-        Some(run) => (Some(file_of(run, SCENE)?), Some(file_of(run, PARAMS)?)),
-        None => (arguments.scene.clone(), None),
-    };
-    let other = arguments.compare.as_deref().map(|run| match run.is_dir() {
-        true => file_of(run, PARAMS),
-        false => Ok(run.to_owned()),
-    });
-    let path = arguments.bakes.kept_path(scene.as_deref(), scratch)?;
-    let output = arguments.output.clone().unwrap_or_else(|| {
-        let folder = match run {
-            Some(run) => run.to_owned(),
-            None => default_folder(&scene.into_iter().collect::<Vec<_>>()),
-        };
-        PathBuf::from(format!("{}.window", folder.display()))
-    });
+    let of = SceneOrRun::of(arguments.scene.as_deref())?;
+    let path = arguments.bakes.kept_path(of.scene.as_deref(), scratch)?;
+    let output = arguments
+        .output
+        .clone()
+        .unwrap_or_else(|| PathBuf::from(format!("{}.window", of.folder().display())));
     Ok(Start {
         reading: Reading {
             scene: path,
@@ -90,22 +76,10 @@ fn start(arguments: &Arguments, scratch: &Path) -> Result<Start, Refusal> {
             cache: arguments.bakes.cache(),
             ..Reading::default()
         },
-        fitted,
-        other: other.transpose()?,
+        fitted: of.fitted,
+        report: of.report,
+        other: arguments.compare.as_deref().map(params_of).transpose()?,
         run: output,
         engine: Engine { cpu: arguments.engine == "cpu", adapter: arguments.adapter.clone() },
     })
-}
-
-/// A file of a run folder.
-fn file_of(run: &Path, name: &str) -> Result<PathBuf, Refusal> {
-    let file = run.join(name);
-    if file.is_file() {
-        return Ok(file);
-    }
-    Err(Refusal::new(format!(
-        "{}: this folder holds no {name}: it is not that of a fit of one scene. Name the run folder of one, or a scene \
-         file.",
-        run.display()
-    )))
 }

@@ -2,6 +2,8 @@
 
 use eframe::egui::{self, Key, KeyboardShortcut, Modifiers};
 
+use crate::look::Pane;
+
 /// What can be asked of the window by a key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
@@ -23,13 +25,27 @@ pub(crate) enum Action {
     WholeImage,
     Home,
     Screenshot,
+    /// Show a pane, or take it away.
+    Pane(Pane),
+    /// Turn the camera: steps to the right, and down.
+    Turn(i8, i8),
+    /// Turn the environment's light: steps to the right.
+    Light(i8),
+    /// Move the line of a wipe: steps to the right.
+    Wipe(i8),
+    /// Pixels of the image larger by a step, or smaller.
+    Zoom(i8),
+    /// Nearer by a step, or farther.
+    Near(i8),
 }
 
 const NONE: Modifiers = Modifiers::NONE;
 const COMMAND: Modifiers = Modifiers::COMMAND;
+const SHIFT: Modifiers = Modifiers::SHIFT;
+const ALT: Modifiers = Modifiers::ALT;
 
 /// The keys, what they do, and how the list says it.
-pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 19] = [
+pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 37] = [
     (NONE, Key::F1, Action::Help, "this list"),
     (COMMAND, Key::Z, Action::Undo, "undo"),
     (COMMAND.plus(Modifiers::SHIFT), Key::Z, Action::Redo, "redo"),
@@ -49,6 +65,24 @@ pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 19] = [
     (NONE, Key::W, Action::WholeImage, "whole image"),
     (NONE, Key::H, Action::Home, "the view's own camera"),
     (COMMAND, Key::S, Action::Screenshot, "leave the window as an image in the run folder"),
+    (NONE, Key::Num1, Action::Pane(Pane::Target), "pane target"),
+    (NONE, Key::Num2, Action::Pane(Pane::Now), "pane now"),
+    (NONE, Key::Num3, Action::Pane(Pane::Start), "pane start"),
+    (NONE, Key::Num4, Action::Pane(Pane::Fit), "pane fit"),
+    (NONE, Key::Num5, Action::Pane(Pane::Other), "pane other run"),
+    (NONE, Key::Num6, Action::Pane(Pane::Error), "pane error"),
+    (SHIFT, Key::ArrowLeft, Action::Turn(-1, 0), "turn the camera to the left"),
+    (SHIFT, Key::ArrowRight, Action::Turn(1, 0), "turn the camera to the right"),
+    (SHIFT, Key::ArrowUp, Action::Turn(0, -1), "turn the camera up"),
+    (SHIFT, Key::ArrowDown, Action::Turn(0, 1), "turn the camera down"),
+    (ALT, Key::ArrowLeft, Action::Light(-1), "turn the light to the left"),
+    (ALT, Key::ArrowRight, Action::Light(1), "turn the light to the right"),
+    (NONE, Key::OpenBracket, Action::Wipe(-1), "line of the wipe to the left"),
+    (NONE, Key::CloseBracket, Action::Wipe(1), "line of the wipe to the right"),
+    (NONE, Key::PageUp, Action::Zoom(1), "larger"),
+    (NONE, Key::PageDown, Action::Zoom(-1), "smaller"),
+    (COMMAND, Key::PageUp, Action::Near(1), "nearer"),
+    (COMMAND, Key::PageDown, Action::Near(-1), "farther"),
 ];
 
 /// What the mouse does, for the list.

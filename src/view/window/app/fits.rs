@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use eframe::egui::{self, Ui};
 
 use super::Window;
-use crate::curves;
 use crate::fitting::Fitting;
 use crate::host::ViewScore;
-use crate::keys::Action;
+use crate::window::curves;
+use crate::window::keys::Action;
 
 impl Window {
     pub(super) fn fit(&mut self, ui: &mut Ui) {
@@ -31,11 +31,11 @@ impl Window {
                 self.session.set_run_folder(PathBuf::from(&self.run));
             }
             self.held_out(ui, idle);
-            if let Some(outcome) = self.session.outcome() {
-                ui.strong(outcome.ending.words());
+            if let Some(found) = self.session.found() {
+                ui.strong(found.ending.words());
                 ui.label(format!(
                     "loss {:.6e}, {} iterations, {} passes, {:.2} s",
-                    outcome.loss_end, outcome.iterations, outcome.evaluations, outcome.seconds
+                    found.loss, found.iterations, found.evaluations, found.seconds
                 ));
             } else if let Some(step) = self.session.path().last().filter(|_| !idle) {
                 ui.label(format!("iteration {}, loss {:.6e}", step.iteration.iteration, step.iteration.loss));
@@ -53,7 +53,7 @@ impl Window {
         }
         let free = self.session.values().map(|values| values.free.clone()).unwrap_or_default();
         let height = (ui.available_height() - 4.0).max(60.0);
-        curves::show(ui, self.session.path(), &free, height);
+        curves::show(ui, &self.session.losses(), self.session.path(), &free, height);
         // The panel stays as high as it was made.
         ui.take_available_space();
     }

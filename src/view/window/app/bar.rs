@@ -3,21 +3,18 @@
 use eframe::egui::{self, ComboBox, Ui};
 
 use super::Window;
-use crate::keys::Action;
 use crate::look::{ErrorKind, Layout, Pane};
-use crate::panes;
 use crate::render::tonemap::Operator;
 use crate::session::Orbit;
+use crate::shown;
+use crate::window::keys::Action;
 
 impl Window {
     /// Views, panes, and how they are shown.
     pub(super) fn bar(&mut self, ui: &mut Ui) {
         self.keep_screenshot();
         ui.horizontal_wrapped(|ui| {
-            let (can_undo, can_redo) = self
-                .session
-                .history()
-                .map_or((false, false), |history| (history.can_undo(), history.can_redo()));
+            let (can_undo, can_redo) = self.session.steps();
             for (can, words, action) in [(can_undo, "undo", Action::Undo), (can_redo, "redo", Action::Redo)] {
                 if ui.add_enabled(can, egui::Button::new(words)).clicked() {
                     self.act(action, ui.ctx());
@@ -26,14 +23,13 @@ impl Window {
             ui.separator();
             self.views(ui);
             ui.separator();
-            let shown = [Pane::Target, Pane::Now, Pane::Start, Pane::Fit, Pane::Other, Pane::Error];
-            for pane in shown {
+            for pane in Pane::OFFERED {
                 if pane == Pane::Other && self.session.other().is_none() {
                     continue;
                 }
                 let mut on = self.look.panes.contains(&pane);
-                let name = format!("pane {}", panes::name(pane));
-                if ui.toggle_value(&mut on, panes::name(pane)).accessible_name(name).changed() {
+                let name = format!("pane {}", shown::name(pane));
+                if ui.toggle_value(&mut on, shown::name(pane)).accessible_name(name).changed() {
                     self.look.set_pane(pane, on);
                 }
             }

@@ -5,7 +5,8 @@ use crate::render::image::Image;
 use crate::scene::view::View;
 
 /// The target as an image, and how much of each pixel is compared.
-pub(super) fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
+#[must_use]
+pub fn compared(view: &View, observed: &ObservedView, fit: &Image) -> (Image, Vec<f32>) {
     let mut target = Image::new(fit.width, fit.height);
     let Some(source) = &view.target else { return (target, fit.alpha.clone()) };
     target.rgb.clone_from(&source.rgb);

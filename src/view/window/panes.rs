@@ -5,73 +5,18 @@ use std::sync::Arc;
 use eframe::egui::{self, Align2, Color32, FontId, PointerButton, Rect, Response, Sense, Ui, Vec2};
 
 use crate::look::{ErrorKind, Layout, Look, Pane};
-use crate::model::params::Param;
-use crate::model::terms::TermName;
-use crate::paint::{Painted, Slot};
-use crate::picture::{self, Kind, Shown};
+use crate::paint::Slot;
+use crate::pixels;
 use crate::render::files::{ImageOptions, write_image};
-use crate::render::image::Image;
 use crate::render::tonemap::ToneMap;
 use crate::session::Session;
-
-/// What the end of each error's scale stands for: FLIP's own, linear radiance, a share of the target.
-const fn scale(kind: ErrorKind) -> f32 {
-    match kind {
-        ErrorKind::Flip => 1.0,
-        ErrorKind::Signed => 0.1,
-        ErrorKind::Relative => 0.5,
-    }
-}
-
-/// A pane's name.
-pub(crate) fn name(pane: Pane) -> &'static str {
-    match pane {
-        Pane::Target => "target",
-        Pane::Now => "now",
-        Pane::Start => "start",
-        Pane::Fit => "fit",
-        Pane::Other => "other run",
-        Pane::Error => "error",
-        Pane::Term(term) => term.name(),
-    }
-}
-
-/// The slot whose image a pane shows.
-const fn slot(pane: Pane) -> Slot {
-    match pane {
-        Pane::Start => Slot::Start,
-        Pane::Fit => Slot::Fit,
-        Pane::Other => Slot::Other,
-        _ => Slot::Now,
-    }
-}
-
-/// A pane's image, where there is one; of the error that of the sliders.
-pub(crate) fn image(session: &Session, pane: Pane) -> Option<Arc<Image>> {
-    match pane {
-        Pane::Target => session.opened()?.targets.get(session.view)?.clone(),
-        Pane::Term(wanted) => {
-            let terms = &session.image(Slot::Now)?.terms;
-            terms.iter().find(|(term, _)| *term == wanted).map(|(_, image)| Arc::clone(image))
-        }
-        pane => session.image(slot(pane)).map(|painted| Arc::clone(&painted.image)),
-    }
-}
-
-/// The target that the image of the sliders may be compared with: from a view's own camera.
-pub(crate) fn compared(session: &Session) -> Option<Arc<Image>> {
-    session.is_at_home().then(|| image(session, Pane::Target)).flatten()
-}
-
-/// The terms that there are images of.
-pub(crate) fn terms(session: &Session) -> Vec<TermName> {
-    session.image(Slot::Now).map_or_else(Vec::new, |now| now.terms.iter().map(|(term, _)| *term).collect())
-}
+use crate::shown::{self, Kind};
+use crate::window::picture::{self, Shown};
 
 /// Show the panes; the pixel that is pointed at.
 pub(crate) fn show(ui: &mut Ui, session: &mut Session, look: &mut Look) -> Option<[u32; 2]> {
     let mut panes = look.panes.clone();
-    panes.extend(if session.terms { terms(session) } else { Vec::new() }.into_iter().map(Pane::Term));
+    panes.extend(if session.terms { shown::terms(session) } else { Vec::new() }.into_iter().map(Pane::Term));
     match look.layout {
         Layout::Side => {}
         Layout::Wipe => panes.truncate(1),
@@ -116,7 +61,7 @@ impl One {
     fn show(self, ui: &mut Ui, session: &mut Session, look: &mut Look) -> Option<[u32; 2]> {
         let id = ui.scope_id().with(("pane", self.pane));
         let response = ui.interact(self.rect, id, Sense::click_and_drag());
-        let title = self.title(session, look);
+        let title = shown::title(session, look, self.pane);
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, &title));
         let size = session.camera().map(|camera| Vec2::new(camera.width as f32, camera.height as f32));
         let pointed = size.and_then(|size| {
@@ -136,7 +81,25 @@ impl One {
         let place = Align2::LEFT_TOP.anchor_size(self.rect.min + Vec2::splat(4.0), galley.size());
         painter.rect_filled(place.expand(3.0), 3.0, Color32::from_black_alpha(170));
         painter.galley(place.min, galley, Color32::WHITE);
+        self.colours(&painter, look, place.expand(3.0));
         pointed
+    }
+
+    /// The colours of its scale, below its title, from the least to the greatest.
+    fn colours(&self, painter: &egui::Painter, look: &Look, title: Rect) {
+        if self.pane != Pane::Error && !look.false_colour {
+            return;
+        }
+        let signed = self.pane == Pane::Error && look.error == ErrorKind::Signed;
+        let bar = Rect::from_min_size(title.left_bottom(), Vec2::new(title.width(), 6.0));
+        let ramp = pixels::ramp(signed);
+        let width = bar.width() / 64.0;
+        for (i, color) in ramp.chunks_exact(4).step_by(4).enumerate() {
+            let corner = bar.min + Vec2::new(i as f32 * width, 0.0);
+            // A little wider than it is: no gap is rounded into being.
+            let rect = Rect::from_min_size(corner, Vec2::new(width + 0.5, bar.height()));
+            painter.rect_filled(rect.intersect(bar), 0.0, Color32::from_rgb(color[0], color[1], color[2]));
+        }
     }
 
     /// Its image as a file in the run folder, on a click of the right button.
@@ -145,7 +108,7 @@ impl One {
             Pane::Error => {
                 session.image(Slot::Now).and_then(|now| Some(Arc::clone(&now.compared.as_ref()?.map)))
             }
-            pane => image(session, pane),
+            pane => shown::image(session, pane),
         };
         let Some(shown) = shown else { return };
         let mut chosen = None;
@@ -164,7 +127,7 @@ impl One {
             .opened()
             .and_then(|opened| opened.views().get(session.view))
             .map(|view| view.name.clone());
-        let pane = name(self.pane).replace(' ', "_");
+        let pane = shown::name(self.pane).replace(' ', "_");
         let file = format!("{}_{pane}.{ending}", view.unwrap_or_default());
         let path = session.run_folder().join(file);
         let tone = ToneMap { operator: look.operator(), exposure: look.exposure };
@@ -175,60 +138,19 @@ impl One {
         });
     }
 
-    /// What stands above it, with its score and the legend of its colours.
-    fn title(&self, session: &Session, look: &Look) -> String {
-        let scored = |painted: Option<&Painted>| {
-            let compared = painted.and_then(|painted| painted.compared.as_ref());
-            compared.map_or_else(String::new, |c| format!("  {:.2} dB, FLIP {:.4}", c.psnr, c.flip))
-        };
-        let colours = if look.false_colour { "  luminance, 2^-8 to 2^2" } else { "" };
-        match (self.pane, look.layout) {
-            (Pane::Error, _) => match look.error {
-                ErrorKind::Flip => format!("error: FLIP, 0 to {}", scale(ErrorKind::Flip)),
-                ErrorKind::Signed => {
-                    let scale = scale(ErrorKind::Signed);
-                    format!("error: now - target, blue -{scale} to red {scale}")
-                }
-                ErrorKind::Relative => {
-                    format!("error: |now - target| / target, 0 to {}", scale(ErrorKind::Relative))
-                }
-            },
-            (pane, Layout::Wipe) => {
-                let beside = look.panes.get(1).copied().unwrap_or(Pane::Now);
-                format!("{} | {}{colours}", name(pane), name(beside))
-            }
-            (pane @ (Pane::Target | Pane::Term(_)), _) => format!("{}{colours}", name(pane)),
-            (pane, _) => format!("{}{}{colours}", name(pane), scored(session.image(slot(pane)))),
-        }
-    }
-
     fn image(&self, ui: &mut Ui, id: egui::Id, session: &Session, look: &Look, (origin, span): (Vec2, Vec2)) {
         let pair = match (self.pane, look.layout) {
-            (Pane::Error, _) => match look.error {
-                ErrorKind::Flip => {
-                    let compared = session.image(Slot::Now).and_then(|now| now.compared.as_ref());
-                    compared.map(|compared| [Arc::clone(&compared.map), Arc::clone(&compared.map)])
-                }
-                _ => image(session, Pane::Now).zip(compared(session)).map(<[_; 2]>::from),
-            },
-            (pane, Layout::Wipe) => {
+            (pane, Layout::Wipe) if pane != Pane::Error => {
                 let beside = look.panes.get(1).copied().unwrap_or(Pane::Now);
-                image(session, pane).zip(image(session, beside)).map(<[_; 2]>::from)
+                shown::image(session, pane).zip(shown::image(session, beside)).map(<[_; 2]>::from)
             }
-            (pane, _) => image(session, pane).map(|image| [Arc::clone(&image), image]),
+            (pane, _) => shown::pair(session, pane, look.error),
         };
         let Some(images) = pair else {
-            let words = match self.pane {
-                Pane::Target => "this view has no target",
-                Pane::Fit => "no fit yet",
-                Pane::Other => "no run is compared",
-                Pane::Error => "nothing is compared",
-                _ => "being drawn",
-            };
             ui.painter().text(
                 self.rect.center(),
                 Align2::CENTER_CENTER,
-                words,
+                shown::lacking(self.pane),
                 FontId::proportional(14.0),
                 ui.visuals().weak_text_color(),
             );
@@ -246,7 +168,7 @@ impl One {
             exposure: look.exposure,
             operator: look.operator(),
             false_colour: look.false_colour,
-            scale: scale(look.error),
+            scale: shown::scale(look.error),
         };
         picture::paint(&ui.painter_at(self.rect), self.rect, id, images, shown);
     }
@@ -270,17 +192,10 @@ impl One {
         } else if response.dragged_by(PointerButton::Primary) && shift {
             // Half a turn for the width of a pane.
             let turn = f64::from(180.0 * drag.x / self.rect.width());
-            if let Some(history) = session.history() {
-                history.drag(|values| {
-                    let at = values.params.scalar(Param::EnvironmentRotation) + turn;
-                    values.params.set(Param::EnvironmentRotation, (at + 540.0).rem_euclid(360.0) - 180.0);
-                });
-            }
+            session.turn_light(turn);
         } else if response.dragged_by(PointerButton::Primary) {
-            session.orbit.yaw += f64::from(drag.x * std::f32::consts::PI / self.rect.width());
-            session.orbit.pitch = (session.orbit.pitch
-                + f64::from(drag.y * std::f32::consts::PI / self.rect.height()))
-            .clamp(-1.5, 1.5);
+            let turn = std::f32::consts::PI * drag / self.rect.size();
+            session.orbit.turn(f64::from(turn.x), f64::from(turn.y), 1.0);
         } else if response.dragged_by(PointerButton::Secondary) || response.dragged_by(PointerButton::Middle)
         {
             let middle = Vec2::from(look.middle) - drag / (points * size);
@@ -299,7 +214,7 @@ impl One {
         if let Some(at) = response.hover_pos().filter(|_| wheel != 0.0) {
             let factor = (wheel / 200.0).exp();
             if command {
-                session.orbit.distance = (session.orbit.distance / f64::from(factor)).clamp(0.05, 20.0);
+                session.orbit.turn(0.0, 0.0, 1.0 / f64::from(factor));
             } else {
                 // The pixel under the pointer stays there.
                 let zoomed = (points * factor).clamp(0.05, 64.0);

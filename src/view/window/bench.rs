@@ -6,9 +6,9 @@ use std::time::Duration;
 use web_time::Instant;
 
 use crate::host::ViewError;
-use crate::offscreen::Offscreen;
 use crate::paint::Slot;
 use crate::values::Values;
+use crate::window::offscreen::Offscreen;
 
 /// Moves of the slider.
 const MOVES: usize = 60;

@@ -3,20 +3,17 @@
 use eframe::egui::Ui;
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 
-use crate::fitting::Step;
+use crate::fitting::{Step, shares};
 use crate::model::params::Column;
 
 /// Two plots side by side, `height` points high.
-pub(crate) fn show(ui: &mut Ui, path: &[Step], free: &[Column], height: f32) {
-    if path.is_empty() {
+pub(crate) fn show(ui: &mut Ui, losses: &[f64], path: &[Step], free: &[Column], height: f32) {
+    if losses.is_empty() {
         ui.weak("The loss and the constants are plotted here while a fit runs.");
         return;
     }
-    let losses: Vec<[f64; 2]> = path
-        .iter()
-        .enumerate()
-        .map(|(i, step)| [i as f64, step.iteration.loss.max(1e-300).log10()])
-        .collect();
+    let losses: Vec<[f64; 2]> =
+        losses.iter().enumerate().map(|(i, loss)| [i as f64, loss.max(1e-300).log10()]).collect();
     ui.columns(2, |columns| {
         plot("loss", height).y_axis_label("lg loss").x_axis_label("iteration").show(
             &mut columns[0],
@@ -40,14 +37,4 @@ fn plot(name: &str, height: f32) -> Plot<'_> {
         .allow_drag(false)
         .allow_zoom(false)
         .allow_boxed_zoom(false)
-}
-
-/// How far a constant has come of its way from the first step to the last; all 0 where it did not move.
-fn shares(path: &[Step], column: Column) -> Vec<[f64; 2]> {
-    let value = |step: &Step| column.get(&step.point.params);
-    let (Some(first), Some(last)) = (path.first().map(value), path.last().map(value)) else {
-        return Vec::new();
-    };
-    let way = if last == first { 1.0 } else { last - first };
-    path.iter().enumerate().map(|(i, step)| [i as f64, (value(step) - first) / way]).collect()
 }

@@ -17,24 +17,14 @@ use wgpu::{
 };
 
 use crate::look::ErrorKind;
+use crate::pixels::ramp;
 use crate::render::image::Image;
 use crate::render::tonemap::Operator;
-use crate::report::pictures::{BACKGROUND, magma};
-use crate::report::signed::diverging;
+use crate::report::pictures::BACKGROUND;
+use crate::shown::Kind;
 
 /// Textures that are kept; the one that was shown longest ago goes.
 const MOST: usize = 16;
-
-/// What a pane shows.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Kind {
-    /// The first image.
-    Image,
-    /// The first less the second, or FLIP's map, which is the first.
-    Error(ErrorKind),
-    /// The first to the left of a line, the second to its right.
-    Wipe(f32),
-}
 
 /// How it is shown.
 #[derive(Clone, Copy, Debug)]
@@ -164,9 +154,7 @@ impl Shared {
             multiview_mask: None,
             cache: None,
         });
-        let positive = (0..256_u16).map(|i| magma(f32::from(i) / 255.0));
-        let signed = (0..256_u16).map(|i| diverging(2.0 * f64::from(i) / 255.0 - 1.0));
-        let bytes: Vec<u8> = positive.chain(signed).flat_map(|[r, g, b]| [r, g, b, 255]).collect();
+        let bytes = [false, true].map(ramp).concat();
         let ramps = upload(device, queue, "ramps", [256, 2], TextureFormat::Rgba8Unorm, &bytes);
         let encoded = !format.is_srgb();
         Self { pipeline, layout, ramps, encoded, textures: HashMap::new(), clock: 0, groups: HashMap::new() }

@@ -17,8 +17,8 @@ use wgpu::{
 
 use crate::Window;
 use crate::host::{Host, ViewError};
-use crate::picture;
 use crate::session::Start;
+use crate::window::picture;
 
 /// Flat colours are drawn as they are: dithering costs a software adapter a good part of a frame.
 const OPTIONS: RendererOptions = RendererOptions {

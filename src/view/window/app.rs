@@ -11,12 +11,13 @@ use std::sync::mpsc::Receiver;
 
 use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 
+use super::keys::{self, Action};
+use super::progress;
+use super::{effects, offscreen, panes, picture, probe_table, rows};
 use crate::host::{Host, ViewError};
-use crate::keys::{self, Action};
 use crate::look::{ErrorKind, Layout, Look, Pane};
 use crate::paint::Slot;
-use crate::session::{Orbit, Session, Start, progress_words};
-use crate::{effects, offscreen, panes, picture, probe, rows};
+use crate::session::{Orbit, Session, Start};
 
 /// Where the look is kept from window to window.
 const LOOK: &str = "look";
@@ -128,7 +129,7 @@ impl Window {
         Panel::left("parameters").resizable(true).default_size(360.0).show(ui, |ui| self.parameters(ui));
         Panel::right("probe").resizable(true).default_size(250.0).show(ui, |ui| {
             ScrollArea::vertical().show(ui, |ui| {
-                probe::show(ui, &self.session, self.pointed);
+                probe_table::show(ui, &self.session, self.pointed);
                 ui.take_available_width();
             });
         });
@@ -169,12 +170,12 @@ impl Window {
             Action::Fit => session.begin_fit(false),
             Action::Resume => session.begin_fit(true),
             Action::Pause => {
-                if let Some(fitting) = session.fitting() {
+                if let Some(fitting) = session.fitting_mut() {
                     fitting.set_paused(!fitting.is_paused());
                 }
             }
             Action::Stop => {
-                if let Some(fitting) = session.fitting() {
+                if let Some(fitting) = session.fitting_mut() {
                     fitting.stop();
                 }
             }
@@ -197,6 +198,24 @@ impl Window {
             Action::FalseColour => look.false_colour = !look.false_colour,
             Action::WholeImage => look.reset_zoom(),
             Action::Home => session.orbit = Orbit::default(),
+            Action::Pane(Pane::Other) if session.other().is_none() => {}
+            Action::Pane(pane) => look.set_pane(pane, !look.panes.contains(&pane)),
+            Action::Turn(right, down) => {
+                session.orbit.turn(0.1 * f64::from(right), 0.1 * f64::from(down), 1.0)
+            }
+            Action::Light(right) => {
+                session.turn_light(5.0 * f64::from(right));
+                if let Some(history) = session.history() {
+                    history.settle();
+                }
+            }
+            Action::Wipe(right) => look.wipe = (look.wipe + 0.02 * f32::from(right)).clamp(0.0, 1.0),
+            // From the whole image, which is about a point a pixel.
+            Action::Zoom(larger) => {
+                let zoomed = look.zoom.unwrap_or(1.0) * 1.25_f32.powi(i32::from(larger));
+                look.zoom = Some(zoomed.clamp(0.05, 64.0));
+            }
+            Action::Near(nearer) => session.orbit.turn(0.0, 0.0, 0.9_f64.powi(i32::from(nearer))),
             Action::Screenshot => {
                 let (send, told) = std::sync::mpsc::channel();
                 self.screenshot = Some(told);
@@ -247,7 +266,7 @@ impl Window {
                 ui.spinner();
                 ui.label("reading the scene");
             }
-            if let Some(words) = progress_words() {
+            if let Some(words) = progress::words() {
                 ui.label(words);
             }
             if let Some(now) = self.session.image(Slot::Now) {

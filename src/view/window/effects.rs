@@ -3,7 +3,7 @@
 use eframe::egui::Ui;
 
 use crate::model::effects::Effect;
-use crate::session::{Change, Session};
+use crate::session::Session;
 
 /// Every effect that may be asked for by name.
 pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
@@ -20,7 +20,7 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
                     switch = Some((effect, on));
                 }
                 if let Some(change) = session.change(effect) {
-                    ui.weak(words_of(change)).on_hover_text(
+                    ui.weak(change.words()).on_hover_text(
                         "What switching it changed: time of a frame, bytes on the adapter, PSNR of this view",
                     );
                 }
@@ -30,10 +30,4 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
     if let Some((effect, on)) = switch {
         session.set_effect(effect, on);
     }
-}
-
-fn words_of(change: Change) -> String {
-    let Change { seconds, bytes, psnr } = change;
-    let psnr = psnr.map_or_else(String::new, |psnr| format!(", {psnr:+.2} dB"));
-    format!("{:+.1} ms, {:+.2} MB{psnr}", 1e3 * seconds, bytes as f64 / 1e6)
 }

@@ -1,7 +1,5 @@
 //! Parameters: a row each.
 
-use std::ops::RangeInclusive;
-
 use eframe::egui::{self, Response, RichText, Slider, SliderClamping, Ui};
 
 use crate::model::params::{Channels, Column, Param, Scale};
@@ -103,16 +101,8 @@ impl Row<'_> {
     }
 
     fn resets(&self, ui: &mut Ui, edits: &mut Vec<Edit>) {
-        let form = self.values.form;
-        let of = |params: Option<&crate::model::params::Params>| params.map(|params| params.rgb(self.param));
-        let outcomes = [
-            ("to the start", of(Some(&self.first.params))),
-            ("to the default", Some(self.param.default_rgb(form))),
-            ("to the fit", of(self.session.fitted())),
-            ("to the compared run", of(self.session.other())),
-        ];
-        for (words, rgb) in outcomes {
-            let Some(rgb) = rgb else { continue };
+        for (words, rgb) in self.session.resets(self.param) {
+            let words = format!("to the {words}");
             if ui.button(words).clicked() {
                 edits.push(Edit::Reset(self.param, rgb));
                 ui.close();
@@ -141,7 +131,7 @@ impl Row<'_> {
         ui.horizontal(|ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 150.0).max(60.0);
             let (lower, upper) = info.range();
-            let slider = Slider::new(&mut value, self.range(column))
+            let slider = Slider::new(&mut value, self.session.range(column))
                 .clamping(SliderClamping::Never)
                 .logarithmic(info.scale == Scale::Log)
                 .suffix(if info.unit == "degrees" { "°" } else { "" })
@@ -156,30 +146,10 @@ impl Row<'_> {
             if is_over(&response, value != before) {
                 edits.push(Edit::Settled);
             }
-            if let Some(error) = self.error(column) {
+            if let Some(error) = self.session.error_words(column) {
                 ui.weak(error).on_hover_text("Standard error of the last fit");
             }
         });
-    }
-
-    /// What the slider's ends stand for: the bounds, where they are finite, else four times what it may well be.
-    fn range(&self, column: Column) -> RangeInclusive<f64> {
-        let info = self.param.info();
-        let known = [column.get(&self.first.params), self.param.default(self.values.form)];
-        let fitted = self.session.fitted().map_or(0.0, |params| column.get(params));
-        let most = known.into_iter().chain([fitted]).fold(0.25, |most: f64, value| most.max(value.abs()));
-        let most = if info.unit == "degrees" { 180.0 } else { 4.0 * most };
-        let lower = if info.lower.is_finite() { info.lower } else { -most };
-        let upper = if info.upper.is_finite() { info.upper } else { most };
-        lower..=upper
-    }
-
-    fn error(&self, column: Column) -> Option<String> {
-        let outcome = self.session.outcome()?.constant(&column.name())?;
-        Some(outcome.std_error.map_or_else(
-            || (if outcome.at_bound { "at its bound" } else { "?" }).to_owned(),
-            |error| format!("± {error:.2e}"),
-        ))
     }
 }
 

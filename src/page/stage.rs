@@ -1,0 +1,226 @@
+//! The worker that draws: a session, told what one does on the page.
+
+use std::cell::RefCell;
+use std::collections::HashMap;
+use std::path::PathBuf;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use js_sys::Function;
+use skinfit_core::files;
+use skinfit_view::archive::{FITTED, REPORT};
+use skinfit_view::fitting::{FitControl, Tell};
+use skinfit_view::look::{Look, Pane};
+use skinfit_view::paint::Engine;
+use skinfit_view::pixels::{pixels, ramp};
+use skinfit_view::shown::{self, Kind};
+use skinfit_view::values::Values;
+use skinfit_view::{FitRequest, Host, Session, Start};
+use wasm_bindgen::prelude::wasm_bindgen;
+use wasm_bindgen::{JsError, JsValue};
+
+use crate::command::{self, Command, pane};
+use crate::held::{hold, reading};
+use crate::message::{Ask, Request, Say};
+use crate::state::State;
+use crate::told::tell_progress;
+
+/// Where constants are put to be saved.
+const SAVED: &str = "/page/saved.toml";
+
+thread_local! {
+    static WAKE: RefCell<Option<Function>> = const { RefCell::new(None) };
+}
+
+/// Have the page poll soon.
+fn wake() {
+    WAKE.with_borrow(|wake| {
+        if let Some(wake) = wake {
+            // It only notes that it is to poll.
+            let _ = wake.call0(&JsValue::UNDEFINED);
+        }
+    });
+}
+
+/// What goes between the session and the worker that fits.
+#[derive(Debug, Default)]
+struct Post {
+    /// What that is to be asked.
+    asks: Vec<Ask>,
+    /// Who hears what it says.
+    tell: Option<Tell>,
+    paused: bool,
+}
+
+type Shared = Arc<Mutex<Post>>;
+
+fn post(shared: &Shared) -> std::sync::MutexGuard<'_, Post> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The page, as the session knows it.
+struct PageHost(Shared);
+
+impl Host for PageHost {
+    fn begin_fit(&self, request: FitRequest, tell: Tell) -> Box<dyn FitControl> {
+        let ask = if request.resume { Ask::Resume } else { Ask::Fit(Request::of(&request)) };
+        let mut post = post(&self.0);
+        post.asks.push(ask);
+        (post.tell, post.paused) = (Some(tell), false);
+        drop(post);
+        Box::new(Control(Arc::clone(&self.0)))
+    }
+
+    fn save_scene(&self, _: &std::path::Path, _: &Values, _: &std::path::Path) -> Result<(), String> {
+        Err("a page writes no scene files: save the constants.".to_owned())
+    }
+}
+
+/// The fit in the other worker.
+#[derive(Debug)]
+struct Control(Shared);
+
+impl FitControl for Control {
+    fn set_paused(&mut self, paused: bool) {
+        let mut post = post(&self.0);
+        post.paused = paused;
+        post.asks.push(Ask::Pause { on: paused });
+    }
+
+    fn is_paused(&self) -> bool {
+        post(&self.0).paused
+    }
+
+    fn stop(&mut self) {
+        let mut post = post(&self.0);
+        post.paused = false;
+        post.asks.push(Ask::Stop);
+    }
+}
+
+/// A pane that was given to the page: its images, and how they were shown.
+type Given = (usize, usize, String);
+
+/// The page's worker.
+#[wasm_bindgen]
+pub struct Stage {
+    session: Session,
+    look: Look,
+    post: Shared,
+    given: HashMap<String, Given>,
+}
+
+#[wasm_bindgen]
+impl Stage {
+    /// Over the page's scene, as an archive, drawn on the CPU where `cpu` says so. `wake` is called when there is
+    /// something to poll, `tell` with words on long work.
+    ///
+    /// # Errors
+    /// When it is none.
+    #[wasm_bindgen(constructor)]
+    pub fn new(archive: &[u8], cpu: bool, wake_page: Function, tell: Function) -> Result<Self, JsError> {
+        WAKE.set(Some(wake_page));
+        tell_progress(tell);
+        let held = hold(archive).map_err(|words| JsError::new(&words))?;
+        let start = Start {
+            reading: reading(),
+            fitted: held.fitted.then(|| PathBuf::from(FITTED)),
+            report: held.report.then(|| PathBuf::from(REPORT)),
+            run: PathBuf::from("/fit"),
+            engine: Engine { cpu, adapter: None },
+            ..Start::default()
+        };
+        let shared = Shared::default();
+        let host = Arc::new(PageHost(Arc::clone(&shared)));
+        let session = Session::new(host, start, Arc::new(wake));
+        Ok(Self { session, look: Look::default(), post: shared, given: HashMap::new() })
+    }
+
+    /// Do what is said, as JSON.
+    ///
+    /// # Errors
+    /// When it is something else.
+    pub fn command(&mut self, command: &str) -> Result<(), JsError> {
+        let command: Command = serde_json::from_str(command)?;
+        command::run(&mut self.session, &mut self.look, command);
+        Ok(())
+    }
+
+    /// Take in what was answered, ask for what is to be shown, and give all that the page shows but its images, as JSON.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn poll(&mut self) -> Result<String, JsError> {
+        self.session.poll();
+        Ok(serde_json::to_string(&State::of(&self.session, &self.look))?)
+    }
+
+    /// What the worker that fits is to be asked, as a list of JSON texts.
+    pub fn asks(&mut self) -> Vec<String> {
+        // Numbers and names are all that is in them: they can be written.
+        post(&self.post).asks.drain(..).filter_map(|ask| serde_json::to_string(&ask).ok()).collect()
+    }
+
+    /// Hear what that worker says.
+    ///
+    /// # Errors
+    /// When it is something else.
+    pub fn hear(&mut self, said: &str) -> Result<(), JsError> {
+        let said: Say = serde_json::from_str(said)?;
+        let (Some(values), Some(tell)) = (self.session.values(), post(&self.post).tell.clone()) else {
+            return Ok(());
+        };
+        tell.say(said.message(&values.params));
+        Ok(())
+    }
+
+    /// A pane's pixels, where they are others than were given last: red, green, blue and 255 of each, row by row.
+    pub fn pixels(&mut self, name: &str) -> Option<Vec<u8>> {
+        let pane = pane(name)?;
+        let Some([first, second]) = shown::pair(&self.session, pane, self.look.error) else {
+            self.given.remove(name);
+            return None;
+        };
+        let place = |image| Arc::as_ptr(image) as usize;
+        // It is made of numbers and names.
+        let look = serde_json::to_string(&self.look).unwrap_or_default();
+        let given = (place(&first), place(&second), look);
+        if self.given.get(name) == Some(&given) {
+            return None;
+        }
+        self.given.insert(name.to_owned(), given);
+        let kind = if pane == Pane::Error { Kind::Error(self.look.error) } else { Kind::Image };
+        Some(pixels([&*first, &*second], kind, &self.look))
+    }
+
+    /// The 256 colours of an error's scale, from least to greatest: red, green, blue and 255 of each.
+    pub fn ramp(&self, signed: bool) -> Vec<u8> {
+        ramp(signed)
+    }
+
+    /// A pixel as all panes have it: a list of names and words, as JSON.
+    ///
+    /// # Errors
+    /// When it cannot be written.
+    pub fn probe(&self, x: u32, y: u32) -> Result<String, JsError> {
+        Ok(serde_json::to_string(&skinfit_view::probe::rows(&self.session, [x, y]))?)
+    }
+
+    /// The constants, as `params.toml`.
+    pub fn params_file(&mut self) -> Option<String> {
+        let file = PathBuf::from(SAVED);
+        self.session.save_params(&file);
+        files::read_to_string(&file).ok()
+    }
+
+    /// The constants, by the names of their sliders: what a test compares.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn constants(&self) -> Result<String, JsError> {
+        let values = self.session.values().map(|values| {
+            let of = |column: &crate::model::params::Column| (column.name(), column.get(&values.params));
+            values.free.iter().map(of).collect::<Vec<_>>()
+        });
+        Ok(serde_json::to_string(&values.unwrap_or_default())?)
+    }
+}
