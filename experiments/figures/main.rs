@@ -16,6 +16,7 @@ mod diffusion;
 mod lab;
 mod light;
 mod lobes;
+mod page;
 mod pages;
 mod passes;
 mod race;
@@ -49,6 +50,7 @@ const FILES: &[(&str, Measure)] = &[
     ("docs/accuracy.json", accuracy::tests),
     ("docs/noise.json", accuracy::noise),
     ("docs/closeup.json", closeup::measure),
+    ("docs/page.json", page::measure),
     ("docs/window.json", window::software),
     ("docs/window_card.json", window::graphics_card),
     ("experiments/ablation/results.json", studies::ablation),

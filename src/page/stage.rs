@@ -2,7 +2,7 @@
 
 use std::cell::RefCell;
 use std::collections::HashMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use js_sys::Function;
@@ -14,7 +14,7 @@ use skinfit_view::paint::Engine;
 use skinfit_view::pixels::{pixels, ramp};
 use skinfit_view::shown::{self, Kind};
 use skinfit_view::values::Values;
-use skinfit_view::{FitRequest, Host, Session, Start};
+use skinfit_view::{FitRequest, Host, Run, Session, Start};
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsError, JsValue};
 
@@ -70,7 +70,15 @@ impl Host for PageHost {
         Box::new(Control(Arc::clone(&self.0)))
     }
 
-    fn save_scene(&self, _: &std::path::Path, _: &Values, _: &std::path::Path) -> Result<(), String> {
+    fn start(&self, _: &Path) -> Result<Start, String> {
+        Err("a page opens no other scene: write a page of that.".to_owned())
+    }
+
+    fn run(&self, _: &Path) -> Result<Run, String> {
+        Err("a page compares no other run: load its constants.".to_owned())
+    }
+
+    fn save_scene(&self, _: &Path, _: &Values, _: &Path) -> Result<(), String> {
         Err("a page writes no scene files: save the constants.".to_owned())
     }
 }
@@ -123,8 +131,10 @@ impl Stage {
         let held = hold(archive).map_err(|words| JsError::new(&words))?;
         let start = Start {
             reading: reading(),
-            fitted: held.fitted.then(|| PathBuf::from(FITTED)),
-            report: held.report.then(|| PathBuf::from(REPORT)),
+            fitted: held.fitted.then(|| Run {
+                params: PathBuf::from(FITTED),
+                report: held.report.then(|| PathBuf::from(REPORT)),
+            }),
             run: PathBuf::from("/fit"),
             engine: Engine { cpu, adapter: None },
             ..Start::default()

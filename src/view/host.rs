@@ -1,12 +1,13 @@
 //! What the program around the window does for it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use crate::engine::Point;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fitting::{FitControl, Tell};
+use crate::start::{Run, Start};
 use crate::values::Values;
 
 /// A fit that the window asks for: of its scene's file, with what was changed in it.
@@ -112,16 +113,23 @@ pub trait Host: Send + Sync {
     /// `tell` hears of each iteration, and of the end.
     fn begin_fit(&self, request: FitRequest, tell: Tell) -> Box<dyn FitControl>;
 
+    /// What is looked at first of a scene's file or a run folder.
+    ///
+    /// # Errors
+    /// When it is neither.
+    fn start(&self, path: &Path) -> Result<Start, String>;
+
+    /// What a run has left, or a file of constants.
+    ///
+    /// # Errors
+    /// When it is no run.
+    fn run(&self, path: &Path) -> Result<Run, String>;
+
     /// Leave the scene's file with what was changed in it as `file`, which any command reads.
     ///
     /// # Errors
     /// When it cannot be written.
-    fn save_scene(
-        &self,
-        scene: &std::path::Path,
-        values: &Values,
-        file: &std::path::Path,
-    ) -> Result<(), String>;
+    fn save_scene(&self, scene: &Path, values: &Values, file: &Path) -> Result<(), String>;
 }
 
 /// The window cannot be shown, or what it shows cannot be.

@@ -1,7 +1,7 @@
 //! A fit that is seen and touched: what the window and the page hold, and the window itself.
 //!
 //! - [`host`]: what the program around them does for them
-//! - state, which knows no widgets: [`values`] (what one edits), [`history`] (undo and redo), [`opened`] (a scene that
+//! - state, which knows no widgets: [`start`] (what is looked at first), [`values`] (what one edits), [`history`] (undo and redo), [`opened`] (a scene that
 //!   is looked at), [`look`] (how images are shown), [`shown`] (what panes show), [`pixels`] (a pane in 8 bits),
 //!   [`probe`] (one pixel), [`reported`] (what a run's report says), [`session`] (all of it)
 //! - work beside them, whose answers the session polls: [`paint`] (images and their scores), [`fitting`]
@@ -28,6 +28,7 @@ pub mod probe;
 pub mod reported;
 pub mod session;
 pub mod shown;
+pub mod start;
 pub mod values;
 #[cfg(feature = "window")]
 pub mod window;
@@ -35,6 +36,7 @@ pub mod window;
 #[cfg(feature = "window")]
 pub use eframe::egui;
 pub use host::{FitRequest, Host, ViewError};
-pub use session::{Session, Start};
+pub use session::Session;
+pub use start::{Run, Start};
 #[cfg(feature = "window")]
 pub use window::{Window, open_window};

@@ -28,27 +28,11 @@ use crate::host::{Fitted, Found, Host, ViewScore};
 use crate::model::effects::Effect;
 use crate::model::params::{Param, Params};
 use crate::opened::{Opened, Reading};
-use crate::paint::{Engine, Job, PaintWorker, Painted, Slot, Wake};
+use crate::paint::{Job, PaintWorker, Painted, Slot, Wake};
 use crate::reported::reported;
 use crate::scene::view::Camera;
+use crate::start::{Run, Start};
 use crate::values::Values;
-
-/// What a window begins with.
-#[derive(Clone, Debug, Default)]
-pub struct Start {
-    /// The scene.
-    pub reading: Reading,
-    /// Constants that were fitted to it, as `params.toml`.
-    pub fitted: Option<PathBuf>,
-    /// What is known of these, and how good they are, as `report.json`.
-    pub report: Option<PathBuf>,
-    /// Constants of another run, to be compared.
-    pub other: Option<PathBuf>,
-    /// Where fits are left.
-    pub run: PathBuf,
-    /// What draws.
-    pub engine: Engine,
-}
 
 /// The window's state.
 pub struct Session {
@@ -61,6 +45,7 @@ pub struct Session {
     first: Option<Values>,
     fitted: Option<Params>,
     other: Option<Params>,
+    other_fit: Option<Fitted>,
     found: Option<Found>,
     scores: Vec<ViewScore>,
     painter: PaintWorker,
@@ -101,6 +86,7 @@ impl Session {
             first: None,
             fitted: None,
             other: None,
+            other_fit: None,
             found: None,
             scores: Vec::new(),
             painter,
@@ -132,6 +118,30 @@ impl Session {
             self.told.push(format!("no thread can be had: {error}"));
         }
         self.opening = Some(opening);
+    }
+
+    /// Look at another scene or run in the place of this one; not while a fit runs.
+    pub fn open(&mut self, path: &Path) {
+        if self.fitting.is_some() {
+            self.told.push("a fit is under way: stop it first.".to_owned());
+            return;
+        }
+        match self.host.start(path) {
+            Ok(start) => {
+                let start = Start { engine: self.start.engine.clone(), ..start };
+                *self = Self::new(Arc::clone(&self.host), start, Arc::clone(&self.wake));
+            }
+            Err(error) => self.told.push(error),
+        }
+    }
+
+    /// Compare another run, or the constants of a file.
+    pub fn compare(&mut self, path: &Path) {
+        let Some(opened) = self.opened.clone() else { return };
+        match self.host.run(path) {
+            Ok(run) => (self.other, self.other_fit) = self.left_by(&opened, Some(&run)),
+            Err(error) => self.told.push(error),
+        }
     }
 
     /// Take in what was answered, and ask for what is to be shown.
@@ -177,26 +187,11 @@ impl Session {
         }
         let scene = Values::of(&opened.baked);
         let first = self.values.is_none().then(|| scene.clone());
-        let params = |file: &Option<PathBuf>| -> Option<Result<Params, String>> {
-            let (scene, file) = (&opened.baked.scene, file.as_ref()?);
-            let read = ParamsFile::read(file, scene.form, &scene.params);
-            Some(read.map(|file| file.of_scene(&scene.path).params).map_err(|error| error.to_string()))
-        };
-        let (fitted, other) = (params(&self.start.fitted), params(&self.start.other));
-        for (place, read) in [(&mut self.fitted, fitted), (&mut self.other, other)] {
-            match read {
-                Some(Ok(params)) if place.is_none() => *place = Some(params),
-                Some(Err(error)) if !self.told.contains(&error) => self.told.push(error),
-                _ => {}
-            }
-        }
-        if first.is_some()
-            && let (Some(report), Some(params)) = (&self.start.report, &self.fitted)
-        {
-            match reported(report, Point { params: params.clone(), gains: scene.gains.clone() }) {
-                Ok(Fitted { found, views }) => (self.found, self.scores) = (Some(found), views),
-                Err(error) => self.told.push(error),
-            }
+        if first.is_some() {
+            let (fitted, known) = self.left_by(&opened, self.start.fitted.clone().as_ref());
+            let (found, views) = known.map(|Fitted { found, views }| (found, views)).unzip();
+            (self.fitted, self.found, self.scores) = (fitted, found, views.unwrap_or_default());
+            (self.other, self.other_fit) = self.left_by(&opened, self.start.other.clone().as_ref());
         }
         if let Some(scene) = first {
             // A run's sliders stand where its fit ended.
@@ -207,6 +202,27 @@ impl Session {
         self.view = self.view.min(opened.views().len().saturating_sub(1));
         self.opened = Some(opened);
         self.asked.clear();
+    }
+
+    /// What a run has left: its constants, and what is known of them. What cannot be read is told.
+    fn left_by(&mut self, opened: &Opened, run: Option<&Run>) -> (Option<Params>, Option<Fitted>) {
+        let Some(Run { params, report }) = run else { return (None, None) };
+        let scene = &opened.baked.scene;
+        let file = match ParamsFile::read(params, scene.form, &scene.params) {
+            Ok(file) => file.of_scene(&scene.path),
+            Err(error) => {
+                self.told.push(error.to_string());
+                return (None, None);
+            }
+        };
+        let gains = vec![1.0; scene.views.len()];
+        let known =
+            report.as_ref().map(|report| reported(report, Point { params: file.params.clone(), gains }));
+        let known = known.transpose().unwrap_or_else(|error| {
+            self.told.push(error);
+            None
+        });
+        (Some(file.params), known)
     }
 
     /// The camera that images are seen from.
@@ -273,6 +289,12 @@ impl Session {
     #[must_use]
     pub const fn other(&self) -> Option<&Params> {
         self.other.as_ref()
+    }
+
+    /// What is known of those, and how good they are, where there is a report of it.
+    #[must_use]
+    pub const fn other_fit(&self) -> Option<&Fitted> {
+        self.other_fit.as_ref()
     }
 
     /// What is known of the last fit of this window.

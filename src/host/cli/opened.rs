@@ -2,6 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use skinfit_view::Run;
+#[cfg(feature = "view")]
+use skinfit_view::{Start, opened::Reading};
+
 use super::Refusal;
 use super::run_folder::default_folder;
 
@@ -18,10 +22,8 @@ pub(super) struct SceneOrRun {
     pub(super) run: Option<PathBuf>,
     /// The scene's file; the built-in scene where there is none.
     pub(super) scene: Option<PathBuf>,
-    /// Constants that were fitted, as `params.toml`.
-    pub(super) fitted: Option<PathBuf>,
-    /// What is known of them, as `report.json`: of a run that was stopped there is none.
-    pub(super) report: Option<PathBuf>,
+    /// What it has found.
+    pub(super) fitted: Option<Run>,
 }
 
 impl SceneOrRun {
@@ -31,15 +33,21 @@ impl SceneOrRun {
     /// When it is a folder, and not that of a fit of one scene.
     pub(super) fn of(path: Option<&Path>) -> Result<Self, Refusal> {
         let Some(run) = path.filter(|path| path.is_dir()) else {
-            return Ok(Self { run: None, scene: path.map(Path::to_owned), fitted: None, report: None });
+            return Ok(Self { run: None, scene: path.map(Path::to_owned), fitted: None });
         };
-        let report = run.join(REPORT);
-        Ok(Self {
-            run: Some(run.to_owned()),
-            scene: Some(file_of(run, SCENE)?),
-            fitted: Some(file_of(run, PARAMS)?),
-            report: report.is_file().then_some(report),
-        })
+        let (scene, fitted) = (Some(file_of(run, SCENE)?), Some(run_of(run)?));
+        Ok(Self { run: Some(run.to_owned()), scene, fitted })
+    }
+
+    /// What a window begins with: the scene's file at `path`, bakes in `cache`, fits beside what is looked at.
+    #[cfg(feature = "view")]
+    pub(super) fn start(self, path: PathBuf, cache: Option<PathBuf>) -> Start {
+        Start {
+            run: PathBuf::from(format!("{}.window", self.folder().display())),
+            reading: Reading { scene: path, cache, ..Reading::default() },
+            fitted: self.fitted,
+            ..Start::default()
+        }
     }
 
     /// Where what is made of it is left: the run folder, or that of a fit of the scene.
@@ -51,9 +59,14 @@ impl SceneOrRun {
     }
 }
 
-/// The constants of a run, or those of a file.
-pub(super) fn params_of(path: &Path) -> Result<PathBuf, Refusal> {
-    if path.is_dir() { file_of(path, PARAMS) } else { Ok(path.to_owned()) }
+/// What a run folder holds of its fit, or a file of constants.
+pub(super) fn run_of(path: &Path) -> Result<Run, Refusal> {
+    if !path.is_dir() {
+        return Ok(Run { params: path.to_owned(), report: None });
+    }
+    // Of a run that was stopped there is none.
+    let report = Some(path.join(REPORT)).filter(|report| report.is_file());
+    Ok(Run { params: file_of(path, PARAMS)?, report })
 }
 
 /// A file of a run folder.

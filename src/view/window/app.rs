@@ -13,11 +13,12 @@ use eframe::egui::{self, CentralPanel, Panel, ScrollArea, Ui};
 
 use super::keys::{self, Action};
 use super::progress;
-use super::{effects, offscreen, panes, picture, probe_table, rows};
+use super::{effects, offscreen, panes, picture, probe_table, rows, table};
 use crate::host::{Host, ViewError};
 use crate::look::{ErrorKind, Layout, Look, Pane};
 use crate::paint::Slot;
-use crate::session::{Orbit, Session, Start};
+use crate::session::{Orbit, Session};
+use crate::start::Start;
 
 /// Where the look is kept from window to window.
 const LOOK: &str = "look";
@@ -30,6 +31,7 @@ pub struct Window {
     /// How it is shown.
     pub look: Look,
     help: bool,
+    table: bool,
     pointed: Option<[u32; 2]>,
     /// What stands in the field for files.
     file: String,
@@ -111,6 +113,7 @@ impl Window {
             session,
             look,
             help: false,
+            table: false,
             pointed: None,
             file: "params.toml".to_owned(),
             run,
@@ -142,6 +145,15 @@ impl Window {
             let open = &mut self.help;
             egui::Window::new("Keys").open(open).collapsible(false).show(ui.ctx(), keys::list);
         }
+        if self.table {
+            let (open, session) = (&mut self.table, &self.session);
+            egui::Window::new("Constants")
+                .open(open)
+                // Beside the panel with the button that opens it.
+                .default_pos([400.0, 80.0])
+                .collapsible(false)
+                .show(ui.ctx(), |ui| ScrollArea::vertical().show(ui, |ui| table::show(ui, session)));
+        }
         if self.session.is_opening() || self.session.fitting().is_some() {
             // What the library says of its progress wakes nobody.
             ui.ctx().request_repaint_after(std::time::Duration::from_millis(100));
@@ -157,6 +169,7 @@ impl Window {
         let (session, look) = (&mut self.session, &mut self.look);
         match action {
             Action::Help => self.help = !self.help,
+            Action::Table => self.table = !self.table,
             Action::Undo => {
                 if let Some(history) = session.history() {
                     history.undo();
@@ -255,6 +268,25 @@ impl Window {
                 .clicked()
             {
                 self.session.save_scene(&file);
+            }
+            if ui
+                .button("open")
+                .on_hover_text("A scene, or the run folder of a fit, in the place of this one")
+                .clicked()
+            {
+                self.session.open(&file);
+                self.run = self.session.run_folder().display().to_string();
+            }
+            if ui
+                .button("compare")
+                .on_hover_text("Another run's folder, or a params.toml, beside this one")
+                .clicked()
+            {
+                self.session.compare(&file);
+                self.look.set_pane(Pane::Other, self.session.other().is_some());
+            }
+            if ui.button("table").on_hover_text("All constants, side by side").clicked() {
+                self.table = !self.table;
             }
         });
     }

@@ -8,6 +8,7 @@ use crate::look::Pane;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Action {
     Help,
+    Table,
     Undo,
     Redo,
     Fit,
@@ -45,8 +46,9 @@ const SHIFT: Modifiers = Modifiers::SHIFT;
 const ALT: Modifiers = Modifiers::ALT;
 
 /// The keys, what they do, and how the list says it.
-pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 37] = [
+pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 38] = [
     (NONE, Key::F1, Action::Help, "this list"),
+    (NONE, Key::F2, Action::Table, "all constants, side by side"),
     (COMMAND, Key::Z, Action::Undo, "undo"),
     (COMMAND.plus(Modifiers::SHIFT), Key::Z, Action::Redo, "redo"),
     (COMMAND, Key::Y, Action::Redo, "redo"),

@@ -1,6 +1,6 @@
 //! The window: widgets over a [`Session`](crate::Session).
 //!
-//! - [`app`]: the window; `rows` (parameters), `effects`, `panes` over `picture` (images on the adapter), `probe_table`,
+//! - [`app`]: the window; `rows` (parameters), `table` (constants side by side), `effects`, `panes` over `picture` (images on the adapter), `probe_table`,
 //!   `curves`, `keys`, `progress` (how far long work is)
 //! - without a display: [`offscreen`] (the window as an image), [`mod@bench`] (how fast it is)
 
@@ -15,6 +15,7 @@ mod picture;
 mod probe_table;
 mod progress;
 mod rows;
+mod table;
 
 pub use app::{Window, open_window};
 pub use progress::watch_progress;

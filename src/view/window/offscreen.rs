@@ -17,7 +17,7 @@ use wgpu::{
 
 use crate::Window;
 use crate::host::{Host, ViewError};
-use crate::session::Start;
+use crate::start::Start;
 use crate::window::picture;
 
 /// Flat colours are drawn as they are: dithering costs a software adapter a good part of a frame.

@@ -12,7 +12,7 @@ use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
-use super::opened::{SceneOrRun, params_of};
+use super::opened::{SceneOrRun, run_of};
 use super::scene::BakeArguments;
 use super::{Exit, Refusal, say, unfinished};
 use crate::output;
@@ -57,7 +57,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let player = player(arguments.player.as_deref())?;
     let mut of = SceneOrRun::of(arguments.scene.as_deref())?;
     if let Some(params) = &arguments.params {
-        (of.fitted, of.report) = (Some(params_of(params)?), None);
+        of.fitted = Some(run_of(params)?);
     }
     let scratch = unfinished::scratch()?;
     let scene = arguments.bakes.kept_path(of.scene.as_deref(), scratch.path())?;

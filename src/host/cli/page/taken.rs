@@ -17,7 +17,7 @@ const FOLDER: &str = "/scene";
 
 /// An archive of the scene's file, all that it names, fitted constants, and bakes.
 pub(super) fn taken(scene: &Path, of: &SceneOrRun, cache: &Path) -> Result<Vec<u8>, Refusal> {
-    let read = read_from(scene, of, cache)?;
+    let read = read_from(scene, cache)?;
     let text = std::fs::read_to_string(scene)?;
     let home = plain(scene);
     let home = home.parent().unwrap_or(Path::new("/"));
@@ -39,7 +39,8 @@ pub(super) fn taken(scene: &Path, of: &SceneOrRun, cache: &Path) -> Result<Vec<u
         };
         files.push((name, std::fs::read(&path)?));
     }
-    for (name, file) in [(archive::FITTED, &of.fitted), (archive::REPORT, &of.report)] {
+    let (params, report) = of.fitted.as_ref().map(|run| (&run.params, &run.report)).unzip();
+    for (name, file) in [(archive::FITTED, params), (archive::REPORT, report.and_then(Option::as_ref))] {
         if let Some(file) = file {
             files.push((PathBuf::from(name), std::fs::read(file)?));
         }
@@ -49,20 +50,15 @@ pub(super) fn taken(scene: &Path, of: &SceneOrRun, cache: &Path) -> Result<Vec<u
 
 /// What the scene is read from, with its effects as they are and without each of them: one that is switched off in the
 /// page may ask for another bake.
-fn read_from(scene: &Path, of: &SceneOrRun, cache: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let reading = Reading {
-        scene: scene.to_owned(),
-        params: of.fitted.clone(),
-        cache: Some(cache.to_owned()),
-        effects: None,
-    };
+fn read_from(scene: &Path, cache: &Path) -> Result<Vec<PathBuf>, Refusal> {
+    let reading =
+        Reading { scene: scene.to_owned(), params: None, cache: Some(cache.to_owned()), effects: None };
     let (opened, mut files) = recorded(|| Opened::read(&reading));
     let effects = opened.map_err(Refusal::new)?.baked.scene.effects;
-    files.retain(|path| of.fitted.as_ref().is_none_or(|fitted| plain(fitted) != *path));
     let each: Vec<_> = effects.iter().filter(|effect| effect.info().within.is_none()).collect();
     let bar = progress::bar("effects", each.len() as u64);
     for effect in each {
-        let reading = Reading { effects: Some(effects.without(effect)), params: None, ..reading.clone() };
+        let reading = Reading { effects: Some(effects.without(effect)), ..reading.clone() };
         let (opened, read) = recorded(|| Opened::read(&reading));
         // A scene that cannot be read without it has nothing to be baked then.
         if opened.is_ok() {

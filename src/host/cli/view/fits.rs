@@ -1,6 +1,6 @@
 //! What the window asks of the command line: fits, and scene files with what was changed in them.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -9,12 +9,12 @@ use skinfit_view::fitting::{FitControl, Tell, on_a_thread};
 use skinfit_view::host::Fitted;
 use skinfit_view::reported::reported;
 use skinfit_view::values::Values;
-use skinfit_view::{FitRequest, Host};
+use skinfit_view::{FitRequest, Host, Run, Start as View};
 
 use crate::cli::fit;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::interrupt::Interrupt;
-use crate::cli::opened::{REPORT, SCENE};
+use crate::cli::opened::{REPORT, SCENE, SceneOrRun, run_of};
 use crate::cli::run_folder::{RunFolder, scene_text};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
@@ -26,6 +26,8 @@ use crate::study::suggest::names;
 pub(super) struct CommandLine {
     /// Words of the command line that say where bakes are kept.
     pub(super) bakes: Vec<String>,
+    /// Where they are kept.
+    pub(super) cache: Option<PathBuf>,
 }
 
 /// The command line of a fit.
@@ -67,6 +69,16 @@ impl Host for CommandLine {
     fn begin_fit(&self, request: FitRequest, tell: Tell) -> Box<dyn FitControl> {
         let host = self.clone();
         on_a_thread(tell, move |watch, interrupt| host.fit(&request, watch, interrupt))
+    }
+
+    fn start(&self, path: &Path) -> Result<View, String> {
+        let of = SceneOrRun::of(Some(path)).map_err(|refusal| refusal.words)?;
+        let scene = of.scene.clone().unwrap_or_else(|| path.to_owned());
+        Ok(of.start(scene, self.cache.clone()))
+    }
+
+    fn run(&self, path: &Path) -> Result<Run, String> {
+        run_of(path).map_err(|refusal| refusal.words)
     }
 
     fn save_scene(&self, scene: &Path, values: &Values, file: &Path) -> Result<(), String> {

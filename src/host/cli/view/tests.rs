@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use egui_kittest::wgpu::WgpuTestRenderer;
-use egui_kittest::{Harness, Node};
+use egui_kittest::{Harness, Node, SnapshotOptions, image_snapshot_options};
+use image::imageops::crop_imm;
 use skinfit_view::egui::accesskit::Role;
 use skinfit_view::egui::{Context, Key, Modifiers, Pos2, Vec2};
 use skinfit_view::look::{Layout, Pane};
@@ -50,7 +51,7 @@ fn start(folder: &Path) -> Start {
 /// Words of the command line that name the same bakes.
 fn host(start: &Start) -> Arc<CommandLine> {
     let cache = start.reading.cache.as_ref().unwrap().display().to_string();
-    Arc::new(CommandLine { bakes: vec!["--cache".to_owned(), cache] })
+    Arc::new(CommandLine { bakes: vec!["--cache".to_owned(), cache], cache: start.reading.cache.clone() })
 }
 
 /// A window over a scene, complete.
@@ -334,6 +335,27 @@ fn panes_show_what_tone_mapping_says() {
     }
 }
 
+/// What the window looks like above the fit's panel, whose times differ from run to run. `UPDATE_SNAPSHOTS=1` draws it anew.
+#[test]
+fn the_window_looks_as_it_did() {
+    if left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut hand = open(&start(folder.path()));
+    hand.state_mut().look.panes = vec![Pane::Target, Pane::Now, Pane::Error];
+    hand.state_mut().point_at([160, 150]);
+    settle(&mut hand);
+    hand.run_steps(3);
+    let below = hand.get_by_role_and_label(Role::Button, "fit").rect().min.y as u32 - 10;
+    let shown = hand.render().unwrap();
+    let top = crop_imm(&shown, 0, 0, shown.width(), below).to_image();
+    // A software adapter of another version rounds a colour by a level or two, and takes other samples at the head's
+    // edge, of which there are some thousand pixels in three panes.
+    let options = SnapshotOptions::new().threshold(1.0).max_failed_pixels(600_usize);
+    image_snapshot_options(&top, "window", &options.output_path("cli/view/snapshots"));
+}
+
 #[test]
 fn an_effect_is_switched_and_what_it_brought_is_told() {
     if left_out() {
@@ -383,6 +405,76 @@ fn presets_go_out_and_come_back() {
     hand.state_mut().session.save_scene(&scene);
     let read = crate::prepare::Loaded::read(&scene, &crate::prepare::PrepareOptions::default()).unwrap();
     assert_eq!(read.scene.params.rgb(Param::BaseWeight), moved);
+}
+
+/// Write a path into the field for files.
+fn name_file(hand: &mut Hand<'_>, path: &Path) {
+    node(hand, "file").focus();
+    hand.step();
+    hand.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    hand.step();
+    node(hand, "file").type_text(&path.display().to_string());
+    hand.step();
+}
+
+#[test]
+fn a_run_is_opened_beside_another_and_a_table_has_both() {
+    if left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let mut hand = open(&start(folder.path()));
+    click(&mut hand, "Files");
+    hand.run_steps(20);
+    // Two runs: all that the scene leaves free, and without a term.
+    click(&mut hand, "fit");
+    until(&mut hand, "the fit ends", |window| window.session.found().is_some());
+    let (whole, part) = (folder.path().join("run"), folder.path().join("part"));
+    let found = hand.state().session.found().unwrap().clone();
+    hand.state_mut().session.set_run_folder(part.clone());
+    click(&mut hand, "undo");
+    click(&mut hand, "fit hilite");
+    click(&mut hand, "fit");
+    until(&mut hand, "the fit ends", |window| {
+        window.session.found().is_some() && window.session.fitting().is_none()
+    });
+    settle(&mut hand);
+
+    name_file(&mut hand, &whole);
+    click(&mut hand, "open");
+    settle(&mut hand);
+    let session = &hand.state().session;
+    assert!(session.told().is_empty(), "{:?}", session.told());
+    assert_eq!(session.fitted().unwrap(), session.values().map(|values| &values.params).unwrap());
+    // What the report says of it is there as after the fit itself: to the digits that the files have.
+    let read = session.found().unwrap();
+    assert_eq!((&read.known, read.loss, &read.losses), (&found.known, found.loss, &found.losses));
+    assert_eq!(session.scores().len(), session.opened().unwrap().views().len());
+
+    name_file(&mut hand, &part);
+    click(&mut hand, "compare");
+    settle(&mut hand);
+    assert!(hand.state().look.panes.contains(&Pane::Other));
+    assert!(hand.state().session.image(Slot::Other).is_some());
+    click(&mut hand, "table");
+    hand.run_steps(4);
+    node(&hand, "other run, dB");
+    let other = hand.state().session.other_fit().unwrap();
+    assert!(other.found.constant("hilite.r").is_none() && other.found.loss > read_loss(&hand), "{other:?}");
+    let score = other.views[0].psnr;
+    node(&hand, &format!("{score:.2}"));
+
+    hand.key_press(Key::F2);
+    hand.run_steps(4);
+    assert!(hand.query_by_label("other run, dB").is_none(), "the table is closed");
+    name_file(&mut hand, &folder.path().join("nothing.toml"));
+    click(&mut hand, "compare");
+    settle(&mut hand);
+    assert!(hand.state().session.told().last().unwrap().contains("nothing.toml"));
+}
+
+fn read_loss(hand: &Hand<'_>) -> f64 {
+    hand.state().session.found().unwrap().loss
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! The window, for the command's arguments.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use skinfit_view::opened::Reading;
@@ -12,7 +12,7 @@ use skinfit_view::{Start, ViewError, open_window};
 
 use super::Arguments;
 use super::fits::CommandLine;
-use crate::cli::opened::{SceneOrRun, params_of};
+use crate::cli::opened::{SceneOrRun, run_of};
 use crate::cli::{Exit, Refusal, quieten_graphics, say, unfinished};
 
 /// Open the window, or leave what it shows.
@@ -23,7 +23,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let homeless = arguments.scene.is_none() && arguments.bakes.cache().is_none();
     let scratch = homeless.then(unfinished::scratch).transpose()?;
     let start = start(arguments, scratch.as_ref().map_or(Path::new(""), |scratch| scratch.path()))?;
-    let host = Arc::new(CommandLine { bakes: arguments.bakes.words() });
+    let host = Arc::new(CommandLine { bakes: arguments.bakes.words(), cache: arguments.bakes.cache() });
     let name = arguments
         .scene
         .as_ref()
@@ -65,21 +65,12 @@ fn without_a_display(error: ViewError) -> Refusal {
 fn start(arguments: &Arguments, scratch: &Path) -> Result<Start, Refusal> {
     let of = SceneOrRun::of(arguments.scene.as_deref())?;
     let path = arguments.bakes.kept_path(of.scene.as_deref(), scratch)?;
-    let output = arguments
-        .output
-        .clone()
-        .unwrap_or_else(|| PathBuf::from(format!("{}.window", of.folder().display())));
+    let start = of.start(path, arguments.bakes.cache());
     Ok(Start {
-        reading: Reading {
-            scene: path,
-            params: arguments.params.clone(),
-            cache: arguments.bakes.cache(),
-            ..Reading::default()
-        },
-        fitted: of.fitted,
-        report: of.report,
-        other: arguments.compare.as_deref().map(params_of).transpose()?,
-        run: output,
+        reading: Reading { params: arguments.params.clone(), ..start.reading },
+        other: arguments.compare.as_deref().map(run_of).transpose()?,
+        run: arguments.output.clone().unwrap_or(start.run),
         engine: Engine { cpu: arguments.engine == "cpu", adapter: arguments.adapter.clone() },
+        ..start
     })
 }
