@@ -16,7 +16,9 @@ use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::{FitOptions, fit_watched};
 use crate::held::{hold, reading};
 use crate::message::{Ask, At, Request, Say, Told};
-use crate::prepare::{JointScene, JointScenes, NamedScene, PrepareOptions, ReadyScene, read_one_skin};
+use crate::prepare::{
+    JointScene, JointScenes, Loaded, NamedScene, PrepareOptions, ReadyScene, read_one_skin,
+};
 use crate::render::shade::Shader;
 use crate::report::compared::compared;
 use crate::report::metrics::Comparison;
@@ -40,6 +42,7 @@ pub struct Fitter {
 
 /// A fit, and how far it is.
 struct UnderWay {
+    request: Request,
     scenes: JointScenes,
     /// Whether there is a state to go on from.
     begun: bool,
@@ -68,19 +71,24 @@ impl Fitter {
         match serde_json::from_str(ask)? {
             Ask::Fit(request) => {
                 (self.paused, self.under_way) = (false, None);
-                match UnderWay::new(&request) {
+                match UnderWay::new(request) {
                     Ok(fit) => self.under_way = Some(fit),
                     Err(words) => self.say.push(Say::Failed { words }),
                 }
             }
-            Ask::Resume => {
+            Ask::Resume(request) => {
                 self.paused = false;
-                match &mut self.under_way {
-                    Some(fit) => fit.running = true,
-                    None => self.say.push(Say::Failed {
-                        words: "there is no fit to go on with: this page has stopped none. Fit.".to_owned(),
-                    }),
-                }
+                let words = match &mut self.under_way {
+                    Some(fit) if fit.request.goes_on_as(&request) => {
+                        fit.running = true;
+                        return Ok(());
+                    }
+                    Some(_) => {
+                        "the fit that was stopped had other effects, free constants or views. Put these back, or fit."
+                    }
+                    None => "there is no fit to go on with: this page has stopped none. Fit.",
+                };
+                self.say.push(Say::Failed { words: words.to_owned() });
             }
             Ask::Pause { on } => self.paused = on,
             Ask::Stop => {
@@ -113,17 +121,21 @@ impl Fitter {
 
 impl UnderWay {
     /// The scene as it is fitted, as the command line does it.
-    fn new(request: &Request) -> Result<Self, String> {
+    fn new(request: Request) -> Result<Self, String> {
         let reading = reading();
+        // Lights and terms of the scene's own are known once it was read.
+        let known = Loaded::read(&reading.scene, &PrepareOptions::default());
+        known.map_err(|error| error.to_string())?;
+        let free = request.free()?;
         let options = PrepareOptions {
             fit: true,
-            effects: Some(request.effects()),
+            effects: Some(request.effects()?),
             cache: reading.cache,
             ..PrepareOptions::default()
         };
         let scenes = read_one_skin(&[reading.scene], &options, |loaded| {
             request.set_params(&mut loaded.scene.params);
-            loaded.scene.fit.free = request.free();
+            loaded.scene.fit.free.clone_from(&free);
         });
         let scenes = scenes.map_err(|error| error.to_string())?;
         let marks = NamedScene::marked(&scenes, &request.hold_out).map_err(|error| error.to_string())?;
@@ -136,7 +148,7 @@ impl UnderWay {
         let ready: Result<Vec<ReadyScene>, crate::prepare::PrepareError> =
             scenes.into_iter().zip(marks).map(ready).collect();
         let scenes = ready.and_then(JointScenes::new).map_err(|error| error.to_string())?;
-        Ok(Self { scenes, begun: false, outcome: None, running: true })
+        Ok(Self { request, scenes, begun: false, outcome: None, running: true })
     }
 
     /// Some iterations; the end is said.

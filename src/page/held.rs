@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use js_sys::{Reflect, global};
 use skinfit_core::files;
 use skinfit_core::shader::term::library;
 use skinfit_view::archive::{BAKES, FITTED, REPORT, SCENE, unpack};
@@ -29,7 +30,12 @@ pub(crate) struct Held {
 /// When it is none.
 pub(crate) fn hold(archive: &[u8]) -> Result<Held, String> {
     library::register_all();
-    std::panic::set_hook(Box::new(|panic| error(&panic.to_string())));
+    std::panic::set_hook(Box::new(|panic| {
+        let words = panic.to_string();
+        error(&words);
+        // For the worker's script, whose own error says that the library has ended, and no more.
+        let _ = Reflect::set(&global(), &"fault".into(), &words.into());
+    }));
     let files = unpack(archive).ok_or("the page's scene is damaged. Write the page anew.")?;
     let has = |name: &str| files.iter().any(|(path, _)| path.as_os_str() == name);
     let held = Held { fitted: has(FITTED), report: has(REPORT) };

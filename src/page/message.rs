@@ -16,8 +16,8 @@ use crate::model::params::{Column, Param, Params};
 pub(crate) enum Ask {
     /// Fit from there.
     Fit(Request),
-    /// Go on with the fit that was stopped.
-    Resume,
+    /// Go on with the fit that was stopped, if it was of the same.
+    Resume(Request),
     /// Wait after the iteration that it is at, or go on.
     Pause { on: bool },
     /// End.
@@ -44,17 +44,27 @@ impl Request {
         }
     }
 
-    pub(crate) fn effects(&self) -> Effects {
-        let known = self.effects.iter().filter_map(|name| Effect::from_name(name));
-        known.fold(Effects::of(&[]), Effects::with)
+    /// Once the scene was read, which makes its lights and its own terms known.
+    pub(crate) fn effects(&self) -> Result<Effects, String> {
+        self.effects.iter().try_fold(Effects::of(&[]), |effects, name| {
+            let effect = Effect::from_name(name).ok_or_else(|| format!("the effect {name} is not known."))?;
+            Ok(effects.with(effect))
+        })
+    }
+
+    /// Whether a fit of the one can go on as a fit of the other.
+    pub(crate) fn goes_on_as(&self, other: &Self) -> bool {
+        (&self.free, &self.effects, &self.hold_out) == (&other.free, &other.effects, &other.hold_out)
     }
 
     pub(crate) fn set_params(&self, params: &mut Params) {
         set(params, &self.params);
     }
 
-    pub(crate) fn free(&self) -> Vec<Column> {
-        self.free.iter().filter_map(|name| column(name)).collect()
+    /// Once the scene was read.
+    pub(crate) fn free(&self) -> Result<Vec<Column>, String> {
+        let known = |name: &String| column(name).ok_or_else(|| format!("the constant {name} is not known."));
+        self.free.iter().map(known).collect()
     }
 }
 

@@ -12,8 +12,14 @@ const make = (name, properties = {}, ...children) => {
 
 // Bytes that the page holds as gzip in base64.
 async function unpacked(id) {
+  if (!globalThis.DecompressionStream) {
+    throw new Error("this browser cannot unpack it. Use one of 2023 or later.");
+  }
   const text = $(id).textContent.trim();
-  const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  $(id).remove();
+  const letters = atob(text);
+  const packed = new Uint8Array(letters.length);
+  for (let i = 0; i < letters.length; i += 1) packed[i] = letters.charCodeAt(i);
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   return new Response(stream).arrayBuffer();
 }
@@ -29,7 +35,7 @@ async function adapter() {
   }
 }
 
-let drawer = null, fitter = null;
+let drawer = null, fitter = null, begun = () => {};
 const send = (does, more = {}) => drawer?.postMessage({ does, ...more });
 const command = (name, more = {}) => send("command", { command: { do: name, ...more } });
 
@@ -40,35 +46,48 @@ async function begin() {
   const module = await WebAssembly.compile(library);
   const worker = (name) => {
     const made = new Worker(url, { name });
-    made.onmessage = ({ data }) => heard(data);
-    made.onerror = (event) => tell(`a worker has failed: ${event.message}`);
+    made.onmessage = ({ data }) => heard(data, name);
+    made.onerror = (event) => {
+      if (name === "draw") tell(`the worker that draws has failed: ${event.message}. Reload the page.`);
+      else heard({ said: [JSON.stringify({ is: "failed", words: event.message })], broken: true }, name);
+    };
     return made;
   };
+  // One that has failed is not used again.
+  begun = () => {
+    fitter?.terminate();
+    fitter = worker("fit");
+    fitter.postMessage({ does: "fit", module, scene });
+  };
   drawer = worker("draw");
-  fitter = worker("fit");
   if (without) note = `The CPU engine draws: ${without}.`;
   send("draw", { module, scene, cpu: without !== null });
-  fitter.postMessage({ does: "fit", module, scene });
+  begun();
   chosen(["target", "now", "error"]);
 }
 
-function heard(data) {
+function heard(data, from) {
   if (data.state) show(data.state);
   if (data.pane) {
-    const bytes = new Uint8ClampedArray(data.pixels);
+    const bytes = new Uint8ClampedArray(data.image, 8);
+    const number = (drawn += 1);
     createImageBitmap(new ImageData(bytes, data.width, data.height)).then((bitmap) => {
-      images.set(data.pane, { bitmap, bytes, width: data.width, height: data.height });
-      drawn += 1;
+      const old = images.get(data.pane);
+      // Bitmaps may be made in another order.
+      if (old?.number > number) return;
+      old?.bitmap.close();
+      images.set(data.pane, { bitmap, bytes, number, width: data.width, height: data.height });
       paint();
-    });
+    }).catch((error) => tell(`an image cannot be shown: ${error.message}`));
   }
   if (data.asks) fitter.postMessage({ does: "ask", asks: data.asks });
   if (data.said) send("said", { said: data.said });
+  if (data.broken) begun();
   if (data.probe) showProbe(data);
   if (data.saved) download("params.toml", data.saved);
   if (data.ramps) ramps = data.ramps;
   if (data.progress !== undefined) {
-    progress = data.progress;
+    progress[from] = data.progress;
     status();
   }
   if (data.constants) waiting.get(data.number)?.(data.constants);
@@ -81,13 +100,16 @@ function tell(words) {
 }
 
 function download(name, text) {
-  const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })), download: name });
-  link.click();
+  const href = URL.createObjectURL(new Blob([text], { type: "text/plain" }));
+  make("a", { href, download: name }).click();
+  URL.revokeObjectURL(href);
 }
 
 // ---- state ----
 
-let state = null, note = "", progress = "", drawn = 0, ramps = null;
+let state = null, note = "", drawn = 0, ramps = null;
+const progress = { draw: "", fit: "" };
+let calls = 0;
 const failures = [], images = new Map(), waiting = new Map();
 let panes = [], zoom = { scale: 1, x: 0.5, y: 0.5 }, wipe = 0.5, flipped = false;
 
@@ -103,9 +125,11 @@ const isTerm = (name) => !offered.includes(name);
 let wanted = "";
 
 function show(next) {
-  const first = state === null;
-  state = next;
-  if (first) once();
+  const before = state;
+  state = { ...next, losses: next.losses ?? before.losses, ways: next.ways ?? before.ways };
+  if (before === null) once();
+  follow();
+  announce(before);
   $("undo").disabled = !state.can_undo;
   $("redo").disabled = !state.can_redo;
   $("home").hidden = state.home;
@@ -137,7 +161,30 @@ function once() {
   options($("tone"), state.tones.map((name) => [name, name]), state.look.operator);
 }
 
-const look = (change) => command("look", { look: { ...state.look, ...change } });
+// What is shown and how, ahead of what is told of it: two keys in a row are two changes.
+function look(change) {
+  state.look = { ...state.look, ...change };
+  command("look", { look: state.look });
+  follow();
+}
+// Controls of the look as it is.
+function follow() {
+  const { layout, error, operator, exposure, false_colour } = state.look;
+  $("layout").value = layout;
+  $("error").value = error;
+  $("tone").value = operator;
+  if (document.activeElement !== $("exposure")) $("exposure").value = exposure;
+  $("false-colour").checked = false_colour;
+}
+
+// Beginnings and ends, for those who do not see them.
+function announce(before) {
+  const words = [];
+  if (before?.opening !== false && !state.opening) words.push("The scene is there.");
+  if (!before?.fitting && state.fitting) words.push("A fit begins.");
+  if (before?.fitting && !state.fitting) words.push(state.found ?? "The fit has ended.");
+  if (words.length) $("live").textContent = words.join(" ");
+}
 
 function buttons(place, names, kind, on, press) {
   sync(place, names.map((name, i) => ({ name, i })), (row) => row.name,
@@ -168,7 +215,7 @@ function status() {
   const words = [];
   if (note) words.push(note);
   if (!state || state.opening) words.push("The scene is being read.");
-  if (progress) words.push(progress);
+  words.push(...Object.values(progress).filter(Boolean));
   if (state?.image) {
     const { milliseconds, bytes, psnr, flip } = state.image;
     words.push(`${state.engine}: ${milliseconds.toFixed(1)} ms an image, ${(bytes / 1e6).toFixed(1)} MB.`);
@@ -304,20 +351,25 @@ function showPanes() {
   const rows = names.map((name) => state.panes.find((pane) => pane.name === name)).filter(Boolean);
   sync($("panes"), rows, (pane) => pane.name, (pane) => {
     const canvas = make("canvas", { tabIndex: 0 });
-    canvas.setAttribute("role", "img");
-    pointer(canvas, pane.name);
+    // Keys and the pointer move what it shows.
+    canvas.setAttribute("role", "application");
+    pointer(canvas);
     return make("figure", {}, canvas, make("p", { className: "lacking" }), make("figcaption"));
   }, (figure, pane) => {
     const [canvas, lacking, caption] = figure.children;
-    const old = canvas.dataset.name;
     canvas.dataset.name = pane.name;
     canvas.hidden = pane.lacking !== null;
+    if (canvas.hidden) {
+      images.get(pane.name)?.bitmap.close();
+      images.delete(pane.name);
+    }
     lacking.hidden = !canvas.hidden;
     lacking.textContent = pane.lacking ?? "";
     const title = layout === "Wipe" && visible().length > 1 ? `${pane.name} | ${visible()[1]}` : pane.title;
     canvas.setAttribute("aria-label", title);
-    if (caption.dataset.title !== title || old !== pane.name) {
-      caption.dataset.title = title;
+    const key = [title, pane.name, state.look.error, state.look.false_colour].join("|");
+    if (caption.dataset.key !== key) {
+      caption.dataset.key = key;
       caption.replaceChildren(title);
       if (ramps && (pane.name === "error" || state.look.false_colour)) caption.append(ramp(pane.name));
     }
@@ -361,7 +413,7 @@ function paintPane(canvas) {
   context.fillRect(0, 0, image.width, image.height);
   put(bitmap);
   const other = images.get(visible()[1]);
-  if (state.look.layout === "Wipe" && other && other.width === image.width) {
+  if (state.look.layout === "Wipe" && other && other.width === image.width && other.height === image.height) {
     const line = wipe * image.width;
     context.save();
     context.beginPath();
@@ -389,6 +441,8 @@ function pointer(canvas) {
   canvas.onpointerdown = (event) => {
     canvas.setPointerCapture(event.pointerId);
     held = { x: event.clientX, y: event.clientY, button: event.button };
+    const at = pixel(canvas, event);
+    if (at) probeSoon(at);
   };
   canvas.onpointermove = (event) => {
     const at = pixel(canvas, event);
@@ -409,9 +463,9 @@ function pointer(canvas) {
       command("orbit", { yaw: Math.PI * x, pitch: Math.PI * y, distance: 1 });
     }
   };
-  canvas.onpointerup = () => {
+  canvas.onpointerup = canvas.onpointercancel = canvas.onlostpointercapture = () => {
+    if (held) command("settle");
     held = null;
-    command("settle");
   };
   canvas.oncontextmenu = (event) => event.preventDefault();
   canvas.ondblclick = whole;
@@ -460,7 +514,8 @@ function showProbe({ probe }) {
 function showFit() {
   const { fitting } = state;
   const idle = fitting === null && !state.opening;
-  $("begin").disabled = $("resume").disabled = !idle;
+  $("begin").disabled = !idle;
+  $("resume").disabled = !idle || !state.can_resume;
   $("pause").disabled = $("stop").disabled = idle;
   $("pause").textContent = fitting?.paused ? "go on" : "pause";
   sync($("fitted-views"), state.views.filter((view) => view.target), (view) => view.name,
@@ -537,9 +592,14 @@ const KEYS = [
   ["]", "line of the wipe to the right", () => moveWipe(0.02)],
   ["PageUp", "larger", () => zoomBy(1.25)],
   ["PageDown", "smaller", () => zoomBy(0.8)],
-  ["Ctrl+PageUp", "nearer", () => command("orbit", { yaw: 0, pitch: 0, distance: 0.9 })],
-  ["Ctrl+PageDown", "farther", () => command("orbit", { yaw: 0, pitch: 0, distance: 1 / 0.9 })],
+  ["N", "nearer", () => command("orbit", { yaw: 0, pitch: 0, distance: 0.9 })],
+  ["M", "farther", () => command("orbit", { yaw: 0, pitch: 0, distance: 1 / 0.9 })],
+  ["Ctrl+Arrows", "move the image, where it is larger than its pane", null],
+  ["Q", "probe the pixel in the middle", () => probeMiddle()],
 ];
+const probeMiddle = () => {
+  if (state.size) probeSoon({ x: Math.floor(state.size[0] * zoom.x), y: Math.floor(state.size[1] * zoom.y) });
+};
 const toggle = (name) => {
   if (state.panes.some((pane) => pane.name === name)) {
     chosen(panes.includes(name) ? panes.filter((other) => other !== name) : [...panes, name]);
@@ -564,12 +624,22 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 
 function pressed(event) {
   const { target } = event;
-  const writing = target.matches?.("input:not([type=checkbox]), select, textarea");
+  if ($("keys").open && event.key !== "F1") return;
+  const writing = target.matches?.("input[type=number], input[type=text]")
+    || (target.matches?.("select") && !event.ctrlKey && event.key.length === 1)
+    || (target.matches?.("input[type=range], select") && /^(Arrow|Page|Home|End)/.test(event.key));
   const control = event.ctrlKey || event.metaKey;
   // Of a letter or a sign that Shift makes, the sign says it.
   const shift = event.shiftKey && (control || event.key.length > 1);
   const name = (control ? "Ctrl+" : "") + (event.altKey ? "Alt+" : "") + (shift ? "Shift+" : "")
     + (event.key.length === 1 ? event.key.toUpperCase() : event.key);
+  if (control && ARROWS[event.key] && !writing) {
+    const [x, y] = ARROWS[event.key];
+    zoom = { ...zoom, x: clamp(zoom.x + 0.1 * x / zoom.scale), y: clamp(zoom.y + 0.1 * y / zoom.scale) };
+    paint();
+    event.preventDefault();
+    return;
+  }
   const free = target.matches?.("canvas") || (event.shiftKey && !writing);
   if (free && ARROWS[event.key] && !control && !event.altKey) {
     const [x, y] = ARROWS[event.key];
@@ -616,7 +686,7 @@ globalThis.skinfit = {
   pixels: (name) => images.get(name),
   drawn: () => drawn,
   constants: () => new Promise((done) => {
-    const number = waiting.size;
+    const number = (calls += 1);
     waiting.set(number, done);
     send("constants", { number });
   }),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use js_sys::Function;
-use skinfit_core::files;
+use skinfit_core::render::image::Image;
 use skinfit_view::archive::{FITTED, REPORT};
 use skinfit_view::fitting::{FitControl, Tell};
 use skinfit_view::look::{Look, Pane};
@@ -23,9 +23,6 @@ use crate::held::{hold, reading};
 use crate::message::{Ask, Request, Say};
 use crate::state::State;
 use crate::told::tell_progress;
-
-/// Where constants are put to be saved.
-const SAVED: &str = "/page/saved.toml";
 
 thread_local! {
     static WAKE: RefCell<Option<Function>> = const { RefCell::new(None) };
@@ -62,7 +59,8 @@ struct PageHost(Shared);
 
 impl Host for PageHost {
     fn begin_fit(&self, request: FitRequest, tell: Tell) -> Box<dyn FitControl> {
-        let ask = if request.resume { Ask::Resume } else { Ask::Fit(Request::of(&request)) };
+        let sent = Request::of(&request);
+        let ask = if request.resume { Ask::Resume(sent) } else { Ask::Fit(sent) };
         let mut post = post(&self.0);
         post.asks.push(ask);
         (post.tell, post.paused) = (Some(tell), false);
@@ -106,7 +104,10 @@ impl FitControl for Control {
 }
 
 /// A pane that was given to the page: its images, and how they were shown.
-type Given = (usize, usize, String);
+struct Given {
+    images: [Arc<Image>; 2],
+    look: String,
+}
 
 /// The page's worker.
 #[wasm_bindgen]
@@ -114,6 +115,10 @@ pub struct Stage {
     session: Session,
     look: Look,
     post: Shared,
+    /// Whether the scene's bakes were looked at.
+    checked: bool,
+    /// How many losses were told.
+    told: Option<usize>,
     given: HashMap<String, Given>,
 }
 
@@ -142,7 +147,14 @@ impl Stage {
         let shared = Shared::default();
         let host = Arc::new(PageHost(Arc::clone(&shared)));
         let session = Session::new(host, start, Arc::new(wake));
-        Ok(Self { session, look: Look::default(), post: shared, given: HashMap::new() })
+        Ok(Self {
+            session,
+            look: Look::default(),
+            post: shared,
+            checked: false,
+            told: None,
+            given: HashMap::new(),
+        })
     }
 
     /// Do what is said, as JSON.
@@ -152,6 +164,9 @@ impl Stage {
     pub fn command(&mut self, command: &str) -> Result<(), JsError> {
         let command: Command = serde_json::from_str(command)?;
         command::run(&mut self.session, &mut self.look, command);
+        // A pane that is shown again is given again.
+        let shown = &self.look.panes;
+        self.given.retain(|name, _| pane(name).is_some_and(|pane| shown.contains(&pane)));
         Ok(())
     }
 
@@ -161,7 +176,13 @@ impl Stage {
     /// When it cannot be written.
     pub fn poll(&mut self) -> Result<String, JsError> {
         self.session.poll();
-        Ok(serde_json::to_string(&State::of(&self.session, &self.look))?)
+        self.check_bakes();
+        // What a fit has gone through is told as it grows.
+        let length = (self.session.fitting().is_some() || self.session.found().is_some())
+            .then(|| self.session.losses().len());
+        let grown = length != self.told || self.session.fitting().is_none();
+        self.told = length;
+        Ok(serde_json::to_string(&State::of(&self.session, &self.look, grown))?)
     }
 
     /// What the worker that fits is to be asked, as a list of JSON texts.
@@ -183,23 +204,28 @@ impl Stage {
         Ok(())
     }
 
-    /// A pane's pixels, where they are others than were given last: red, green, blue and 255 of each, row by row.
+    /// A pane's image, where it is another than was given last: its width and height as 32 bits each, the lowest byte
+    /// first, then red, green, blue and 255 of each pixel, row by row.
     pub fn pixels(&mut self, name: &str) -> Option<Vec<u8>> {
         let pane = pane(name)?;
-        let Some([first, second]) = shown::pair(&self.session, pane, self.look.error) else {
+        let Some(images) = shown::pair(&self.session, pane, self.look.error) else {
             self.given.remove(name);
             return None;
         };
-        let place = |image| Arc::as_ptr(image) as usize;
         // It is made of numbers and names.
         let look = serde_json::to_string(&self.look).unwrap_or_default();
-        let given = (place(&first), place(&second), look);
-        if self.given.get(name) == Some(&given) {
+        let same = |given: &Given| {
+            given.look == look && given.images.iter().zip(&images).all(|(a, b)| Arc::ptr_eq(a, b))
+        };
+        if self.given.get(name).is_some_and(same) {
             return None;
         }
-        self.given.insert(name.to_owned(), given);
         let kind = if pane == Pane::Error { Kind::Error(self.look.error) } else { Kind::Image };
-        Some(pixels([&*first, &*second], kind, &self.look))
+        let [first, second] = &images;
+        let size = [first.width, first.height].map(|side| (side as u32).to_le_bytes());
+        let bytes = [&size.concat()[..], &pixels([first, second], kind, &self.look)].concat();
+        self.given.insert(name.to_owned(), Given { images, look });
+        Some(bytes)
     }
 
     /// The 256 colours of an error's scale, from least to greatest: red, green, blue and 255 of each.
@@ -216,10 +242,8 @@ impl Stage {
     }
 
     /// The constants, as `params.toml`.
-    pub fn params_file(&mut self) -> Option<String> {
-        let file = PathBuf::from(SAVED);
-        self.session.save_params(&file);
-        files::read_to_string(&file).ok()
+    pub fn params_file(&self) -> Option<String> {
+        self.session.params_text()
     }
 
     /// The constants, by the names of their sliders: what a test compares.
@@ -232,5 +256,20 @@ impl Stage {
             values.free.iter().map(of).collect::<Vec<_>>()
         });
         Ok(serde_json::to_string(&values.unwrap_or_default())?)
+    }
+}
+
+impl Stage {
+    /// Say so where the page's bakes are not those that this library looks for: then they were made anew.
+    fn check_bakes(&mut self) {
+        let Some(opened) = self.session.opened().filter(|_| !self.checked) else { return };
+        self.checked = true;
+        if opened.baked.stats.rows.iter().any(|row| !row.cached && row.name != "environment") {
+            self.session.tell(
+                "the page's player is of other sources than the program that wrote it: what that had baked was baked \
+                 anew here. Build the player, src/page/build, and write the page anew."
+                    .to_owned(),
+            );
+        }
     }
 }

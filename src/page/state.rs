@@ -9,6 +9,7 @@ use skinfit_view::paint::Slot;
 use skinfit_view::shown;
 use skinfit_view::values::{Freedom, Values};
 
+use crate::fit::outcome::Ending;
 use crate::model::effects::Effect;
 use crate::model::params::{Channels, Column, Param, Scale};
 use crate::render::tonemap::Operator;
@@ -27,6 +28,7 @@ pub(crate) struct State<'a> {
     home: bool,
     can_undo: bool,
     can_redo: bool,
+    can_resume: bool,
     rows: Vec<Row>,
     effects: Vec<EffectRow>,
     panes: Vec<PaneRow>,
@@ -38,8 +40,9 @@ pub(crate) struct State<'a> {
     fitting: Option<FittingWords>,
     found: Option<String>,
     scores: &'a [ViewScore],
-    losses: Vec<f64>,
-    ways: Vec<Way>,
+    /// Nothing where they are as they were told.
+    losses: Option<Vec<f64>>,
+    ways: Option<Vec<Way>>,
 }
 
 /// The image of the sliders.
@@ -116,7 +119,8 @@ struct Way {
 }
 
 impl<'a> State<'a> {
-    pub(crate) fn of(session: &'a Session, look: &'a Look) -> Self {
+    /// `grown`: with what a fit has gone through.
+    pub(crate) fn of(session: &'a Session, look: &'a Look, grown: bool) -> Self {
         let values = session.values();
         let last = session.path().last();
         let now = session.image(Slot::Now);
@@ -137,6 +141,9 @@ impl<'a> State<'a> {
             home: session.is_at_home(),
             can_undo: session.steps().0,
             can_redo: session.steps().1,
+            // Of a fit of this page.
+            can_resume: session.found().is_some_and(|found| found.ending != Ending::Converged)
+                && last.is_some(),
             rows: values.map_or_else(Vec::new, |values| {
                 values.rows().into_iter().map(|param| row(session, values, param)).collect()
             }),
@@ -158,8 +165,8 @@ impl<'a> State<'a> {
                 format!("{ending}: loss {loss:.6e}, {iterations} iterations, {seconds:.2} s")
             }),
             scores: session.scores(),
-            losses: session.losses(),
-            ways: values.map_or_else(Vec::new, |values| ways(session, values)),
+            losses: grown.then(|| session.losses()),
+            ways: values.filter(|_| grown).map(|values| ways(session, values)),
         }
     }
 }

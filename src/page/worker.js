@@ -2,12 +2,21 @@
 "use strict";
 
 // What the worker has been told to be.
-let stage = null, fitter = null;
+let role = null, stage = null, fitter = null;
 // Panes that the page shows.
 let shown = [];
 
 const say = (message, transfer) => postMessage(message, transfer ?? []);
-const fail = (error) => say({ failed: String(error?.message ?? error) });
+// What a panic of the library's has said is more than the error that it ends with.
+function fail(error) {
+  const fault = globalThis.fault;
+  const words = fault
+    ? `a fault of skinfit's: ${fault.split("\n").join(" ")}. Please report it; reload the page to go on.`
+    : String(error?.message ?? error);
+  // Nobody waits any longer for a fit that has failed; its worker is not used again.
+  if (role === "fit") say({ said: [JSON.stringify({ is: "failed", words })], broken: true });
+  else say({ failed: words });
+}
 
 // Turns of the event loop without a timer's delay, so that what is asked in between is heard.
 const turns = new MessageChannel();
@@ -32,10 +41,11 @@ function poll() {
   const state = JSON.parse(stage.poll());
   say({ state });
   for (const name of shown) {
-    const pixels = stage.pixels(name);
-    if (pixels) {
-      const [width, height] = state.size;
-      say({ pane: name, width, height, pixels: pixels.buffer }, [pixels.buffer]);
+    const image = stage.pixels(name);
+    if (image) {
+      const size = new DataView(image.buffer, image.byteOffset, 8);
+      const [width, height] = [size.getUint32(0, true), size.getUint32(4, true)];
+      say({ pane: name, width, height, image: image.buffer }, [image.buffer]);
     }
   }
   const asks = stage.asks();
@@ -51,12 +61,14 @@ function slice() {
 
 const does = {
   async draw({ module, scene, cpu }) {
+    role = "draw";
     await wasm_bindgen({ module_or_path: module });
     stage = new wasm_bindgen.Stage(new Uint8Array(scene), cpu, () => soon(poll), (words) => say({ progress: words }));
     say({ ramps: [stage.ramp(false), stage.ramp(true)] });
     soon(poll);
   },
   async fit({ module, scene }) {
+    role = "fit";
     await wasm_bindgen({ module_or_path: module });
     fitter = new wasm_bindgen.Fitter(new Uint8Array(scene), (words) => say({ progress: words }));
   },

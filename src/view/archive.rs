@@ -22,7 +22,8 @@ pub const BAKES: &str = "/bakes";
 pub fn pack<'a>(files: impl IntoIterator<Item = (&'a Path, &'a [u8])>) -> Vec<u8> {
     let mut packed = MAGIC.to_vec();
     for (path, bytes) in files {
-        let path = path.to_string_lossy();
+        // As the page's system has them.
+        let path = path.to_string_lossy().replace('\\', "/");
         for part in [path.as_bytes(), bytes] {
             packed.extend((part.len() as u64).to_le_bytes());
             packed.extend(part);

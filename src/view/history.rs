@@ -41,6 +41,14 @@ impl<T: Clone + PartialEq> History<T> {
         }
     }
 
+    /// Change it within the step that it is in, as that led to something else; what leads nowhere is no step.
+    pub fn amend(&mut self, change: impl FnOnce(&mut T)) {
+        change(&mut self.now);
+        if self.past.last() == Some(&self.now) {
+            self.past.pop();
+        }
+    }
+
     /// The drag is over.
     pub fn settle(&mut self) {
         if let Some(before) = self.begun.take().filter(|before| *before != self.now) {
@@ -119,6 +127,20 @@ mod tests {
         assert_eq!((*history.now(), history.can_redo()), (2, false));
         history.undo();
         assert_eq!(*history.now(), 1);
+    }
+
+    #[test]
+    fn a_step_is_amended_and_one_that_leads_nowhere_is_none() {
+        let mut history = History::new(1);
+        history.edit(|now| *now = 2);
+        history.amend(|now| *now = 3);
+        history.undo();
+        assert_eq!(*history.now(), 1);
+        history.redo();
+        history.edit(|now| *now = 4);
+        history.amend(|now| *now = 3);
+        history.undo();
+        assert_eq!((*history.now(), history.can_undo()), (1, false));
     }
 
     #[test]

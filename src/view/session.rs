@@ -139,7 +139,10 @@ impl Session {
     pub fn compare(&mut self, path: &Path) {
         let Some(opened) = self.opened.clone() else { return };
         match self.host.run(path) {
-            Ok(run) => (self.other, self.other_fit) = self.left_by(&opened, Some(&run)),
+            Ok(run) => {
+                let (other, other_fit) = self.left_by(&opened, Some(&run));
+                (self.other, self.other_fit) = (other.map(|other| other.params), other_fit);
+            }
             Err(error) => self.told.push(error),
         }
     }
@@ -187,17 +190,25 @@ impl Session {
         }
         let scene = Values::of(&opened.baked);
         let first = self.values.is_none().then(|| scene.clone());
-        if first.is_some() {
+        if let Some(scene) = first {
             let (fitted, known) = self.left_by(&opened, self.start.fitted.clone().as_ref());
             let (found, views) = known.map(|Fitted { found, views }| (found, views)).unzip();
-            (self.fitted, self.found, self.scores) = (fitted, found, views.unwrap_or_default());
-            (self.other, self.other_fit) = self.left_by(&opened, self.start.other.clone().as_ref());
-        }
-        if let Some(scene) = first {
+            (self.found, self.scores) = (found, views.unwrap_or_default());
+            let (other, other_fit) = self.left_by(&opened, self.start.other.clone().as_ref());
+            (self.other, self.other_fit) = (other.map(|other| other.params), other_fit);
             // A run's sliders stand where its fit ended.
-            let params = self.fitted.clone().unwrap_or_else(|| scene.params.clone());
-            self.values = Some(History::new(Values { params, ..scene.clone() }));
+            let mut values = scene.clone();
+            if let Some(Point { params, gains }) = fitted {
+                self.fitted = Some(params.clone());
+                (values.params, values.gains) = (params, gains);
+            }
+            self.values = Some(History::new(values));
             self.first = Some(scene);
+        }
+        // A scene may bring effects along: lights one each, morph targets with weights.
+        let loaded = opened.baked.scene.effects;
+        if let Some(history) = &mut self.values {
+            history.amend(|values| values.effects = loaded);
         }
         self.view = self.view.min(opened.views().len().saturating_sub(1));
         self.opened = Some(opened);
@@ -205,7 +216,7 @@ impl Session {
     }
 
     /// What a run has left: its constants, and what is known of them. What cannot be read is told.
-    fn left_by(&mut self, opened: &Opened, run: Option<&Run>) -> (Option<Params>, Option<Fitted>) {
+    fn left_by(&mut self, opened: &Opened, run: Option<&Run>) -> (Option<Point>, Option<Fitted>) {
         let Some(Run { params, report }) = run else { return (None, None) };
         let scene = &opened.baked.scene;
         let file = match ParamsFile::read(params, scene.form, &scene.params) {
@@ -215,14 +226,15 @@ impl Session {
                 return (None, None);
             }
         };
-        let gains = vec![1.0; scene.views.len()];
-        let known =
-            report.as_ref().map(|report| reported(report, Point { params: file.params.clone(), gains }));
+        let mut gains = opened.baked.gains.clone();
+        files::take_gains(&file, opened.views(), &mut gains);
+        let end = Point { params: file.params, gains };
+        let known = report.as_ref().map(|report| reported(report, end.clone()));
         let known = known.transpose().unwrap_or_else(|error| {
             self.told.push(error);
             None
         });
-        (Some(file.params), known)
+        (Some(end), known)
     }
 
     /// The camera that images are seen from.

@@ -78,10 +78,10 @@ pub fn image(session: &Session, pane: Pane) -> Option<Arc<Image>> {
     }
 }
 
-/// The target that the image of the sliders may be compared with: from a view's own camera.
+/// The target that the image of the sliders, as it is there, may be compared with: from a view's own camera.
 #[must_use]
 pub fn compared(session: &Session) -> Option<Arc<Image>> {
-    session.is_at_home().then(|| image(session, Pane::Target)).flatten()
+    session.image(Slot::Now)?.job.target.clone()
 }
 
 /// The terms that there are images of.

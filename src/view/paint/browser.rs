@@ -39,6 +39,8 @@ impl Task {
             let mut work = work();
             while let Some(piece) = next(&shared).await {
                 work.step(piece, &shared).await;
+                // The CPU engine has not waited for anything: what was asked in the meantime is heard.
+                timeout(0).await;
             }
         });
         Self
@@ -82,13 +84,7 @@ async fn next(shared: &Shared) -> Option<Piece> {
 
 /// Wait for a while, or until something is asked for.
 async fn quiet(shared: &Shared) {
-    let mut timer = pin!(JsFuture::from(Promise::new(&mut |resolve, _| {
-        let timeout = Reflect::get(&global(), &"setTimeout".into());
-        if let Some(timeout) = timeout.ok().and_then(|timeout| timeout.dyn_into::<Function>().ok()) {
-            // Without a timer nothing would follow: a browser has one.
-            let _ = timeout.call2(&JsValue::UNDEFINED, &resolve, &QUIET.into());
-        }
-    })));
+    let mut timer = pin!(timeout(QUIET));
     poll_fn(|context| {
         let wanted = shared.wanted();
         if wanted.over || !wanted.jobs.is_empty() {
@@ -96,7 +92,20 @@ async fn quiet(shared: &Shared) {
         }
         drop(wanted);
         shared.changed.listen(context.waker());
-        timer.as_mut().poll(context).map(drop)
+        timer.as_mut().poll(context)
     })
     .await;
+}
+
+/// Let the browser do other things for so many milliseconds.
+async fn timeout(milliseconds: u32) {
+    let timer = Promise::new(&mut |resolve, _| {
+        let timeout = Reflect::get(&global(), &"setTimeout".into());
+        if let Some(timeout) = timeout.ok().and_then(|timeout| timeout.dyn_into::<Function>().ok()) {
+            // Without a timer nothing would follow: a browser has one.
+            let _ = timeout.call2(&JsValue::UNDEFINED, &resolve, &milliseconds.into());
+        }
+    });
+    // A timer does not fail.
+    let _ = JsFuture::from(timer).await;
 }

@@ -2,8 +2,11 @@
 
 use std::path::Path;
 
+use skinfit_core::output;
+
 use super::Session;
 use crate::fit::params_file::{Origin, ParamsFile};
+use crate::scene::view::View;
 
 impl Session {
     /// Take the constants of a `params.toml`: a step of the history.
@@ -13,15 +16,10 @@ impl Session {
             match ParamsFile::read(file, scene.form, &history.now().params) {
                 Ok(read) => {
                     let read = read.of_scene(&scene.path);
-                    let names: Vec<String> = opened.views().iter().map(|view| view.name.clone()).collect();
+                    let views = opened.views();
                     history.edit(|values| {
+                        take_gains(&read, views, &mut values.gains);
                         values.params = read.params;
-                        for (name, gain) in &read.gains {
-                            let place = names.iter().position(|other| other == name);
-                            if let Some(own) = place.and_then(|place| values.gains.get_mut(place)) {
-                                *own = *gain;
-                            }
-                        }
                     });
                 }
                 Err(error) => self.told.push(error.to_string()),
@@ -29,9 +27,10 @@ impl Session {
         }
     }
 
-    /// Leave the constants as a `params.toml`.
-    pub fn save_params(&mut self, file: &Path) {
-        let (Some(opened), Some(values)) = (&self.opened, self.values()) else { return };
+    /// The constants as a `params.toml` has them.
+    #[must_use]
+    pub fn params_text(&self) -> Option<String> {
+        let (opened, values) = (self.opened.as_ref()?, self.values()?);
         let scene = &opened.baked.scene;
         let names = scene.views.iter().map(|view| view.name.clone());
         let saved = ParamsFile {
@@ -42,9 +41,13 @@ impl Session {
             gains: names.zip(values.gains.iter().copied()).collect(),
             scenes: Vec::new(),
         };
-        let origin = Origin { scene: &scene.path, outcome: None, set: &[], numbers: &[] };
-        let done = saved.write(file, origin);
-        self.told.push(match done {
+        Some(saved.to_toml(Origin { scene: &scene.path, outcome: None, set: &[], numbers: &[] }))
+    }
+
+    /// Leave the constants as a `params.toml`.
+    pub fn save_params(&mut self, file: &Path) {
+        let Some(text) = self.params_text() else { return };
+        self.told.push(match output::write(file, text.as_bytes()) {
             Ok(()) => format!("wrote {}", file.display()),
             Err(error) => error.to_string(),
         });
@@ -58,5 +61,15 @@ impl Session {
             Ok(()) => format!("wrote {}", file.display()),
             Err(error) => error,
         });
+    }
+}
+
+/// Take a file's factors on views, by their names.
+pub(super) fn take_gains(file: &ParamsFile, views: &[View], gains: &mut [f64]) {
+    for (name, gain) in &file.gains {
+        let place = views.iter().position(|view| view.name == *name);
+        if let Some(own) = place.and_then(|place| gains.get_mut(place)) {
+            *own = *gain;
+        }
     }
 }

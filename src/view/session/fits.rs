@@ -23,7 +23,6 @@ impl Session {
         if !resume {
             self.path.clear();
         }
-        (self.found, self.scores) = (None, Vec::new());
         self.fitting = Some(Fitting::begin(&self.host, request, Arc::clone(&self.wake)));
     }
 
@@ -36,6 +35,8 @@ impl Session {
                     if let (Some(history), Some(opened)) = (&mut self.values, &self.opened) {
                         history.drag(|values| values.take(&step.point, opened.views()));
                     }
+                    // What was known was of another fit.
+                    (self.found, self.scores) = (None, Vec::new());
                     self.path.push(*step);
                 }
                 Message::Done(done) => {

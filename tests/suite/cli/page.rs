@@ -159,7 +159,7 @@ fn request(stream: &TcpStream) -> Option<(String, Vec<u8>)> {
 }
 
 /// What scripts use the page with: controls by their names, as assistive technology has them.
-const HANDS: &str = r#"
+const HANDS: &str = r##"
 const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 const until = async (what, done) => {
   const since = performance.now();
@@ -198,8 +198,18 @@ const bytes = (name) => {
   for (let i = 0; i < image.bytes.length; i += 8192) text += String.fromCharCode(...image.bytes.subarray(i, i + 8192));
   return { width: image.width, height: image.height, bytes: btoa(text) };
 };
+// What the probe says of the middle of the first pane, which is pointed at.
+const probe = async () => {
+  const canvas = document.querySelector("#panes canvas");
+  const box = canvas.getBoundingClientRect();
+  const at = { clientX: box.left + box.width / 2, clientY: box.top + box.height / 2, pointerId: 1, bubbles: true };
+  canvas.dispatchEvent(new PointerEvent("pointermove", at));
+  await until("the probe", () => document.querySelectorAll("#probe-rows tr").length > 4);
+  return [...document.querySelectorAll("#probe-rows tr")].map((row) => [...row.children].map((cell) => cell.textContent));
+};
+const key = (name, more = {}) => document.body.dispatchEvent(new KeyboardEvent("keydown", { key: name, bubbles: true, ...more }));
 const value = (name) => skinfit.state().rows.flatMap((row) => row.sliders).find((slider) => slider.name === name).value;
-"#;
+"##;
 
 /// How a page shows an image that the program has rendered.
 fn expected(file: &Path) -> Vec<[u8; 3]> {
@@ -272,12 +282,7 @@ fn a_page_draws_with_webgpu_and_fits_as_the_program_does() {
         found.losses = skinfit.state().losses;
         found.psnr = skinfit.state().image.psnr;
         found.errors = skinfit.state().rows.flatMap((row) => row.sliders).filter((slider) => slider.error).length;
-        const canvas = document.querySelector("#panes canvas");
-        const box = canvas.getBoundingClientRect();
-        const at = { clientX: box.left + box.width / 2, clientY: box.top + box.height / 2, pointerId: 1, bubbles: true };
-        canvas.dispatchEvent(new PointerEvent("pointermove", at));
-        await until("the probe", () => document.querySelectorAll("#probe-rows tr").length > 4);
-        found.probe = [...document.querySelectorAll("#probe-rows tr")].map((row) => row.children[0].textContent);
+        found.probe = (await probe()).map(([name]) => name);
         found.tables = [...document.querySelectorAll("#rows th")].map((head) => head.textContent);
         return found;
     "##;
@@ -335,9 +340,10 @@ fn a_page_draws_without_webgpu_and_says_so() {
     for (with, words, shot) in
         [(With::NoAdapter, "WebGPU", "page_no_adapter.png"), (With::Nothing, "WebGPU", "page_nothing.png")]
     {
-        let script = r#"
+        let script = r##"
             await complete();
             const found = { engine: skinfit.state().engine, start: bytes("now"), status: document.getElementById("status").textContent };
+            found.probe = await probe();
             const before = skinfit.state().image.psnr;
             slide("base_weight", [0.35]);
             await until("the image follows", () => skinfit.state().can_undo && skinfit.state().idle && skinfit.state().image.psnr !== before);
@@ -347,8 +353,14 @@ fn a_page_draws_without_webgpu_and_says_so() {
             await until("it is off", () => !skinfit.state().rows.some((row) => row.name === "reflection"));
             await until("it is weighed", () => skinfit.state().effects.find((effect) => effect.name === "reflection").change);
             found.change = skinfit.state().effects.find((effect) => effect.name === "reflection").change;
+            // The scene's own weights ask for morph targets: they come back, and nothing hangs.
+            const drawn = skinfit.drawn();
+            control("effect morph").click();
+            await until("it was read anew", () => skinfit.drawn() > drawn);
+            await complete();
+            found.morph = skinfit.state().effects.find((effect) => effect.name === "morph").on;
             return found;
-        "#;
+        "##;
         let Some(found) = visit(&page, with, script, Some(shot)) else { return };
         assert_eq!(found["engine"], "cpu", "{with:?}: {}", found["status"]);
         let status = found["status"].as_str().unwrap();
@@ -357,6 +369,18 @@ fn a_page_draws_without_webgpu_and_says_so() {
         same(&found["start"], &sandbox.path("front.exr"), 0);
         assert_ne!(found["psnr"][0], found["psnr"][1]);
         assert!(found["change"].as_str().unwrap().contains("dB"), "{}", found["change"]);
+        assert_eq!(found["morph"], true);
+        // The probe's numbers are the image's.
+        let row = |name: &str| -> Vec<f64> {
+            let rows = found["probe"].as_array().unwrap();
+            let row = rows.iter().find(|row| row[0] == name).unwrap_or_else(|| panic!("{name}: {rows:?}"));
+            row[1].as_str().unwrap().split([' ', ',']).filter_map(|word| word.parse().ok()).collect()
+        };
+        let (place, now) = (row("pixel"), row("now"));
+        let planes = read_exr(&sandbox.path("front.exr"));
+        let rgb = planes.rgb(["R", "G", "B"])[place[1] as usize * planes.width + place[0] as usize];
+        // As many digits as it writes.
+        assert!(rgb.iter().zip(&now).all(|(&a, b)| (f64::from(a) - b).abs() < 6e-6), "{rgb:?} {now:?}");
     }
 }
 
@@ -373,7 +397,10 @@ fn a_run_is_a_page_that_its_report_links_to() {
     let page = sandbox.path("run/page.html");
     // It says nothing of where it was made.
     let place = sandbox.path("").display().to_string();
-    assert!(!std::fs::read_to_string(&page).unwrap().contains(&place));
+    let place = place.trim_end_matches('/').as_bytes();
+    let held = |bytes: &[u8]| bytes.windows(place.len()).any(|window| window == place);
+    assert!(held(&sandbox.read("run/scene.toml")), "what the page takes along says it");
+    assert!(!held(&sandbox.read("run/page.html")) && !held(&scene_of(&sandbox.text("run/page.html"))));
     let script = r#"
         await complete();
         return { found: skinfit.state().found, scores: skinfit.state().scores, losses: skinfit.state().losses,
@@ -393,6 +420,80 @@ fn a_run_is_a_page_that_its_report_links_to() {
     assert_eq!(found["losses"].as_array().unwrap().len(), report["history"].as_array().unwrap().len());
     assert_eq!(found["scores"].as_array().unwrap().len(), 2);
     assert!(found["found"].as_str().unwrap().starts_with(report["ending"].as_str().unwrap()));
+}
+
+/// The files of a page, in one piece.
+fn scene_of(page: &str) -> Vec<u8> {
+    let packed = page.split_once("id=\"scene\">").unwrap().1.split_once('<').unwrap().0;
+    let packed = BASE64_STANDARD.decode(packed).unwrap();
+    let mut bytes = Vec::new();
+    flate2::read::GzDecoder::new(&packed[..]).read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn a_fit_in_a_page_waits_ends_goes_on_and_leaves_views_out() {
+    if browser().is_none() {
+        return;
+    }
+    let sandbox = Sandbox::new();
+    made(&sandbox);
+    let script = r##"
+        await complete();
+        const found = {};
+        // Another view, with an error that takes both images.
+        key("e");
+        await until("the error is signed", () => skinfit.state().look.error === "Signed");
+        press("view profile");
+        await until("the view", () => skinfit.state().view === 2);
+        await complete();
+        key("v");
+        await until("the first view", () => skinfit.state().view === 0);
+        press("fit view profile");
+        await until("it is left out", () => !skinfit.state().views[2].fitted);
+        press("fit");
+        await until("it fits", () => skinfit.state().fitting);
+        key("p");
+        await until("it waits", () => skinfit.state().fitting.paused);
+        await pause(300);
+        const before = skinfit.state().losses.length;
+        await pause(1500);
+        found.waited = [before, skinfit.state().losses.length, control("go on").disabled];
+        press("go on");
+        await until("a step", () => skinfit.state().losses.length > 1 || !skinfit.state().fitting);
+        if (skinfit.state().fitting) key("Escape");
+        await until("it ends", () => !skinfit.state().fitting);
+        found.stopped = skinfit.state().found;
+        found.told = skinfit.told();
+        if (skinfit.state().can_resume) {
+          press("resume");
+          await until("it goes on", () => skinfit.state().fitting);
+        }
+        await until("the fit ends", () => !skinfit.state().fitting && skinfit.state().found.startsWith("converged"));
+        found.constants = await skinfit.constants();
+        found.scores = skinfit.state().scores;
+        return found;
+    "##;
+    let Some(found) = visit(&sandbox.path("page.html"), With::NoAdapter, script, None) else { return };
+    assert_eq!(found["waited"][0], found["waited"][1], "it went on while it was to wait");
+    assert_eq!(found["waited"][2], false);
+    assert!(found["stopped"].is_string(), "{}", found["told"]);
+    let held: Vec<bool> = found["scores"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|score| score["held_out"].as_bool().unwrap())
+        .collect();
+    assert_eq!(held, [false, false, true]);
+    // As if nobody had stopped it, with that view left out.
+    sandbox.run(&["fit", "-o", "held", "--engine", "cpu", "--hold-out", "profile"]).done();
+    let report = sandbox.json("held/report.json");
+    for unknown in report["unknowns"].as_array().unwrap() {
+        let constants = found["constants"].as_array().unwrap();
+        let constant = constants.iter().find(|constant| constant[0] == unknown["name"]).unwrap();
+        let (got, want) = (constant[1].as_f64().unwrap(), unknown["value"].as_f64().unwrap());
+        assert!((got - want).abs() <= 1e-4 * want.abs().max(0.1), "{}: {got} for {want}", unknown["name"]);
+    }
 }
 
 #[test]

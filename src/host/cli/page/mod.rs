@@ -11,6 +11,7 @@ use base64::Engine as _;
 use base64::prelude::BASE64_STANDARD;
 use flate2::Compression;
 use flate2::write::GzEncoder;
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 
 use super::opened::{SceneOrRun, run_of};
 use super::scene::BakeArguments;
@@ -145,15 +146,21 @@ fn link(report: &Path, page: &Path) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// A page's address in a report: its name where they stand side by side.
+/// A page's address in a report: the way from the one to the other.
 fn address(page: &Path, report: &Path) -> String {
     let whole = |path: &Path| path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let (page, report) = (whole(page), whole(report));
-    let encoded = |text: &str| text.replace('%', "%25").replace('#', "%23").replace('?', "%3F");
-    match (page.parent() == report.parent(), page.file_name()) {
-        (true, Some(name)) => encoded(&name.to_string_lossy()),
-        _ => format!("file://{}", encoded(&page.to_string_lossy())),
-    }
+    let folder = report.parent().unwrap_or(Path::new(""));
+    let shared = page.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(shared).map(|_| "..".to_owned());
+    let down = page.components().skip(shared).map(|part| encoded(&part.as_os_str().to_string_lossy()));
+    up.chain(down).collect::<Vec<_>>().join("/")
+}
+
+/// A name as part of an address.
+fn encoded(name: &str) -> String {
+    const KEPT: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'.').remove(b'_').remove(b'~');
+    utf8_percent_encode(name, KEPT).to_string()
 }
 
 #[cfg(test)]
@@ -169,11 +176,12 @@ mod tests {
         link(&report, &folder.path().join("earlier.html")).unwrap();
         link(&report, &page).unwrap();
         let text = std::fs::read_to_string(&report).unwrap();
-        assert!(text.contains("<a href=\"a page%231.html\">") && !text.contains("earlier"), "{text}");
+        assert!(text.contains("<a href=\"a%20page%231.html\">") && !text.contains("earlier"), "{text}");
         assert!(
             text.ends_with("</header><main></main>") && text.matches("class=\"page\"").count() == 1,
             "{text}"
         );
+        assert_eq!(address(Path::new("/a/b/p.html"), Path::new("/a/c/d/report.html")), "../../b/p.html");
         // Without a report there is nothing to link.
         link(&folder.path().join("none.html"), &page).unwrap();
     }

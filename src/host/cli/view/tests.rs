@@ -374,6 +374,11 @@ fn an_effect_is_switched_and_what_it_brought_is_told() {
     assert!(!session.opened().unwrap().baked.scene.effects.has(effect));
     let change = session.change(effect).expect("it is weighed once its image is there");
     assert!(change.psnr.is_some(), "{change:?}");
+    // What the scene's own weights ask for comes back, and nothing is read again and again.
+    click(&mut hand, "effect morph");
+    settle(&mut hand);
+    let session = &hand.state().session;
+    assert!(session.values().unwrap().effects.has(crate::model::effects::Effect::Morph));
     // Its parameter is gone from the rows, and from what is free.
     assert!(hand.query_by_label("fit reflection").is_none());
     hand.key_press_modifiers(Modifiers::COMMAND, Key::Z);
