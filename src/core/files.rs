@@ -51,7 +51,7 @@ pub fn read_to_string(path: &Path) -> Result<String, Error> {
 /// When there is nothing of that name.
 pub fn length(path: &Path) -> Result<Option<u64>, Error> {
     match &*locked(&HELD) {
-        None => std::fs::metadata(path).map(|metadata| metadata.is_file().then(|| metadata.len())),
+        None => std::fs::metadata(path).map(|metadata| metadata.is_file().then_some(metadata.len())),
         Some(held) => held.get(&plain(path)).map(|bytes| Some(bytes.len() as u64)).ok_or_else(missing),
     }
 }

@@ -214,7 +214,7 @@ impl Window {
             Action::Pane(Pane::Other) if session.other().is_none() => {}
             Action::Pane(pane) => look.set_pane(pane, !look.panes.contains(&pane)),
             Action::Turn(right, down) => {
-                session.orbit.turn(0.1 * f64::from(right), 0.1 * f64::from(down), 1.0)
+                session.orbit.turn(0.1 * f64::from(right), 0.1 * f64::from(down), 1.0);
             }
             Action::Light(right) => {
                 session.turn_light(5.0 * f64::from(right));
