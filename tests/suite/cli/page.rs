@@ -22,7 +22,7 @@ use super::sandbox::Sandbox;
 use crate::fixtures::read_exr;
 
 /// How long a page is waited for: the software adapter of a browser takes seconds to compile a shader.
-const PATIENCE: Duration = Duration::from_secs(300);
+const PATIENCE: Duration = Duration::from_secs(900);
 
 /// What a browser draws with.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -164,7 +164,7 @@ const pause = (ms) => new Promise((done) => setTimeout(done, ms));
 const until = async (what, done) => {
   const since = performance.now();
   while (!done()) {
-    if (performance.now() - since > 240000) throw new Error(`${what}: waited too long`);
+    if (performance.now() - since > 600000) throw new Error(`${what}: waited too long`);
     await pause(10);
   }
 };
