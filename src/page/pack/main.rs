@@ -52,10 +52,14 @@ fn packed(library: &Path, page: &Path) -> Result<String, Box<dyn Error>> {
     let glue = output.js().replace("</script", "<\\/script");
     let html = PARTS.iter().fold(PAGE.to_owned(), |html, (mark, part)| html.replacen(mark, part, 1));
     let html = html.replacen("{{glue}}", &glue, 1).replacen("{{library}}", &packed, 1);
-    // Beside its place first: nobody finds half of it.
+    // Beside its place first: nobody finds half of it. The folder may be of a build to come.
     let beside = page.with_extension("part");
-    std::fs::write(&beside, &html)?;
-    std::fs::rename(&beside, page)?;
+    let put = || -> std::io::Result<()> {
+        page.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+        std::fs::write(&beside, &html)?;
+        std::fs::rename(&beside, page)
+    };
+    put().map_err(|error| format!("{} cannot be written: {error}", page.display()))?;
     let mebibytes = |bytes: usize| bytes as f64 / f64::from(1 << 20);
     let (whole, library) = (mebibytes(html.len()), mebibytes(wasm.len()));
     Ok(format!("wrote {}: {whole:.2} MiB, of which the library is {library:.2} MiB unpacked", page.display()))
