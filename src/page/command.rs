@@ -87,8 +87,6 @@ pub(crate) enum Command {
     Load {
         text: String,
     },
-    /// Give the device up, as a driver that is reset does.
-    LoseDevice,
 }
 
 /// Do it.
@@ -181,7 +179,6 @@ pub(crate) fn run(session: &mut Session, look: &mut Look, command: Command) {
             files::hold([(file.to_owned(), text.into_bytes())]);
             session.load_params(file);
         }
-        Command::LoseDevice => session.lose_device(),
     }
 }
 

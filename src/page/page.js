@@ -126,7 +126,7 @@ let wanted = "";
 
 function show(next) {
   const before = state;
-  state = { ...next, losses: next.losses ?? before.losses, ways: next.ways ?? before.ways };
+  state = { ...next, losses: next.losses ?? before?.losses ?? [], ways: next.ways ?? before?.ways ?? [] };
   if (before === null) once();
   follow();
   announce(before);
@@ -148,6 +148,7 @@ function show(next) {
   showRows();
   showPanes();
   showFit();
+  if (next.losses) showCurves();
   showTold();
   status();
 }
@@ -531,6 +532,13 @@ function showFit() {
   $("fit-words").textContent = fitting
     ? `${fitting.paused ? "paused at" : "fitting:"} iteration ${fitting.iteration ?? 0}, loss ${fitting.loss?.toExponential(6) ?? "…"}`
     : state.found ?? "";
+  $("scores").hidden = state.scores.length === 0;
+  $("scores").tBodies[0].replaceChildren(...state.scores.map((score) => make("tr", {},
+    make("th", { scope: "row", textContent: score.view + (score.held_out ? " (held out)" : "") }),
+    ...[score.psnr?.toFixed(2), score.ssim?.toFixed(4), score.flip?.toFixed(4)].map((words) => make("td", { textContent: words })))));
+}
+
+function showCurves() {
   const losses = state.losses.map((loss) => Math.log10(Math.max(loss, 1e-300)));
   lines($("loss"), [losses]);
   if (losses.length) {
@@ -543,10 +551,6 @@ function showFit() {
     name.style.color = hue(i, moved.length);
     return name;
   }));
-  $("scores").hidden = state.scores.length === 0;
-  $("scores").tBodies[0].replaceChildren(...state.scores.map((score) => make("tr", {},
-    make("th", { scope: "row", textContent: score.view + (score.held_out ? " (held out)" : "") }),
-    ...[score.psnr?.toFixed(2), score.ssim?.toFixed(4), score.flip?.toFixed(4)].map((words) => make("td", { textContent: words })))));
 }
 
 const hue = (i, count) => `light-dark(hsl(${360 * i / count} 80% 32%), hsl(${360 * i / count} 70% 70%))`;

@@ -21,6 +21,7 @@ use wasm_bindgen::{JsError, JsValue};
 use crate::command::{self, Command, pane};
 use crate::held::{hold, reading};
 use crate::message::{Ask, Request, Say};
+use crate::model::params::Column;
 use crate::state::State;
 use crate::told::tell_progress;
 
@@ -117,8 +118,8 @@ pub struct Stage {
     post: Shared,
     /// Whether the scene's bakes were looked at.
     checked: bool,
-    /// How many losses were told.
-    told: Option<usize>,
+    /// What of a fit was told: how many losses and the last of them, and of which constants the ways.
+    told: Option<(usize, Option<f64>, Vec<Column>)>,
     given: HashMap<String, Given>,
 }
 
@@ -177,11 +178,12 @@ impl Stage {
     pub fn poll(&mut self) -> Result<String, JsError> {
         self.session.poll();
         self.check_bakes();
-        // What a fit has gone through is told as it grows.
-        let length = (self.session.fitting().is_some() || self.session.found().is_some())
-            .then(|| self.session.losses().len());
-        let grown = length != self.told || self.session.fitting().is_none();
-        self.told = length;
+        // What a fit has gone through is told as it grows, and not with every move of a slider.
+        let losses = self.session.losses();
+        let free = self.session.values().map(|values| values.free.clone()).unwrap_or_default();
+        let told = (losses.len(), losses.last().copied(), free);
+        let grown = self.told.as_ref() != Some(&told);
+        self.told = Some(told);
         Ok(serde_json::to_string(&State::of(&self.session, &self.look, grown))?)
     }
 
@@ -252,7 +254,7 @@ impl Stage {
     /// When they cannot be written.
     pub fn constants(&self) -> Result<String, JsError> {
         let values = self.session.values().map(|values| {
-            let of = |column: &crate::model::params::Column| (column.name(), column.get(&values.params));
+            let of = |column: &Column| (column.name(), column.get(&values.params));
             values.free.iter().map(of).collect::<Vec<_>>()
         });
         Ok(serde_json::to_string(&values.unwrap_or_default())?)
