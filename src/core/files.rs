@@ -118,6 +118,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("a");
         std::fs::write(&file, "words").unwrap();
+        std::fs::create_dir(folder.path().join("b")).unwrap();
         let around = folder.path().join("b/../a");
         let (text, read_from) = recorded(|| read_to_string(&around).unwrap());
         assert_eq!(text, "words");
