@@ -7,7 +7,6 @@ use skinfit_core::files;
 use skinfit_view::Session;
 use skinfit_view::look::{Look, Pane};
 use skinfit_view::session::Orbit;
-use skinfit_view::values::Freedom;
 
 use crate::message::column;
 use crate::model::effects::Effect;
@@ -24,6 +23,15 @@ pub(crate) enum Command {
     Slide {
         slider: String,
         value: f64,
+    },
+    /// The slider of a view's gain is moved, as part of a drag.
+    SlideGain {
+        view: usize,
+        value: f64,
+    },
+    /// Whether a fit moves the gains.
+    FreeGains {
+        on: bool,
     },
     /// A drag is over.
     Settle,
@@ -46,14 +54,15 @@ pub(crate) enum Command {
         name: String,
         on: bool,
     },
-    /// Whether a fit sees a view.
+    /// Whether a fit sees a view, by its place in the list.
     FitView {
-        view: String,
+        index: usize,
         on: bool,
     },
     View {
         index: usize,
     },
+    NextView,
     /// Turn the camera: radians, and a factor on the distance.
     Orbit {
         yaw: f64,
@@ -93,40 +102,26 @@ pub(crate) enum Command {
 pub(crate) fn run(session: &mut Session, look: &mut Look, command: Command) {
     match command {
         Command::Slide { slider, value } => {
-            if let (Some(column), Some(history)) = (column(&slider), session.history()) {
-                let (lower, upper) = column.param.info().range();
-                if value.is_finite() {
-                    history.drag(|values| column.set(&mut values.params, value.clamp(lower, upper)));
-                }
+            if let Some(column) = column(&slider) {
+                session.slide(column, value);
             }
         }
-        Command::Settle => {
-            if let Some(history) = session.history() {
-                history.settle();
-            }
-        }
+        Command::SlideGain { view, value } => session.slide_gain(view, value),
+        Command::FreeGains { on } => session.edit(|values| values.free_gains = on),
+        Command::Settle => session.settle(),
         Command::Reset { param, to } => {
-            let found = Param::from_name(&param).and_then(|param| {
-                let (_, rgb) = session.resets(param).into_iter().find(|(name, _)| *name == to)?;
-                Some((param, rgb))
-            });
-            if let (Some((param, rgb)), Some(history)) = (found, session.history()) {
-                history.edit(|values| values.params.set_rgb(param, rgb));
+            if let Some(param) = Param::from_name(&param) {
+                session.reset(param, &to);
             }
         }
         Command::Free { param, on } => {
-            if let (Some(param), Some(history)) = (Param::from_name(&param), session.history()) {
-                let freedom = match (on, history.now().by_channel(param)) {
-                    (false, _) => Freedom::Fixed,
-                    (true, true) => Freedom::PerChannel,
-                    (true, false) => Freedom::Tied,
-                };
-                history.edit(|values| values.set_freedom(param, freedom));
+            if let Some(param) = Param::from_name(&param) {
+                session.edit(|values| values.set_free(param, on));
             }
         }
         Command::Apart { param, on } => {
-            if let (Some(param), Some(history)) = (Param::from_name(&param), session.history()) {
-                history.edit(|values| values.set_apart(param, on));
+            if let Some(param) = Param::from_name(&param) {
+                session.edit(|values| values.set_apart(param, on));
             }
         }
         Command::Effect { name, on } => {
@@ -134,40 +129,18 @@ pub(crate) fn run(session: &mut Session, look: &mut Look, command: Command) {
                 session.set_effect(effect, on);
             }
         }
-        Command::FitView { view, on } => {
-            if let Some(history) = session.history() {
-                history.edit(|values| values.set_held_out(&view, !on));
-            }
-        }
-        Command::View { index } => {
-            let count = session.opened().map_or(1, |opened| opened.views().len().max(1));
-            session.view = index.min(count - 1);
-        }
+        Command::FitView { index, on } => session.set_fitted(index, on),
+        Command::View { index } => session.look_at(index),
+        Command::NextView => session.look_at_next(),
         Command::Orbit { yaw, pitch, distance } => session.orbit.turn(yaw, pitch, distance),
         Command::Light { degrees } => session.turn_light(degrees),
         Command::Home => session.orbit = Orbit::default(),
-        Command::Undo => {
-            if let Some(history) = session.history() {
-                history.undo();
-            }
-        }
-        Command::Redo => {
-            if let Some(history) = session.history() {
-                history.redo();
-            }
-        }
+        Command::Undo => session.undo(),
+        Command::Redo => session.redo(),
         Command::Fit => session.begin_fit(false),
         Command::Resume => session.begin_fit(true),
-        Command::Pause => {
-            if let Some(fitting) = session.fitting_mut() {
-                fitting.set_paused(!fitting.is_paused());
-            }
-        }
-        Command::Stop => {
-            if let Some(fitting) = session.fitting_mut() {
-                fitting.stop();
-            }
-        }
+        Command::Pause => session.toggle_pause(),
+        Command::Stop => session.stop_fit(),
         Command::Terms { on } => session.terms = on,
         Command::Look { look: other } => look.take(other),
         Command::Panes { names } => {

@@ -14,16 +14,17 @@ use web_time::Instant;
 use crate::engine::Point;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fit::{FitOptions, fit_watched};
-use crate::held::{hold, reading};
+use crate::held::hold;
 use crate::message::{Ask, At, Request, Say, Told};
 use crate::prepare::{
-    JointScene, JointScenes, Loaded, NamedScene, PrepareOptions, ReadyScene, read_one_skin,
+    JointScene, JointScenes, Loaded, NamedScene, PrepareError, PrepareOptions, ReadyScene, read_one_skin_each,
 };
 use crate::render::shade::Shader;
 use crate::report::compared::compared;
 use crate::report::metrics::Comparison;
 use crate::told::tell_progress;
 use skinfit_view::host::{Found, ViewScore};
+use skinfit_view::opened::Reading;
 
 /// Milliseconds that a slice takes at the least.
 const SLICE: u128 = 200;
@@ -33,6 +34,7 @@ const STATE: &str = "/fit/state.json";
 /// A worker's fits.
 #[wasm_bindgen]
 pub struct Fitter {
+    scenes: Vec<Reading>,
     under_way: Option<UnderWay>,
     /// Whether it is to do nothing for now.
     paused: bool,
@@ -59,8 +61,8 @@ impl Fitter {
     #[wasm_bindgen(constructor)]
     pub fn new(archive: &[u8], tell: Function) -> Result<Self, JsError> {
         tell_progress(tell);
-        hold(archive).map_err(|words| JsError::new(&words))?;
-        Ok(Self { under_way: None, paused: false, say: Vec::new() })
+        let held = hold(archive).map_err(|words| JsError::new(&words))?;
+        Ok(Self { scenes: held.readings(), under_way: None, paused: false, say: Vec::new() })
     }
 
     /// Do what is asked, as JSON.
@@ -71,7 +73,7 @@ impl Fitter {
         match serde_json::from_str(ask)? {
             Ask::Fit(request) => {
                 (self.paused, self.under_way) = (false, None);
-                match UnderWay::new(request) {
+                match UnderWay::new(request, &self.scenes) {
                     Ok(fit) => self.under_way = Some(fit),
                     Err(words) => self.say.push(Say::Failed { words }),
                 }
@@ -120,33 +122,40 @@ impl Fitter {
 }
 
 impl UnderWay {
-    /// The scene as it is fitted, as the command line does it.
-    fn new(request: Request) -> Result<Self, String> {
-        let reading = reading();
-        // Lights and terms of the scene's own are known once it was read.
-        let known = Loaded::read(&reading.scene, &PrepareOptions::default());
-        known.map_err(|error| error.to_string())?;
-        let free = request.free()?;
-        let options = PrepareOptions {
-            fit: true,
-            effects: Some(request.effects()?),
-            cache: reading.cache,
-            ..PrepareOptions::default()
-        };
-        let scenes = read_one_skin(&[reading.scene], &options, |loaded| {
-            request.set_params(&mut loaded.scene.params);
-            loaded.scene.fit.free.clone_from(&free);
+    /// The scenes as they are fitted, as the command line does it.
+    fn new(request: Request, readings: &[Reading]) -> Result<Self, String> {
+        // Lights and terms of the scenes' own are known once they were read.
+        for reading in readings {
+            let known = Loaded::read(&reading.scene, &PrepareOptions::default());
+            known.map_err(|error| error.to_string())?;
+        }
+        let (mut scenes, mut free) = (Vec::new(), Vec::new());
+        for (reading, asked) in readings.iter().zip(&request.scenes) {
+            free.push(asked.free()?);
+            let options = PrepareOptions {
+                fit: true,
+                effects: Some(asked.effects()?),
+                cache: reading.cache.clone(),
+                ..PrepareOptions::default()
+            };
+            scenes.push((reading.scene.clone(), options));
+        }
+        let scenes = read_one_skin_each(&scenes, |number, loaded| {
+            request.scenes[number].set(loaded, free[number].clone());
         });
         let scenes = scenes.map_err(|error| error.to_string())?;
-        let marks = NamedScene::marked(&scenes, &request.hold_out).map_err(|error| error.to_string())?;
+        let marks = NamedScene::marked(&scenes, &request.hold_out()).map_err(|error| error.to_string())?;
         let ready = |(NamedScene { name, loaded }, marks): (NamedScene, Vec<bool>)| {
             let (baked, held) = loaded.bake()?.hold_out(&marks)?;
+            // A scene of which all is held out has nothing to be fitted.
+            if held.is_all_of(&baked.scene) {
+                return Ok(ReadyScene { name, baked, held, engine: None });
+            }
             let observed = baked.sample()?.observe()?;
             let engine = observed.engine()?;
             Ok(ReadyScene { name, baked: observed.baked, held, engine: Some(Box::new(engine)) })
         };
-        let ready: Result<Vec<ReadyScene>, crate::prepare::PrepareError> =
-            scenes.into_iter().zip(marks).map(ready).collect();
+        let ready: Result<Vec<ReadyScene>, PrepareError> = scenes.into_iter().zip(marks).map(ready).collect();
         let scenes = ready.and_then(JointScenes::new).map_err(|error| error.to_string())?;
         Ok(Self { request, scenes, begun: false, outcome: None, running: true })
     }
@@ -163,7 +172,8 @@ impl UnderWay {
             ..FitOptions::default()
         };
         let mut watch = |iteration: &_, point: &Point| {
-            say.push(Say::Step { iteration: *iteration, at: At::of(point) });
+            let at = self.scenes.points(point).iter().map(At::of).collect();
+            say.push(Say::Step { iteration: *iteration, at });
             if since.elapsed().as_millis() >= SLICE {
                 over.store(true, Ordering::SeqCst);
             }
@@ -192,7 +202,11 @@ impl UnderWay {
             return Say::Failed { words: "the fit was stopped before its first iteration.".to_owned() };
         };
         match scores(&self.scenes, &outcome.end) {
-            Ok(views) => Say::Done { found: Told::of(&Found::of(outcome)), views },
+            Ok(views) => {
+                let ends = self.scenes.points(&outcome.end);
+                let found = Found::of(outcome, ends, |name| self.scenes.label(name));
+                Say::Done { found: Told::of(&found), views }
+            }
             Err(words) => Say::Failed { words },
         }
     }
@@ -214,7 +228,8 @@ fn scores(scenes: &JointScenes, end: &Point) -> Result<Vec<ViewScore>, String> {
             let (target, coverage) = compared(view, observed, &image);
             if let Some(found) = Comparison::new(&target, &image, &coverage).scores() {
                 let (psnr, ssim, flip) = (found.psnr, found.ssim, found.flip);
-                scores.push(ViewScore { view: view.name.clone(), held_out, psnr, ssim, flip });
+                let view = scenes.view_name(part, &view.name);
+                scores.push(ViewScore { view, held_out, psnr, ssim, flip });
             }
         }
     }

@@ -1,11 +1,12 @@
-//! The page's scene, as files in memory.
+//! The page's scenes, as files in memory.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use js_sys::{Reflect, global};
 use skinfit_core::files;
 use skinfit_core::shader::term::library;
-use skinfit_view::archive::{BAKES, FITTED, REPORT, SCENE, unpack};
+use skinfit_view::Run;
+use skinfit_view::archive::{BAKES, FITTED, OTHER, OTHER_REPORT, REPORT, SCENES, unpack};
 use skinfit_view::opened::Reading;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -18,10 +19,12 @@ extern "C" {
 
 /// What the page holds.
 pub(crate) struct Held {
-    /// Whether there are fitted constants.
-    pub(crate) fitted: bool,
-    /// Whether there is a report of them.
-    pub(crate) report: bool,
+    /// Its scenes, in their order.
+    scenes: Vec<PathBuf>,
+    /// What a fit of them has left, where it has.
+    pub(crate) fitted: Option<Run>,
+    /// The same of a run that is compared.
+    pub(crate) other: Option<Run>,
 }
 
 /// Hold an archive's files.
@@ -38,12 +41,25 @@ pub(crate) fn hold(archive: &[u8]) -> Result<Held, String> {
     }));
     let files = unpack(archive).ok_or("the page's scene is damaged. Write the page anew.")?;
     let has = |name: &str| files.iter().any(|(path, _)| path.as_os_str() == name);
-    let held = Held { fitted: has(FITTED), report: has(REPORT) };
+    let run = |params: &str, report: &str| {
+        let report = has(report).then(|| PathBuf::from(report));
+        has(params).then(|| Run { params: PathBuf::from(params), report })
+    };
+    let is_scene = |path: &&PathBuf| {
+        path.parent() == Some(Path::new(SCENES)) && path.extension().is_some_and(|ending| ending == "toml")
+    };
+    let scenes = files.iter().map(|(path, _)| path).filter(is_scene).cloned().collect();
+    let held = Held { scenes, fitted: run(FITTED, REPORT), other: run(OTHER, OTHER_REPORT) };
     files::hold(files);
     Ok(held)
 }
 
-/// How the scene is read.
-pub(crate) fn reading() -> Reading {
-    Reading { scene: PathBuf::from(SCENE), cache: Some(PathBuf::from(BAKES)), ..Reading::default() }
+impl Held {
+    /// How the scenes are read.
+    pub(crate) fn readings(&self) -> Vec<Reading> {
+        let cache = Some(PathBuf::from(BAKES));
+        let reading =
+            |scene: &PathBuf| Reading { scene: scene.clone(), cache: cache.clone(), ..Reading::default() };
+        self.scenes.iter().map(reading).collect()
+    }
 }

@@ -7,7 +7,7 @@
 //! - `fitter`: the worker that fits, an iteration or a few at a time: the CPU engine
 //! - `command`, `state`, `message`: what the page says, what it is told, what the workers tell each other
 //! - `held`: the scene's files; `told`: how far long work is
-//! - `page.html`, `page.css`, `page.js`, `worker.js`: the page itself; `build` makes one file of all that, by `pack`
+//! - `page.html`, `page.css`, `script/`, `worker.js`: the page itself; `build` makes one file of all that, by `pack`
 //!
 //! For anything but WebAssembly it is empty.
 #![cfg(target_family = "wasm")]

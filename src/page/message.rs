@@ -1,14 +1,18 @@
 //! What the workers tell each other of a fit.
 
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 use skinfit_view::FitRequest;
 use skinfit_view::fitting::{Message, Step};
-use skinfit_view::host::{Fitted, Found, Known, ViewScore};
+use skinfit_view::host::{FitScene, Fitted, Found, Known, ViewScore};
+use skinfit_view::opened::Opened;
 
 use crate::engine::Point;
 use crate::fit::outcome::{Ending, Iteration};
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Column, Param, Params};
+use crate::prepare::{Loaded, view_of};
 
 /// What the worker that fits is asked.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -24,21 +28,57 @@ pub(crate) enum Ask {
     Stop,
 }
 
-/// A fit: where it starts, what is free, which effects are on, what is left out.
+/// A fit of the page's scenes, in their order.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Request {
-    params: Vec<(String, [f64; 3])>,
+    pub(crate) scenes: Vec<OfScene>,
+}
+
+/// What is fitted of a scene: where it starts, what is free, which effects are on, what is left out.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct OfScene {
+    name: String,
+    at: At,
     free: Vec<String>,
+    free_gains: bool,
     effects: Vec<String>,
-    pub(crate) hold_out: Vec<String>,
+    hold_out: Vec<String>,
 }
 
 impl Request {
     pub(crate) fn of(request: &FitRequest) -> Self {
-        let values = &request.values;
+        Self { scenes: request.scenes.iter().map(OfScene::of).collect() }
+    }
+
+    /// Whether a fit of the one can go on as a fit of the other.
+    pub(crate) fn goes_on_as(&self, other: &Self) -> bool {
+        let same = |(one, other): (&OfScene, &OfScene)| {
+            (&one.free, one.free_gains, &one.effects, &one.hold_out)
+                == (&other.free, other.free_gains, &other.effects, &other.hold_out)
+        };
+        self.scenes.len() == other.scenes.len() && self.scenes.iter().zip(&other.scenes).all(same)
+    }
+
+    /// Which views are held out, as the command line names them.
+    pub(crate) fn hold_out(&self) -> Vec<String> {
+        let several = self.scenes.len() > 1;
+        let name = |scene: &OfScene, view: &String| match several {
+            true => view_of(&scene.name, view),
+            false => view.clone(),
+        };
+        let of = |scene: &OfScene| scene.hold_out.iter().map(|view| name(scene, view)).collect::<Vec<_>>();
+        self.scenes.iter().flat_map(of).collect()
+    }
+}
+
+impl OfScene {
+    fn of(scene: &FitScene) -> Self {
+        let values = &scene.values;
         Self {
-            params: named(&values.params),
+            name: scene.name.clone(),
+            at: At { params: named(&values.params), gains: values.gains.clone() },
             free: values.free.iter().map(Column::name).collect(),
+            free_gains: values.free_gains,
             effects: values.effects.iter().map(|effect| effect.name().to_owned()).collect(),
             hold_out: values.hold_out.clone(),
         }
@@ -52,19 +92,17 @@ impl Request {
         })
     }
 
-    /// Whether a fit of the one can go on as a fit of the other.
-    pub(crate) fn goes_on_as(&self, other: &Self) -> bool {
-        (&self.free, &self.effects, &self.hold_out) == (&other.free, &other.effects, &other.hold_out)
-    }
-
-    pub(crate) fn set_params(&self, params: &mut Params) {
-        set(params, &self.params);
-    }
-
-    /// Once the scene was read.
+    /// As of [`effects`](Self::effects).
     pub(crate) fn free(&self) -> Result<Vec<Column>, String> {
-        let known = |name: &String| column(name).ok_or_else(|| format!("the constant {name} is not known."));
+        let known = |name: &String| column(name).ok_or_else(|| format!("the parameter {name} is not known."));
         self.free.iter().map(known).collect()
+    }
+
+    /// Begin there, with that free.
+    pub(crate) fn set(&self, loaded: &mut Loaded, free: Vec<Column>) {
+        set(&mut loaded.scene.params, &self.at.params);
+        loaded.gains.clone_from(&self.at.gains);
+        (loaded.scene.fit.free, loaded.scene.fit.free_gains) = (free, self.free_gains);
     }
 }
 
@@ -91,7 +129,7 @@ fn set(params: &mut Params, values: &[(String, [f64; 3])]) {
 #[serde(tag = "is", rename_all = "snake_case")]
 pub(crate) enum Say {
     /// It has made a step.
-    Step { iteration: Iteration, at: At },
+    Step { iteration: Iteration, at: Vec<At> },
     /// It is over.
     Done { found: Told, views: Vec<ViewScore> },
     /// It failed.
@@ -110,8 +148,8 @@ impl At {
         Self { params: named(&point.params), gains: point.gains.clone() }
     }
 
-    fn point(self, like: &Params) -> Point {
-        let mut params = like.clone();
+    fn point(self, scene: &Opened) -> Point {
+        let mut params = scene.baked.scene.params.clone();
         set(&mut params, &self.params);
         Point { params, gains: self.gains }
     }
@@ -120,7 +158,7 @@ impl At {
 /// What was found.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Told {
-    end: At,
+    ends: Vec<At>,
     known: Vec<Known>,
     ending: Ending,
     loss: f64,
@@ -133,7 +171,7 @@ pub(crate) struct Told {
 impl Told {
     pub(crate) fn of(found: &Found) -> Self {
         Self {
-            end: At::of(&found.end),
+            ends: found.ends.iter().map(At::of).collect(),
             known: found.known.clone(),
             ending: found.ending,
             loss: found.loss,
@@ -146,16 +184,15 @@ impl Told {
 }
 
 impl Say {
-    /// As the session takes it; what it does not name is as in `like`.
-    pub(crate) fn message(self, like: &Params) -> Message {
+    /// As the session takes it, of its scenes.
+    pub(crate) fn message(self, scenes: &[Arc<Opened>]) -> Message {
+        let points = |at: Vec<At>| at.into_iter().zip(scenes).map(|(at, scene)| at.point(scene)).collect();
         match self {
-            Self::Step { iteration, at } => {
-                Message::Step(Box::new(Step { iteration, point: at.point(like) }))
-            }
+            Self::Step { iteration, at } => Message::Step(Box::new(Step { iteration, points: points(at) })),
             Self::Done { found, views } => {
-                let Told { end, known, ending, loss, losses, iterations, evaluations, seconds } = found;
-                let end = end.point(like);
-                let found = Found { end, known, ending, loss, losses, iterations, evaluations, seconds };
+                let Told { ends, known, ending, loss, losses, iterations, evaluations, seconds } = found;
+                let ends = points(ends);
+                let found = Found { ends, known, ending, loss, losses, iterations, evaluations, seconds };
                 Message::Done(Box::new(Ok(Fitted { found, views })))
             }
             Self::Failed { words } => Message::Done(Box::new(Err(words))),

@@ -7,19 +7,19 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use js_sys::Function;
 use skinfit_core::render::image::Image;
-use skinfit_view::archive::{FITTED, REPORT};
 use skinfit_view::fitting::{FitControl, Tell};
 use skinfit_view::look::{Look, Pane};
 use skinfit_view::paint::Engine;
 use skinfit_view::pixels::{pixels, ramp};
 use skinfit_view::shown::{self, Kind};
+use skinfit_view::table::{constants, scores};
 use skinfit_view::values::Values;
 use skinfit_view::{FitRequest, Host, Run, Session, Start};
 use wasm_bindgen::prelude::wasm_bindgen;
 use wasm_bindgen::{JsError, JsValue};
 
 use crate::command::{self, Command, pane};
-use crate::held::{hold, reading};
+use crate::held::hold;
 use crate::message::{Ask, Request, Say};
 use crate::model::params::Column;
 use crate::state::State;
@@ -136,14 +136,11 @@ impl Stage {
         tell_progress(tell);
         let held = hold(archive).map_err(|words| JsError::new(&words))?;
         let start = Start {
-            reading: reading(),
-            fitted: held.fitted.then(|| Run {
-                params: PathBuf::from(FITTED),
-                report: held.report.then(|| PathBuf::from(REPORT)),
-            }),
+            scenes: held.readings(),
+            fitted: held.fitted,
+            other: held.other,
             run: PathBuf::from("/fit"),
             engine: Engine { cpu, adapter: None },
-            ..Start::default()
         };
         let shared = Shared::default();
         let host = Arc::new(PageHost(Arc::clone(&shared)));
@@ -165,6 +162,7 @@ impl Stage {
     pub fn command(&mut self, command: &str) -> Result<(), JsError> {
         let command: Command = serde_json::from_str(command)?;
         command::run(&mut self.session, &mut self.look, command);
+        self.session.look_for(shown::slots(&self.look));
         // A pane that is shown again is given again.
         let shown = &self.look.panes;
         self.given.retain(|name, _| pane(name).is_some_and(|pane| shown.contains(&pane)));
@@ -199,10 +197,8 @@ impl Stage {
     /// When it is something else.
     pub fn hear(&mut self, said: &str) -> Result<(), JsError> {
         let said: Say = serde_json::from_str(said)?;
-        let (Some(values), Some(tell)) = (self.session.values(), post(&self.post).tell.clone()) else {
-            return Ok(());
-        };
-        tell.say(said.message(&values.params));
+        let Some(tell) = post(&self.post).tell.clone() else { return Ok(()) };
+        tell.say(said.message(self.session.scenes()));
         Ok(())
     }
 
@@ -210,7 +206,7 @@ impl Stage {
     /// first, then red, green, blue and 255 of each pixel, row by row.
     pub fn pixels(&mut self, name: &str) -> Option<Vec<u8>> {
         let pane = pane(name)?;
-        let Some(images) = shown::pair(&self.session, pane, self.look.error) else {
+        let Some(images) = shown::pair(&self.session, pane, &self.look) else {
             self.given.remove(name);
             return None;
         };
@@ -240,12 +236,20 @@ impl Stage {
     /// # Errors
     /// When it cannot be written.
     pub fn probe(&self, x: u32, y: u32) -> Result<String, JsError> {
-        Ok(serde_json::to_string(&skinfit_view::probe::rows(&self.session, [x, y]))?)
+        Ok(serde_json::to_string(&skinfit_view::probe::rows(&self.session, self.look.error_of, [x, y]))?)
     }
 
     /// The constants, as `params.toml`.
     pub fn params_file(&self) -> Option<String> {
         self.session.params_text()
+    }
+
+    /// All constants and scores side by side: two tables, as JSON.
+    ///
+    /// # Errors
+    /// When they cannot be written.
+    pub fn tables(&self) -> Result<String, JsError> {
+        Ok(serde_json::to_string(&[constants(&self.session), scores(&self.session)])?)
     }
 
     /// The constants, by the names of their sliders: what a test compares.
@@ -264,9 +268,13 @@ impl Stage {
 impl Stage {
     /// Say so where the page's bakes are not those that this library looks for: then they were made anew.
     fn check_bakes(&mut self) {
-        let Some(opened) = self.session.opened().filter(|_| !self.checked) else { return };
+        let scenes = self.session.scenes();
+        if self.checked || scenes.is_empty() {
+            return;
+        }
         self.checked = true;
-        if opened.baked.stats.rows.iter().any(|row| !row.cached && row.name != "environment") {
+        let mut bakes = scenes.iter().flat_map(|opened| &opened.baked.stats.rows);
+        if bakes.any(|row| !row.cached && row.name != "environment") {
             self.session.tell(
                 "the page's player is of other sources than the program that wrote it: what that had baked was baked \
                  anew here. Build the player, src/page/build, and write the page anew."

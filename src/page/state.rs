@@ -3,9 +3,10 @@
 use serde::Serialize;
 use skinfit_view::Session;
 use skinfit_view::fitting::shares;
-use skinfit_view::host::ViewScore;
+use skinfit_view::host::{Known, ViewScore};
 use skinfit_view::look::{ErrorKind, Layout, Look, Pane};
 use skinfit_view::paint::Slot;
+use skinfit_view::session::Place;
 use skinfit_view::shown;
 use skinfit_view::values::{Freedom, Values};
 
@@ -13,6 +14,7 @@ use crate::fit::outcome::Ending;
 use crate::model::effects::Effect;
 use crate::model::params::{Channels, Column, Param, Scale};
 use crate::render::tonemap::Operator;
+use crate::scene::view::View;
 
 /// All of it.
 #[derive(Serialize)]
@@ -25,12 +27,17 @@ pub(crate) struct State<'a> {
     image: Option<ImageWords>,
     views: Vec<ViewRow>,
     view: usize,
+    /// Whose errors can be shown.
+    error_of: Vec<(Slot, &'static str)>,
+    gains: Option<Gains>,
     home: bool,
     can_undo: bool,
     can_redo: bool,
     can_resume: bool,
     rows: Vec<Row>,
     effects: Vec<EffectRow>,
+    /// Panes that are of no term, by their keys.
+    offered: [&'static str; Pane::OFFERED.len()],
     panes: Vec<PaneRow>,
     look: &'a Look,
     tones: Vec<&'static str>,
@@ -61,6 +68,22 @@ struct ViewRow {
     fitted: bool,
 }
 
+/// The factors on the images of the scene that is looked at.
+#[derive(Serialize)]
+struct Gains {
+    free: bool,
+    /// Whether there is anything to say of them.
+    shown: bool,
+    views: Vec<Gain>,
+}
+
+#[derive(Serialize)]
+struct Gain {
+    view: String,
+    value: f64,
+    error: Option<String>,
+}
+
 /// A parameter.
 #[derive(Serialize)]
 struct Row {
@@ -86,6 +109,8 @@ struct SliderRow {
     upper: f64,
     log: bool,
     error: Option<String>,
+    /// From one standard error below to one above.
+    interval: Option<[f64; 2]>,
 }
 
 #[derive(Serialize)]
@@ -99,6 +124,8 @@ struct EffectRow {
 #[derive(Serialize)]
 struct PaneRow {
     name: &'static str,
+    /// Whether it is one of the terms.
+    term: bool,
     title: String,
     /// Why it shows nothing, where it does.
     lacking: Option<&'static str>,
@@ -137,7 +164,13 @@ impl<'a> State<'a> {
                 flip: now.compared.as_ref().map(|compared| compared.flip),
             }),
             views: views(session),
-            view: session.view,
+            view: session.at(),
+            error_of: Slot::ALL
+                .into_iter()
+                .filter(|slot| *slot != Slot::Other || session.other().is_some())
+                .map(|slot| (slot, shown::name_of(slot)))
+                .collect(),
+            gains: gains(session),
             home: session.is_at_home(),
             can_undo: session.steps().0,
             can_redo: session.steps().1,
@@ -148,6 +181,7 @@ impl<'a> State<'a> {
                 values.rows().into_iter().map(|param| row(session, values, param)).collect()
             }),
             effects: values.map_or_else(Vec::new, |values| effects(session, values)),
+            offered: Pane::OFFERED.map(shown::name),
             panes: panes(session, look),
             look,
             tones: Operator::ALL.iter().map(|operator| operator.name()).collect(),
@@ -172,13 +206,19 @@ impl<'a> State<'a> {
 }
 
 fn views(session: &Session) -> Vec<ViewRow> {
-    let (Some(opened), Some(values)) = (session.opened(), session.values()) else { return Vec::new() };
-    let row = |view: &crate::scene::view::View| ViewRow {
-        name: view.name.clone(),
-        target: view.target.is_some(),
-        fitted: view.target.is_some() && !values.hold_out.contains(&view.name),
+    let row = |Place { name, target, fitted, .. }: Place| ViewRow { name, target, fitted };
+    session.places().into_iter().map(row).collect()
+}
+
+fn gains(session: &Session) -> Option<Gains> {
+    let (opened, values) = (session.opened()?, session.values()?);
+    let row = |(view, &value): (&View, &f64)| Gain {
+        view: view.name.clone(),
+        value,
+        error: session.known_gain(&view.name).map(Known::words),
     };
-    opened.views().iter().map(row).collect()
+    let views = opened.views().iter().zip(&values.gains).map(row).collect();
+    Some(Gains { free: values.free_gains, shown: values.has_gains(), views })
 }
 
 fn row(session: &Session, values: &Values, param: Param) -> Row {
@@ -197,7 +237,8 @@ fn row(session: &Session, values: &Values, param: Param) -> Row {
             lower: *range.start(),
             upper: *range.end(),
             log: info.scale == Scale::Log,
-            error: session.error_words(column),
+            error: session.known(column).map(Known::words),
+            interval: session.interval(column),
         }
     };
     Row {
@@ -229,8 +270,9 @@ fn panes(session: &Session, look: &Look) -> Vec<PaneRow> {
     let offered = Pane::OFFERED.into_iter().filter(|pane| *pane != Pane::Other || session.other().is_some());
     let row = |pane: Pane| PaneRow {
         name: shown::name(pane),
+        term: matches!(pane, Pane::Term(_)),
         title: shown::title(session, look, pane),
-        lacking: shown::pair(session, pane, look.error).is_none().then_some(shown::lacking(pane)),
+        lacking: shown::pair(session, pane, look).is_none().then_some(shown::lacking(pane)),
     };
     offered.chain(terms.into_iter().map(Pane::Term)).map(row).collect()
 }
@@ -238,7 +280,7 @@ fn panes(session: &Session, look: &Look) -> Vec<PaneRow> {
 fn ways(session: &Session, values: &Values) -> Vec<Way> {
     let way = |column: &Column| Way {
         name: column.name(),
-        at: shares(session.path(), *column).into_iter().map(|[_, at]| at).collect(),
+        at: shares(session.path(), session.scene(), *column).into_iter().map(|[_, at]| at).collect(),
     };
     values.free.iter().map(way).collect()
 }

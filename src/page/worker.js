@@ -84,6 +84,9 @@ const does = {
   probe({ x, y }) {
     say({ probe: JSON.parse(stage.probe(x, y)), x, y });
   },
+  tables() {
+    say({ tables: JSON.parse(stage.tables()) });
+  },
   save() {
     say({ saved: stage.params_file() });
     soon(poll);

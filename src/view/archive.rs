@@ -8,12 +8,16 @@ use std::path::{Path, PathBuf};
 /// What an archive begins with.
 const MAGIC: &[u8; 8] = b"SKINPAGE";
 
-/// Where an archive has the scene.
-pub const SCENE: &str = "/scene/scene.toml";
+/// The folder of an archive's scenes, in their order; what these are read from lies below it.
+pub const SCENES: &str = "/scene";
 /// Where it has constants that were fitted, where they are.
-pub const FITTED: &str = "/scene/params.toml";
+pub const FITTED: &str = "/fitted/params.toml";
 /// Where it has what a report says of them, where there is one.
-pub const REPORT: &str = "/scene/report.json";
+pub const REPORT: &str = "/fitted/report.json";
+/// Where it has those of a run that is compared.
+pub const OTHER: &str = "/other/params.toml";
+/// Where it has what a report says of these.
+pub const OTHER_REPORT: &str = "/other/report.json";
 /// The folder of its bakes.
 pub const BAKES: &str = "/bakes";
 

@@ -23,8 +23,8 @@ pub use thread::on_a_thread;
 pub struct Step {
     /// Its number and its loss.
     pub iteration: Iteration,
-    /// The constants after it.
-    pub point: Point,
+    /// Where it stands after it, in each scene.
+    pub points: Vec<Point>,
 }
 
 /// What a fit says.
@@ -121,10 +121,10 @@ impl Fitting {
     }
 }
 
-/// How far a constant has come of its way from the first step to the last; all 0 where it did not move.
+/// How far a scene's constant has come of its way from the first step to the last; all 0 where it did not move.
 #[must_use]
-pub fn shares(path: &[Step], column: Column) -> Vec<[f64; 2]> {
-    let value = |step: &Step| column.get(&step.point.params);
+pub fn shares(path: &[Step], scene: usize, column: Column) -> Vec<[f64; 2]> {
+    let value = |step: &Step| step.points.get(scene).map_or(0.0, |point| column.get(&point.params));
     let (Some(first), Some(last)) = (path.first().map(value), path.last().map(value)) else {
         return Vec::new();
     };

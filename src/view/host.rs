@@ -10,17 +10,28 @@ use crate::fitting::{FitControl, Tell};
 use crate::start::{Run, Start};
 use crate::values::Values;
 
-/// A fit that the window asks for: of its scene's file, with what was changed in it.
+/// A fit that the window asks for: of its scenes' files, with what was changed in them.
 #[derive(Clone, Debug)]
 pub struct FitRequest {
-    /// The scene's file.
-    pub scene: PathBuf,
-    /// Where it starts, what is free, which effects are on, and what is left out of it.
-    pub values: Values,
+    /// The scenes.
+    pub scenes: Vec<FitScene>,
+    /// Where it starts as a `params.toml` has it.
+    pub start: String,
     /// The run folder.
     pub run: PathBuf,
     /// Whether it goes on from where a fit in that folder stopped.
     pub resume: bool,
+}
+
+/// A scene of a fit.
+#[derive(Clone, Debug)]
+pub struct FitScene {
+    /// What it is called among others.
+    pub name: String,
+    /// Its file.
+    pub path: PathBuf,
+    /// Where it starts, what is free, which effects are on, and what is left out of it.
+    pub values: Values,
 }
 
 /// What a fit has found, and how good it is.
@@ -35,8 +46,8 @@ pub struct Fitted {
 /// What a fit has found, as far as it is shown.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Found {
-    /// The constants.
-    pub end: Point,
+    /// Where it ended, in each scene.
+    pub ends: Vec<Point>,
     /// What is known of each that was free, by its name.
     pub known: Vec<Known>,
     /// How it ended.
@@ -65,16 +76,16 @@ pub struct Known {
 }
 
 impl Found {
-    /// Of what a fit yields.
+    /// Of what a fit yields: where that is in each scene, and how an unknown's name is told.
     #[must_use]
-    pub fn of(outcome: &Outcome) -> Self {
+    pub fn of(outcome: &Outcome, ends: Vec<Point>, label: impl Fn(&str) -> String) -> Self {
         let known = outcome.unknowns.iter().map(|unknown| Known {
-            name: unknown.unknown.name(),
+            name: label(&unknown.unknown.name()),
             std_error: unknown.std_error,
             at_bound: unknown.at_bound,
         });
         Self {
-            end: outcome.end.clone(),
+            ends,
             known: known.collect(),
             ending: outcome.ending,
             loss: outcome.loss_end,

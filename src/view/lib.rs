@@ -1,9 +1,11 @@
 //! A fit that is seen and touched: what the window and the page hold, and the window itself.
 //!
 //! - [`host`]: what the program around them does for them
-//! - state, which knows no widgets: [`start`] (what is looked at first), [`values`] (what one edits), [`history`] (undo and redo), [`opened`] (a scene that
+//! - state, which knows no widgets: [`start`] (what is looked at first), [`values`] (what one edits of a scene), [`skin`] (of several),
+//!   [`history`] (undo and redo), [`opened`] (a scene that
 //!   is looked at), [`look`] (how images are shown), [`shown`] (what panes show), [`pixels`] (a pane in 8 bits),
-//!   [`probe`] (one pixel), [`reported`] (what a run's report says), [`session`] (all of it)
+//!   [`probe`] (one pixel), [`reported`] (what a run's report says),
+//!   [`table`] (constants side by side), [`session`] (all of it)
 //! - work beside them, whose answers the session polls: [`paint`] (images and their scores), [`fitting`]
 //! - [`archive`]: the scene that a page holds
 //! - [`window`]: widgets over all that (feature `window`); the page has its own in HTML
@@ -28,7 +30,9 @@ pub mod probe;
 pub mod reported;
 pub mod session;
 pub mod shown;
+pub mod skin;
 pub mod start;
+pub mod table;
 pub mod values;
 #[cfg(feature = "window")]
 pub mod window;

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::model::terms::TermName;
+use crate::paint::Slot;
 use crate::render::tonemap::Operator;
 
 /// What a pane shows.
@@ -18,7 +19,7 @@ pub enum Pane {
     Fit,
     /// The image of the run that is compared.
     Other,
-    /// How far the image of the sliders is from the target.
+    /// How far an image is from the target.
     Error,
     /// One term of the image of the sliders.
     Term(TermName),
@@ -92,6 +93,8 @@ pub struct Look {
     pub false_colour: bool,
     /// Which error.
     pub error: ErrorKind,
+    /// Of which image.
+    pub error_of: Slot,
     /// How panes share the window.
     pub layout: Layout,
     /// Where the line of a wipe is, from 0 to 1.
@@ -117,6 +120,7 @@ impl Default for Look {
             operator: Operator::default().name().to_owned(),
             false_colour: false,
             error: ErrorKind::default(),
+            error_of: Slot::default(),
             layout: Layout::default(),
             wipe: 0.5,
             panes: vec![Pane::Target, Pane::Now, Pane::Error],

@@ -9,7 +9,7 @@ use crate::bake::rays::RayMesh;
 use crate::bake::stacks::Stack;
 use crate::model::effects::Effects;
 use crate::model::params::{Column, Param, Params};
-use crate::prepare::{Baked, Loaded, PrepareError, PrepareOptions};
+use crate::prepare::{Baked, Loaded, NamedScene, PrepareError, PrepareOptions, read_one_skin_each};
 use crate::render::image::Image;
 use crate::samples::hit_at;
 use crate::scene::mesh::PosedMesh;
@@ -28,8 +28,24 @@ pub struct Reading {
     pub cache: Option<PathBuf>,
 }
 
+impl Reading {
+    fn options(&self) -> PrepareOptions {
+        PrepareOptions {
+            effects: self.effects,
+            fit: true,
+            params: self.params.clone(),
+            cache: self.cache.clone(),
+            // Targets show nothing behind the mesh.
+            background: Some(Background::None),
+            ..PrepareOptions::default()
+        }
+    }
+}
+
 /// A scene with its bakes, and what a probe asks of it.
 pub struct Opened {
+    /// What it is called among others.
+    pub name: String,
     /// The scene and its bakes.
     pub baked: Baked,
     /// The targets of its views, in front of nothing.
@@ -63,21 +79,30 @@ impl Opened {
     /// # Errors
     /// What is wrong with it, as the command line says it.
     pub fn read(reading: &Reading) -> Result<Self, String> {
-        let options = PrepareOptions {
-            effects: reading.effects,
-            fit: true,
-            params: reading.params.clone(),
-            cache: reading.cache.clone(),
-            // Targets show nothing behind the mesh.
-            background: Some(Background::None),
-            ..PrepareOptions::default()
-        };
-        let baked = baked(&reading.scene, &options).map_err(|error| error.to_string())?;
+        let mut scenes = Self::read_all(std::slice::from_ref(reading))?;
+        scenes.pop().ok_or_else(|| "no scene is named.".to_owned())
+    }
+
+    /// Read and bake scenes that share one skin.
+    ///
+    /// # Errors
+    /// What is wrong with them, as the command line says it.
+    pub fn read_all(readings: &[Reading]) -> Result<Vec<Self>, String> {
+        let scenes: Vec<_> =
+            readings.iter().map(|reading| (reading.scene.clone(), reading.options())).collect();
+        let opened = read_one_skin_each(&scenes, |_, _| {}).and_then(|scenes| {
+            scenes.into_iter().map(|NamedScene { name, loaded }| Self::of(name, loaded)).collect()
+        });
+        opened.map_err(|error| error.to_string())
+    }
+
+    fn of(name: String, loaded: Loaded) -> Result<Self, PrepareError> {
+        let baked = baked(loaded)?;
         let mesh = baked.scene.mesh.pose();
         let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
         let targets = baked.scene.views.iter().map(|view| target(view).map(Arc::new)).collect();
         let extent = extent(&mesh);
-        Ok(Self { baked, targets, extent, mesh, rays })
+        Ok(Self { name, baked, targets, extent, mesh, rays })
     }
 
     /// The scene's file.
@@ -108,8 +133,7 @@ impl Opened {
 }
 
 /// A scene with lobes of every sharpness and roughness that a slider may ask for.
-fn baked(scene: &Path, options: &PrepareOptions) -> Result<Baked, PrepareError> {
-    let mut loaded = Loaded::read(scene, options)?;
+fn baked(mut loaded: Loaded) -> Result<Baked, PrepareError> {
     let free = loaded.scene.fit.free.clone();
     let (params, effects) = (&loaded.scene.params, loaded.scene.effects);
     let places = |params: &Params| Stack::ALL.map(|stack| stack.place(params));

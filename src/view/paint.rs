@@ -15,6 +15,8 @@ use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
+use serde::{Deserialize, Serialize};
+
 use crate::model::params::Params;
 use crate::model::terms::TermName;
 use crate::opened::Opened;
@@ -27,9 +29,10 @@ use thread::{Changed, Task};
 use work::{Next, Piece, Work};
 
 /// What an image is for; the first are drawn first.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Slot {
     /// The sliders.
+    #[default]
     Now,
     /// The last fit.
     Fit,
@@ -37,6 +40,11 @@ pub enum Slot {
     Start,
     /// The run that is compared.
     Other,
+}
+
+impl Slot {
+    /// Every one.
+    pub const ALL: [Self; 4] = [Self::Now, Self::Fit, Self::Start, Self::Other];
 }
 
 /// An image that is asked for.
@@ -71,6 +79,8 @@ pub struct Painted {
     pub job: Arc<Job>,
     /// Whether it has a sample a pixel until one with all of the scene's follows.
     pub quick: bool,
+    /// Whether it is its scene's first: most of its time went into what is made once.
+    pub cold: bool,
     /// Bytes of the scene on the adapter; 0 of the CPU engine.
     pub uploaded: u64,
 }
@@ -144,6 +154,11 @@ struct Wanted {
 impl Shared {
     fn wanted(&self) -> MutexGuard<'_, Wanted> {
         self.wanted.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether an image is asked for.
+    fn is_asked(&self) -> bool {
+        !self.wanted().jobs.is_empty()
     }
 }
 

@@ -3,13 +3,14 @@
 use std::sync::Arc;
 
 use crate::look::Pane;
+use crate::paint::Slot;
 use crate::render::image::Image;
 use crate::session::Session;
 use crate::shown;
 
-/// What a pixel is, as rows of names and numbers.
+/// What a pixel is, as rows of names and numbers; the residual and FLIP are of that image.
 #[must_use]
-pub fn rows(session: &Session, [x, y]: [u32; 2]) -> Vec<(String, String)> {
+pub fn rows(session: &Session, error_of: Slot, [x, y]: [u32; 2]) -> Vec<(String, String)> {
     let mut rows = vec![("pixel".to_owned(), format!("{x}, {y}"))];
     if let (Some(opened), Some(camera)) = (session.opened(), session.camera())
         && let Some(place) = opened.place(&camera, x, y)
@@ -31,12 +32,11 @@ pub fn rows(session: &Session, [x, y]: [u32; 2]) -> Vec<(String, String)> {
             rows.push((shown::name(pane).to_owned(), three(rgb)));
         }
     }
-    let now = shown::image(session, Pane::Now).as_ref().and_then(value);
-    let target = shown::compared(session).as_ref().and_then(value);
-    if let (Some(now), Some(target)) = (now, target) {
-        rows.push(("residual".to_owned(), three([0, 1, 2].map(|c| now[c] - target[c]))));
+    let compared = shown::compared(session, error_of);
+    if let Some([Some(image), Some(target)]) = compared.map(|pair| pair.each_ref().map(value)) {
+        rows.push(("residual".to_owned(), three([0, 1, 2].map(|c| image[c] - target[c]))));
     }
-    if let Some(map) = session.image(crate::paint::Slot::Now).and_then(|now| now.compared.as_ref()) {
+    if let Some(map) = session.image(error_of).and_then(|painted| painted.compared.as_ref()) {
         rows.extend(value(&map.map).map(|flip| ("FLIP".to_owned(), format!("{:.4}", flip[0]))));
     }
     for term in shown::terms(session) {

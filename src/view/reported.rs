@@ -42,11 +42,11 @@ struct View {
     flip: Option<f64>,
 }
 
-/// What the report of a fit that has ended at `end` says.
+/// What the report of a fit that has ended at `ends`, in each scene, says.
 ///
 /// # Errors
 /// When it cannot be read, or is no report of this version.
-pub fn reported(report: &Path, end: Point) -> Result<Fitted, String> {
+pub fn reported(report: &Path, ends: Vec<Point>) -> Result<Fitted, String> {
     let unreadable = |reason: String| format!("{}: {reason}. Fit again.", report.display());
     let bytes = files::read(report).map_err(|error| unreadable(error.to_string()))?;
     let report: Report = serde_json::from_slice(&bytes).map_err(|error| unreadable(error.to_string()))?;
@@ -59,7 +59,7 @@ pub fn reported(report: &Path, end: Point) -> Result<Fitted, String> {
         flip: number(of.flip),
     };
     let found = Found {
-        end,
+        ends,
         known: report.unknowns,
         ending: report.ending,
         loss: report.loss.end,

@@ -1,54 +1,63 @@
-//! All that the window holds, without a widget: the scene, the values that one edits, the images that are asked for, the
+//! All that the window holds, without a widget: the scenes, the values that one edits, the images that are asked for, the
 //! fit that runs.
 //!
-//! - `images`: which are asked for, and what effects change in them; `camera`: where they are seen from
+//! - `opening`: scenes and runs that are read; `edits`: what one does to the values; `places`: which view is looked at,
+//!   and `camera`: from where
+//! - `images`: which are asked for, and what effects change in them
 //! - `known`: what is known of a parameter beside its value
-//! - `fits`: the fit beside the window; `files`: constants and scenes as files
+//! - `fits`: the fit beside the window; `files`: constants and scenes as files; `aside`: what is written beside the window
 
+mod aside;
 mod camera;
+mod edits;
 mod files;
 mod fits;
 mod images;
 mod known;
+mod opening;
+mod places;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, TryRecvError, channel};
+use std::sync::mpsc::Receiver;
 
+use aside::Aside;
 pub use camera::Orbit;
 use images::Before;
 pub use images::Change;
+pub use known::START;
+pub use places::Place;
 
 use crate::engine::Point;
-use crate::fit::params_file::ParamsFile;
 use crate::fitting::{Fitting, Step};
 use crate::history::History;
 use crate::host::{Fitted, Found, Host, ViewScore};
 use crate::model::effects::Effect;
-use crate::model::params::{Param, Params};
-use crate::opened::{Opened, Reading};
+use crate::model::params::Params;
+use crate::opened::Opened;
 use crate::paint::{Job, PaintWorker, Painted, Slot, Wake};
-use crate::reported::reported;
-use crate::scene::view::Camera;
-use crate::start::{Run, Start};
+use crate::skin::Skin;
+use crate::start::Start;
 use crate::values::Values;
 
-/// The window's state.
+/// The window's state. One of its scenes is looked at: what is said of constants, views and images is said of that.
 pub struct Session {
     host: Arc<dyn Host>,
     start: Start,
     wake: Wake,
-    opening: Option<Receiver<Result<Opened, String>>>,
-    opened: Option<Arc<Opened>>,
-    values: Option<History<Values>>,
-    first: Option<Values>,
-    fitted: Option<Params>,
-    other: Option<Params>,
+    opening: Option<Receiver<Result<Vec<Opened>, String>>>,
+    scenes: Vec<Arc<Opened>>,
+    values: Option<History<Skin>>,
+    first: Option<Skin>,
+    fitted: Option<Vec<Point>>,
+    other: Option<Vec<Point>>,
     other_fit: Option<Fitted>,
     found: Option<Found>,
     scores: Vec<ViewScore>,
     painter: PaintWorker,
+    /// Which images somebody looks at.
+    looked_at: Vec<Slot>,
     images: BTreeMap<Slot, Painted>,
     asked: BTreeMap<Slot, Arc<Job>>,
     engine: String,
@@ -56,8 +65,9 @@ pub struct Session {
     changes: BTreeMap<&'static str, Change>,
     fitting: Option<Fitting>,
     path: Vec<Step>,
-    /// Which of the views is looked at.
-    pub view: usize,
+    aside: Aside,
+    /// Which of the scenes is looked at, and which of its views.
+    at: (usize, usize),
     /// How the camera is turned away from the view's.
     pub orbit: Orbit,
     /// Whether terms are wanted of the image of the sliders.
@@ -72,16 +82,17 @@ impl std::fmt::Debug for Session {
 }
 
 impl Session {
-    /// Begin to open a scene; `wake` is called when there is something to [`poll`](Self::poll).
+    /// Begin to open scenes; `wake` is called when there is something to [`poll`](Self::poll).
     #[must_use]
     pub fn new(host: Arc<dyn Host>, start: Start, wake: Wake) -> Self {
         let painter = PaintWorker::new(start.engine.clone(), Arc::clone(&wake));
         let mut session = Self {
             host,
             start,
+            aside: Aside::new(Arc::clone(&wake)),
             wake,
             opening: None,
-            opened: None,
+            scenes: Vec::new(),
             values: None,
             first: None,
             fitted: None,
@@ -90,6 +101,7 @@ impl Session {
             found: None,
             scores: Vec::new(),
             painter,
+            looked_at: vec![Slot::Now],
             images: BTreeMap::new(),
             asked: BTreeMap::new(),
             engine: String::new(),
@@ -97,54 +109,13 @@ impl Session {
             changes: BTreeMap::new(),
             fitting: None,
             path: Vec::new(),
-            view: 0,
+            at: (0, 0),
             orbit: Orbit::default(),
             terms: false,
             told: Vec::new(),
         };
-        session.read(session.start.reading.clone());
+        session.read(session.start.scenes.clone());
         session
-    }
-
-    fn read(&mut self, reading: Reading) {
-        let (send, opening) = channel();
-        let wake = Arc::clone(&self.wake);
-        let work = move || {
-            // The window may be gone.
-            let _ = send.send(Opened::read(&reading));
-            wake();
-        };
-        if let Err(error) = aside(work) {
-            self.told.push(format!("no thread can be had: {error}"));
-        }
-        self.opening = Some(opening);
-    }
-
-    /// Look at another scene or run in the place of this one; not while a fit runs.
-    pub fn open(&mut self, path: &Path) {
-        if self.fitting.is_some() {
-            self.told.push("a fit is under way: stop it first.".to_owned());
-            return;
-        }
-        match self.host.start(path) {
-            Ok(start) => {
-                let start = Start { engine: self.start.engine.clone(), ..start };
-                *self = Self::new(Arc::clone(&self.host), start, Arc::clone(&self.wake));
-            }
-            Err(error) => self.told.push(error),
-        }
-    }
-
-    /// Compare another run, or the constants of a file.
-    pub fn compare(&mut self, path: &Path) {
-        let Some(opened) = self.opened.clone() else { return };
-        match self.host.run(path) {
-            Ok(run) => {
-                let (other, other_fit) = self.left_by(&opened, Some(&run));
-                (self.other, self.other_fit) = (other.map(|other| other.params), other_fit);
-            }
-            Err(error) => self.told.push(error),
-        }
     }
 
     /// Take in what was answered, and ask for what is to be shown.
@@ -154,153 +125,61 @@ impl Session {
             self.painted(answer);
         }
         self.follow_fit();
+        self.told.extend(self.aside.told());
         self.ask();
     }
 
-    fn follow_opening(&mut self) {
-        let Some(opening) = &self.opening else { return };
-        let opened = match opening.try_recv() {
-            Ok(opened) => opened,
-            Err(TryRecvError::Empty) => return,
-            Err(TryRecvError::Disconnected) => {
-                Err("the scene could not be read by a fault of skinfit's, told on standard error. Please report it."
-                    .to_owned())
-            }
-        };
-        self.opening = None;
-        match opened {
-            Ok(opened) => self.take(opened),
-            Err(error) => {
-                self.told.push(error);
-                // What is shown stays, with its effects: the step to others is taken back.
-                if let (Some(history), Some(opened)) = (&mut self.values, &self.opened) {
-                    let effects = opened.baked.scene.effects;
-                    history.refuse(|values| values.effects == effects);
-                }
-            }
-        }
-    }
-
-    fn take(&mut self, opened: Opened) {
-        let opened = Arc::new(opened);
-        for words in &opened.baked.warnings {
-            if !self.told.contains(words) {
-                self.told.push(words.clone());
-            }
-        }
-        let scene = Values::of(&opened.baked);
-        let first = self.values.is_none().then(|| scene.clone());
-        if let Some(scene) = first {
-            let (fitted, known) = self.left_by(&opened, self.start.fitted.clone().as_ref());
-            let (found, views) = known.map(|Fitted { found, views }| (found, views)).unzip();
-            (self.found, self.scores) = (found, views.unwrap_or_default());
-            let (other, other_fit) = self.left_by(&opened, self.start.other.clone().as_ref());
-            (self.other, self.other_fit) = (other.map(|other| other.params), other_fit);
-            // A run's sliders stand where its fit ended.
-            let mut values = scene.clone();
-            if let Some(Point { params, gains }) = fitted {
-                self.fitted = Some(params.clone());
-                (values.params, values.gains) = (params, gains);
-            }
-            self.values = Some(History::new(values));
-            self.first = Some(scene);
-        }
-        // A scene may bring effects along: lights one each, morph targets with weights.
-        let loaded = opened.baked.scene.effects;
-        if let Some(history) = &mut self.values {
-            history.amend(|values| values.effects = loaded);
-        }
-        self.view = self.view.min(opened.views().len().saturating_sub(1));
-        self.opened = Some(opened);
-        self.asked.clear();
-    }
-
-    /// What a run has left: its constants, and what is known of them. What cannot be read is told.
-    fn left_by(&mut self, opened: &Opened, run: Option<&Run>) -> (Option<Point>, Option<Fitted>) {
-        let Some(Run { params, report }) = run else { return (None, None) };
-        let scene = &opened.baked.scene;
-        let file = match ParamsFile::read(params, scene.form, &scene.params) {
-            Ok(file) => file.of_scene(&scene.path),
-            Err(error) => {
-                self.told.push(error.to_string());
-                return (None, None);
-            }
-        };
-        let mut gains = opened.baked.gains.clone();
-        files::take_gains(&file, opened.views(), &mut gains);
-        let end = Point { params: file.params, gains };
-        let known = report.as_ref().map(|report| reported(report, end.clone()));
-        let known = known.transpose().unwrap_or_else(|error| {
-            self.told.push(error);
-            None
-        });
-        (Some(end), known)
-    }
-
-    /// The camera that images are seen from.
+    /// The scene that is looked at, once it is opened.
     #[must_use]
-    pub fn camera(&self) -> Option<Camera> {
-        let opened = self.opened.as_ref()?;
-        let view = opened.views().get(self.view)?;
-        Some(self.orbit.turned(&view.camera, opened.extent.0))
+    pub fn opened(&self) -> Option<&Arc<Opened>> {
+        self.scenes.get(self.at.0)
     }
 
-    /// Whether images are seen from the view's own camera.
+    /// Every scene, once they are opened.
     #[must_use]
-    pub fn is_at_home(&self) -> bool {
-        self.orbit == Orbit::default()
+    pub fn scenes(&self) -> &[Arc<Opened>] {
+        &self.scenes
     }
 
-    /// The scene, once it is opened.
+    /// The number of the scene that is looked at.
     #[must_use]
-    pub const fn opened(&self) -> Option<&Arc<Opened>> {
-        self.opened.as_ref()
+    pub const fn scene(&self) -> usize {
+        self.at.0
     }
 
     /// The values that one edits.
     #[must_use]
     pub fn values(&self) -> Option<&Values> {
-        self.values.as_ref().map(History::now)
+        self.values_of(self.at.0)
     }
 
-    /// Those and their past, to edit them; not while a fit moves them.
-    pub fn history(&mut self) -> Option<&mut History<Values>> {
-        if self.fitting.is_some() { None } else { self.values.as_mut() }
-    }
-
-    /// Whether there is a step back, and one forward.
+    /// Those of a scene.
     #[must_use]
-    pub fn steps(&self) -> (bool, bool) {
-        let idle = self.values.as_ref().filter(|_| self.fitting.is_none());
-        idle.map_or((false, false), |history| (history.can_undo(), history.can_redo()))
-    }
-
-    /// Turn the environment's light by so many degrees, as part of a drag.
-    pub fn turn_light(&mut self, degrees: f64) {
-        if let Some(history) = self.history() {
-            history.drag(|values| {
-                let at = values.params.scalar(Param::EnvironmentRotation) + degrees;
-                values.params.set(Param::EnvironmentRotation, (at + 540.0).rem_euclid(360.0) - 180.0);
-            });
-        }
+    pub fn values_of(&self, scene: usize) -> Option<&Values> {
+        self.values.as_ref()?.now().scenes().get(scene)
     }
 
     /// Where the sliders began.
     #[must_use]
-    pub const fn first(&self) -> Option<&Values> {
-        self.first.as_ref()
+    pub fn first(&self) -> Option<&Values> {
+        self.first.as_ref().map(|first| first.in_scene(self.at.0))
     }
 
     /// What the last fit found.
     #[must_use]
-    pub const fn fitted(&self) -> Option<&Params> {
-        self.fitted.as_ref()
+    pub fn fitted(&self) -> Option<&Params> {
+        self.here(self.fitted.as_deref()).map(|point| &point.params)
     }
 
     /// The constants of the run that is compared.
     #[must_use]
-    pub const fn other(&self) -> Option<&Params> {
-        self.other.as_ref()
+    pub fn other(&self) -> Option<&Params> {
+        self.here(self.other.as_deref()).map(|point| &point.params)
+    }
+
+    /// What a list has of the scene that is looked at.
+    fn here<'a>(&self, points: Option<&'a [Point]>) -> Option<&'a Point> {
+        points?.get(self.at.0)
     }
 
     /// What is known of those, and how good they are, where there is a report of it.
@@ -321,10 +200,11 @@ impl Session {
         &self.scores
     }
 
-    /// A slot's image.
+    /// A slot's image of the scene that is looked at.
     #[must_use]
     pub fn image(&self, slot: Slot) -> Option<&Painted> {
-        self.images.get(&slot)
+        let path = self.opened()?.path();
+        self.images.get(&slot).filter(|painted| painted.job.opened.path() == path)
     }
 
     /// What draws.
@@ -343,11 +223,6 @@ impl Session {
     #[must_use]
     pub const fn fitting(&self) -> Option<&Fitting> {
         self.fitting.as_ref()
-    }
-
-    /// The same, to pause or stop it.
-    pub const fn fitting_mut(&mut self) -> Option<&mut Fitting> {
-        self.fitting.as_mut()
     }
 
     /// The steps of the fit that runs, or of the last one.
@@ -392,7 +267,12 @@ impl Session {
         self.told.clear();
     }
 
-    /// Whether a scene is being read.
+    /// Do something that takes a while, as writing a file, beside the window; what it says is told.
+    pub fn aside(&mut self, work: impl FnOnce() -> String + Send + 'static) {
+        self.aside.begin(work);
+    }
+
+    /// Whether scenes are being read.
     #[must_use]
     pub const fn is_opening(&self) -> bool {
         self.opening.is_some()
@@ -401,7 +281,7 @@ impl Session {
     /// Whether all that is asked for is there.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        self.opening.is_none() && self.fitting.is_none() && self.painter.is_idle()
+        self.opening.is_none() && self.fitting.is_none() && self.painter.is_idle() && self.aside.is_idle()
     }
 
     /// Give the adapter's device up, as a driver that is reset does: the window goes on without it.
@@ -409,13 +289,4 @@ impl Session {
         self.painter.lose_device();
         self.asked.clear();
     }
-}
-
-/// Do long work on a thread of its own; in a browser's worker, which is one, at once.
-fn aside(work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-    #[cfg(target_family = "wasm")]
-    work();
-    #[cfg(not(target_family = "wasm"))]
-    std::thread::Builder::new().name("open".to_owned()).spawn(work)?;
-    Ok(())
 }

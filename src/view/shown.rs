@@ -55,6 +55,22 @@ pub const fn lacking(pane: Pane) -> &'static str {
     }
 }
 
+/// The name of the pane that shows a slot's image.
+#[must_use]
+pub fn name_of(slot: Slot) -> &'static str {
+    name(match slot {
+        Slot::Now => Pane::Now,
+        Slot::Fit => Pane::Fit,
+        Slot::Start => Pane::Start,
+        Slot::Other => Pane::Other,
+    })
+}
+
+/// The slots whose images are shown.
+pub fn slots(look: &Look) -> impl Iterator<Item = Slot> {
+    look.panes.iter().map(|pane| if *pane == Pane::Error { look.error_of } else { slot(*pane) })
+}
+
 /// The slot whose image a pane shows.
 const fn slot(pane: Pane) -> Slot {
     match pane {
@@ -65,23 +81,25 @@ const fn slot(pane: Pane) -> Slot {
     }
 }
 
-/// A pane's image, where there is one; of the error that of the sliders.
+/// A pane's image, where there is one; none of the error's, which is made of two.
 #[must_use]
 pub fn image(session: &Session, pane: Pane) -> Option<Arc<Image>> {
     match pane {
-        Pane::Target => session.opened()?.targets.get(session.view)?.clone(),
+        Pane::Target => session.opened()?.targets.get(session.view_number())?.clone(),
         Pane::Term(wanted) => {
             let terms = &session.image(Slot::Now)?.terms;
             terms.iter().find(|(term, _)| *term == wanted).map(|(_, image)| Arc::clone(image))
         }
+        Pane::Error => None,
         pane => session.image(slot(pane)).map(|painted| Arc::clone(&painted.image)),
     }
 }
 
-/// The target that the image of the sliders, as it is there, may be compared with: from a view's own camera.
+/// An image and the target that it may be compared with: from a view's own camera.
 #[must_use]
-pub fn compared(session: &Session) -> Option<Arc<Image>> {
-    session.image(Slot::Now)?.job.target.clone()
+pub fn compared(session: &Session, slot: Slot) -> Option<[Arc<Image>; 2]> {
+    let painted = session.image(slot)?;
+    Some([Arc::clone(&painted.image), painted.job.target.clone()?])
 }
 
 /// The terms that there are images of.
@@ -92,13 +110,13 @@ pub fn terms(session: &Session) -> Vec<TermName> {
 
 /// The images of a pane by itself, as its [`Kind`] takes them.
 #[must_use]
-pub fn pair(session: &Session, pane: Pane, error: ErrorKind) -> Option<[Arc<Image>; 2]> {
-    match (pane, error) {
+pub fn pair(session: &Session, pane: Pane, look: &Look) -> Option<[Arc<Image>; 2]> {
+    match (pane, look.error) {
         (Pane::Error, ErrorKind::Flip) => {
-            let compared = session.image(Slot::Now)?.compared.as_ref()?;
+            let compared = session.image(look.error_of)?.compared.as_ref()?;
             Some([Arc::clone(&compared.map), Arc::clone(&compared.map)])
         }
-        (Pane::Error, _) => image(session, Pane::Now).zip(compared(session)).map(<[_; 2]>::from),
+        (Pane::Error, _) => compared(session, look.error_of),
         (pane, _) => image(session, pane).map(|image| [Arc::clone(&image), image]),
     }
 }
@@ -112,16 +130,15 @@ pub fn title(session: &Session, look: &Look, pane: Pane) -> String {
     };
     let colours = if look.false_colour { "  luminance, 2^-8 to 2^2" } else { "" };
     match (pane, look.layout) {
-        (Pane::Error, _) => match look.error {
-            ErrorKind::Flip => format!("error: FLIP, 0 to {}", scale(ErrorKind::Flip)),
-            ErrorKind::Signed => {
-                let scale = scale(ErrorKind::Signed);
-                format!("error: now - target, blue -{scale} to red {scale}")
+        (Pane::Error, _) => {
+            let (scale, of) = (scale(look.error), name_of(look.error_of));
+            match look.error {
+                ErrorKind::Flip if look.error_of == Slot::Now => format!("error: FLIP, 0 to {scale}"),
+                ErrorKind::Flip => format!("error of {of}: FLIP, 0 to {scale}"),
+                ErrorKind::Signed => format!("error: {of} - target, blue -{scale} to red {scale}"),
+                ErrorKind::Relative => format!("error: |{of} - target| / target, 0 to {scale}"),
             }
-            ErrorKind::Relative => {
-                format!("error: |now - target| / target, 0 to {}", scale(ErrorKind::Relative))
-            }
-        },
+        }
         (pane, Layout::Wipe) => {
             let beside = look.panes.get(1).copied().unwrap_or(Pane::Now);
             format!("{} | {}{colours}", name(pane), name(beside))

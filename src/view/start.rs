@@ -8,9 +8,9 @@ use crate::paint::Engine;
 /// What a window or a page begins with.
 #[derive(Clone, Debug, Default)]
 pub struct Start {
-    /// The scene.
-    pub reading: Reading,
-    /// A fit of it, at whose end the sliders stand.
+    /// The scenes, which share one skin.
+    pub scenes: Vec<Reading>,
+    /// A fit of them, at whose end the sliders stand.
     pub fitted: Option<Run>,
     /// Another, to be compared.
     pub other: Option<Run>,

@@ -15,7 +15,9 @@ pub struct Values {
     pub params: Params,
     /// A factor on each view's image.
     pub gains: Vec<f64>,
-    /// What a fit moves.
+    /// Whether a fit moves these, but for the first.
+    pub free_gains: bool,
+    /// What else a fit moves.
     pub free: Vec<Column>,
     /// What shows a value a channel, whether or not a fit moves it.
     pub apart: Vec<Param>,
@@ -45,6 +47,7 @@ impl Values {
             form: scene.form,
             params: scene.params.clone(),
             gains: baked.gains.clone(),
+            free_gains: scene.fit.free_gains,
             free: scene.fit.free.clone(),
             apart: Vec::new(),
             effects: scene.effects,
@@ -108,6 +111,22 @@ impl Values {
         }
     }
 
+    /// Whether there is anything to say of gains: they are free, or one is not 1.
+    #[must_use]
+    pub fn has_gains(&self) -> bool {
+        self.free_gains || self.gains.iter().any(|&gain| gain != 1.0)
+    }
+
+    /// Say whether a fit moves a parameter: in each channel where it shows a value for each.
+    pub fn set_free(&mut self, param: Param, free: bool) {
+        let freedom = match (free, self.by_channel(param)) {
+            (false, _) => Freedom::Fixed,
+            (true, true) => Freedom::PerChannel,
+            (true, false) => Freedom::Tied,
+        };
+        self.set_freedom(param, freedom);
+    }
+
     /// Take the constants of a fit; its gains are of the views that it has seen.
     pub fn take(&mut self, point: &Point, views: &[View]) {
         self.params = point.params.clone();
@@ -126,6 +145,11 @@ impl Values {
         if let Some(whole) = effect.lacks(self.effects).filter(|_| on) {
             self.effects = self.effects.with(whole);
         }
+        self.without_parts();
+    }
+
+    /// Turn parts off whose whole is off, and leave nothing free that no effect asks for.
+    pub fn without_parts(&mut self) {
         while let Some(part) = self.effects.iter().find(|part| part.lacks(self.effects).is_some()) {
             self.effects = self.effects.without(part);
         }

@@ -192,6 +192,14 @@ impl Effect {
         self.info().within.filter(|&whole| !effects.has(whole))
     }
 
+    /// Whether it belongs to each of several scenes that are fitted as one skin, and not to the skin: poses shade nothing,
+    /// and lights are each scene's own.
+    #[must_use]
+    pub fn is_of_scene(self) -> bool {
+        let own = [Self::Morph, Self::Skin, Self::KeyLight, Self::Lights, Self::Shadows];
+        own.contains(&self) || self.info().within.is_some_and(Self::is_of_scene)
+    }
+
     /// Add a row. A row of the same name and meaning is not added again.
     ///
     /// # Errors

@@ -122,6 +122,12 @@ impl JointScenes {
         })
     }
 
+    /// The same of every scene, in their order.
+    #[must_use]
+    pub fn points(&self, end: &Point) -> Vec<Point> {
+        self.parts.iter().map(|part| self.point_of(part, end)).collect()
+    }
+
     /// What a view is called in reports: of several scenes after its scene.
     #[must_use]
     pub fn view_name(&self, part: &JointScene, view: &str) -> String {

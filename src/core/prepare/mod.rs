@@ -32,7 +32,7 @@ pub use self::held_out::HeldOut;
 pub use self::joint_scenes::{JointScene, JointScenes, ReadyScene, view_of};
 pub use self::loaded::{Loaded, untied};
 pub use self::marked::HoldOutError;
-pub use self::named::{NamedScene, read_one_skin, scene_names};
+pub use self::named::{NamedScene, read_one_skin, read_one_skin_each, scene_names};
 pub use self::observed::Observed;
 pub use self::one_skin::share_skin;
 pub use self::options::{ClipOcclusion, PrepareOptions, Views};

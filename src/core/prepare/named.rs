@@ -24,13 +24,26 @@ pub fn read_one_skin(
     options: &PrepareOptions,
     change: impl Fn(&mut Loaded),
 ) -> Result<Vec<NamedScene>, PrepareError> {
-    let names = scene_names(paths)?;
-    let one = |path: &PathBuf| -> Result<Loaded, PrepareError> {
+    let scenes: Vec<_> = paths.iter().map(|path| (path.clone(), options.clone())).collect();
+    read_one_skin_each(&scenes, |_, loaded| change(loaded))
+}
+
+/// The same of scenes that are each read in a way of its own; `change` is told the number of each.
+///
+/// # Errors
+/// As of [`read_one_skin`].
+pub fn read_one_skin_each(
+    scenes: &[(PathBuf, PrepareOptions)],
+    change: impl Fn(usize, &mut Loaded),
+) -> Result<Vec<NamedScene>, PrepareError> {
+    let paths: Vec<PathBuf> = scenes.iter().map(|(path, _)| path.clone()).collect();
+    let names = scene_names(&paths)?;
+    let one = |(number, (path, options)): (usize, &(PathBuf, PrepareOptions))| {
         let mut loaded = Loaded::read(path, options)?;
-        change(&mut loaded);
-        Ok(loaded)
+        change(number, &mut loaded);
+        Ok::<_, PrepareError>(loaded)
     };
-    let mut loaded = paths.iter().map(one).collect::<Result<Vec<_>, _>>()?;
+    let mut loaded = scenes.iter().enumerate().map(one).collect::<Result<Vec<_>, _>>()?;
     share_skin(&mut loaded)?;
     Ok(names.into_iter().zip(loaded).map(|(name, loaded)| NamedScene { name, loaded }).collect())
 }

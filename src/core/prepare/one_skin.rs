@@ -6,14 +6,6 @@ use crate::model::effects::Effect;
 use crate::model::params::{Channels, Column, Param};
 use crate::scene::{Scene, short};
 
-/// Effects that belong to the scene, and not to the skin: poses shade nothing, and lights are each scene's own.
-const OF_SCENE: [Effect; 5] =
-    [Effect::Morph, Effect::Skin, Effect::KeyLight, Effect::Lights, Effect::Shadows];
-
-fn is_of_scene(effect: Effect) -> bool {
-    OF_SCENE.contains(&effect) || effect.info().within.is_some_and(is_of_scene)
-}
-
 /// Have `scenes` share one skin: form, silhouette, lookups, named choices, loss, the skin's effects and what is free
 /// of its parameters have to be the same in all of them. Free parameters of the skin then start everywhere as in the
 /// first scene; those that are held have to stand at one value. Meshes, maps, views, poses, lights and their
@@ -85,7 +77,7 @@ fn is_held(scene: &Scene, param: Param) -> bool {
 }
 
 fn effects(scene: &Scene) -> String {
-    let own = scene.effects.iter().filter(|effect| !is_of_scene(*effect));
+    let own = scene.effects.iter().filter(|effect| !effect.is_of_scene());
     own.map(Effect::name).collect::<Vec<_>>().join(", ")
 }
 

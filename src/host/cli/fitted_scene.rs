@@ -19,6 +19,8 @@ pub(super) struct Changes<'a> {
     pub(super) loss: Option<&'a str>,
     /// What is free, instead of the file's.
     pub(super) free: Option<&'a [Column]>,
+    /// Whether gains are free, instead of what the file says.
+    pub(super) free_gains: Option<bool>,
     /// The start values, instead of the file's.
     pub(super) start: Option<Start<'a>>,
     /// Fitted maps, instead of the file's: key in `[maps]` and path.
@@ -59,6 +61,12 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
         && let Some(fit) = section(scene.as_table_mut(), "fit")
     {
         set_free(fit, free);
+    }
+    if let Some(free) = changes.free_gains
+        && let Some(fit) = section(scene.as_table_mut(), "fit")
+        && (free || fit.contains_key("gains"))
+    {
+        set(fit, "gains", free.into());
     }
     if let Some(start) = changes.start {
         let model = section(scene.as_table_mut(), "model");

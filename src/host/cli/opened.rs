@@ -6,8 +6,11 @@ use skinfit_view::Run;
 #[cfg(feature = "view")]
 use skinfit_view::{Start, opened::Reading};
 
+use toml_edit::{DocumentMut, Item};
+
 use super::Refusal;
 use super::run_folder::default_folder;
+use crate::report::SCENES;
 
 /// The scene's file as it was fitted, in a run folder.
 pub(super) const SCENE: &str = "scene.toml";
@@ -16,46 +19,82 @@ const PARAMS: &str = "params.toml";
 /// The report's numbers.
 pub(super) const REPORT: &str = "report.json";
 
-/// A scene or a run.
+/// Scenes that share one skin, or a run.
 pub(super) struct SceneOrRun {
     /// The run folder, where it is one.
     pub(super) run: Option<PathBuf>,
-    /// The scene's file; the built-in scene where there is none.
-    pub(super) scene: Option<PathBuf>,
+    /// The scenes' files; the built-in scene where there is none.
+    pub(super) scenes: Vec<PathBuf>,
     /// What it has found.
     pub(super) fitted: Option<Run>,
 }
 
 impl SceneOrRun {
-    /// What `path` is.
+    /// What `paths` are.
     ///
     /// # Errors
-    /// When it is a folder, and not that of a fit of one scene.
-    pub(super) fn of(path: Option<&Path>) -> Result<Self, Refusal> {
-        let Some(run) = path.filter(|path| path.is_dir()) else {
-            return Ok(Self { run: None, scene: path.map(Path::to_owned), fitted: None });
+    /// When one is a folder, and not that of a fit, or there are others beside that.
+    pub(super) fn of(paths: &[PathBuf]) -> Result<Self, Refusal> {
+        let Some(run) = paths.iter().find(|path| path.is_dir()) else {
+            return Ok(Self { run: None, scenes: paths.to_vec(), fitted: None });
         };
-        let (scene, fitted) = (Some(file_of(run, SCENE)?), Some(run_of(run)?));
-        Ok(Self { run: Some(run.to_owned()), scene, fitted })
+        if paths.len() > 1 {
+            return Err(Refusal::new(format!(
+                "{}: this is a folder, and others are named beside it. Name one run folder, or scene files.",
+                run.display()
+            )));
+        }
+        let fitted = Some(run_of(run)?);
+        Ok(Self { run: Some(run.clone()), scenes: scenes_of(run)?, fitted })
     }
 
-    /// What a window begins with: the scene's file at `path`, bakes in `cache`, fits beside what is looked at.
+    /// What a window begins with: the scenes' files at `paths`, bakes in `cache`, fits beside what is looked at.
     #[cfg(feature = "view")]
-    pub(super) fn start(self, path: PathBuf, cache: Option<PathBuf>) -> Start {
+    pub(super) fn start(self, paths: Vec<PathBuf>, cache: Option<PathBuf>) -> Start {
+        let reading = |scene| Reading { scene, cache: cache.clone(), ..Reading::default() };
         Start {
             run: PathBuf::from(format!("{}.window", self.folder().display())),
-            reading: Reading { scene: path, cache, ..Reading::default() },
+            scenes: paths.into_iter().map(reading).collect(),
             fitted: self.fitted,
             ..Start::default()
         }
     }
 
-    /// Where what is made of it is left: the run folder, or that of a fit of the scene.
+    /// Where what is made of it is left: the run folder, or that of a fit of the scenes.
     pub(super) fn folder(&self) -> PathBuf {
         match &self.run {
             Some(run) => run.clone(),
-            None => default_folder(self.scene.as_slice()),
+            None => default_folder(&self.scenes),
         }
+    }
+}
+
+/// The scenes' files of a run folder, in the order in which they were fitted.
+fn scenes_of(run: &Path) -> Result<Vec<PathBuf>, Refusal> {
+    let one = run.join(SCENE);
+    let several = run.join(SCENES);
+    if one.is_file() || !several.is_dir() {
+        return file_of(run, SCENE).map(|scene| vec![scene]);
+    }
+    let mut files: Vec<PathBuf> = std::fs::read_dir(&several)?
+        .filter_map(|entry| Some(entry.ok()?.path()))
+        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
+        .collect();
+    files.sort();
+    // The constants name them in their order.
+    let constants = std::fs::read_to_string(run.join(PARAMS)).unwrap_or_default();
+    let constants: DocumentMut = constants.parse().unwrap_or_default();
+    let names = constants.get(SCENES).and_then(Item::as_table_like);
+    let names: Vec<&str> =
+        names.map(|names| names.iter().map(|(name, _)| name).collect()).unwrap_or_default();
+    let place = |path: &PathBuf| {
+        let own = path.file_stem().unwrap_or_default().to_string_lossy();
+        names.iter().position(|name| *name == own).unwrap_or(usize::MAX)
+    };
+    files.sort_by_key(place);
+    match files.is_empty() {
+        true => file_of(run, SCENE).map(|scene| vec![scene]),
+        false => Ok(files),
     }
 }
 
@@ -76,8 +115,7 @@ fn file_of(run: &Path, name: &str) -> Result<PathBuf, Refusal> {
         return Ok(file);
     }
     Err(Refusal::new(format!(
-        "{}: this folder holds no {name}: it is not that of a fit of one scene. Name the run folder of one, or a scene \
-         file.",
+        "{}: this folder holds no {name}: it is not that of a fit. Name the run folder of one, or a scene file.",
         run.display()
     )))
 }

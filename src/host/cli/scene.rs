@@ -103,10 +103,7 @@ impl ScenesArguments {
 
     /// As [`BakeArguments::kept_path`], of each scene that is named.
     pub(super) fn kept_paths(&self, folder: &Path) -> Result<Vec<PathBuf>, Refusal> {
-        match self.named.as_slice() {
-            [] => Ok(vec![self.bakes.kept_path(None, folder)?]),
-            scenes => scenes.iter().map(|scene| self.bakes.kept_path(Some(scene), folder)).collect(),
-        }
+        self.bakes.kept_paths(&self.named, folder)
     }
 
     /// What the scenes are called in reports: their files.
@@ -129,6 +126,14 @@ impl BakeArguments {
                 let cache = self.cache();
                 Ok(demo::kept_scene(cache.as_deref().unwrap_or(folder), cache.as_deref())?)
             }
+        }
+    }
+
+    /// The same of several scenes; of none the built-in one.
+    pub(super) fn kept_paths(&self, scenes: &[PathBuf], folder: &Path) -> Result<Vec<PathBuf>, Refusal> {
+        match scenes {
+            [] => Ok(vec![self.kept_path(None, folder)?]),
+            scenes => scenes.iter().map(|scene| self.kept_path(Some(scene), folder)).collect(),
         }
     }
 

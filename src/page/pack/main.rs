@@ -16,10 +16,19 @@ use wasm_bindgen_cli_support::Bindgen;
 
 /// The page's parts.
 const PAGE: &str = include_str!("../page.html");
+const SCRIPT: &str = concat!(
+    include_str!("../script/workers.js"),
+    include_str!("../script/state.js"),
+    include_str!("../script/rows.js"),
+    include_str!("../script/panes.js"),
+    include_str!("../script/fit.js"),
+    include_str!("../script/keys.js"),
+    include_str!("../script/begin.js"),
+);
 const PARTS: [(&str, &str); 3] = [
     ("{{css}}", include_str!("../page.css")),
     ("{{worker}}", include_str!("../worker.js")),
-    ("{{script}}", include_str!("../page.js")),
+    ("{{script}}", SCRIPT),
 ];
 
 fn main() -> ExitCode {

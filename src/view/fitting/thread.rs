@@ -4,13 +4,16 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::thread::JoinHandle;
 
+use rayon::ThreadPoolBuilder;
+use thread_priority::{ThreadPriority, set_current_thread_priority};
+
 use super::{FitControl, Message, Step, Tell};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::host::Fitted;
 
 /// What is done at each iteration; the fit goes on when it returns.
-type Watch<'a> = dyn FnMut(&Iteration, &Point) + 'a;
+type Watch<'a> = dyn FnMut(&Iteration, &[Point]) + 'a;
 
 /// Whether it is to wait, and who waits for that to change.
 #[derive(Debug, Default)]
@@ -53,15 +56,27 @@ pub fn on_a_thread(
     let (stop, theirs) = (Arc::clone(&interrupt), Arc::clone(&pause));
     let thread = std::thread::Builder::new().name("fit".to_owned());
     let work = move || {
-        let mut watch = |iteration: &Iteration, point: &Point| {
-            let step = Step { iteration: *iteration, point: point.clone() };
+        let mut watch = |iteration: &Iteration, points: &[Point]| {
+            let step = Step { iteration: *iteration, points: points.to_vec() };
             tell.say(Message::Step(Box::new(step)));
             theirs.wait();
         };
         let done = fit(&mut watch, &stop);
         tell.say(Message::Done(Box::new(done)));
     };
-    Box::new(Threaded { interrupt, pause, thread: thread.spawn(work).ok() })
+    // What it shares out among threads of its own gives way, too.
+    let run = move || match ThreadPoolBuilder::new().start_handler(|_| give_way()).build() {
+        Ok(pool) => pool.install(work),
+        Err(_) => work(),
+    };
+    Box::new(Threaded { interrupt, pause, thread: thread.spawn(run).ok() })
+}
+
+/// Have this thread give way to those that draw: a window that stutters while a fit runs is of less use than a fit that
+/// takes a little longer.
+fn give_way() {
+    // Where the system does not let a thread do so, it competes as any other.
+    let _ = set_current_thread_priority(ThreadPriority::Min);
 }
 
 impl FitControl for Threaded {

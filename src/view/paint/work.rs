@@ -28,8 +28,20 @@ pub(super) struct Work {
     gpu: Option<Gpu>,
     /// Whether a whole image takes long.
     slow: bool,
-    scene: Option<(Arc<Opened>, Box<dyn Painter>)>,
+    /// What draws each scene, the last one that did last.
+    painters: Vec<Drawing>,
 }
+
+/// What draws a scene.
+struct Drawing {
+    opened: Arc<Opened>,
+    painter: Box<dyn Painter>,
+    /// Whether it has drawn: of the first image most is making pipelines.
+    warm: bool,
+}
+
+/// Scenes whose painters are kept: one goes back and forth between them.
+const MOST: usize = 4;
 
 /// Layers by their names.
 type Layers = Vec<(String, Image)>;
@@ -49,7 +61,7 @@ pub(super) enum Next {
 
 impl Work {
     pub(super) const fn new(engine: Engine, send: Sender<Answer>, wake: Wake) -> Self {
-        Self { engine, send, wake, gpu: None, slow: false, scene: None }
+        Self { engine, send, wake, gpu: None, slow: false, painters: Vec::new() }
     }
 
     /// Do what is next.
@@ -59,10 +71,7 @@ impl Work {
         }
         let follow = match next {
             Next::Paint(job) => self.paint(slot, &job).await,
-            Next::Follow(painted) => {
-                self.follow(slot, *painted).await;
-                None
-            }
+            Next::Follow(painted) => self.follow(slot, *painted, shared).await,
         };
         let mut wanted = shared.wanted();
         if let Some(painted) = follow
@@ -87,30 +96,41 @@ impl Work {
                 self.answer(Answer::Painted(slot, painted.clone()));
                 Some(painted)
             }
-            Err(error) => {
-                self.answer(Answer::Failed(slot, error.to_string()));
-                None
-            }
+            Err(error) => self.failed(slot, &error),
         }
     }
 
-    async fn follow(&mut self, slot: Slot, mut painted: Painted) {
+    /// What follows an image: it with all samples, its terms, its scores. What is asked for in between comes first: then
+    /// what is there is given back, to be followed once more.
+    async fn follow(&mut self, slot: Slot, mut painted: Painted, shared: &Shared) -> Option<Painted> {
         let job = Arc::clone(&painted.job);
-        if painted.quick {
+        if painted.quick || painted.cold {
             match self.picture(&job, false, false).await {
                 Ok((_, whole)) => painted = whole,
-                Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
+                Err(error) => return self.failed(slot, &error),
             }
         }
-        if job.terms {
+        if shared.is_asked() {
+            return Some(painted);
+        }
+        if job.terms && painted.terms.is_empty() {
             let named = |(name, image): (String, Image)| Some((TermName::from_name(&name)?, Arc::new(image)));
             match self.picture(&job, true, false).await {
                 Ok((layers, _)) => painted.terms = layers.into_iter().filter_map(named).collect(),
-                Err(error) => return self.answer(Answer::Failed(slot, error.to_string())),
+                Err(error) => return self.failed(slot, &error),
             }
+        }
+        if shared.is_asked() {
+            return Some(painted);
         }
         painted.compared = job.target.as_ref().and_then(|target| compared(target, &painted.image));
         self.answer(Answer::Whole(slot, painted));
+        None
+    }
+
+    fn failed(&self, slot: Slot, error: &PaintError) -> Option<Painted> {
+        self.answer(Answer::Failed(slot, error.to_string()));
+        None
     }
 
     /// An image, and its layers where they are wanted. Where the device fails, the CPU engine draws from now on.
@@ -123,7 +143,8 @@ impl Work {
         match self.drawn(job, layers, quick).await {
             Err(PaintError::Gpu(error)) => {
                 self.answer(Answer::Told(format!("{error} The CPU engine draws from now on.")));
-                (self.engine.cpu, self.gpu, self.scene) = (true, None, None);
+                (self.engine.cpu, self.gpu) = (true, None);
+                self.painters.clear();
                 self.drawn(job, layers, quick).await
             }
             done => done,
@@ -136,26 +157,21 @@ impl Work {
         layers: bool,
         quick: bool,
     ) -> Result<(Layers, Painted), PaintError> {
-        if self.scene.as_ref().is_none_or(|(opened, _)| !Arc::ptr_eq(opened, &job.opened)) {
-            self.scene = None;
-            let painter = self.painter(&job.opened).await?;
-            self.answer(Answer::Engine(painter.name()));
-            self.scene = Some((Arc::clone(&job.opened), painter));
-        }
-        let Some((_, painter)) = &mut self.scene else { return Err(GpuError::NoAdapter.into()) };
-        let samples = job.opened.baked.scene.quality.samples_per_axis;
         // The CPU engine keeps its samples: it has no use for fewer.
         let quick = quick && !self.engine.cpu;
+        let Drawing { painter, warm, .. } = self.drawing(&job.opened).await?;
+        let samples = job.opened.baked.scene.quality.samples_per_axis;
         painter.set_samples(if quick { 1 } else { samples });
         painter.set_params(&job.params)?;
         let start = Instant::now();
         let Picture { image, layers, .. } =
             drawn_by(&mut **painter, &job.camera, job.gain, Beside { layers, haze: false }).await?;
         let seconds = start.elapsed().as_secs_f64();
+        let cold = !std::mem::replace(warm, true);
+        let uploaded = painter.uploaded_bytes();
         if !quick && layers.is_empty() {
             self.slow = seconds > LONG && samples > 1;
         }
-        let uploaded = painter.uploaded_bytes();
         let image = Arc::new(image);
         let painted = Painted {
             image,
@@ -165,8 +181,29 @@ impl Work {
             uploaded,
             job: Arc::clone(job),
             quick,
+            cold,
         };
         Ok((layers, painted))
+    }
+
+    /// What draws a scene, which is made where there is none.
+    async fn drawing(&mut self, opened: &Arc<Opened>) -> Result<&mut Drawing, PaintError> {
+        let place = self.painters.iter().position(|drawing| Arc::ptr_eq(&drawing.opened, opened));
+        let drawing = match place {
+            Some(place) => self.painters.remove(place),
+            None => {
+                // Of a scene that was read anew nobody asks for the one before.
+                self.painters.retain(|drawing| drawing.opened.path() != opened.path());
+                if self.painters.len() >= MOST {
+                    self.painters.remove(0);
+                }
+                let painter = self.painter(opened).await?;
+                self.answer(Answer::Engine(painter.name()));
+                Drawing { opened: Arc::clone(opened), painter, warm: false }
+            }
+        };
+        self.painters.push(drawing);
+        self.painters.last_mut().ok_or_else(|| GpuError::NoAdapter.into())
     }
 
     async fn painter(&mut self, opened: &Opened) -> Result<Box<dyn Painter>, PaintError> {

@@ -1,67 +1,97 @@
 //! Constants and scenes as files.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use skinfit_core::output;
 
 use super::Session;
-use crate::fit::params_file::{Origin, ParamsFile};
+use crate::engine::Point;
+use crate::fit::params_file::{Origin, ParamsFile, ParamsFileError, SceneValues};
+use crate::model::params::Param;
+use crate::opened::Opened;
 use crate::scene::view::View;
+use crate::values::Values;
 
 impl Session {
     /// Take the constants of a `params.toml`: a step of the history.
     pub fn load_params(&mut self, file: &Path) {
-        if let (Some(opened), Some(history), None) = (&self.opened, &mut self.values, &self.fitting) {
+        let Some(history) = self.values.as_mut().filter(|_| self.fitting.is_none()) else { return };
+        let read = |(opened, values): (&Arc<Opened>, &Values)| {
             let scene = &opened.baked.scene;
-            match ParamsFile::read(file, scene.form, &history.now().params) {
-                Ok(read) => {
-                    let read = read.of_scene(&scene.path);
-                    let views = opened.views();
-                    history.edit(|values| {
-                        take_gains(&read, views, &mut values.gains);
-                        values.params = read.params;
-                    });
-                }
-                Err(error) => self.told.push(error.to_string()),
-            }
+            let read = ParamsFile::read(file, scene.form, &values.params)?.of_scene(&scene.path);
+            let mut gains = values.gains.clone();
+            take_gains(&read, opened.views(), &mut gains);
+            Ok(Point { params: read.params, gains })
+        };
+        let points: Result<Vec<Point>, ParamsFileError> =
+            self.scenes.iter().zip(history.now().scenes()).map(read).collect();
+        match points {
+            Ok(points) => history.edit(|values| values.set_points(&points)),
+            Err(error) => self.told.push(error.to_string()),
         }
     }
 
     /// The constants as a `params.toml` has them.
     #[must_use]
     pub fn params_text(&self) -> Option<String> {
-        let (opened, values) = (self.opened.as_ref()?, self.values()?);
-        let scene = &opened.baked.scene;
-        let names = scene.views.iter().map(|view| view.name.clone());
-        let saved = ParamsFile {
-            form: scene.form,
-            effects: Some(values.effects),
-            loss: None,
-            params: values.params.clone(),
-            gains: names.zip(values.gains.iter().copied()).collect(),
-            scenes: Vec::new(),
+        let values = self.values.as_ref()?.now().scenes();
+        let (first, several) = (values.first()?, values.len() > 1);
+        let own = |(opened, own): (&Arc<Opened>, &Values)| SceneValues {
+            name: opened.name.clone(),
+            effects: Some(own.effects).filter(|effects| *effects != first.effects),
+            params: own_params(own),
+            gains: gains(opened, own),
         };
-        Some(saved.to_toml(Origin { scene: &scene.path, outcome: None, set: &[], numbers: &[] }))
+        let scenes = self.scenes.iter().zip(values);
+        let saved = ParamsFile {
+            form: first.form,
+            effects: Some(first.effects),
+            loss: None,
+            params: first.params.clone(),
+            gains: if several { Vec::new() } else { scenes.clone().flat_map(|(o, v)| gains(o, v)).collect() },
+            scenes: if several { scenes.map(own).collect() } else { Vec::new() },
+        };
+        let paths: Vec<String> =
+            self.scenes.iter().map(|opened| opened.path().display().to_string()).collect();
+        let paths = paths.join(", ");
+        let origin = Origin { scene: Path::new(&paths), outcome: None, set: &[], numbers: &[] };
+        Some(saved.to_toml(origin))
     }
 
     /// Leave the constants as a `params.toml`.
     pub fn save_params(&mut self, file: &Path) {
         let Some(text) = self.params_text() else { return };
-        self.told.push(match output::write(file, text.as_bytes()) {
+        let file = file.to_owned();
+        self.aside(move || match output::write(&file, text.as_bytes()) {
             Ok(()) => format!("wrote {}", file.display()),
             Err(error) => error.to_string(),
         });
     }
 
-    /// Leave the scene with the window's values as a scene file.
+    /// Leave the scene that is looked at with the window's values as a scene file.
     pub fn save_scene(&mut self, file: &Path) {
-        let (Some(opened), Some(values)) = (&self.opened, &self.values) else { return };
-        let done = self.host.save_scene(opened.path(), values.now(), file);
-        self.told.push(match done {
+        let (Some(opened), Some(values)) = (self.opened(), self.values()) else { return };
+        let (scene, values, file) = (opened.path().to_owned(), values.clone(), file.to_owned());
+        let host = Arc::clone(&self.host);
+        self.aside(move || match host.save_scene(&scene, &values, &file) {
             Ok(()) => format!("wrote {}", file.display()),
             Err(error) => error,
         });
     }
+}
+
+/// What a scene has of its own, as far as it is nobody's to give elsewhere.
+fn own_params(values: &Values) -> Vec<(Param, [f64; 3])> {
+    let free = |param: Param| values.free.iter().any(|column| column.param == param);
+    let given = |param: Param| param.info().held || (param.info().found && !free(param));
+    let own = Param::of(values.effects).filter(|param| param.is_of_scene() && !given(*param));
+    own.map(|param| (param, values.params.rgb(param))).collect()
+}
+
+fn gains(opened: &Opened, values: &Values) -> Vec<(String, f64)> {
+    let names = opened.views().iter().map(|view| view.name.clone());
+    names.zip(values.gains.iter().copied()).collect()
 }
 
 /// Take a file's factors on views, by their names.

@@ -5,25 +5,41 @@ use std::sync::Arc;
 use super::Session;
 use crate::fit::outcome::Ending;
 use crate::fitting::{Fitting, Message};
-use crate::host::{FitRequest, Fitted};
+use crate::host::{FitRequest, FitScene, Fitted};
 
 impl Session {
     /// Fit from where the sliders stand; `resume`: go on with the fit that was stopped.
     pub fn begin_fit(&mut self, resume: bool) {
-        let (Some(opened), Some(values), None) = (&self.opened, &mut self.values, &self.fitting) else {
+        self.settle();
+        let (Some(values), Some(start), None) = (&self.values, self.params_text(), &self.fitting) else {
             return;
         };
-        values.settle();
-        let request = FitRequest {
-            scene: opened.path().to_owned(),
-            values: values.now().clone(),
-            run: self.start.run.clone(),
-            resume,
-        };
+        let scenes = self.scenes.iter().zip(values.now().scenes());
+        let scenes = scenes.map(|(opened, values)| FitScene {
+            name: opened.name.clone(),
+            path: opened.path().to_owned(),
+            values: values.clone(),
+        });
+        let run = self.start.run.clone();
+        let request = FitRequest { scenes: scenes.collect(), start, run, resume };
         if !resume {
             self.path.clear();
         }
         self.fitting = Some(Fitting::begin(&self.host, request, Arc::clone(&self.wake)));
+    }
+
+    /// Have the fit wait after the iteration that it is at, or go on.
+    pub fn toggle_pause(&mut self) {
+        if let Some(fitting) = &mut self.fitting {
+            fitting.set_paused(!fitting.is_paused());
+        }
+    }
+
+    /// Have it end soon, with what it has found.
+    pub fn stop_fit(&mut self) {
+        if let Some(fitting) = &mut self.fitting {
+            fitting.stop();
+        }
     }
 
     /// Take in what the fit has said.
@@ -32,8 +48,9 @@ impl Session {
         for message in fitting.messages() {
             match message {
                 Message::Step(step) => {
-                    if let (Some(history), Some(opened)) = (&mut self.values, &self.opened) {
-                        history.drag(|values| values.take(&step.point, opened.views()));
+                    let scenes = self.scenes.iter().map(|opened| &**opened);
+                    if let Some(history) = &mut self.values {
+                        history.drag(|values| values.take(&step.points, scenes));
                     }
                     // What was known was of another fit.
                     (self.found, self.scores) = (None, Vec::new());
@@ -55,9 +72,11 @@ impl Session {
     }
 
     fn fitted_to(&mut self, Fitted { found, views }: Fitted) {
-        self.scores = views;
-        if let (Some(history), Some(opened)) = (&mut self.values, &self.opened) {
-            history.drag(|values| values.take(&found.end, opened.views()));
+        self.scores = self.in_order(views);
+        let scenes = self.scenes.iter().map(|opened| &**opened);
+        if let Some(history) = &mut self.values {
+            history.drag(|values| values.take(&found.ends, scenes));
+            self.fitted = Some(history.now().points());
         }
         if found.ending != Ending::Converged {
             self.told.push(format!(
@@ -68,7 +87,6 @@ impl Session {
                 }
             ));
         }
-        self.fitted = Some(found.end.params.clone());
         self.found = Some(found);
     }
 }

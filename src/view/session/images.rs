@@ -3,9 +3,11 @@
 use std::sync::Arc;
 
 use super::Session;
+use crate::engine::Point;
 use crate::model::effects::Effect;
 use crate::opened::Reading;
 use crate::paint::{Answer, Job, Painted, Slot};
+use crate::skin::Skin;
 
 /// What an effect brought when it was turned on, or took when it was turned off.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -40,41 +42,55 @@ pub(super) struct Before {
 impl Session {
     /// Ask for every image that is not the one that would be drawn now.
     pub(super) fn ask(&mut self) {
-        let (Some(opened), Some(values), Some(camera)) = (&self.opened, &self.values, self.camera()) else {
+        let (Some(opened), Some(history), Some(camera)) = (self.opened(), &self.values, self.camera()) else {
             return;
         };
-        let values = values.now();
-        if values.effects != opened.baked.scene.effects {
+        if !history.now().is_read(self.scenes.iter().map(|opened| &**opened)) {
             if self.opening.is_none() {
-                let effects = Some(values.effects);
-                self.read(Reading { effects, params: None, ..self.start.reading.clone() });
+                let scenes = self.start.scenes.iter().zip(history.now().scenes());
+                let scenes = scenes.map(|(reading, values)| Reading {
+                    effects: Some(values.effects),
+                    params: None,
+                    ..reading.clone()
+                });
+                self.read(scenes.collect());
             }
             return;
         }
-        let first = self.first.as_ref().map(|first| &first.params);
+        let now = history.now().points();
+        let first = self.first.as_ref().map(Skin::points);
         let wanted = [
-            (Slot::Now, Some(&values.params)),
+            (Slot::Now, Some(&now)),
             (Slot::Fit, self.fitted.as_ref()),
-            (Slot::Start, first),
+            (Slot::Start, first.as_ref()),
             (Slot::Other, self.other.as_ref()),
         ];
-        let at_home = self.is_at_home();
-        for (slot, params) in wanted {
-            let Some(params) = params else { continue };
-            let job = Job {
-                opened: Arc::clone(opened),
-                params: params.clone(),
-                gain: values.gains.get(self.view).copied().unwrap_or(1.0),
-                camera,
-                target: opened.targets.get(self.view).cloned().flatten().filter(|_| at_home),
-                terms: self.terms && slot == Slot::Now,
-            };
+        let target = opened.targets.get(self.at.1).cloned().flatten().filter(|_| self.is_at_home());
+        let job = |slot: Slot, Point { params, gains }: &Point| Job {
+            opened: Arc::clone(opened),
+            params: params.clone(),
+            gain: gains.get(self.at.1).copied().unwrap_or(1.0),
+            camera,
+            target: target.clone(),
+            terms: self.terms && slot == Slot::Now,
+        };
+        let wanted = wanted.into_iter().filter(|(slot, _)| self.looked_at.contains(slot));
+        let jobs = wanted.filter_map(|(slot, points)| Some((slot, job(slot, points?.get(self.at.0)?))));
+        for (slot, job) in jobs.collect::<Vec<_>>() {
             if self.asked.get(&slot).is_none_or(|asked| !same(asked, &job)) {
                 let job = Arc::new(job);
                 self.asked.insert(slot, Arc::clone(&job));
                 self.painter.ask(slot, job);
             }
         }
+    }
+
+    /// Say which images somebody looks at beside that of the sliders, whose scores are always told: no others are drawn.
+    pub fn look_for(&mut self, slots: impl IntoIterator<Item = Slot>) {
+        self.looked_at = std::iter::once(Slot::Now).chain(slots).collect();
+        let looked_at = &self.looked_at;
+        self.asked.retain(|slot, _| looked_at.contains(slot));
+        self.images.retain(|slot, _| looked_at.contains(slot));
     }
 
     /// Take in what the worker has said.
@@ -120,7 +136,7 @@ impl Session {
     /// What the effect that was switched has changed, once its image is there.
     fn weigh(&mut self) {
         let drawn = self.images.get(&Slot::Now).map(|now| now.job.opened.baked.scene.effects);
-        let wanted = self.values.as_ref().map(|values| values.now().effects);
+        let wanted = self.values().map(|values| values.effects);
         if drawn != wanted {
             return;
         }
@@ -135,18 +151,14 @@ impl Session {
         }
     }
 
-    /// Turn an effect on or off: a step of the history. What that changes is told once its image is there.
-    pub fn set_effect(&mut self, effect: Effect, on: bool) {
-        let now = self.images.get(&Slot::Now);
-        self.switched = now.map(|now| Before {
+    /// Note what is known of the image before an effect is switched.
+    pub(super) fn weigh_from(&mut self, effect: Effect) {
+        self.switched = self.image(Slot::Now).map(|now| Before {
             effect,
             seconds: now.seconds,
             uploaded: now.uploaded,
             psnr: now.compared.as_ref().map(|compared| compared.psnr),
         });
-        if let Some(history) = self.history() {
-            history.edit(|values| values.set_effect(effect, on));
-        }
     }
 }
 

@@ -3,8 +3,11 @@
 use std::ops::RangeInclusive;
 
 use super::Session;
-use crate::host::Known;
+use crate::host::{Found, Known};
 use crate::model::params::{Column, Param};
+
+/// The name of where the sliders began, among what they can be reset to.
+pub const START: &str = "start";
 
 impl Session {
     /// What a slider's ends stand for: the bounds, where they are finite, else four times what it may well be.
@@ -26,7 +29,7 @@ impl Session {
     pub fn resets(&self, param: Param) -> Vec<(&'static str, [f64; 3])> {
         let first = self.first();
         let values = [
-            ("start", first.map(|first| first.params.rgb(param))),
+            (START, first.map(|first| first.params.rgb(param))),
             ("default", first.map(|first| param.default_rgb(first.form))),
             ("fit", self.fitted().map(|params| params.rgb(param))),
             ("compared run", self.other().map(|params| params.rgb(param))),
@@ -34,13 +37,46 @@ impl Session {
         values.into_iter().filter_map(|(name, rgb)| Some((name, rgb?))).collect()
     }
 
-    /// What the last fit says of a constant's error, where it moved that.
+    /// What the last fit says of a constant, where it moved that.
     #[must_use]
-    pub fn error_words(&self, column: Column) -> Option<String> {
-        let Known { std_error, at_bound, .. } = self.found()?.constant(&column.name())?;
-        Some(std_error.map_or_else(
+    pub fn known(&self, column: Column) -> Option<&Known> {
+        self.known_of(self.found()?, column)
+    }
+
+    /// What a fit says of a constant of the scene that is looked at.
+    #[must_use]
+    pub fn known_of<'a>(&self, found: &'a Found, column: Column) -> Option<&'a Known> {
+        let name = column.name();
+        let own = self.opened().filter(|_| column.param.is_of_scene() && self.scenes.len() > 1);
+        let Some(opened) = own else { return found.constant(&name) };
+        // Where one scene alone was fitted, and others were held out, its own stand as the skin's do.
+        let fitted = self.places().iter().any(|place| place.scene == self.scene() && place.fitted);
+        let alone = found.constant(&name).filter(|_| fitted);
+        found.constant(&format!("{}/{name}", opened.name)).or(alone)
+    }
+
+    /// What the last fit says of a view's gain, where it moved that.
+    #[must_use]
+    pub fn known_gain(&self, view: &str) -> Option<&Known> {
+        self.found()?.constant(&format!("gain.{}", self.view_name(self.scene(), view)))
+    }
+
+    /// Where the last fit has a constant for sure: from one standard error below what it found to one above.
+    #[must_use]
+    pub fn interval(&self, column: Column) -> Option<[f64; 2]> {
+        let (at, error) = (column.get(self.fitted()?), self.known(column)?.std_error?);
+        Some([at - error, at + error])
+    }
+}
+
+impl Known {
+    /// Its error in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let Self { std_error, at_bound, .. } = self;
+        std_error.map_or_else(
             || (if *at_bound { "at its bound" } else { "?" }).to_owned(),
             |error| format!("± {error:.2e}"),
-        ))
+        )
     }
 }

@@ -18,6 +18,7 @@ use crate::host::{Host, ViewError};
 use crate::look::{ErrorKind, Layout, Look, Pane};
 use crate::paint::Slot;
 use crate::session::{Orbit, Session};
+use crate::shown;
 use crate::start::Start;
 
 /// Where the look is kept from window to window.
@@ -126,13 +127,14 @@ impl Window {
         for action in keys::asked(ui.ctx()) {
             self.act(action, ui.ctx());
         }
+        self.session.look_for(shown::slots(&self.look));
         Panel::top("bar").show(ui, |ui| self.bar(ui));
         Panel::bottom("status").show(ui, |ui| self.status(ui));
         Panel::bottom("fit").resizable(true).default_size(190.0).show(ui, |ui| self.fit(ui));
         Panel::left("parameters").resizable(true).default_size(360.0).show(ui, |ui| self.parameters(ui));
         Panel::right("probe").resizable(true).default_size(250.0).show(ui, |ui| {
             ScrollArea::vertical().show(ui, |ui| {
-                probe_table::show(ui, &self.session, self.pointed);
+                probe_table::show(ui, &self.session, self.look.error_of, self.pointed);
                 ui.take_available_width();
             });
         });
@@ -170,32 +172,13 @@ impl Window {
         match action {
             Action::Help => self.help = !self.help,
             Action::Table => self.table = !self.table,
-            Action::Undo => {
-                if let Some(history) = session.history() {
-                    history.undo();
-                }
-            }
-            Action::Redo => {
-                if let Some(history) = session.history() {
-                    history.redo();
-                }
-            }
+            Action::Undo => session.undo(),
+            Action::Redo => session.redo(),
             Action::Fit => session.begin_fit(false),
             Action::Resume => session.begin_fit(true),
-            Action::Pause => {
-                if let Some(fitting) = session.fitting_mut() {
-                    fitting.set_paused(!fitting.is_paused());
-                }
-            }
-            Action::Stop => {
-                if let Some(fitting) = session.fitting_mut() {
-                    fitting.stop();
-                }
-            }
-            Action::NextView => {
-                let count = session.opened().map_or(1, |opened| opened.views().len().max(1));
-                session.view = (session.view + 1) % count;
-            }
+            Action::Pause => session.toggle_pause(),
+            Action::Stop => session.stop_fit(),
+            Action::NextView => session.look_at_next(),
             Action::Layout => {
                 let at = Layout::ALL.iter().position(|(layout, _)| *layout == look.layout).unwrap_or(0);
                 look.layout = Layout::ALL[(at + 1) % Layout::ALL.len()].0;
@@ -204,6 +187,12 @@ impl Window {
             Action::Error => {
                 let at = ErrorKind::ALL.iter().position(|kind| *kind == look.error).unwrap_or(0);
                 look.error = ErrorKind::ALL[(at + 1) % ErrorKind::ALL.len()];
+            }
+            Action::ErrorOf => {
+                let offered = |slot: &Slot| *slot != Slot::Other || session.other().is_some();
+                let slots: Vec<Slot> = Slot::ALL.into_iter().filter(offered).collect();
+                let at = slots.iter().position(|slot| *slot == look.error_of).unwrap_or(0);
+                look.error_of = slots[(at + 1) % slots.len()];
             }
             Action::Terms => session.terms = !session.terms,
             Action::Brighter => look.exposure += 0.5,
@@ -218,9 +207,7 @@ impl Window {
             }
             Action::Light(right) => {
                 session.turn_light(5.0 * f64::from(right));
-                if let Some(history) = session.history() {
-                    history.settle();
-                }
+                session.settle();
             }
             Action::Wipe(right) => look.wipe = (look.wipe + 0.02 * f32::from(right)).clamp(0.0, 1.0),
             // From the whole image, which is about a point a pixel.
@@ -325,12 +312,13 @@ impl Window {
         let Some(image) = arrived else { return };
         self.screenshot = None;
         let file = self.session.run_folder().join("window.png");
-        let bytes: Vec<u8> = image.pixels.iter().flat_map(egui::Color32::to_array).collect();
-        let [width, height] = image.size;
-        let done = offscreen::write(&file, &bytes, [width as u32, height as u32]);
-        self.session.tell(match done {
-            Ok(()) => format!("wrote {}", file.display()),
-            Err(error) => error.to_string(),
+        self.session.aside(move || {
+            let bytes: Vec<u8> = image.pixels.iter().flat_map(egui::Color32::to_array).collect();
+            let [width, height] = image.size;
+            match offscreen::write(&file, &bytes, [width as u32, height as u32]) {
+                Ok(()) => format!("wrote {}", file.display()),
+                Err(error) => error.to_string(),
+            }
         });
     }
 }

@@ -80,9 +80,7 @@ fn slider(offscreen: &mut Offscreen) -> Result<Vec<f64>, ViewError> {
         let Some(param) = rows.into_iter().find(|param| param.info().linear) else { break };
         let value = 0.5 + 0.005 * i as f64;
         let start = Instant::now();
-        if let Some(history) = session.history() {
-            history.edit(|values| values.params.set(param, value));
-        }
+        session.edit(|values| values.params.set(param, value));
         loop {
             offscreen.frame()?;
             let now = offscreen.window.session.image(Slot::Now);

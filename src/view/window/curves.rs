@@ -6,8 +6,16 @@ use egui_plot::{Legend, Line, Plot, PlotPoints};
 use crate::fitting::{Step, shares};
 use crate::model::params::Column;
 
+/// The ways that a scene's constants have gone.
+#[derive(Clone, Copy)]
+pub(crate) struct Ways<'a> {
+    pub(crate) path: &'a [Step],
+    pub(crate) scene: usize,
+    pub(crate) free: &'a [Column],
+}
+
 /// Two plots side by side, `height` points high.
-pub(crate) fn show(ui: &mut Ui, losses: &[f64], path: &[Step], free: &[Column], height: f32) {
+pub(crate) fn show(ui: &mut Ui, losses: &[f64], Ways { path, scene, free }: Ways<'_>, height: f32) {
     if losses.is_empty() {
         ui.weak("The loss and the constants are plotted here while a fit runs.");
         return;
@@ -24,7 +32,7 @@ pub(crate) fn show(ui: &mut Ui, losses: &[f64], path: &[Step], free: &[Column], 
         let names = plot("constants", height).legend(Legend::default());
         names.y_axis_label("share of the way").x_axis_label("iteration").show(&mut columns[1], |plot| {
             for column in free {
-                plot.line(Line::new(column.name(), PlotPoints::from(shares(path, *column))));
+                plot.line(Line::new(column.name(), PlotPoints::from(shares(path, scene, *column))));
             }
         });
     });

@@ -19,6 +19,7 @@ pub(crate) enum Action {
     Layout,
     Flip,
     Error,
+    ErrorOf,
     Terms,
     Brighter,
     Darker,
@@ -46,7 +47,7 @@ const SHIFT: Modifiers = Modifiers::SHIFT;
 const ALT: Modifiers = Modifiers::ALT;
 
 /// The keys, what they do, and how the list says it.
-pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 38] = [
+pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 39] = [
     (NONE, Key::F1, Action::Help, "this list"),
     (NONE, Key::F2, Action::Table, "all constants, side by side"),
     (COMMAND, Key::Z, Action::Undo, "undo"),
@@ -60,6 +61,7 @@ pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 38] = [
     (NONE, Key::L, Action::Layout, "side by side, wipe, or flip"),
     (NONE, Key::F, Action::Flip, "flip between the first two panes"),
     (NONE, Key::E, Action::Error, "error: FLIP, signed, relative"),
+    (SHIFT, Key::E, Action::ErrorOf, "error of now, the fit, the start, or the other run"),
     (NONE, Key::T, Action::Terms, "terms of the image, or none"),
     (NONE, Key::Plus, Action::Brighter, "half a stop brighter"),
     (NONE, Key::Minus, Action::Darker, "half a stop darker"),

@@ -5,7 +5,6 @@ use std::sync::Arc;
 use eframe::egui::{self, Align2, Color32, FontId, PointerButton, Rect, Response, Sense, Ui, Vec2};
 
 use crate::look::{ErrorKind, Layout, Look, Pane};
-use crate::paint::Slot;
 use crate::pixels;
 use crate::render::files::{ImageOptions, write_image};
 use crate::render::tonemap::ToneMap;
@@ -105,9 +104,9 @@ impl One {
     /// Its image as a file in the run folder, on a click of the right button.
     fn offer_file(&self, response: &Response, session: &mut Session, look: &Look) {
         let shown = match self.pane {
-            Pane::Error => {
-                session.image(Slot::Now).and_then(|now| Some(Arc::clone(&now.compared.as_ref()?.map)))
-            }
+            Pane::Error => session
+                .image(look.error_of)
+                .and_then(|painted| Some(Arc::clone(&painted.compared.as_ref()?.map))),
             pane => shown::image(session, pane),
         };
         let Some(shown) = shown else { return };
@@ -122,19 +121,17 @@ impl One {
                 }
             }
         });
-        let Some(ending) = chosen else { return };
-        let view = session
-            .opened()
-            .and_then(|opened| opened.views().get(session.view))
-            .map(|view| view.name.clone());
+        let (Some(ending), Some(view)) = (chosen, session.view()) else { return };
+        // As the report of several scenes calls its pictures.
+        let view = session.view_name(session.scene(), &view.name).replace('/', "_");
         let pane = shown::name(self.pane).replace(' ', "_");
-        let file = format!("{}_{pane}.{ending}", view.unwrap_or_default());
-        let path = session.run_folder().join(file);
+        let path = session.run_folder().join(format!("{view}_{pane}.{ending}"));
         let tone = ToneMap { operator: look.operator(), exposure: look.exposure };
-        let done = write_image(&path, &shown, &ImageOptions { tone, ..ImageOptions::default() });
-        session.tell(match done {
-            Ok(()) => format!("wrote {}", path.display()),
-            Err(error) => error.to_string(),
+        session.aside(move || {
+            match write_image(&path, &shown, &ImageOptions { tone, ..ImageOptions::default() }) {
+                Ok(()) => format!("wrote {}", path.display()),
+                Err(error) => error.to_string(),
+            }
         });
     }
 
@@ -144,7 +141,7 @@ impl One {
                 let beside = look.panes.get(1).copied().unwrap_or(Pane::Now);
                 shown::image(session, pane).zip(shown::image(session, beside)).map(<[_; 2]>::from)
             }
-            (pane, _) => shown::pair(session, pane, look.error),
+            (pane, _) => shown::pair(session, pane, look),
         };
         let Some(images) = pair else {
             ui.painter().text(
@@ -201,10 +198,8 @@ impl One {
             let middle = Vec2::from(look.middle) - drag / (points * size);
             look.middle = middle.clamp(Vec2::ZERO, Vec2::splat(1.0)).into();
         }
-        if response.drag_stopped()
-            && let Some(history) = session.history()
-        {
-            history.settle();
+        if response.drag_stopped() {
+            session.settle();
         }
         if response.double_clicked() {
             look.reset_zoom();

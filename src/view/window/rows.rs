@@ -1,50 +1,92 @@
 //! Parameters: a row each.
 
-use eframe::egui::{self, Response, RichText, Slider, SliderClamping, Ui};
+use std::ops::RangeInclusive;
+
+use eframe::egui::{self, Pos2, Rect, Response, RichText, Slider, SliderClamping, Ui};
 
 use crate::model::params::{Channels, Column, Param, Scale};
-use crate::session::Session;
+use crate::session::{START, Session};
 use crate::values::{Freedom, Values};
 
 /// A change that a row asks for.
 enum Edit {
     /// A value, as part of a drag.
     Value(Column, f64),
-    /// All channels, as a step.
-    Reset(Param, [f64; 3]),
-    Freedom(Param, Freedom),
+    /// To what is called so, as a step.
+    Reset(Param, &'static str),
+    /// Whether a fit moves it.
+    Free(Param, bool),
     /// A value for each channel, or one for all.
     Apart(Param, bool),
+    /// A view's gain, as part of a drag.
+    Gain(usize, f64),
+    /// Whether a fit moves the gains.
+    FreeGains(bool),
     /// A drag is over.
     Settled,
 }
 
-/// Every parameter that the enabled effects ask for.
+/// Every parameter that the enabled effects ask for, and the gains where there is anything to say of them.
 pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
-    let (Some(values), Some(first)) = (session.values().cloned(), session.first().cloned()) else { return };
+    let Some(values) = session.values().cloned() else { return };
     let mut edits = Vec::new();
     ui.add_enabled_ui(session.fitting().is_none(), |ui| {
         for param in values.rows() {
-            let row = Row { param, values: &values, first: &first, session };
+            let row = Row { param, values: &values, session };
             ui.push_id(param.name(), |ui| row.show(ui, &mut edits));
         }
+        gains(ui, session, &values, &mut edits);
     });
-    let Some(history) = session.history() else { return };
     for edit in edits {
         match edit {
-            Edit::Value(column, value) => history.drag(|values| column.set(&mut values.params, value)),
-            Edit::Reset(param, rgb) => history.edit(|values| values.params.set_rgb(param, rgb)),
-            Edit::Freedom(param, freedom) => history.edit(|values| values.set_freedom(param, freedom)),
-            Edit::Apart(param, apart) => history.edit(|values| values.set_apart(param, apart)),
-            Edit::Settled => history.settle(),
+            Edit::Value(column, value) => session.slide(column, value),
+            Edit::Reset(param, to) => session.reset(param, to),
+            Edit::Free(param, free) => session.edit(|values| values.set_free(param, free)),
+            Edit::Apart(param, apart) => session.edit(|values| values.set_apart(param, apart)),
+            Edit::Gain(view, gain) => session.slide_gain(view, gain),
+            Edit::FreeGains(free) => session.edit(|values| values.free_gains = free),
+            Edit::Settled => session.settle(),
         }
     }
+}
+
+/// The factor on each view's image.
+fn gains(ui: &mut Ui, session: &Session, values: &Values, edits: &mut Vec<Edit>) {
+    let Some(opened) = session.opened() else { return };
+    egui::CollapsingHeader::new("Gains of views").default_open(values.has_gains()).show(ui, |ui| {
+        let mut free = values.free_gains;
+        let words = "Whether a fit moves each view's but the first's";
+        if ui.checkbox(&mut free, "free").on_hover_text(words).accessible_name("fit gains").changed() {
+            edits.push(Edit::FreeGains(free));
+        }
+        for (i, (view, &gain)) in opened.views().iter().zip(&values.gains).enumerate() {
+            ui.horizontal(|ui| {
+                ui.spacing_mut().slider_width = (ui.available_width() - 190.0).max(60.0);
+                let mut value = gain;
+                let slider = Slider::new(&mut value, 0.1..=10.0)
+                    .clamping(SliderClamping::Never)
+                    .logarithmic(true)
+                    .update_while_editing(false)
+                    .max_decimals(5);
+                let response = ui.add(slider).accessible_name(format!("gain {}", view.name));
+                if value != gain {
+                    edits.push(Edit::Gain(i, value));
+                }
+                if is_over(&response, value != gain) {
+                    edits.push(Edit::Settled);
+                }
+                ui.label(&view.name);
+                if let Some(known) = session.known_gain(&view.name) {
+                    ui.weak(known.words());
+                }
+            });
+        }
+    });
 }
 
 struct Row<'a> {
     param: Param,
     values: &'a Values,
-    first: &'a Values,
     session: &'a Session,
 }
 
@@ -58,20 +100,12 @@ impl Row<'_> {
             let box_ =
                 ui.checkbox(&mut free, "").on_hover_text(words).accessible_name(format!("fit {}", info.name));
             if box_.changed() {
-                let by_channel = self.values.by_channel(self.param);
-                edits.push(Edit::Freedom(
-                    self.param,
-                    match (free, by_channel) {
-                        (false, _) => Freedom::Fixed,
-                        (true, true) => Freedom::PerChannel,
-                        (true, false) => Freedom::Tied,
-                    },
-                ));
+                edits.push(Edit::Free(self.param, free));
             }
             let name = egui::Label::new(RichText::new(info.name).strong()).sense(egui::Sense::click());
             let name = ui.add(name).on_hover_ui(|ui| self.tell(ui));
             if name.double_clicked() {
-                edits.push(Edit::Reset(self.param, self.first.params.rgb(self.param)));
+                edits.push(Edit::Reset(self.param, START));
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 ui.menu_button("reset", |ui| self.resets(ui, edits))
@@ -101,10 +135,9 @@ impl Row<'_> {
     }
 
     fn resets(&self, ui: &mut Ui, edits: &mut Vec<Edit>) {
-        for (words, rgb) in self.session.resets(self.param) {
-            let words = format!("to the {words}");
-            if ui.button(words).clicked() {
-                edits.push(Edit::Reset(self.param, rgb));
+        for (name, _) in self.session.resets(self.param) {
+            if ui.button(format!("to the {name}")).clicked() {
+                edits.push(Edit::Reset(self.param, name));
                 ui.close();
             }
         }
@@ -130,8 +163,8 @@ impl Row<'_> {
         };
         ui.horizontal(|ui| {
             ui.spacing_mut().slider_width = (ui.available_width() - 150.0).max(60.0);
-            let (lower, upper) = info.range();
-            let slider = Slider::new(&mut value, self.session.range(column))
+            let range = self.session.range(column);
+            let slider = Slider::new(&mut value, range.clone())
                 .clamping(SliderClamping::Never)
                 .logarithmic(info.scale == Scale::Log)
                 .suffix(if info.unit == "degrees" { "°" } else { "" })
@@ -139,18 +172,50 @@ impl Row<'_> {
                 .update_while_editing(false)
                 .max_decimals(5);
             let response = ui.add(slider).accessible_name(format!("{channel}{}", info.name));
-            value = value.clamp(lower, upper);
             if value != before && value.is_finite() {
                 edits.push(Edit::Value(column, value));
             }
             if is_over(&response, value != before) {
                 edits.push(Edit::Settled);
             }
-            if let Some(error) = self.session.error_words(column) {
-                ui.weak(error).on_hover_text("Standard error of the last fit");
+            if let Some(interval) = self.session.interval(column) {
+                let shares = interval.map(|value| place(&range, info.scale, value));
+                error_bar(ui, &response, shares);
+            }
+            if let Some(known) = self.session.known(column) {
+                ui.weak(known.words()).on_hover_text("Standard error of the last fit");
             }
         });
     }
+}
+
+/// The least value that a slider of decades tells from 0.
+const LEAST: f64 = 1e-6;
+
+/// A value's place on a slider, from 0 to 1.
+fn place(range: &RangeInclusive<f64>, scale: Scale, value: f64) -> f32 {
+    let (lower, upper) = (*range.start(), *range.end());
+    let share = match scale {
+        Scale::Log if lower >= 0.0 => {
+            let least = if lower > 0.0 { lower } else { LEAST };
+            (value.max(least) / least).ln() / (upper / least).ln()
+        }
+        _ => (value - lower) / (upper - lower),
+    };
+    share.clamp(0.0, 1.0) as f32
+}
+
+/// A bar below a slider, between two of its places.
+fn error_bar(ui: &Ui, slider: &Response, [from, to]: [f32; 2]) {
+    let width = ui.spacing().slider_width;
+    // The middle of its handle moves between these.
+    let radius = slider.rect.height() / 2.5;
+    let at = |share: f32| slider.rect.left() + radius + share * (width - 2.0 * radius);
+    // However small the error is, it is seen where it is.
+    let (from, to) = (at(from), at(to).max(at(from) + 2.0));
+    let y = slider.rect.bottom() - 1.5;
+    let bar = Rect::from_min_max(Pos2::new(from, y), Pos2::new(to, y + 3.0));
+    ui.painter().rect_filled(bar, 1.0, ui.visuals().warn_fg_color);
 }
 
 /// Whether a slider is at rest: a drag that ended, a field that was left, or a change by a key.

@@ -22,7 +22,7 @@ use super::scene::{HoldOutArguments, ScenesArguments};
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, unfinished};
 use crate::engine::Point;
-use crate::fit::outcome::{Iteration, Outcome};
+use crate::fit::outcome::Iteration;
 use crate::model::params::Param;
 use crate::scene::suggestion;
 use conclude::{Fitted, conclude};
@@ -81,19 +81,19 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// Is told of each iteration, and where it has led; the fit goes on when it returns.
-pub(super) type Watch<'a> = dyn FnMut(&Iteration, &Point) + 'a;
+/// Is told of each iteration, and where it has led in each scene; the fit goes on when it returns.
+pub(super) type Watch<'a> = dyn FnMut(&Iteration, &[Point]) + 'a;
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     run_watched(arguments, &Interrupt::default(), &mut |_, _| {}).map(|(exit, _)| exit)
 }
 
-/// As [`run`], watched: how it ended, and what was found.
+/// As [`run`], watched: how it ended, and where in each scene.
 pub(super) fn run_watched(
     arguments: &Arguments,
     interrupt: &Interrupt,
     watch: &mut Watch<'_>,
-) -> Result<(Exit, Outcome), Refusal> {
+) -> Result<(Exit, Vec<Point>), Refusal> {
     let begun = Instant::now();
     arguments.check()?;
     if arguments.engine.may_be_gpu() {
@@ -111,7 +111,7 @@ pub(super) fn run_watched(
     let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
     let fitted = Fitted { scenes: &scenes, maps: maps.as_ref(), begun };
     let exit = conclude(arguments, solving, &folder, fitted, &outcome)?;
-    Ok((exit, outcome))
+    Ok((exit, scenes.points(&outcome.end)))
 }
 
 impl Arguments {

@@ -80,7 +80,7 @@ pub(super) fn solve(
     };
     let bar = progress::spinner("fit");
     let outcome = fit::fit_watched(&scenes.joint, &scenes.start, &options, &mut |iteration, point| {
-        watch(iteration, point);
+        watch(iteration, &scenes.points(point));
         bar.set_position(iteration.iteration);
         bar.set_message(format!("loss {:.6e}, {} passes", iteration.loss, iteration.evaluations));
     });

@@ -32,17 +32,20 @@ const REPORT: &str = "report.html";
 /// Write a scene or a run as a page: sliders, fits and all, in a browser, from disk
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The page is one file that opens without a server. It draws with WebGPU, or on the processor where a browser has none, and fits on the processor. It holds the scene's files, so whoever has the page has these. Bakes of the scene's effects are in it; what other effects ask for is baked in the browser.\n\nExamples:\n  skinfit page                         the built-in scene, as runs/builtin/page.html\n  skinfit page runs/a                  a run: its scene, its constants; its report links to the page\n  skinfit page scene.toml -o fit.html")
+    after_help = super::with_exit_codes("The page is one file that opens without a server. It draws with WebGPU, or on the processor where a browser has none, and fits on the processor. It holds the scene's files, so whoever has the page has these. Bakes of the scene's effects are in it; what other effects ask for is baked in the browser.\n\nExamples:\n  skinfit page                         the built-in scene, as runs/builtin/page.html\n  skinfit page runs/a                  a run: its scene, its constants; its report links to the page\n  skinfit page runs/a --compare runs/b   beside another\n  skinfit page noon.toml night.toml    one skin in two lights\n  skinfit page scene.toml -o fit.html")
 )]
 pub(super) struct Arguments {
-    /// The scene file, or the run folder of a fit; the built-in scene when left out.
+    /// The scene file, several that share one skin, or the run folder of a fit; the built-in scene when left out.
     #[arg(value_name = "SCENE|RUN")]
-    scene: Option<PathBuf>,
+    scenes: Vec<PathBuf>,
     #[command(flatten)]
     bakes: BakeArguments,
     /// Begin with these constants: a params.toml, or the run folder that has one [default: those of the run].
     #[arg(long, value_name = "FILE|RUN")]
     params: Option<PathBuf>,
+    /// Another run beside them: its folder, or a params.toml.
+    #[arg(long, value_name = "RUN|FILE")]
+    compare: Option<PathBuf>,
     /// The file to write [default: page.html in the run folder].
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
@@ -56,15 +59,16 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let player = player(arguments.player.as_deref())?;
-    let mut of = SceneOrRun::of(arguments.scene.as_deref())?;
+    let mut of = SceneOrRun::of(&arguments.scenes)?;
     if let Some(params) = &arguments.params {
         of.fitted = Some(run_of(params)?);
     }
+    let other = arguments.compare.as_deref().map(run_of).transpose()?;
     let scratch = unfinished::scratch()?;
-    let scene = arguments.bakes.kept_path(of.scene.as_deref(), scratch.path())?;
+    let scenes = arguments.bakes.kept_paths(&of.scenes, scratch.path())?;
     // Bakes are taken along as the cache has them.
     let cache = arguments.bakes.cache().unwrap_or_else(|| scratch.path().join("bakes"));
-    let archive = taken(&scene, &of, &cache)?;
+    let archive = taken(&scenes, [of.fitted.as_ref(), other.as_ref()], &cache)?;
     let packed = gzip(&archive)?;
     let title = arguments.title.clone().unwrap_or_else(|| title(&of));
     let page = player.replacen(MARKS[0], &BASE64_STANDARD.encode(packed), 1);
@@ -116,7 +120,7 @@ fn title(of: &SceneOrRun) -> String {
     let name = folder.file_name().unwrap_or_default().to_string_lossy();
     format!(
         "skinfit: {}",
-        if of.run.is_none() && of.scene.is_none() { "the built-in scene".into() } else { name }
+        if of.run.is_none() && of.scenes.is_empty() { "the built-in scene".into() } else { name }
     )
 }
 

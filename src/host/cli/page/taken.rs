@@ -8,34 +8,34 @@ use serde_json::Value;
 use skinfit_view::Run;
 use skinfit_view::archive::{self, pack};
 use skinfit_view::opened::{Opened, Reading};
-use skinfit_view::values::Values;
+use skinfit_view::skin::Skin;
 
 use crate::cli::Refusal;
 use crate::cli::fitted_scene::with_files;
-use crate::cli::opened::SceneOrRun;
 use crate::files::{plain, recorded};
 use crate::fit::params_file::{Origin, ParamsFile};
+use crate::model::effects::Effect;
 use crate::progress;
-
-/// The folder of the scene in an archive.
-const FOLDER: &str = "/scene";
 
 /// What the page shows of a report.
 const NUMBERS: [&str; 8] =
     ["loss", "views", "iterations", "evaluations", "seconds", "ending", "unknowns", "history"];
 
-/// An archive of the scene's file, all that it names, fitted constants, and bakes.
-pub(super) fn taken(scene: &Path, of: &SceneOrRun, cache: &Path) -> Result<Vec<u8>, Refusal> {
-    let (opened, from) = read_from(scene, cache)?;
-    let text = String::from_utf8(read(scene)?)?;
-    let home = plain(scene);
-    let home = home.parent().unwrap_or(Path::new("/"));
-    let mut places = Places(Vec::new());
-    let text = with_files(&text, &mut |path| places.place(&plain(&home.join(path))));
-    let text = text.map_err(|error| Refusal::new(format!("{}: {error}", scene.display())))?;
-    let mut files = vec![(PathBuf::from(archive::SCENE), text.into_bytes())];
-    let (cache, own) = (plain(cache), plain(scene));
-    for path in from.into_iter().filter(|path| *path != own && path.is_file()) {
+/// An archive of the scenes' files, all that they name, bakes, and what the run that is shown and the one that is compared
+/// have left.
+pub(super) fn taken(scenes: &[PathBuf], runs: [Option<&Run>; 2], cache: &Path) -> Result<Vec<u8>, Refusal> {
+    let (opened, from) = read_from(scenes, cache)?;
+    let (mut places, mut files) = (Places(Vec::new()), Vec::new());
+    for (path, opened) in scenes.iter().zip(&opened) {
+        let home = plain(path);
+        let home = home.parent().unwrap_or(Path::new("/"));
+        let text = String::from_utf8(read(path)?)?;
+        let text = with_files(&text, &mut |path| places.place(&plain(&home.join(path))));
+        let text = text.map_err(|error| Refusal::new(format!("{}: {error}", path.display())))?;
+        files.push((Path::new(archive::SCENES).join(scene_file(scenes, opened)), text.into_bytes()));
+    }
+    let (cache, own): (_, Vec<PathBuf>) = (plain(cache), scenes.iter().map(|path| plain(path)).collect());
+    for path in from.into_iter().filter(|path| !own.contains(path) && path.is_file()) {
         let bake = path.parent() == Some(&cache) && path.extension().is_some_and(|ending| ending == "bake");
         let names = match path.file_name().filter(|_| bake) {
             Some(name) => vec![Path::new(archive::BAKES).join(name)],
@@ -50,31 +50,52 @@ pub(super) fn taken(scene: &Path, of: &SceneOrRun, cache: &Path) -> Result<Vec<u
         let bytes = read(&path)?;
         files.extend(names.into_iter().map(|name| (name, bytes.clone())));
     }
-    if let Some(run) = &of.fitted {
-        files.push((PathBuf::from(archive::FITTED), constants(run, &opened)?));
-        if let Some(report) = &run.report {
-            files.push((PathBuf::from(archive::REPORT), numbers(report)?));
+    let names = [(archive::FITTED, archive::REPORT), (archive::OTHER, archive::OTHER_REPORT)];
+    for (run, (params, report)) in runs.into_iter().zip(names) {
+        let Some(run) = run else { continue };
+        files.push((PathBuf::from(params), constants(run, &opened)?));
+        if let Some(numbers_of) = &run.report {
+            files.push((PathBuf::from(report), numbers(numbers_of)?));
         }
     }
     Ok(pack(files.iter().map(|(path, bytes)| (path.as_path(), bytes.as_slice()))))
 }
 
-/// What the scene is read from, with its effects as they are and without each of them: one that is switched off in the
+/// The name of a scene's file in the page: of one it says nothing of where it was.
+fn scene_file(scenes: &[PathBuf], opened: &Opened) -> String {
+    match scenes.len() {
+        1 => "scene.toml".to_owned(),
+        _ => format!("{}.toml", opened.name),
+    }
+}
+
+/// What the scenes are read from, with their effects as they are and without each of them: one that is switched off in the
 /// page may ask for another bake.
-fn read_from(scene: &Path, cache: &Path) -> Result<(Opened, Vec<PathBuf>), Refusal> {
-    let reading =
-        Reading { scene: scene.to_owned(), params: None, cache: Some(cache.to_owned()), effects: None };
-    let (opened, mut files) = recorded(|| Opened::read(&reading));
+fn read_from(scenes: &[PathBuf], cache: &Path) -> Result<(Vec<Opened>, Vec<PathBuf>), Refusal> {
+    let reading = |scene: &PathBuf| Reading {
+        scene: scene.clone(),
+        cache: Some(cache.to_owned()),
+        ..Reading::default()
+    };
+    let readings: Vec<Reading> = scenes.iter().map(reading).collect();
+    let (opened, mut files) = recorded(|| Opened::read_all(&readings));
     let first = opened.map_err(Refusal::new)?;
-    let effects = first.baked.scene.effects;
-    let values = Values::of(&first.baked);
-    let each: Vec<_> = effects.iter().filter(|effect| effect.info().within.is_none()).collect();
+    let skin = Skin::of(&first);
+    let whole = |effect: &Effect| effect.info().within.is_none();
+    let each: Vec<(usize, Effect)> = (skin.scenes().iter().enumerate())
+        .flat_map(|(scene, values)| values.effects.iter().filter(whole).map(move |effect| (scene, effect)))
+        // The skin's are switched in all scenes at once.
+        .filter(|(scene, effect)| *scene == 0 || effect.is_of_scene())
+        .collect();
     let bar = progress::bar("effects", each.len() as u64);
-    for effect in each {
-        let mut without = values.clone();
-        without.set_effect(effect, false);
-        let reading = Reading { effects: Some(without.effects), ..reading.clone() };
-        let (opened, read) = recorded(|| Opened::read(&reading));
+    for (scene, effect) in each {
+        let mut without = skin.clone();
+        without.change(scene, |values| values.set_effect(effect, false));
+        let readings = readings.iter().zip(without.scenes());
+        let readings = readings
+            .map(|(reading, values)| Reading { effects: Some(values.effects), ..reading.clone() })
+            .collect::<Vec<_>>();
+        let (opened, read) = recorded(|| Opened::read_all(&readings));
         // A scene that cannot be read without it has nothing to be baked then.
         if opened.is_ok() {
             files.extend(read);
@@ -87,12 +108,18 @@ fn read_from(scene: &Path, cache: &Path) -> Result<(Opened, Vec<PathBuf>), Refus
     Ok((first, files))
 }
 
-/// Fitted constants as the page reads them: those of this scene, and no word of where they come from.
-fn constants(run: &Run, opened: &Opened) -> Result<Vec<u8>, Refusal> {
-    let scene = &opened.baked.scene;
-    let file = ParamsFile::read(&run.params, scene.form, &scene.params)?.of_scene(&scene.path);
+/// Fitted constants as the page reads them: those of its scenes, and no word of where they come from.
+fn constants(run: &Run, opened: &[Opened]) -> Result<Vec<u8>, Refusal> {
     let origin = Origin { scene: Path::new("scene.toml"), outcome: None, set: &[], numbers: &[] };
-    Ok(file.to_toml(origin).into_bytes())
+    let [first, others @ ..] = opened else { return Ok(Vec::new()) };
+    let scene = &first.baked.scene;
+    let mut kept = ParamsFile::read(&run.params, scene.form, &scene.params)?;
+    if others.is_empty() {
+        kept = kept.of_scene(&scene.path);
+    }
+    // Of several scenes each finds its own there.
+    kept.scenes.retain(|scene| opened.iter().any(|opened| opened.name == scene.name));
+    Ok(kept.to_toml(origin).into_bytes())
 }
 
 /// What the page shows of a report, which also says where it was made, and by which command.
@@ -132,7 +159,7 @@ impl Places {
     fn known(&self, path: &Path) -> Vec<PathBuf> {
         let within = self.0.iter().enumerate().filter_map(|(number, folder)| {
             let rest = path.strip_prefix(folder).ok()?;
-            Some(Path::new(FOLDER).join(number.to_string()).join(rest))
+            Some(Path::new(archive::SCENES).join(number.to_string()).join(rest))
         });
         within.collect()
     }

@@ -6,7 +6,7 @@ use std::sync::atomic::AtomicBool;
 
 use clap::Parser;
 use skinfit_view::fitting::{FitControl, Tell, on_a_thread};
-use skinfit_view::host::Fitted;
+use skinfit_view::host::{FitScene, Fitted};
 use skinfit_view::reported::reported;
 use skinfit_view::values::Values;
 use skinfit_view::{FitRequest, Host, Run, Start as View};
@@ -19,7 +19,12 @@ use crate::cli::run_folder::{RunFolder, scene_text};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::output;
+use crate::prepare::view_of;
+use crate::report::SCENES;
 use crate::study::suggest::names;
+
+/// Where a fit of the window starts, in its run folder.
+const START: &str = "start.toml";
 
 /// Fits as `skinfit fit` does.
 #[derive(Clone)]
@@ -43,26 +48,56 @@ impl CommandLine {
     fn fit(
         &self,
         request: &FitRequest,
-        watch: &mut dyn FnMut(&Iteration, &Point),
+        watch: &mut dyn FnMut(&Iteration, &[Point]),
         interrupt: &Arc<AtomicBool>,
     ) -> Result<Fitted, String> {
-        let scene = request.run.join(SCENE);
-        let mut words = vec!["fit".to_owned(), scene.display().to_string()];
-        words.extend(["-o".to_owned(), request.run.display().to_string()]);
-        if request.resume {
-            words.push("--resume".to_owned());
-        } else {
+        let FitRequest { scenes, run, resume, .. } = request;
+        if !resume {
             // Only a folder that no other run writes to is changed.
-            RunFolder::check_free(&request.run).map_err(|refusal| refusal.words)?;
-            self.save_scene(&request.scene, &request.values, &scene)?;
+            RunFolder::check_free(run).map_err(|refusal| refusal.words)?;
         }
-        words.extend(request.values.hold_out.iter().map(|view| format!("--hold-out={view}")));
+        let mut words = vec!["fit".to_owned()];
+        for scene in scenes {
+            let file = match scenes.len() {
+                1 => run.join(SCENE),
+                _ => run.join(SCENES).join(format!("{}.toml", scene.name)),
+            };
+            words.push(file.display().to_string());
+            if !resume {
+                self.save_scene(&scene.path, &scene.values, &file)?;
+            }
+        }
+        words.extend(["-o".to_owned(), run.display().to_string()]);
+        words.extend(resume.then(|| "--resume".to_owned()));
+        words.extend(Self::start_of(request)?);
+        words.extend(scenes.iter().flat_map(|scene| held_out(scene, scenes.len() > 1)));
         words.extend(self.bakes.iter().cloned());
         let line = Line::try_parse_from(words).map_err(|error| error.to_string())?;
         let done = fit::run_watched(&line.arguments, &Interrupt::of(interrupt), watch);
-        let (_, outcome) = done.map_err(|refusal| refusal.words)?;
-        reported(&request.run.join(REPORT), outcome.end)
+        let (_, ends) = done.map_err(|refusal| refusal.words)?;
+        reported(&run.join(REPORT), ends)
     }
+
+    /// Where it starts is in the scenes' files, but for gains, which have no place there.
+    fn start_of(request: &FitRequest) -> Result<Vec<String>, String> {
+        let file = request.run.join(START);
+        let gained = request.scenes.iter().any(|scene| scene.values.gains.iter().any(|&gain| gain != 1.0));
+        if !request.resume {
+            match gained.then_some(&request.start) {
+                Some(start) => output::write(&file, start.as_bytes()).map_err(|error| error.to_string())?,
+                // Of an earlier fit in this folder.
+                None => drop(std::fs::remove_file(&file)),
+            }
+        }
+        let words = ["--params".to_owned(), file.display().to_string()];
+        Ok(if file.is_file() { words.to_vec() } else { Vec::new() })
+    }
+}
+
+/// Which views of a scene are held out, as the command line says it.
+fn held_out(scene: &FitScene, several: bool) -> Vec<String> {
+    let name = |view: &String| if several { view_of(&scene.name, view) } else { view.clone() };
+    scene.values.hold_out.iter().map(|view| format!("--hold-out={}", name(view))).collect()
 }
 
 impl Host for CommandLine {
@@ -72,9 +107,9 @@ impl Host for CommandLine {
     }
 
     fn start(&self, path: &Path) -> Result<View, String> {
-        let of = SceneOrRun::of(Some(path)).map_err(|refusal| refusal.words)?;
-        let scene = of.scene.clone().unwrap_or_else(|| path.to_owned());
-        Ok(of.start(scene, self.cache.clone()))
+        let of = SceneOrRun::of(std::slice::from_ref(&path.to_owned())).map_err(|refusal| refusal.words)?;
+        let scenes = if of.scenes.is_empty() { vec![path.to_owned()] } else { of.scenes.clone() };
+        Ok(of.start(scenes, self.cache.clone()))
     }
 
     fn run(&self, path: &Path) -> Result<Run, String> {
@@ -87,6 +122,7 @@ impl Host for CommandLine {
             effects: Some(&effects),
             free: Some(&values.free),
             start: Some(Start { form: values.form, params: &values.params, free: &values.free }),
+            free_gains: Some(values.free_gains),
             ..Changes::default()
         };
         let text = scene_text(scene, changes).map_err(|refusal| refusal.words)?;

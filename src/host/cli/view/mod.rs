@@ -24,13 +24,13 @@ pub(super) use window::run;
 /// See a scene or a run in a window, move its constants, watch a fit find them
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_exit_codes("The window needs a build of its own: `cargo run --release --features view -- view`. F1 lists its keys. A run's sliders stand where its fit ended. Fits of the window are the command line's, from where the sliders stand; their run folders hold what those of `skinfit fit` do, and one that was stopped is resumed by either.\n\nExamples:\n  skinfit view                              the built-in scene\n  skinfit view scene.toml\n  skinfit view runs/a                       a run: its scene, its constants, its start\n  skinfit view runs/a --compare runs/b      beside those of another\n  skinfit view scene.toml --screenshot window.png    the window as an image, without a display\n  skinfit view scene.toml --bench           how fast sliders and frames are, as JSON after the fit's own words")
+    after_help = super::with_exit_codes("The window needs a build of its own: `cargo run --release --features view -- view`. F1 lists its keys. A run's sliders stand where its fit ended. Fits of the window are the command line's, from where the sliders stand; their run folders hold what those of `skinfit fit` do, and one that was stopped is resumed by either.\n\nExamples:\n  skinfit view                              the built-in scene\n  skinfit view scene.toml\n  skinfit view noon.toml night.toml         one skin in two lights, as `skinfit fit` fits it\n  skinfit view runs/a                       a run: its scene, its constants, its start\n  skinfit view runs/a --compare runs/b      beside those of another\n  skinfit view scene.toml --screenshot window.png    the window as an image, without a display\n  skinfit view scene.toml --bench           how fast sliders and frames are, as JSON after the fit's own words")
 )]
 #[cfg_attr(not(feature = "view"), allow(dead_code, reason = "there is no window"))]
 pub(super) struct Arguments {
-    /// The scene file, or the run folder of a fit; the built-in scene when left out.
+    /// The scene file, several that share one skin, or the run folder of a fit; the built-in scene when left out.
     #[arg(value_name = "SCENE|RUN")]
-    scene: Option<PathBuf>,
+    scenes: Vec<PathBuf>,
     #[command(flatten)]
     bakes: BakeArguments,
     /// Begin with these constants, instead of the scene's start values.

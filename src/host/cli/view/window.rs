@@ -20,14 +20,12 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     quieten_graphics();
     watch_progress();
     // Without a cache the built-in scene lives in a folder of its own that goes with the window.
-    let homeless = arguments.scene.is_none() && arguments.bakes.cache().is_none();
+    let homeless = arguments.scenes.is_empty() && arguments.bakes.cache().is_none();
     let scratch = homeless.then(unfinished::scratch).transpose()?;
     let start = start(arguments, scratch.as_ref().map_or(Path::new(""), |scratch| scratch.path()))?;
     let host = Arc::new(CommandLine { bakes: arguments.bakes.words(), cache: arguments.bakes.cache() });
-    let name = arguments
-        .scene
-        .as_ref()
-        .map_or_else(|| "the built-in scene".to_owned(), |path| path.display().to_string());
+    let names: Vec<String> = arguments.scenes.iter().map(|path| path.display().to_string()).collect();
+    let name = if names.is_empty() { "the built-in scene".to_owned() } else { names.join(", ") };
     let (width, height) = arguments.size;
     let size = [width, height];
     if let Some(file) = &arguments.screenshot {
@@ -63,11 +61,12 @@ fn without_a_display(error: ViewError) -> Refusal {
 }
 
 fn start(arguments: &Arguments, scratch: &Path) -> Result<Start, Refusal> {
-    let of = SceneOrRun::of(arguments.scene.as_deref())?;
-    let path = arguments.bakes.kept_path(of.scene.as_deref(), scratch)?;
-    let start = of.start(path, arguments.bakes.cache());
+    let of = SceneOrRun::of(&arguments.scenes)?;
+    let paths = arguments.bakes.kept_paths(&of.scenes, scratch)?;
+    let start = of.start(paths, arguments.bakes.cache());
+    let reading = |reading: Reading| Reading { params: arguments.params.clone(), ..reading };
     Ok(Start {
-        reading: Reading { params: arguments.params.clone(), ..start.reading },
+        scenes: start.scenes.into_iter().map(reading).collect(),
         other: arguments.compare.as_deref().map(run_of).transpose()?,
         run: arguments.output.clone().unwrap_or(start.run),
         engine: Engine { cpu: arguments.engine == "cpu", adapter: arguments.adapter.clone() },

@@ -4,6 +4,7 @@ use eframe::egui::{self, ComboBox, Ui};
 
 use super::Window;
 use crate::look::{ErrorKind, Layout, Pane};
+use crate::paint::Slot;
 use crate::render::tonemap::Operator;
 use crate::session::Orbit;
 use crate::shown;
@@ -53,6 +54,15 @@ impl Window {
                 },
             );
             combo.response.accessible_name("error");
+            let other = self.session.other().is_some();
+            let of = shown::name_of(look.error_of);
+            let combo = ComboBox::from_id_salt("error of").selected_text(format!("of {of}")).width(70.0);
+            let combo = combo.show_ui(ui, |ui| {
+                for slot in Slot::ALL.into_iter().filter(|slot| *slot != Slot::Other || other) {
+                    ui.selectable_value(&mut look.error_of, slot, shown::name_of(slot));
+                }
+            });
+            combo.response.accessible_name("error of");
             let drag =
                 egui::DragValue::new(&mut look.exposure).speed(0.05).range(-16.0..=16.0).suffix(" stops");
             ui.add(drag).on_hover_text("Exposure of the images").accessible_name("exposure");
@@ -80,14 +90,11 @@ impl Window {
 
     /// Which view is looked at.
     fn views(&mut self, ui: &mut Ui) {
-        let Some(opened) = self.session.opened().cloned() else { return };
-        for (i, view) in opened.views().iter().enumerate() {
-            if ui
-                .selectable_label(self.session.view == i, &view.name)
-                .accessible_name(format!("view {}", view.name))
-                .clicked()
-            {
-                self.session.view = i;
+        let at = self.session.at();
+        for (i, place) in self.session.places().into_iter().enumerate() {
+            let name = format!("view {}", place.name);
+            if ui.selectable_label(at == i, place.name).accessible_name(name).clicked() {
+                self.session.look_at(i);
             }
         }
         if self.session.orbit != Orbit::default()

@@ -53,27 +53,23 @@ impl Window {
         }
         let free = self.session.values().map(|values| values.free.clone()).unwrap_or_default();
         let height = (ui.available_height() - 4.0).max(60.0);
-        curves::show(ui, &self.session.losses(), self.session.path(), &free, height);
+        let ways = curves::Ways { path: self.session.path(), scene: self.session.scene(), free: &free };
+        curves::show(ui, &self.session.losses(), ways, height);
         // The panel stays as high as it was made.
         ui.take_available_space();
     }
 
     /// Which views a fit leaves out.
     fn held_out(&mut self, ui: &mut Ui, idle: bool) {
-        let Some(opened) = self.session.opened().cloned() else { return };
         ui.separator();
         ui.label("fitted views");
-        for view in opened.views().iter().filter(|view| view.target.is_some()) {
-            let Some(values) = self.session.values() else { return };
-            let mut fitted = !values.hold_out.contains(&view.name);
-            let name = format!("fit view {}", view.name);
-            if ui
-                .add_enabled(idle, egui::Checkbox::new(&mut fitted, &view.name))
-                .accessible_name(name)
-                .changed()
-                && let Some(history) = self.session.history()
-            {
-                history.edit(|values| values.set_held_out(&view.name, !fitted));
+        let places = self.session.places().into_iter().enumerate();
+        for (i, place) in places.filter(|(_, place)| place.target).collect::<Vec<_>>() {
+            let mut fitted = place.fitted;
+            let name = format!("fit view {}", place.name);
+            let box_ = egui::Checkbox::new(&mut fitted, &place.name);
+            if ui.add_enabled(idle, box_).accessible_name(name).changed() {
+                self.session.set_fitted(i, fitted);
             }
         }
         ui.separator();

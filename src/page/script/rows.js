@@ -1,0 +1,180 @@
+// Parameters, gains and effects: a row each.
+function showEffects() {
+  sync($("effects"), state.effects, (row) => row.name,
+    () => make("li", {}, make("label", {}, make("input", { type: "checkbox" }), make("b")), make("span")),
+    (item, row) => {
+      const [label, change] = item.children;
+      const [box, name] = label.children;
+      label.title = row.meaning;
+      name.textContent = ` ${row.name} `;
+      box.checked = row.on;
+      box.disabled = state.fitting !== null;
+      box.setAttribute("aria-label", `effect ${row.name}`);
+      box.onchange = () => command("effect", { name: row.name, on: box.checked });
+      change.textContent = row.change ?? "";
+    });
+}
+
+// A slider's place from 0 to 1 and its value; by decades where the parameter is so.
+const DECADES = 4;
+const place = ({ lower, upper, log }, value) => {
+  if (!log) return (value - lower) / (upper - lower);
+  const least = lower > 0 ? lower : upper * 10 ** -DECADES;
+  return value <= least ? 0 : Math.log(value / least) / Math.log(upper / least);
+};
+const valueAt = ({ lower, upper, log }, at) => {
+  if (!log) return lower + at * (upper - lower);
+  const least = lower > 0 ? lower : upper * 10 ** -DECADES;
+  return at <= 0 ? lower : least * (upper / least) ** at;
+};
+const written = (value) => String(Number(value.toPrecision(6)));
+
+function showRows() {
+  sync($("rows"), state.rows, (row) => row.name, () => {
+    const cells = [make("input", { type: "checkbox" }), make("button"), make("div", { className: "value" }),
+      make("div", { className: "error" }), make("select")];
+    const row = make("tr", {}, make("td", {}, cells[0]), make("th", { scope: "row" }, cells[1]),
+      make("td", {}, cells[2]), make("td", {}, cells[3]), make("td", {}, cells[4]));
+    row.cells_ = cells;
+    return row;
+  }, (item, row) => {
+    const [free, name, values, errors, reset] = item.cells_;
+    const idle = state.fitting === null;
+    free.checked = row.free;
+    free.disabled = !idle;
+    free.setAttribute("aria-label", `fit ${row.name}`);
+    free.onchange = () => command("free", { param: row.name, on: free.checked });
+    name.textContent = row.name;
+    name.title = `${row.meaning}\nbounds ${row.bounds} ${row.unit}\n${row.source}`
+      + (row.rgb ? "\nClick: a value for each channel, or one for all." : "");
+    name.disabled = !row.rgb || !idle;
+    name.setAttribute("aria-label", row.rgb ? `channels of ${row.name}` : row.name);
+    if (row.rgb) name.setAttribute("aria-pressed", String(row.apart));
+    else name.removeAttribute("aria-pressed");
+    name.onclick = () => command("apart", { param: row.name, on: !row.apart });
+    errors.replaceChildren(...row.sliders.map((slider) => make("div", { textContent: slider.error ?? "" })));
+    const resets = ["", ...row.resets].join("|");
+    if (reset.dataset.resets !== resets) {
+      reset.dataset.resets = resets;
+      reset.replaceChildren(make("option", { value: "", textContent: "…" }),
+        ...row.resets.map((to) => make("option", { value: to, textContent: `to the ${to}` })));
+    }
+    reset.disabled = !idle;
+    reset.setAttribute("aria-label", `reset ${row.name}`);
+    reset.onchange = () => {
+      if (reset.value) command("reset", { param: row.name, to: reset.value });
+      reset.value = "";
+    };
+    showSliders(values, row, idle);
+  });
+}
+
+function showSliders(values, row, idle) {
+  const cells = row.sliders.flatMap((slider) => ["channel", "slider", "number"].map((kind) => ({ slider, kind })));
+  sync(values, cells, ({ slider, kind }) => `${slider.name} ${kind}`, ({ kind }) => ({
+    channel: () => make("span"),
+    slider: () => make("div", { className: "slider" }, make("input", { type: "range", min: 0, max: 1, step: 0.0005 }), make("i")),
+    number: () => make("input", { type: "number", step: "any" }),
+  })[kind](), (cell, { slider, kind }) => {
+    if (kind === "channel") {
+      cell.textContent = slider.channel;
+      return;
+    }
+    const label = `${slider.channel} ${row.name}`.trim();
+    if (kind === "slider") {
+      errorBar(cell.lastChild, slider);
+      cell = cell.firstChild;
+    }
+    cell.disabled = !idle;
+    cell.setAttribute("aria-label", kind === "slider" ? label : `value of ${label}`);
+    if (kind === "slider") {
+      // What is held by the pointer is ahead of what is told.
+      if (!cell.held) cell.value = place(slider, slider.value);
+      cell.setAttribute("aria-valuetext", `${written(slider.value)} ${row.unit}`.trim());
+      cell.oninput = () => {
+        cell.held = true;
+        command("slide", { slider: slider.name, value: valueAt(slider, Number(cell.value)) });
+      };
+      cell.onchange = () => {
+        cell.held = false;
+        command("settle");
+      };
+    } else {
+      if (document.activeElement !== cell) cell.value = written(slider.value);
+      cell.onchange = () => {
+        if (cell.value !== "") {
+          command("slide", { slider: slider.name, value: Number(cell.value) });
+          command("settle");
+        }
+      };
+    }
+  });
+}
+
+// Where the last fit has it for sure, below the slider.
+function errorBar(bar, slider) {
+  bar.hidden = slider.interval === null;
+  if (bar.hidden) return;
+  const [from, to] = slider.interval.map((value) => clamp(place(slider, value)));
+  bar.style.setProperty("--from", from);
+  bar.style.setProperty("--wide", to - from);
+}
+
+function showGains() {
+  const idle = state.fitting === null;
+  const views = state.gains?.views ?? [];
+  if (state.gains?.shown && !$("gains").dataset.seen) {
+    $("gains").open = true;
+    $("gains").dataset.seen = "yes";
+  }
+  $("free-gains").checked = state.gains?.free ?? false;
+  $("free-gains").disabled = !idle;
+  sync($("gain-rows"), views.map((gain, view) => ({ ...gain, number: view })), (gain) => gain.view, () => {
+    const cells = [make("th", { scope: "row" }), make("input", { type: "range", min: 0, max: 1, step: 0.0005 }),
+      make("input", { type: "number", step: "any", min: 0 }), make("td", { className: "error" })];
+    const row = make("tr", {}, cells[0], make("td", {}, make("div", { className: "value" }, cells[1], cells[2])), cells[3]);
+    row.cells_ = cells;
+    return row;
+  }, (item, gain) => {
+    const [name, slider, number, error] = item.cells_;
+    const range = { lower: 0.1, upper: 10, log: true };
+    const slide = (value) => command("slide_gain", { view: gain.number, value });
+    name.textContent = gain.view;
+    error.textContent = gain.error ?? "";
+    slider.disabled = number.disabled = !idle;
+    slider.setAttribute("aria-label", `gain ${gain.view}`);
+    number.setAttribute("aria-label", `value of gain ${gain.view}`);
+    if (!slider.held) slider.value = place(range, gain.value);
+    slider.setAttribute("aria-valuetext", written(gain.value));
+    slider.oninput = () => {
+      slider.held = true;
+      slide(valueAt(range, Number(slider.value)));
+    };
+    slider.onchange = () => {
+      slider.held = false;
+      command("settle");
+    };
+    if (document.activeElement !== number) number.value = written(gain.value);
+    number.onchange = () => {
+      if (number.value === "") return;
+      slide(Number(number.value));
+      command("settle");
+    };
+  });
+}
+
+// All constants and scores side by side.
+function showTables(tables) {
+  $("tables-shown").replaceChildren(...tables.map(({ heads, rows }) => make("table", {},
+    make("thead", {}, make("tr", {}, ...heads.map((head) => make("th", { scope: "col", textContent: head })))),
+    make("tbody", {}, ...rows.map(([name, ...cells]) => make("tr", {}, make("th", { scope: "row", textContent: name }),
+      ...cells.map((words) => make("td", { textContent: words }))))))));
+}
+function toggleTables() {
+  if ($("tables").open) {
+    $("tables").close();
+  } else {
+    $("tables").showModal();
+    send("tables");
+  }
+}

@@ -1,0 +1,102 @@
+//! The values of several scenes that share one skin: what one edits in a scene holds in the others as far as it is the
+//! skin's.
+
+use crate::engine::Point;
+use crate::model::effects::Effects;
+use crate::model::params::{Column, Param};
+use crate::opened::Opened;
+use crate::values::Values;
+
+/// Each scene's values, in their order; one of them at the least.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skin(Vec<Values>);
+
+impl Skin {
+    /// The scenes' own, which share one skin: they were read so.
+    #[must_use]
+    pub fn of<'a>(scenes: impl IntoIterator<Item = &'a Opened>) -> Self {
+        Self(scenes.into_iter().map(|opened| Values::of(&opened.baked)).collect())
+    }
+
+    /// Those of a scene.
+    #[must_use]
+    pub fn in_scene(&self, scene: usize) -> &Values {
+        &self.0[scene]
+    }
+
+    /// Those of every scene.
+    #[must_use]
+    pub fn scenes(&self) -> &[Values] {
+        &self.0
+    }
+
+    /// Change those of a scene.
+    pub fn change(&mut self, scene: usize, change: impl FnOnce(&mut Values)) {
+        change(&mut self.0[scene]);
+        let (before, rest) = self.0.split_at_mut(scene);
+        if let Some((changed, after)) = rest.split_first_mut() {
+            before.iter_mut().chain(after).for_each(|other| share(changed, other));
+        }
+    }
+
+    /// Take what the scenes' files have brought along.
+    pub fn take_effects<'a>(&mut self, scenes: impl IntoIterator<Item = &'a Opened>) {
+        for (values, opened) in self.0.iter_mut().zip(scenes) {
+            values.effects = opened.baked.scene.effects;
+        }
+    }
+
+    /// Whether every scene was read with these effects.
+    #[must_use]
+    pub fn is_read<'a>(&self, scenes: impl IntoIterator<Item = &'a Opened>) -> bool {
+        let read = |(values, opened): (&Values, &Opened)| values.effects == opened.baked.scene.effects;
+        self.0.iter().zip(scenes).all(read)
+    }
+
+    /// Take where a fit stands in each scene.
+    pub fn take<'a>(&mut self, points: &[Point], scenes: impl IntoIterator<Item = &'a Opened>) {
+        for ((values, point), opened) in self.0.iter_mut().zip(points).zip(scenes) {
+            values.take(point, opened.views());
+        }
+    }
+
+    /// Constants and gains of each scene.
+    #[must_use]
+    pub fn points(&self) -> Vec<Point> {
+        let point = |values: &Values| Point { params: values.params.clone(), gains: values.gains.clone() };
+        self.0.iter().map(point).collect()
+    }
+
+    /// The same, as they are given.
+    pub fn set_points(&mut self, points: &[Point]) {
+        for (values, point) in self.0.iter_mut().zip(points) {
+            (values.params, values.gains) = (point.params.clone(), point.gains.clone());
+        }
+    }
+}
+
+/// Have `other` take of a scene's values what is the skin's.
+fn share(changed: &Values, other: &mut Values) {
+    for param in Param::all().filter(|param| !param.is_of_scene()) {
+        other.params.set_rgb(param, changed.params.rgb(param));
+    }
+    let parted = |changed: &[Param], other: &[Param]| -> Vec<Param> {
+        let skins = changed.iter().filter(|param| !param.is_of_scene());
+        skins.chain(other.iter().filter(|param| param.is_of_scene())).copied().collect()
+    };
+    other.apart = parted(&changed.apart, &other.apart);
+    let own: Vec<Column> = other.free.iter().filter(|column| column.param.is_of_scene()).copied().collect();
+    other.free =
+        changed.free.iter().filter(|column| !column.param.is_of_scene()).copied().chain(own).collect();
+    let mut effects = Effects::of(&[]);
+    for effect in changed.effects.iter().filter(|effect| !effect.is_of_scene()) {
+        effects = effects.with(effect);
+    }
+    for effect in other.effects.iter().filter(|effect| effect.is_of_scene()) {
+        effects = effects.with(effect);
+    }
+    if effects != other.effects {
+        other.effects = effects;
+        other.without_parts();
+    }
+}
