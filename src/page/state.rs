@@ -272,7 +272,7 @@ fn panes(session: &Session, look: &Look) -> Vec<PaneRow> {
         name: shown::name(pane),
         term: matches!(pane, Pane::Term(_)),
         title: shown::title(session, look, pane),
-        lacking: shown::pair(session, pane, look).is_none().then_some(shown::lacking(pane)),
+        lacking: shown::pair(session, pane, look).is_none().then_some(shown::lacking(session, pane)),
     };
     offered.chain(terms.into_iter().map(Pane::Term)).map(row).collect()
 }

@@ -45,11 +45,11 @@ pub fn name(pane: Pane) -> &'static str {
 
 /// What a pane says that has nothing to show.
 #[must_use]
-pub const fn lacking(pane: Pane) -> &'static str {
+pub fn lacking(session: &Session, pane: Pane) -> &'static str {
     match pane {
         Pane::Target => "this view has no target",
-        Pane::Fit => "no fit yet",
-        Pane::Other => "no run is compared",
+        Pane::Fit if session.fitted().is_none() => "no fit yet",
+        Pane::Other if session.other().is_none() => "no run is compared",
         Pane::Error => "nothing is compared",
         _ => "being drawn",
     }

@@ -147,7 +147,7 @@ impl One {
             ui.painter().text(
                 self.rect.center(),
                 Align2::CENTER_CENTER,
-                shown::lacking(self.pane),
+                shown::lacking(session, self.pane),
                 FontId::proportional(14.0),
                 ui.visuals().weak_text_color(),
             );

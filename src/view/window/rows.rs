@@ -2,6 +2,7 @@
 
 use std::ops::RangeInclusive;
 
+use eframe::egui::style::HandleShape;
 use eframe::egui::{self, Pos2, Rect, Response, RichText, Slider, SliderClamping, Ui};
 
 use crate::model::params::{Channels, Column, Param, Scale};
@@ -208,8 +209,12 @@ fn place(range: &RangeInclusive<f64>, scale: Scale, value: f64) -> f32 {
 /// A bar below a slider, between two of its places.
 fn error_bar(ui: &Ui, slider: &Response, [from, to]: [f32; 2]) {
     let width = ui.spacing().slider_width;
-    // The middle of its handle moves between these.
-    let radius = slider.rect.height() / 2.5;
+    // The middle of its handle moves between half a handle from either end.
+    let aspect = match ui.visuals().handle_shape {
+        HandleShape::Circle => 1.0,
+        HandleShape::Rect { aspect_ratio } => aspect_ratio,
+    };
+    let radius = slider.rect.height() / 2.5 * aspect;
     let at = |share: f32| slider.rect.left() + radius + share * (width - 2.0 * radius);
     // However small the error is, it is seen where it is.
     let (from, to) = (at(from), at(to).max(at(from) + 2.0));
