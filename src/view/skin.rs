@@ -80,11 +80,9 @@ fn share(changed: &Values, other: &mut Values) {
     for param in Param::all().filter(|param| !param.is_of_scene()) {
         other.params.set_rgb(param, changed.params.rgb(param));
     }
-    let parted = |changed: &[Param], other: &[Param]| -> Vec<Param> {
-        let skins = changed.iter().filter(|param| !param.is_of_scene());
-        skins.chain(other.iter().filter(|param| param.is_of_scene())).copied().collect()
-    };
-    other.apart = parted(&changed.apart, &other.apart);
+    let skins = changed.apart.iter().filter(|param| !param.is_of_scene());
+    let own = other.apart.iter().filter(|param| param.is_of_scene());
+    other.apart = skins.chain(own).copied().collect();
     let own: Vec<Column> = other.free.iter().filter(|column| column.param.is_of_scene()).copied().collect();
     other.free =
         changed.free.iter().filter(|column| !column.param.is_of_scene()).copied().chain(own).collect();

@@ -50,8 +50,8 @@ impl SceneOrRun {
 
     /// What a window begins with: the scenes' files at `paths`, bakes in `cache`, fits beside what is looked at.
     #[cfg(feature = "view")]
-    pub(super) fn start(self, paths: Vec<PathBuf>, cache: Option<PathBuf>) -> Start {
-        let reading = |scene| Reading { scene, cache: cache.clone(), ..Reading::default() };
+    pub(super) fn start(self, paths: Vec<PathBuf>, cache: Option<&Path>) -> Start {
+        let reading = |scene| Reading { scene, cache: cache.map(Path::to_owned), ..Reading::default() };
         Start {
             run: PathBuf::from(format!("{}.window", self.folder().display())),
             scenes: paths.into_iter().map(reading).collect(),

@@ -95,6 +95,7 @@ impl Offscreen {
             screen_rect: Some(egui::Rect::from_min_size(egui::Pos2::ZERO, points)),
             time: Some(f64::from(self.frame) / 60.0),
             focused: true,
+            max_texture_side: Some(self.state.device.limits().max_texture_dimension_2d as usize),
             events: std::mem::take(&mut self.events),
             ..egui::RawInput::default()
         };

@@ -7,6 +7,7 @@ use eframe::egui::{self, Align2, Color32, FontId, PointerButton, Rect, Response,
 use crate::look::{ErrorKind, Layout, Look, Pane};
 use crate::pixels;
 use crate::render::files::{ImageOptions, write_image};
+use crate::render::image::Image;
 use crate::render::tonemap::ToneMap;
 use crate::session::Session;
 use crate::shown::{self, Kind};
@@ -143,15 +144,16 @@ impl One {
             }
             (pane, _) => shown::pair(session, pane, look),
         };
-        let Some(images) = pair else {
-            ui.painter().text(
-                self.rect.center(),
-                Align2::CENTER_CENTER,
-                shown::lacking(session, self.pane),
-                FontId::proportional(14.0),
-                ui.visuals().weak_text_color(),
-            );
-            return;
+        let side = ui.input(|input| input.max_texture_side);
+        let too_large = |image: &Arc<Image>| image.width.max(image.height) > side;
+        let images = match pair {
+            Some(images) if images.iter().any(too_large) => {
+                let words =
+                    format!("too large to be shown: this window's adapter takes {side} pixels a side");
+                return self.say(ui, &words);
+            }
+            Some(images) => images,
+            None => return self.say(ui, shown::lacking(session, self.pane)),
         };
         let kind = match (self.pane, look.layout) {
             (Pane::Error, _) => Kind::Error(look.error),
@@ -168,6 +170,12 @@ impl One {
             scale: shown::scale(look.error),
         };
         picture::paint(&ui.painter_at(self.rect), self.rect, id, images, shown);
+    }
+
+    /// Words where there is no image.
+    fn say(&self, ui: &Ui, words: &str) {
+        let (font, color) = (FontId::proportional(14.0), ui.visuals().weak_text_color());
+        ui.painter().text(self.rect.center(), Align2::CENTER_CENTER, words, font, color);
     }
 
     /// What the mouse does here.

@@ -17,6 +17,7 @@ use super::opened::{SceneOrRun, run_of};
 use super::scene::BakeArguments;
 use super::{Exit, Refusal, say, unfinished};
 use crate::output;
+use crate::prepare::scene_names;
 use taken::taken;
 
 /// The page without a scene, beside the program.
@@ -114,14 +115,15 @@ fn gzip(bytes: &[u8]) -> Result<Vec<u8>, Refusal> {
     Ok(gzip.finish()?)
 }
 
-/// The name of the run or the scene, and of no folder that these are in.
+/// The names of the run or the scenes, and of no folder that these are in.
 fn title(of: &SceneOrRun) -> String {
     let folder = of.folder();
-    let name = folder.file_name().unwrap_or_default().to_string_lossy();
-    format!(
-        "skinfit: {}",
-        if of.run.is_none() && of.scenes.is_empty() { "the built-in scene".into() } else { name }
-    )
+    let name = match &of.scenes[..] {
+        [] => "the built-in scene".to_owned(),
+        scenes @ [_, _, ..] if of.run.is_none() => scene_names(scenes).unwrap_or_default().join(", "),
+        _ => folder.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    };
+    format!("skinfit: {name}")
 }
 
 /// As text of HTML.

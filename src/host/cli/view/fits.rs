@@ -109,7 +109,7 @@ impl Host for CommandLine {
     fn start(&self, path: &Path) -> Result<View, String> {
         let of = SceneOrRun::of(std::slice::from_ref(&path.to_owned())).map_err(|refusal| refusal.words)?;
         let scenes = if of.scenes.is_empty() { vec![path.to_owned()] } else { of.scenes.clone() };
-        Ok(of.start(scenes, self.cache.clone()))
+        Ok(of.start(scenes, self.cache.as_deref()))
     }
 
     fn run(&self, path: &Path) -> Result<Run, String> {

@@ -63,7 +63,7 @@ fn without_a_display(error: ViewError) -> Refusal {
 fn start(arguments: &Arguments, scratch: &Path) -> Result<Start, Refusal> {
     let of = SceneOrRun::of(&arguments.scenes)?;
     let paths = arguments.bakes.kept_paths(&of.scenes, scratch)?;
-    let start = of.start(paths, arguments.bakes.cache());
+    let start = of.start(paths, arguments.bakes.cache().as_deref());
     let reading = |reading: Reading| Reading { params: arguments.params.clone(), ..reading };
     Ok(Start {
         scenes: start.scenes.into_iter().map(reading).collect(),
