@@ -1,6 +1,6 @@
 //! What one does on the page.
 
-use std::path::Path;
+use std::path::PathBuf;
 
 use serde::Deserialize;
 use skinfit_core::files;
@@ -11,9 +11,6 @@ use skinfit_view::session::Orbit;
 use crate::message::column;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
-
-/// Where constants are put to be read.
-pub(crate) const LOADED: &str = "/page/params.toml";
 
 /// What is done.
 #[derive(Clone, Debug, Deserialize)]
@@ -94,6 +91,7 @@ pub(crate) enum Command {
     Forget,
     /// Constants of a file.
     Load {
+        name: String,
         text: String,
     },
 }
@@ -147,10 +145,11 @@ pub(crate) fn run(session: &mut Session, look: &mut Look, command: Command) {
             look.panes = names.iter().filter_map(|name| pane(name)).collect();
         }
         Command::Forget => session.forget_told(),
-        Command::Load { text } => {
-            let file = Path::new(LOADED);
-            files::hold([(file.to_owned(), text.into_bytes())]);
-            session.load_params(file);
+        Command::Load { name, text } => {
+            // What is wrong with it is told by its own name.
+            let file = PathBuf::from(format!("/{name}"));
+            files::hold([(file.clone(), text.into_bytes())]);
+            session.load_params(&file);
         }
     }
 }

@@ -144,7 +144,7 @@ impl UnderWay {
             request.scenes[number].set(loaded, free[number].clone());
         });
         let scenes = scenes.map_err(|error| error.to_string())?;
-        let marks = NamedScene::marked(&scenes, &request.hold_out()).map_err(|error| error.to_string())?;
+        let marks = NamedScene::marked(&scenes, &request.hold_out).map_err(|error| error.to_string())?;
         let ready = |(NamedScene { name, loaded }, marks): (NamedScene, Vec<bool>)| {
             let (baked, held) = loaded.bake()?.hold_out(&marks)?;
             // A scene of which all is held out has nothing to be fitted.

@@ -1,5 +1,6 @@
 //! What the workers tell each other of a fit.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,7 @@ use crate::engine::Point;
 use crate::fit::outcome::{Ending, Iteration};
 use crate::model::effects::{Effect, Effects};
 use crate::model::params::{Column, Param, Params};
-use crate::prepare::{Loaded, view_of};
+use crate::prepare::Loaded;
 
 /// What the worker that fits is asked.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -32,42 +33,35 @@ pub(crate) enum Ask {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Request {
     pub(crate) scenes: Vec<OfScene>,
+    /// Which views are held out, as the command line names them.
+    pub(crate) hold_out: Vec<String>,
 }
 
 /// What is fitted of a scene: where it starts, what is free, which effects are on, what is left out.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct OfScene {
-    name: String,
     at: At,
     free: Vec<String>,
     free_gains: bool,
     effects: Vec<String>,
-    hold_out: Vec<String>,
 }
 
 impl Request {
     pub(crate) fn of(request: &FitRequest) -> Self {
-        Self { scenes: request.scenes.iter().map(OfScene::of).collect() }
+        Self { scenes: request.scenes.iter().map(OfScene::of).collect(), hold_out: request.hold_out() }
     }
 
     /// Whether a fit of the one can go on as a fit of the other.
     pub(crate) fn goes_on_as(&self, other: &Self) -> bool {
+        let sorted = |names: &[String]| names.iter().cloned().collect::<BTreeSet<_>>();
         let same = |(one, other): (&OfScene, &OfScene)| {
-            (&one.free, one.free_gains, &one.effects, &one.hold_out)
-                == (&other.free, other.free_gains, &other.effects, &other.hold_out)
+            one.free_gains == other.free_gains
+                && sorted(&one.free) == sorted(&other.free)
+                && sorted(&one.effects) == sorted(&other.effects)
         };
-        self.scenes.len() == other.scenes.len() && self.scenes.iter().zip(&other.scenes).all(same)
-    }
-
-    /// Which views are held out, as the command line names them.
-    pub(crate) fn hold_out(&self) -> Vec<String> {
-        let several = self.scenes.len() > 1;
-        let name = |scene: &OfScene, view: &String| match several {
-            true => view_of(&scene.name, view),
-            false => view.clone(),
-        };
-        let of = |scene: &OfScene| scene.hold_out.iter().map(|view| name(scene, view)).collect::<Vec<_>>();
-        self.scenes.iter().flat_map(of).collect()
+        self.scenes.len() == other.scenes.len()
+            && self.scenes.iter().zip(&other.scenes).all(same)
+            && sorted(&self.hold_out) == sorted(&other.hold_out)
     }
 }
 
@@ -75,12 +69,10 @@ impl OfScene {
     fn of(scene: &FitScene) -> Self {
         let values = &scene.values;
         Self {
-            name: scene.name.clone(),
             at: At { params: named(&values.params), gains: values.gains.clone() },
             free: values.free.iter().map(Column::name).collect(),
             free_gains: values.free_gains,
             effects: values.effects.iter().map(|effect| effect.name().to_owned()).collect(),
-            hold_out: values.hold_out.clone(),
         }
     }
 

@@ -118,8 +118,8 @@ pub struct Stage {
     post: Shared,
     /// Whether the scene's bakes were looked at.
     checked: bool,
-    /// What of a fit was told: how many losses and the last of them, and of which constants the ways.
-    told: Option<(usize, Option<f64>, Vec<Column>)>,
+    /// What of a fit was told: how many losses and the last of them, and of which scene's constants the ways.
+    told: Option<(usize, Option<f64>, usize, Vec<Column>)>,
     given: HashMap<String, Given>,
 }
 
@@ -162,7 +162,8 @@ impl Stage {
     pub fn command(&mut self, command: &str) -> Result<(), JsError> {
         let command: Command = serde_json::from_str(command)?;
         command::run(&mut self.session, &mut self.look, command);
-        self.session.look_for(shown::slots(&self.look));
+        let slots = shown::slots(&self.session, &self.look);
+        self.session.look_for(slots);
         // A pane that is shown again is given again.
         let shown = &self.look.panes;
         self.given.retain(|name, _| pane(name).is_some_and(|pane| shown.contains(&pane)));
@@ -179,7 +180,7 @@ impl Stage {
         // What a fit has gone through is told as it grows, and not with every move of a slider.
         let losses = self.session.losses();
         let free = self.session.values().map(|values| values.free.clone()).unwrap_or_default();
-        let told = (losses.len(), losses.last().copied(), free);
+        let told = (losses.len(), losses.last().copied(), self.session.scene(), free);
         let grown = self.told.as_ref() != Some(&told);
         self.told = Some(told);
         Ok(serde_json::to_string(&State::of(&self.session, &self.look, grown))?)
@@ -236,7 +237,11 @@ impl Stage {
     /// # Errors
     /// When it cannot be written.
     pub fn probe(&self, x: u32, y: u32) -> Result<String, JsError> {
-        Ok(serde_json::to_string(&skinfit_view::probe::rows(&self.session, self.look.error_of, [x, y]))?)
+        Ok(serde_json::to_string(&skinfit_view::probe::rows(
+            &self.session,
+            shown::error_of(&self.session, &self.look),
+            [x, y],
+        ))?)
     }
 
     /// The constants, as `params.toml`.

@@ -6,7 +6,7 @@ use skinfit_view::fitting::shares;
 use skinfit_view::host::{Known, ViewScore};
 use skinfit_view::look::{ErrorKind, Layout, Look, Pane};
 use skinfit_view::paint::Slot;
-use skinfit_view::session::Place;
+use skinfit_view::session::{GAINS, Place, least};
 use skinfit_view::shown;
 use skinfit_view::values::{Freedom, Values};
 
@@ -29,6 +29,8 @@ pub(crate) struct State<'a> {
     view: usize,
     /// Whose errors can be shown.
     error_of: Vec<(Slot, &'static str)>,
+    /// Whose error is shown.
+    error_shown: Slot,
     gains: Option<Gains>,
     home: bool,
     can_undo: bool,
@@ -74,6 +76,9 @@ struct Gains {
     free: bool,
     /// Whether there is anything to say of them.
     shown: bool,
+    /// What their sliders span.
+    lower: f64,
+    upper: f64,
     views: Vec<Gain>,
 }
 
@@ -107,6 +112,8 @@ struct SliderRow {
     value: f64,
     lower: f64,
     upper: f64,
+    /// Of a slider of decades the least value that it tells from 0.
+    least: f64,
     log: bool,
     error: Option<String>,
     /// From one standard error below to one above.
@@ -165,11 +172,8 @@ impl<'a> State<'a> {
             }),
             views: views(session),
             view: session.at(),
-            error_of: Slot::ALL
-                .into_iter()
-                .filter(|slot| *slot != Slot::Other || session.other().is_some())
-                .map(|slot| (slot, shown::name_of(slot)))
-                .collect(),
+            error_of: shown::errors_of(session).map(|slot| (slot, shown::name_of(slot))).collect(),
+            error_shown: shown::error_of(session, look),
             gains: gains(session),
             home: session.is_at_home(),
             can_undo: session.steps().0,
@@ -218,7 +222,8 @@ fn gains(session: &Session) -> Option<Gains> {
         error: session.known_gain(&view.name).map(Known::words),
     };
     let views = opened.views().iter().zip(&values.gains).map(row).collect();
-    Some(Gains { free: values.free_gains, shown: values.has_gains(), views })
+    let (lower, upper) = GAINS.into_inner();
+    Some(Gains { free: values.free_gains, shown: values.has_gains(), lower, upper, views })
 }
 
 fn row(session: &Session, values: &Values, param: Param) -> Row {
@@ -236,6 +241,7 @@ fn row(session: &Session, values: &Values, param: Param) -> Row {
             value: column.get(&values.params),
             lower: *range.start(),
             upper: *range.end(),
+            least: least(&range),
             log: info.scale == Scale::Log,
             error: session.known(column).map(Known::words),
             interval: session.interval(column),

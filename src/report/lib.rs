@@ -58,7 +58,7 @@ use misfit::Misfit;
 use pictures::Picture;
 
 /// The folder of the scenes' files in the run folder of a fit of several.
-pub const SCENES: &str = "scenes";
+pub const SCENES: &str = scene::names::RUN_SCENES;
 /// The folder of fitted maps in a run folder.
 pub const MAPS: &str = "maps";
 /// What was found of fitted maps, in numbers.

@@ -59,7 +59,7 @@ impl Tell {
 }
 
 /// A fit under way, from beside it. Dropped, it is stopped, and waited for where it leaves files.
-pub trait FitControl: fmt::Debug {
+pub trait FitControl: fmt::Debug + Send {
     /// Have it wait after the iteration that it is at, or go on.
     fn set_paused(&mut self, paused: bool);
     /// Whether it is to wait.

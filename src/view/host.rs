@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::engine::Point;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fitting::{FitControl, Tell};
+use crate::prepare::view_of;
 use crate::start::{Run, Start};
 use crate::values::Values;
 
@@ -34,6 +35,19 @@ pub struct FitScene {
     pub values: Values,
 }
 
+impl FitRequest {
+    /// Which views are held out, as the command line names them.
+    #[must_use]
+    pub fn hold_out(&self) -> Vec<String> {
+        let several = self.scenes.len() > 1;
+        let of = |scene: &FitScene| {
+            let name = |view: &String| if several { view_of(&scene.name, view) } else { view.clone() };
+            scene.values.hold_out.iter().map(name).collect::<Vec<_>>()
+        };
+        self.scenes.iter().flat_map(of).collect()
+    }
+}
+
 /// What a fit has found, and how good it is.
 #[derive(Clone, Debug)]
 pub struct Fitted {
@@ -42,6 +56,35 @@ pub struct Fitted {
     /// How good each view is, as the report says.
     pub views: Vec<ViewScore>,
 }
+
+impl Fitted {
+    /// What it says of one of its scenes, where it was of several: by the names that a fit of that alone has.
+    #[must_use]
+    pub fn of_scene(mut self, scene: &str) -> Self {
+        let before = view_of(scene, "");
+        if self.views.iter().any(|view| view.view.starts_with(&before)) {
+            let own = |name: &str| name.strip_prefix(&before).map(str::to_owned);
+            self.views.retain_mut(|view| own(&view.view).map(|name| view.view = name).is_some());
+            for known in &mut self.found.known {
+                known.name = own_name(&known.name, &before);
+            }
+        }
+        self
+    }
+}
+
+/// An unknown's name without the scene's that it begins with.
+#[must_use]
+pub fn own_name(name: &str, before: &str) -> String {
+    let gain = name
+        .strip_prefix(GAIN)
+        .and_then(|view| view.strip_prefix(before))
+        .map(|view| format!("{GAIN}{view}"));
+    gain.unwrap_or_else(|| name.strip_prefix(before).unwrap_or(name).to_owned())
+}
+
+/// What the name of a view's gain begins with.
+pub const GAIN: &str = "gain.";
 
 /// What a fit has found, as far as it is shown.
 #[derive(Clone, Debug, PartialEq)]

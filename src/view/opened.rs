@@ -7,6 +7,8 @@ use glam::{DVec3, Vec3};
 
 use crate::bake::rays::RayMesh;
 use crate::bake::stacks::Stack;
+use crate::engine::Point;
+use crate::fit::params_file::{ParamsFile, ParamsFileError};
 use crate::model::effects::Effects;
 use crate::model::params::{Column, Param, Params};
 use crate::prepare::{Baked, Loaded, NamedScene, PrepareError, PrepareOptions, read_one_skin_each};
@@ -14,6 +16,7 @@ use crate::render::image::Image;
 use crate::samples::hit_at;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::{Background, Camera, View};
+use crate::values::Values;
 
 /// How a scene is read.
 #[derive(Clone, Debug, Default)]
@@ -103,6 +106,24 @@ impl Opened {
         let targets = baked.scene.views.iter().map(|view| target(view).map(Arc::new)).collect();
         let extent = extent(&mesh);
         Ok(Self { name, baked, targets, extent, mesh, rays })
+    }
+
+    /// Where a file of constants has the scene; what it does not name is as in `values`, or as the scene has it.
+    ///
+    /// # Errors
+    /// When it cannot be read, or is of another form.
+    pub fn point_in(&self, params: &Path, values: Option<&Values>) -> Result<Point, ParamsFileError> {
+        let scene = &self.baked.scene;
+        let base = values.map_or(&scene.params, |values| &values.params);
+        let file = ParamsFile::read(params, scene.form, base)?.of_scene(&scene.path);
+        let mut gains = values.map_or(&self.baked.gains, |values| &values.gains).clone();
+        for (name, gain) in &file.gains {
+            let place = self.views().iter().position(|view| view.name == *name);
+            if let Some(own) = place.and_then(|place| gains.get_mut(place)) {
+                *own = *gain;
+            }
+        }
+        Ok(Point { params: file.params, gains })
     }
 
     /// The scene's file.

@@ -8,7 +8,8 @@ use crate::render::image::Image;
 use crate::session::Session;
 use crate::shown;
 
-/// What a pixel is, as rows of names and numbers; the residual and FLIP are of that image.
+/// What a pixel is, as rows of names and numbers; the residual and FLIP are of that image, where it is drawn, else of the
+/// sliders'.
 #[must_use]
 pub fn rows(session: &Session, error_of: Slot, [x, y]: [u32; 2]) -> Vec<(String, String)> {
     let mut rows = vec![("pixel".to_owned(), format!("{x}, {y}"))];
@@ -32,6 +33,7 @@ pub fn rows(session: &Session, error_of: Slot, [x, y]: [u32; 2]) -> Vec<(String,
             rows.push((shown::name(pane).to_owned(), three(rgb)));
         }
     }
+    let error_of = if session.image(error_of).is_some() { error_of } else { Slot::Now };
     let compared = shown::compared(session, error_of);
     if let Some([Some(image), Some(target)]) = compared.map(|pair| pair.each_ref().map(value)) {
         rows.push(("residual".to_owned(), three([0, 1, 2].map(|c| image[c] - target[c]))));

@@ -17,17 +17,17 @@ mod known;
 mod opening;
 mod places;
 
+use aside::Aside;
+pub use camera::Orbit;
+pub use edits::GAINS;
+use images::Before;
+pub use images::Change;
+pub use known::{START, least};
+use opening::Opening;
+pub use places::Place;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
-
-use aside::Aside;
-pub use camera::Orbit;
-use images::Before;
-pub use images::Change;
-pub use known::START;
-pub use places::Place;
 
 use crate::engine::Point;
 use crate::fitting::{Fitting, Step};
@@ -46,7 +46,9 @@ pub struct Session {
     host: Arc<dyn Host>,
     start: Start,
     wake: Wake,
-    opening: Option<Receiver<Result<Vec<Opened>, String>>>,
+    opening: Option<Opening>,
+    /// What is to be looked at in the place of this, once it is opened.
+    next: Option<Box<Self>>,
     scenes: Vec<Arc<Opened>>,
     values: Option<History<Skin>>,
     first: Option<Skin>,
@@ -62,9 +64,12 @@ pub struct Session {
     asked: BTreeMap<Slot, Arc<Job>>,
     engine: String,
     switched: Option<Before>,
-    changes: BTreeMap<&'static str, Change>,
+    /// By scene and effect.
+    changes: BTreeMap<(usize, &'static str), Change>,
     fitting: Option<Fitting>,
     path: Vec<Step>,
+    /// The run folder that these steps were made in.
+    path_of: PathBuf,
     aside: Aside,
     /// Which of the scenes is looked at, and which of its views.
     at: (usize, usize),
@@ -92,6 +97,7 @@ impl Session {
             aside: Aside::new(Arc::clone(&wake)),
             wake,
             opening: None,
+            next: None,
             scenes: Vec::new(),
             values: None,
             first: None,
@@ -109,6 +115,7 @@ impl Session {
             changes: BTreeMap::new(),
             fitting: None,
             path: Vec::new(),
+            path_of: PathBuf::new(),
             at: (0, 0),
             orbit: Orbit::default(),
             terms: false,
@@ -121,6 +128,7 @@ impl Session {
     /// Take in what was answered, and ask for what is to be shown.
     pub fn poll(&mut self) {
         self.follow_opening();
+        self.follow_next();
         for answer in self.painter.answers().collect::<Vec<_>>() {
             self.painted(answer);
         }
@@ -177,6 +185,16 @@ impl Session {
         self.here(self.other.as_deref()).map(|point| &point.params)
     }
 
+    /// Whether there is anything to draw in a slot.
+    #[must_use]
+    pub const fn has(&self, slot: Slot) -> bool {
+        match slot {
+            Slot::Now | Slot::Start => true,
+            Slot::Fit => self.fitted.is_some(),
+            Slot::Other => self.other.is_some(),
+        }
+    }
+
     /// What a list has of the scene that is looked at.
     fn here<'a>(&self, points: Option<&'a [Point]>) -> Option<&'a Point> {
         points?.get(self.at.0)
@@ -216,7 +234,7 @@ impl Session {
     /// What an effect brought or took when it was switched last.
     #[must_use]
     pub fn change(&self, effect: Effect) -> Option<Change> {
-        self.changes.get(effect.name()).copied()
+        self.changes.get(&(self.scene(), effect.name())).copied()
     }
 
     /// The fit that runs.
@@ -234,8 +252,9 @@ impl Session {
     /// The loss at the start and after each iteration, of the fit that runs or of the last one.
     #[must_use]
     pub fn losses(&self) -> Vec<f64> {
-        match (self.path.is_empty(), &self.found) {
-            (true, Some(found)) => found.losses.clone(),
+        match (&self.fitting, &self.found) {
+            // Those of a fit that was resumed, too.
+            (None, Some(found)) => found.losses.clone(),
             _ => self.path.iter().map(|step| step.iteration.loss).collect(),
         }
     }
@@ -275,13 +294,13 @@ impl Session {
     /// Whether scenes are being read.
     #[must_use]
     pub const fn is_opening(&self) -> bool {
-        self.opening.is_some()
+        self.opening.is_some() || self.next.is_some()
     }
 
     /// Whether all that is asked for is there.
     #[must_use]
     pub fn is_idle(&self) -> bool {
-        self.opening.is_none() && self.fitting.is_none() && self.painter.is_idle() && self.aside.is_idle()
+        !self.is_opening() && self.fitting.is_none() && self.painter.is_idle() && self.aside.is_idle()
     }
 
     /// Give the adapter's device up, as a driver that is reset does: the window goes on without it.

@@ -67,8 +67,28 @@ pub fn name_of(slot: Slot) -> &'static str {
 }
 
 /// The slots whose images are shown.
-pub fn slots(look: &Look) -> impl Iterator<Item = Slot> {
-    look.panes.iter().map(|pane| if *pane == Pane::Error { look.error_of } else { slot(*pane) })
+pub fn slots(session: &Session, look: &Look) -> Vec<Slot> {
+    let of = error_of(session, look);
+    look.panes.iter().map(|pane| if *pane == Pane::Error { of } else { slot(*pane) }).collect()
+}
+
+/// The image whose error is shown: the one that was chosen, as long as there is one.
+#[must_use]
+pub fn error_of(session: &Session, look: &Look) -> Slot {
+    if session.has(look.error_of) { look.error_of } else { Slot::Now }
+}
+
+/// The next image whose error can be shown.
+#[must_use]
+pub fn next_error_of(session: &Session, look: &Look) -> Slot {
+    let slots: Vec<Slot> = errors_of(session).collect();
+    let at = slots.iter().position(|slot| *slot == error_of(session, look)).unwrap_or(0);
+    slots[(at + 1) % slots.len()]
+}
+
+/// The images whose errors can be shown.
+pub fn errors_of(session: &Session) -> impl Iterator<Item = Slot> {
+    Slot::ALL.into_iter().filter(|slot| session.has(*slot))
 }
 
 /// The slot whose image a pane shows.
@@ -113,10 +133,10 @@ pub fn terms(session: &Session) -> Vec<TermName> {
 pub fn pair(session: &Session, pane: Pane, look: &Look) -> Option<[Arc<Image>; 2]> {
     match (pane, look.error) {
         (Pane::Error, ErrorKind::Flip) => {
-            let compared = session.image(look.error_of)?.compared.as_ref()?;
+            let compared = session.image(error_of(session, look))?.compared.as_ref()?;
             Some([Arc::clone(&compared.map), Arc::clone(&compared.map)])
         }
-        (Pane::Error, _) => compared(session, look.error_of),
+        (Pane::Error, _) => compared(session, error_of(session, look)),
         (pane, _) => image(session, pane).map(|image| [Arc::clone(&image), image]),
     }
 }
@@ -131,9 +151,10 @@ pub fn title(session: &Session, look: &Look, pane: Pane) -> String {
     let colours = if look.false_colour { "  luminance, 2^-8 to 2^2" } else { "" };
     match (pane, look.layout) {
         (Pane::Error, _) => {
-            let (scale, of) = (scale(look.error), name_of(look.error_of));
+            let slot = error_of(session, look);
+            let (scale, of) = (scale(look.error), name_of(slot));
             match look.error {
-                ErrorKind::Flip if look.error_of == Slot::Now => format!("error: FLIP, 0 to {scale}"),
+                ErrorKind::Flip if slot == Slot::Now => format!("error: FLIP, 0 to {scale}"),
                 ErrorKind::Flip => format!("error of {of}: FLIP, 0 to {scale}"),
                 ErrorKind::Signed => format!("error: {of} - target, blue -{scale} to red {scale}"),
                 ErrorKind::Relative => format!("error: |{of} - target| / target, 0 to {scale}"),

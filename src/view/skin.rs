@@ -2,6 +2,7 @@
 //! skin's.
 
 use crate::engine::Point;
+use crate::fit::params_file::{ParamsFile, SceneValues};
 use crate::model::effects::Effects;
 use crate::model::params::{Column, Param};
 use crate::opened::Opened;
@@ -39,10 +40,13 @@ impl Skin {
         }
     }
 
-    /// Take what the scenes' files have brought along.
-    pub fn take_effects<'a>(&mut self, scenes: impl IntoIterator<Item = &'a Opened>) {
-        for (values, opened) in self.0.iter_mut().zip(scenes) {
-            values.effects = opened.baked.scene.effects;
+    /// Take the effects that scenes have brought along when they were read with those that were `asked` for: what was
+    /// switched in the meantime is read next.
+    pub fn bring_effects(&mut self, asked: &[Option<Effects>], brought: impl IntoIterator<Item = Effects>) {
+        for ((values, brought), asked) in self.0.iter_mut().zip(brought).zip(asked) {
+            if asked.is_none_or(|asked| asked == values.effects) {
+                values.effects = brought;
+            }
         }
     }
 
@@ -73,6 +77,39 @@ impl Skin {
             (values.params, values.gains) = (point.params.clone(), point.gains.clone());
         }
     }
+}
+
+/// These values as a `params.toml` has them: of several scenes with what each has of its own.
+#[must_use]
+pub fn params_file(values: &[Values], scenes: &[&Opened]) -> Option<ParamsFile> {
+    let (first, several) = (values.first()?, values.len() > 1);
+    let gains = |(values, opened): (&Values, &&Opened)| {
+        let names = opened.views().iter().map(|view| view.name.clone());
+        names.zip(values.gains.iter().copied()).collect::<Vec<_>>()
+    };
+    let own = |(values, opened): (&Values, &&Opened)| SceneValues {
+        name: opened.name.clone(),
+        effects: Some(values.effects).filter(|effects| *effects != first.effects),
+        params: own_params(values),
+        gains: gains((values, opened)),
+    };
+    let both = values.iter().zip(scenes);
+    Some(ParamsFile {
+        form: first.form,
+        effects: Some(first.effects),
+        loss: None,
+        params: first.params.clone(),
+        gains: if several { Vec::new() } else { both.clone().flat_map(gains).collect() },
+        scenes: if several { both.map(own).collect() } else { Vec::new() },
+    })
+}
+
+/// What a scene has of its own, as far as it is nobody's to give elsewhere.
+fn own_params(values: &Values) -> Vec<(Param, [f64; 3])> {
+    let free = |param: Param| values.free.iter().any(|column| column.param == param);
+    let given = |param: Param| param.info().held || (param.info().found && !free(param));
+    let own = Param::of(values.effects).filter(|param| param.is_of_scene() && !given(*param));
+    own.map(|param| (param, values.params.rgb(param))).collect()
 }
 
 /// Have `other` take of a scene's values what is the skin's.

@@ -26,8 +26,11 @@ pub fn constants(session: &Session) -> Table {
     let (Some(values), Some(first)) = (session.values(), session.first()) else {
         return Table { heads, rows: Vec::new() };
     };
-    let others =
-        [(session.fitted(), session.found()), (session.other(), session.other_fit().map(|fit| &fit.found))];
+    let other = session.other_fit().map(|fit| (&fit.found, &fit.views[..]));
+    let others = [
+        (session.fitted(), session.found().map(|found| (found, session.scores()))),
+        (session.other(), other),
+    ];
     let columns = values.rows().into_iter().flat_map(|param| {
         let coloured = |params: &Params| {
             let rgb = params.rgb(param);
@@ -37,8 +40,8 @@ pub fn constants(session: &Session) -> Table {
         if apart { Column::per_channel(param).to_vec() } else { vec![Column::tied(param)] }
     });
     let number = |params: &Params, column: Column| format!("{:.5}", column.get(params));
-    let error = |found: &Found, column: Column| {
-        let error = session.known_of(found, column)?.std_error?;
+    let error = |(found, scores): (&Found, &[ViewScore]), column: Column| {
+        let error = session.known_of(found, scores, column)?.std_error?;
         Some(format!("{error:.1e}"))
     };
     let row = |column: Column| {

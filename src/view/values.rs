@@ -19,6 +19,8 @@ pub struct Values {
     pub free_gains: bool,
     /// What else a fit moves.
     pub free: Vec<Column>,
+    /// The parameters that the scene's file leaves free: what is free again stands where it stood.
+    order: Vec<Param>,
     /// What shows a value a channel, whether or not a fit moves it.
     pub apart: Vec<Param>,
     /// Which effects are on.
@@ -49,6 +51,7 @@ impl Values {
             gains: baked.gains.clone(),
             free_gains: scene.fit.free_gains,
             free: scene.fit.free.clone(),
+            order: scene.fit.free.iter().map(|column| column.param).collect(),
             apart: Vec::new(),
             effects: scene.effects,
             hold_out: Vec::new(),
@@ -73,8 +76,10 @@ impl Values {
 
     /// Say what a fit may do to a parameter. One that becomes tied takes the mean of its channels.
     pub fn set_freedom(&mut self, param: Param, freedom: Freedom) {
-        let at = self.free.iter().position(|column| column.param == param).unwrap_or(self.free.len());
         self.free.retain(|column| column.param != param);
+        let rank = |param: Param| self.order.iter().position(|other| *other == param).unwrap_or(usize::MAX);
+        let after = |column: &Column| rank(column.param) > rank(param);
+        let at = self.free.iter().position(after).unwrap_or(self.free.len());
         let columns = match freedom {
             Freedom::Fixed => Vec::new(),
             Freedom::Tied => vec![Column::tied(param)],
@@ -119,6 +124,10 @@ impl Values {
 
     /// Say whether a fit moves a parameter: in each channel where it shows a value for each.
     pub fn set_free(&mut self, param: Param, free: bool) {
+        // Channels stay apart: free again, each moves again.
+        if self.freedom(param) == Freedom::PerChannel && !self.apart.contains(&param) {
+            self.apart.push(param);
+        }
         let freedom = match (free, self.by_channel(param)) {
             (false, _) => Freedom::Fixed,
             (true, true) => Freedom::PerChannel,

@@ -2,6 +2,9 @@
 
 use std::path::Path;
 
+/// The folder of the scenes' files in the run folder of a fit of several.
+pub const RUN_SCENES: &str = "scenes";
+
 /// The names that the scene at `path` goes by, the first one preferred: the file's own without its ending, or the folder's
 /// of a `scene.toml`; with the folder's before it; and the file's own whatever it is. Made of the path alone.
 #[must_use]
@@ -10,7 +13,9 @@ pub fn names_of(path: &Path) -> [String; 3] {
     let words = |part: Option<&std::ffi::OsStr>| part.map(|name| name.to_string_lossy().into_owned());
     let folder = words(absolute.parent().and_then(Path::file_name)).unwrap_or_default();
     let file = words(absolute.file_stem()).unwrap_or_default();
-    let short = if file == "scene" && !folder.is_empty() { folder.clone() } else { file.clone() };
+    // In a run's folder of scenes each file is called as its scene was.
+    let of_folder = file == "scene" && !folder.is_empty() && folder != RUN_SCENES;
+    let short = if of_folder { folder.clone() } else { file.clone() };
     [short, format!("{folder}.{file}"), file]
 }
 
@@ -44,5 +49,7 @@ mod tests {
         assert_eq!(names_of(Path::new("/scene.toml"))[0], "scene");
         // As a run folder keeps it.
         assert!(names_of(Path::new("/run/scenes/a.Day.toml")).contains(&"a.Day".to_owned()));
+        assert_eq!(named(&["/scene/scene.toml", "/b/night.toml"]).unwrap(), "scene night");
+        assert_eq!(named(&["/run/scenes/scene.toml", "/run/scenes/night.toml"]).unwrap(), "scene night");
     }
 }

@@ -69,33 +69,22 @@ impl SceneOrRun {
     }
 }
 
-/// The scenes' files of a run folder, in the order in which they were fitted.
+/// The scenes' files of a run folder, in the order in which they were fitted: of several the constants name them.
 fn scenes_of(run: &Path) -> Result<Vec<PathBuf>, Refusal> {
-    let one = run.join(SCENE);
-    let several = run.join(SCENES);
-    if one.is_file() || !several.is_dir() {
-        return file_of(run, SCENE).map(|scene| vec![scene]);
-    }
-    let mut files: Vec<PathBuf> = std::fs::read_dir(&several)?
-        .filter_map(|entry| Some(entry.ok()?.path()))
-        .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
-        .collect();
-    files.sort();
-    // The constants name them in their order.
     let constants = std::fs::read_to_string(run.join(PARAMS)).unwrap_or_default();
     let constants: DocumentMut = constants.parse().unwrap_or_default();
     let names = constants.get(SCENES).and_then(Item::as_table_like);
-    let names: Vec<&str> =
-        names.map(|names| names.iter().map(|(name, _)| name).collect()).unwrap_or_default();
-    let place = |path: &PathBuf| {
-        let own = path.file_stem().unwrap_or_default().to_string_lossy();
-        names.iter().position(|name| *name == own).unwrap_or(usize::MAX)
-    };
-    files.sort_by_key(place);
-    match files.is_empty() {
-        true => file_of(run, SCENE).map(|scene| vec![scene]),
-        false => Ok(files),
+    let names: Vec<String> =
+        names.into_iter().flat_map(|names| names.iter()).map(|(name, _)| name.to_owned()).collect();
+    match names.as_slice() {
+        [] => Ok(vec![file_of(run, SCENE)?]),
+        names => names.iter().map(|name| file_of(run, &scene_file(name, true))).collect(),
     }
+}
+
+/// A scene's file in a run folder: of `several` by its name.
+pub(super) fn scene_file(name: &str, several: bool) -> String {
+    if several { format!("{SCENES}/{name}.toml") } else { SCENE.to_owned() }
 }
 
 /// What a run folder holds of its fit, or a file of constants.

@@ -19,7 +19,7 @@ function listen() {
   $("save").onclick = () => send("save");
   $("load").onchange = async () => {
     const [file] = $("load").files;
-    if (file) command("load", { text: await file.text() });
+    if (file) command("load", { name: file.name, text: await file.text() });
     $("load").value = "";
   };
   addEventListener("keydown", pressed);

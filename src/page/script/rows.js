@@ -16,15 +16,12 @@ function showEffects() {
 }
 
 // A slider's place from 0 to 1 and its value; by decades where the parameter is so.
-const DECADES = 4;
-const place = ({ lower, upper, log }, value) => {
+const place = ({ lower, upper, log, least }, value) => {
   if (!log) return (value - lower) / (upper - lower);
-  const least = lower > 0 ? lower : upper * 10 ** -DECADES;
   return value <= least ? 0 : Math.log(value / least) / Math.log(upper / least);
 };
-const valueAt = ({ lower, upper, log }, at) => {
+const valueAt = ({ lower, upper, log, least }, at) => {
   if (!log) return lower + at * (upper - lower);
-  const least = lower > 0 ? lower : upper * 10 ** -DECADES;
   return at <= 0 ? lower : least * (upper / least) ** at;
 };
 const written = (value) => String(Number(value.toPrecision(6)));
@@ -32,7 +29,7 @@ const written = (value) => String(Number(value.toPrecision(6)));
 function showRows() {
   sync($("rows"), state.rows, (row) => row.name, () => {
     const cells = [make("input", { type: "checkbox" }), make("button"), make("div", { className: "value" }),
-      make("div", { className: "error" }), make("select")];
+      make("div", { className: "error" }), make("details", { className: "reset" }, make("summary", { textContent: "…" }), make("div"))];
     const row = make("tr", {}, make("td", {}, cells[0]), make("th", { scope: "row" }, cells[1]),
       make("td", {}, cells[2]), make("td", {}, cells[3]), make("td", {}, cells[4]));
     row.cells_ = cells;
@@ -53,18 +50,18 @@ function showRows() {
     else name.removeAttribute("aria-pressed");
     name.onclick = () => command("apart", { param: row.name, on: !row.apart });
     errors.replaceChildren(...row.sliders.map((slider) => make("div", { textContent: slider.error ?? "" })));
-    const resets = ["", ...row.resets].join("|");
-    if (reset.dataset.resets !== resets) {
-      reset.dataset.resets = resets;
-      reset.replaceChildren(make("option", { value: "", textContent: "…" }),
-        ...row.resets.map((to) => make("option", { value: to, textContent: `to the ${to}` })));
-    }
-    reset.disabled = !idle;
-    reset.setAttribute("aria-label", `reset ${row.name}`);
-    reset.onchange = () => {
-      if (reset.value) command("reset", { param: row.name, to: reset.value });
-      reset.value = "";
-    };
+    const [summary, list] = reset.children;
+    summary.setAttribute("aria-label", `reset ${row.name}`);
+    sync(list, row.resets, (to) => to, () => make("button"), (button, to) => {
+      button.textContent = `to the ${to}`;
+      button.setAttribute("aria-label", `reset ${row.name} to the ${to}`);
+      button.disabled = !idle;
+      button.onclick = () => {
+        command("reset", { param: row.name, to });
+        reset.open = false;
+        summary.focus();
+      };
+    });
     showSliders(values, row, idle);
   });
 }
@@ -100,7 +97,10 @@ function showSliders(values, row, idle) {
         command("settle");
       };
     } else {
-      if (document.activeElement !== cell) cell.value = written(slider.value);
+      const told = () => { cell.value = written(slider.value); };
+      if (document.activeElement !== cell) told();
+      // What was beyond its bounds is not what was taken.
+      cell.onblur = told;
       cell.onchange = () => {
         if (cell.value !== "") {
           command("slide", { slider: slider.name, value: Number(cell.value) });
@@ -137,7 +137,8 @@ function showGains() {
     return row;
   }, (item, gain) => {
     const [name, slider, number, error] = item.cells_;
-    const range = { lower: 0.1, upper: 10, log: true };
+    const { lower, upper } = state.gains;
+    const range = { lower, upper, log: true, least: lower };
     const slide = (value) => command("slide_gain", { view: gain.number, value });
     name.textContent = gain.view;
     error.textContent = gain.error ?? "";
@@ -154,7 +155,9 @@ function showGains() {
       slider.held = false;
       command("settle");
     };
-    if (document.activeElement !== number) number.value = written(gain.value);
+    const told = () => { number.value = written(gain.value); };
+    if (document.activeElement !== number) told();
+    number.onblur = told;
     number.onchange = () => {
       if (number.value === "") return;
       slide(Number(number.value));

@@ -30,6 +30,8 @@ function show(next) {
   buttons($("pane-names"), names, "pane", (i) => panes.includes(names[i]),
     (i) => toggle(names[i]));
   $("terms").checked = state.terms;
+  sync($("error-of"), state.error_of, ([slot]) => slot, ([slot, name]) => make("option", { value: slot, textContent: `of ${name}` }), () => {});
+  $("error-of").value = state.error_shown;
   const shownNow = JSON.stringify(visible());
   if (shownNow !== wanted) {
     wanted = shownNow;
@@ -53,22 +55,21 @@ function once() {
     ...all.map(([value, name]) => make("option", { value, textContent: name, selected: value === now })));
   options($("layout"), state.layouts, state.look.layout);
   options($("error"), state.errors, state.look.error);
-  options($("error-of"), state.error_of.map(([slot, name]) => [slot, `of ${name}`]), state.look.error_of);
   options($("tone"), state.tones.map((name) => [name, name]), state.look.operator);
 }
 
 // What is shown and how, ahead of what is told of it: two keys in a row are two changes.
 function look(change) {
+  if (state === null) return;
   state.look = { ...state.look, ...change };
   command("look", { look: state.look });
   follow();
 }
 // Controls of the look as it is.
 function follow() {
-  const { layout, error, error_of: errorOf, operator, exposure, false_colour } = state.look;
+  const { layout, error, operator, exposure, false_colour } = state.look;
   $("layout").value = layout;
   $("error").value = error;
-  $("error-of").value = errorOf;
   $("tone").value = operator;
   if (document.activeElement !== $("exposure")) $("exposure").value = exposure;
   $("false-colour").checked = false_colour;
@@ -103,9 +104,12 @@ function sync(place, list, key, create, update) {
     update(child, item);
     return child;
   });
-  if (children.length !== place.children.length || children.some((child, i) => place.children[i] !== child)) {
-    place.replaceChildren(...children);
-  }
+  const kept = new Set(children);
+  for (const child of [...place.children]) if (!kept.has(child)) child.remove();
+  // What stays where it is keeps the focus.
+  children.forEach((child, i) => {
+    if (place.children[i] !== child) place.insertBefore(child, place.children[i] ?? null);
+  });
 }
 
 function status() {

@@ -64,8 +64,10 @@ pub fn on_a_thread(
         let done = fit(&mut watch, &stop);
         tell.say(Message::Done(Box::new(done)));
     };
-    // What it shares out among threads of its own gives way, too.
-    let run = move || match ThreadPoolBuilder::new().start_handler(|_| give_way()).build() {
+    // What it shares out among threads of its own gives way, too; there are as many as the program may have.
+    let count = rayon::current_num_threads();
+    let run = move || match ThreadPoolBuilder::new().num_threads(count).start_handler(|_| give_way()).build()
+    {
         Ok(pool) => pool.install(work),
         Err(_) => work(),
     };

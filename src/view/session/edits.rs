@@ -1,13 +1,16 @@
 //! What one does to the values: each is a step of the history, or part of one that goes on until it is settled. While a
 //! fit moves them nothing else does.
 
+use std::ops::RangeInclusive;
+
 use super::Session;
+use crate::engine::Unknown;
 use crate::model::effects::Effect;
 use crate::model::params::{Column, Param};
 use crate::values::Values;
 
-/// The least and the greatest factor on a view's image.
-const GAINS: [f64; 2] = [1e-3, 1e3];
+/// What the slider of a gain spans.
+pub const GAINS: RangeInclusive<f64> = 0.1..=10.0;
 
 impl Session {
     /// Change the values of the scene that is looked at by a whole step: what is the skin's changes in all scenes.
@@ -62,7 +65,7 @@ impl Session {
 
     /// Move the slider of a view's gain, as part of a drag.
     pub fn slide_gain(&mut self, view: usize, value: f64) {
-        let [least, greatest] = GAINS;
+        let (least, greatest) = Unknown::Gain(view).bounds();
         if value.is_finite() {
             self.drag(|values| {
                 if let Some(gain) = values.gains.get_mut(view) {

@@ -10,6 +10,10 @@ use crate::host::{FitRequest, FitScene, Fitted};
 impl Session {
     /// Fit from where the sliders stand; `resume`: go on with the fit that was stopped.
     pub fn begin_fit(&mut self, resume: bool) {
+        if self.is_opening() {
+            self.told.push("the scene is being read: fit once it is there.".to_owned());
+            return;
+        }
         self.settle();
         let (Some(values), Some(start), None) = (&self.values, self.params_text(), &self.fitting) else {
             return;
@@ -22,9 +26,10 @@ impl Session {
         });
         let run = self.start.run.clone();
         let request = FitRequest { scenes: scenes.collect(), start, run, resume };
-        if !resume {
+        if !resume || self.path_of != self.start.run {
             self.path.clear();
         }
+        self.path_of.clone_from(&self.start.run);
         self.fitting = Some(Fitting::begin(&self.host, request, Arc::clone(&self.wake)));
     }
 

@@ -7,6 +7,7 @@ use crate::engine::Point;
 use crate::model::effects::Effect;
 use crate::opened::Reading;
 use crate::paint::{Answer, Job, Painted, Slot};
+use crate::scene::view::Camera;
 use crate::skin::Skin;
 
 /// What an effect brought when it was turned on, or took when it was turned off.
@@ -34,6 +35,8 @@ impl Change {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Before {
     effect: Effect,
+    scene: usize,
+    camera: Camera,
     seconds: f64,
     uploaded: u64,
     psnr: Option<f64>,
@@ -140,14 +143,17 @@ impl Session {
         if drawn != wanted {
             return;
         }
-        if let (Some(before), Some(now)) = (self.switched.take(), self.images.get(&Slot::Now)) {
+        // Of another scene or camera nothing can be told.
+        let here = (self.scene(), self.camera());
+        let before = self.switched.take().filter(|before| (before.scene, Some(before.camera)) == here);
+        if let (Some(before), Some(now)) = (before, self.images.get(&Slot::Now)) {
             let psnr = now.compared.as_ref().map(|compared| compared.psnr);
             let change = Change {
                 seconds: now.seconds - before.seconds,
                 bytes: now.uploaded as i64 - before.uploaded as i64,
                 psnr: psnr.zip(before.psnr).map(|(now, before)| now - before),
             };
-            self.changes.insert(before.effect.name(), change);
+            self.changes.insert((before.scene, before.effect.name()), change);
         }
     }
 
@@ -155,6 +161,8 @@ impl Session {
     pub(super) fn weigh_from(&mut self, effect: Effect) {
         self.switched = self.image(Slot::Now).map(|now| Before {
             effect,
+            scene: self.scene(),
+            camera: now.job.camera,
             seconds: now.seconds,
             uploaded: now.uploaded,
             psnr: now.compared.as_ref().map(|compared| compared.psnr),

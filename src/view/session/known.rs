@@ -3,11 +3,18 @@
 use std::ops::RangeInclusive;
 
 use super::Session;
-use crate::host::{Found, Known};
+use crate::host::{Found, GAIN, Known, ViewScore};
 use crate::model::params::{Column, Param};
+use crate::prepare::view_of;
 
 /// The name of where the sliders began, among what they can be reset to.
 pub const START: &str = "start";
+
+/// The least value that a slider of decades tells from 0: where its lower end is 0, four decades below the upper one.
+#[must_use]
+pub fn least(range: &RangeInclusive<f64>) -> f64 {
+    if *range.start() > 0.0 { *range.start() } else { 1e-4 * range.end() }
+}
 
 impl Session {
     /// What a slider's ends stand for: the bounds, where they are finite, else four times what it may well be.
@@ -40,25 +47,26 @@ impl Session {
     /// What the last fit says of a constant, where it moved that.
     #[must_use]
     pub fn known(&self, column: Column) -> Option<&Known> {
-        self.known_of(self.found()?, column)
+        self.known_of(self.found()?, self.scores(), column)
     }
 
-    /// What a fit says of a constant of the scene that is looked at.
+    /// What a fit with these scores says of a constant of the scene that is looked at.
     #[must_use]
-    pub fn known_of<'a>(&self, found: &'a Found, column: Column) -> Option<&'a Known> {
+    pub fn known_of<'a>(&self, found: &'a Found, scores: &[ViewScore], column: Column) -> Option<&'a Known> {
         let name = column.name();
         let own = self.opened().filter(|_| column.param.is_of_scene() && self.scenes.len() > 1);
         let Some(opened) = own else { return found.constant(&name) };
         // Where one scene alone was fitted, and others were held out, its own stand as the skin's do.
-        let fitted = self.places().iter().any(|place| place.scene == self.scene() && place.fitted);
+        let before = view_of(&opened.name, "");
+        let fitted = scores.iter().any(|score| !score.held_out && score.view.starts_with(&before));
         let alone = found.constant(&name).filter(|_| fitted);
-        found.constant(&format!("{}/{name}", opened.name)).or(alone)
+        found.constant(&format!("{before}{name}")).or(alone)
     }
 
     /// What the last fit says of a view's gain, where it moved that.
     #[must_use]
     pub fn known_gain(&self, view: &str) -> Option<&Known> {
-        self.found()?.constant(&format!("gain.{}", self.view_name(self.scene(), view)))
+        self.found()?.constant(&format!("{GAIN}{}", self.view_name(self.scene(), view)))
     }
 
     /// Where the last fit has a constant for sure: from one standard error below what it found to one above.

@@ -2,22 +2,31 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::mpsc::{TryRecvError, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 
-use super::{Session, files};
+use super::Session;
 use crate::engine::Point;
-use crate::fit::params_file::ParamsFile;
+use crate::fit::params_file::ParamsFileError;
 use crate::history::History;
 use crate::host::Fitted;
+use crate::model::effects::Effects;
 use crate::opened::{Opened, Reading};
 use crate::reported::reported;
 use crate::skin::Skin;
 use crate::start::{Run, Start};
 
+/// Scenes that are being read.
+pub(super) struct Opening {
+    scenes: Receiver<Result<Vec<Opened>, String>>,
+    /// The effects that were asked for in each, where not the file's own.
+    effects: Vec<Option<Effects>>,
+}
+
 impl Session {
     /// Begin to read scenes.
     pub(super) fn read(&mut self, scenes: Vec<Reading>) {
-        let (send, opening) = channel();
+        let (send, opened) = channel();
+        let effects = scenes.iter().map(|reading| reading.effects).collect();
         let wake = Arc::clone(&self.wake);
         let work = move || {
             // The window may be gone.
@@ -27,10 +36,10 @@ impl Session {
         if let Err(error) = aside(work) {
             self.told.push(format!("no thread can be had: {error}"));
         }
-        self.opening = Some(opening);
+        self.opening = Some(Opening { scenes: opened, effects });
     }
 
-    /// Look at another scene or run in the place of this one; not while a fit runs.
+    /// Look at another scene or run in the place of this one, once it is there; not while a fit runs.
     pub fn open(&mut self, path: &Path) {
         if self.fitting.is_some() {
             self.told.push("a fit is under way: stop it first.".to_owned());
@@ -39,9 +48,26 @@ impl Session {
         match self.host.start(path) {
             Ok(start) => {
                 let start = Start { engine: self.start.engine.clone(), ..start };
-                *self = Self::new(Arc::clone(&self.host), start, Arc::clone(&self.wake));
+                self.next = Some(Box::new(Self::new(Arc::clone(&self.host), start, Arc::clone(&self.wake))));
             }
             Err(error) => self.told.push(error),
+        }
+    }
+
+    /// Go over to what was asked for, once it is opened; what cannot be opened is told, and this stays.
+    pub(super) fn follow_next(&mut self) {
+        let Some(mut next) = self.next.take().filter(|_| self.fitting.is_none()) else { return };
+        next.follow_opening();
+        if next.opening.is_some() {
+            self.next = Some(next);
+        } else if next.scenes.is_empty() {
+            self.told.append(&mut next.told);
+        } else {
+            std::mem::swap(self, &mut next);
+            // What the one before is still writing is told here.
+            std::mem::swap(&mut self.aside, &mut next.aside);
+            // Its painter may be in the middle of an image.
+            self.aside.begin_quietly(move || drop(next));
         }
     }
 
@@ -51,7 +77,13 @@ impl Session {
             return;
         }
         match self.host.run(path) {
-            Ok(run) => (self.other, self.other_fit) = self.left_by(Some(&run)),
+            Ok(run) => {
+                let (other, other_fit) = self.left_by(Some(&run));
+                // What cannot be read was told, and leaves what there was.
+                if other.is_some() {
+                    (self.other, self.other_fit) = (other, other_fit);
+                }
+            }
             Err(error) => self.told.push(error),
         }
     }
@@ -59,7 +91,7 @@ impl Session {
     /// Take in scenes that were read.
     pub(super) fn follow_opening(&mut self) {
         let Some(opening) = &self.opening else { return };
-        let opened = match opening.try_recv() {
+        let opened = match opening.scenes.try_recv() {
             Ok(opened) => opened,
             Err(TryRecvError::Empty) => return,
             Err(TryRecvError::Disconnected) => {
@@ -67,9 +99,9 @@ impl Session {
                     .to_owned())
             }
         };
-        self.opening = None;
+        let asked = self.opening.take().map(|opening| opening.effects).unwrap_or_default();
         match opened {
-            Ok(opened) => self.take(opened),
+            Ok(opened) => self.take(opened, &asked),
             Err(error) => {
                 self.told.push(error);
                 // What is shown stays, with its effects: the step to others is taken back.
@@ -81,7 +113,7 @@ impl Session {
         }
     }
 
-    fn take(&mut self, opened: Vec<Opened>) {
+    fn take(&mut self, opened: Vec<Opened>, asked: &[Option<Effects>]) {
         self.scenes = opened.into_iter().map(Arc::new).collect();
         for words in self.scenes.iter().flat_map(|opened| &opened.baked.warnings) {
             if !self.told.contains(words) {
@@ -93,7 +125,8 @@ impl Session {
         }
         // A scene may bring effects along: lights one each, morph targets with weights.
         if let Some(history) = &mut self.values {
-            history.amend(|values| values.take_effects(self.scenes.iter().map(|opened| &**opened)));
+            let brought = self.scenes.iter().map(|opened| opened.baked.scene.effects);
+            history.amend(|values| values.bring_effects(asked, brought));
         }
         self.stay_within();
         self.asked.clear();
@@ -117,11 +150,17 @@ impl Session {
     /// What a run has left: its constants in each scene, and what is known of them. What cannot be read is told.
     fn left_by(&mut self, run: Option<&Run>) -> (Option<Vec<Point>>, Option<Fitted>) {
         let Some(Run { params, report }) = run else { return (None, None) };
-        let points: Result<Vec<Point>, String> =
-            self.scenes.iter().map(|opened| point_of(params, opened)).collect();
-        let known = points.and_then(|points| {
-            let known = report.as_ref().map(|report| reported(report, points.clone()));
-            Ok((points, known.transpose()?))
+        let points: Result<Vec<Point>, ParamsFileError> =
+            self.scenes.iter().map(|opened| opened.point_in(params, None)).collect();
+        let known = points.map_err(|error| error.to_string()).and_then(|points| {
+            let known = report.as_ref().map(|report| reported(report, points.clone())).transpose()?;
+            // Of a fit of several, of which one is looked at alone.
+            let alone = self.scenes.first().filter(|_| self.scenes.len() == 1);
+            let known = known.map(|known| match alone {
+                Some(scene) => known.of_scene(&scene.name),
+                None => known,
+            });
+            Ok((points, known))
         });
         match known {
             Ok((points, known)) => (Some(points), known),
@@ -131,16 +170,6 @@ impl Session {
             }
         }
     }
-}
-
-/// Where a file of constants has a scene.
-fn point_of(params: &Path, opened: &Opened) -> Result<Point, String> {
-    let scene = &opened.baked.scene;
-    let file = ParamsFile::read(params, scene.form, &scene.params).map_err(|error| error.to_string())?;
-    let file = file.of_scene(&scene.path);
-    let mut gains = opened.baked.gains.clone();
-    files::take_gains(&file, opened.views(), &mut gains);
-    Ok(Point { params: file.params, gains })
 }
 
 /// Do long work on a thread of its own; in a browser's worker, which is one, at once.

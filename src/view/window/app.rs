@@ -37,6 +37,7 @@ pub struct Window {
     /// What stands in the field for files.
     file: String,
     run: String,
+    run_shown: PathBuf,
     /// A screenshot that was asked for.
     screenshot: Option<Receiver<Arc<egui::ColorImage>>>,
 }
@@ -104,7 +105,8 @@ impl Window {
     #[must_use]
     pub fn new(host: Arc<dyn Host>, start: Start, ctx: &egui::Context) -> Self {
         let waker = ctx.clone();
-        let run = start.run.display().to_string();
+        let run_shown = start.run.clone();
+        let run = run_shown.display().to_string();
         let mut look = Look::default();
         if start.other.is_some() {
             look.panes = vec![Pane::Target, Pane::Now, Pane::Other, Pane::Error];
@@ -118,6 +120,7 @@ impl Window {
             pointed: None,
             file: "params.toml".to_owned(),
             run,
+            run_shown,
             screenshot: None,
         }
     }
@@ -127,14 +130,16 @@ impl Window {
         for action in keys::asked(ui.ctx()) {
             self.act(action, ui.ctx());
         }
-        self.session.look_for(shown::slots(&self.look));
+        self.session.look_for(shown::slots(&self.session, &self.look));
+        self.follow_run();
         Panel::top("bar").show(ui, |ui| self.bar(ui));
         Panel::bottom("status").show(ui, |ui| self.status(ui));
         Panel::bottom("fit").resizable(true).default_size(190.0).show(ui, |ui| self.fit(ui));
         Panel::left("parameters").resizable(true).default_size(360.0).show(ui, |ui| self.parameters(ui));
         Panel::right("probe").resizable(true).default_size(250.0).show(ui, |ui| {
             ScrollArea::vertical().show(ui, |ui| {
-                probe_table::show(ui, &self.session, self.look.error_of, self.pointed);
+                let error_of = shown::error_of(&self.session, &self.look);
+                probe_table::show(ui, &self.session, error_of, self.pointed);
                 ui.take_available_width();
             });
         });
@@ -177,6 +182,8 @@ impl Window {
             Action::Fit => session.begin_fit(false),
             Action::Resume => session.begin_fit(true),
             Action::Pause => session.toggle_pause(),
+            // What stands over the window is closed first.
+            Action::Stop if self.help || self.table => (self.help, self.table) = (false, false),
             Action::Stop => session.stop_fit(),
             Action::NextView => session.look_at_next(),
             Action::Layout => {
@@ -188,19 +195,15 @@ impl Window {
                 let at = ErrorKind::ALL.iter().position(|kind| *kind == look.error).unwrap_or(0);
                 look.error = ErrorKind::ALL[(at + 1) % ErrorKind::ALL.len()];
             }
-            Action::ErrorOf => {
-                let offered = |slot: &Slot| *slot != Slot::Other || session.other().is_some();
-                let slots: Vec<Slot> = Slot::ALL.into_iter().filter(offered).collect();
-                let at = slots.iter().position(|slot| *slot == look.error_of).unwrap_or(0);
-                look.error_of = slots[(at + 1) % slots.len()];
-            }
+            Action::ErrorOf => look.error_of = shown::next_error_of(session, look),
             Action::Terms => session.terms = !session.terms,
             Action::Brighter => look.exposure += 0.5,
             Action::Darker => look.exposure -= 0.5,
             Action::FalseColour => look.false_colour = !look.false_colour,
             Action::WholeImage => look.reset_zoom(),
             Action::Home => session.orbit = Orbit::default(),
-            Action::Pane(Pane::Other) if session.other().is_none() => {}
+            // One that shows nothing can still be taken away.
+            Action::Pane(Pane::Other) if session.other().is_none() => look.set_pane(Pane::Other, false),
             Action::Pane(pane) => look.set_pane(pane, !look.panes.contains(&pane)),
             Action::Turn(right, down) => {
                 session.orbit.turn(0.1 * f64::from(right), 0.1 * f64::from(down), 1.0);
@@ -216,11 +219,42 @@ impl Window {
                 look.zoom = Some(zoomed.clamp(0.05, 64.0));
             }
             Action::Near(nearer) => session.orbit.turn(0.0, 0.0, 0.9_f64.powi(i32::from(nearer))),
+            Action::Move(right, down) => {
+                let step = 0.1 / look.zoom.unwrap_or(1.0).max(1.0);
+                let [x, y] = look.middle;
+                look.middle =
+                    [x + step * f32::from(right), y + step * f32::from(down)].map(|at| at.clamp(0.0, 1.0));
+            }
+            Action::Probe => {
+                let [x, y] = look.middle;
+                self.pointed = session.camera().map(|camera| {
+                    let at =
+                        |share: f32, size: u32| ((share * size as f32) as u32).min(size.saturating_sub(1));
+                    [at(x, camera.width), at(y, camera.height)]
+                });
+            }
+            Action::SavePane => {
+                if let Some(pane) = look.panes.first().copied() {
+                    panes::save(session, look, pane, if pane == Pane::Error { "exr" } else { "png" });
+                }
+            }
             Action::Screenshot => {
                 let (send, told) = std::sync::mpsc::channel();
                 self.screenshot = Some(told);
                 // Of the next frame; the window may be gone by then.
                 ctx.request_screenshot(move |image| drop(send.send(image)));
+            }
+        }
+    }
+
+    /// The field of the run folder says where that is: with another scene it is another.
+    fn follow_run(&mut self) {
+        if self.session.run_folder() != self.run_shown {
+            self.run_shown = self.session.run_folder().to_owned();
+            self.run = self.run_shown.display().to_string();
+            // Of the scene before.
+            if self.session.other().is_none() {
+                self.look.set_pane(Pane::Other, false);
             }
         }
     }
@@ -262,7 +296,6 @@ impl Window {
                 .clicked()
             {
                 self.session.open(&file);
-                self.run = self.session.run_folder().display().to_string();
             }
             if ui
                 .button("compare")

@@ -26,7 +26,11 @@ pub(crate) enum Action {
     FalseColour,
     WholeImage,
     Home,
+    Probe,
     Screenshot,
+    SavePane,
+    /// Move the image: steps to the right, and down.
+    Move(i8, i8),
     /// Show a pane, or take it away.
     Pane(Pane),
     /// Turn the camera: steps to the right, and down.
@@ -47,7 +51,7 @@ const SHIFT: Modifiers = Modifiers::SHIFT;
 const ALT: Modifiers = Modifiers::ALT;
 
 /// The keys, what they do, and how the list says it.
-pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 39] = [
+pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 45] = [
     (NONE, Key::F1, Action::Help, "this list"),
     (NONE, Key::F2, Action::Table, "all constants, side by side"),
     (COMMAND, Key::Z, Action::Undo, "undo"),
@@ -68,6 +72,13 @@ pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 39] = [
     (NONE, Key::C, Action::FalseColour, "luminance as a colour"),
     (NONE, Key::W, Action::WholeImage, "whole image"),
     (NONE, Key::H, Action::Home, "the view's own camera"),
+    (NONE, Key::Q, Action::Probe, "probe the pixel in the middle of the panes"),
+    (
+        COMMAND.plus(Modifiers::SHIFT),
+        Key::S,
+        Action::SavePane,
+        "leave the first pane's image in the run folder",
+    ),
     (COMMAND, Key::S, Action::Screenshot, "leave the window as an image in the run folder"),
     (NONE, Key::Num1, Action::Pane(Pane::Target), "pane target"),
     (NONE, Key::Num2, Action::Pane(Pane::Now), "pane now"),
@@ -81,6 +92,10 @@ pub(crate) const KEYS: [(Modifiers, Key, Action, &str); 39] = [
     (SHIFT, Key::ArrowDown, Action::Turn(0, 1), "turn the camera down"),
     (ALT, Key::ArrowLeft, Action::Light(-1), "turn the light to the left"),
     (ALT, Key::ArrowRight, Action::Light(1), "turn the light to the right"),
+    (COMMAND, Key::ArrowLeft, Action::Move(-1, 0), "move what is shown of the image to the left"),
+    (COMMAND, Key::ArrowRight, Action::Move(1, 0), "move what is shown of the image to the right"),
+    (COMMAND, Key::ArrowUp, Action::Move(0, -1), "move what is shown of the image up"),
+    (COMMAND, Key::ArrowDown, Action::Move(0, 1), "move what is shown of the image down"),
     (NONE, Key::OpenBracket, Action::Wipe(-1), "line of the wipe to the left"),
     (NONE, Key::CloseBracket, Action::Wipe(1), "line of the wipe to the right"),
     (NONE, Key::PageUp, Action::Zoom(1), "larger"),
@@ -103,11 +118,16 @@ pub(crate) const MOUSE: [(&str, &str); 7] = [
 /// What was asked for by keys since the last frame; but for a few, none is taken from a field that is being written in.
 pub(crate) fn asked(ctx: &egui::Context) -> Vec<Action> {
     let writing = ctx.text_edit_focused();
+    // A list that stands open is closed by Escape, and nothing else is.
+    let listing = egui::Popup::is_any_open(ctx);
     ctx.input_mut(|input| {
         let pressed = |(modifiers, key, action, _): &(Modifiers, Key, Action, &str)| {
             let everywhere = matches!(action, Action::Help | Action::Fit);
-            ((everywhere || !writing) && input.consume_shortcut(&KeyboardShortcut::new(*modifiers, *key)))
-                .then_some(*action)
+            let theirs = listing && *action == Action::Stop;
+            ((everywhere || !writing)
+                && !theirs
+                && input.consume_shortcut(&KeyboardShortcut::new(*modifiers, *key)))
+            .then_some(*action)
         };
         // Those with more modifiers first: Ctrl+Z is part of Ctrl+Shift+Z.
         let mut keys = KEYS;

@@ -52,6 +52,33 @@ fn columns(count: usize, size: Vec2, aspect: f32) -> usize {
     (1..=count).max_by(|&a, &b| height(a).total_cmp(&height(b)).then(b.cmp(&a))).unwrap_or(1)
 }
 
+/// What of a pane is saved: its image, or an error's map.
+fn file_of(session: &Session, look: &Look, pane: Pane) -> Option<Arc<Image>> {
+    match pane {
+        Pane::Error => {
+            let painted = session.image(shown::error_of(session, look))?;
+            Some(Arc::clone(&painted.compared.as_ref()?.map))
+        }
+        pane => shown::image(session, pane),
+    }
+}
+
+/// Leave a pane's image in the run folder.
+pub(crate) fn save(session: &mut Session, look: &Look, pane: Pane, ending: &'static str) {
+    let (Some(shown), Some(view)) = (file_of(session, look, pane), session.view()) else { return };
+    // As the report of several scenes calls its pictures.
+    let view = session.view_name(session.scene(), &view.name).replace('/', "_");
+    let pane = shown::name(pane).replace(' ', "_");
+    let path = session.run_folder().join(format!("{view}_{pane}.{ending}"));
+    let tone = ToneMap { operator: look.operator(), exposure: look.exposure };
+    session.aside(move || {
+        match write_image(&path, &shown, &ImageOptions { tone, ..ImageOptions::default() }) {
+            Ok(()) => format!("wrote {}", path.display()),
+            Err(error) => error.to_string(),
+        }
+    });
+}
+
 struct One {
     pane: Pane,
     rect: Rect,
@@ -104,13 +131,9 @@ impl One {
 
     /// Its image as a file in the run folder, on a click of the right button.
     fn offer_file(&self, response: &Response, session: &mut Session, look: &Look) {
-        let shown = match self.pane {
-            Pane::Error => session
-                .image(look.error_of)
-                .and_then(|painted| Some(Arc::clone(&painted.compared.as_ref()?.map))),
-            pane => shown::image(session, pane),
-        };
-        let Some(shown) = shown else { return };
+        if file_of(session, look, self.pane).is_none() {
+            return;
+        }
         let mut chosen = None;
         response.context_menu(|ui| {
             // An error's colours are the window's; its numbers are kept.
@@ -122,18 +145,9 @@ impl One {
                 }
             }
         });
-        let (Some(ending), Some(view)) = (chosen, session.view()) else { return };
-        // As the report of several scenes calls its pictures.
-        let view = session.view_name(session.scene(), &view.name).replace('/', "_");
-        let pane = shown::name(self.pane).replace(' ', "_");
-        let path = session.run_folder().join(format!("{view}_{pane}.{ending}"));
-        let tone = ToneMap { operator: look.operator(), exposure: look.exposure };
-        session.aside(move || {
-            match write_image(&path, &shown, &ImageOptions { tone, ..ImageOptions::default() }) {
-                Ok(()) => format!("wrote {}", path.display()),
-                Err(error) => error.to_string(),
-            }
-        });
+        if let Some(ending) = chosen {
+            save(session, look, self.pane, ending);
+        }
     }
 
     fn image(&self, ui: &mut Ui, id: egui::Id, session: &Session, look: &Look, (origin, span): (Vec2, Vec2)) {

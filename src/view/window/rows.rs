@@ -6,7 +6,7 @@ use eframe::egui::style::HandleShape;
 use eframe::egui::{self, Pos2, Rect, Response, RichText, Slider, SliderClamping, Ui};
 
 use crate::model::params::{Channels, Column, Param, Scale};
-use crate::session::{START, Session};
+use crate::session::{GAINS, START, Session, least};
 use crate::values::{Freedom, Values};
 
 /// A change that a row asks for.
@@ -64,7 +64,7 @@ fn gains(ui: &mut Ui, session: &Session, values: &Values, edits: &mut Vec<Edit>)
             ui.horizontal(|ui| {
                 ui.spacing_mut().slider_width = (ui.available_width() - 190.0).max(60.0);
                 let mut value = gain;
-                let slider = Slider::new(&mut value, 0.1..=10.0)
+                let slider = Slider::new(&mut value, GAINS)
                     .clamping(SliderClamping::Never)
                     .logarithmic(true)
                     .update_while_editing(false)
@@ -168,6 +168,7 @@ impl Row<'_> {
             let slider = Slider::new(&mut value, range.clone())
                 .clamping(SliderClamping::Never)
                 .logarithmic(info.scale == Scale::Log)
+                .smallest_positive(least(&range))
                 .suffix(if info.unit == "degrees" { "°" } else { "" })
                 // A typed number counts once it is there.
                 .update_while_editing(false)
@@ -190,15 +191,12 @@ impl Row<'_> {
     }
 }
 
-/// The least value that a slider of decades tells from 0.
-const LEAST: f64 = 1e-6;
-
 /// A value's place on a slider, from 0 to 1.
 fn place(range: &RangeInclusive<f64>, scale: Scale, value: f64) -> f32 {
     let (lower, upper) = (*range.start(), *range.end());
     let share = match scale {
         Scale::Log if lower >= 0.0 => {
-            let least = if lower > 0.0 { lower } else { LEAST };
+            let least = least(range);
             (value.max(least) / least).ln() / (upper / least).ln()
         }
         _ => (value - lower) / (upper - lower),

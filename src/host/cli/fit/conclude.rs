@@ -11,6 +11,7 @@ use super::words::{Times, advice, advice_on_maps, tell_run};
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::machine::made;
 use crate::cli::maps::MapsLeft;
+use crate::cli::opened::scene_file;
 use crate::cli::run_folder::RunFolder;
 use crate::cli::{Exit, Refusal, say, tell, tell_warnings};
 use crate::engine::Engine;
@@ -20,7 +21,7 @@ use crate::model::choices::Choices;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
 use crate::prepare::JointScene;
-use crate::report::{self, RunInfo, SCENES, ViewEvidence};
+use crate::report::{self, RunInfo, ViewEvidence};
 use crate::scene::Scene;
 
 /// What was fitted, what was left of its maps, and when the command began.
@@ -47,10 +48,7 @@ pub(super) fn conclude(
     seconds.render = clock.elapsed().as_secs_f64();
     let (mut named, mut files) = (Vec::new(), Vec::new());
     for part in &scenes.parts {
-        let file = match scenes.several() {
-            true => format!("{SCENES}/{}.toml", part.name),
-            false => "scene.toml".to_owned(),
-        };
+        let file = scene_file(&part.name, scenes.several());
         let maps = maps.map_or(&[][..], |left| &left.named);
         named.extend(folder.write_scene(
             part.path(),

@@ -7,14 +7,16 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use skinfit_view::Run;
 use skinfit_view::archive::{self, pack};
+use skinfit_view::host::own_name;
 use skinfit_view::opened::{Opened, Reading};
-use skinfit_view::skin::Skin;
+use skinfit_view::skin::{Skin, params_file};
 
 use crate::cli::Refusal;
 use crate::cli::fitted_scene::with_files;
 use crate::files::{plain, recorded};
-use crate::fit::params_file::{Origin, ParamsFile};
+use crate::fit::params_file::Origin;
 use crate::model::effects::Effect;
+use crate::prepare::view_of;
 use crate::progress;
 
 /// What the page shows of a report.
@@ -55,7 +57,7 @@ pub(super) fn taken(scenes: &[PathBuf], runs: [Option<&Run>; 2], cache: &Path) -
         let Some(run) = run else { continue };
         files.push((PathBuf::from(params), constants(run, &opened)?));
         if let Some(numbers_of) = &run.report {
-            files.push((PathBuf::from(report), numbers(numbers_of)?));
+            files.push((PathBuf::from(report), numbers(numbers_of, &opened)?));
         }
     }
     Ok(pack(files.iter().map(|(path, bytes)| (path.as_path(), bytes.as_slice()))))
@@ -110,26 +112,42 @@ fn read_from(scenes: &[PathBuf], cache: &Path) -> Result<(Vec<Opened>, Vec<PathB
 
 /// Fitted constants as the page reads them: those of its scenes, and no word of where they come from.
 fn constants(run: &Run, opened: &[Opened]) -> Result<Vec<u8>, Refusal> {
+    let mut skin = Skin::of(opened);
+    let points: Result<Vec<_>, _> = opened.iter().map(|opened| opened.point_in(&run.params, None)).collect();
+    skin.set_points(&points?);
+    let file = params_file(skin.scenes(), &opened.iter().collect::<Vec<_>>());
     let origin = Origin { scene: Path::new("scene.toml"), outcome: None, set: &[], numbers: &[] };
-    let [first, others @ ..] = opened else { return Ok(Vec::new()) };
-    let scene = &first.baked.scene;
-    let mut kept = ParamsFile::read(&run.params, scene.form, &scene.params)?;
-    if others.is_empty() {
-        kept = kept.of_scene(&scene.path);
-    }
-    // Of several scenes each finds its own there.
-    kept.scenes.retain(|scene| opened.iter().any(|opened| opened.name == scene.name));
-    Ok(kept.to_toml(origin).into_bytes())
+    Ok(file.map(|file| file.to_toml(origin).into_bytes()).unwrap_or_default())
 }
 
 /// What the page shows of a report, which also says where it was made, and by which command.
-fn numbers(report: &Path) -> Result<Vec<u8>, Refusal> {
+fn numbers(report: &Path, opened: &[Opened]) -> Result<Vec<u8>, Refusal> {
     let damaged = |error: serde_json::Error| {
         Refusal::new(format!("{}: this is no report of a fit: {error}. Fit again.", report.display()))
     };
     let mut numbers: BTreeMap<String, Value> = serde_json::from_slice(&read(report)?).map_err(damaged)?;
     numbers.retain(|key, _| NUMBERS.contains(&key.as_str()));
+    if let [alone] = opened {
+        of_scene(&mut numbers, &view_of(&alone.name, ""));
+    }
     Ok(serde_json::to_vec(&numbers)?)
+}
+
+/// Of a fit of several scenes what is of that whose names begin so: a scene by itself has another name in the page.
+fn of_scene(numbers: &mut BTreeMap<String, Value>, before: &str) {
+    let Some(views) = numbers.get_mut("views").and_then(Value::as_object_mut) else { return };
+    if !views.keys().any(|name| name.starts_with(before)) {
+        return;
+    }
+    let all = std::mem::take(views);
+    views.extend(
+        all.into_iter().filter_map(|(name, view)| Some((name.strip_prefix(before)?.to_owned(), view))),
+    );
+    for unknown in numbers.get_mut("unknowns").and_then(Value::as_array_mut).into_iter().flatten() {
+        if let Some(Value::String(name)) = unknown.get_mut("name") {
+            *name = own_name(name, before);
+        }
+    }
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Refusal> {

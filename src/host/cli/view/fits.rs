@@ -1,5 +1,6 @@
 //! What the window asks of the command line: fits, and scene files with what was changed in them.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -14,13 +15,13 @@ use skinfit_view::{FitRequest, Host, Run, Start as View};
 use crate::cli::fit;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::interrupt::Interrupt;
-use crate::cli::opened::{REPORT, SCENE, SceneOrRun, run_of};
+use crate::cli::opened::{REPORT, SceneOrRun, run_of, scene_file};
 use crate::cli::run_folder::{RunFolder, scene_text};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
+use crate::model::params::Column;
 use crate::output;
-use crate::prepare::view_of;
-use crate::report::SCENES;
+use crate::prepare::{Loaded, PrepareOptions};
 use crate::study::suggest::names;
 
 /// Where a fit of the window starts, in its run folder.
@@ -52,25 +53,23 @@ impl CommandLine {
         interrupt: &Arc<AtomicBool>,
     ) -> Result<Fitted, String> {
         let FitRequest { scenes, run, resume, .. } = request;
-        if !resume {
+        let files: Vec<PathBuf> =
+            scenes.iter().map(|scene| run.join(scene_file(&scene.name, scenes.len() > 1))).collect();
+        if *resume {
+            scenes.iter().zip(&files).try_for_each(|(scene, file)| goes_on(scene, file))?;
+        } else {
             // Only a folder that no other run writes to is changed.
             RunFolder::check_free(run).map_err(|refusal| refusal.words)?;
-        }
-        let mut words = vec!["fit".to_owned()];
-        for scene in scenes {
-            let file = match scenes.len() {
-                1 => run.join(SCENE),
-                _ => run.join(SCENES).join(format!("{}.toml", scene.name)),
-            };
-            words.push(file.display().to_string());
-            if !resume {
-                self.save_scene(&scene.path, &scene.values, &file)?;
+            for (scene, file) in scenes.iter().zip(&files) {
+                self.save_scene(&scene.path, &scene.values, file)?;
             }
         }
+        let mut words = vec!["fit".to_owned()];
+        words.extend(files.iter().map(|file| file.display().to_string()));
         words.extend(["-o".to_owned(), run.display().to_string()]);
         words.extend(resume.then(|| "--resume".to_owned()));
         words.extend(Self::start_of(request)?);
-        words.extend(scenes.iter().flat_map(|scene| held_out(scene, scenes.len() > 1)));
+        words.extend(request.hold_out().iter().map(|view| format!("--hold-out={view}")));
         words.extend(self.bakes.iter().cloned());
         let line = Line::try_parse_from(words).map_err(|error| error.to_string())?;
         let done = fit::run_watched(&line.arguments, &Interrupt::of(interrupt), watch);
@@ -94,10 +93,53 @@ impl CommandLine {
     }
 }
 
-/// Which views of a scene are held out, as the command line says it.
-fn held_out(scene: &FitScene, several: bool) -> Vec<String> {
-    let name = |view: &String| if several { view_of(&scene.name, view) } else { view.clone() };
-    scene.values.hold_out.iter().map(|view| format!("--hold-out={}", name(view))).collect()
+/// Refuse to go on with a fit of another scene than this, or of other effects or constants: what the boxes say would not
+/// hold.
+fn goes_on(scene: &FitScene, file: &Path) -> Result<(), String> {
+    let other = |what: &str| {
+        let file = file.display();
+        format!("{file}: the fit that was stopped there was of {what}. Put these back, or fit.")
+    };
+    let kept = Loaded::read(file, &PrepareOptions::default()).map_err(|error| error.to_string())?;
+    let (kept, values) = (&kept.scene, &scene.values);
+    let columns = |free: &[Column]| free.iter().map(Column::name).collect::<BTreeSet<_>>();
+    if kept.effects != values.effects {
+        return Err(other("other effects"));
+    }
+    if columns(&kept.fit.free) != columns(&values.free) || kept.fit.free_gains != values.free_gains {
+        return Err(other("other free constants"));
+    }
+    let text =
+        scene_text(&scene.path, changes(values, &names(values.effects))).map_err(|refusal| refusal.words)?;
+    let of_file = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
+    match [&of_file, &text].map(|text| bare(text)) {
+        [kept, own] if kept == own => Ok(()),
+        _ => Err(other("another scene")),
+    }
+}
+
+/// A scene's file without what a fit changes in it.
+fn bare(text: &str) -> toml::Table {
+    let mut scene: toml::Table = text.parse().unwrap_or_default();
+    scene.remove("fit");
+    if let Some(model) = scene.get_mut("model").and_then(toml::Value::as_table_mut) {
+        model.remove("params");
+        model.remove("effects");
+    }
+    // A table that a fit has made where there was none.
+    scene.retain(|_, value| value.as_table().is_none_or(|table| !table.is_empty()));
+    scene
+}
+
+/// What the window changed in a scene's file.
+fn changes<'a>(values: &'a Values, effects: &'a [&'static str]) -> Changes<'a> {
+    Changes {
+        effects: Some(effects),
+        free: Some(&values.free),
+        start: Some(Start { form: values.form, params: &values.params, free: &values.free }),
+        free_gains: Some(values.free_gains),
+        ..Changes::default()
+    }
 }
 
 impl Host for CommandLine {
@@ -118,14 +160,7 @@ impl Host for CommandLine {
 
     fn save_scene(&self, scene: &Path, values: &Values, file: &Path) -> Result<(), String> {
         let effects = names(values.effects);
-        let changes = Changes {
-            effects: Some(&effects),
-            free: Some(&values.free),
-            start: Some(Start { form: values.form, params: &values.params, free: &values.free }),
-            free_gains: Some(values.free_gains),
-            ..Changes::default()
-        };
-        let text = scene_text(scene, changes).map_err(|refusal| refusal.words)?;
+        let text = scene_text(scene, changes(values, &effects)).map_err(|refusal| refusal.words)?;
         output::write(file, text.as_bytes()).map_err(|error| error.to_string())
     }
 }

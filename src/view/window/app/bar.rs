@@ -4,7 +4,6 @@ use eframe::egui::{self, ComboBox, Ui};
 
 use super::Window;
 use crate::look::{ErrorKind, Layout, Pane};
-use crate::paint::Slot;
 use crate::render::tonemap::Operator;
 use crate::session::Orbit;
 use crate::shown;
@@ -25,7 +24,8 @@ impl Window {
             self.views(ui);
             ui.separator();
             for pane in Pane::OFFERED {
-                if pane == Pane::Other && self.session.other().is_none() {
+                let lacks = pane == Pane::Other && self.session.other().is_none();
+                if lacks && !self.look.panes.contains(&pane) {
                     continue;
                 }
                 let mut on = self.look.panes.contains(&pane);
@@ -54,11 +54,10 @@ impl Window {
                 },
             );
             combo.response.accessible_name("error");
-            let other = self.session.other().is_some();
-            let of = shown::name_of(look.error_of);
+            let of = shown::name_of(shown::error_of(&self.session, look));
             let combo = ComboBox::from_id_salt("error of").selected_text(format!("of {of}")).width(70.0);
             let combo = combo.show_ui(ui, |ui| {
-                for slot in Slot::ALL.into_iter().filter(|slot| *slot != Slot::Other || other) {
+                for slot in shown::errors_of(&self.session) {
                     ui.selectable_value(&mut look.error_of, slot, shown::name_of(slot));
                 }
             });

@@ -14,7 +14,7 @@ impl Window {
     pub(super) fn fit(&mut self, ui: &mut Ui) {
         ui.horizontal_wrapped(|ui| {
             let paused = self.session.fitting().map(Fitting::is_paused);
-            let idle = paused.is_none() && self.session.opened().is_some();
+            let idle = paused.is_none() && self.session.opened().is_some() && !self.session.is_opening();
             for (enabled, words, action) in [
                 (idle, "fit", Action::Fit),
                 (idle, "resume", Action::Resume),
@@ -28,7 +28,8 @@ impl Window {
             ui.label("run folder");
             let field = egui::TextEdit::singleline(&mut self.run).desired_width(180.0);
             if ui.add_enabled(idle, field).accessible_name("run folder").changed() {
-                self.session.set_run_folder(PathBuf::from(&self.run));
+                self.run_shown = PathBuf::from(&self.run);
+                self.session.set_run_folder(self.run_shown.clone());
             }
             self.held_out(ui, idle);
             if let Some(found) = self.session.found() {

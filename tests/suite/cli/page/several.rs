@@ -76,6 +76,27 @@ fn a_page_fits_scenes_as_one_skin_as_the_program_does() {
     assert!(found["ending"].as_str().unwrap().starts_with("converged"), "{}", found["ending"]);
     assert!(found["errors"].as_u64().unwrap() > 8, "{}", found["errors"]);
 
+    // A page of one of them alone with these constants, beside constants that name no scene's own.
+    sandbox.write("preset.toml", b"[params]\nhilite = 0.25\n");
+    sandbox
+        .run(&["page", "night.toml", "--params", "run", "--compare", "preset.toml", "-o", "one.html"])
+        .done();
+    let script = r##"
+        await complete();
+        return { constants: await skinfit.constants(), told: skinfit.told(), scores: skinfit.state().scores.map((score) => score.view),
+          rotation: skinfit.state().rows.find((row) => row.name === "environment_rotation").sliders[0],
+          other: skinfit.state().panes.some((pane) => pane.name === "other run") };
+    "##;
+    let Some(found) = visit(&sandbox.path("one.html"), With::NoAdapter, script, None) else { return };
+    assert_eq!(found["told"], json!([]), "{found}");
+    let unknowns = report["unknowns"].as_array().unwrap();
+    let own = unknowns.iter().find(|unknown| unknown["name"] == "night/environment_rotation").unwrap();
+    let turned = found["rotation"]["value"].as_f64().unwrap();
+    assert!((turned - own["value"].as_f64().unwrap()).abs() < 1e-9, "{turned} for {own}");
+    assert!(found["rotation"]["interval"].is_array(), "{}", found["rotation"]);
+    assert_eq!(found["scores"], json!(["front", "side"]));
+    assert_eq!(found["other"], true);
+
     // The run as a page: each scene stands where the fit has left it.
     sandbox.run(&["page", "run"]).done();
     let script = r##"

@@ -63,6 +63,24 @@ fn an_effect_is_switched_and_what_it_brought_is_told() {
     settle(&mut hand);
     let session = &hand.state().session;
     assert!(session.values().unwrap().effects.has(crate::model::effects::Effect::Morph));
+    // Two that are switched while the scene is read are both.
+    hand.state_mut().session.set_effect(crate::model::effects::Effect::Rim, false);
+    hand.step();
+    hand.state_mut().session.set_effect(crate::model::effects::Effect::Hilite, false);
+    settle(&mut hand);
+    let effects = hand.state().session.opened().unwrap().baked.scene.effects;
+    assert!(
+        !effects.has(crate::model::effects::Effect::Rim)
+            && !effects.has(crate::model::effects::Effect::Hilite)
+    );
+    // So is one that is taken back while it is.
+    click(&mut hand, "undo");
+    click(&mut hand, "undo");
+    settle(&mut hand);
+    let effects = hand.state().session.opened().unwrap().baked.scene.effects;
+    assert!(
+        effects.has(crate::model::effects::Effect::Rim) && effects.has(crate::model::effects::Effect::Hilite)
+    );
     // Its parameter is gone from the rows, and from what is free.
     assert!(hand.query_by_label("fit reflection").is_none());
     hand.key_press_modifiers(Modifiers::COMMAND, Key::Z);

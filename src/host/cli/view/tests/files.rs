@@ -101,6 +101,13 @@ fn a_run_is_opened_beside_another_and_a_table_has_both() {
     click(&mut hand, "compare");
     settle(&mut hand);
     assert!(hand.state().session.told().last().unwrap().contains("nothing.toml"));
+    // What was there is there still, also where a scene cannot be opened.
+    assert!(hand.state().session.other().is_some());
+    click(&mut hand, "open");
+    settle(&mut hand);
+    assert!(hand.state().session.told().last().unwrap().contains("nothing.toml"));
+    assert_eq!(hand.state().session.scores().len(), 3);
+    assert!(hand.state().session.other().is_some());
 }
 
 fn read_loss(hand: &Hand<'_>) -> f64 {

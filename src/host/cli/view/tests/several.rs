@@ -63,7 +63,18 @@ fn scenes_share_a_skin_and_each_has_its_own_light() {
     hand.state_mut().session.settle();
     assert_eq!(values(&hand, Param::EnvironmentRotation), [0.0, 35.0]);
     click(&mut hand, "undo");
+    assert_eq!(values(&hand, Param::EnvironmentRotation), [0.0, 20.0]);
+    // Constants of both go out and come back.
+    let file = folder.path().join("both.toml");
+    hand.state_mut().session.save_params(&file);
+    settle(&mut hand);
+    click(&mut hand, "undo");
+    assert_ne!(values(&hand, Param::BaseWeight), [one; 2]);
+    hand.state_mut().session.load_params(&file);
+    assert_eq!(values(&hand, Param::BaseWeight), [one; 2]);
+    assert_eq!(values(&hand, Param::EnvironmentRotation), [0.0, 20.0]);
     click(&mut hand, "fit hilite");
+    let fixed = values(&hand, Param::Hilite);
     // An effect of the skin's goes in both.
     let effects = |hand: &Hand<'_>| {
         hand.state().session.scenes().iter().map(|opened| opened.baked.scene.effects).collect::<Vec<_>>()
@@ -88,6 +99,7 @@ fn scenes_share_a_skin_and_each_has_its_own_light() {
     assert_eq!((found.ending, found.ends.len()), (Ending::Converged, 2), "{:?}", session.told());
     let [one, other] = values(&hand, Param::BaseWeight);
     assert_eq!(one, other);
+    assert_eq!(values(&hand, Param::Hilite), fixed, "it was fixed");
     let held: Vec<&str> =
         session.scores().iter().filter(|score| score.held_out).map(|score| score.view.as_str()).collect();
     assert_eq!(held, [second.as_str()]);
