@@ -1,14 +1,14 @@
 //! What one does on the page.
 
-use std::path::PathBuf;
+use std::path::Path;
 
 use serde::Deserialize;
 use skinfit_core::files;
 use skinfit_view::Session;
 use skinfit_view::look::{Look, Pane};
 use skinfit_view::session::Orbit;
+use skinfit_view::values::column;
 
-use crate::message::column;
 use crate::model::effects::Effect;
 use crate::model::params::Param;
 
@@ -147,7 +147,8 @@ pub(crate) fn run(session: &mut Session, look: &mut Look, command: Command) {
         Command::Forget => session.forget_told(),
         Command::Load { name, text } => {
             // What is wrong with it is told by its own name.
-            let file = PathBuf::from(format!("/{name}"));
+            let name = Path::new(&name).file_name().unwrap_or_default();
+            let file = Path::new("/").join(name);
             files::hold([(file.clone(), text.into_bytes())]);
             session.load_params(&file);
         }

@@ -8,6 +8,7 @@ use skinfit_view::FitRequest;
 use skinfit_view::fitting::{Message, Step};
 use skinfit_view::host::{FitScene, Fitted, Found, Known, ViewScore};
 use skinfit_view::opened::Opened;
+use skinfit_view::values::column;
 
 use crate::engine::Point;
 use crate::fit::outcome::{Ending, Iteration};
@@ -96,12 +97,6 @@ impl OfScene {
         loaded.gains.clone_from(&self.at.gains);
         (loaded.scene.fit.free, loaded.scene.fit.free_gains) = (free, self.free_gains);
     }
-}
-
-/// The column of that name, as reports have it: `hilite.r`.
-pub(crate) fn column(name: &str) -> Option<Column> {
-    let columns = |param: Param| std::iter::once(Column::tied(param)).chain(Column::per_channel(param));
-    Param::all().flat_map(columns).find(|column| column.name() == name)
 }
 
 fn named(params: &Params) -> Vec<(String, [f64; 3])> {

@@ -8,8 +8,9 @@ use crate::engine::Point;
 use crate::fit::outcome::{Ending, Outcome};
 use crate::fitting::{FitControl, Tell};
 use crate::prepare::view_of;
+use crate::scene::names::names_of;
 use crate::start::{Run, Start};
-use crate::values::Values;
+use crate::values::{Values, column};
 
 /// A fit that the window asks for: of its scenes' files, with what was changed in them.
 #[derive(Clone, Debug)]
@@ -58,24 +59,29 @@ pub struct Fitted {
 }
 
 impl Fitted {
-    /// What it says of one of its scenes, where it was of several: by the names that a fit of that alone has.
+    /// What it says of the scene at `path`, where it was of several: by the names that a fit of that alone has.
     #[must_use]
-    pub fn of_scene(mut self, scene: &str) -> Self {
-        let before = view_of(scene, "");
-        if self.views.iter().any(|view| view.view.starts_with(&before)) {
-            let own = |name: &str| name.strip_prefix(&before).map(str::to_owned);
-            self.views.retain_mut(|view| own(&view.view).map(|name| view.view = name).is_some());
-            for known in &mut self.found.known {
-                known.name = own_name(&known.name, &before);
-            }
+    pub fn of_scene(mut self, path: &Path) -> Self {
+        let named = |before: &String| self.views.iter().any(|view| view.view.starts_with(before));
+        let Some(before) = names_of(path).map(|name| view_of(&name, "")).into_iter().find(named) else {
+            return self;
+        };
+        let own = |name: &str| name.strip_prefix(&before).map(str::to_owned);
+        self.views.retain_mut(|view| own(&view.view).map(|name| view.view = name).is_some());
+        // Where one scene alone was fitted, and this was held out, what has no scene before it may be that one's.
+        if self.views.iter().all(|view| view.held_out) {
+            let skins = |known: &Known| column(&known.name).is_some_and(|column| !column.param.is_of_scene());
+            self.found.known.retain(skins);
+        }
+        for known in &mut self.found.known {
+            known.name = own_name(&known.name, &before);
         }
         self
     }
 }
 
 /// An unknown's name without the scene's that it begins with.
-#[must_use]
-pub fn own_name(name: &str, before: &str) -> String {
+fn own_name(name: &str, before: &str) -> String {
     let gain = name
         .strip_prefix(GAIN)
         .and_then(|view| view.strip_prefix(before))

@@ -49,6 +49,8 @@ pub struct Session {
     opening: Option<Opening>,
     /// What is to be looked at in the place of this, once it is opened.
     next: Option<Box<Self>>,
+    /// How many there were before this.
+    number: u64,
     scenes: Vec<Arc<Opened>>,
     values: Option<History<Skin>>,
     first: Option<Skin>,
@@ -98,6 +100,7 @@ impl Session {
             wake,
             opening: None,
             next: None,
+            number: 0,
             scenes: Vec::new(),
             values: None,
             first: None,
@@ -257,6 +260,12 @@ impl Session {
             (None, Some(found)) => found.losses.clone(),
             _ => self.path.iter().map(|step| step.iteration.loss).collect(),
         }
+    }
+
+    /// A number that is another once something else was [opened](Self::open).
+    #[must_use]
+    pub const fn number(&self) -> u64 {
+        self.number
     }
 
     /// Where fits are left.

@@ -1,8 +1,10 @@
 //! The values of several scenes that share one skin: what one edits in a scene holds in the others as far as it is the
 //! skin's.
 
+use std::path::Path;
+
 use crate::engine::Point;
-use crate::fit::params_file::{ParamsFile, SceneValues};
+use crate::fit::params_file::{Origin, ParamsFile, SceneValues};
 use crate::model::effects::Effects;
 use crate::model::params::{Column, Param};
 use crate::opened::Opened;
@@ -34,6 +36,7 @@ impl Skin {
     /// Change those of a scene.
     pub fn change(&mut self, scene: usize, change: impl FnOnce(&mut Values)) {
         change(&mut self.0[scene]);
+        self.0[scene].untie();
         let (before, rest) = self.0.split_at_mut(scene);
         if let Some((changed, after)) = rest.split_first_mut() {
             before.iter_mut().chain(after).for_each(|other| share(changed, other));
@@ -47,6 +50,13 @@ impl Skin {
             if asked.is_none_or(|asked| asked == values.effects) {
                 values.effects = brought;
             }
+        }
+    }
+
+    /// Go back to the effects that the scenes were read with.
+    pub fn set_effects<'a>(&mut self, scenes: impl IntoIterator<Item = &'a Opened>) {
+        for (values, opened) in self.0.iter_mut().zip(scenes) {
+            values.effects = opened.baked.scene.effects;
         }
     }
 
@@ -75,14 +85,17 @@ impl Skin {
     pub fn set_points(&mut self, points: &[Point]) {
         for (values, point) in self.0.iter_mut().zip(points) {
             (values.params, values.gains) = (point.params.clone(), point.gains.clone());
+            values.untie();
         }
     }
 }
 
-/// These values as a `params.toml` has them: of several scenes with what each has of its own.
+/// These values as the text of a `params.toml`: of several scenes with what each has of its own. With `all` also what the
+/// scenes themselves give elsewhere, as the directions of lights that are not free.
 #[must_use]
-pub fn params_file(values: &[Values], scenes: &[&Opened]) -> Option<ParamsFile> {
+pub fn params_text(values: &[Values], scenes: &[&Opened], from: &str, all: bool) -> Option<String> {
     let (first, several) = (values.first()?, values.len() > 1);
+    let effects = first.effects;
     let gains = |(values, opened): (&Values, &&Opened)| {
         let names = opened.views().iter().map(|view| view.name.clone());
         names.zip(values.gains.iter().copied()).collect::<Vec<_>>()
@@ -90,26 +103,32 @@ pub fn params_file(values: &[Values], scenes: &[&Opened]) -> Option<ParamsFile> 
     let own = |(values, opened): (&Values, &&Opened)| SceneValues {
         name: opened.name.clone(),
         effects: Some(values.effects).filter(|effects| *effects != first.effects),
-        params: own_params(values),
+        params: own_params(values, all),
         gains: gains((values, opened)),
     };
     let both = values.iter().zip(scenes);
-    Some(ParamsFile {
+    let file = ParamsFile {
         form: first.form,
-        effects: Some(first.effects),
+        effects: Some(effects),
         loss: None,
         params: first.params.clone(),
         gains: if several { Vec::new() } else { both.clone().flat_map(gains).collect() },
         scenes: if several { both.map(own).collect() } else { Vec::new() },
-    })
+    };
+    let free: Vec<Param> = Param::all().filter(|param| !is_given(*param, first, all)).collect();
+    Some(file.to_toml(Origin { scene: Path::new(from), outcome: None, set: &[], free: &free, numbers: &[] }))
 }
 
 /// What a scene has of its own, as far as it is nobody's to give elsewhere.
-fn own_params(values: &Values) -> Vec<(Param, [f64; 3])> {
-    let free = |param: Param| values.free.iter().any(|column| column.param == param);
-    let given = |param: Param| param.info().held || (param.info().found && !free(param));
-    let own = Param::of(values.effects).filter(|param| param.is_of_scene() && !given(*param));
+fn own_params(values: &Values, all: bool) -> Vec<(Param, [f64; 3])> {
+    let own = Param::of(values.effects).filter(|param| param.is_of_scene() && !is_given(*param, values, all));
     own.map(|param| (param, values.params.rgb(param))).collect()
+}
+
+/// Whether a parameter is the scene's to give elsewhere.
+fn is_given(param: Param, values: &Values, all: bool) -> bool {
+    let free = values.free.iter().any(|column| column.param == param);
+    param.info().held || (param.info().found && !free && !all)
 }
 
 /// Have `other` take of a scene's values what is the skin's.

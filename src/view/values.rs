@@ -3,7 +3,7 @@
 use crate::engine::Point;
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::params::{Channels, Column, Param, Params};
-use crate::prepare::Baked;
+use crate::prepare::{Baked, untied};
 use crate::scene::view::View;
 
 /// Every state of these is a step of the history.
@@ -91,6 +91,11 @@ impl Values {
         }
     }
 
+    /// Have what is free as one move in each channel where its channels stand apart, as a fit has it.
+    pub fn untie(&mut self) {
+        self.free = untied(&self.free, &self.params, &[]);
+    }
+
     fn tie(&mut self, param: Param) {
         let rgb = self.params.rgb(param);
         self.params.set(param, rgb.iter().sum::<f64>() / 3.0);
@@ -172,4 +177,11 @@ impl Values {
             self.hold_out.push(view.to_owned());
         }
     }
+}
+
+/// The column of that name, as reports have it: `hilite.r`.
+#[must_use]
+pub fn column(name: &str) -> Option<Column> {
+    let columns = |param: Param| std::iter::once(Column::tied(param)).chain(Column::per_channel(param));
+    Param::all().flat_map(columns).find(|column| column.name() == name)
 }

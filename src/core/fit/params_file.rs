@@ -89,6 +89,8 @@ pub struct Origin<'a> {
     pub outcome: Option<&'a Outcome>,
     /// What was set instead of the scene's values.
     pub set: &'a [Assignment],
+    /// Where nothing was fitted: what is free all the same, and so is no scene's to give elsewhere.
+    pub free: &'a [Param],
     /// Of several scenes that were fitted as one skin their numbers in the outcome, and those of their first views; by the
     /// order of [`ParamsFile::scenes`]. A scene that was not fitted has none.
     pub numbers: &'a [Option<(usize, usize)>],
@@ -127,7 +129,7 @@ impl ParamsFile {
     }
 
     fn write_text(&self, text: &mut String, origin: Origin<'_>) -> std::fmt::Result {
-        let Origin { scene, outcome, set, numbers } = origin;
+        let Origin { scene, outcome, set, free, numbers } = origin;
         // A line break in a path must not end the comment.
         let scene: String =
             scene.display().to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
@@ -154,7 +156,10 @@ impl ParamsFile {
         let known = outcome.map_or(&[][..], |outcome| &outcome.unknowns);
         let shared = |param: &Param| self.scenes.is_empty() || !param.is_of_scene();
         let was_free = |param: Param| {
-            known.iter().any(|known| known.unknown.column().is_some_and(|column| column.param == param))
+            free.contains(&param)
+                || known
+                    .iter()
+                    .any(|known| known.unknown.column().is_some_and(|column| column.param == param))
         };
         let of_scene = |param: Param| param.info().held || (param.info().found && !was_free(param));
         let written = |param: &Param| shared(param) && !of_scene(*param);
@@ -349,7 +354,7 @@ mod tests {
             let file = ParamsFile { form, effects, loss, params, gains, scenes: Vec::new() };
             let set = ["hilite=1,2,3".parse().unwrap()];
             let scene = Path::new("a\nform = 1");
-            let text = file.to_toml(Origin { scene, outcome: None, set: &set, numbers: &[] });
+            let text = file.to_toml(Origin { scene, outcome: None, set: &set, free: &[], numbers: &[] });
             assert_eq!(read(&text, form).unwrap(), file, "{text}");
             assert!(text.contains("\n# Set on the command line before the fit: hilite=1,2,3.\n"), "{text}");
             let folder = tempfile::tempdir().unwrap();
@@ -374,7 +379,7 @@ mod tests {
         let (effects, loss, gains) = (Some(Effects::SURFACE), Some(Loss::L2), Vec::new());
         let file = ParamsFile { form, effects, loss, params, gains, scenes };
         let scene = Path::new("noon.toml");
-        let text = file.to_toml(Origin { scene, outcome: None, set: &[], numbers: &[] });
+        let text = file.to_toml(Origin { scene, outcome: None, set: &[], free: &[], numbers: &[] });
         assert_eq!(read(&text, form).unwrap(), file, "{text}");
         // The skin's alone stand for all.
         let shared = text.split("[scenes.").next().unwrap();

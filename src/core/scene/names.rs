@@ -16,7 +16,9 @@ pub fn names_of(path: &Path) -> [String; 3] {
     // In a run's folder of scenes each file is called as its scene was.
     let of_folder = file == "scene" && !folder.is_empty() && folder != RUN_SCENES;
     let short = if of_folder { folder.clone() } else { file.clone() };
-    [short, format!("{folder}.{file}"), file]
+    // A user's folder may be called as a run's is.
+    let other = if short == "scene" && folder == RUN_SCENES { folder.clone() } else { file.clone() };
+    [short, format!("{folder}.{file}"), other]
 }
 
 /// A name for each of several scenes, no two the same (case does not count); `None` where their paths do not tell them

@@ -16,6 +16,8 @@ use crate::report::SCENES;
 pub(super) const SCENE: &str = "scene.toml";
 /// What was found.
 const PARAMS: &str = "params.toml";
+/// Where a fit of the window starts, where its scene's file cannot say it.
+pub(super) const START: &str = "start.toml";
 /// The report's numbers.
 pub(super) const REPORT: &str = "report.json";
 

@@ -66,6 +66,12 @@ const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], Arrow
 function pressed(event) {
   const { target } = event;
   if (($("keys").open && event.key !== "F1") || ($("tables").open && event.key !== "F2")) return;
+  const list = document.querySelector("details.reset[open]");
+  if (event.key === "Escape" && list) {
+    list.open = false;
+    list.firstChild.focus();
+    return;
+  }
   const writing = target.matches?.("input[type=number], input[type=text]")
     || (target.matches?.("select") && !event.ctrlKey && event.key.length === 1)
     || (target.matches?.("input[type=range], select") && /^(Arrow|Page|Home|End)/.test(event.key));

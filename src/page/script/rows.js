@@ -29,7 +29,7 @@ const written = (value) => String(Number(value.toPrecision(6)));
 function showRows() {
   sync($("rows"), state.rows, (row) => row.name, () => {
     const cells = [make("input", { type: "checkbox" }), make("button"), make("div", { className: "value" }),
-      make("div", { className: "error" }), make("details", { className: "reset" }, make("summary", { textContent: "…" }), make("div"))];
+      make("div", { className: "error" }), make("details", { className: "reset", name: "reset" }, make("summary", { textContent: "…" }), make("div"))];
     const row = make("tr", {}, make("td", {}, cells[0]), make("th", { scope: "row" }, cells[1]),
       make("td", {}, cells[2]), make("td", {}, cells[3]), make("td", {}, cells[4]));
     row.cells_ = cells;
@@ -97,18 +97,26 @@ function showSliders(values, row, idle) {
         command("settle");
       };
     } else {
-      const told = () => { cell.value = written(slider.value); };
-      if (document.activeElement !== cell) told();
-      // What was beyond its bounds is not what was taken.
-      cell.onblur = told;
+      showNumber(cell, slider.value);
       cell.onchange = () => {
-        if (cell.value !== "") {
-          command("slide", { slider: slider.name, value: Number(cell.value) });
-          command("settle");
-        }
+        if (cell.value === "") return;
+        cell.sent = true;
+        command("slide", { slider: slider.name, value: Number(cell.value) });
+        command("settle");
       };
     }
   });
+}
+
+// A number that can be typed: while it is, and until what was typed is told back, it stays.
+function showNumber(cell, value) {
+  if (document.activeElement !== cell) cell.value = written(value);
+  cell.told = written(value);
+  cell.sent = false;
+  // What was beyond its bounds is not what was taken.
+  cell.onblur = () => {
+    if (!cell.sent) cell.value = cell.told;
+  };
 }
 
 // Where the last fit has it for sure, below the slider.
@@ -155,11 +163,10 @@ function showGains() {
       slider.held = false;
       command("settle");
     };
-    const told = () => { number.value = written(gain.value); };
-    if (document.activeElement !== number) told();
-    number.onblur = told;
+    showNumber(number, gain.value);
     number.onchange = () => {
       if (number.value === "") return;
+      number.sent = true;
       slide(Number(number.value));
       command("settle");
     };

@@ -7,9 +7,9 @@ use skinfit_core::output;
 
 use super::Session;
 use crate::engine::Point;
-use crate::fit::params_file::{Origin, ParamsFileError};
+use crate::fit::params_file::ParamsFileError;
 use crate::opened::Opened;
-use crate::skin::params_file;
+use crate::skin::params_text;
 use crate::values::Values;
 
 impl Session {
@@ -29,12 +29,8 @@ impl Session {
     #[must_use]
     pub fn params_text(&self) -> Option<String> {
         let scenes: Vec<&Opened> = self.scenes.iter().map(|opened| &**opened).collect();
-        let saved = params_file(self.values.as_ref()?.now().scenes(), &scenes)?;
-        let paths: Vec<String> =
-            self.scenes.iter().map(|opened| opened.path().display().to_string()).collect();
-        let paths = paths.join(", ");
-        let origin = Origin { scene: Path::new(&paths), outcome: None, set: &[], numbers: &[] };
-        Some(saved.to_toml(origin))
+        let paths: Vec<String> = scenes.iter().map(|opened| opened.path().display().to_string()).collect();
+        params_text(self.values.as_ref()?.now().scenes(), &scenes, &paths.join(", "), false)
     }
 
     /// Leave the constants as a `params.toml`.

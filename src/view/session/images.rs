@@ -159,7 +159,9 @@ impl Session {
 
     /// Note what is known of the image before an effect is switched.
     pub(super) fn weigh_from(&mut self, effect: Effect) {
-        self.switched = self.image(Slot::Now).map(|now| Before {
+        // What two have changed together is neither's.
+        let alone = self.switched.is_none() && !self.is_opening();
+        self.switched = self.image(Slot::Now).filter(|_| alone).map(|now| Before {
             effect,
             scene: self.scene(),
             camera: now.job.camera,

@@ -48,7 +48,9 @@ impl Session {
         match self.host.start(path) {
             Ok(start) => {
                 let start = Start { engine: self.start.engine.clone(), ..start };
-                self.next = Some(Box::new(Self::new(Arc::clone(&self.host), start, Arc::clone(&self.wake))));
+                let mut next = Self::new(Arc::clone(&self.host), start, Arc::clone(&self.wake));
+                next.number = self.number + 1;
+                self.next = Some(Box::new(next));
             }
             Err(error) => self.told.push(error),
         }
@@ -64,6 +66,8 @@ impl Session {
             self.told.append(&mut next.told);
         } else {
             std::mem::swap(self, &mut next);
+            self.terms = next.terms;
+            self.told.splice(0..0, next.told.drain(..));
             // What the one before is still writing is told here.
             std::mem::swap(&mut self.aside, &mut next.aside);
             // Its painter may be in the middle of an image.
@@ -108,6 +112,8 @@ impl Session {
                 let scenes = self.scenes.iter().map(|opened| &**opened);
                 if let Some(history) = self.values.as_mut().filter(|_| !self.scenes.is_empty()) {
                     history.refuse(|values| values.is_read(scenes.clone()));
+                    // No step leads back where one was undone into what cannot be read any more.
+                    history.amend(|values| values.set_effects(scenes));
                 }
             }
         }
@@ -157,7 +163,7 @@ impl Session {
             // Of a fit of several, of which one is looked at alone.
             let alone = self.scenes.first().filter(|_| self.scenes.len() == 1);
             let known = known.map(|known| match alone {
-                Some(scene) => known.of_scene(&scene.name),
+                Some(scene) => known.of_scene(scene.path()),
                 None => known,
             });
             Ok((points, known))

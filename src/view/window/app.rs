@@ -37,7 +37,8 @@ pub struct Window {
     /// What stands in the field for files.
     file: String,
     run: String,
-    run_shown: PathBuf,
+    /// The session's.
+    number: u64,
     /// A screenshot that was asked for.
     screenshot: Option<Receiver<Arc<egui::ColorImage>>>,
 }
@@ -105,8 +106,7 @@ impl Window {
     #[must_use]
     pub fn new(host: Arc<dyn Host>, start: Start, ctx: &egui::Context) -> Self {
         let waker = ctx.clone();
-        let run_shown = start.run.clone();
-        let run = run_shown.display().to_string();
+        let run = start.run.display().to_string();
         let mut look = Look::default();
         if start.other.is_some() {
             look.panes = vec![Pane::Target, Pane::Now, Pane::Other, Pane::Error];
@@ -120,7 +120,7 @@ impl Window {
             pointed: None,
             file: "params.toml".to_owned(),
             run,
-            run_shown,
+            number: 0,
             screenshot: None,
         }
     }
@@ -247,16 +247,16 @@ impl Window {
         }
     }
 
-    /// The field of the run folder says where that is: with another scene it is another.
+    /// With another scene the field of the run folder says another, and nothing is pointed at.
     fn follow_run(&mut self) {
-        if self.session.run_folder() != self.run_shown {
-            self.run_shown = self.session.run_folder().to_owned();
-            self.run = self.run_shown.display().to_string();
-            // Of the scene before.
-            if self.session.other().is_none() {
-                self.look.set_pane(Pane::Other, false);
-            }
+        if self.session.number() == self.number {
+            return;
         }
+        self.number = self.session.number();
+        self.run = self.session.run_folder().display().to_string();
+        self.pointed = None;
+        self.look.reset_zoom();
+        self.look.set_pane(Pane::Other, self.session.other().is_some());
     }
 
     fn parameters(&mut self, ui: &mut Ui) {

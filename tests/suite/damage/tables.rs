@@ -86,7 +86,7 @@ fn no_file_of_constants_makes_its_reader_panic_or_pass_what_is_out_of_bounds() {
         }],
     };
     let scene = Path::new("scene.toml");
-    let whole = toml_tree(&file.to_toml(Origin { scene, outcome: None, set: &[], numbers: &[] }));
+    let whole = toml_tree(&file.to_toml(Origin { scene, outcome: None, set: &[], free: &[], numbers: &[] }));
     throw(1500, &harmed(toml_text), |harmed| {
         let Some(bytes) = harmed.of(&whole) else { return Ok(()) };
         std::fs::write(&path, bytes).unwrap();

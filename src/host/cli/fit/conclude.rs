@@ -145,6 +145,7 @@ fn write_params(
         scene: Path::new(&files),
         outcome: Some(outcome),
         set,
+        free: &[],
         numbers: if several { &numbers } else { &[] },
     };
     Ok(file.write(&folder.path().join("params.toml"), origin)?)

@@ -17,6 +17,7 @@ use std::time::Instant;
 use super::fit_engine::FitEngineArguments;
 use super::interrupt::Interrupt;
 use super::maps::MapArguments;
+use super::opened::START;
 use super::run_folder::RunFolder;
 use super::scene::{HoldOutArguments, ScenesArguments};
 use super::set::SetArguments;
@@ -24,6 +25,7 @@ use super::{Exit, Refusal, quieten_graphics, unfinished};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::model::params::Param;
+use crate::output::OutputError;
 use crate::scene::suggestion;
 use conclude::{Fitted, conclude};
 use scenes::Scenes;
@@ -103,6 +105,11 @@ pub(super) fn run_watched(
         "interrupted before the search began: the run folder is as it was; only bakes in the cache were kept.".into(),
     );
     let mut folder = RunFolder::open(arguments.output.as_deref(), &arguments.scenes.named)?;
+    // Of an earlier fit of the window: this one starts elsewhere.
+    let start = folder.path().join(START);
+    if !arguments.resume && arguments.params.as_ref() != Some(&start) && start.is_file() {
+        std::fs::remove_file(&start).map_err(|error| OutputError::new(&start, &error))?;
+    }
     let loaded = scenes::read(arguments, folder.path())?;
     let solving = Solving::of(arguments, folder.path())?;
     let (scenes, maps) = Scenes::ready(arguments, loaded, interrupt)?;

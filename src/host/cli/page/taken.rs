@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use skinfit_view::Run;
 use skinfit_view::archive::{self, pack};
-use skinfit_view::host::own_name;
 use skinfit_view::opened::{Opened, Reading};
-use skinfit_view::skin::{Skin, params_file};
+use skinfit_view::skin::{Skin, params_text};
+use skinfit_view::values::Values;
 
 use crate::cli::Refusal;
 use crate::cli::fitted_scene::with_files;
 use crate::files::{plain, recorded};
-use crate::fit::params_file::Origin;
+use crate::fit::params_file::ParamsFile;
 use crate::model::effects::Effect;
-use crate::prepare::view_of;
 use crate::progress;
+use crate::scene::names::names_of;
 
 /// What the page shows of a report.
 const NUMBERS: [&str; 8] =
@@ -34,7 +34,7 @@ pub(super) fn taken(scenes: &[PathBuf], runs: [Option<&Run>; 2], cache: &Path) -
         let text = String::from_utf8(read(path)?)?;
         let text = with_files(&text, &mut |path| places.place(&plain(&home.join(path))));
         let text = text.map_err(|error| Refusal::new(format!("{}: {error}", path.display())))?;
-        files.push((Path::new(archive::SCENES).join(scene_file(scenes, opened)), text.into_bytes()));
+        files.push((Path::new(archive::SCENES).join(scene_file(scenes, opened, runs)), text.into_bytes()));
     }
     let (cache, own): (_, Vec<PathBuf>) = (plain(cache), scenes.iter().map(|path| plain(path)).collect());
     for path in from.into_iter().filter(|path| !own.contains(path) && path.is_file()) {
@@ -57,18 +57,25 @@ pub(super) fn taken(scenes: &[PathBuf], runs: [Option<&Run>; 2], cache: &Path) -
         let Some(run) = run else { continue };
         files.push((PathBuf::from(params), constants(run, &opened)?));
         if let Some(numbers_of) = &run.report {
-            files.push((PathBuf::from(report), numbers(numbers_of, &opened)?));
+            files.push((PathBuf::from(report), numbers(numbers_of)?));
         }
     }
     Ok(pack(files.iter().map(|(path, bytes)| (path.as_path(), bytes.as_slice()))))
 }
 
-/// The name of a scene's file in the page: of one it says nothing of where it was.
-fn scene_file(scenes: &[PathBuf], opened: &Opened) -> String {
-    match scenes.len() {
-        1 => "scene.toml".to_owned(),
-        _ => format!("{}.toml", opened.name),
-    }
+/// The name of a scene's file in the page: of one it says nothing of where it was, but where runs of several know it by
+/// its name.
+fn scene_file(scenes: &[PathBuf], opened: &Opened, runs: [Option<&Run>; 2]) -> String {
+    let scene = &opened.baked.scene;
+    let known = |run: &Run| {
+        let file = ParamsFile::read(&run.params, scene.form, &scene.params).ok()?;
+        names_of(&scene.path).into_iter().find(|name| file.scenes.iter().any(|own| own.name == *name))
+    };
+    let name = match scenes.len() {
+        1 => runs.into_iter().flatten().find_map(known).unwrap_or_else(|| "scene".to_owned()),
+        _ => opened.name.clone(),
+    };
+    format!("{name}.toml")
 }
 
 /// What the scenes are read from, with their effects as they are and without each of them: one that is switched off in the
@@ -115,39 +122,27 @@ fn constants(run: &Run, opened: &[Opened]) -> Result<Vec<u8>, Refusal> {
     let mut skin = Skin::of(opened);
     let points: Result<Vec<_>, _> = opened.iter().map(|opened| opened.point_in(&run.params, None)).collect();
     skin.set_points(&points?);
-    let file = params_file(skin.scenes(), &opened.iter().collect::<Vec<_>>());
-    let origin = Origin { scene: Path::new("scene.toml"), outcome: None, set: &[], numbers: &[] };
-    Ok(file.map(|file| file.to_toml(origin).into_bytes()).unwrap_or_default())
+    // Effects that the page's scenes have off may be switched on there, with the run's constants.
+    let scene = opened.first().map(|opened| &opened.baked.scene);
+    let file = scene.map(|scene| ParamsFile::read(&run.params, scene.form, &scene.params)).transpose()?;
+    let fitted = file.and_then(|file| file.effects).unwrap_or_default();
+    let effects = |values: &mut Values| {
+        values.effects = fitted.iter().fold(values.effects, |effects, effect| effects.with(effect));
+    };
+    let mut values = skin.scenes().to_vec();
+    values.iter_mut().for_each(effects);
+    let scenes: Vec<&Opened> = opened.iter().collect();
+    Ok(params_text(&values, &scenes, "scene.toml", true).map(String::into_bytes).unwrap_or_default())
 }
 
 /// What the page shows of a report, which also says where it was made, and by which command.
-fn numbers(report: &Path, opened: &[Opened]) -> Result<Vec<u8>, Refusal> {
+fn numbers(report: &Path) -> Result<Vec<u8>, Refusal> {
     let damaged = |error: serde_json::Error| {
         Refusal::new(format!("{}: this is no report of a fit: {error}. Fit again.", report.display()))
     };
     let mut numbers: BTreeMap<String, Value> = serde_json::from_slice(&read(report)?).map_err(damaged)?;
     numbers.retain(|key, _| NUMBERS.contains(&key.as_str()));
-    if let [alone] = opened {
-        of_scene(&mut numbers, &view_of(&alone.name, ""));
-    }
     Ok(serde_json::to_vec(&numbers)?)
-}
-
-/// Of a fit of several scenes what is of that whose names begin so: a scene by itself has another name in the page.
-fn of_scene(numbers: &mut BTreeMap<String, Value>, before: &str) {
-    let Some(views) = numbers.get_mut("views").and_then(Value::as_object_mut) else { return };
-    if !views.keys().any(|name| name.starts_with(before)) {
-        return;
-    }
-    let all = std::mem::take(views);
-    views.extend(
-        all.into_iter().filter_map(|(name, view)| Some((name.strip_prefix(before)?.to_owned(), view))),
-    );
-    for unknown in numbers.get_mut("unknowns").and_then(Value::as_array_mut).into_iter().flatten() {
-        if let Some(Value::String(name)) = unknown.get_mut("name") {
-            *name = own_name(name, before);
-        }
-    }
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, Refusal> {

@@ -15,17 +15,14 @@ use skinfit_view::{FitRequest, Host, Run, Start as View};
 use crate::cli::fit;
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::interrupt::Interrupt;
-use crate::cli::opened::{REPORT, SceneOrRun, run_of, scene_file};
+use crate::cli::opened::{REPORT, START, SceneOrRun, run_of, scene_file};
 use crate::cli::run_folder::{RunFolder, scene_text};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::model::params::Column;
 use crate::output;
-use crate::prepare::{Loaded, PrepareOptions};
+use crate::prepare::{Loaded, PrepareOptions, untied};
 use crate::study::suggest::names;
-
-/// Where a fit of the window starts, in its run folder.
-const START: &str = "start.toml";
 
 /// Fits as `skinfit fit` does.
 #[derive(Clone)]
@@ -106,7 +103,9 @@ fn goes_on(scene: &FitScene, file: &Path) -> Result<(), String> {
     if kept.effects != values.effects {
         return Err(other("other effects"));
     }
-    if columns(&kept.fit.free) != columns(&values.free) || kept.fit.free_gains != values.free_gains {
+    if columns(&kept.fit.free) != columns(&untied(&values.free, &values.params, &[]))
+        || kept.fit.free_gains != values.free_gains
+    {
         return Err(other("other free constants"));
     }
     let text =

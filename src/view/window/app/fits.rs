@@ -28,8 +28,7 @@ impl Window {
             ui.label("run folder");
             let field = egui::TextEdit::singleline(&mut self.run).desired_width(180.0);
             if ui.add_enabled(idle, field).accessible_name("run folder").changed() {
-                self.run_shown = PathBuf::from(&self.run);
-                self.session.set_run_folder(self.run_shown.clone());
+                self.session.set_run_folder(PathBuf::from(&self.run));
             }
             self.held_out(ui, idle);
             if let Some(found) = self.session.found() {
