@@ -15,7 +15,7 @@ use crate::cli::Refusal;
 use crate::cli::fitted_scene::with_files;
 use crate::files::{plain, recorded};
 use crate::fit::params_file::ParamsFile;
-use crate::model::effects::Effect;
+use crate::model::effects::{Effect, Effects};
 use crate::progress;
 use crate::scene::names::names_of;
 
@@ -127,7 +127,7 @@ fn constants(run: &Run, opened: &[Opened]) -> Result<Vec<u8>, Refusal> {
     let file = scene.map(|scene| ParamsFile::read(&run.params, scene.form, &scene.params)).transpose()?;
     let fitted = file.and_then(|file| file.effects).unwrap_or_default();
     let effects = |values: &mut Values| {
-        values.effects = fitted.iter().fold(values.effects, |effects, effect| effects.with(effect));
+        values.effects = fitted.iter().fold(values.effects, Effects::with);
     };
     let mut values = skin.scenes().to_vec();
     values.iter_mut().for_each(effects);

@@ -161,3 +161,27 @@ fn a_views_gain_is_a_row_and_a_fit_starts_there() {
     assert_eq!(hand.state().session.values().unwrap().gains[1], 1.0);
     node(&hand, &format!("gain {second}"));
 }
+
+#[test]
+fn a_step_back_into_what_cannot_be_read_any_more_is_told_once() {
+    if left_out() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let both = two(folder.path());
+    let start = Start { scenes: both.scenes[..1].to_vec(), ..both };
+    let mut hand = open(&start);
+    click(&mut hand, "Effects");
+    hand.run_steps(20);
+    click(&mut hand, "effect bloom");
+    settle(&mut hand);
+    let effects = |hand: &Hand<'_>| hand.state().session.opened().unwrap().baked.scene.effects;
+    let before = effects(&hand);
+    std::fs::remove_file(&start.scenes[0].scene).unwrap();
+    click(&mut hand, "undo");
+    settle(&mut hand);
+    let session = &hand.state().session;
+    assert_eq!(session.told().len(), 1, "{:?}", session.told());
+    // What is shown stays, and what is edited says so.
+    assert_eq!((effects(&hand), session.values().unwrap().effects), (before, before));
+}
