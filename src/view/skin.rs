@@ -77,8 +77,7 @@ impl Skin {
     /// Constants and gains of each scene.
     #[must_use]
     pub fn points(&self) -> Vec<Point> {
-        let point = |values: &Values| Point { params: values.params.clone(), gains: values.gains.clone() };
-        self.0.iter().map(point).collect()
+        self.0.iter().map(Values::point).collect()
     }
 
     /// The same, as they are given.
@@ -95,7 +94,6 @@ impl Skin {
 #[must_use]
 pub fn params_text(values: &[Values], scenes: &[&Opened], from: &str, all: bool) -> Option<String> {
     let (first, several) = (values.first()?, values.len() > 1);
-    let effects = first.effects;
     let gains = |(values, opened): (&Values, &&Opened)| {
         let names = opened.views().iter().map(|view| view.name.clone());
         names.zip(values.gains.iter().copied()).collect::<Vec<_>>()
@@ -109,7 +107,7 @@ pub fn params_text(values: &[Values], scenes: &[&Opened], from: &str, all: bool)
     let both = values.iter().zip(scenes);
     let file = ParamsFile {
         form: first.form,
-        effects: Some(effects),
+        effects: Some(first.effects),
         loss: None,
         params: first.params.clone(),
         gains: if several { Vec::new() } else { both.clone().flat_map(gains).collect() },
@@ -142,13 +140,9 @@ fn share(changed: &Values, other: &mut Values) {
     let own: Vec<Column> = other.free.iter().filter(|column| column.param.is_of_scene()).copied().collect();
     other.free =
         changed.free.iter().filter(|column| !column.param.is_of_scene()).copied().chain(own).collect();
-    let mut effects = Effects::of(&[]);
-    for effect in changed.effects.iter().filter(|effect| !effect.is_of_scene()) {
-        effects = effects.with(effect);
-    }
-    for effect in other.effects.iter().filter(|effect| effect.is_of_scene()) {
-        effects = effects.with(effect);
-    }
+    let skins = changed.effects.iter().filter(|effect| !effect.is_of_scene());
+    let own = other.effects.iter().filter(|effect| effect.is_of_scene());
+    let effects = skins.chain(own).fold(Effects::of(&[]), Effects::with);
     if effects != other.effects {
         other.effects = effects;
         other.without_parts();

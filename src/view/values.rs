@@ -121,6 +121,12 @@ impl Values {
         }
     }
 
+    /// The constants and the gains.
+    #[must_use]
+    pub fn point(&self) -> Point {
+        Point { params: self.params.clone(), gains: self.gains.clone() }
+    }
+
     /// Whether there is anything to say of gains: they are free, or one is not 1.
     #[must_use]
     pub fn has_gains(&self) -> bool {

@@ -5,14 +5,21 @@ use std::ops::RangeInclusive;
 
 use super::Session;
 use crate::engine::Unknown;
+use crate::history::History;
 use crate::model::effects::Effect;
 use crate::model::params::{Column, Param};
+use crate::skin::Skin;
 use crate::values::Values;
 
 /// What the slider of a gain spans.
 pub const GAINS: RangeInclusive<f64> = 0.1..=10.0;
 
 impl Session {
+    /// The values and their past, while no fit moves them.
+    pub(super) fn editable(&mut self) -> Option<&mut History<Skin>> {
+        if self.fitting.is_some() { None } else { self.values.as_mut() }
+    }
+
     /// Change the values of the scene that is looked at by a whole step: what is the skin's changes in all scenes.
     pub fn edit(&mut self, change: impl FnOnce(&mut Values)) {
         self.drag(change);
@@ -22,28 +29,28 @@ impl Session {
     /// Change them as part of a step.
     pub fn drag(&mut self, change: impl FnOnce(&mut Values)) {
         let scene = self.at.0;
-        if let Some(history) = self.values.as_mut().filter(|_| self.fitting.is_none()) {
+        if let Some(history) = self.editable() {
             history.drag(|values| values.change(scene, change));
         }
     }
 
     /// The step is over.
     pub fn settle(&mut self) {
-        if let Some(history) = self.values.as_mut().filter(|_| self.fitting.is_none()) {
+        if let Some(history) = self.editable() {
             history.settle();
         }
     }
 
     /// Back by a step, if there is one.
     pub fn undo(&mut self) {
-        if let Some(history) = self.values.as_mut().filter(|_| self.fitting.is_none()) {
+        if let Some(history) = self.editable() {
             history.undo();
         }
     }
 
     /// Forward again.
     pub fn redo(&mut self) {
-        if let Some(history) = self.values.as_mut().filter(|_| self.fitting.is_none()) {
+        if let Some(history) = self.editable() {
             history.redo();
         }
     }
@@ -100,7 +107,7 @@ impl Session {
     pub fn set_fitted(&mut self, place: usize, fitted: bool) {
         let Some(place) = self.places().into_iter().nth(place) else { return };
         let name = self.scenes[place.scene].views()[place.view].name.clone();
-        if let Some(history) = self.values.as_mut().filter(|_| self.fitting.is_none()) {
+        if let Some(history) = self.editable() {
             history.edit(|values| {
                 values.change(place.scene, |values| values.set_held_out(&name, !fitted));
             });

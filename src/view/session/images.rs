@@ -8,7 +8,7 @@ use crate::model::effects::Effect;
 use crate::opened::Reading;
 use crate::paint::{Answer, Job, Painted, Slot};
 use crate::scene::view::Camera;
-use crate::skin::Skin;
+use crate::values::Values;
 
 /// What an effect brought when it was turned on, or took when it was turned off.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -60,25 +60,23 @@ impl Session {
             }
             return;
         }
-        let now = history.now().points();
-        let first = self.first.as_ref().map(Skin::points);
-        let wanted = [
-            (Slot::Now, Some(&now)),
-            (Slot::Fit, self.fitted.as_ref()),
-            (Slot::Start, first.as_ref()),
-            (Slot::Other, self.other.as_ref()),
-        ];
+        let point = |slot: Slot| match slot {
+            Slot::Now => self.values().map(Values::point),
+            Slot::Start => self.first().map(Values::point),
+            Slot::Fit => self.here(self.fitted.as_deref()).cloned(),
+            Slot::Other => self.here(self.other.as_deref()).cloned(),
+        };
         let target = opened.targets.get(self.at.1).cloned().flatten().filter(|_| self.is_at_home());
-        let job = |slot: Slot, Point { params, gains }: &Point| Job {
+        let job = |slot: Slot, Point { params, gains }: Point| Job {
             opened: Arc::clone(opened),
-            params: params.clone(),
+            params,
             gain: gains.get(self.at.1).copied().unwrap_or(1.0),
             camera,
             target: target.clone(),
             terms: self.terms && slot == Slot::Now,
         };
-        let wanted = wanted.into_iter().filter(|(slot, _)| self.looked_at.contains(slot));
-        let jobs = wanted.filter_map(|(slot, points)| Some((slot, job(slot, points?.get(self.at.0)?))));
+        let wanted = Slot::ALL.into_iter().filter(|slot| self.looked_at.contains(slot));
+        let jobs = wanted.filter_map(|slot| Some((slot, job(slot, point(slot)?))));
         for (slot, job) in jobs.collect::<Vec<_>>() {
             if self.asked.get(&slot).is_none_or(|asked| !same(asked, &job)) {
                 let job = Arc::new(job);

@@ -105,16 +105,16 @@ pub(super) fn run_watched(
         "interrupted before the search began: the run folder is as it was; only bakes in the cache were kept.".into(),
     );
     let mut folder = RunFolder::open(arguments.output.as_deref(), &arguments.scenes.named)?;
-    // Of an earlier fit of the window: this one starts elsewhere.
-    let start = folder.path().join(START);
-    if !arguments.resume && arguments.params.as_ref() != Some(&start) && start.is_file() {
-        std::fs::remove_file(&start).map_err(|error| OutputError::new(&start, &error))?;
-    }
     let loaded = scenes::read(arguments, folder.path())?;
     let solving = Solving::of(arguments, folder.path())?;
     let (scenes, maps) = Scenes::ready(arguments, loaded, interrupt)?;
     let outcome = solve(arguments, solving, &folder, &scenes, interrupt, watch)?;
     folder.keep();
+    // Of an earlier fit of the window: this one started elsewhere.
+    let start = folder.path().join(START);
+    if !arguments.resume && arguments.params.as_ref() != Some(&start) && start.is_file() {
+        std::fs::remove_file(&start).map_err(|error| OutputError::new(&start, &error))?;
+    }
     let maps = maps.map(|maps| maps.conclude(folder.path(), arguments.json)).transpose()?;
     let fitted = Fitted { scenes: &scenes, maps: maps.as_ref(), begun };
     let exit = conclude(arguments, solving, &folder, fitted, &outcome)?;
