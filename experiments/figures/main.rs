@@ -19,6 +19,7 @@ mod lobes;
 mod page;
 mod pages;
 mod passes;
+mod portrait;
 mod race;
 mod results;
 mod speed;
@@ -50,6 +51,7 @@ const FILES: &[(&str, Measure)] = &[
     ("docs/accuracy.json", accuracy::tests),
     ("docs/noise.json", accuracy::noise),
     ("docs/closeup.json", closeup::measure),
+    ("docs/portrait.json", portrait::measure),
     ("docs/page.json", page::measure),
     ("docs/window.json", window::software),
     ("docs/window_card.json", window::graphics_card),

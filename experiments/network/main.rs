@@ -214,7 +214,7 @@ fn sphere() -> ViewSamples {
         pixel: (0..(SIZE * SIZE) as u32).collect(),
         coverage: vec![1.0; SIZE * SIZE],
         surface: SurfaceRecords::new(asked, groups),
-        atlas: None,
+        ..ViewSamples::default()
     };
     for slot in 0..SIZE * SIZE {
         let at = |i: usize| 2.0 * (i as f64 + 0.5) / SIZE as f64 - 1.0;

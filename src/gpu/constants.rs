@@ -91,12 +91,14 @@ fn view_projection(camera: &Camera, tile: Tile) -> DMat4 {
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     // From the whole image's range to the tile's.
     let scale = [width / f64::from(tile.width), height / f64::from(tile.height)];
+    // What bends rays is refused before: `Lens::distortion`.
+    let [cx, cy] = camera.lens.centre;
     let shift = [
-        scale[0] - 2.0 * f64::from(tile.x) / f64::from(tile.width) - 1.0,
-        1.0 - scale[1] + 2.0 * f64::from(tile.y) / f64::from(tile.height),
+        scale[0] - 2.0 * (f64::from(tile.x) - cx) / f64::from(tile.width) - 1.0,
+        1.0 - scale[1] + 2.0 * (f64::from(tile.y) - cy) / f64::from(tile.height),
     ];
     let projection = DMat4::from_cols(
-        DVec4::new(scale[0] * height / (width * tangent), 0.0, 0.0, 0.0),
+        DVec4::new(scale[0] * height * camera.lens.ratio / (width * tangent), 0.0, 0.0, 0.0),
         DVec4::new(0.0, scale[1] / tangent, 0.0, 0.0),
         DVec4::new(-shift[0], -shift[1], 0.0, -1.0),
         DVec4::new(0.0, 0.0, NEAR, 0.0),
@@ -107,13 +109,15 @@ fn view_projection(camera: &Camera, tile: Tile) -> DMat4 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::lens::Lens;
     use glam::DVec3;
 
     #[test]
     fn clip_space_agrees_with_the_cameras_projection_in_every_tile() {
         let world_to_camera =
             DMat4::from_rotation_y(0.3) * DMat4::from_translation(DVec3::new(0.1, -0.2, -3.0));
-        let camera = Camera { world_to_camera, fov_y: 0.7, width: 90, height: 64 };
+        let lens = Lens { centre: [7.5, -4.0], ratio: 1.1, distortion: None };
+        let camera = Camera { world_to_camera, fov_y: 0.7, width: 90, height: 64, lens };
         for tile in [Tile { x: 0, y: 0, width: 90, height: 64 }, Tile { x: 30, y: 48, width: 20, height: 16 }]
         {
             let matrix = view_projection(&camera, tile);

@@ -1,6 +1,8 @@
 //! What the renderer refuses, and what a device can do to it. An error says what happened; what to do depends on the
 //! command, which knows what its options can help.
 
+use crate::scene::Scene;
+
 /// The packages of a software Vulkan driver, by system.
 pub const SOFTWARE_DRIVER: &str = if cfg!(target_os = "linux") {
     "On Debian and Ubuntu, `apt-get install mesa-vulkan-drivers libvulkan1` brings a software one"
@@ -97,6 +99,12 @@ pub enum GpuError {
         /// The adapter.
         adapter: String,
     },
+    /// The scene has what adapters do not draw.
+    #[error("{what}, which the CPU engine alone draws.")]
+    CpuAlone {
+        /// That it has it.
+        what: String,
+    },
     /// Samples that the adapter makes do not all stay on it.
     #[error(
         "adapter {adapter}: its samples take {bytes} bytes, but {most} may stay there, and those that the adapter makes have to stay."
@@ -147,4 +155,14 @@ pub enum GpuError {
     /// No shader yields the image within the accuracy.
     #[error("{0}")]
     Plan(String),
+}
+
+impl GpuError {
+    /// Refuse a scene that adapters do not draw.
+    ///
+    /// # Errors
+    /// When it has what the CPU engine alone draws.
+    pub fn check_drawn(scene: &Scene) -> Result<(), Self> {
+        scene.cpu_alone().map_or(Ok(()), |what| Err(Self::CpuAlone { what }))
+    }
 }

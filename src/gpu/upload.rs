@@ -237,7 +237,7 @@ impl Uploads {
             return Ok(HashMap::new());
         }
         let posed = mesh.pose();
-        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        let rays = RayMesh::of(&posed);
         // Where triangles share no vertices, the fields are the mesh file's own.
         let whole = self.split.is_none();
         let sky = own.and_then(|own| own.sky.as_ref()).or(self.content.sky.as_deref());

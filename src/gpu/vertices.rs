@@ -76,6 +76,7 @@ pub(super) fn by_corner(mesh: &Mesh, occlusion: Option<&VertexOcclusion>) -> (Me
         weights: each(&mesh.weights, triangles),
         bones: mesh.bones.clone(),
         fields: mesh.fields.iter().map(by_corner).collect(),
+        plain: mesh.plain.clone(),
     };
     let occlusion = occlusion.map(|occlusion| VertexOcclusion {
         base: each(&occlusion.base, triangles),

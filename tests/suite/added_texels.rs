@@ -14,6 +14,7 @@ use skinfit::model::evaluate::Setup;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
 use skinfit::scene::Scene;
+use skinfit::scene::lens::Lens;
 use skinfit::scene::mesh::Mesh;
 use skinfit::scene::view::{Background, Camera, View};
 use skinfit::shader::atlas::tangent::Along;
@@ -185,6 +186,7 @@ fn scene() -> Scene {
         fov_y: FOV,
         width: PIXELS,
         height: PIXELS,
+        lens: Lens::default(),
     };
     let view = View { name: "front".to_owned(), camera, target: None, background: Background::None };
     Scene { mesh, views: vec![view], ..bare_scene(Effects::of(&[term().effect])) }

@@ -13,6 +13,7 @@ use skinfit::bake::{BakeStats, LobeStack, Ranges, bake};
 use skinfit::model::cube::{Cube, texel_direction, texel_solid_angle};
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::scene::Scene;
+use skinfit::scene::lens::Lens;
 use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::mesh::PosedMesh;
 use skinfit::scene::view::Camera;
@@ -288,6 +289,7 @@ fn ball(
         fov_y: calib["camera"]["yfov_rad"].as_f64().unwrap(),
         width: 384,
         height: 384,
+        lens: Lens::default(),
     };
     let centre = DVec3::from_slice(&numbers(&calib["ball"]["center"]));
     let radius = calib["ball"]["radius"].as_f64().unwrap();

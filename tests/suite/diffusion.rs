@@ -191,6 +191,7 @@ impl<'v> Case<'v> {
             coverage: vec![1.0; LANES],
             surface,
             atlas: Some(Arc::clone(atlas)),
+            ..ViewSamples::default()
         }
     }
 

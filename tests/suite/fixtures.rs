@@ -12,6 +12,7 @@ use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::Params;
 use skinfit::scene::diffusion::Diffusion;
+use skinfit::scene::lens::Lens;
 use skinfit::scene::maps::{Environment, Map, Maps, Spots};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
 use skinfit::scene::view::{Background, Camera, View};
@@ -83,7 +84,7 @@ pub(crate) fn head(folder: &Path) -> PosedMesh {
         normals: reader.read_normals().unwrap().map(Vec3::from).collect(),
         uvs: reader.read_tex_coords(0).unwrap().into_f32().map(Vec2::from).collect(),
         triangles: indices.as_chunks::<3>().0.to_vec(),
-        fields: Vec::new(),
+        ..PosedMesh::default()
     };
     generate_tangents(&mut Corners(&mut mesh)).unwrap();
     for i in 0..mesh.normals.len() {
@@ -131,7 +132,13 @@ impl Geometry for Corners<'_> {
 /// A camera as scene files write it.
 pub(crate) fn camera(rows: [f64; 16], fov_y_degrees: f64, size: u32) -> Camera {
     let world_to_camera = DMat4::from_cols_array(&rows).transpose();
-    Camera { world_to_camera, fov_y: fov_y_degrees.to_radians(), width: size, height: size }
+    Camera {
+        world_to_camera,
+        fov_y: fov_y_degrees.to_radians(),
+        width: size,
+        height: size,
+        lens: Lens::default(),
+    }
 }
 
 /// The three cameras of the scanned head's scenes, read from the scene file.

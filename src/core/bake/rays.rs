@@ -14,6 +14,7 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::triangle::Triangle;
 
 use super::wide_bvh::WideBvh;
+use crate::scene::mesh::PosedMesh;
 
 /// Positions beyond this have boxes whose area has no place in f32.
 const FARTHEST: f32 = 1e18;
@@ -100,6 +101,12 @@ impl RayMesh {
         let triangles: Vec<Triangle> = index.iter().map(triangle).collect();
         let bvh = (!triangles.is_empty()).then(|| hierarchy(&triangles));
         Self { bvh, triangles, index, wide: OnceLock::new() }
+    }
+
+    /// That of what stands in a light's way, of a mesh in its pose.
+    #[must_use]
+    pub fn of(mesh: &PosedMesh) -> Self {
+        Self::new(&mesh.positions, &mesh.occluders())
     }
 
     /// The hierarchy for packets of rays.

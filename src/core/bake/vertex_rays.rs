@@ -127,7 +127,7 @@ impl VertexRays {
 
     /// What `of` makes of each one's rays at rest, with what they found. All cores.
     pub(super) fn at_rest<F: Found, R: Send>(&self, of: impl Fn(usize, &Rays, Vec<F>) -> R + Sync) -> Vec<R> {
-        let mesh = RayMesh::new(&self.rest.positions, &self.rest.triangles);
+        let mesh = RayMesh::of(&self.rest);
         let found = |i: usize| {
             let rays = self.rays(i, &self.rest);
             let found = F::along(mesh.wide(), &rays);
@@ -144,7 +144,7 @@ impl VertexRays {
         at_rest: &[Vec<F>],
         of: impl Fn(usize, &Rays, Vec<F>) -> R + Sync,
     ) -> Vec<R> {
-        let mesh = RayMesh::new(&target.positions, &target.triangles);
+        let mesh = RayMesh::of(target);
         let moved = moved_triangles(&self.rest, target);
         let found = |i: usize| {
             let rays = self.rays(i, target);

@@ -3,7 +3,7 @@
 use web_time::Instant;
 
 use super::observed::beside;
-use super::{Baked, PrepareError, StageSeconds};
+use super::{Baked, PrepareError, StageSeconds, silhouettes};
 use crate::engine::view::ObservedView;
 use crate::samples;
 use crate::scene::Scene;
@@ -56,6 +56,8 @@ impl Baked {
         baked.gains = gains;
         let posed = baked.scene.mesh.pose();
         let samples = samples::sample_these(&baked.scene, &held.views, &posed, baked.surface_bakes())?;
+        let path = baked.scene.path.display().to_string();
+        baked.warnings.extend(silhouettes::warnings(&path, &held.views, &samples));
         held.observed = beside(&baked.scene.path, &held.views, samples)?;
         baked.seconds = StageSeconds { samples: start.elapsed().as_secs_f64(), ..baked.seconds };
         Ok((baked, held))

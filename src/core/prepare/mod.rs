@@ -5,6 +5,7 @@
 //! - [`Baked`]: it and its light and occlusion
 //! - [`Sampled`]: these and the visible surface of each view
 //! - [`Observed`]: of the views that have a target, samples beside what was observed there
+//!   (`silhouettes`: whether it lies where the mesh is)
 //! - [`HeldOut`]: views that are taken out of a scene before its fit, to score it on
 //!
 //! Of several scenes that are fitted as one skin: [`scene_names`] calls them, [`share_skin`] has them agree on what is one
@@ -25,6 +26,7 @@ mod observed;
 mod one_skin;
 mod options;
 mod sampled;
+mod silhouettes;
 
 pub use self::baked::Baked;
 pub use self::error::{NotOneSkin, PrepareError};

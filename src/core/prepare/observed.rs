@@ -4,7 +4,7 @@ use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 
-use super::{Baked, PrepareError, PrepareOptions, Sampled};
+use super::{Baked, PrepareError, PrepareOptions, Sampled, silhouettes};
 use crate::engine::Task;
 use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
@@ -31,9 +31,12 @@ impl Observed {
         Sampled::new(path, &options)?.observe()
     }
 
-    /// Of views all of which have a target, with their samples.
-    pub(super) fn of(baked: Baked, samples: Vec<ViewSamples>) -> Result<Self, PrepareError> {
-        let views = beside(&baked.scene.path, &baked.scene.views, samples)?;
+    /// Of views all of which have a target, with their samples. Silhouettes that lie apart are a warning.
+    pub(super) fn of(mut baked: Baked, samples: Vec<ViewSamples>) -> Result<Self, PrepareError> {
+        let scene = &baked.scene;
+        let apart = silhouettes::warnings(&scene.path.display().to_string(), &scene.views, &samples);
+        let views = beside(&scene.path, &scene.views, samples)?;
+        baked.warnings.extend(apart);
         Ok(Self { baked, views: views.into() })
     }
 

@@ -23,9 +23,9 @@ pub struct PrepareOptions {
     pub set: Vec<Assignment>,
     /// Where bakes are kept between runs.
     pub cache: Option<PathBuf>,
-    /// Seconds into animation 0, instead of the scene's.
+    /// Seconds into the animation, instead of the scene's.
     pub time: Option<f64>,
-    /// That the mesh will go through animation 0, and how its occlusion follows.
+    /// That the mesh will go through its animation, and how its occlusion follows.
     pub clip: Option<ClipOcclusion>,
     /// Instead of the views' backgrounds.
     pub background: Option<Background>,

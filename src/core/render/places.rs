@@ -140,7 +140,13 @@ mod tests {
         }
         let mut pixel = vec![u32::MAX; LANES];
         pixel[0] = 2;
-        ViewSamples { group_start: vec![0, 2], pixel, coverage: vec![1.0; LANES], surface, atlas: None }
+        ViewSamples {
+            group_start: vec![0, 2],
+            pixel,
+            coverage: vec![1.0; LANES],
+            surface,
+            ..ViewSamples::default()
+        }
     }
 
     fn setup() -> Setup {

@@ -17,13 +17,18 @@ use crate::samples::{LANES, ViewSamples};
 use crate::scene::view::Camera;
 use crate::with_simd;
 
+/// What the layer of what is not skin is called.
+pub const PLAIN_LAYER: &str = "plain";
+
 /// A view's image and what it is made of.
 #[derive(Clone, Debug)]
 pub struct Shaded {
     /// The whole, alpha being the coverage.
     pub image: Image,
-    /// An image for each enabled term; they add up to the whole.
+    /// An image for each enabled term; with `plain` they add up to the whole.
     pub terms: Vec<(TermName, Image)>,
+    /// What is not skin; `None` where nothing is seen of it.
+    pub plain: Option<Image>,
     /// The haze of each pixel, premultiplied by its coverage and times the gain, as radiance is; empty unless an
     /// effect asks for it.
     pub haze: Vec<f32>,
@@ -82,6 +87,7 @@ impl Shader {
         let mut shaded = Shaded {
             image: Image::new(width, height),
             terms: self.names.iter().map(|&name| (name, Image::new(width, height))).collect(),
+            plain: None,
             haze: vec![0.0; plane(self.effects.has_any(&[Effect::Haze, Effect::Bloom]))],
             glow: vec![[0.0; 3]; plane(self.effects.has(Effect::Bloom))],
         };
@@ -108,6 +114,17 @@ impl Shader {
             if let Some(glow) = shaded.glow.get_mut(at) {
                 *glow = pixel.glow.map(|x| x as f32);
             }
+        }
+        if !samples.plain.is_empty() {
+            let mut plain = Image::new(width, height);
+            for part in &samples.plain {
+                let at = part.pixel as usize;
+                let rgb = part.rgb.map(|c| (gain * f64::from(c)) as f32);
+                (plain.rgb[at], plain.alpha[at]) = (rgb, part.share);
+                (0..3).for_each(|c| shaded.image.rgb[at][c] += rgb[c]);
+                shaded.image.alpha[at] += part.share;
+            }
+            shaded.plain = Some(plain);
         }
         shaded
     }
@@ -170,6 +187,7 @@ mod tests {
     use crate::model::effects::{Form, Silhouette};
     use crate::samples::SurfaceRecords;
     use crate::samples::surface_records::{Asked, NEUTRAL};
+    use crate::scene::lens::Lens;
 
     /// The first of sixteen pixels in a row, of one sample each, all alike.
     fn first(effects: &[Effect], set: impl Fn(&mut Params)) -> Shaded {
@@ -178,13 +196,19 @@ mod tests {
             pixel: (0..LANES as u32).collect(),
             coverage: vec![1.0; LANES],
             surface: SurfaceRecords::new(Asked::EVERYTHING, 1),
-            atlas: None,
+            ..ViewSamples::default()
         };
         let facing =
             crate::model::fragment::Fragment { base: [0.0, 0.0, 1.0], view: [0.0, 0.0, -1.0], ..NEUTRAL };
         (0..LANES).for_each(|slot| samples.surface.set(slot, &facing, 1.0));
         let setup = Setup::new(Form::Corrected, Silhouette::Bumped, Effects::of(effects));
-        let camera = Camera { world_to_camera: DMat4::IDENTITY, fov_y: 1.0, width: LANES as u32, height: 1 };
+        let camera = Camera {
+            world_to_camera: DMat4::IDENTITY,
+            fov_y: 1.0,
+            width: LANES as u32,
+            height: 1,
+            lens: Lens::default(),
+        };
         let dark = Illumination::default();
         let mut params = Params::defaults(Form::Corrected);
         set(&mut params);

@@ -6,7 +6,7 @@
 
 use glam::{DVec3, Vec2};
 
-use super::trace::{Hit, Lens};
+use super::trace::{CameraRays, Hit};
 use crate::scene::maps::{Map, Maps};
 use crate::scene::mesh::PosedMesh;
 use crate::scene::mip_maps::MipMaps;
@@ -34,7 +34,7 @@ impl Footprint {
 /// The footprints of a camera's samples on a mesh.
 pub(super) struct Footprints<'a> {
     mesh: &'a PosedMesh,
-    lens: Lens,
+    rays: CameraRays,
     /// The samples along a pixel's side.
     axis: f64,
 }
@@ -42,7 +42,7 @@ pub(super) struct Footprints<'a> {
 impl<'a> Footprints<'a> {
     /// Of `axis` samples along a pixel's side.
     pub(super) fn new(mesh: &'a PosedMesh, camera: &Camera, axis: u32) -> Self {
-        Self { mesh, lens: Lens::new(camera), axis: f64::from(axis) }
+        Self { mesh, rays: CameraRays::new(camera), axis: f64::from(axis) }
     }
 
     /// Of the sample at `hit`.
@@ -54,9 +54,9 @@ impl<'a> Footprints<'a> {
         let PosedMesh { positions, uvs, triangles, .. } = self.mesh;
         let vertices = triangles[hit.triangle as usize].map(|i| i as usize);
         let weights = hit.weights().map(f64::from);
-        let [a, b, c] = vertices.map(|i| positions[i].as_dvec3() - self.lens.eye);
+        let [a, b, c] = vertices.map(|i| positions[i].as_dvec3() - self.rays.eye);
         let place = weights[0] * a + weights[1] * b + weights[2] * c;
-        let pace = place.dot(self.lens.forward) / (a.dot(b.cross(c)) * self.axis);
+        let pace = place.dot(self.rays.forward) / (a.dot(b.cross(c)) * self.axis);
         let edges = [b.cross(c), c.cross(a), a.cross(b)];
         let along = |step: DVec3| {
             let turned = edges.map(|edge| edge.dot(step));
@@ -70,7 +70,8 @@ impl<'a> Footprints<'a> {
             }
             uv
         };
-        Footprint::new(along(self.lens.right), along(self.lens.down))
+        let [right, down] = self.rays.steps(place);
+        Footprint::new(along(right), along(down))
     }
 }
 
@@ -121,6 +122,7 @@ mod tests {
     use crate::bake::rays::RayMesh;
     use crate::model::texture_filter::TextureFilter;
     use crate::samples::trace::trace;
+    use crate::scene::lens::Lens;
 
     /// A slanted quad, whose texture coordinates are no map of its plane onto the map's, so that its triangles differ.
     fn slanted() -> PosedMesh {
@@ -136,7 +138,7 @@ mod tests {
     fn camera() -> Camera {
         let world_to_camera =
             DMat4::from_rotation_y(0.2) * DMat4::from_translation(DVec3::new(0.1, -0.2, -3.0));
-        Camera { world_to_camera, fov_y: 0.6, width: 70, height: 60 }
+        Camera { world_to_camera, fov_y: 0.6, width: 70, height: 60, lens: Lens::default() }
     }
 
     #[test]
@@ -174,7 +176,7 @@ mod tests {
         let finite = |Footprint { right, below }: Footprint| right.is_finite() && below.is_finite();
         let eye = camera().eye().as_vec3();
         // A point, a line, one through the eye, one that is seen from its edge, and one behind the eye.
-        let forward = Lens::new(&camera()).forward.as_vec3();
+        let forward = CameraRays::new(&camera()).forward.as_vec3();
         let mut mesh = slanted();
         mesh.positions.extend([
             eye,

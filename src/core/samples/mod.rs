@@ -13,6 +13,7 @@
 //!   maps at a hit; `footprint`: how much of a map a sample covers; `lobe`: rays into a specular lobe there,
 //!   `lobe_light`: the light that they bring; `through`: what comes through the mesh
 //! - `group`: samples packed into groups
+//! - `plain`: what is not skin, as pictures show it
 //! - [`covered`]: the same groups of samples that a rasteriser found
 //! - [`rows`]: sixteen numbers side by side, the unit of all that is streamed
 //! - [`surface_records`]: what the model reads of each sample, in rows
@@ -34,6 +35,7 @@ mod lit;
 mod lit_mesh;
 mod lobe;
 mod lobe_light;
+mod plain;
 mod posed;
 pub mod rows;
 mod seams;
@@ -51,21 +53,23 @@ mod through;
 mod trace;
 pub mod visibility;
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::Vec2;
+use glam::{DVec3, Vec2, Vec3};
 
 use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
 use crate::progress;
-use crate::scene::Scene;
 use crate::scene::mesh::{Morph, PosedMesh};
 use crate::scene::view::{Camera, View};
+use crate::scene::{Scene, digits};
 pub use atlas::Atlas;
 pub use bounced::gather_of;
 pub use dilation::Dilation;
 pub use group::z_order;
+pub use plain::PlainPixel;
 pub use posed::{PosedSurface, SurfaceBakes};
 pub use surface_records::SurfaceRecords;
 pub use targets::TargetRows;
@@ -88,6 +92,8 @@ pub struct ViewSamples {
     pub surface: SurfaceRecords,
     /// The texels of the mesh that an effect is computed in; views of one pose share them.
     pub atlas: Option<Arc<Atlas>>,
+    /// The parts of pixels that show what is not skin.
+    pub plain: Vec<PlainPixel>,
 }
 
 impl ViewSamples {
@@ -115,6 +121,7 @@ impl ViewSamples {
             coverage: self.coverage[pixels].to_vec(),
             surface: self.surface.part(first as usize..starts[starts.len() - 1] as usize),
             atlas: self.atlas.clone(),
+            plain: Vec::new(),
         }
     }
 
@@ -130,14 +137,16 @@ impl ViewSamples {
 pub enum SampleError {
     /// The camera looks past the mesh.
     #[error(
-        "{scene}: view \"{view}\": no pixel shows the mesh. The camera looks down its own -Z; check \
-         world_to_camera (row by row, translation last) and fov_y_degrees."
+        "{scene}: view \"{view}\": no pixel shows the mesh, {places}. Give eye and look_at, or check world_to_camera (row by \
+         row, translation last; the camera looks down its own -Z) and fov_y_degrees."
     )]
     NothingVisible {
         /// The scene file.
         scene: String,
         /// The view.
         view: String,
+        /// Where the mesh is, and where the camera looks.
+        places: String,
     },
     /// A map is asked for, but the mesh cannot be textured.
     #[error(
@@ -242,7 +251,7 @@ pub fn sample_these(
     bakes: SurfaceBakes<'_>,
 ) -> Result<Vec<ViewSamples>, SampleError> {
     check_uvs(scene, &posed.uvs)?;
-    let rays = RayMesh::new(&posed.positions, &posed.triangles);
+    let rays = RayMesh::of(posed);
     let posed = PosedSurface::new(scene, posed, &rays, &scene.mesh.morphs, bakes)?;
     let atlas = atlas_of(scene, &posed)?;
     let pixels = |view: &View| u64::from(view.camera.width) * u64::from(view.camera.height);
@@ -262,7 +271,20 @@ pub fn sample_these(
 /// That a view of `scene` shows nothing of the mesh.
 #[must_use]
 pub fn nothing_visible(scene: &Scene, view: &View) -> SampleError {
-    SampleError::NothingVisible { scene: scene.path.display().to_string(), view: view.name.clone() }
+    let positions = scene.mesh.pose().positions;
+    let least = positions.iter().copied().reduce(Vec3::min).unwrap_or_default().as_dvec3();
+    let most = positions.iter().copied().reduce(Vec3::max).unwrap_or_default().as_dvec3();
+    let Camera { world_to_camera, .. } = view.camera;
+    let along = -world_to_camera.row(2).truncate();
+    let told = |v: DVec3, between: &str| v.to_array().map(|x| digits(x, 3)).join(between);
+    let places = format!(
+        "which is {} units large around ({}); the camera stands at ({}) and looks along ({})",
+        told(most - least, " x "),
+        told(0.5 * (least + most), ", "),
+        told(view.camera.eye(), ", "),
+        told(along, ", ")
+    );
+    SampleError::NothingVisible { scene: scene.path.display().to_string(), view: view.name.clone(), places }
 }
 
 /// Refuse a mesh of those texture coordinates where the effects sample a map and it has none.
@@ -325,9 +347,22 @@ fn sampled(
     done: impl Fn(u64) + Sync,
 ) -> ViewSamples {
     let n = scene.quality.samples_per_axis.max(1);
-    let hits = trace::trace(posed.rays, posed.mesh, camera, n);
+    let hits = primary(posed.rays, posed.mesh, camera, n);
     let surface = surface::Surface::new(scene, posed, camera);
-    group::pack(&hits, &surface, (camera.width, n * n), done)
+    let mut samples = group::pack(&hits, &surface, (camera.width, n * n), done);
+    samples.plain = plain::pixels(scene, posed, camera, &hits.plain, n * n);
+    samples
+}
+
+/// What a camera sees: also what stands in no light's way.
+fn primary(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -> trace::Hits {
+    match mesh.occluders() {
+        Cow::Borrowed(_) => trace::trace(rays, mesh, camera, n),
+        Cow::Owned(_) => {
+            let all = RayMesh::new(&mesh.positions, &mesh.triangles);
+            trace::trace(&all, mesh, camera, n)
+        }
+    }
 }
 
 /// So many records of what the effects of `scene` ask for, all zero.
@@ -340,5 +375,5 @@ pub fn asked_records(scene: &Scene, count: usize) -> SurfaceRecords {
 #[must_use]
 pub fn sample_hits(scene: &Scene, posed: &PosedMesh, rays: &RayMesh, camera: &Camera) -> Vec<Hit> {
     let n = scene.quality.samples_per_axis.max(1);
-    group::slots(&trace::trace(rays, posed, camera, n), camera.width)
+    group::slots(&primary(rays, posed, camera, n), camera.width)
 }

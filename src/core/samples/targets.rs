@@ -1,5 +1,7 @@
 //! What each pixel of a target asks of the model: its colour, and how much it counts.
 
+use std::collections::BTreeSet;
+
 use super::rows::{Row, Rows};
 use super::{LANES, SampleError, ViewSamples};
 use crate::scene::view::{Clip, View};
@@ -25,7 +27,7 @@ impl TargetRows {
     ///
     /// The colour is the target's over its alpha, so that a silhouette pixel is compared with the
     /// samples that cover it; it counts by the smaller of the two coverages. A target without
-    /// alpha is compared where the samples cover the whole pixel.
+    /// alpha is compared where the samples cover the whole pixel. Pixels that show something else than skin do not count.
     ///
     /// # Errors
     /// When the target has not as many pixels as the view, or none of them counts.
@@ -39,9 +41,11 @@ impl TargetRows {
         }
         let groups = samples.groups();
         let count = if target.haze.is_some() { 4 } else { 3 };
+        // What a target shows there is of both.
+        let mixed: BTreeSet<u32> = samples.plain.iter().map(|plain| plain.pixel).collect();
         let (mut channels, mut weights) = (Rows::new(count, groups), vec![Row::ZERO; groups]);
         for (slot, (&pixel, &coverage)) in samples.pixel.iter().zip(&samples.coverage).enumerate() {
-            let (asked, weight) = if pixel == u32::MAX {
+            let (asked, weight) = if pixel == u32::MAX || mixed.contains(&pixel) {
                 ([0.0; 4], 0.0)
             } else {
                 let i = pixel as usize;

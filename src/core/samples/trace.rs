@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec2, Vec3A};
 use rayon::prelude::*;
 
+use crate::bake::low_discrepancy::mix;
 use crate::bake::rays::RayMesh;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::Camera;
@@ -41,7 +42,19 @@ pub(super) struct Hits {
     /// For each pixel, row by row: its index in the image, and where its hits start and end.
     pub(super) pixels: Vec<(u32, std::ops::Range<u32>)>,
     pub(super) hits: Vec<Hit>,
+    /// The samples that show what is not skin: their pixels' indices, and their hits.
+    pub(super) plain: Vec<(u32, Hit)>,
 }
+
+/// What a ray sees.
+enum Shown {
+    Nothing,
+    Skin(Hit),
+    Plain(Hit),
+}
+
+/// Of so many layers that blend, one behind the other, the rest is not seen.
+const MOST_LAYERS: usize = 16;
 
 /// A triangle as seen from the eye: rays from there hit it by three dot products.
 ///
@@ -74,43 +87,68 @@ impl Seen {
 }
 
 /// Rays of a camera, as `Camera::direction` but for their length.
-pub(super) struct Lens {
+pub(super) struct CameraRays {
     pub(super) eye: DVec3,
     /// Unit vector along which depth is measured; every direction goes one unit along it.
     pub(super) forward: DVec3,
-    /// Direction through the image's top left corner, and its steps for a pixel right and down.
+    /// Direction through the image's top left corner, and its steps for a pixel right and down: of a pinhole.
     corner: DVec3,
-    pub(super) right: DVec3,
-    pub(super) down: DVec3,
+    right: DVec3,
+    down: DVec3,
+    /// The camera, where its lens bends rays, and unit vectors to the right and down.
+    bent: Option<(Camera, [DVec3; 2])>,
 }
 
-impl Lens {
+impl CameraRays {
     pub(super) fn new(camera: &Camera) -> Self {
         let to_world = camera.world_to_camera.inverse();
         let tangent = (0.5 * camera.fov_y).tan();
-        // Pixels are square: the field of view is the image's height.
+        let [cx, cy] = camera.lens.centre;
         let pixel = 2.0 * tangent / f64::from(camera.height);
-        let half = 0.5 * pixel * f64::from(camera.width);
+        let across = pixel / camera.lens.ratio;
+        let half = 0.5 * across * f64::from(camera.width);
         let local = |x: f64, y: f64, z: f64| to_world.transform_vector3(DVec3::new(x, y, z));
+        let axes = [local(1.0, 0.0, 0.0), local(0.0, -1.0, 0.0)];
         Self {
             eye: to_world.w_axis.truncate(),
             forward: local(0.0, 0.0, -1.0),
-            corner: local(-half, tangent, -1.0),
-            right: local(pixel, 0.0, 0.0),
+            corner: local(-half - across * cx, tangent + pixel * cy, -1.0),
+            right: local(across, 0.0, 0.0),
             down: local(0.0, -pixel, 0.0),
+            bent: camera.lens.distortion.is_some().then_some((*camera, axes)),
         }
     }
 
     pub(super) fn direction(&self, x: f64, y: f64) -> DVec3 {
-        self.corner + x * self.right + y * self.down
+        match &self.bent {
+            None => self.corner + x * self.right + y * self.down,
+            Some((camera, [right, down])) => {
+                let [across, below] = camera.image_plane(x, y).unwrap_or_else(|place| place);
+                self.forward + across * right + below * down
+            }
+        }
+    }
+
+    /// How the direction of a ray moves for a pixel right and down where it goes to `place`, from the eye: in its lengths
+    /// of one unit along the camera's axis.
+    pub(super) fn steps(&self, place: DVec3) -> [DVec3; 2] {
+        let Some((camera, axes)) = &self.bent else { return [self.right, self.down] };
+        let depth = place.dot(self.forward);
+        let on_plane = axes.map(|axis| place.dot(axis) / depth);
+        // The inverse of how the lens moves what it shows.
+        let [[a, b], [c, d]] = camera.lens.distorted(on_plane).1;
+        let det = a * d - b * c;
+        let sizes = [self.right.length(), self.down.length()];
+        let columns = [[d / det, -b / det], [-c / det, a / det]];
+        std::array::from_fn(|i| sizes[i] * (columns[i][0] * axes[0] + columns[i][1] * axes[1]))
     }
 }
 
 /// The hits of `n x n` samples a pixel, at the centres of its strata, row by row. Both sides of a
 /// triangle are seen.
 pub(super) fn trace(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -> Hits {
-    let lens = Lens::new(camera);
-    let seen: Vec<Seen> = mesh.triangles.par_iter().map(|&t| Seen::new(mesh, t, lens.eye)).collect();
+    let camera_rays = CameraRays::new(camera);
+    let seen: Vec<Seen> = mesh.triangles.par_iter().map(|&t| Seen::new(mesh, t, camera_rays.eye)).collect();
     let [columns, rows] = bounds(mesh, camera);
     let n = n.max(1);
     let parts: Vec<Hits> = rows
@@ -121,9 +159,16 @@ pub(super) fn trace(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -
                 let start = part.hits.len() as u32;
                 for i in 0..n * n {
                     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
-                    let d = lens.direction(f64::from(x) + at(i % n), f64::from(y) + at(i / n));
-                    part.hits
-                        .extend(nearest(rays, lens.eye, d, |triangle, d| seen[triangle as usize].hit(d)));
+                    let d = camera_rays.direction(f64::from(x) + at(i % n), f64::from(y) + at(i / n));
+                    let cut =
+                        || (f64::from((i + mix(y * camera.width + x)) % (n * n)) + 0.5) / f64::from(n * n);
+                    match shown(rays, mesh, (camera_rays.eye, d), cut, |triangle, d| {
+                        seen[triangle as usize].hit(d)
+                    }) {
+                        Shown::Nothing => {}
+                        Shown::Skin(hit) => part.hits.push(hit),
+                        Shown::Plain(hit) => part.plain.push((y * camera.width + x, hit)),
+                    }
                 }
                 let end = part.hits.len() as u32;
                 if end > start {
@@ -140,17 +185,52 @@ pub(super) fn trace(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -
             |(pixel, hits): (u32, std::ops::Range<u32>)| (pixel, base + hits.start..base + hits.end);
         all.pixels.extend(part.pixels.into_iter().map(shifted));
         all.hits.extend(part.hits);
+        all.plain.extend(part.plain);
     }
     all
 }
 
-/// What the point (x, y) of an image shows, in pixels from the upper left corner.
+/// The skin that the point (x, y) of an image shows, in pixels from the upper left corner.
 #[must_use]
 pub fn hit_at(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, x: f64, y: f64) -> Option<Hit> {
-    let lens = Lens::new(camera);
-    nearest(rays, lens.eye, lens.direction(x, y), |triangle, d| {
-        Seen::new(mesh, mesh.triangles[triangle as usize], lens.eye).hit(d)
-    })
+    let camera_rays = CameraRays::new(camera);
+    let ray = (camera_rays.eye, camera_rays.direction(x, y));
+    let hit =
+        |triangle: u32, d: DVec3| Seen::new(mesh, mesh.triangles[triangle as usize], camera_rays.eye).hit(d);
+    match shown(rays, mesh, ray, || 0.5, hit) {
+        Shown::Skin(hit) => Some(hit),
+        Shown::Plain(_) | Shown::Nothing => None,
+    }
+}
+
+/// What is seen from `eye` along `d`. A layer that blends is seen by those rays whose `cut`, in (0, 1), lies below what
+/// it and the layers before it cover, so that the mean over a pixel is blended in order (Enderton et al. 2010, *Stochastic
+/// Transparency*, stratified).
+fn shown(
+    rays: &RayMesh,
+    mesh: &PosedMesh,
+    (eye, d): (DVec3, DVec3),
+    cut: impl Fn() -> f64,
+    hit: impl Fn(u32, DVec3) -> Option<(f64, [f64; 3])>,
+) -> Shown {
+    let Some(plain) = &mesh.plain else {
+        return nearest(rays, eye, d, hit).map_or(Shown::Nothing, Shown::Skin);
+    };
+    let mut passed: Vec<u32> = Vec::new();
+    // What goes through the layers so far.
+    let mut through = 1.0;
+    while passed.len() < MOST_LAYERS {
+        let beyond =
+            |triangle: u32, d: DVec3| if passed.contains(&triangle) { None } else { hit(triangle, d) };
+        let Some(found) = nearest(rays, eye, d, beyond) else { return Shown::Nothing };
+        let Some(material) = plain.material(found.triangle) else { return Shown::Skin(found) };
+        through *= 1.0 - f64::from(material.seen(found.uv(mesh)));
+        if cut() < 1.0 - through {
+            return Shown::Plain(found);
+        }
+        passed.push(found.triangle);
+    }
+    Shown::Nothing
 }
 
 /// The nearest triangle from `eye` along `d`, by what `hit` says of a triangle and a unit direction.
@@ -173,6 +253,10 @@ fn nearest(
 /// the eye.
 fn bounds(mesh: &PosedMesh, camera: &Camera) -> [std::ops::Range<u32>; 2] {
     let size = [camera.width, camera.height];
+    // What is straight bulges beyond its ends there.
+    if camera.lens.distortion.is_some() {
+        return size.map(|size| 0..size);
+    }
     let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
     for position in &mesh.positions {
         let (x, y, depth) = camera.project(position.as_dvec3());
@@ -193,11 +277,12 @@ fn bounds(mesh: &PosedMesh, camera: &Camera) -> [std::ops::Range<u32>; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::lens::{Distortion, Lens};
     use glam::{DMat4, Vec3};
 
     fn camera(size: u32) -> Camera {
         let world_to_camera = DMat4::from_translation(DVec3::new(0.1, -0.2, -3.0));
-        Camera { world_to_camera, fov_y: 0.7, width: size + 7, height: size }
+        Camera { world_to_camera, fov_y: 0.7, width: size + 7, height: size, lens: Lens::default() }
     }
 
     /// A sphere of `n` rings.
@@ -220,15 +305,46 @@ mod tests {
     }
 
     #[test]
-    fn a_lens_gives_the_cameras_directions() {
-        let camera = camera(40);
-        let lens = Lens::new(&camera);
-        for (x, y) in [(0.0, 0.0), (12.5, 30.5), (46.5, 39.5)] {
-            let error = lens.direction(x, y).normalize() - camera.direction(x, y);
-            // A few roundings of f64.
-            assert!(error.length() < 1e-15, "{error}");
+    fn rays_go_where_the_camera_says() {
+        for lens in lenses() {
+            let camera = Camera { lens, ..camera(40) };
+            let rays = CameraRays::new(&camera);
+            for (x, y) in [(0.0, 0.0), (12.5, 30.5), (46.5, 39.5)] {
+                let error = rays.direction(x, y).normalize() - camera.direction(x, y);
+                // A few roundings of f64.
+                assert!(error.length() < 1e-15, "{error}");
+                let (px, py, _) = camera.project(rays.eye + 3.0 * rays.direction(x, y));
+                // Of numbers up to 50.
+                assert!((px - x).hypot(py - y) < 1e-12, "{lens:?}: {px} {py}");
+            }
+            assert!((rays.eye - camera.eye()).length() < 1e-15);
         }
-        assert!((lens.eye - camera.eye()).length() < 1e-15);
+    }
+
+    #[test]
+    fn steps_are_those_from_pixel_to_pixel() {
+        for lens in lenses() {
+            let rays = CameraRays::new(&Camera { lens, ..camera(40) });
+            for (x, y) in [(3.0, 5.0), (22.5, 18.5), (40.5, 35.5)] {
+                let h = 1e-4;
+                let differences = [(h, 0.0), (0.0, h)].map(|(dx, dy)| {
+                    (rays.direction(x + dx, y + dy) - rays.direction(x - dx, y - dy)) / (2.0 * h)
+                });
+                for (step, want) in rays.steps(7.0 * rays.direction(x, y)).into_iter().zip(differences) {
+                    // Roundings over the difference: 1e-16 over 1e-4, beside steps of 0.02.
+                    assert!((step - want).length() < 1e-10, "{lens:?}: {step} {want}");
+                }
+            }
+        }
+    }
+
+    /// A pinhole, one that is off the middle and not square, and lenses that bend.
+    fn lenses() -> [Lens; 4] {
+        let off = Lens { centre: [3.5, -2.0], ratio: 1.1, distortion: None };
+        let brown = Distortion::Brown { k: [-0.28, 0.11, -0.02], p: [0.0012, -0.0007] };
+        let fisheye = Distortion::Fisheye { k: [-0.02, 0.004, -0.001, 0.0002] };
+        let with = |distortion: Distortion| Lens { distortion: Some(distortion), ..off };
+        [Lens::default(), off, with(brown), with(fisheye)]
     }
 
     #[test]

@@ -4,18 +4,18 @@ use std::path::Path;
 
 use toml::Spanned;
 
-use super::Scene;
 use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
 use super::gltf::{Ask, Document, Tangents, Uvs};
 use super::maps::Maps;
 use super::mesh::Mesh;
 use super::numbers::{interval, number, short};
+use super::{Scene, suggestion};
 use crate::model::effects::{Effect, Effects, Form};
 use crate::model::fields::Fields;
 use crate::model::needs::Needs;
 
-/// The mesh of a scene through its animation 0.
+/// The mesh of a scene through its animation.
 pub struct Animation {
     document: Document,
     ask: Ask,
@@ -33,7 +33,7 @@ impl Animation {
         let file: SceneFile = source.parse()?;
         let pose = Pose::check(&source, &file)?;
         let folder = scene.path.parent().unwrap_or(Path::new(""));
-        let document = Document::open(&folder.join(&file.mesh.file))?;
+        let document = mesh_file(&source, &file, folder)?;
         let needs = scene.needs();
         let ask = ask(&scene.maps, scene.form, scene.effects, needs, &pose);
         let seconds = document.animation_seconds()?;
@@ -50,6 +50,27 @@ impl Animation {
     }
 }
 
+/// The mesh file of a scene, in `folder`, whose nodes the animation moves that the scene names: else the first.
+pub(super) fn mesh_file(source: &Source, file: &SceneFile, folder: &Path) -> Result<Document, SceneError> {
+    let document = Document::open(&folder.join(&file.mesh.file))?;
+    let Some(wanted) = &file.mesh.animation else { return Ok(document) };
+    let names = document.animation_names();
+    let of_name: Vec<usize> = (0..names.len()).filter(|&i| names[i] == *wanted.get_ref()).collect();
+    let path = document.path().display().to_string();
+    match of_name.as_slice() {
+        [clip] => Ok(document.with_animation(*clip)),
+        [] => {
+            let known: Vec<&str> = names.iter().map(String::as_str).collect();
+            let what = format!("{path} has no animation `{}`", wanted.get_ref());
+            Err(source.error(wanted, what, suggestion(wanted.get_ref(), &known)))
+        }
+        several => {
+            let what = format!("{path} has {} animations `{}`", several.len(), wanted.get_ref());
+            Err(source.error(wanted, what, "Give each a name of its own there"))
+        }
+    }
+}
+
 /// Beyond f32's range a position would not be finite: weights times deltas must stay well within.
 const MOST_WEIGHT: f64 = 1e6;
 /// Thirty years: whatever an animation's length, its last pose is meant.
@@ -59,6 +80,7 @@ const MOST_SECONDS: f64 = 1e9;
 pub(super) struct Pose {
     morph_weights: Option<Vec<f32>>,
     time: Option<f64>,
+    skin: Option<Vec<String>>,
 }
 
 impl Pose {
@@ -72,7 +94,12 @@ impl Pose {
             let within = interval(-MOST_WEIGHT, MOST_WEIGHT);
             return Err(source.error(spanned, what, format!("Give weights in {within}, mostly in [0, 1]")));
         }
+        if let Some(empty) = file.mesh.skin.as_ref().filter(|names| names.get_ref().is_empty()) {
+            let remedy = "Name materials or meshes of the file, or leave it out: then all of it is skin";
+            return Err(source.error(empty, "skin names nothing", remedy));
+        }
         Ok(Self {
+            skin: file.mesh.skin.as_ref().map(|names| names.get_ref().clone()),
             morph_weights: weights.map(|w| w.get_ref().iter().map(|&w| w as f32).collect()),
             time: match &file.mesh.time {
                 Some(time) => Some(number(
@@ -109,6 +136,8 @@ impl Pose {
             None => add(add(Effects::SURFACE, morphs, Effect::Morph), skins, Effect::Skin),
         };
         let effects = add(effects, self.morph_weights.is_some(), Effect::Morph);
+        // At a time the mesh is as the animation has it.
+        let effects = add(effects, self.time.is_some() && document.moves_morphs(), Effect::Morph);
         Ok(add(effects, self.time.is_some(), Effect::Skin))
     }
 }
@@ -119,6 +148,8 @@ pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose:
     let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
     let looked_up = built_in || !own.is_empty();
     let uvs = match (needs.maps() || needs.atlas, looked_up || needs.atlas) {
+        // What is not skin has maps of its own.
+        (false, _) if pose.skin.is_some() => Uvs::Optional,
         (false, _) => Uvs::None,
         (true, false) => Uvs::Optional,
         (true, true) => Uvs::Required,
@@ -138,6 +169,7 @@ pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose:
         bones: effects.has(Effect::Skin),
         fields: Fields::of(needs.fields.iter().filter(|field| field.is_of_vertices())),
         time: pose.time.filter(|_| effects.has_any(&[Effect::Morph, Effect::Skin])),
+        skin: pose.skin.clone(),
         clip: false,
     }
 }

@@ -43,6 +43,8 @@ pub(super) struct MeshTable {
     pub file: PathBuf,
     pub morph_weights: Option<Spanned<Vec<f64>>>,
     pub time: Option<Spanned<f64>>,
+    pub animation: Option<Spanned<String>>,
+    pub skin: Option<Spanned<Vec<String>>>,
     pub metres_per_unit: Option<Spanned<f64>>,
     #[serde(default)]
     pub lights: bool,
@@ -138,14 +140,35 @@ pub(super) type ParamsTable = BTreeMap<Spanned<String>, Spanned<ParamValue>>;
 #[serde(deny_unknown_fields)]
 pub(super) struct ViewTable {
     pub name: Spanned<String>,
-    pub world_to_camera: Spanned<Vec<f64>>,
-    pub fov_y_degrees: Spanned<f64>,
+    pub world_to_camera: Option<Spanned<Vec<f64>>>,
+    pub eye: Option<Spanned<[f64; 3]>>,
+    pub look_at: Option<Spanned<[f64; 3]>>,
+    pub up: Option<Spanned<[f64; 3]>>,
+    pub camera: Option<Spanned<String>>,
+    pub lens: Option<Spanned<LensTable>>,
+    pub fov_y_degrees: Option<Spanned<f64>>,
     pub width: Spanned<i64>,
     pub height: Spanned<i64>,
     pub target: Option<PathBuf>,
     pub mask: Option<PathBuf>,
     pub haze: Option<PathBuf>,
     pub background: Option<Spanned<BackgroundValue>>,
+}
+
+/// `lens = { ... }` of a view
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LensTable {
+    pub model: Option<Spanned<String>>,
+    pub fx: Option<Spanned<f64>>,
+    pub cx: Option<Spanned<f64>>,
+    pub cy: Option<Spanned<f64>>,
+    pub k1: Option<Spanned<f64>>,
+    pub k2: Option<Spanned<f64>>,
+    pub k3: Option<Spanned<f64>>,
+    pub k4: Option<Spanned<f64>>,
+    pub p1: Option<Spanned<f64>>,
+    pub p2: Option<Spanned<f64>>,
 }
 
 /// What stands behind the mesh: a name, or a colour.

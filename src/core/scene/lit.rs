@@ -2,12 +2,14 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::Scene;
-use super::animation::Pose;
+use super::animation::{Pose, mesh_file};
 use super::error::{SceneError, Warnings, warn};
 use super::file::{SceneFile, Source};
 use super::gltf::Document;
-use super::light::{Light, LightKind};
+use super::light::{Beam, Lamp, Light, LightKind};
 use super::lights;
 use super::settings::spots;
 use super::sky_lights::sky_lights;
@@ -57,6 +59,19 @@ impl Light {
     }
 }
 
+/// The terms of a directional light called `beam` and of a point or spot light called `lamp`, for tables of the parameters
+/// that lights bring with them; known to this process from then on.
+///
+/// # Errors
+/// When a file of rules has taken their names.
+pub fn families() -> Result<[&'static Term; 2], TermError> {
+    let lamp = Lamp { position: DVec3::ZERO, intensity: [0.0; 3], range: None, radius: 0.0 };
+    let beam = Beam { direction: DVec3::NEG_Y, irradiance: [0.0; 3], angular_diameter_degrees: 0.0 };
+    let beam = Light { name: "beam".to_owned(), kind: LightKind::Directional(beam) };
+    let lamp = Light { name: "lamp".to_owned(), kind: LightKind::Point(lamp) };
+    Ok([effect_of(&beam, false)?, effect_of(&lamp, false)?])
+}
+
 /// A light's rules with those of what the skin throws back of it: declarations stand before all rules.
 fn bounced(rules: &str) -> String {
     let (declared, rules) = rules.split_once("\n\n").unwrap_or((rules, ""));
@@ -69,7 +84,8 @@ pub(super) struct Lights {
     pub(super) own: Vec<Light>,
     /// How many the panorama may yield.
     spots: u32,
-    terms: Vec<&'static Term>,
+    /// The effect that each is.
+    pub(super) terms: Vec<&'static Term>,
 }
 
 impl Lights {
@@ -109,7 +125,7 @@ impl Lights {
     /// As of [`Self::read`].
     pub(super) fn of_file(source: &Source, file: &SceneFile) -> Result<Self, SceneError> {
         let folder = source.path.parent().unwrap_or(Path::new(""));
-        let document = file.mesh.lights.then(|| Document::open(&folder.join(&file.mesh.file))).transpose()?;
+        let document = file.mesh.lights.then(|| mesh_file(source, file, folder)).transpose()?;
         let time = Pose::check(source, file)?.time();
         Self::read(source, file, document.as_ref().map(|document| (document, time)), &mut Warnings::new())
     }

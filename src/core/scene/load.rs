@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::animation::{Pose, ask, idle_effects};
-use super::cameras::{self, ViewPlan};
+use super::animation::{Pose, ask, idle_effects, mesh_file};
+use super::cameras::{self, MeshCameras, ViewPlan};
 use super::dapple::dapple;
 use super::diffusion;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, MapsTable, SceneFile, Source};
-use super::gltf::{Ask, Document};
+use super::gltf::Ask;
 use super::lit::{self, Lights};
 use super::maps::{Environment, Map, Maps, OwnMap};
 use super::numbers::{interval, number};
@@ -37,9 +37,9 @@ pub struct LoadOptions {
     pub effects: Option<Effects>,
     /// Whether targets and masks are read.
     pub targets: bool,
-    /// Seconds into animation 0, instead of the file's `time`.
+    /// Seconds into the animation, instead of the file's `time`.
     pub time: Option<f64>,
-    /// Whether the mesh will go through animation 0: then the targets are marked that it moves.
+    /// Whether the mesh will go through its animation: then the targets are marked that it moves.
     pub clip: bool,
     /// Instead of the views' `background`.
     pub background: Option<Background>,
@@ -72,7 +72,6 @@ impl Scene {
         let lookups = settings::lookups(&source, &file.model)?;
         let choices = settings::choices(&source, &file.model)?;
         let dapple = read_dapple(&source, &file)?;
-        let mut plans = cameras::plan(&source, &file.view)?;
         let quality = settings::quality(&source, &file.quality)?;
         let shadow_maps = shadow_maps(&source, &file.quality)?;
         let bloom = settings::bloom(&source, &file.bloom)?;
@@ -82,12 +81,13 @@ impl Scene {
         let pose = Pose::check(&source, &file)?.at(options.time);
         let metres_per_unit = metres(&source, &file)?;
 
+        let bar = progress::bar("loading", 3 + file.view.len() as u64);
+        let document = mesh_file(&source, &file, folder)?;
+        let of_file = MeshCameras { document: &document, time: pose.time() };
+        let mut plans = cameras::plan(&source, &file.view, Some(of_file), &mut warnings)?;
         if let Some(background) = options.background {
             plans.iter_mut().for_each(|plan| plan.background = background);
         }
-
-        let bar = progress::bar("loading", 3 + plans.len() as u64);
-        let document = Document::open(&folder.join(&file.mesh.file))?;
         let lights = Lights::read(&source, &file, Some((&document, pose.time())), &mut warnings)?;
         let mut params = settings::params(&source, &file.model.params, form)?;
         let given = settings::effects(&source, &file.model)?;
@@ -376,7 +376,7 @@ pub fn check_values(path: &Path, text: &str) -> Result<(), SceneError> {
     settings::params(&source, &file.model.params, form)?;
     settings::lookups(&source, &file.model)?;
     settings::choices(&source, &file.model)?;
-    cameras::plan(&source, &file.view)?;
+    cameras::plan(&source, &file.view, None, &mut Warnings::new())?;
     settings::quality(&source, &file.quality)?;
     shadow_maps(&source, &file.quality)?;
     settings::bloom(&source, &file.bloom)?;

@@ -1,7 +1,11 @@
 //! The mesh as loaded, and posed: the structures between reader, vertex stage and samples.
 
+use std::borrow::Cow;
+use std::sync::Arc;
+
 use glam::{Mat4, Vec2, Vec3, Vec4};
 
+use super::plain::{Alpha, PlainParts};
 use crate::model::fields::Field;
 
 /// A mesh in world units, node transforms applied; not yet morphed or skinned.
@@ -29,6 +33,8 @@ pub struct Mesh {
     pub bones: Vec<Mat4>,
     /// Numbers that rules read by name, those alone that enabled effects ask for.
     pub fields: Vec<VertexField>,
+    /// What of it is not skin; none where all of it is.
+    pub plain: Option<Arc<PlainParts>>,
 }
 
 /// One morph target: what is added at weight 1.
@@ -61,6 +67,35 @@ pub struct PosedMesh {
     pub triangles: Vec<[u32; 3]>,
     /// Numbers that rules read by name.
     pub fields: Vec<VertexField>,
+    /// What of it is not skin; none where all of it is.
+    pub plain: Option<Arc<PlainParts>>,
+}
+
+impl PosedMesh {
+    /// Its triangles, of which those have no area that have holes or blend: they stand in no light's way.
+    #[must_use]
+    pub fn occluders(&self) -> Cow<'_, [[u32; 3]]> {
+        let open = |plain: &PlainParts, triangle: usize| {
+            plain.material(triangle as u32).is_some_and(|material| material.alpha != Alpha::Opaque)
+        };
+        match &self.plain {
+            Some(plain) if (0..self.triangles.len()).any(|triangle| open(plain, triangle)) => {
+                let each = self.triangles.iter().enumerate();
+                Cow::Owned(
+                    each.map(|(i, &[a, b, c])| if open(plain, i) { [a; 3] } else { [a, b, c] }).collect(),
+                )
+            }
+            _ => Cow::Borrowed(&self.triangles),
+        }
+    }
+
+    /// Its triangles, of which those that are not skin have no area: for what the skin's own texture coordinates are of.
+    #[must_use]
+    pub fn skin_triangles(&self) -> Cow<'_, [[u32; 3]]> {
+        let Some(plain) = &self.plain else { return Cow::Borrowed(&self.triangles) };
+        let one = |(&[a, b, c], of): (&[u32; 3], &Option<u16>)| if of.is_some() { [a; 3] } else { [a, b, c] };
+        Cow::Owned(self.triangles.iter().zip(&plain.of_triangle).map(one).collect())
+    }
 }
 
 /// A field of every vertex, its numbers one after the other; no pose moves it.

@@ -1,7 +1,7 @@
 //! Everything that is read: scene files, meshes, maps, environments, cameras, targets.
 //!
-//! - [`mesh`]: the mesh as loaded, and posed
-//! - [`view`]: cameras and targets
+//! - [`mesh`]: the mesh as loaded, and posed; [`plain`]: what of it is not skin
+//! - [`view`]: cameras and targets; [`lens`]: what bends their images
 //! - [`maps`]: texture maps and the panorama; [`mip_maps`]: their coarser levels
 //! - [`light`]: lights beside it, and the irradiance that they bring
 //! - [`load`]: a scene file and everything that it names; its tables are in `file`, their meaning in
@@ -13,6 +13,8 @@
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`names`]: what a scene is called among several; `offers`: what it has for effects that may be off
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
+//! - [`inspect`]: what a mesh file holds, before there is a scene of it; [`draft`]: a first scene file for it
+//! - [`import`]: cameras that other programs solved or placed
 //! - [`facts`]: what a scene calls for of the shader planner
 //! - [`animation`]: how the mesh is to be posed, and its animation; [`pose`]: morphing and skinning
 //! - [`error`]: what is refused, and what is mended with a warning
@@ -26,11 +28,15 @@ mod cameras;
 pub mod charts;
 mod dapple;
 pub mod diffusion;
+pub mod draft;
 pub mod error;
 pub mod facts;
 mod file;
 mod gltf;
 pub mod images;
+pub mod import;
+pub mod inspect;
+pub mod lens;
 pub mod light;
 mod lights;
 pub(crate) mod lit;
@@ -43,6 +49,7 @@ pub mod names;
 mod normals;
 mod numbers;
 mod offers;
+pub mod plain;
 pub mod pose;
 mod settings;
 pub mod shadow_maps;
@@ -57,10 +64,11 @@ pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub use file::{Source, check_text};
 pub use light::{Light, LightKind};
+pub use lit::families as light_families;
 pub use load::LoadOptions;
 pub use load::check_values;
 pub use map_fit::{MapKind, MapPrior, MapSettings, MapSolver};
-pub use numbers::{interval, short};
+pub use numbers::{digits, interval, short};
 pub use offers::Offers;
 pub use shadow_maps::ShadowMaps;
 pub use terms::register_terms;
@@ -129,6 +137,17 @@ impl Scene {
     #[must_use]
     pub fn reflects_skin(&self) -> bool {
         reflects_skin(&self.setup())
+    }
+
+    /// What the CPU engine alone draws of the scene, in words; `None` where adapters draw all of it.
+    #[must_use]
+    pub fn cpu_alone(&self) -> Option<String> {
+        // A rasteriser draws straight edges straight.
+        let bent = self.views.iter().find(|view| view.camera.lens.distortion.is_some());
+        match bent {
+            Some(view) => Some(format!("view \"{}\" has a lens that bends what is straight", view.name)),
+            None => self.mesh.plain.as_ref().map(|_| "the mesh has parts that are not skin".to_owned()),
+        }
     }
 
     /// The switches of the model.

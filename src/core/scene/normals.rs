@@ -6,21 +6,23 @@ use glam::{DVec3, Vec3};
 
 use super::mesh::Mesh;
 
-/// Drop triangles that have no area at rest nor in any morph target; how many they were.
+/// Drop triangles that have no area at rest nor in any morph target; of each, whether it stays.
 ///
 /// A triangle that a morph opens (between closed lips, say) is kept.
-pub(super) fn drop_degenerate(mesh: &mut Mesh) -> usize {
-    let before = mesh.triangles.len();
+pub(super) fn drop_degenerate(mesh: &mut Mesh) -> Vec<bool> {
     let (positions, morphs) = (&mesh.positions, &mesh.morphs);
-    mesh.triangles.retain(|triangle| {
+    let stays = |triangle: &[u32; 3]| {
         let rest = triangle.map(|v| positions[v as usize].as_dvec3());
         has_area(rest)
             || morphs.iter().any(|morph| {
                 let delta = triangle.map(|v| morph.positions[v as usize].as_dvec3());
                 has_area(std::array::from_fn(|i| rest[i] + delta[i]))
             })
-    });
-    before - mesh.triangles.len()
+    };
+    let kept: Vec<bool> = mesh.triangles.iter().map(stays).collect();
+    let mut each = kept.iter();
+    mesh.triangles.retain(|_| each.next() != Some(&false));
+    kept
 }
 
 fn has_area([a, b, c]: [DVec3; 3]) -> bool {

@@ -11,6 +11,21 @@ pub fn short(number: f64) -> String {
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
+/// A number to so many digits, as one would write it.
+#[must_use]
+pub fn digits(x: f64, digits: i32) -> String {
+    // Without a sign.
+    if x == 0.0 {
+        return "0".to_owned();
+    }
+    if !x.is_finite() {
+        return short(x);
+    }
+    let unit = 10.0_f64.powi((digits - 1).saturating_sub(x.abs().log10().floor() as i32).clamp(-300, 300));
+    let rounded = (x * unit).round() / unit;
+    short(if rounded == 0.0 { 0.0 } else { rounded })
+}
+
 /// "[0, inf)" and the like.
 #[must_use]
 pub fn interval(lower: f64, upper: f64) -> String {

@@ -40,7 +40,8 @@ impl Mesh {
         let surfaces =
             (0..count).into_par_iter().with_min_len(BLOCK).map(|i| self.vertex(i, &active, &bones));
         let (uvs, triangles, fields) = (self.uvs.clone(), self.triangles.clone(), self.fields.clone());
-        let mut posed = PosedMesh { uvs, triangles, fields, ..PosedMesh::default() };
+        let plain = self.plain.clone();
+        let mut posed = PosedMesh { uvs, triangles, fields, plain, ..PosedMesh::default() };
         let single = |v: [f64; 3]| DVec3::from(v).as_vec3();
         let (places, frames): (Vec<Vec3>, Vec<(Vec3, Vec3)>) =
             surfaces.map(|s| (single(s.position), (single(s.normal), single(s.tangent)))).unzip();

@@ -13,8 +13,8 @@ use crate::shader::term::{Term, library, register, stamped};
 /// Rules are short; more is another kind of file.
 const MOST_BYTES: u64 = 1 << 20;
 
-/// Register the terms that a scene file names, and read no more of it: after that its effects and parameters have
-/// names.
+/// Register the terms that a scene file names, its lights' first, and read no more of it: after that its effects and
+/// parameters have names.
 ///
 /// # Errors
 /// When the scene file or one of its terms cannot be read.
@@ -22,9 +22,9 @@ pub fn register_terms(path: &Path) -> Result<Vec<&'static Term>, SceneError> {
     let source = Source::read(path)?;
     let file: SceneFile = source.parse()?;
     library::register_all();
-    // Lights are terms that the library brings along.
-    Lights::of_file(&source, &file)?;
-    terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))
+    let mut all = Lights::of_file(&source, &file)?.terms;
+    all.extend(terms(&source, &file.model, path.parent().unwrap_or(Path::new("")))?);
+    Ok(all)
 }
 
 /// The terms of the `[model]` table; paths are relative to `folder`.

@@ -1,6 +1,8 @@
 //! Cameras and targets.
 
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DMat3, DMat4, DVec3, DVec4};
+
+use super::lens::Lens;
 
 /// One view of the scene.
 #[derive(Clone, Debug)]
@@ -32,12 +34,14 @@ pub enum Background {
 pub struct Camera {
     /// World to camera, acting on column vectors; a rigid motion.
     pub world_to_camera: DMat4,
-    /// Vertical field of view, radians.
+    /// Vertical field of view of a pinhole of its focal length, radians.
     pub fov_y: f64,
     /// Image width in pixels.
     pub width: u32,
     /// Image height in pixels.
     pub height: u32,
+    /// How it is no pinhole in the middle of its image.
+    pub lens: Lens,
 }
 
 impl Camera {
@@ -51,12 +55,24 @@ impl Camera {
     /// corner; a pixel's centre is at half numbers.
     #[must_use]
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+        let [right, down] = self.image_plane(x, y).unwrap_or_else(|place| place);
+        let local = DVec4::new(right, -down, -1.0, 0.0);
+        (self.world_to_camera.inverse() * local).truncate().normalize()
+    }
+
+    /// Where on the image plane, one in front of the eye, the light comes from that meets an image point: to the right and
+    /// down.
+    ///
+    /// # Errors
+    /// Where no light meets it, as the lens bends it: the place of a pinhole.
+    pub fn image_plane(&self, x: f64, y: f64) -> Result<[f64; 2], [f64; 2]> {
         let tangent = (0.5 * self.fov_y).tan();
         let aspect = f64::from(self.width) / f64::from(self.height);
-        let ndc_x = 2.0 * x / f64::from(self.width) - 1.0;
-        let ndc_y = 1.0 - 2.0 * y / f64::from(self.height);
-        let local = DVec4::new(ndc_x * tangent * aspect, ndc_y * tangent, -1.0, 0.0);
-        (self.world_to_camera.inverse() * local).truncate().normalize()
+        let [cx, cy] = self.lens.centre;
+        let ndc_x = 2.0 * (x - cx) / f64::from(self.width) - 1.0;
+        let ndc_y = 2.0 * (y - cy) / f64::from(self.height) - 1.0;
+        let place = [ndc_x * tangent * aspect / self.lens.ratio, ndc_y * tangent];
+        self.lens.undistorted(place).ok_or(place)
     }
 
     /// The image point, in pixels, and the distance along the camera's axis of a world point.
@@ -66,10 +82,24 @@ impl Camera {
         let depth = -p.z;
         let tangent = (0.5 * self.fov_y).tan();
         let aspect = f64::from(self.width) / f64::from(self.height);
-        let ndc_x = p.x / (depth * tangent * aspect);
-        let ndc_y = p.y / (depth * tangent);
-        (0.5 * (ndc_x + 1.0) * f64::from(self.width), 0.5 * (1.0 - ndc_y) * f64::from(self.height), depth)
+        let [right, down] = self.lens.distorted([p.x / depth, -p.y / depth]).0;
+        let ndc_x = right * self.lens.ratio / (tangent * aspect);
+        let ndc_y = down / tangent;
+        let [cx, cy] = self.lens.centre;
+        (
+            0.5 * (ndc_x + 1.0) * f64::from(self.width) + cx,
+            0.5 * (ndc_y + 1.0) * f64::from(self.height) + cy,
+            depth,
+        )
     }
+}
+
+/// World to camera of one that stands at `eye` and looks along a unit vector; what is along `up`, which is across it, is
+/// upright in its image.
+pub(super) fn looking(eye: DVec3, along: DVec3, up: DVec3) -> DMat4 {
+    let right = along.cross(up).normalize();
+    let rows = DMat3::from_cols(right, right.cross(along), -along).transpose();
+    DMat4::from_mat3_translation(rows, rows * -eye)
 }
 
 /// An image to be matched, at the camera's size.

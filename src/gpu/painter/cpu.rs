@@ -17,7 +17,7 @@ use crate::prepare::Baked;
 use crate::render::backdrop::Backdrop;
 use crate::render::bloom::add_bloom;
 use crate::render::image::Image;
-use crate::render::shade::Shader;
+use crate::render::shade::{PLAIN_LAYER, Shader};
 use crate::samples::{Atlas, PosedSurface, SurfaceBakes, ViewSamples, atlas_of, gather_of, sample_view};
 use crate::scene::Scene;
 use crate::scene::mesh::{Mesh, Morph, PosedMesh};
@@ -93,7 +93,7 @@ struct Pose {
 impl Pose {
     fn of(scene: &Scene, mesh: &Mesh, own: Option<PoseBake>) -> Self {
         let posed = mesh.pose();
-        let rays = RayMesh::new(&posed.positions, &posed.triangles);
+        let rays = RayMesh::of(&posed);
         let gather = gather_of(scene, &posed);
         let (morphs, own) = (mesh.morphs.clone(), own.unwrap_or_default());
         Self { mesh: posed, rays, morphs, own, gather }
@@ -138,6 +138,7 @@ impl Painter for CpuPainter {
         let scene = &*self.baked.scene;
         let mut layers: Vec<(String, Image)> =
             shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image)).collect();
+        layers.extend(shaded.plain.map(|image| (PLAIN_LAYER.to_owned(), image)));
         let background = scene.views[0].background;
         let n = scene.quality.samples_per_axis;
         if let Some(backdrop) = Backdrop::new(scene, &self.params, background, camera, n) {

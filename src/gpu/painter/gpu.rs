@@ -32,8 +32,9 @@ impl GpuPainter {
     /// Of a scene, on an adapter's device.
     ///
     /// # Errors
-    /// As of [`Renderer::new`].
+    /// As of [`Renderer::new`], and when the scene has what the CPU engine alone draws.
     pub fn new(gpu: Gpu, baked: &Baked, options: RenderOptions) -> Result<Self, GpuError> {
+        GpuError::check_drawn(&baked.scene)?;
         let mut renderer = Renderer::new(&gpu, Content::of(baked), options)?;
         renderer.set_background(baked.scene.views[0].background);
         let terms = TermName::of(baked.scene.effects);

@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     // What rays find at vertices and in texels is of one posed surface.
     let posed = (arguments.stages || vertices::are_asked_for(scene)).then(|| {
         let mesh = scene.mesh.pose();
-        let rays = RayMesh::new(&mesh.positions, &mesh.triangles);
+        let rays = RayMesh::of(&mesh);
         (mesh, rays)
     });
     let surface = match &posed {

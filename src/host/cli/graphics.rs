@@ -53,6 +53,10 @@ impl Task {
                     "Use smaller views, fewer samples (samples_per_axis in [quality]) or smaller maps",
                 ),
             },
+            GpuError::CpuAlone { .. } => match self {
+                Self::Render => "Take --engine cpu".to_owned(),
+                _ => "Have samples made by the CPU".to_owned(),
+            },
             GpuError::SamplesStay { .. } => {
                 "Allow more (--device-memory), or have them made by the CPU (--samples cpu)".to_owned()
             }
@@ -140,6 +144,7 @@ mod tests {
             GpuError::NoDevice { adapter: adapter(), reason: reason() },
             GpuError::OutOfMemory { adapter: adapter() },
             GpuError::SamplesStay { adapter: adapter(), bytes: 9, most: 8 },
+            GpuError::CpuAlone { what: "it has eyes".to_owned() },
             GpuError::Lost { adapter: adapter(), reason: reason() },
             GpuError::Refused { adapter: adapter(), reason: reason() },
             GpuError::NothingShown,

@@ -1,8 +1,9 @@
 //! The command line: a file or folder a command. Every command ends with an [`Exit`].
 //!
-//! - `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `suggest`, `stability`,
-//!   `view`, `page`, `sweep`, `collect`: the commands
+//! - `inspect`, `import`, `panorama`, `fit`, `render`, `bake`, `demo`, `params`, `shader`, `export`, `info`, `ablate`, `tradeoff`, `suggest`,
+//!   `stability`, `view`, `page`, `sweep`, `collect`: the commands
 //! - `fit_engine`: what evaluates the passes of a fit; `fingerprint`: what its state belongs to
+//! - `columns`: tables in a terminal; `first_scene`: a scene file for a mesh
 //! - `graphics`: what to do about an adapter that cannot; `machine`: what a report says of its making
 //! - `opened`: a scene or a run folder, to be looked at
 //! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
@@ -12,19 +13,24 @@
 
 mod ablate;
 mod bake;
+mod columns;
 mod demo;
 mod export;
 mod fingerprint;
+mod first_scene;
 mod fit;
 mod fit_engine;
 mod fitted_scene;
 mod graphics;
+mod import;
 mod info;
+mod inspect;
 mod interrupt;
 mod machine;
 mod maps;
 mod opened;
 mod page;
+mod panorama;
 mod params;
 mod render;
 mod run_folder;
@@ -119,6 +125,9 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Command {
+    Inspect(inspect::Arguments),
+    Import(import::Arguments),
+    Panorama(panorama::Arguments),
     Fit(fit::Arguments),
     Ablate(ablate::Arguments),
     Tradeoff(tradeoff::Arguments),
@@ -148,6 +157,9 @@ pub fn main() -> ExitCode {
         progress::show();
     }
     let done = match arguments.command {
+        Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Import(arguments) => import::run(&arguments),
+        Command::Panorama(arguments) => panorama::run(&arguments),
         Command::Fit(arguments) => fit::run(&arguments),
         Command::Ablate(arguments) => ablate::run(&arguments),
         Command::Tradeoff(arguments) => tradeoff::run(&arguments),

@@ -3,15 +3,16 @@
 use std::fmt::Write as _;
 use std::path::PathBuf;
 
+use super::columns::aligned;
 use super::{Exit, Refusal, say};
 use crate::model::params::{Owner, ParamInfo, Scale, TABLE};
-use crate::scene::{interval, register_terms};
+use crate::scene::{interval, light_families, register_terms};
 use crate::shader::term::library;
 
 /// Print the parameter table: name, defaults, bounds, unit, kind, source
 #[derive(clap::Args)]
 #[command(
-    after_help = "`corrected` and `listing` are the defaults of the two forms.\n\nExamples:\n  skinfit params\n  skinfit params scene.toml\n  skinfit params --format markdown > parameters.md"
+    after_help = "`corrected` and `listing` are the defaults of the two forms.\n\nEach light of a scene brings parameters of its name: in their place stand those of a directional light called beam and of a point or spot light called lamp, where no scene is named.\n\nExamples:\n  skinfit params\n  skinfit params scene.toml\n  skinfit params --format markdown > parameters.md"
 )]
 pub(super) struct Arguments {
     /// A scene file, whose terms' parameters are listed too.
@@ -22,7 +23,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
-    let terms = arguments.scene.as_deref().map(register_terms).transpose()?.unwrap_or_default();
+    let terms = match &arguments.scene {
+        Some(scene) => register_terms(scene)?,
+        // Without a scene nobody has named a light.
+        None => light_families()?.to_vec(),
+    };
     let added = terms.iter().flat_map(|term| &term.params).map(|param| param.info());
     let library = library::terms().iter().flat_map(|term| &term.params).map(|param| param.info());
     let rows: Vec<&ParamInfo> = TABLE.iter().chain(library).chain(added).collect();
@@ -72,15 +77,7 @@ fn cells(row: &ParamInfo) -> [String; 8] {
 fn plain(rows: &[&ParamInfo]) -> String {
     let rows: Vec<[String; 8]> =
         std::iter::once(HEAD.map(str::to_owned)).chain(rows.iter().map(|row| cells(row))).collect();
-    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..8).map(width).collect();
-    let mut text = String::new();
-    for row in &rows {
-        let line: Vec<String> =
-            row.iter().zip(&widths).map(|(cell, &width)| format!("{cell:width$}")).collect();
-        let _ = writeln!(text, "{}", line.join("  ").trim_end());
-    }
-    text
+    aligned(&rows)
 }
 
 /// The table as Markdown; docs/parameters.md holds exactly this.

@@ -306,7 +306,7 @@ impl<'a> Bench<'a> {
     fn hits(&self, scene: &Scene) -> Arc<Vec<Vec<Hit>>> {
         let traced = || {
             let posed = scene.mesh.pose();
-            let rays = RayMesh::new(&posed.positions, &posed.triangles);
+            let rays = RayMesh::of(&posed);
             let of = |view: &View| sample_hits(scene, &posed, &rays, &view.camera);
             Arc::new(scene.views.iter().map(of).collect())
         };
@@ -317,7 +317,7 @@ impl<'a> Bench<'a> {
 /// The texels that effects of a scene are computed in.
 fn atlas(scene: &Scene, bakes: SurfaceBakes<'_>) -> Result<Option<Arc<Atlas>>, SampleError> {
     let posed = scene.mesh.pose();
-    let rays = RayMesh::new(&posed.positions, &posed.triangles);
+    let rays = RayMesh::of(&posed);
     samples::atlas_of(scene, &PosedSurface::new(scene, &posed, &rays, &scene.mesh.morphs, bakes)?)
 }
 

@@ -96,7 +96,7 @@ mod tests {
             pixel: (0..pixels as u32).collect(),
             coverage: (0..pixels).map(|i| i as f32).collect(),
             surface,
-            atlas: None,
+            ..ViewSamples::default()
         }
     }
 

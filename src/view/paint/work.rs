@@ -207,11 +207,12 @@ impl Work {
     }
 
     async fn painter(&mut self, opened: &Opened) -> Result<Box<dyn Painter>, PaintError> {
-        if !self.engine.cpu && self.gpu.is_none() {
+        let cpu = self.engine.cpu || opened.baked.scene.cpu_alone().is_some();
+        if !cpu && self.gpu.is_none() {
             let choice = Choice { name: self.engine.adapter.clone(), ..Choice::default() };
             self.gpu = Some(Gpu::request(&choice).await?);
         }
-        let Some(gpu) = self.gpu.as_ref().filter(|_| !self.engine.cpu) else {
+        let Some(gpu) = self.gpu.as_ref().filter(|_| !cpu) else {
             return Ok(Box::new(CpuPainter::new(&opened.baked)?));
         };
         let options = RenderOptions {

@@ -46,7 +46,7 @@ fn scene_files_that_say_what_there_is_not() {
             &["line 3: unknown key `flie`. Did you mean `file`?"],
         ),
         ("unknown table", "[quality]", "[qualty]", &["unknown key `qualty`. Did you mean `quality`?"]),
-        ("missing key", "fov_y_degrees = 35.0", "", &["line 17", "the key `fov_y_degrees` is missing"]),
+        ("missing key", "fov_y_degrees = 35.0", "", &["line 18", "the key `fov_y_degrees` is missing"]),
         (
             "unknown parameter",
             "hilite = 0.7",

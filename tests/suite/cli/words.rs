@@ -10,6 +10,11 @@ fn every_help_page_holds_an_example_that_is_understood() {
     let sandbox = Sandbox::new();
     for command in [
         "",
+        "inspect",
+        "import",
+        "panorama",
+        "panorama merge",
+        "panorama stitch",
         "fit",
         "ablate",
         "tradeoff",
@@ -25,7 +30,8 @@ fn every_help_page_holds_an_example_that_is_understood() {
         "sweep",
         "collect",
     ] {
-        let arguments: Vec<&str> = [command, "--help"].into_iter().filter(|word| !word.is_empty()).collect();
+        let arguments: Vec<&str> =
+            command.split(' ').chain(["--help"]).filter(|word| !word.is_empty()).collect();
         let help = sandbox.run(&arguments).done().out;
         let examples: Vec<&str> = help.lines().filter(|line| line.starts_with("  skinfit ")).collect();
         assert!(!examples.is_empty(), "{command}: no example\n{help}");
@@ -81,8 +87,12 @@ fn the_parameter_table_is_whole_in_every_format() {
     let library = library::terms().iter().flat_map(|term| &term.params).map(|param| param.info());
     let table: Vec<&ParamInfo> = TABLE.iter().chain(library).collect();
     assert!(table.iter().any(|row| row.name == "roughness"));
-    assert_eq!(text.lines().count(), 1 + table.len());
-    assert_eq!(markdown.lines().count(), 2 + table.len());
+    // Behind them those of a light of each kind.
+    let of_lights = |line: &&str| line.starts_with("light.beam.") || line.starts_with("light.lamp.");
+    let lights = text.lines().filter(of_lights).count();
+    assert!(lights > 6, "{text}");
+    assert_eq!(text.lines().count(), 1 + table.len() + lights);
+    assert_eq!(markdown.lines().count(), 2 + table.len() + lights);
     for (i, row) in table.iter().enumerate() {
         let line = text.lines().nth(1 + i).unwrap();
         assert!(line.starts_with(row.name), "{line}");
@@ -93,7 +103,7 @@ fn the_parameter_table_is_whole_in_every_format() {
     }
     let json: serde_json::Value = serde_json::from_str(&print("json")).unwrap();
     let rows = json.as_array().unwrap();
-    assert_eq!(rows.len(), table.len());
+    assert_eq!(rows.len(), table.len() + lights);
     for (json, row) in rows.iter().zip(&table) {
         assert_eq!((json["name"].as_str(), json["unit"].as_str()), (Some(row.name), Some(row.unit)));
         for (form, default) in [("corrected", row.corrected), ("listing", row.listing)] {

@@ -95,6 +95,7 @@ impl Composed<'_> {
             coverage: vec![1.0; LANES],
             surface,
             atlas,
+            ..ViewSamples::default()
         }
     }
 

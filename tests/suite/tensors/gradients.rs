@@ -57,7 +57,7 @@ impl Case {
             pixel: (0..(GROUPS * LANES) as u32).collect(),
             coverage: vec![1.0; GROUPS * LANES],
             surface: SurfaceRecords::new(Asked::EVERYTHING, N / LANES),
-            atlas: None,
+            ..ViewSamples::default()
         };
         for group in 0..GROUPS {
             let records = group_start[group] as usize..group_start[group + 1] as usize;

@@ -1,8 +1,8 @@
-//! Animation 0 at a time: translations, rotations, scales and morph weights of nodes.
+//! An animation at a time: translations, rotations, scales and morph weights of nodes.
 
 use glam::{DQuat, DVec3, DVec4};
 use gltf::json;
-use json::animation::{Interpolation, Property};
+use json::animation::{Animation, Interpolation, Property};
 use json::validation::Checked;
 
 use super::document::Document;
@@ -29,7 +29,7 @@ impl Document {
         local: &mut [Local],
         weights: &mut [Option<Vec<f32>>],
     ) -> Result<(), SceneError> {
-        let Some(animation) = self.root.animations.first() else { return Ok(()) };
+        let Some(animation) = self.animation() else { return Ok(()) };
         for (i, channel) in animation.channels.iter().enumerate() {
             // Extensions animate other things, which do not move the mesh.
             let Checked::Valid(property) = channel.target.path else { continue };
@@ -60,11 +60,37 @@ impl Document {
         Ok(())
     }
 
-    /// Which of a node's morph targets animation 0 gives another weight than 0 at any time: a key's value, or a
+    /// The names of the file's animations, in its order: `animation N` where it gives none.
+    pub(in crate::scene) fn animation_names(&self) -> Vec<String> {
+        let animations = self.root.animations.iter().enumerate();
+        let named = animations
+            .map(|(i, animation)| animation.name.clone().unwrap_or_else(|| format!("animation {i}")));
+        named.collect()
+    }
+
+    /// The same document, whose nodes the animation at this place in the file moves.
+    pub(in crate::scene) fn with_animation(mut self, clip: usize) -> Self {
+        self.clip = clip;
+        self
+    }
+
+    /// Whether the animation moves morph targets.
+    pub(in crate::scene) fn moves_morphs(&self) -> bool {
+        let weights = Checked::Valid(Property::MorphTargetWeights);
+        let channels = self.animation().map_or(&[][..], |animation| &animation.channels);
+        channels.iter().any(|channel| channel.target.path == weights)
+    }
+
+    /// The animation that moves nodes.
+    fn animation(&self) -> Option<&Animation> {
+        self.root.animations.get(self.clip)
+    }
+
+    /// Which of a node's morph targets the animation gives another weight than 0 at any time: a key's value, or a
     /// tangent of its spline, is not 0. Shorter than the targets where those at the end stay.
     pub(super) fn moved_targets(&self, node: usize) -> Result<Vec<bool>, SceneError> {
         let mut moved = Vec::new();
-        let Some(animation) = self.root.animations.first() else { return Ok(moved) };
+        let Some(animation) = self.animation() else { return Ok(moved) };
         for (i, channel) in animation.channels.iter().enumerate() {
             let weights = Checked::Valid(Property::MorphTargetWeights);
             if channel.target.path != weights || channel.target.node.value() != node {
@@ -85,9 +111,13 @@ impl Document {
         Ok(moved)
     }
 
-    /// The first and the last key's time of animation 0; `None` without one, or without keys.
+    /// The first and the last key's time of the animation; `None` without one, or without keys.
     pub(in crate::scene) fn animation_seconds(&self) -> Result<Option<(f64, f64)>, SceneError> {
-        let Some(animation) = self.root.animations.first() else { return Ok(None) };
+        self.animation().map_or(Ok(None), |animation| self.seconds_of(animation))
+    }
+
+    /// The first and the last key's time of an animation.
+    pub(super) fn seconds_of(&self, animation: &Animation) -> Result<Option<(f64, f64)>, SceneError> {
         let mut ends: Option<(f64, f64)> = None;
         for sampler in &animation.samplers {
             let times = self.scalars(sampler.input)?;
@@ -102,7 +132,7 @@ impl Document {
 
     fn channel_error(&self, channel: usize, what: &str) -> SceneError {
         self.error(what, "Export the animation anew, or leave `time` out")
-            .at(format!("animation 0, channel {channel}"))
+            .at(format!("animation {}, channel {channel}", self.clip))
     }
 }
 

@@ -1,10 +1,13 @@
 //! Every primitive of the scene in one mesh: placed by its node, or left to its bones.
 
+use std::sync::Arc;
+
 use glam::{DMat3, DMat4, DVec3, Mat4, Vec3, Vec4};
 use gltf::json;
 
 use super::document::Document;
 use super::nodes::Nodes;
+use super::plain::Split;
 use super::primitive::{Mended, Part, Target};
 use super::{Ask, Tangents, Uvs};
 use crate::scene::error::{SceneError, Warnings, warn};
@@ -55,6 +58,7 @@ impl Document {
             mesh: Mesh { fields: ask.fields.iter().map(VertexField::new).collect(), ..Mesh::default() },
             identity: None,
             skins: vec![None; self.root.skins.len()],
+            split: ask.skin.as_deref().map(Split::new),
             mended: Mended::default(),
         };
         for i in 0..builder.nodes.in_scene.len() {
@@ -73,6 +77,8 @@ struct Builder<'a> {
     identity: Option<u16>,
     /// Where each skin's bones begin.
     skins: Vec<Option<usize>>,
+    /// What is skin, where a scene says.
+    split: Option<Split<'a>>,
     mended: Mended,
 }
 
@@ -94,8 +100,20 @@ impl Builder<'_> {
         for (i, primitive) in mesh.primitives.iter().enumerate() {
             let place = format!("{name}, primitive {i}");
             let bones = skin.map(|(_, bones)| bones);
-            if let Some(part) = document.part(primitive, &place, self.ask, bones, &mut self.mended)? {
+            let plain = match &mut self.split {
+                Some(split) => split.of(document, mesh, primitive, warnings)?,
+                None => None,
+            };
+            // Maps of the scene's are not looked up on what is not skin.
+            let loose = plain.filter(|_| self.ask.uvs == Uvs::Required);
+            let loose = loose.map(|_| Ask { uvs: Uvs::Optional, ..self.ask.clone() });
+            let ask = loose.as_ref().unwrap_or(self.ask);
+            if let Some(part) = document.part(primitive, &place, ask, bones, &mut self.mended)? {
+                let count = part.triangles.len();
                 self.append(part, &place, world, skin.map(|(first, _)| first), &slots)?;
+                if let Some(split) = &mut self.split {
+                    split.add(count, plain);
+                }
             }
         }
         Ok(())
@@ -278,12 +296,16 @@ impl Builder<'_> {
             }
             morphs.iter_mut().zip(weights).for_each(|(morph, &weight)| morph.weight = weight);
         }
-        self.mended.degenerate = normals::drop_degenerate(&mut self.mesh);
+        let kept = normals::drop_degenerate(&mut self.mesh);
+        self.mended.degenerate = kept.iter().filter(|kept| !**kept).count();
         if self.mesh.triangles.is_empty() {
             return Err(document.error(
                 "has no triangles (that have an area) in its scene: the mesh is empty",
                 "Export a mesh of triangles, in the file's default scene",
             ));
+        }
+        if let Some(split) = self.split.take() {
+            self.mesh.plain = split.finish(document, &kept)?.map(Arc::new);
         }
         normals::complete(&mut self.mesh);
         match self.ask.tangents {

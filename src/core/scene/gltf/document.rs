@@ -20,6 +20,8 @@ pub(in crate::scene) struct Document {
     pub(super) path: PathBuf,
     pub(super) root: json::Root,
     buffers: Vec<Vec<u8>>,
+    /// The animation that moves nodes, where there is one at this place.
+    pub(super) clip: usize,
 }
 
 impl Document {
@@ -38,7 +40,7 @@ impl Document {
         })?;
         let blob = parsed.blob;
         let root = parsed.document.into_json();
-        let mut document = Self { path: path.to_owned(), root, buffers: Vec::new() };
+        let mut document = Self { path: path.to_owned(), root, buffers: Vec::new(), clip: 0 };
         document.check_extensions()?;
         document.load_buffers(blob)?;
         Ok(document)
@@ -63,7 +65,7 @@ impl Document {
                     self.error("has no binary chunk for its buffer", "Export it anew")
                         .at(format!("buffer {i}"))
                 })?,
-                Some(uri) => self.resolve(uri, i)?,
+                Some(uri) => self.resolve(uri, &format!("buffer {i}"))?,
             };
             let (held, promised) = (bytes.len() as u64, buffer.byte_length.0);
             if held < promised {
@@ -77,8 +79,8 @@ impl Document {
     }
 
     /// The bytes behind a URI: a data URI, or a file beside this one.
-    fn resolve(&self, uri: &str, i: usize) -> Result<Vec<u8>, SceneError> {
-        let at = |error: SceneError| error.at(format!("buffer {i}"));
+    pub(super) fn resolve(&self, uri: &str, place: &str) -> Result<Vec<u8>, SceneError> {
+        let at = |error: SceneError| error.at(place);
         if let Some(data) = uri.strip_prefix("data:") {
             let (head, body) = data.split_once(',').unwrap_or((data, ""));
             if !head.ends_with(";base64") {

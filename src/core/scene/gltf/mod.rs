@@ -3,8 +3,11 @@
 //! - [`document`]: the JSON, its buffers, and checked lookups of everything by index
 //! - [`accessor`]: typed arrays out of the buffers
 //! - [`nodes`]: the node tree, posed by an [`animation`] at a time
+//! - [`cameras`]: the cameras of its nodes
+//! - [`contents`]: what the file holds, for people
 //! - [`lights`]: the lights of its nodes (KHR_lights_punctual)
 //! - [`primitive`]: one primitive's attributes and triangles
+//! - [`plain`]: which triangles are skin, and the materials of the others
 //! - [`skins`]: bones and their influences
 //! - [`assemble`]: every primitive of the scene in one [`Mesh`](super::mesh::Mesh)
 //!
@@ -14,12 +17,16 @@
 mod accessor;
 mod animation;
 mod assemble;
+mod cameras;
+mod contents;
 mod document;
 mod lights;
 mod nodes;
+mod plain;
 mod primitive;
 mod skins;
 
+pub(super) use cameras::FileCamera;
 pub(super) use document::Document;
 
 use crate::model::fields::Fields;
@@ -39,9 +46,11 @@ pub(super) struct Ask {
     pub bones: bool,
     /// Numbers of vertices, of the attributes `_NAME`.
     pub fields: Fields,
-    /// Seconds into animation 0; without: the nodes as they stand.
+    /// Seconds into the animation; without: the nodes as they stand.
     pub time: Option<f64>,
-    /// Whether morph targets are to be marked that animation 0 moves.
+    /// The names of materials and meshes that are skin; without: all of it is.
+    pub skin: Option<Vec<String>>,
+    /// Whether morph targets are to be marked that the animation moves.
     pub clip: bool,
 }
 

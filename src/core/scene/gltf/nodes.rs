@@ -55,7 +55,7 @@ pub(super) struct Nodes {
 }
 
 impl Document {
-    /// Place every node, by animation 0 at `time` seconds or as it stands.
+    /// Place every node, by the animation at `time` seconds or as it stands.
     pub(super) fn nodes(&self, time: Option<f64>) -> Result<Nodes, SceneError> {
         let nodes = &self.root.nodes;
         let mut local: Vec<Local> = nodes.iter().map(Local::of).collect();

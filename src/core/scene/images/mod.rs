@@ -1,17 +1,23 @@
 //! Image files as linear numbers: OpenEXR, Radiance HDR, PNG and JPEG.
 //!
 //! - `open_exr`, `raster`: the decoders
+//! - `chromaticities`: other primaries than Rec.709's
 //! - `target`: images to be matched, and their masks
 //!
 //! Files are told apart by their content. Colour maps in 8 or 16 bits are sRGB; data maps are taken
 //! as they are; EXR and HDR are linear. Sizes are checked before anything is allocated.
 
+mod chromaticities;
 mod open_exr;
 mod raster;
 mod target;
 
 use std::path::Path;
 
+use glam::DVec3;
+use rayon::prelude::*;
+
+use self::chromaticities::Chromaticities;
 pub(super) use target::{haze, target};
 
 use super::error::{SceneError, Warnings, guarded, read_bytes, warn};
@@ -31,6 +37,8 @@ struct Image {
     alpha: Option<Vec<f32>>,
     /// The greatest code of an 8- or 16-bit file; `None` for floating point.
     code: Option<u16>,
+    /// What its colours are shares of, where the file says; else of Rec.709's primaries.
+    chromaticities: Option<Chromaticities>,
 }
 
 /// What a reader needs to know of the file that it decodes.
@@ -87,13 +95,18 @@ impl Opened<'_> {
 
 /// Decode any image; of size `size` when that is given. No pixel is NaN or infinite.
 fn read(path: &Path, size: Option<(u32, u32)>) -> Result<Image, SceneError> {
-    read_with(path, size, |opened| match opened.bytes {
+    read_with(path, size, decode)
+}
+
+/// Decode an image by its first bytes.
+fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
+    match opened.bytes {
         [0x76, 0x2f, 0x31, 0x01, ..] => open_exr::decode(opened),
         [b'#', b'?', ..] => raster::decode_hdr(opened),
         [0x89, b'P', b'N', b'G', ..] => raster::decode(opened, image::ImageFormat::Png),
         [0xff, 0xd8, 0xff, ..] => raster::decode(opened, image::ImageFormat::Jpeg),
         _ => {
-            let claims = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+            let claims = opened.path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
             let what = match claims.as_str() {
                 "exr" => "is not an EXR file, whatever its name says",
                 "hdr" => "is not a Radiance HDR file, whatever its name says",
@@ -103,7 +116,24 @@ fn read(path: &Path, size: Option<(u32, u32)>) -> Result<Image, SceneError> {
             };
             Err(opened.error(what, "Use OpenEXR, Radiance HDR, PNG or JPEG"))
         }
-    })
+    }
+}
+
+/// Decode an image of colours: in linear files Rec.709's shares, whatever primaries the file has.
+fn read_colors(path: &Path, size: Option<(u32, u32)>) -> Result<Image, SceneError> {
+    let mut image = read(path, size)?;
+    let Some(chromaticities) = image.chromaticities.take() else { return Ok(image) };
+    let matrix = chromaticities.to_rec709().map_err(|what| {
+        let what = format!("has {what} in its attribute `chromaticities`");
+        SceneError::new(path, what, "Write the file anew with those of its colours, or without the attribute")
+    })?;
+    if let Some(matrix) = matrix {
+        image.rgb.par_iter_mut().for_each(|rgb| {
+            *rgb = (matrix * DVec3::from(rgb.map(f64::from))).as_vec3().to_array();
+        });
+        image.check_finite(path)?;
+    }
+    Ok(image)
 }
 
 /// Decode an image by `decode`; no pixel is NaN or infinite.
@@ -159,9 +189,12 @@ pub fn srgb_decode(code: f64) -> f64 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
-/// A colour map: linear Rec.709.
-pub(super) fn color_map(path: &Path) -> Result<Map<3>, SceneError> {
-    let mut image = read(path, None)?;
+/// A colour map, or a picture of radiance: linear Rec.709. Codes of 8 or 16 bits are sRGB's.
+///
+/// # Errors
+/// When it cannot be read as an image.
+pub fn color_map(path: &Path) -> Result<Map<3>, SceneError> {
+    let mut image = read_colors(path, None)?;
     image.decode_srgb();
     Ok(image.into_map())
 }
@@ -182,6 +215,27 @@ pub(super) fn normal_map(path: &Path, flip: bool) -> Result<(Map<3>, Option<Map<
     Ok((map, alpha))
 }
 
+/// A picture with its alpha, which is 1 without: colours are made linear, numbers are taken as they are.
+pub(super) fn picture(path: &Path, color: bool) -> Result<Map<4>, SceneError> {
+    Ok(with_alpha(read(path, None)?, color))
+}
+
+/// The same of a file's bytes within another file.
+pub(super) fn picture_of(path: &Path, bytes: &[u8], color: bool) -> Result<Map<4>, SceneError> {
+    let image = guarded(path, || decode(Opened { path, bytes, size: None }))?;
+    image.check_finite(path)?;
+    Ok(with_alpha(image, color))
+}
+
+fn with_alpha(mut image: Image, color: bool) -> Map<4> {
+    if color {
+        image.decode_srgb();
+    }
+    let alpha = image.alpha.unwrap_or_else(|| vec![1.0; image.rgb.len()]);
+    let texels = image.rgb.iter().zip(alpha).map(|(&[r, g, b], a)| [r, g, b, a]).collect();
+    Map { width: image.width, height: image.height, texels }
+}
+
 /// The first channel of a data map.
 pub(super) fn scalar_map(path: &Path) -> Result<Map<1>, SceneError> {
     let image = read(path, None)?;
@@ -191,7 +245,7 @@ pub(super) fn scalar_map(path: &Path) -> Result<Map<1>, SceneError> {
 
 /// A lat-long panorama: linear radiance, never negative.
 pub(super) fn panorama(path: &Path, warnings: &mut Warnings) -> Result<Map<3>, SceneError> {
-    let mut image = read(path, None)?;
+    let mut image = read_colors(path, None)?;
     if let Some(code) = image.code {
         let bits = if code == 255 { 8 } else { 16 };
         let message = format!("holds {bits}-bit colours, read as sRGB: lights brighter than white are lost");

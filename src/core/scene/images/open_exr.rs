@@ -9,7 +9,9 @@ use exr::image::{FlatSamples, Layer};
 use exr::meta::MetaData;
 use exr::meta::header::Header;
 use exr::prelude::{AnyChannels, ReadChannels, ReadLayers, Vec2};
+use glam::DVec2;
 
+use super::chromaticities::Chromaticities;
 use super::{Image, Opened};
 use crate::scene::error::SceneError;
 
@@ -25,6 +27,12 @@ pub(super) fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
 pub(super) fn decode_haze(opened: Opened<'_>) -> Result<Image, SceneError> {
     let remedy = "Save the haze under the name haze.Y";
     decode_by(opened, haze, "has no channel haze.Y, and is not an image of Y alone", remedy)
+}
+
+/// Of the attribute of that name.
+fn xy(given: exr::meta::attribute::Chromaticities) -> Chromaticities {
+    let point = |Vec2(x, y): Vec2<f32>| DVec2::new(f64::from(x), f64::from(y));
+    Chromaticities { primaries: [given.red, given.green, given.blue].map(point), white: point(given.white) }
 }
 
 /// The indices of a layer's R, G, B and perhaps A.
@@ -58,7 +66,8 @@ fn decode_by(
     let mut found = Vec::new();
     for layer in &image.layer_data {
         if let Some(channels) = find(layer) {
-            return place(opened, layer, &channels, window.position, window.size);
+            let placed = place(opened, layer, &channels, window.position, window.size)?;
+            return Ok(Image { chromaticities: image.attributes.chromaticities.map(xy), ..placed });
         }
         found.extend(layer.channel_data.list.iter().map(|channel| channel.name.to_string()));
     }
@@ -242,5 +251,5 @@ fn place(
         copy(&samples(i), Box::new(|at, value| plane[at] = value));
         plane
     });
-    Ok(Image { width, height, rgb: out, alpha, code: None })
+    Ok(Image { width, height, rgb: out, alpha, code: None, chromaticities: None })
 }

@@ -46,7 +46,14 @@ pub(super) fn decode(opened: Opened<'_>, format: ImageFormat) -> Result<Image, S
     } else {
         decoded.into_rgb8().pixels().map(|p| p.0.map(|v| scale(v.into()))).collect()
     };
-    Ok(Image { width: width as usize, height: height as usize, rgb, alpha, code: Some(code) })
+    Ok(Image {
+        width: width as usize,
+        height: height as usize,
+        rgb,
+        alpha,
+        code: Some(code),
+        chromaticities: None,
+    })
 }
 
 /// Whether an end-of-image marker follows the last start of a scan: the decoder would fill what is
@@ -78,5 +85,6 @@ pub(super) fn decode_hdr(opened: Opened<'_>) -> Result<Image, SceneError> {
         rgb: decoded.pixels().map(|p| p.0.map(|v| v / exposure)).collect(),
         alpha: None,
         code: None,
+        chromaticities: None,
     })
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Image, open_exr, read, read_with, srgb_decode};
+use super::{Image, open_exr, read, read_colors, read_with, srgb_decode};
 use crate::model::params::LARGEST;
 use crate::scene::error::{SceneError, Warnings, warn};
 use crate::scene::view::{Clip, Target};
@@ -20,7 +20,7 @@ pub(in crate::scene) fn target(
     size: (u32, u32),
     warnings: &mut Warnings,
 ) -> Result<Target, SceneError> {
-    let mut image = read(path, Some(size))?;
+    let mut image = read_colors(path, Some(size))?;
     let clipped_at = image.code.map(|code| {
         // Half a code from either end: what rounds to the end may lie beyond it.
         let at = |half: f64| srgb_decode(half / f64::from(code)) as f32;

@@ -9,7 +9,7 @@ use crate::model::params::Params;
 use crate::prepare::{Baked, JointScene};
 use crate::progress;
 use crate::render::places::places;
-use crate::render::shade::Shader;
+use crate::render::shade::{PLAIN_LAYER, Shader};
 use crate::report::ViewEvidence;
 use crate::report::compared::compared;
 use crate::scene::view::View;
@@ -52,6 +52,7 @@ fn shown(
     let (target, coverage) = compared(view, observed, &shaded.image);
     let size = [view.camera.width, view.camera.height].map(|side| side as usize);
     let terms = shaded.terms.into_iter().map(|(name, image)| (name.name().to_owned(), image));
+    let terms = terms.chain(shaded.plain.map(|image| (PLAIN_LAYER.to_owned(), image)));
     ViewEvidence {
         name: view.name.clone(),
         target,

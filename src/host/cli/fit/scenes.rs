@@ -101,7 +101,10 @@ impl Ready {
         let (observed, chosen) = if arguments.engine.makes_samples() {
             let baked = baked.keep_targets()?;
             tell_of(arguments, &baked);
-            arguments.engine.over_own_samples(baked)?
+            let told = baked.warnings.len();
+            let (observed, chosen) = arguments.engine.over_own_samples(baked)?;
+            tell_warnings(&observed.warnings[told..]);
+            (observed, chosen)
         } else {
             let observed = baked.sample()?.observe()?;
             tell_of(arguments, &observed);

@@ -79,7 +79,11 @@ impl FitEngineArguments {
     ) -> Result<(Observed, SelectedEngine), Refusal> {
         let (observed, chosen) = match self.with_own_samples(baked.clone())? {
             Ok((observed, engine)) => (observed, SelectedEngine { engine: Box::new(engine), why: None }),
-            Err(error @ (GpuError::OutOfMemory { .. } | GpuError::SamplesStay { .. })) => {
+            Err(
+                error @ (GpuError::OutOfMemory { .. }
+                | GpuError::SamplesStay { .. }
+                | GpuError::CpuAlone { .. }),
+            ) => {
                 tell(&format!("{error} The CPU makes the samples."));
                 let observed = baked.sample()?.observe()?;
                 let chosen = self.on_gpu(&observed, None)?;

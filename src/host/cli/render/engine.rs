@@ -72,7 +72,13 @@ impl EngineArguments {
     /// The requested engine with the scene in it.
     pub(super) fn painter(&self, baked: &Baked, painting: Painting) -> Result<Box<dyn Painter>, Refusal> {
         let antialias = self.antialias.unwrap_or(Antialias::Grid(baked.scene.quality.samples_per_axis));
+        let auto = self.engine == "auto" && self.adapter.is_none();
+        let alone = baked.scene.cpu_alone().filter(|_| auto);
+        if let Some(what) = &alone {
+            tell(&format!("{what}: the CPU engine renders."));
+        }
         if self.may_be_gpu()
+            && alone.is_none()
             && let Some(gpu) = self.open()?
         {
             let Painting { animated, timed } = painting;

@@ -73,7 +73,7 @@ pub(super) struct Arguments {
     /// Render so many frames: a whole turn of the camera about the mesh's vertical axis.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Sequences")]
     frames: Option<u32>,
-    /// Let the frames go through the mesh file's animation 0 instead, the camera standing still.
+    /// Let the frames go through the mesh's animation instead, the camera standing still.
     #[arg(long, requires = "frames", help_heading = "Sequences")]
     animate: bool,
     /// How ambient occlusion follows the animation: `targets`, by what is baked once for each morph target that it

@@ -32,6 +32,8 @@ impl Remeshed {
         let open = samples::posed_occlusion(scene, &scene.mesh.morphs, vertices, bakes.occlusion);
         let fields = seen_of_sky(scene, &mesh, bakes).map_err(PrepareError::from)?;
         mesh.fields.extend(fields);
+        // Of other triangles it would not be known which are skin.
+        mesh.plain = None;
         Ok(Self { mesh, open: open.map_err(PrepareError::from)? })
     }
 
@@ -90,8 +92,8 @@ impl Remeshed {
     /// The scene with this mesh and these settings, sampled.
     pub(super) fn evaluated(&self, bench: &Bench<'_>, settings: Settings) -> Result<Evaluated, StudyError> {
         let mut scene = bench.scene(settings);
-        let PosedMesh { positions, normals, tangents, uvs, triangles, fields } = self.mesh.clone();
-        scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, fields, ..Mesh::default() };
+        let PosedMesh { positions, normals, tangents, uvs, triangles, fields, plain } = self.mesh.clone();
+        scene.mesh = Mesh { positions, normals, tangents, uvs, triangles, fields, plain, ..Mesh::default() };
         let occlusion = self.open.clone().map(|base| VertexOcclusion { base, morphs: Vec::new() });
         let bakes = SurfaceBakes { occlusion: occlusion.as_ref(), ..SurfaceBakes::default() };
         let samples = samples::sample_views(&scene, &self.mesh, bakes).map_err(PrepareError::from)?;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::quality::ROUNDS;
 use crate::StudyError;
 use crate::gpu::upload::Content;
-use crate::gpu::{Choice, Gpu, RenderOptions, Renderer};
+use crate::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use crate::model::effects::Effect;
 use crate::model::shadow_filter::ShadowFilter;
 use crate::reference::Difference;
@@ -175,6 +175,7 @@ impl<'a> Drawn<'a> {
         evaluated: &Evaluated,
         maps: ShadowMaps,
     ) -> Result<Self, StudyError> {
+        GpuError::check_drawn(&evaluated.scene)?;
         let mut scene = evaluated.scene.clone();
         scene.shadow_maps = maps;
         // The processor's images here are without it.

@@ -156,6 +156,7 @@ fn samples(atlas: Option<&Arc<Atlas>>) -> ViewSamples {
         coverage: vec![1.0; groups * LANES],
         surface,
         atlas: atlas.cloned(),
+        ..ViewSamples::default()
     }
 }
 

@@ -1,12 +1,23 @@
 //! The `[[view]]` tables: names, cameras and the files that belong to them, checked.
+//!
+//! - `lens`: what bends its image
+//! - `place`: where a camera stands: by a matrix, by what it looks at, or by its name in the mesh file
+
+mod lens;
+mod place;
 
 use std::path::PathBuf;
 
-use glam::{DMat3, DMat4, DVec3};
+use glam::DMat4;
 use toml::Spanned;
 
-use super::error::SceneError;
+pub(super) use self::place::{MeshCameras, all_finite, turns_alone};
+
+use self::lens::with_lens;
+use self::place::Place;
+use super::error::{SceneError, Warnings};
 use super::file::{BackgroundValue, Source, ViewTable};
+use super::lens::Lens;
 use super::numbers::{interval, number, short};
 use super::view::{Background, Camera};
 use crate::model::params::LARGEST;
@@ -26,13 +37,18 @@ pub(super) struct ViewPlan {
     pub background: Background,
 }
 
-/// All views of a scene; there must be one.
-pub(super) fn plan(source: &Source, tables: &[Spanned<ViewTable>]) -> Result<Vec<ViewPlan>, SceneError> {
+/// All views of a scene; there must be one. Without a mesh file, cameras that are named stand anywhere.
+pub(super) fn plan(
+    source: &Source,
+    tables: &[Spanned<ViewTable>],
+    mesh: Option<MeshCameras<'_>>,
+    warnings: &mut Warnings,
+) -> Result<Vec<ViewPlan>, SceneError> {
     if tables.is_empty() {
         return Err(SceneError::new(
             &source.path,
             "has no view",
-            "Add a [[view]] with name, world_to_camera, fov_y_degrees, width and height",
+            "Add a [[view]] with name, eye, look_at, fov_y_degrees, width and height",
         ));
     }
     let mut plans: Vec<ViewPlan> = Vec::new();
@@ -48,7 +64,7 @@ pub(super) fn plan(source: &Source, tables: &[Spanned<ViewTable>]) -> Result<Vec
         }
         plans.push(ViewPlan {
             name,
-            camera: camera(source, table)?,
+            camera: camera(source, table, mesh, warnings)?,
             target: table.target.clone(),
             mask: table.mask.clone(),
             haze: table.haze.clone(),
@@ -117,17 +133,39 @@ fn file_name(source: &Source, name: &Spanned<String>) -> Result<String, SceneErr
     ))
 }
 
-fn camera(source: &Source, table: &ViewTable) -> Result<Camera, SceneError> {
+fn camera(
+    source: &Source,
+    table: &ViewTable,
+    mesh: Option<MeshCameras<'_>>,
+    warnings: &mut Warnings,
+) -> Result<Camera, SceneError> {
+    let (width, height) = (side(source, &table.width, "width")?, side(source, &table.height, "height")?);
     let wanted = format!("degrees from {NARROWEST_FOV} to below 180");
-    let fov = number(source, Some(&table.fov_y_degrees), 0.0, "fov_y_degrees", &wanted, |f| {
-        (NARROWEST_FOV..180.0).contains(&f)
+    let within = |degrees: f64| (NARROWEST_FOV..180.0).contains(&degrees);
+    let degrees = number(source, table.fov_y_degrees.as_ref(), 0.0, "fov_y_degrees", &wanted, within)?;
+    let given = table.fov_y_degrees.is_some().then(|| degrees.to_radians());
+    let (world_to_camera, own) = match Place::of(source, table)? {
+        Place::World(matrix) => (matrix, None),
+        Place::Named(name) => match mesh {
+            Some(mesh) => {
+                let camera = mesh.named(source, name)?;
+                camera.tell_aspect(&table.name, [width, height], warnings, &source.path);
+                (camera.world_to_camera, Some(camera.fov_y))
+            }
+            // The values alone are checked.
+            None => (DMat4::IDENTITY, Some(1.0)),
+        },
+    };
+    let fov_y = given.or(own).ok_or_else(|| {
+        let what = format!("the key `fov_y_degrees` is missing in the view `{}`", table.name.get_ref());
+        source.error(&table.name, what, format!("Give {wanted}: the vertical field of view"))
     })?;
-    Ok(Camera {
-        world_to_camera: rigid(source, &table.world_to_camera)?,
-        fov_y: fov.to_radians(),
-        width: side(source, &table.width, "width")?,
-        height: side(source, &table.height, "height")?,
-    })
+    if !within(fov_y.to_degrees()) {
+        let what = format!("the camera has a field of view of {} degrees", short(fov_y.to_degrees()));
+        return Err(source.error(&table.name, what, format!("Give fov_y_degrees, {wanted}")));
+    }
+    let camera = Camera { world_to_camera, fov_y, width, height, lens: Lens::default() };
+    with_lens(source, table, camera)
 }
 
 fn side(source: &Source, value: &Spanned<i64>, name: &str) -> Result<u32, SceneError> {
@@ -140,48 +178,4 @@ fn side(source: &Source, value: &Spanned<i64>, name: &str) -> Result<u32, SceneE
             format!("Give a number of pixels in [1, {LARGEST_SIDE}]"),
         )),
     }
-}
-
-/// The matrix of 16 numbers, row by row, which must move without scaling, shearing or mirroring.
-fn rigid(source: &Source, value: &Spanned<Vec<f64>>) -> Result<DMat4, SceneError> {
-    let refuse = |what: String| {
-        source.error(
-            value,
-            format!("world_to_camera {what}"),
-            "Give 16 finite numbers, row by row: a rotation, a translation in the last column, and 0, 0, 0, 1",
-        )
-    };
-    let numbers = value.get_ref();
-    let Ok(rows) = <[f64; 16]>::try_from(numbers.as_slice()) else {
-        return Err(refuse(format!("has {} numbers instead of 16", numbers.len())));
-    };
-    all_finite(&rows, 4).map_err(refuse)?;
-    let matrix = DMat4::from_cols_array(&rows).transpose();
-    turns_alone(DMat3::from_mat4(matrix)).map_err(|what| refuse(what.into()))?;
-    if (matrix.row(3) - glam::DVec4::W).abs().max_element() > 1e-9 {
-        return Err(refuse("has a last row other than 0, 0, 0, 1 (is it stored by columns?)".into()));
-    }
-    Ok(matrix)
-}
-
-/// Say where a matrix of so many columns holds what is not finite.
-pub(super) fn all_finite(rows: &[f64], columns: usize) -> Result<(), String> {
-    match rows.iter().position(|number| !number.is_finite()) {
-        Some(i) => Err(format!("holds {} at row {}, column {}", rows[i], i / columns, i % columns)),
-        None => Ok(()),
-    }
-}
-
-/// Say how a matrix is no rotation.
-pub(super) fn turns_alone(rotation: DMat3) -> Result<(), &'static str> {
-    // Files round to a few digits; beyond 1e-3 the image would be visibly sheared.
-    let close = |a: DVec3, b: DVec3| (a - b).abs().max_element() <= 1e-3;
-    let gram = rotation.transpose() * rotation;
-    if !(close(gram.x_axis, DVec3::X) && close(gram.y_axis, DVec3::Y) && close(gram.z_axis, DVec3::Z)) {
-        return Err("scales or shears: its rotation part is not orthonormal to 1e-3");
-    }
-    if rotation.determinant() < 0.0 {
-        return Err("mirrors: its rotation part is left-handed");
-    }
-    Ok(())
 }

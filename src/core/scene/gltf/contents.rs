@@ -1,0 +1,170 @@
+//! What a file holds, by its own names: for people who have not seen it yet.
+
+use std::collections::BTreeMap;
+
+use gltf::json;
+use json::animation::Property;
+use json::material::AlphaMode;
+use json::mesh::Semantic;
+use json::validation::Checked;
+
+use super::document::Document;
+use crate::scene::error::SceneError;
+use crate::scene::inspect::{Animation, FilePicture, Material, MeshPart, Picture, UnreadExtension};
+
+/// Extensions whose numbers are read.
+const READ: [&str; 2] = ["KHR_mesh_quantization", "KHR_lights_punctual"];
+
+impl Document {
+    /// The program that wrote the file, where it says.
+    pub(in crate::scene) fn generator(&self) -> Option<String> {
+        self.root.asset.generator.clone()
+    }
+
+    /// The primitives of the scene's nodes, in their order.
+    pub(in crate::scene) fn parts(&self) -> Result<Vec<MeshPart>, SceneError> {
+        let nodes = self.nodes(None)?;
+        let mut parts = Vec::new();
+        for &i in &nodes.in_scene {
+            let node = &self.root.nodes[i];
+            let Some(index) = node.mesh else { continue };
+            let mesh = self.get(&self.root.meshes, index, "mesh")?;
+            let name = mesh.name.clone().or_else(|| node.name.clone());
+            let name = name.unwrap_or_else(|| format!("mesh {}", index.value()));
+            for primitive in &mesh.primitives {
+                let count = |accessor: Option<json::Index<json::Accessor>>| match accessor {
+                    Some(index) => Ok(self.get(&self.root.accessors, index, "accessor")?.count.0 as usize),
+                    None => Ok(0),
+                };
+                let attribute =
+                    |semantic: Semantic| primitive.attributes.get(&Checked::Valid(semantic)).copied();
+                let vertices = count(attribute(Semantic::Positions))?;
+                let corners = if primitive.indices.is_some() { count(primitive.indices)? } else { vertices };
+                let sets = (0..).take_while(|&set| attribute(Semantic::TexCoords(set)).is_some()).count();
+                parts.push(MeshPart {
+                    mesh: name.clone(),
+                    material: primitive.material.map(|index| self.material_name(index.value())),
+                    vertices,
+                    triangles: match primitive.mode {
+                        Checked::Valid(json::mesh::Mode::Triangles) => corners / 3,
+                        Checked::Valid(json::mesh::Mode::TriangleStrip | json::mesh::Mode::TriangleFan) => {
+                            corners.saturating_sub(2)
+                        }
+                        _ => 0,
+                    },
+                    uv_sets: sets,
+                    tangents: attribute(Semantic::Tangents).is_some(),
+                    vertex_colors: attribute(Semantic::Colors(0)).is_some(),
+                    morph_targets: primitive.targets.as_ref().map_or(0, Vec::len),
+                    skinned: node.skin.is_some(),
+                });
+            }
+        }
+        Ok(parts)
+    }
+
+    /// The name of a material, or its place.
+    pub(super) fn material_name(&self, index: usize) -> String {
+        let named = self.root.materials.get(index).and_then(|material| material.name.clone());
+        named.unwrap_or_else(|| format!("material {index}"))
+    }
+
+    /// The file's materials, with the pictures that they name.
+    pub(in crate::scene) fn materials(&self) -> Result<Vec<Material>, SceneError> {
+        let mut materials = Vec::new();
+        for (i, material) in self.root.materials.iter().enumerate() {
+            let surface = &material.pbr_metallic_roughness;
+            let color = surface.base_color_texture.as_ref().map(|texture| (texture.index, texture.tex_coord));
+            let normal = material.normal_texture.as_ref().map(|texture| (texture.index, texture.tex_coord));
+            let picture = |found: Option<(json::Index<json::Texture>, u32)>| match found {
+                Some((index, uv_set)) => self.picture(index, uv_set),
+                None => Ok(None),
+            };
+            materials.push(Material {
+                name: self.material_name(i),
+                alpha: match material.alpha_mode {
+                    Checked::Valid(AlphaMode::Mask) => "mask",
+                    Checked::Valid(AlphaMode::Blend) => "blend",
+                    _ => "opaque",
+                },
+                color: picture(color)?,
+                normal: picture(normal)?,
+            });
+        }
+        Ok(materials)
+    }
+
+    /// The picture of a texture; none where an extension alone says what it is of.
+    pub(super) fn picture(
+        &self,
+        texture: json::Index<json::Texture>,
+        uv_set: u32,
+    ) -> Result<Option<Picture>, SceneError> {
+        let texture = self.get(&self.root.textures, texture, "texture")?;
+        // The crate's own mark for a texture without a source.
+        if texture.source.value() == u32::MAX as usize {
+            return Ok(None);
+        }
+        let index = texture.source.value();
+        let image = self.get(&self.root.images, texture.source, "image")?;
+        let of_kind = |kind: Option<&str>| if kind == Some("image/jpeg") { "jpg" } else { "png" };
+        let file = match (&image.uri, image.buffer_view) {
+            (Some(uri), _) if !uri.starts_with("data:") => {
+                let decoded = percent_encoding::percent_decode_str(uri).decode_utf8_lossy();
+                FilePicture::Beside(decoded.into_owned().into())
+            }
+            (Some(_), _) | (None, Some(_)) => {
+                let kind = image.mime_type.as_ref().map(|kind| kind.0.as_str());
+                let of_uri = image.uri.as_ref().and_then(|uri| uri.strip_prefix("data:")?.split(';').next());
+                FilePicture::Within { index, ending: of_kind(kind.or(of_uri)) }
+            }
+            (None, None) => return Ok(None),
+        };
+        let name = image.name.clone().filter(|name| !name.is_empty());
+        Ok(Some(Picture { name, file, uv_set: uv_set as usize }))
+    }
+
+    /// The bytes of a picture within the file, as they are encoded.
+    pub(in crate::scene) fn picture_bytes(&self, index: usize) -> Result<Vec<u8>, SceneError> {
+        let image = self.get(&self.root.images, json::Index::new(index as u32), "image")?;
+        match (&image.uri, image.buffer_view) {
+            (Some(uri), _) => self.resolve(uri, &format!("image {index}")),
+            (None, Some(view)) => Ok(self.view(view)?.to_vec()),
+            (None, None) => Err(self.error("has an image without bytes", "Export it anew")),
+        }
+    }
+
+    /// How many bones the file has, over all of its skins.
+    pub(in crate::scene) fn bones_count(&self) -> usize {
+        self.root.skins.iter().map(|skin| skin.joints.len()).sum()
+    }
+
+    /// The file's animations, and how long each is.
+    pub(in crate::scene) fn animations(&self) -> Result<Vec<Animation>, SceneError> {
+        let mut animations = Vec::new();
+        for (animation, name) in self.root.animations.iter().zip(self.animation_names()) {
+            let seconds = self.seconds_of(animation)?.map_or(0.0, |(first, last)| last - first);
+            let moves = |property: Property| {
+                animation.channels.iter().any(|channel| channel.target.path == Checked::Valid(property))
+            };
+            let nodes = [Property::Translation, Property::Rotation, Property::Scale].into_iter().any(moves);
+            animations.push(Animation {
+                name,
+                seconds,
+                moves_nodes: nodes,
+                moves_morph_targets: moves(Property::MorphTargetWeights),
+            });
+        }
+        Ok(animations)
+    }
+
+    /// The extensions that the file uses and that are not read, each once.
+    pub(in crate::scene) fn unread_extensions(&self) -> Vec<UnreadExtension> {
+        let required = &self.root.extensions_required;
+        let used = self.root.extensions_used.iter().chain(required);
+        let names = used.filter(|name| !READ.contains(&name.as_str()));
+        let by_name: BTreeMap<&String, bool> =
+            names.map(|name| (name, required.iter().any(|other| other == name))).collect();
+        by_name.into_iter().map(|(name, required)| UnreadExtension { name: name.clone(), required }).collect()
+    }
+}

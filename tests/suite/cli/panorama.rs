@@ -1,0 +1,130 @@
+//! `panorama`: photographs become an environment.
+
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
+
+use image::{ImageFormat, Rgb, RgbImage};
+
+use super::sandbox::Sandbox;
+use crate::common;
+use crate::fixtures::{quantile, read_exr};
+use crate::scene_folder::encode;
+
+#[test]
+fn brackets_are_merged_to_the_radiance_that_they_are_of() {
+    let Some(data) = common::data() else { return };
+    let sandbox = Sandbox::new();
+    let folder = data.join("brackets");
+    let told: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(folder.join("brackets.json")).unwrap()).unwrap();
+    let scale = told["scale_K"].as_f64().unwrap();
+    let images = told["images"].as_array().unwrap();
+    let files: Vec<String> = images
+        .iter()
+        .map(|image| folder.join(image["file"].as_str().unwrap()).display().to_string())
+        .collect();
+    let times: Vec<String> =
+        images.iter().map(|image| image["shutter_s"].as_f64().unwrap().to_string()).collect();
+    let times = times.join(",");
+    let files: Vec<&str> = files.iter().map(String::as_str).collect();
+    let arguments = [&["panorama", "merge"], &files[..], &["--seconds", &times, "-o", "merged.exr"]].concat();
+    let ran = sandbox.run(&arguments);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    assert!(ran.out.contains("exposure_4.png") && ran.out.ends_with("wrote merged.exr\n"), "{}", ran.out);
+    // The lamps of this room are clipped in all of them.
+    assert!(ran.err.contains("pixels are clipped in every photograph"), "{}", ran.err);
+    let merged = read_exr(&sandbox.path("merged.exr"));
+    let truth = read_exr(&data.join("env/studio.exr"));
+    assert_eq!((merged.width, merged.height), (truth.width, truth.height));
+    let mut errors = Vec::new();
+    for channel in ["R", "G", "B"] {
+        for (got, want) in merged.planes[channel].iter().zip(&truth.planes[channel]) {
+            let want = scale * f64::from(*want);
+            // What the longest sees well and the shortest does not clip.
+            if (2.0..500.0).contains(&want) {
+                errors.push((f64::from(*got) / want - 1.0).abs());
+            }
+        }
+    }
+    assert!(errors.len() > 100_000, "{}", errors.len());
+    errors.sort_by(f64::total_cmp);
+    // Noise of the sensor and 8 bits: 2% are asked for in the middle.
+    assert!(quantile(&errors, 0.5) < 0.02, "{}", quantile(&errors, 0.5));
+}
+
+/// A grey photograph.
+fn photograph(code: u8) -> Vec<u8> {
+    encode(RgbImage::from_pixel(16, 12, Rgb([code, code, code / 2])), ImageFormat::Png)
+}
+
+#[test]
+fn a_grey_card_sets_balance_and_exposure() {
+    let sandbox = Sandbox::new();
+    sandbox.write("a.png", &photograph(120));
+    sandbox.write("b.png", &photograph(160));
+    let merge = ["panorama", "merge", "a.png", "b.png", "--seconds", "1/4,1/2", "-o", "card.exr"];
+    let balanced = sandbox.run(&[&merge[..], &["--grey-card", "2,2,8,8", "--reflectance"]].concat());
+    assert_eq!(balanced.code, Some(0), "{}", balanced.err);
+    let planes = read_exr(&sandbox.path("card.exr"));
+    for channel in ["R", "G", "B"] {
+        // To the 16 bits that such a picture has room for.
+        assert!(planes.planes[channel].iter().all(|value| (value - 0.18).abs() < 2e-4), "{channel}");
+    }
+}
+
+#[test]
+fn shots_of_an_even_room_become_an_even_panorama_that_a_scene_takes() {
+    let sandbox = Sandbox::new();
+    sandbox.write_exr("shot.exr", 64, 64, |_, _| [0.5, 0.25, 1.0]);
+    let shot = |z: i32| {
+        format!(
+            "[[shot]]\nfile = \"shot.exr\"\nlens = \"equidistant\"\ncentre = [32, 32]\nradius = 31\nfield_of_view_degrees = 200\ntowards = [0, 0, {z}]\n"
+        )
+    };
+    sandbox.write("shots.toml", (shot(-1) + &shot(1)).as_bytes());
+    let stitch =
+        ["panorama", "stitch", "shots.toml", "-o", "sky.exr", "--width", "64", "--no-refine", "--no-gains"];
+    let ran = sandbox.run(&stitch);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let planes = read_exr(&sandbox.path("sky.exr"));
+    assert_eq!((planes.width, planes.height), (64, 32));
+    for (channel, want) in [("R", 0.5), ("G", 0.25), ("B", 1.0)] {
+        // Weights that sum to 1, in f32.
+        assert!(planes.planes[channel].iter().all(|value| (value - want).abs() < 1e-3), "{channel}");
+    }
+    sandbox.edit("env.exr", "sky.exr");
+    sandbox.run(&["render", "scene.toml", "--engine", "cpu", "--view", "front", "-o", "lit.exr"]).done();
+}
+
+#[test]
+fn what_is_no_photograph_or_no_shot_is_refused() {
+    let sandbox = Sandbox::new();
+    sandbox.write("a.png", &photograph(120));
+    sandbox.write("small.png", &encode(RgbImage::new(4, 4), ImageFormat::Png));
+    let merge = |more: &[&str]| sandbox.run(&[&["panorama", "merge", "-o", "made.exr"], more].concat());
+    merge(&["a.png", "--seconds", "1,2"]).refused(&["--seconds: 2 for 1 photographs"]);
+    merge(&["none.png", "--seconds", "1"]).refused(&["none.png: cannot be read"]);
+    merge(&["env.exr", "--seconds", "1"]).refused(&["env.exr"]);
+    merge(&["scene.toml", "--seconds", "1"]).refused(&["scene.toml"]);
+    merge(&["a.png", "small.png", "--seconds", "1,2"]).refused(&["4"]);
+    merge(&["a.png", "--seconds", "1", "--grey-card", "10,10,10,10"]).refused(&["10"]);
+    sandbox
+        .run(&["panorama", "merge", "a.png", "--seconds", "1", "-o", "made.png"])
+        .refused(&["made.png: is not called .exr"]);
+    assert_eq!(
+        sandbox.run(&["panorama", "merge", "a.png", "--seconds", "none", "-o", "made.exr"]).code,
+        Some(2)
+    );
+    let stitch = |text: &str| {
+        sandbox.write("shots.toml", text.as_bytes());
+        sandbox.run(&["panorama", "stitch", "shots.toml", "-o", "made.exr", "--width", "64"])
+    };
+    stitch("[[shot]]\nfile = 3\n").refused(&["shots.toml: line 2"]);
+    let shot = "[[shot]]\nfile = \"env.exr\"\nlens = \"equidistant\"\ncentre = [16, 8]\nradius = 8\ntowards = [0, 0, -1]\n";
+    stitch(shot).refused(&["shots.toml: shot 0: has no field_of_view_degrees"]);
+    stitch(&shot.replace("[0, 0, -1]", "[0, 1, 0]"))
+        .refused(&["shot 0: towards and up are no two directions"]);
+    stitch(&format!("{shot}field_of_view_degrees = 900\n")).refused(&["900"]);
+    stitch(&format!("{shot}field_of_view_degrees = 180\n").replace("env.exr", "none.exr"))
+        .refused(&["none.exr"]);
+    assert!(!sandbox.path("made.exr").exists());
+}

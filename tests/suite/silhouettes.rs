@@ -1,0 +1,173 @@
+//! Cameras that are wrong are noticed before a fit, and those that are right are not accused.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
+
+use std::path::Path;
+use std::sync::LazyLock;
+
+use glam::{DMat4, DVec3};
+use skinfit::model::effects::{Effect, Effects};
+use skinfit::prepare::{Loaded, PrepareOptions};
+use skinfit::scene::Scene;
+use skinfit::scene::view::Target;
+
+use crate::common;
+
+/// A scene with the effects that its silhouettes depend on, so that nothing is baked.
+fn read(path: &Path, effects: &[Effect]) -> Loaded {
+    let effects = Some(Effects::of(effects));
+    Loaded::read(path, &PrepareOptions { effects, fit: true, ..PrepareOptions::default() }).unwrap()
+}
+
+/// What is said of the silhouettes of a scene.
+fn said(mut loaded: Loaded) -> Vec<String> {
+    loaded.scene.quality.samples_per_axis = 2;
+    let observed = loaded.bake().unwrap().sample().unwrap().observe().unwrap();
+    let of_silhouettes = |warning: &&String| warning.contains("silhouettes of its target and of the mesh");
+    observed.warnings.iter().filter(of_silhouettes).cloned().collect()
+}
+
+/// The built-in scene as it is.
+static TRUE: LazyLock<(tempfile::TempDir, Loaded)> = LazyLock::new(|| {
+    let folder = tempfile::tempdir().unwrap();
+    let path = skinfit::built_in_scene(folder.path()).unwrap();
+    // As it is posed.
+    let loaded = read(&path, &[Effect::Morph, Effect::Skin]);
+    (folder, loaded)
+});
+
+fn with(mistake: impl FnOnce(&mut Scene)) -> Vec<String> {
+    let mut loaded = TRUE.1.clone();
+    mistake(&mut loaded.scene);
+    said(loaded)
+}
+
+/// The number behind these words.
+fn number_after(text: &str, words: &str) -> f64 {
+    let at = text.find(words).unwrap_or_else(|| panic!("{words:?} is not in {text:?}")) + words.len();
+    let number: String = text[at..].chars().take_while(|c| c.is_ascii_digit() || *c == '.').collect();
+    number.parse().unwrap()
+}
+
+/// Rows and pixels of a target in another order.
+fn reordered(target: &mut Target, width: usize, order: impl Fn(usize, usize) -> usize) {
+    let pixels = target.rgb.len();
+    let at = |i: usize| order(i % width, i / width);
+    target.rgb = (0..pixels).map(|i| target.rgb[at(i)]).collect();
+    target.alpha = target.alpha.as_ref().map(|alpha| (0..pixels).map(|i| alpha[at(i)]).collect());
+}
+
+#[test]
+fn the_built_in_scene_is_not_accused() {
+    assert_eq!(with(|_| ()), Vec::<String>::new());
+}
+
+#[test]
+fn swapped_targets_are_noticed() {
+    for (a, b) in [(0, 1), (1, 2), (0, 2)] {
+        let told = with(|scene| {
+            let first = scene.views[a].target.take();
+            let second = scene.views[b].target.take();
+            (scene.views[a].target, scene.views[b].target) = (second, first);
+        });
+        assert_eq!(told.len(), 2, "{told:#?}");
+        let names = [a, b].map(|i| TRUE.1.scene.views[i].name.clone());
+        for (told, [view, other]) in told.iter().zip([[&names[0], &names[1]], [&names[1], &names[0]]]) {
+            assert!(told.contains(&format!("view \"{view}\"")), "{told}");
+            assert!(told.contains(&format!("fits view \"{other}\"")) && told.contains("swapped"), "{told}");
+        }
+    }
+}
+
+#[test]
+fn turned_targets_are_noticed() {
+    // The front view is nearly its own mirror image, so that is a mistake of the others.
+    for (i, flip, words) in [
+        (1, [true, false], "mirrored"),
+        (2, [true, false], "mirrored"),
+        (0, [false, true], "upside down"),
+        (1, [true, true], "by 180 degrees"),
+    ] {
+        let told = with(|scene| {
+            let (width, height) =
+                (scene.views[i].camera.width as usize, scene.views[i].camera.height as usize);
+            let target = scene.views[i].target.as_mut().unwrap();
+            reordered(target, width, |x, y| {
+                let x = if flip[0] { width - 1 - x } else { x };
+                let y = if flip[1] { height - 1 - y } else { y };
+                y * width + x
+            });
+        });
+        assert_eq!(told.len(), 1, "{told:#?}");
+        assert!(told[0].contains(words), "{}", told[0]);
+    }
+}
+
+#[test]
+fn wrong_fields_of_view_are_noticed_and_the_right_one_is_named() {
+    for i in 0..3 {
+        for factor in [0.95, 1.05] {
+            let fov = TRUE.1.scene.views[i].camera.fov_y;
+            let told = with(|scene| scene.views[i].camera.fov_y *= factor);
+            assert_eq!(told.len(), 1, "{told:#?}");
+            let named = number_after(&told[0], "with fov_y_degrees = ");
+            // A tenth of a pixel at a silhouette some hundred pixels from the centre is 0.1%; twice that.
+            assert!((named / fov.to_degrees() - 1.0).abs() < 2e-3, "{named}, not {}", fov.to_degrees());
+        }
+    }
+}
+
+#[test]
+fn displaced_cameras_are_noticed_and_by_how_much() {
+    for (i, right, up) in [(0, 0.1, 0.0), (1, 0.0, 0.12), (2, -0.08, 0.05)] {
+        let aside = DMat4::from_translation(DVec3::new(right, up, 0.0));
+        let mut pixels = [0.0; 2];
+        let told = with(|scene| {
+            let camera = &mut scene.views[i].camera;
+            // Of a point at the head's distance.
+            let point = |camera: &skinfit::scene::view::Camera| camera.project(DVec3::new(0.0, -0.034, 0.0));
+            let before = point(camera);
+            camera.world_to_camera = aside * camera.world_to_camera;
+            let after = point(camera);
+            pixels = [before.0 - after.0, before.1 - after.1];
+        });
+        assert_eq!(told.len(), 1, "{told:#?}");
+        let text = &told[0];
+        let across = number_after(text, "the target's lies ");
+        // Perspective: what lies nearer moves further, by a twentieth here.
+        assert!((across - pixels[0].abs()).abs() < 0.05 * pixels[0].abs() + 1.0, "{text}: {pixels:?}");
+        let down = number_after(text, if pixels[0] < 0.0 { "left and " } else { "right and " });
+        assert!((down - pixels[1].abs()).abs() < 0.05 * pixels[1].abs() + 1.5, "{text}: {pixels:?}");
+    }
+}
+
+#[test]
+fn other_poses_are_noticed() {
+    for (i, angle) in [(0, 25.0_f64), (1, -30.0), (2, 20.0)] {
+        let told = with(|scene| {
+            let camera = &mut scene.views[i].camera;
+            camera.world_to_camera *= DMat4::from_rotation_y(angle.to_radians());
+        });
+        assert_eq!(told.len(), 1, "{told:#?}");
+    }
+}
+
+#[test]
+fn path_traced_scenes_are_not_accused() {
+    let Some(data) = common::data() else { return };
+    let scenes: [(&str, &[Effect]); 10] = [
+        ("lps_forest/scene.toml", &[]),
+        ("lps_sunrise/scene.toml", &[]),
+        ("lps_studio/scene.toml", &[]),
+        ("lps_studio_dry/scene.toml", &[]),
+        ("mh_portrait/scene.toml", &[Effect::Skin]),
+        ("calib_lights/directional.toml", &[]),
+        ("calib_lights/directional_soft.toml", &[]),
+        ("calib_lights/point.toml", &[]),
+        ("calib_lights/point_soft.toml", &[]),
+        ("calib_lights/spot.toml", &[]),
+    ];
+    for (scene, effects) in scenes {
+        assert_eq!(said(read(&data.join(scene), effects)), Vec::<String>::new(), "{scene}");
+    }
+}
