@@ -178,9 +178,6 @@ fn not_read(contents: &MeshContents) -> String {
     if contents.parts.iter().any(|part| part.uv_sets > 1) {
         lines.push("texture coordinates but the first set".to_owned());
     }
-    if contents.animations.len() > 1 {
-        lines.push("animations but the first".to_owned());
-    }
     lines.extend(contents.unread_extensions.iter().map(|extension| {
         let required = if extension.required { " (required)" } else { "" };
         format!("{}{required}", extension.name)

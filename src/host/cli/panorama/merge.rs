@@ -108,11 +108,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     let weighting = if arguments.weighting == "hat" { Weighting::Hat } else { Weighting::default() };
     let mut merged = merge(&exposures, &response, MergeOptions { weighting, align: arguments.align })?;
+    let balanced = match arguments.grey_card {
+        Some(rectangle) => Some(balance(&mut merged, rectangle, arguments.reflectance)?),
+        None => None,
+    };
     merged.doubts.iter().for_each(|doubt| tell(&format!("warning: {doubt}")));
     say(times_told(&arguments.photographs, &merged).trim_end())?;
     tell_counts(&merged);
-    if let Some(rectangle) = arguments.grey_card {
-        balance(&mut merged, rectangle, arguments.reflectance)?;
+    if let Some(told) = balanced {
+        say(&told)?;
     }
     pictures::write(&arguments.output, &merged.picture)?;
     say(&format!("wrote {}", arguments.output.display()))?;
@@ -154,8 +158,8 @@ fn tell_counts(merged: &Merged) {
     }
 }
 
-/// Make a card grey, and where a reflectance is given as bright as it says.
-fn balance(merged: &mut Merged, rectangle: Rectangle, reflectance: Option<f64>) -> Result<(), Refusal> {
+/// Make a card grey, and where a reflectance is given as bright as it says; returns what that was.
+fn balance(merged: &mut Merged, rectangle: Rectangle, reflectance: Option<f64>) -> Result<String, Refusal> {
     let card = grey_card::measure(&merged.picture, rectangle, reflectance.unwrap_or(REFLECTANCE))?;
     if card.unevenness > UNEVEN {
         let percent = digits(100.0 * card.unevenness, 2);
@@ -166,8 +170,5 @@ fn balance(merged: &mut Merged, rectangle: Rectangle, reflectance: Option<f64>) 
     let what = if reflectance.is_some() { Normalise::Exposure } else { Normalise::WhiteBalance };
     grey_card::normalise(&mut merged.picture, &card, what);
     let factors = if reflectance.is_some() { card.exposure } else { card.white_balance };
-    say(&format!(
-        "grey card: times {} (red, green, blue)",
-        factors.map(|factor| digits(factor, 4)).join(", ")
-    ))
+    Ok(format!("grey card: times {} (red, green, blue)", factors.map(|factor| digits(factor, 4)).join(", ")))
 }
