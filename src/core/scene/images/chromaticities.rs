@@ -32,7 +32,7 @@ impl Chromaticities {
     /// # Errors
     /// What is wrong with them, where no such matrix is.
     pub(super) fn to_rec709(self) -> Result<Option<DMat3>, &'static str> {
-        let near = |a: DVec2, b: DVec2| (a - b).abs().max_element() < SAME;
+        let near = |a: DVec2, b: DVec2| (a - b).length() < SAME;
         let own = self.primaries.iter().zip(REC709.primaries).all(|(&a, b)| near(a, b));
         if own && near(self.white, REC709.white) {
             return Ok(None);
