@@ -25,7 +25,6 @@ use super::readback::Copy;
 use super::targets::{Tile, texture_for};
 use super::timing::Timer;
 use super::upload::{Bound, Content, Uploads};
-use crate::scene::lens::Lens;
 use crate::scene::mesh::{Mesh, tile_outside_atlas};
 use crate::scene::view::Camera;
 use crate::shader::Plan;
@@ -162,13 +161,7 @@ pub fn levels(gpu: &Gpu, plan: &Plan, content: Content) -> Result<HashMap<String
     let mut uploads = Uploads::new(gpu, content, targets)?;
     let Some(atlas) = Atlas::new(gpu, plan, &mut uploads)? else { return Ok(HashMap::new()) };
     // Nobody sees a texel: any camera does.
-    let camera = Camera {
-        world_to_camera: glam::DMat4::IDENTITY,
-        fov_y: 1.0,
-        width: 1,
-        height: 1,
-        lens: Lens::default(),
-    };
+    let camera = Camera::pinhole(glam::DMat4::IDENTITY, 1.0, [1, 1]);
     let tile = Tile { x: 0, y: 0, width: 1, height: 1 };
     let params = &uploads.content().params;
     atlas.set(gpu, &Values { params, camera: &camera, tile, morph_weights: &morph_weights });

@@ -14,20 +14,13 @@ use super::readback::read_floats;
 use super::targets::Tile;
 use super::upload::{Content, Uploads};
 use crate::model::params::Params;
-use crate::scene::lens::Lens;
 use crate::scene::view::Camera;
 use crate::shader::probe::{Probe, WORKGROUP};
 
 /// The uniform block of a probe's plan at `params`: the eye at the origin, no morph targets.
 #[must_use]
 pub fn constants(probe: &Probe, params: &Params) -> Vec<f32> {
-    let camera = Camera {
-        world_to_camera: glam::DMat4::IDENTITY,
-        fov_y: 1.0,
-        width: 1,
-        height: 1,
-        lens: Lens::default(),
-    };
+    let camera = Camera::pinhole(glam::DMat4::IDENTITY, 1.0, [1, 1]);
     let tile = Tile { x: 0, y: 0, width: 1, height: 1 };
     constants::block(&probe.plan.constants, &Values { params, camera: &camera, tile, morph_weights: &[] })
 }

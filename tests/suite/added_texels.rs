@@ -14,7 +14,6 @@ use skinfit::model::evaluate::Setup;
 use skinfit::render::antialias::Antialias;
 use skinfit::render::image::Image;
 use skinfit::scene::Scene;
-use skinfit::scene::lens::Lens;
 use skinfit::scene::mesh::Mesh;
 use skinfit::scene::view::{Background, Camera, View};
 use skinfit::shader::atlas::tangent::Along;
@@ -181,13 +180,7 @@ fn scene() -> Scene {
         triangles: vec![[0, 3, 2], [0, 2, 1]],
         ..Mesh::default()
     };
-    let camera = Camera {
-        world_to_camera: DMat4::from_translation(DVec3::new(0.0, 0.0, -DISTANCE)),
-        fov_y: FOV,
-        width: PIXELS,
-        height: PIXELS,
-        lens: Lens::default(),
-    };
+    let camera = Camera::pinhole(DMat4::from_translation(DVec3::new(0.0, 0.0, -DISTANCE)), FOV, [PIXELS; 2]);
     let view = View { name: "front".to_owned(), camera, target: None, background: Background::None };
     Scene { mesh, views: vec![view], ..bare_scene(Effects::of(&[term().effect])) }
 }

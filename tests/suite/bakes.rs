@@ -13,7 +13,6 @@ use skinfit::bake::{BakeStats, LobeStack, Ranges, bake};
 use skinfit::model::cube::{Cube, texel_direction, texel_solid_angle};
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::scene::Scene;
-use skinfit::scene::lens::Lens;
 use skinfit::scene::maps::{Environment, Map, Spots};
 use skinfit::scene::mesh::PosedMesh;
 use skinfit::scene::view::Camera;
@@ -284,13 +283,11 @@ fn ball(
     radiance: impl Fn(DVec3, DVec3) -> [f64; 3] + Sync,
 ) -> Vec<([f64; 3], [f32; 3])> {
     let rows: [f64; 16] = numbers(&calib["camera"]["world_to_camera"]).try_into().unwrap();
-    let camera = Camera {
-        world_to_camera: DMat4::from_cols_array(&rows).transpose(),
-        fov_y: calib["camera"]["yfov_rad"].as_f64().unwrap(),
-        width: 384,
-        height: 384,
-        lens: Lens::default(),
-    };
+    let camera = Camera::pinhole(
+        DMat4::from_cols_array(&rows).transpose(),
+        calib["camera"]["yfov_rad"].as_f64().unwrap(),
+        [384, 384],
+    );
     let centre = DVec3::from_slice(&numbers(&calib["ball"]["center"]));
     let radius = calib["ball"]["radius"].as_f64().unwrap();
     let eye = camera.eye();

@@ -12,7 +12,6 @@ use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effects, Form, Lookups, Silhouette};
 use skinfit::model::params::Params;
 use skinfit::scene::diffusion::Diffusion;
-use skinfit::scene::lens::Lens;
 use skinfit::scene::maps::{Environment, Map, Maps, Spots};
 use skinfit::scene::mesh::{Mesh, PosedMesh};
 use skinfit::scene::view::{Background, Camera, View};
@@ -132,13 +131,7 @@ impl Geometry for Corners<'_> {
 /// A camera as scene files write it.
 pub(crate) fn camera(rows: [f64; 16], fov_y_degrees: f64, size: u32) -> Camera {
     let world_to_camera = DMat4::from_cols_array(&rows).transpose();
-    Camera {
-        world_to_camera,
-        fov_y: fov_y_degrees.to_radians(),
-        width: size,
-        height: size,
-        lens: Lens::default(),
-    }
+    Camera::pinhole(world_to_camera, fov_y_degrees.to_radians(), [size, size])
 }
 
 /// The three cameras of the scanned head's scenes, read from the scene file.

@@ -131,7 +131,7 @@ fn posed_key(mut key: Key, pose: &(dyn Fn(&[f32]) -> PosedMesh + Sync), morphs: 
     for target in 0..=morphs {
         let weights: Vec<f32> = (1..=morphs).map(|i| f32::from(u8::from(i == target))).collect();
         let posed = pose(&weights);
-        key = key.with(&posed.positions).with(&posed.normals).with(posed.triangles.as_flattened());
+        key = key.with(&posed.positions).with(&posed.normals).with(posed.occluders().as_flattened());
         vertices = posed.positions.len();
     }
     (key, vertices)

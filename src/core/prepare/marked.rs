@@ -88,18 +88,11 @@ fn files(scenes: &[Place<'_>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::lens::Lens;
     use crate::scene::view::{Background, Camera, Target};
 
     fn view(name: &str, with_target: bool) -> View {
         let target = Target { rgb: Vec::new(), alpha: None, haze: None, mask: None, clipped_at: None };
-        let camera = Camera {
-            world_to_camera: glam::DMat4::IDENTITY,
-            fov_y: 1.0,
-            width: 1,
-            height: 1,
-            lens: Lens::default(),
-        };
+        let camera = Camera::pinhole(glam::DMat4::IDENTITY, 1.0, [1, 1]);
         let target = with_target.then_some(target);
         View { name: name.to_owned(), camera, target, background: Background::None }
     }

@@ -187,7 +187,6 @@ mod tests {
     use crate::model::effects::{Form, Silhouette};
     use crate::samples::SurfaceRecords;
     use crate::samples::surface_records::{Asked, NEUTRAL};
-    use crate::scene::lens::Lens;
 
     /// The first of sixteen pixels in a row, of one sample each, all alike.
     fn first(effects: &[Effect], set: impl Fn(&mut Params)) -> Shaded {
@@ -202,13 +201,7 @@ mod tests {
             crate::model::fragment::Fragment { base: [0.0, 0.0, 1.0], view: [0.0, 0.0, -1.0], ..NEUTRAL };
         (0..LANES).for_each(|slot| samples.surface.set(slot, &facing, 1.0));
         let setup = Setup::new(Form::Corrected, Silhouette::Bumped, Effects::of(effects));
-        let camera = Camera {
-            world_to_camera: DMat4::IDENTITY,
-            fov_y: 1.0,
-            width: LANES as u32,
-            height: 1,
-            lens: Lens::default(),
-        };
+        let camera = Camera::pinhole(DMat4::IDENTITY, 1.0, [LANES as u32, 1]);
         let dark = Illumination::default();
         let mut params = Params::defaults(Form::Corrected);
         set(&mut params);

@@ -122,7 +122,6 @@ mod tests {
     use crate::bake::rays::RayMesh;
     use crate::model::texture_filter::TextureFilter;
     use crate::samples::trace::trace;
-    use crate::scene::lens::Lens;
 
     /// A slanted quad, whose texture coordinates are no map of its plane onto the map's, so that its triangles differ.
     fn slanted() -> PosedMesh {
@@ -138,7 +137,7 @@ mod tests {
     fn camera() -> Camera {
         let world_to_camera =
             DMat4::from_rotation_y(0.2) * DMat4::from_translation(DVec3::new(0.1, -0.2, -3.0));
-        Camera { world_to_camera, fov_y: 0.6, width: 70, height: 60, lens: Lens::default() }
+        Camera::pinhole(world_to_camera, 0.6, [70, 60])
     }
 
     #[test]

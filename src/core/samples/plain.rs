@@ -28,6 +28,8 @@ use crate::specular::brdf::{ggx_distribution, ggx_visibility};
 const RAYS: u32 = 32;
 /// Samples that one task shades.
 const CHUNK: usize = 64;
+/// A cosine; a normal that faces away is turned until it has this one with the view.
+const LEAST_FACING: f64 = 1e-4;
 
 /// The part of a pixel that shows what is not skin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,6 +92,15 @@ pub(super) fn pixels(
     pixels
 }
 
+/// The normal, turned towards the view until it faces it.
+fn facing(normal: DVec3, view: DVec3) -> DVec3 {
+    let cosine = normal.dot(view);
+    if cosine >= LEAST_FACING {
+        return normal;
+    }
+    (normal + (LEAST_FACING - cosine) * view).normalize_or_zero()
+}
+
 impl PlainLight<'_> {
     /// The radiance that leaves a place of a material towards the eye.
     fn leaving(
@@ -105,19 +116,26 @@ impl PlainLight<'_> {
         let smooth: DVec3 = (0..3).map(|i| weights[i] * posed.mesh.normals[corners[i]].as_dvec3()).sum();
         let view = (eye - place.position).normalize_or_zero();
         let normal = smooth.normalize_or_zero();
-        // Both sides are drawn, each as the front.
-        let (normal, place) = if normal.dot(view) < 0.0 {
+        // Both sides are drawn, each as the front. The triangle says which one is seen: near the silhouette of a coarse
+        // mesh the smooth normal may face away.
+        let [a, b, c] = corners.map(|i| posed.mesh.positions[i].as_dvec3());
+        let plane = (b - a).cross(c - a);
+        let seen_from_behind = plane.dot(normal) * plane.dot(view) < 0.0;
+        let (normal, place) = if seen_from_behind {
             let origin = 2.0 * place.position.as_vec3a() - place.origin;
             (-normal, Place { origin, ..place })
         } else {
             (normal, place)
         };
-        let surface = material.at(hit.uv(posed.mesh));
-        let mut rgb = material.emission.map(f64::from);
+        let normal = facing(normal, view);
+        let tint =
+            posed.mesh.plain.as_ref().map_or([1.0; 4], |plain| plain.tint(hit.triangle, hit.weights()));
+        let surface = material.at(hit.uv(posed.mesh), tint);
+        let mut rgb = surface.emission;
         if normal == DVec3::ZERO || view == DVec3::ZERO {
             return rgb;
         }
-        let facing = normal.dot(view).max(1e-4);
+        let facing = normal.dot(view).max(LEAST_FACING);
         if let Some(sky) = &self.sky {
             let found = self.of_sky(sky, &place, (normal, view, facing), &surface, seed);
             (0..3).for_each(|c| rgb[c] += found[c]);
@@ -144,7 +162,9 @@ impl PlainLight<'_> {
         let mut rays: Vec<(Vec3A, f64, [f64; 3])> = Vec::with_capacity(2 * RAYS as usize);
         for d in self.spread.hemisphere(mix(seed)) {
             let cosine = f64::from(d.z.max(1e-3));
-            rays.push((frame * d, PI / (each * cosine), surface.diffuse.map(|c| c / each)));
+            let toward = (frame * d).as_dvec3();
+            let v_h = view.dot((toward + view).normalize_or_zero());
+            rays.push((frame * d, PI / (each * cosine), surface.diffuse_towards(v_h).map(|c| c / each)));
         }
         for (radius, [sine, cosine]) in self.spread.disc(mix(seed ^ 0x5bd1_e995)) {
             // tan^2 of the half vector's angle is alpha^2 u / (1 - u).
@@ -163,7 +183,7 @@ impl PlainLight<'_> {
             let density = ggx_distribution(1.0 - up * up, up * up, surface.alpha) * up / (4.0 * v_h);
             let masked = ggx_visibility(n_l, facing, surface.alpha) * 4.0 * n_l * facing;
             let weight = masked * v_h / (facing * up * each);
-            let fresnel = surface.f0.map(|f0| weight * (f0 + (1.0 - f0) * (1.0 - v_h).powi(5)));
+            let fresnel = surface.fresnel(v_h).map(|f| weight * f);
             rays.push((toward.as_vec3a(), 1.0 / (each * density), fresnel));
         }
         let directions: Vec<Vec3A> = rays.iter().map(|(along, ..)| *along).collect();
@@ -198,9 +218,7 @@ impl PlainLight<'_> {
         let (n_h, v_h) = (normal.dot(half), view.dot(half).max(0.0));
         let lobe = ggx_distribution(1.0 - n_h * n_h, n_h * n_h, surface.alpha)
             * ggx_visibility(n_l, facing, surface.alpha);
-        std::array::from_fn(|c| {
-            let fresnel = surface.f0[c] + (1.0 - surface.f0[c]) * (1.0 - v_h).powi(5);
-            (surface.diffuse[c] / PI + fresnel * lobe) * strength[c] * arriving * n_l
-        })
+        let (fresnel, diffuse) = (surface.fresnel(v_h), surface.diffuse_towards(v_h));
+        std::array::from_fn(|c| (diffuse[c] / PI + fresnel[c] * lobe) * strength[c] * arriving * n_l)
     }
 }

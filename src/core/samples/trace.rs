@@ -55,6 +55,8 @@ enum Shown {
 
 /// Of so many layers that blend, one behind the other, the rest is not seen.
 const MOST_LAYERS: usize = 16;
+/// And of so many triangles with holes there.
+const MOST_HOLES: usize = 256;
 
 /// A triangle as seen from the eye: rays from there hit it by three dot products.
 ///
@@ -160,8 +162,8 @@ pub(super) fn trace(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -
                 for i in 0..n * n {
                     let at = |i: u32| (f64::from(i) + 0.5) / f64::from(n);
                     let d = camera_rays.direction(f64::from(x) + at(i % n), f64::from(y) + at(i / n));
-                    let cut =
-                        || (f64::from((i + mix(y * camera.width + x)) % (n * n)) + 0.5) / f64::from(n * n);
+                    let (turn, all) = (mix(y * camera.width + x) % (n * n), n * n);
+                    let cut = || (f64::from((i + turn) % all) + 0.5) / f64::from(all);
                     match shown(rays, mesh, (camera_rays.eye, d), cut, |triangle, d| {
                         seen[triangle as usize].hit(d)
                     }) {
@@ -217,14 +219,16 @@ fn shown(
         return nearest(rays, eye, d, hit).map_or(Shown::Nothing, Shown::Skin);
     };
     let mut passed: Vec<u32> = Vec::new();
-    // What goes through the layers so far.
-    let mut through = 1.0;
-    while passed.len() < MOST_LAYERS {
+    // What goes through the layers so far, and how many hold back some of it: holes do not.
+    let (mut through, mut layers) = (1.0, 0);
+    while layers < MOST_LAYERS && passed.len() < MOST_HOLES {
         let beyond =
             |triangle: u32, d: DVec3| if passed.contains(&triangle) { None } else { hit(triangle, d) };
         let Some(found) = nearest(rays, eye, d, beyond) else { return Shown::Nothing };
         let Some(material) = plain.material(found.triangle) else { return Shown::Skin(found) };
-        through *= 1.0 - f64::from(material.seen(found.uv(mesh)));
+        let seen = f64::from(material.seen(found.uv(mesh), plain.tint(found.triangle, found.weights())));
+        through *= 1.0 - seen;
+        layers += usize::from(seen > 0.0);
         if cut() < 1.0 - through {
             return Shown::Plain(found);
         }
@@ -282,7 +286,7 @@ mod tests {
 
     fn camera(size: u32) -> Camera {
         let world_to_camera = DMat4::from_translation(DVec3::new(0.1, -0.2, -3.0));
-        Camera { world_to_camera, fov_y: 0.7, width: size + 7, height: size, lens: Lens::default() }
+        Camera::pinhole(world_to_camera, 0.7, [size + 7, size])
     }
 
     /// A sphere of `n` rings.

@@ -5,8 +5,8 @@ use std::path::Path;
 use toml::Spanned;
 
 use super::error::{SceneError, Warnings, warn};
-use super::file::{SceneFile, Source};
-use super::gltf::{Ask, Document, Tangents, Uvs};
+use super::file::{MapsTable, SceneFile, Source};
+use super::gltf::{Ask, Document, SkinMaps, Tangents, TextureUv, Uvs};
 use super::maps::Maps;
 use super::mesh::Mesh;
 use super::numbers::{interval, number, short};
@@ -35,7 +35,9 @@ impl Animation {
         let folder = scene.path.parent().unwrap_or(Path::new(""));
         let document = mesh_file(&source, &file, folder)?;
         let needs = scene.needs();
-        let ask = ask(&scene.maps, scene.form, scene.effects, needs, &pose);
+        let own = own_maps(&file, &document, &pose, &mut Warnings::new())?;
+        let uv = own.map(|own| own.uv()).unwrap_or_default();
+        let ask = Ask { uv, ..ask(&scene.maps, scene.form, scene.effects, needs, &pose) };
         let seconds = document.animation_seconds()?;
         Ok(seconds.map(|seconds| Self { document, ask, seconds }))
     }
@@ -142,6 +144,21 @@ impl Pose {
     }
 }
 
+/// The maps of the skin's own material, where the scene names none.
+pub(super) fn own_maps(
+    file: &SceneFile,
+    document: &Document,
+    pose: &Pose,
+    warnings: &mut Warnings,
+) -> Result<Option<SkinMaps>, SceneError> {
+    let MapsTable { color, normal, specular, attenuator, material, .. } = &file.maps;
+    let named = [color, normal, specular, attenuator].into_iter().any(Option::is_some);
+    match named || *material == Some(false) {
+        true => Ok(None),
+        false => document.skin_maps(pose.skin.as_deref(), warnings),
+    }
+}
+
 /// What the effects want of the mesh, `maps` being those that they look up.
 pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
     let Maps { color, normal, specular, attenuator, own } = maps;
@@ -163,6 +180,8 @@ pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose:
     };
     Ask {
         uvs,
+        uv: TextureUv::default(),
+        colors: false,
         tangents,
         morphs: effects.has(Effect::Morph),
         morph_weights: pose.morph_weights.clone(),

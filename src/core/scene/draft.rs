@@ -177,7 +177,11 @@ impl Draft<'_> {
     /// The file's own cameras, those whose names may be views'.
     fn file_views(&self, out: &mut String) {
         let mut names: Vec<String> = STANDS.iter().map(|(name, ..)| (*name).to_owned()).collect();
-        for camera in &self.contents.cameras {
+        for camera in self.contents.cameras.iter().filter(|camera| camera.usable) {
+            // A view cannot tell which of two it names.
+            if self.contents.cameras.iter().filter(|other| other.name == camera.name).count() > 1 {
+                continue;
+            }
             let safe = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '_' | '-') { c } else { '_' };
             let name: String =
                 format!("camera_{}", camera.name.chars().take(40).map(safe).collect::<String>());

@@ -59,6 +59,8 @@ pub(super) struct MapsTable {
     pub specular: Option<PathBuf>,
     pub attenuator: Option<PathBuf>,
     pub normal_y: Option<Spanned<String>>,
+    /// Whether the skin's own material gives the maps where none is named here.
+    pub material: Option<bool>,
     /// Those that files of rules declare.
     #[serde(default)]
     pub own: BTreeMap<Spanned<String>, PathBuf>,

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::error::{SceneError, Warning, Warnings};
-use super::gltf::{Ask, Document, Tangents, Uvs};
+use super::gltf::{Ask, Document, Tangents, TextureUv, Uvs};
 use crate::model::fields::Fields;
 
 /// What a glTF file holds, by its own names. Lengths and places are in the file's unit, in the world.
@@ -49,11 +49,11 @@ pub struct MeshPart {
     pub vertices: usize,
     /// How many triangles; 0 of points and lines.
     pub triangles: usize,
-    /// Sets of texture coordinates; the first is read.
+    /// Sets of texture coordinates.
     pub uv_sets: usize,
     /// Whether it has tangents of its own.
     pub tangents: bool,
-    /// Whether it has colours at its vertices, which are not read.
+    /// Whether it has colours at its vertices, which are not read of skin.
     pub vertex_colors: bool,
     /// How many morph targets.
     pub morph_targets: usize,
@@ -83,6 +83,8 @@ pub struct Picture {
     pub file: FilePicture,
     /// The set of texture coordinates that it is looked up by.
     pub uv_set: usize,
+    /// Whether these are moved before (KHR_texture_transform).
+    pub moved: bool,
 }
 
 /// Where a picture's bytes are.
@@ -120,6 +122,8 @@ pub struct CameraOfFile {
     pub name: String,
     /// Where it stands.
     pub eye: [f64; 3],
+    /// Whether a view may name it: not at a node that mirrors, shears or has no size.
+    pub usable: bool,
     /// Vertical field of view.
     pub fov_y_degrees: f64,
     /// Width over height, where the file says.
@@ -145,6 +149,8 @@ impl MeshContents {
         let mut warnings = Warnings::new();
         let ask = Ask {
             uvs: Uvs::None,
+            uv: TextureUv::default(),
+            colors: false,
             tangents: Tangents::None,
             morphs: true,
             morph_weights: None,
@@ -159,7 +165,8 @@ impl MeshContents {
         let least = positions.iter().copied().reduce(DVec3::min).unwrap_or_default();
         let most = positions.iter().copied().reduce(DVec3::max).unwrap_or_default();
         let cameras = document.cameras(None)?.into_iter().map(|camera| CameraOfFile {
-            eye: camera.world_to_camera.inverse().w_axis.truncate().to_array(),
+            eye: camera.eye.to_array(),
+            usable: camera.world_to_camera.is_some(),
             fov_y_degrees: camera.fov_y.to_degrees(),
             name: camera.name,
             aspect: camera.aspect,
@@ -202,8 +209,9 @@ impl MeshContents {
     /// The opaque material of the most triangles: of a character mostly its skin.
     #[must_use]
     pub fn largest_material(&self) -> Option<&Material> {
+        let triangles = |material: &&Material| self.triangles_of(&material.name);
         let opaque = self.materials.iter().filter(|material| material.alpha == "opaque");
         // Of equals the first.
-        opaque.rev().max_by_key(|material| self.triangles_of(&material.name))
+        opaque.filter(|material| triangles(material) > 0).rev().max_by_key(triangles)
     }
 }

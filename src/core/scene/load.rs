@@ -4,13 +4,13 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::animation::{Pose, ask, idle_effects, mesh_file};
+use super::animation::{Pose, ask, idle_effects, mesh_file, own_maps};
 use super::cameras::{self, MeshCameras, ViewPlan};
 use super::dapple::dapple;
 use super::diffusion;
 use super::error::{SceneError, Warning, Warnings, warn};
 use super::file::{EnvironmentTable, MapsTable, SceneFile, Source};
-use super::gltf::Ask;
+use super::gltf::{Ask, TextureUv};
 use super::lit::{self, Lights};
 use super::maps::{Environment, Map, Maps, OwnMap};
 use super::numbers::{interval, number};
@@ -123,9 +123,21 @@ impl Scene {
         }
         check_lobe(&source, &file, &setup, &mut warnings);
         let declared = Fields::of(terms.iter().flat_map(|term| term.fields.iter())).of_maps();
-        let maps = read_maps(&source, &file, folder, (needs, declared), &mut warnings)?;
+        let mut maps = read_maps(&source, &file, folder, (needs, declared), &mut warnings)?;
+        let mut uv = TextureUv::default();
+        if (needs.color_map || needs.normal_map)
+            && let Some(own) = own_maps(&file, &document, &pose, &mut warnings)?
+        {
+            let wanted = (needs.color_map, needs.normal_map);
+            (maps.color, maps.normal) = document.read_skin_maps(&own, wanted, &mut warnings)?;
+            if normal_flip(&source, &file)? {
+                let texels = maps.normal.iter_mut().flat_map(|map| &mut map.texels);
+                texels.for_each(|texel| texel[1] = 1.0 - texel[1]);
+            }
+            uv = own.uv();
+        }
         bar.inc(1);
-        let ask = Ask { clip: options.clip, ..ask(&maps, form, effects, needs, &pose) };
+        let ask = Ask { clip: options.clip, uv, ..ask(&maps, form, effects, needs, &pose) };
         let mesh = document.mesh(&ask, &mut warnings)?;
         idle_effects(&document, effects, &mesh, &mut warnings)?;
         drop(document);

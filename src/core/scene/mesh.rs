@@ -123,10 +123,14 @@ impl VertexField {
 }
 
 impl PosedMesh {
-    /// Whether its texture coordinates tell places apart: where a file has none, all of them are 0.
+    /// Whether its skin's texture coordinates tell places apart: where a file has none, all of them are 0.
     #[must_use]
     pub fn is_unwrapped(&self) -> bool {
-        self.uvs.iter().any(|uv| *uv != self.uvs[0])
+        let skin = self.skin_triangles();
+        // Those that are not skin have no corners apart.
+        let mut corners = skin.iter().filter(|[a, b, _]| a != b).flatten().map(|&i| self.uvs.get(i as usize));
+        let first = corners.next().flatten();
+        first.is_some() && corners.any(|uv| uv != first)
     }
 }
 

@@ -1,5 +1,7 @@
 //! The parts of a mesh that are not skin (eyes, lashes, hair, cloth), and what they are drawn by: glTF's own materials.
 
+use std::sync::Arc;
+
 use glam::Vec2;
 
 use super::maps::Map;
@@ -11,6 +13,8 @@ pub struct PlainParts {
     pub of_triangle: Vec<Option<u16>>,
     /// What the others are drawn by.
     pub materials: Vec<PlainMaterial>,
+    /// Factors on the base colour at the corners of each triangle, linear, with alpha; empty where all are 1.
+    pub corner_colors: Vec<[[f32; 4]; 3]>,
 }
 
 /// A metallic-roughness material (glTF 2.0, section 3.9); colours are linear.
@@ -21,17 +25,41 @@ pub struct PlainMaterial {
     /// Colour and alpha.
     pub base_color: [f32; 4],
     /// A factor on them.
-    pub color_map: Option<Map<4>>,
+    pub color_map: Option<PlainMap>,
     /// How much of a metal it is.
     pub metallic: f32,
     /// The square root of GGX's alpha.
     pub roughness: f32,
     /// Factors: of the roughness in the second channel, of the metal in the third.
-    pub roughness_map: Option<Map<4>>,
+    pub roughness_map: Option<PlainMap>,
     /// What its alpha does.
     pub alpha: Alpha,
     /// Radiance of its own.
     pub emission: [f32; 3],
+    /// A factor on it.
+    pub emission_map: Option<PlainMap>,
+}
+
+/// A picture of a material, and how it is looked up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlainMap {
+    /// The picture; parts of a mesh may share one.
+    pub map: Arc<Map<4>>,
+    /// What lies beyond its borders along u and v.
+    pub wrap: [Wrap; 2],
+    /// Whether its texels are seen as squares.
+    pub nearest: bool,
+}
+
+/// What lies beyond a picture's borders (glTF 2.0, section 5.26).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wrap {
+    /// The picture again.
+    Repeat,
+    /// The picture again, mirrored each second time.
+    Mirror,
+    /// Its texels at the border.
+    Clamp,
 }
 
 /// What a material's alpha does.
@@ -54,12 +82,30 @@ pub struct PlainSurface {
     pub f0: [f64; 3],
     /// GGX's alpha.
     pub alpha: f64,
+    /// Radiance of its own.
+    pub emission: [f64; 3],
 }
 
 /// The reflectance of what is no metal (glTF 2.0, appendix B.2).
 const DIELECTRIC_F0: f64 = 0.04;
 /// A lobe of less is a mirror's, which rays do not find lamps in.
 const LEAST_ALPHA: f64 = 1e-3;
+
+impl PlainSurface {
+    /// Schlick's reflectance, by the cosine between view and half vector.
+    #[must_use]
+    pub fn fresnel(&self, v_h: f64) -> [f64; 3] {
+        let grazing = (1.0 - v_h.clamp(0.0, 1.0)).powi(5);
+        self.f0.map(|f0| f0 + (1.0 - f0) * grazing)
+    }
+
+    /// The diffuse albedo of what enters by that reflectance (glTF 2.0, appendix B.2: of what is no metal).
+    #[must_use]
+    pub fn diffuse_towards(&self, v_h: f64) -> [f64; 3] {
+        let grazing = (1.0 - v_h.clamp(0.0, 1.0)).powi(5);
+        self.diffuse.map(|c| c * (1.0 - DIELECTRIC_F0) * (1.0 - grazing))
+    }
+}
 
 impl PlainParts {
     /// The material of a triangle that is not skin.
@@ -68,13 +114,43 @@ impl PlainParts {
         let place = (*self.of_triangle.get(triangle as usize)?)?;
         self.materials.get(usize::from(place))
     }
+
+    /// The factor on a material's base colour at a place of a triangle, by the weights of its corners.
+    #[must_use]
+    pub fn tint(&self, triangle: u32, weights: [f32; 3]) -> [f32; 4] {
+        self.corner_colors.get(triangle as usize).map_or([1.0; 4], |corners| {
+            std::array::from_fn(|c| (0..3).map(|i| weights[i] * corners[i][c]).sum())
+        })
+    }
+}
+
+impl PlainMap {
+    /// The picture at texture coordinates.
+    #[must_use]
+    pub fn sample(&self, uv: Vec2) -> [f32; 4] {
+        let at = |i: usize, size: usize| {
+            // Half a texel from the border the filter reads no other.
+            let texel = 1.0 / size as f32;
+            let place = match self.wrap[i] {
+                Wrap::Repeat => uv[i] - uv[i].floor(),
+                Wrap::Mirror => 1.0 - (uv[i].rem_euclid(2.0) - 1.0).abs(),
+                Wrap::Clamp => uv[i],
+            };
+            let place = if self.nearest { ((place * size as f32).floor() + 0.5) * texel } else { place };
+            match self.wrap[i] {
+                Wrap::Repeat => place,
+                Wrap::Mirror | Wrap::Clamp => place.clamp(0.5 * texel, 1.0 - 0.5 * texel),
+            }
+        };
+        self.map.sample(at(0, self.map.width), at(1, self.map.height))
+    }
 }
 
 impl PlainMaterial {
-    /// The share of it that is seen at a place of its map: 0 or 1 but where it blends.
+    /// The share of it that is seen at a place of its map, where the mesh has that `tint`: 0 or 1 but where it blends.
     #[must_use]
-    pub fn seen(&self, uv: Vec2) -> f32 {
-        let alpha = || self.color(uv)[3].clamp(0.0, 1.0);
+    pub fn seen(&self, uv: Vec2, tint: [f32; 4]) -> f32 {
+        let alpha = || self.color((uv, tint))[3].clamp(0.0, 1.0);
         match self.alpha {
             Alpha::Opaque => 1.0,
             Alpha::Mask(cutoff) => f32::from(u8::from(alpha() >= cutoff)),
@@ -82,23 +158,25 @@ impl PlainMaterial {
         }
     }
 
-    /// What it is at a place of its maps.
+    /// What it is at a place of its maps, where the mesh has that `tint`.
     #[must_use]
-    pub fn at(&self, uv: Vec2) -> PlainSurface {
-        let [r, g, b, _] = self.color(uv);
+    pub fn at(&self, uv: Vec2, tint: [f32; 4]) -> PlainSurface {
+        let [r, g, b, _] = self.color((uv, tint));
         let base = [r, g, b].map(|c| f64::from(c).clamp(0.0, 1.0));
-        let [_, rough, metal, _] = self.roughness_map.as_ref().map_or([1.0; 4], |map| map.sample(uv.x, uv.y));
+        let [_, rough, metal, _] = self.roughness_map.as_ref().map_or([1.0; 4], |map| map.sample(uv));
         let metal = f64::from(self.metallic * metal).clamp(0.0, 1.0);
         let roughness = f64::from(self.roughness * rough).clamp(0.0, 1.0);
+        let glow = self.emission_map.as_ref().map_or([1.0; 4], |map| map.sample(uv));
         PlainSurface {
             diffuse: base.map(|c| c * (1.0 - metal)),
             f0: base.map(|c| DIELECTRIC_F0 + (c - DIELECTRIC_F0) * metal),
             alpha: (roughness * roughness).max(LEAST_ALPHA),
+            emission: std::array::from_fn(|c| f64::from(self.emission[c] * glow[c]).max(0.0)),
         }
     }
 
-    fn color(&self, uv: Vec2) -> [f32; 4] {
-        let map = self.color_map.as_ref().map_or([1.0; 4], |map| map.sample(uv.x, uv.y));
-        std::array::from_fn(|c| self.base_color[c] * map[c])
+    fn color(&self, (uv, tint): (Vec2, [f32; 4])) -> [f32; 4] {
+        let map = self.color_map.as_ref().map_or([1.0; 4], |map| map.sample(uv));
+        std::array::from_fn(|c| self.base_color[c] * map[c] * tint[c])
     }
 }

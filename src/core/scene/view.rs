@@ -45,6 +45,12 @@ pub struct Camera {
 }
 
 impl Camera {
+    /// A pinhole in the middle of its image; the vertical field of view is in radians.
+    #[must_use]
+    pub fn pinhole(world_to_camera: DMat4, fov_y: f64, [width, height]: [u32; 2]) -> Self {
+        Self { world_to_camera, fov_y, width, height, lens: Lens::default() }
+    }
+
     /// The eye in the world.
     #[must_use]
     pub fn eye(&self) -> DVec3 {

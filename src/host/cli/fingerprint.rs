@@ -6,6 +6,7 @@ use crate::model::effects::Effect;
 use crate::prepare::HeldOut;
 use crate::scene::maps::{Environment, Map, Maps, OwnMap};
 use crate::scene::mesh::Mesh;
+use crate::scene::plain::Alpha;
 use crate::scene::view::Target;
 use crate::scene::{Quality, Scene};
 
@@ -122,6 +123,18 @@ fn mesh(mesh: &Mesh, metres_per_unit: f64) -> String {
         .numbers(mesh.weights.as_flattened())
         .numbers(&bones);
     let rest = mesh.fields.iter().fold(rest, |all, of| all.words(&of.field).numbers(&of.numbers));
+    // Which triangles are no skin, and which of those have holes: pixels that show them do not count.
+    let rest = mesh.plain.iter().fold(rest, |all, plain| {
+        let colors = plain.corner_colors.as_flattened().as_flattened();
+        let all = all.words(&plain.of_triangle).numbers(colors);
+        plain.materials.iter().fold(all, |all, of| {
+            let all = all.words(&(of.alpha, of.base_color[3]));
+            match of.color_map.as_ref().filter(|_| of.alpha != Alpha::Opaque) {
+                Some(map) => all.words(&(map.wrap, map.nearest)).numbers(map.map.texels.as_flattened()),
+                None => all,
+            }
+        })
+    });
     // A target without weight moves nothing, and its occlusion is not baked.
     let moved = mesh.morphs.iter().filter(|morph| morph.weight != 0.0);
     moved

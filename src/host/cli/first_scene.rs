@@ -34,12 +34,17 @@ impl FirstScene<'_> {
         let (mut maps, mut within) = (Vec::new(), Vec::new());
         for (key, picture) in pictures.into_iter().flatten() {
             match picture {
-                // The first set of texture coordinates is read.
-                Some(Picture { file: FilePicture::Beside(path), uv_set: 0, .. }) => {
+                // What a scene names is looked up by the first set of texture coordinates as it stands.
+                Some(Picture { file: FilePicture::Beside(path), uv_set: 0, moved: false, .. }) => {
                     let beside = contents.file.parent().unwrap_or(Path::new("")).join(path);
                     maps.push((key, named_from(folder, &beside)));
                 }
-                Some(Picture { file: FilePicture::Within { index, ending }, uv_set: 0, .. }) => {
+                Some(Picture {
+                    file: FilePicture::Within { index, ending },
+                    uv_set: 0,
+                    moved: false,
+                    ..
+                }) => {
                     let stem = scene.file_stem().unwrap_or_default().to_string_lossy();
                     let name = format!("{stem}_{key}.{ending}");
                     free(&folder.join(&name))?;

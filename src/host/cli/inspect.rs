@@ -114,7 +114,7 @@ fn materials(contents: &MeshContents) -> String {
     let head = ["material", "triangles", "alpha", "colour", "normals"].map(str::to_owned);
     let picture = |picture: &Option<Picture>| match picture {
         None => "-".to_owned(),
-        Some(Picture { name, file, uv_set }) => {
+        Some(Picture { name, file, uv_set, .. }) => {
             let file = match file {
                 FilePicture::Beside(path) => path.display().to_string(),
                 FilePicture::Within { index, ending } => {
@@ -152,11 +152,10 @@ fn motions(contents: &MeshContents) -> String {
     list("animations", animations.collect());
     let cameras = contents.cameras.iter().map(|camera| {
         let eye = camera.eye.map(|x| digits(x, 3)).join(", ");
-        format!(
-            "{} ({} degrees from top to bottom, at [{eye}])",
-            camera.name,
-            digits(camera.fov_y_degrees, 3)
-        )
+        let degrees = digits(camera.fov_y_degrees, 3);
+        let mirrored =
+            if camera.usable { "" } else { "; of no use: its node mirrors, shears or has no size" };
+        format!("{} ({degrees} degrees from top to bottom, at [{eye}]{mirrored})", camera.name)
     });
     list("cameras", cameras.collect());
     list("lights", contents.lights.clone());
@@ -173,10 +172,10 @@ fn not_read(contents: &MeshContents) -> String {
         lines.push("alpha of materials that are skin: it is opaque".to_owned());
     }
     if contents.parts.iter().any(|part| part.vertex_colors) {
-        lines.push("colours at vertices".to_owned());
+        lines.push("colours at vertices of skin".to_owned());
     }
     if contents.parts.iter().any(|part| part.uv_sets > 1) {
-        lines.push("texture coordinates but the first set".to_owned());
+        lines.push("texture coordinates but the set that a part's first picture names".to_owned());
     }
     lines.extend(contents.unread_extensions.iter().map(|extension| {
         let required = if extension.required { " (required)" } else { "" };

@@ -86,6 +86,12 @@ mod gpu {
                 Err(error) if wished => return Err(error.into()),
                 _ => return Ok((Self(None), None)),
             };
+            if let Some(what) = content(whole, point).and_then(|whole| whole.scene.cpu_alone()) {
+                return Ok((
+                    Self(None),
+                    Some(format!("GPU time is not measured: {what}, which no adapter draws.")),
+                ));
+            }
             if !gpu.timestamps() {
                 let warning = format!("GPU time is not measured: {} has no timestamps.", gpu.name());
                 return Ok((Self(None), Some(warning)));

@@ -44,7 +44,7 @@ fn unwrapped(numbers: &[f32], mesh: &PosedMesh) -> Image {
         return image;
     }
     let size = UNWRAPPED as f32;
-    for triangle in &mesh.triangles {
+    for triangle in mesh.skin_triangles().iter() {
         let [a, b, c] = triangle.map(|i| mesh.uvs[i as usize] * size - 0.5);
         let area = (b - a).perp_dot(c - a);
         if area == 0.0 || !area.is_finite() {

@@ -48,13 +48,12 @@ impl Orbit {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::lens::Lens;
 
     #[test]
     fn the_middle_of_the_mesh_stays_where_it_is_seen() {
         let turned = DMat4::from_rotation_x(0.4) * DMat4::from_rotation_y(-0.2);
         let world_to_camera = DMat4::from_translation(DVec3::new(0.1, -0.3, -5.0)) * turned;
-        let camera = Camera { world_to_camera, fov_y: 0.6, width: 64, height: 48, lens: Lens::default() };
+        let camera = Camera::pinhole(world_to_camera, 0.6, [64, 48]);
         let centre = DVec3::new(0.2, -0.1, 0.3);
         let (x, y, depth) = camera.project(centre);
         let turned = Orbit { yaw: 0.7, pitch: -0.3, distance: 1.0 }.turned(&camera, centre);

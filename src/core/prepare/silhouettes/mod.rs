@@ -57,6 +57,10 @@ enum Likely<'a> {
 /// What is to be said of a scene's views, whose samples are in their order; nothing of a target that has no alpha, or
 /// whose alpha is the same everywhere: it shows no silhouette.
 pub(super) fn warnings(scene: &str, views: &[View], samples: &[ViewSamples]) -> Vec<String> {
+    let shows = |view: &View| view.target.as_ref().is_some_and(|target| target.alpha.is_some());
+    if !views.iter().any(shows) {
+        return Vec::new();
+    }
     let meshes: Vec<Plane> =
         views.iter().zip(samples).map(|(view, samples)| Plane::of_mesh(view, samples)).collect();
     let apart = (0..meshes.len()).filter_map(|i| look(i, views, &meshes));

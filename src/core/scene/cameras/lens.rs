@@ -44,6 +44,11 @@ pub(super) fn with_lens(source: &Source, table: &ViewTable, camera: Camera) -> R
     Ok(camera)
 }
 
+/// Refuse a distortion that is none.
+pub(super) fn check_coefficients(source: &Source, table: &ViewTable) -> Result<(), SceneError> {
+    table.lens.as_ref().map_or(Ok(()), |lens| distortion(source, lens.get_ref()).map(drop))
+}
+
 fn distortion(source: &Source, lens: &LensTable) -> Result<Option<Distortion>, SceneError> {
     let fisheye = match &lens.model {
         None => false,

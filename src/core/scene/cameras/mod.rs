@@ -13,11 +13,10 @@ use toml::Spanned;
 
 pub(super) use self::place::{MeshCameras, all_finite, turns_alone};
 
-use self::lens::with_lens;
+use self::lens::{check_coefficients, with_lens};
 use self::place::Place;
 use super::error::{SceneError, Warnings};
 use super::file::{BackgroundValue, Source, ViewTable};
-use super::lens::Lens;
 use super::numbers::{interval, number, short};
 use super::view::{Background, Camera};
 use crate::model::params::LARGEST;
@@ -148,12 +147,17 @@ fn camera(
         Place::World(matrix) => (matrix, None),
         Place::Named(name) => match mesh {
             Some(mesh) => {
-                let camera = mesh.named(source, name)?;
+                let (camera, world_to_camera) = mesh.named(source, name)?;
                 camera.tell_aspect(&table.name, [width, height], warnings, &source.path);
-                (camera.world_to_camera, Some(camera.fov_y))
+                (world_to_camera, Some(camera.fov_y))
             }
-            // The values alone are checked.
-            None => (DMat4::IDENTITY, Some(1.0)),
+            // The values alone are checked; what a lens shows hangs on the field of view.
+            None if given.is_none() => {
+                let camera = Camera::pinhole(DMat4::IDENTITY, 1.0, [width, height]);
+                check_coefficients(source, table)?;
+                return Ok(camera);
+            }
+            None => (DMat4::IDENTITY, None),
         },
     };
     let fov_y = given.or(own).ok_or_else(|| {
@@ -164,7 +168,7 @@ fn camera(
         let what = format!("the camera has a field of view of {} degrees", short(fov_y.to_degrees()));
         return Err(source.error(&table.name, what, format!("Give fov_y_degrees, {wanted}")));
     }
-    let camera = Camera { world_to_camera, fov_y, width, height, lens: Lens::default() };
+    let camera = Camera::pinhole(world_to_camera, fov_y, [width, height]);
     with_lens(source, table, camera)
 }
 

@@ -64,15 +64,27 @@ pub(in crate::scene) struct MeshCameras<'a> {
 }
 
 impl MeshCameras<'_> {
-    /// The camera that a scene file names.
-    pub(super) fn named(self, source: &Source, name: &Spanned<String>) -> Result<FileCamera, SceneError> {
+    /// The camera that a scene file names, and its world to camera.
+    pub(super) fn named(
+        self,
+        source: &Source,
+        name: &Spanned<String>,
+    ) -> Result<(FileCamera, DMat4), SceneError> {
         let cameras = self.document.cameras(self.time)?;
         let wanted = name.get_ref();
         let (found, others): (Vec<_>, Vec<_>) =
             cameras.into_iter().partition(|camera| camera.name == *wanted);
         let file = self.document.path().display();
         match <[FileCamera; 1]>::try_from(found) {
-            Ok([camera]) => Ok(camera),
+            Ok([camera]) => match camera.world_to_camera {
+                Some(world_to_camera) => Ok((camera, world_to_camera)),
+                None => {
+                    let what = format!(
+                        "{file} has the camera `{wanted}` at a node that mirrors, shears or has no size"
+                    );
+                    Err(source.error(name, what, "Apply the node's scale there, and export it anew"))
+                }
+            },
             Err(found) if found.is_empty() => {
                 let known: Vec<&str> = others.iter().map(|camera| camera.name.as_str()).collect();
                 let what = format!("{file} has no camera `{wanted}`");

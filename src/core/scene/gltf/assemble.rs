@@ -101,19 +101,25 @@ impl Builder<'_> {
             let place = format!("{name}, primitive {i}");
             let bones = skin.map(|(_, bones)| bones);
             let plain = match &mut self.split {
-                Some(split) => split.of(document, mesh, primitive, warnings)?,
+                Some(split) => {
+                    let mesh = document.mesh_name(index.value(), &root.nodes[node]);
+                    split.of(document, &mesh, primitive, warnings)?
+                }
                 None => None,
             };
-            // Maps of the scene's are not looked up on what is not skin.
-            let loose = plain.filter(|_| self.ask.uvs == Uvs::Required);
-            let loose = loose.map(|_| Ask { uvs: Uvs::Optional, ..self.ask.clone() });
+            // What is not skin is drawn by maps of its own.
+            let loose = plain.map(|plain| Ask {
+                uvs: if self.ask.uvs == Uvs::None { Uvs::None } else { Uvs::Optional },
+                uv: plain.uv,
+                colors: true,
+                ..self.ask.clone()
+            });
             let ask = loose.as_ref().unwrap_or(self.ask);
             if let Some(part) = document.part(primitive, &place, ask, bones, &mut self.mended)? {
-                let count = part.triangles.len();
-                self.append(part, &place, world, skin.map(|(first, _)| first), &slots)?;
                 if let Some(split) = &mut self.split {
-                    split.add(count, plain);
+                    split.add(&part, plain);
                 }
+                self.append(part, &place, world, skin.map(|(first, _)| first), &slots)?;
             }
         }
         Ok(())

@@ -11,8 +11,10 @@ use crate::scene::view::looking;
 pub(in crate::scene) struct FileCamera {
     /// Its node's name, else its own, else `camera_N` after its place in the file.
     pub name: String,
-    /// World to camera; a rigid motion.
-    pub world_to_camera: DMat4,
+    /// Where it stands.
+    pub eye: DVec3,
+    /// World to camera, a rigid motion; `None` at a node that mirrors, shears or has no size.
+    pub world_to_camera: Option<DMat4>,
     /// Vertical field of view, radians.
     pub fov_y: f64,
     /// Width over height, where the file says.
@@ -31,12 +33,10 @@ impl Document {
             let Some(lens) = &camera.perspective else { continue };
             let name = node.name.as_ref().or(camera.name.as_ref());
             let name = name.cloned().unwrap_or_else(|| format!("camera_{}", index.value()));
-            let world_to_camera = without_scale(nodes.world[i]).ok_or_else(|| {
-                let what = format!("has the camera {name:?} at a node that mirrors, shears or has no size");
-                self.error(what, "Apply the node's scale, and export it anew").at(format!("node {i}"))
-            })?;
+            let world_to_camera = without_scale(nodes.world[i]);
+            let eye = nodes.world[i].w_axis.truncate();
             let aspect = lens.aspect_ratio.map(f64::from).filter(|aspect| *aspect > 0.0);
-            cameras.push(FileCamera { name, world_to_camera, fov_y: f64::from(lens.yfov), aspect });
+            cameras.push(FileCamera { name, eye, world_to_camera, fov_y: f64::from(lens.yfov), aspect });
         }
         Ok(cameras)
     }

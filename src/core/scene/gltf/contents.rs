@@ -9,11 +9,12 @@ use json::mesh::Semantic;
 use json::validation::Checked;
 
 use super::document::Document;
+use super::textures::TextureUse;
 use crate::scene::error::SceneError;
 use crate::scene::inspect::{Animation, FilePicture, Material, MeshPart, Picture, UnreadExtension};
 
 /// Extensions whose numbers are read.
-const READ: [&str; 2] = ["KHR_mesh_quantization", "KHR_lights_punctual"];
+const READ: [&str; 3] = ["KHR_mesh_quantization", "KHR_lights_punctual", "KHR_texture_transform"];
 
 impl Document {
     /// The program that wrote the file, where it says.
@@ -29,8 +30,7 @@ impl Document {
             let node = &self.root.nodes[i];
             let Some(index) = node.mesh else { continue };
             let mesh = self.get(&self.root.meshes, index, "mesh")?;
-            let name = mesh.name.clone().or_else(|| node.name.clone());
-            let name = name.unwrap_or_else(|| format!("mesh {}", index.value()));
+            let name = self.mesh_name(index.value(), node);
             for primitive in &mesh.primitives {
                 let count = |accessor: Option<json::Index<json::Accessor>>| match accessor {
                     Some(index) => Ok(self.get(&self.root.accessors, index, "accessor")?.count.0 as usize),
@@ -63,6 +63,12 @@ impl Document {
         Ok(parts)
     }
 
+    /// The name of a mesh, else of the node that has it, or its place.
+    pub(super) fn mesh_name(&self, index: usize, node: &json::Node) -> String {
+        let named = self.root.meshes.get(index).and_then(|mesh| mesh.name.clone());
+        named.or_else(|| node.name.clone()).unwrap_or_else(|| format!("mesh {index}"))
+    }
+
     /// The name of a material, or its place.
     pub(super) fn material_name(&self, index: usize) -> String {
         let named = self.root.materials.get(index).and_then(|material| material.name.clone());
@@ -74,10 +80,10 @@ impl Document {
         let mut materials = Vec::new();
         for (i, material) in self.root.materials.iter().enumerate() {
             let surface = &material.pbr_metallic_roughness;
-            let color = surface.base_color_texture.as_ref().map(|texture| (texture.index, texture.tex_coord));
-            let normal = material.normal_texture.as_ref().map(|texture| (texture.index, texture.tex_coord));
-            let picture = |found: Option<(json::Index<json::Texture>, u32)>| match found {
-                Some((index, uv_set)) => self.picture(index, uv_set),
+            let color = surface.base_color_texture.as_ref().map(TextureUse::of);
+            let normal = material.normal_texture.as_ref().map(TextureUse::of_normals);
+            let picture = |found: Option<TextureUse>| match found {
+                Some(texture) => self.picture(texture),
                 None => Ok(None),
             };
             materials.push(Material {
@@ -97,10 +103,9 @@ impl Document {
     /// The picture of a texture; none where an extension alone says what it is of.
     pub(super) fn picture(
         &self,
-        texture: json::Index<json::Texture>,
-        uv_set: u32,
+        TextureUse { index, uv }: TextureUse,
     ) -> Result<Option<Picture>, SceneError> {
-        let texture = self.get(&self.root.textures, texture, "texture")?;
+        let texture = self.get(&self.root.textures, index, "texture")?;
         // The crate's own mark for a texture without a source.
         if texture.source.value() == u32::MAX as usize {
             return Ok(None);
@@ -121,7 +126,7 @@ impl Document {
             (None, None) => return Ok(None),
         };
         let name = image.name.clone().filter(|name| !name.is_empty());
-        Ok(Some(Picture { name, file, uv_set: uv_set as usize }))
+        Ok(Some(Picture { name, file, uv_set: uv.set as usize, moved: uv.is_moved() }))
     }
 
     /// The bytes of a picture within the file, as they are encoded.

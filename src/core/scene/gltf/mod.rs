@@ -9,6 +9,8 @@
 //! - [`primitive`]: one primitive's attributes and triangles
 //! - [`plain`]: which triangles are skin, and the materials of the others
 //! - [`skins`]: bones and their influences
+//! - [`skin_maps`]: the maps of the skin's own material
+//! - [`textures`]: what a material says of a texture
 //! - [`assemble`]: every primitive of the scene in one [`Mesh`](super::mesh::Mesh)
 //!
 //! Only the JSON types of the `gltf` crate are used: its wrappers trust indices that files of the
@@ -24,10 +26,14 @@ mod lights;
 mod nodes;
 mod plain;
 mod primitive;
+mod skin_maps;
 mod skins;
+mod textures;
 
 pub(super) use cameras::FileCamera;
 pub(super) use document::Document;
+pub(super) use skin_maps::SkinMaps;
+pub(super) use textures::TextureUv;
 
 use crate::model::fields::Fields;
 
@@ -36,6 +42,10 @@ use crate::model::fields::Fields;
 pub(super) struct Ask {
     /// Texture coordinates: a map will be looked up.
     pub uvs: Uvs,
+    /// Which ones of the skin.
+    pub uv: TextureUv,
+    /// Colours of vertices.
+    pub colors: bool,
     /// Tangents, and how good they must be.
     pub tangents: Tangents,
     /// Morph targets.

@@ -33,6 +33,8 @@ pub(super) struct Part {
     pub fields: Vec<Vec<f32>>,
     /// Bone indices (into the skin) and weights.
     pub influences: Option<Vec<Influence>>,
+    /// Colours of its vertices, linear, with alpha; where they are asked for.
+    pub colors: Option<Vec<[f32; 4]>>,
     pub triangles: Vec<[u32; 3]>,
     pub targets: Vec<Target>,
 }
@@ -126,8 +128,13 @@ impl Document {
             None => None,
         };
         same(tangents.as_ref().map_or(count, Vec::len), "tangents")?;
-        let uvs = self.uvs(attribute(Semantic::TexCoords(0)), place, ask)?;
+        let uvs = self.uvs(attribute(Semantic::TexCoords(ask.uv.set)), place, ask)?;
         same(uvs.as_ref().map_or(count, Vec::len), "texture coordinates")?;
+        let colors = match attribute(Semantic::Colors(0)).filter(|_| ask.colors) {
+            Some(index) => Some(self.colors(index, place)?),
+            None => None,
+        };
+        same(colors.as_ref().map_or(count, Vec::len), "colours")?;
         let fields = self.fields(primitive, place, ask, count)?;
         let influences = match bones {
             Some(bones) => self.influences(primitive, bones, count, place, mended)?,
@@ -149,7 +156,7 @@ impl Document {
             targets.push(target);
         }
         let triangles = self.triangles(primitive, mode, count, place)?;
-        Ok(Some(Part { positions, normals, tangents, uvs, fields, influences, triangles, targets }))
+        Ok(Some(Part { positions, normals, tangents, uvs, fields, influences, colors, triangles, targets }))
     }
 
     fn vectors(&self, index: Index<Accessor>) -> Result<Vec<Vec3>, SceneError> {
@@ -175,9 +182,24 @@ impl Document {
         };
         let uvs: Vec<Vec2> = self.floats::<2>(index)?.into_iter().map(Vec2::from).collect();
         match uvs.iter().position(|uv| !uv.is_finite()) {
-            None => Ok(Some(uvs)),
+            None => Ok(Some(ask.uv.moved(uvs))),
             Some(i) => Err(self
                 .error("has a texture coordinate that is not finite", "Repair the mesh")
+                .at(format!("{place}, vertex {i}"))),
+        }
+    }
+
+    /// Colours of vertices, of three numbers or four.
+    fn colors(&self, index: Index<Accessor>, place: &str) -> Result<Vec<[f32; 4]>, SceneError> {
+        let kind = self.get(&self.root.accessors, index, "accessor")?.type_;
+        let colors: Vec<[f32; 4]> = match kind {
+            Checked::Valid(json::accessor::Type::Vec4) => self.floats::<4>(index)?,
+            _ => self.floats::<3>(index)?.into_iter().map(|[r, g, b]| [r, g, b, 1.0]).collect(),
+        };
+        match colors.iter().position(|color| color.iter().any(|c| !c.is_finite())) {
+            None => Ok(colors),
+            Some(i) => Err(self
+                .error("has a colour that is not finite", "Repair the mesh")
                 .at(format!("{place}, vertex {i}"))),
         }
     }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DMat4};
+use glam::{DMat3, DMat4, DVec4};
 
 use super::{ImportedView, Intrinsics, Names, damaged};
 use crate::scene::cameras::turns_alone;
@@ -64,7 +64,12 @@ pub fn read(path: &Path) -> Result<Vec<ImportedView>, SceneError> {
         let rows = frame.transform_matrix.as_flattened();
         let matrix = DMat4::from_cols_array(rows.try_into().unwrap_or(&[0.0; 16])).transpose();
         let motion = matrix.is_finite().then_some(()).ok_or("is not finite");
-        if let Err(what) = motion.and_then(|()| turns_alone(DMat3::from_mat4(matrix))) {
+        let affine = || match (matrix.row(3) - DVec4::W).abs().max_element() <= 1e-9 {
+            true => Ok(()),
+            false => Err("has a last row other than 0, 0, 0, 1 (is it stored by columns?)"),
+        };
+        if let Err(what) = motion.and_then(|()| affine()).and_then(|()| turns_alone(DMat3::from_mat4(matrix)))
+        {
             return Err(damaged(path, place, format!("has a transform_matrix that {what}")));
         }
         let intrinsics = intrinsics(path, &place, &frame.own, &file.all)?;

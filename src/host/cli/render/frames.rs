@@ -63,7 +63,6 @@ fn numbered(output: &Path, i: u32, count: u32) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::lens::Lens;
     use glam::Vec3;
 
     #[test]
@@ -71,7 +70,7 @@ mod tests {
         let positions = vec![Vec3::new(1.0, 0.0, 2.0), Vec3::new(3.0, 4.0, 4.0)];
         let mesh = Mesh { normals: vec![Vec3::Y; 2], positions, ..Mesh::default() };
         let world_to_camera = DMat4::from_translation(DVec3::new(-2.0, -1.0, -9.0));
-        let camera = Camera { world_to_camera, fov_y: 0.5, width: 4, height: 4, lens: Lens::default() };
+        let camera = Camera::pinhole(world_to_camera, 0.5, [4, 4]);
         let frames = turntable(&camera, &mesh, 4, Path::new("a/turn.png"));
         assert_eq!(frames[0].camera, camera);
         // From +Z a quarter turn leads to +X: the axis is at (2, 3), the eye 6 away from it.
