@@ -48,6 +48,7 @@ mod phases;
 mod plain;
 mod readings;
 mod refusals;
+mod registration;
 mod reports;
 mod samples;
 mod scene_files;

@@ -4,7 +4,9 @@ use std::path::Path;
 use std::sync::Arc;
 use web_time::Instant;
 
-use super::{Loaded, Observed, PrepareError, PrepareOptions, Sampled, StageSeconds};
+use super::{
+    Loaded, MovedCamera, Observed, PrepareError, PrepareOptions, Sampled, StageSeconds, registration,
+};
 use crate::bake::{self, Bake, BakeStats, Illumination, Ranges, SkyBake, VertexOcclusion, VertexThickness};
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
@@ -31,6 +33,8 @@ pub struct Baked {
     pub sky: Option<Arc<SkyBake>>,
     /// How thick the mesh is below each vertex, when asked for.
     pub thickness: Option<Arc<VertexThickness>>,
+    /// The cameras that were moved to where the targets show the mesh, if the fit is to.
+    pub cameras: Vec<MovedCamera>,
     /// What was baked, and what came from the cache.
     pub stats: BakeStats,
     /// Seconds by stage so far.
@@ -65,7 +69,26 @@ impl Baked {
         warnings.extend(stats.warnings.iter().cloned());
         let seconds = StageSeconds { bake: start.elapsed().as_secs_f64(), ..seconds };
         let (scene, illumination) = (Arc::new(scene), Arc::new(baked.illumination));
-        Ok(Self { scene, fitted, gains, illumination, occlusion, sky, thickness, stats, seconds, warnings })
+        let cameras = Vec::new();
+        let mut baked = Self {
+            scene,
+            fitted,
+            gains,
+            illumination,
+            occlusion,
+            sky,
+            thickness,
+            cameras,
+            stats,
+            seconds,
+            warnings,
+        };
+        if asked.fit && baked.scene.fit.cameras {
+            baked.cameras = registration::register(&mut baked)?;
+            let path = baked.scene.path.display().to_string();
+            baked.warnings.extend(baked.cameras.iter().map(|camera| camera.told(&path)));
+        }
+        Ok(baked)
     }
 
     /// The same bakes of a scene that differs in what they do not depend on, such as constants (a lobe's exponent within

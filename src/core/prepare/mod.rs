@@ -2,7 +2,7 @@
 //! change under it.
 //!
 //! - [`Loaded`]: the scene as it was read; here it may still be changed
-//! - [`Baked`]: it and its light and occlusion
+//! - [`Baked`]: it and its light and occlusion (`registration`: its cameras moved to where targets show the mesh)
 //! - [`Sampled`]: these and the visible surface of each view
 //! - [`Observed`]: of the views that have a target, samples beside what was observed there
 //!   (`silhouettes`: whether it lies where the mesh is)
@@ -25,6 +25,7 @@ mod named;
 mod observed;
 mod one_skin;
 mod options;
+mod registration;
 mod sampled;
 mod silhouettes;
 
@@ -38,6 +39,7 @@ pub use self::named::{NamedScene, read_one_skin, read_one_skin_each, scene_names
 pub use self::observed::Observed;
 pub use self::one_skin::share_skin;
 pub use self::options::{ClipOcclusion, PrepareOptions, Views};
+pub use self::registration::MovedCamera;
 pub use self::sampled::Sampled;
 
 /// Seconds spent in each stage of a run.

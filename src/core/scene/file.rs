@@ -230,6 +230,8 @@ pub(super) struct FitTable {
     #[serde(default)]
     pub gains: bool,
     #[serde(default)]
+    pub cameras: bool,
+    #[serde(default)]
     pub maps: MapFitTable,
 }
 

@@ -196,7 +196,13 @@ mod tests {
         let free =
             [Param::Hilite, Param::SpecularLobe, Param::EnvironmentRotation].map(Column::tied).to_vec();
         let maps = MapSettings::default();
-        let fit = FitSettings { free: free.clone(), loss: Loss::default(), free_gains: false, maps };
+        let fit = FitSettings {
+            free: free.clone(),
+            loss: Loss::default(),
+            free_gains: false,
+            cameras: false,
+            maps,
+        };
         let held = |kinds: &[MapKind]| {
             let mut fit = fit.clone();
             let told = fit.hold_beside(kinds);

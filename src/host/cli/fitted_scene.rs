@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use toml_edit::{Array, DocumentMut, Item, Table, TableLike, TomlError, Value};
 
+use super::fitted_cameras::set_cameras;
 use crate::model::effects::Form;
 use crate::model::params::{Channels, Column, Param, Params};
+use crate::prepare::MovedCamera;
 use crate::study::tradeoff::axis::Choose;
 
 /// The keys of `[maps]` that name files.
@@ -27,6 +29,8 @@ pub(super) struct Changes<'a> {
     pub(super) maps: &'a [(&'static str, String)],
     /// Settings, instead of the file's.
     pub(super) settings: &'a [Choose],
+    /// Cameras that the fit moved, instead of the file's.
+    pub(super) cameras: &'a [MovedCamera],
     /// The effects that are on, instead of the file's.
     pub(super) effects: Option<&'a [&'static str]>,
 }
@@ -74,6 +78,7 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
             set_params(params, start);
         }
     }
+    set_cameras(&mut scene, changes.cameras);
     if let Some(effects) = changes.effects
         && let Some(model) = section(scene.as_table_mut(), "model")
     {
@@ -164,7 +169,7 @@ fn section<'a>(table: &'a mut dyn TableLike, name: &str) -> Option<&'a mut dyn T
 }
 
 /// Set a value; what stands around it (spaces, a comment) stays.
-fn set(table: &mut dyn TableLike, key: &str, mut value: Value) {
+pub(super) fn set(table: &mut dyn TableLike, key: &str, mut value: Value) {
     match table.get_mut(key).and_then(Item::as_value_mut) {
         Some(old) => {
             *value.decor_mut() = old.decor().clone();

@@ -20,6 +20,7 @@ mod fingerprint;
 mod first_scene;
 mod fit;
 mod fit_engine;
+mod fitted_cameras;
 mod fitted_scene;
 mod graphics;
 mod import;

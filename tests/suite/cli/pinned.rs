@@ -146,9 +146,10 @@ fn moved(scene: &str, got: &Pin, pin: &Pin) -> Vec<String> {
             moved.push(format!("{scene}: {name} is not determined"));
             continue;
         };
-        // A fit ends where a step would gain less than it can measure: within a hundredth of a standard error; f32 has
-        // no more than some 1e-7 of a constant.
-        let by = 0.01 * error + 1e-7 * want.abs();
+        // A fit ends where a step would gain less than it can measure. What it can, hangs on how a processor's
+        // instructions round sums: at losses that are the same to 1e-8, AVX2 and AVX-512 end up to 0.15 standard errors
+        // apart where constants stand for each other. f32 has no more than some 1e-7 of a constant.
+        let by = 0.25 * error + 1e-7 * want.abs();
         if (got - want).abs() > by || (found - error).abs() > by {
             moved.push(format!("{scene}: {name} {got} +- {found:e} instead of {want} +- {error:e}"));
         }
@@ -158,8 +159,8 @@ fn moved(scene: &str, got: &Pin, pin: &Pin) -> Vec<String> {
         let pairs = got.pictures[view].iter().flatten().zip(want.iter().flatten());
         let most = pairs.map(|(got, want)| (got - want).abs()).fold(0.0, f64::max) / mean;
         println!("{scene}: {view}: {most:e}");
-        // What a hundredth of each constant's standard error moves.
-        if most > 1e-5 {
+        // Twice what ends that are so far apart show.
+        if most > 1e-4 {
             moved.push(format!("{scene}: {view}: a block is off by {most:e} of the picture's mean"));
         }
     }

@@ -149,7 +149,8 @@ impl Apart<'_> {
                 let (right, down) = (direction(x, "right", "left"), direction(y, "down", "up"));
                 format!(
                     "the target's lies {right} and {down}{zoom}; so moved, they would by {}. Mend the view's \
-                     world_to_camera, or crop the target as the camera sees it.",
+                     world_to_camera, crop the target as the camera sees it, or have the fit move the camera there: \
+                     cameras = true in [fit].",
                     percent(overlap)
                 )
             }

@@ -98,6 +98,7 @@ fn changes<'a>(arguments: &'a Arguments, scenes: &'a Scenes, part: &'a JointScen
         loss: arguments.loss.as_deref(),
         start: (elsewhere || scenes.several()).then_some(start),
         free: (!arguments.free.is_empty()).then_some(&fit.free),
+        cameras: &part.baked.cameras,
         ..Changes::default()
     }
 }

@@ -1,0 +1,146 @@
+//! What a drawn image and a target differ by: in coverage, and in colour where both are covered wholly.
+//!
+//! The constants are not fitted yet, so that colours are compared but for a factor and a constant a channel, which are
+//! the best for that image. Each kind of difference weighs by how large it is where nothing moves it any more.
+
+use super::image::Picture;
+
+/// Covered by more is covered wholly; of less, what shows is of the border.
+const WHOLE: f32 = 0.999;
+/// Least root mean squares by which differences are weighed: a coverage of 16 samples is off by so much at a border, and
+/// so are colours of what is hardly textured.
+const LEAST: f64 = 0.02;
+/// Colours that differ do so over whole regions: of each kind's weight the colours' is lessened by this, as so many
+/// pixels side by side say the same.
+const ALIKE: f64 = 0.25;
+
+/// Weights of the two kinds of differences.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Weights {
+    cover: f64,
+    color: f64,
+}
+
+/// The differences of an image and a target; 0 where nothing is compared.
+#[derive(Clone, Debug)]
+pub(super) struct Residual {
+    /// Of the coverage of each pixel.
+    cover: Vec<f64>,
+    /// Of the colours of each pixel, and whether they are compared.
+    color: Vec<Option<[f64; 3]>>,
+}
+
+impl Residual {
+    pub(super) fn new(drawn: &Picture, target: &Picture) -> Self {
+        let weight = |i: usize| f64::from(target.mask.get(i).copied().unwrap_or(1.0));
+        let covered = |picture: &Picture, i: usize| picture.alpha.as_ref().map_or(1.0, |alpha| alpha[i]);
+        let count = target.rgb.len();
+        let cover = match &target.alpha {
+            Some(alpha) => {
+                let difference = |i: usize| weight(i) * f64::from(covered(drawn, i) - alpha[i]);
+                (0..count).map(difference).collect()
+            }
+            None => vec![0.0; count],
+        };
+        let both = |i: usize| weight(i) >= 1.0 && covered(drawn, i) > WHOLE && covered(target, i) > WHOLE;
+        let compared: Vec<bool> = (0..count).map(both).collect();
+        let fitted: [Line; 3] = std::array::from_fn(|c| Line::through(drawn, target, &compared, c));
+        let color = |i: usize| {
+            compared[i].then(|| {
+                std::array::from_fn(|c| {
+                    let line = fitted[c];
+                    line.difference(f64::from(drawn.rgb[i][c]), f64::from(target.rgb[i][c]))
+                })
+            })
+        };
+        Self { cover, color: (0..count).map(color).collect() }
+    }
+
+    /// The weights by which these differences are as large as each other.
+    pub(super) fn weights(&self) -> Weights {
+        let edges = self.cover.iter().filter(|d| **d != 0.0);
+        let (sum, count) = edges.fold((0.0, 0.0), |(sum, count), d| (sum + d * d, count + 1.0));
+        let cover = (sum / f64::max(count, 1.0)).sqrt().max(LEAST).recip();
+        let colors = self.color.iter().flatten().flatten();
+        let (sum, count) = colors.fold((0.0, 0.0), |(sum, count), d| (sum + d * d, count + 1.0));
+        let color = ALIKE * (sum / f64::max(count, 1.0)).sqrt().max(LEAST).recip();
+        Weights { cover, color }
+    }
+
+    /// Half the weighted sum of squares, of which colours count as that `share` of the pixels: to look away from some
+    /// brings nothing.
+    pub(super) fn loss(&self, weights: Weights, share: f64) -> f64 {
+        let cover: f64 = self.cover.iter().map(|d| d * d).sum();
+        let colors = self.color.iter().flatten();
+        let (sum, count) = colors
+            .fold((0.0, 0.0), |(sum, count), d| (sum + d.iter().map(|x| x * x).sum::<f64>(), count + 1.0));
+        let pixels = self.color.len() as f64;
+        // Where none is left to compare, each channel is as far off as its standard deviation.
+        let mean = if count > 0.0 { sum / count } else { 3.0 };
+        0.5 * (weights.cover.powi(2) * cover / pixels + weights.color.powi(2) * mean * share)
+    }
+
+    /// The share of pixels whose colours are compared.
+    pub(super) fn share(&self) -> f64 {
+        self.color.iter().flatten().count() as f64 / self.color.len().max(1) as f64
+    }
+
+    /// The weighted differences, one after the other: of coverage, then of colours, with 0 where they are not compared.
+    pub(super) fn weighted(&self, weights: Weights) -> impl Iterator<Item = [f64; 4]> + '_ {
+        self.cover.iter().zip(&self.color).map(move |(cover, color)| {
+            let [r, g, b] = color.unwrap_or_default();
+            [weights.cover * cover, weights.color * r, weights.color * g, weights.color * b]
+        })
+    }
+
+    /// Half the difference of two others, where both are compared: how this one changes a step.
+    pub(super) fn slope(ahead: &Self, behind: &Self, step: f64) -> Self {
+        let cover = ahead.cover.iter().zip(&behind.cover).map(|(a, b)| (a - b) / (2.0 * step)).collect();
+        let color = ahead.color.iter().zip(&behind.color).map(|(a, b)| match (a, b) {
+            (Some(a), Some(b)) => Some(std::array::from_fn(|c| (a[c] - b[c]) / (2.0 * step))),
+            _ => None,
+        });
+        Self { cover, color: color.collect() }
+    }
+}
+
+/// The line that takes a channel's drawn values nearest to the target's, both in standard deviations of the target's.
+#[derive(Clone, Copy, Debug, Default)]
+struct Line {
+    factor: f64,
+    constant: f64,
+    /// One over the target's standard deviation; 0 where it has none.
+    scale: f64,
+}
+
+impl Line {
+    fn through(drawn: &Picture, target: &Picture, compared: &[bool], channel: usize) -> Self {
+        let mut sums = [0.0; 5];
+        for i in (0..compared.len()).filter(|&i| compared[i]) {
+            let (x, y) = (f64::from(drawn.rgb[i][channel]), f64::from(target.rgb[i][channel]));
+            for (sum, value) in sums.iter_mut().zip([1.0, x, y, x * x, x * y]) {
+                *sum += value;
+            }
+        }
+        let [count, x, y, xx, xy] = sums;
+        if count < 2.0 {
+            return Self::default();
+        }
+        let (mean_x, mean_y) = (x / count, y / count);
+        let variance = xx / count - mean_x * mean_x;
+        let covariance = xy / count - mean_x * mean_y;
+        // Colours that go the other way are not the same surface's.
+        let factor = if variance > 0.0 { (covariance / variance).max(0.0) } else { 0.0 };
+        let spread = (0..compared.len()).filter(|&i| compared[i]).map(|i| {
+            let d = f64::from(target.rgb[i][channel]) - mean_y;
+            d * d
+        });
+        let deviation = (spread.sum::<f64>() / count).sqrt();
+        let scale = if deviation > 0.0 { deviation.recip() } else { 0.0 };
+        Self { factor, constant: mean_y - factor * mean_x, scale }
+    }
+
+    fn difference(&self, drawn: f64, target: f64) -> f64 {
+        self.scale * (self.factor * drawn + self.constant - target)
+    }
+}

@@ -1,0 +1,155 @@
+//! Cameras that are off are moved to where the targets show the mesh.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may stop where the tests themselves would")]
+
+use std::path::Path;
+
+use glam::{DMat4, DVec3};
+use skinfit::prepare::{Baked, Loaded, PrepareOptions};
+use skinfit::scene::view::Camera;
+
+use crate::common;
+
+fn read(path: &Path) -> Loaded {
+    let mut loaded = Loaded::read(path, &PrepareOptions { fit: true, ..PrepareOptions::default() }).unwrap();
+    loaded.scene.quality.samples_per_axis = 2;
+    loaded
+}
+
+/// Places of the mesh that both cameras have in their images: by how many pixels these lie apart, median and largest.
+fn apart(baked: &Baked, a: &Camera, b: &Camera) -> [f64; 2] {
+    let within = |camera: &Camera, (x, y, depth): (f64, f64, f64)| {
+        depth > 0.0
+            && (0.0..f64::from(camera.width)).contains(&x)
+            && (0.0..f64::from(camera.height)).contains(&y)
+    };
+    let posed = baked.scene.mesh.pose();
+    let mut pixels: Vec<f64> = Vec::new();
+    for position in &posed.positions {
+        let (p, q) = (a.project(position.as_dvec3()), b.project(position.as_dvec3()));
+        if within(a, p) && within(b, q) {
+            pixels.push((p.0 - q.0).hypot(p.1 - q.1));
+        }
+    }
+    pixels.sort_by(f64::total_cmp);
+    [pixels[pixels.len() / 2], pixels[pixels.len() - 1]]
+}
+
+/// The camera moved: so many pixels to the right and down at the mesh, turned about the mesh by degrees, and its tangent
+/// of half the field of view multiplied.
+fn displaced(
+    camera: &Camera,
+    middle: DVec3,
+    [right, down]: [f64; 2],
+    degrees: [f64; 3],
+    zoom: f64,
+) -> Camera {
+    let inside = camera.world_to_camera.transform_point3(middle);
+    let pixel = -inside.z * 2.0 * (0.5 * camera.fov_y).tan() / f64::from(camera.height);
+    let [x, y, z] = degrees.map(f64::to_radians);
+    let turn = DMat4::from_rotation_x(x) * DMat4::from_rotation_y(y) * DMat4::from_rotation_z(z);
+    let about = DMat4::from_translation(inside + pixel * DVec3::new(right, -down, 0.0))
+        * turn
+        * DMat4::from_translation(-inside);
+    Camera {
+        world_to_camera: about * camera.world_to_camera,
+        fov_y: 2.0 * ((0.5 * camera.fov_y).tan() * zoom).atan(),
+        ..*camera
+    }
+}
+
+/// The cameras that views begin with, and where these are moved to.
+fn registered(mut loaded: Loaded, mistakes: &[([f64; 2], [f64; 3], f64)]) -> (Baked, Vec<[Camera; 3]>) {
+    let positions = loaded.scene.mesh.pose().positions;
+    let least = positions.iter().copied().reduce(glam::Vec3::min).unwrap();
+    let most = positions.iter().copied().reduce(glam::Vec3::max).unwrap();
+    let middle = 0.5 * (least + most).as_dvec3();
+    let truth: Vec<Camera> = loaded.scene.views.iter().map(|view| view.camera).collect();
+    for (view, &(shift, degrees, zoom)) in loaded.scene.views.iter_mut().zip(mistakes) {
+        view.camera = displaced(&view.camera, middle, shift, degrees, zoom);
+    }
+    loaded.scene.fit.cameras = true;
+    let baked = loaded.bake().unwrap();
+    let cameras =
+        baked.cameras.iter().zip(truth).map(|(moved, truth)| [truth, moved.before, moved.after]).collect();
+    (baked, cameras)
+}
+
+#[test]
+fn cameras_of_the_built_in_scene_are_found_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = skinfit::built_in_scene(folder.path()).unwrap();
+    // Some five pixels each: a shift, a turn, a field of view, and some of all.
+    let mistakes = [
+        ([4.0, -3.0], [0.0; 3], 1.0),
+        ([0.0, 0.0], [1.5, -2.0, 1.0], 1.0),
+        ([1.5, 2.0], [-0.8, 1.0, 0.5], 1.02),
+    ];
+    let (baked, cameras) = registered(read(&path), &mistakes);
+    assert_eq!(cameras.len(), 3);
+    for ([truth, before, after], moved) in cameras.iter().zip(&baked.cameras) {
+        let (start, end) = (apart(&baked, truth, before), apart(&baked, truth, after));
+        println!("{}: {start:?} -> {end:?}, settled: {}", moved.view, moved.settled);
+        // What is asked for: a tenth of a pixel, from some five.
+        assert!(start[0] > 2.0 && end[0] < 0.1, "{}: {start:?} -> {end:?}", moved.view);
+        assert!(end[1] < 0.3 && moved.settled, "{}: {end:?}", moved.view);
+        let told = moved.told("scene.toml");
+        assert!(baked.warnings.iter().any(|warning| warning.ends_with(&told[10..])), "{told}");
+    }
+}
+
+#[test]
+fn cameras_of_path_traced_heads_end_at_the_same_place_from_anywhere_near() {
+    let Some(data) = common::data() else { return };
+    let path = data.join("lps_forest/scene.toml");
+    let none = ([0.0; 2], [0.0; 3], 1.0);
+    let mistakes = [
+        ([5.0, 0.0], [0.0; 3], 1.0),
+        ([0.0, -3.0], [0.5, 0.8, -0.6], 1.0),
+        ([2.0, 2.0], [0.4, -0.6, 0.4], 0.985),
+    ];
+    let (baked, from_truth) = registered(read(&path), &[none; 3]);
+    let (_, from_aside) = registered(read(&path), &mistakes);
+    for (i, (here, there)) in from_truth.iter().zip(&from_aside).enumerate() {
+        let start = apart(&baked, &there[0], &there[1]);
+        let bias = apart(&baked, &here[0], &here[2]);
+        let end = apart(&baked, &here[2], &there[2]);
+        println!(
+            "view {i}: {start:?} -> {end:?} of one another, {:?} of the truth, which is {bias:?} off",
+            apart(&baked, &there[0], &there[2])
+        );
+        // The same optimum from both; the paper's model at its default constants shows such a head so well that the
+        // optimum lies this near to the truth.
+        assert!(end[0] < 0.1, "view {i}: {start:?} -> {end:?}");
+        assert!(bias[0] < 0.5, "view {i}: {bias:?}");
+    }
+}
+
+#[test]
+fn what_a_scene_file_asks_for_is_done_and_other_views_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = skinfit::built_in_scene(folder.path()).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    assert!(read(&path).bake().unwrap().cameras.is_empty());
+    let asked = text.replace("[fit]\n", "[fit]\ncameras = true\n");
+    assert_ne!(text, asked);
+    std::fs::write(&path, asked).unwrap();
+    let mut loaded = read(&path);
+    assert!(loaded.scene.fit.cameras);
+    // A view that nothing is compared with has nothing to move by.
+    loaded.scene.views[1].target = None;
+    let (before, name) = (loaded.scene.views[1].camera, loaded.scene.views[1].name.clone());
+    let baked = loaded.bake().unwrap();
+    assert_eq!(baked.cameras.len(), 2);
+    assert_eq!(baked.scene.views.iter().find(|view| view.name == name).unwrap().camera, before);
+    // Those that are right stay where they are, to a twentieth of a pixel: what coverage of four samples a pixel, and
+    // constants that are not those of the targets, make of it.
+    for moved in &baked.cameras {
+        let [median, _] = apart(&baked, &moved.before, &moved.after);
+        assert!(median < 0.05, "{}: {median}", moved.view);
+        assert_eq!(moved.pixels, apart(&baked, &moved.before, &moved.after));
+    }
+    // A picture of it has the cameras of its file.
+    let drawn = Baked::new(&path, &PrepareOptions::default()).unwrap();
+    assert!(drawn.cameras.is_empty());
+}
