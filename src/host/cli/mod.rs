@@ -9,7 +9,7 @@
 //! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
-//! - `run_folder`, `fitted_scene`: where a fit leaves what it found, and what it was made from
+//! - `run_folder`, `fitted_scene`, `fitted_cameras`: where a fit leaves what it found, and what it was made from
 
 mod ablate;
 mod bake;
