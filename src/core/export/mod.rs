@@ -1,4 +1,5 @@
-//! Tuned constants, alone or with the shader that they belong to, as text for other engines.
+//! What other engines take: tuned constants, alone or with the shader that they belong to, as text; baked cubes as texture
+//! files; what is baked of vertices as streams.
 //!
 //! - [`target`]: the languages and formats
 //! - [`dialect`]: how each language spells what the shader rules say in WGSL
@@ -6,11 +7,13 @@
 //! - [`provenance`]: where the constants come from
 //! - `names`: the prefix of all that an export defines, and its citations
 //! - `idle`: terms without a weight, which no shader need compute
+//! - [`cubes`]: baked cubes as KTX2 and DDS; [`vertices`]: what is baked of a mesh, as its attributes
 //! - `constants`, `function`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
 //!
 //! The shader is written once, as the planner's rules; every exported function is a translation of them.
 
 mod constants;
+pub mod cubes;
 pub mod dialect;
 mod function;
 mod idle;
@@ -19,6 +22,7 @@ mod passes;
 pub mod provenance;
 pub mod target;
 mod translate;
+pub mod vertices;
 
 pub use provenance::Provenance;
 pub use target::Target;
