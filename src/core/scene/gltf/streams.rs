@@ -250,3 +250,6 @@ fn kind_of_picture(bytes: &[u8]) -> Option<&'static str> {
         _ => None,
     }
 }
+
+#[cfg(test)]
+mod tests;

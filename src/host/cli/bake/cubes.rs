@@ -125,8 +125,8 @@ impl Named<'_> {
         let clamped = write_cubes(&path, format, &cubes, &notes)?;
         if clamped > 0 {
             tell_warnings(&[format!(
-                "{}: {clamped} numbers are beyond what half floats hold and were set to {}; the EXR file has them as they \
-                 are.",
+                "{}: {clamped} numbers are beyond what half floats hold and are written as {}. With --cubes exr \
+                 they are kept.",
                 path.display(),
                 short(f64::from(LARGEST_HALF))
             )]);
