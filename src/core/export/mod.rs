@@ -8,7 +8,7 @@
 //! - `names`: the prefix of all that an export defines, and its citations
 //! - `idle`: terms without a weight, which no shader need compute
 //! - [`cubes`]: baked cubes as KTX2 and DDS; [`vertices`]: what is baked of a mesh, as its attributes
-//! - `constants`, `function`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
+//! - `constants`, `function`, `material`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
 //!
 //! The shader is written once, as the planner's rules; every exported function is a translation of them.
 
@@ -17,6 +17,7 @@ pub mod cubes;
 pub mod dialect;
 mod function;
 mod idle;
+mod material;
 mod names;
 mod passes;
 pub mod provenance;
@@ -24,6 +25,7 @@ pub mod target;
 mod translate;
 pub mod vertices;
 
+pub use material::material;
 pub use provenance::Provenance;
 pub use target::Target;
 
@@ -47,6 +49,23 @@ pub enum ExportError {
         target: &'static str,
         /// Those that hold one.
         languages: String,
+    },
+    /// No engine that there are materials for.
+    #[error("{target} is no engine that a material can be written for. Take {engines}.")]
+    NoMaterial {
+        /// The target's name.
+        target: &'static str,
+        /// Those that are.
+        engines: String,
+    },
+    /// A material has nothing to hand over to the shader.
+    #[error(
+        "the shader asks for {what}, which no material file hands over. Export the shader alone, and wire it by the words \
+         in its head."
+    )]
+    Unfilled {
+        /// What it asks for.
+        what: String,
     },
     /// Lookups that the accuracy has the shader filter by itself.
     #[error(
