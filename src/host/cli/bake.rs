@@ -32,8 +32,8 @@ pub(super) struct Arguments {
     /// The folder to write into; it is made if need be.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
-    /// What cubes are written as, comma-separated: exr, which is one picture of the faces, with a .png
-    /// to look at; ktx2 and dds, which are cube textures of half floats.
+    /// What cubes are written as, comma-separated: exr, a picture of the faces, with a .png to look at; ktx2 and dds, cube
+    /// textures of half floats.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "exr", value_parser = parse_kind)]
     cubes: Vec<Kind>,
     /// Effects to switch on, comma-separated, instead of the scene's.
@@ -89,6 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         false => Vec::new(),
     };
     let mesh = (!streams.is_empty()).then(|| mesh_with_streams(scene, &streams)).transpose()?;
+    let written = written + usize::from(mesh.is_some());
     if written > 0 || stages.is_some() {
         folder.keep_results();
     }
