@@ -160,12 +160,12 @@ PROPERTIES
         Pass {
             HLSLPROGRAM
             #pragma target 4.5
-            #pragma vertex vertex
-            #pragma fragment fragment
+            #pragma vertex skin_vertex
+            #pragma fragment skin_fragment
             #include "UnityCG.cginc"
             #include "SHADER"
 
-            struct Vertex {
+            struct OfMesh {
                 float4 position : POSITION;
                 float3 normal : NORMAL;
                 float4 tangent : TANGENT;
@@ -187,7 +187,7 @@ PROPERTIES
                 return float3(-v.x, v.y, v.z);
             }
 
-            Between vertex(Vertex from) {
+            Between skin_vertex(OfMesh from) {
                 Between to;
                 float3 normal = UnityObjectToWorldNormal(from.normal);
                 float3 tangent = UnityObjectToWorldDir(from.tangent.xyz);
@@ -202,7 +202,7 @@ PROPERTIES
                 return to;
             }
 
-            float4 fragment(Between from) : SV_Target {
+            float4 skin_fragment(Between from) : SV_Target {
                 SkinfitSurface at;
 FILLED
                 return skinfit_shade(at);

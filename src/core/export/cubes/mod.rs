@@ -1,4 +1,4 @@
-//! Baked cubes as texture files that engines and their tools take as they are: [`ktx2`], [`dds`].
+//! Baked cubes as texture files that engines and their tools take as they are: `ktx2`, `dds`.
 //!
 //! Both hold the faces +X -X +Y -Y +Z -Z, each row by row from its top, in the left-handed face coordinates that Vulkan
 //! (1.3, "Cube Map Face Selection") and Direct3D 11 (functional specification, section 7.18.11) share and
