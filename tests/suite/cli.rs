@@ -6,6 +6,7 @@ mod browser;
 mod built_in;
 mod constants;
 mod damaged;
+mod engines;
 mod exported;
 mod followed;
 mod graphics;

@@ -152,6 +152,15 @@ pub(crate) fn compile_hlsl(text: &str) -> Result<(), String> {
     )
 }
 
+/// A stage of a whole shader, HLSL unless it begins with a version of GLSL.
+pub(crate) fn compile_stage(stage: &str, entry: &str, text: &str) -> Result<(), String> {
+    let own = ["-V", "-S", stage, "-e", entry, "--auto-map-bindings", "--auto-map-locations"];
+    match text.starts_with("#version") {
+        true => compile("glslangValidator", &["-V", "-S", stage], stage, text),
+        false => compile("glslangValidator", &[&["-D"], &own[..]].concat(), "hlsl", text),
+    }
+}
+
 /// A text that a compiler has taken, and must not take with any of `faults` in it: so that what it says is worth
 /// something.
 fn assert_taken(compile: fn(&str) -> Result<(), String>, name: &str, text: &str, faults: &[(&str, &str)]) {

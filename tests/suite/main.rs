@@ -42,6 +42,7 @@ mod light_files;
 mod lights;
 mod lit;
 mod lobe;
+mod materials;
 mod meshes;
 mod occlusion;
 mod phases;

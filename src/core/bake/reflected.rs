@@ -48,6 +48,12 @@ impl ReflectedStack {
         Self { model, stack: LobeStack { exponents, cubes } }
     }
 
+    /// The roughness of each cube.
+    #[must_use]
+    pub fn roughnesses(&self) -> Vec<f64> {
+        self.stack.exponents.iter().map(|&sharpness| roughness(self.model, sharpness)).collect()
+    }
+
     /// The cube at a roughness and its derivative by it; constant beyond the stack's ends.
     #[must_use]
     pub fn at(&self, m: f64) -> (Cube<f32>, Cube<f32>) {

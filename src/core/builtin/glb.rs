@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 use super::atlas::Atlas;
 use super::expressions::EXPRESSIONS;
 use super::rig::{BONES, nod, weights};
+use crate::scene::container;
 
 const FLOAT: u32 = 5126;
 const UNSIGNED_BYTE: u32 = 5121;
@@ -201,21 +202,4 @@ fn animation(buffer: &mut Buffer) -> Value {
     let weights: Vec<[f32; 1]> = keys.iter().flat_map(|key| key.expressions).map(|w| [w]).collect();
     channel(0, "weights", buffer.floats("SCALAR", &weights, None));
     json!({"name": "nod", "samplers": samplers, "channels": channels})
-}
-
-/// The binary container (glTF 2.0, section 4.4): header, JSON chunk, binary chunk.
-fn container(mut json: Vec<u8>, mut binary: Vec<u8>) -> Vec<u8> {
-    json.resize(json.len().next_multiple_of(4), b' ');
-    binary.resize(binary.len().next_multiple_of(4), 0);
-    let length = 12 + 8 + json.len() + 8 + binary.len();
-    let mut out = Vec::with_capacity(length);
-    out.extend_from_slice(b"glTF");
-    out.extend_from_slice(&2_u32.to_le_bytes());
-    out.extend_from_slice(&(length as u32).to_le_bytes());
-    for (kind, chunk) in [(b"JSON", json), (b"BIN\0", binary)] {
-        out.extend_from_slice(&(chunk.len() as u32).to_le_bytes());
-        out.extend_from_slice(kind);
-        out.extend_from_slice(&chunk);
-    }
-    out
 }

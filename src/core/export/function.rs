@@ -27,19 +27,7 @@ pub(super) fn text(
             Target::ALL.into_iter().filter(|t| t.dialect().is_some()).map(Target::name).collect();
         return Err(ExportError::NoFunction { target: target.name(), languages: languages.join(", ") });
     };
-    let idle = idle(facts.setup.effects, params);
-    let effects = facts.setup.effects.iter().filter(|&effect| !idle.has(effect)).collect();
-    // Not every language has 16-bit numbers, nor every engine's adapter; and an engine has shadow maps of its own, of which
-    // the functions take what they leave of each light.
-    let setup = Setup { effects, ..facts.setup };
-    let atlas = facts.atlas.filter(|_| setup.needs().atlas);
-    let plan = plan(&Facts { setup, f16: false, atlas, shadows: None, ..*facts })?;
-    // Of the passes and the image together.
-    let resources = plan.merged().resources;
-    let filtered = |resource: &&Resource| matches!(resource.kind(), Kind::Texels | Kind::Faces);
-    if let Some(resource) = resources.iter().find(filtered) {
-        return Err(ExportError::Filtered { resource: resource.name() });
-    }
+    let (plan, resources, idle) = planned(facts, params)?;
     let mut text = header((&plan, &resources), idle, params, from);
     let _ = write!(text, "\n{}", dialect.prologue);
     let literals = plan.literals(params);
@@ -67,6 +55,23 @@ pub(super) fn text(
     }
     text.push_str(dialect.epilogue);
     Ok(text)
+}
+
+/// The plan of an export, what its passes and its image read together, and the effects that it leaves out.
+pub(super) fn planned(facts: &Facts, params: &Params) -> Result<(Plan, Vec<Resource>, Effects), ExportError> {
+    let idle = idle(facts.setup.effects, params);
+    let effects = facts.setup.effects.iter().filter(|&effect| !idle.has(effect)).collect();
+    // Not every language has 16-bit numbers, nor every engine's adapter; and an engine has shadow maps of its own, of which
+    // the functions take what they leave of each light.
+    let setup = Setup { effects, ..facts.setup };
+    let atlas = facts.atlas.filter(|_| setup.needs().atlas);
+    let plan = plan(&Facts { setup, f16: false, atlas, shadows: None, ..*facts })?;
+    let resources = plan.merged().resources;
+    let filtered = |resource: &&Resource| matches!(resource.kind(), Kind::Texels | Kind::Faces);
+    if let Some(resource) = resources.iter().find(filtered) {
+        return Err(ExportError::Filtered { resource: resource.name() });
+    }
+    Ok((plan, resources, idle))
 }
 
 /// What it is, what it is called with, and what it reads.
@@ -141,7 +146,7 @@ fn indented(text: &str) -> String {
 }
 
 /// What belongs in a cube or map.
-fn what_to_bind(resource: Resource, params: &Params) -> Option<String> {
+pub(super) fn what_to_bind(resource: Resource, params: &Params) -> Option<String> {
     let words = match resource {
         Resource::IrradianceCube => "irradiance / pi of the environment (irradiance.exr)".to_owned(),
         Resource::SpecularCube => format!(
@@ -149,6 +154,13 @@ fn what_to_bind(resource: Resource, params: &Params) -> Option<String> {
             params.scalar(Param::SpecularLobe)
         ),
         Resource::HiliteCube => "the environment (hilite.exr)".to_owned(),
+        Resource::ReflectedCube => {
+            "the environment as the skin mirrors it where the specular map is black (reflected.exr)"
+                .to_owned()
+        }
+        Resource::GlossyCube => {
+            "the environment as the skin mirrors it where the specular map is white (glossy.exr)".to_owned()
+        }
         Resource::ColorMap => "the scene's colour map, decoded from sRGB".to_owned(),
         Resource::NormalMap => "the scene's normal map as stored, +Y up".to_owned(),
         Resource::SpecularMap => "the scene's specular map, linear".to_owned(),

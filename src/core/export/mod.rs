@@ -1,4 +1,5 @@
-//! Tuned constants, alone or with the shader that they belong to, as text for other engines.
+//! What other engines take: tuned constants, alone or with the shader that they belong to, as text; baked cubes as texture
+//! files; what is baked of vertices as streams.
 //!
 //! - [`target`]: the languages and formats
 //! - [`dialect`]: how each language spells what the shader rules say in WGSL
@@ -6,20 +7,25 @@
 //! - [`provenance`]: where the constants come from
 //! - `names`: the prefix of all that an export defines, and its citations
 //! - `idle`: terms without a weight, which no shader need compute
-//! - `constants`, `function`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
+//! - [`cubes`]: baked cubes as KTX2 and DDS; [`vertices`]: what is baked of a mesh, as its attributes
+//! - `constants`, `function`, `material`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
 //!
 //! The shader is written once, as the planner's rules; every exported function is a translation of them.
 
 mod constants;
+pub mod cubes;
 pub mod dialect;
 mod function;
 mod idle;
+mod material;
 mod names;
 mod passes;
 pub mod provenance;
 pub mod target;
 mod translate;
+pub mod vertices;
 
+pub use material::material;
 pub use provenance::Provenance;
 pub use target::Target;
 
@@ -43,6 +49,23 @@ pub enum ExportError {
         target: &'static str,
         /// Those that hold one.
         languages: String,
+    },
+    /// No engine that there are materials for.
+    #[error("{target} is no engine that a material can be written for. Take {engines}.")]
+    NoMaterial {
+        /// The target's name.
+        target: &'static str,
+        /// Those that are.
+        engines: String,
+    },
+    /// A material has nothing to hand over to the shader.
+    #[error(
+        "the shader asks for {what}, which no material file hands over. Export the shader alone, and wire it by the words \
+         in its head."
+    )]
+    Unfilled {
+        /// What it asks for.
+        what: String,
     },
     /// Lookups that the accuracy has the shader filter by itself.
     #[error(

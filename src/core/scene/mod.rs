@@ -13,6 +13,7 @@
 //! - [`map_fit`]: how whole maps are fitted; [`assignment`]: a parameter's value, as a command line gives it
 //! - [`names`]: what a scene is called among several; `offers`: what it has for effects that may be off
 //! - [`images`], `gltf`: image and mesh files; what those leave out is made in `normals` and `tangents`
+//! - [`streams`]: numbers of vertices, as attributes of the mesh file
 //! - [`inspect`]: what a mesh file holds, before there is a scene of it; [`draft`]: a first scene file for it
 //! - [`import`]: cameras that other programs solved or placed
 //! - [`facts`]: what a scene calls for of the shader planner
@@ -54,6 +55,7 @@ pub mod pose;
 mod settings;
 pub mod shadow_maps;
 pub mod sky_lights;
+pub mod streams;
 mod tangents;
 mod terms;
 mod transmission;
@@ -63,6 +65,7 @@ pub use assignment::Assignment;
 pub use error::{SceneError, Warning};
 pub use file::suggestion;
 pub use file::{Source, check_text};
+pub(crate) use gltf::container;
 pub use light::{Light, LightKind};
 pub use lit::families as light_families;
 pub use load::LoadOptions;

@@ -1,31 +1,30 @@
 //! `skinfit bake`: what a scene's effects ask to be baked, as files to look at.
 
+mod cubes;
 mod stages;
 mod vertices;
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
+use self::cubes::{Kind, parse_kind};
 use self::stages::Stages;
 use super::run_folder::RunFolder;
 use super::scene::{SceneArguments, parse_effects};
 use super::{Exit, Refusal, say, tell, tell_warnings, unfinished};
+use crate::bake::VertexOcclusion;
 use crate::bake::rays::RayMesh;
-use crate::bake::{Illumination, VertexOcclusion};
-use crate::model::cube::Cube;
+use crate::export::vertices::vertex_streams;
 use crate::model::effects::Effects;
-use crate::model::params::{Param, Params};
 use crate::output;
 use crate::prepare::{Baked, PrepareOptions};
-use crate::render::files::{ImageOptions, write_image};
-use crate::render::image::Image;
 use crate::samples::PosedSurface;
+use crate::scene::streams::mesh_with_streams;
 
 /// Bake what a scene's effects ask for into files: cube maps, and what rays find at vertices
 #[derive(clap::Args)]
 #[command(
-    after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at), occlusion.csv (a row a vertex: the open share of its hemisphere) and vertices.csv (a row a vertex, a column for each number of each field that rays find there: the sky that it sees, bent normals, light that the skin throws back, shadows, depths). With --stages also charts, stretch, light_map, level_1 and on, and how light map and levels move along each free parameter, light_map_by_<parameter> and so on, each as .exr and .png: texels of the UV atlas, stretch in the scene's unit a texel; and charts.csv (a row a vertex: the chart that it lies on). Beside them an empty .lock, which keeps two commands from writing there at once.\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
+    after_help = super::with_failure("Writes what the enabled effects ask for, and no more: irradiance.exr, lobe_<exponent>.exr, specular.exr (between two lobes), hilite.exr, reflected.exr and glossy.exr (each a column of the faces +X -X +Y -Y +Z -Z, with a .png to look at; with --cubes ktx2 or dds the same names with that ending, and lobe_stack and reflected_stack, which are arrays of all cubes that were baked for a lobe), occlusion.csv (a row a vertex: the open share of its hemisphere) and vertices.csv (a row a vertex, a column for each number of each field that rays find there: the sky that it sees, bent normals, light that the skin throws back, shadows, depths). With --glb also vertices.glb: the mesh file as it is, pictures within, with the open share as the attribute _OCCLUSION, and every field as that of its name in capitals; of what is baked for morph targets, these have what they add. With --stages also charts, stretch, light_map, level_1 and on, and how light map and levels move along each free parameter, light_map_by_<parameter> and so on, each as .exr and .png: texels of the UV atlas, stretch in the scene's unit a texel; and charts.csv (a row a vertex: the chart that it lies on). Beside them an empty .lock, which keeps two commands from writing there at once.\n\nExamples:\n  skinfit bake scene.toml -o baked\n  skinfit bake scene.toml -o baked --effects diffuse,occlusion\n  skinfit bake scene.toml -o baked --cubes exr,ktx2 --glb\n  skinfit bake runs/a/scene.toml --params runs/a/params.toml -o baked", "the command was interrupted")
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -33,9 +32,16 @@ pub(super) struct Arguments {
     /// The folder to write into; it is made if need be.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// What cubes are written as, comma-separated: exr, a picture of the faces, with a .png to look at; ktx2 and dds, cube
+    /// textures of half floats.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "exr", value_parser = parse_kind)]
+    cubes: Vec<Kind>,
     /// Effects to switch on, comma-separated, instead of the scene's.
     #[arg(long, value_name = "LIST", value_parser = parse_effects)]
     effects: Option<Effects>,
+    /// Also the mesh file with what is baked of its vertices as attributes: vertices.glb.
+    #[arg(long)]
+    glb: bool,
     /// Also the stages of texture-space diffusion in the UV atlas, which the effect `diffusion` makes.
     #[arg(long)]
     stages: bool,
@@ -56,7 +62,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     };
     let baked = Baked::new(&path, &options)?;
     tell_warnings(&baked.warnings);
-    let cubes = cubes(&baked.illumination, &baked.scene.params);
+    let mut cubes = cubes::baked(&baked.illumination, &baked.scene);
+    cubes.retain(|cube| cube.is_written(&arguments.cubes));
     let scene = &*baked.scene;
     // What rays find at vertices and in texels is of one posed surface.
     let posed = (arguments.stages || vertices::are_asked_for(scene)).then(|| {
@@ -77,18 +84,29 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         Some(surface) if arguments.stages => Some(Stages::new(&baked, surface)?),
         _ => None,
     };
+    let streams = match arguments.glb {
+        true => vertex_streams(scene, baked.surface_bakes(), surface.as_ref()),
+        false => Vec::new(),
+    };
+    let mesh = (!streams.is_empty()).then(|| mesh_with_streams(scene, &streams)).transpose()?;
+    let written = written + usize::from(mesh.is_some());
     if written > 0 || stages.is_some() {
         folder.keep_results();
     }
     let folder = folder.path();
-    for (name, cube) in &cubes {
-        write_cube(folder, name, cube)?;
+    for cube in &cubes {
+        cube.write(folder, &arguments.cubes)?;
     }
     if let Some(occlusion) = &baked.occlusion {
         output::write(&folder.join("occlusion.csv"), occlusion_csv(occlusion).as_bytes())?;
     }
     if let Some(vertices) = vertices {
         output::write(&folder.join("vertices.csv"), vertices.as_bytes())?;
+    }
+    match &mesh {
+        Some(mesh) => output::write(&folder.join("vertices.glb"), mesh)?,
+        None if arguments.glb => tell("nothing is baked of vertices; vertices.glb was not written."),
+        None => {}
     }
     for row in &baked.stats.rows {
         let from = if row.cached { "kept from an earlier run" } else { "baked" };
@@ -105,43 +123,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         _ => say(&format!("wrote {written} bakes to {}", folder.display()))?,
     }
     Ok(Exit::Done)
-}
-
-/// The cubes that were baked, by the names of their files.
-fn cubes<'a>(light: &'a Illumination, params: &Params) -> Vec<(String, Cow<'a, Cube<f32>>)> {
-    let mut cubes = Vec::new();
-    let mut add = |name: &str, cube| cubes.push((name.to_owned(), cube));
-    if let Some(irradiance) = &light.irradiance {
-        add("irradiance", Cow::Borrowed(irradiance));
-    }
-    if let Some(lobes) = &light.lobes {
-        for (exponent, lobe) in lobes.exponents.iter().zip(&lobes.cubes) {
-            add(&format!("lobe_{exponent}"), Cow::Borrowed(lobe));
-        }
-        // Between the stack's exponents, what shaders look up is none of its cubes.
-        if lobes.cubes.len() > 1 {
-            add("specular", Cow::Owned(lobes.at(params.scalar(Param::SpecularLobe)).0));
-        }
-    }
-    if let Some(hilite) = &light.hilite {
-        add("hilite", Cow::Borrowed(hilite));
-    }
-    cubes
-}
-
-/// The faces below each other, as EXR and as PNG.
-fn write_cube(folder: &Path, name: &str, cube: &Cube<f32>) -> Result<(), Refusal> {
-    let size = cube.size();
-    let mut image = Image::new(size, 6 * size);
-    for (at, (rgb, alpha)) in image.rgb.iter_mut().zip(&mut image.alpha).enumerate() {
-        let [r, g, b, _] = cube.texel(at / (size * size), at % size, at / size % size);
-        *rgb = [r, g, b];
-        *alpha = 1.0;
-    }
-    for ending in ["exr", "png"] {
-        write_image(&folder.join(format!("{name}.{ending}")), &image, &ImageOptions::default())?;
-    }
-    Ok(())
 }
 
 /// A column for each morph target that has a weight; the others are not baked.

@@ -14,7 +14,7 @@ use crate::shader::Facts;
 /// Write tuned constants, alone or with their shader, for another engine
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot and unity hold the shader, and of light that scatters the passes before it, with how to wire them in the head; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
+    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n  skinfit export runs/a/params.toml --to godot --material skin.gdshaderinc -o skin.tres\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot and unity hold the shader, and of light that scatters the passes before it, with how to wire them in the head; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
 )]
 pub(super) struct Arguments {
     /// The parameters: params.toml of a run folder.
@@ -28,6 +28,9 @@ pub(super) struct Arguments {
     /// The scene that the parameters belong to [default: scene.toml beside them; constants alone need none].
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
+    /// For godot and unity: in place of the shader a material that includes it by this name.
+    #[arg(long, value_name = "SHADER", conflicts_with = "constants")]
+    material: Option<String>,
     #[command(flatten)]
     set: SetArguments,
     /// A file to write instead of standard output.
@@ -38,7 +41,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     arguments.set.values()?;
     // Some targets hold nothing else.
-    let alone = arguments.constants || arguments.to.dialect().is_none();
+    let alone = arguments.material.is_none() && (arguments.constants || arguments.to.dialect().is_none());
     let beside = |name: &str| arguments.params.parent().unwrap_or(Path::new("")).join(name);
     let path = arguments.scene.clone().unwrap_or_else(|| beside("scene.toml"));
     let there = arguments.scene.is_some() || path.exists();
@@ -59,8 +62,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         tell_foreign(arguments, &path, scene, &file);
     }
     let from = provenance(arguments, there.then_some(&path), &file, &beside("report.json"));
-    let text = match &scene {
-        Some(scene) if !alone => export::function(arguments.to, &facts(scene, &file), &file.params, &from)?,
+    let text = match (&scene, &arguments.material) {
+        (Some(scene), Some(shader)) => {
+            export::material(arguments.to, &facts(scene, &file), &file.params, shader)?
+        }
+        (Some(scene), None) if !alone => {
+            export::function(arguments.to, &facts(scene, &file), &file.params, &from)?
+        }
         _ => {
             let constants = Constants {
                 form: file.form,

@@ -127,6 +127,30 @@ fn constants_for_another_scenes_effects_are_exported_with_a_word_of_it() {
 }
 
 #[test]
+fn a_material_includes_the_shader_by_its_name() {
+    let sandbox = Sandbox::new();
+    sandbox.fit("run", &[]).done();
+    let material = |to: &str, shader: &str| {
+        sandbox.run(&["export", "run/params.toml", "--to", to, "--material", shader])
+    };
+    let godot = material("godot", "skin.gdshaderinc").done().out;
+    // The shader stands within a string of the material.
+    assert!(
+        godot.contains("#include \\\"skin.gdshaderinc\\\"") && godot.contains("ShaderMaterial"),
+        "{godot}"
+    );
+    assert!(
+        godot.contains("res://irradiance.dds") && godot.contains("at.vertex_occlusion = UV2.x;"),
+        "{godot}"
+    );
+    let unity = material("unity", "Skin.hlsl").done().out;
+    assert!(unity.contains("#include \"Skin.hlsl\"") && unity.contains("skinfit_hilite_cube (\""), "{unity}");
+    material("glsl", "skin.glsl").refused(&["glsl is no engine", "godot or unity"]);
+    let both = ["export", "run/params.toml", "--to", "unity", "--constants", "--material", "Skin.hlsl"];
+    assert_eq!(sandbox.run(&both).code, Some(2));
+}
+
+#[test]
 fn exports_that_cannot_be() {
     let nothing = |_: &Sandbox| {};
     let alone =

@@ -9,7 +9,7 @@ use super::document::Document;
 use super::nodes::Nodes;
 use super::plain::Split;
 use super::primitive::{Mended, Part, Target};
-use super::{Ask, Tangents, Uvs};
+use super::{Ask, Tangents, Uvs, places};
 use crate::scene::error::{SceneError, Warnings, warn};
 use crate::scene::mesh::{Mesh, Morph, VertexField};
 use crate::scene::{normals, tangents};
@@ -150,23 +150,15 @@ impl Builder<'_> {
         Err(self.document.error(format!("has more than {most} {what}"), "Simplify it"))
     }
 
-    /// The morph slots of a node's targets. Targets of one name share a slot (a face, its lashes and
-    /// its teeth smile together); the first one's weight counts.
+    /// The morph slots of a node's targets; of those that share one, the first one's weight counts.
     fn slots(
         &mut self,
         node: usize,
         mesh: &json::Mesh,
         warnings: &mut Warnings,
     ) -> Result<Vec<usize>, SceneError> {
-        #[derive(serde::Deserialize)]
-        struct Extras {
-            #[serde(rename = "targetNames", default)]
-            names: Vec<String>,
-        }
-        let extras = mesh.extras.as_ref().and_then(|raw| serde_json::from_str::<Extras>(raw.get()).ok());
-        let names = extras.map(|extras| extras.names).unwrap_or_default();
-        let count =
-            mesh.primitives.iter().filter_map(|p| p.targets.as_ref()).map(Vec::len).max().unwrap_or(0);
+        let mut names: Vec<String> = self.mesh.morphs.iter().map(|morph| morph.name.clone()).collect();
+        let slots = places::slots(mesh, &mut names);
         let animated = self.nodes.weights[node].as_ref();
         let weights = animated.or(self.document.root.nodes[node].weights.as_ref()).or(mesh.weights.as_ref());
         // Weights that the scene gives hold through the whole animation.
@@ -174,26 +166,17 @@ impl Builder<'_> {
             true => self.document.moved_targets(node)?,
             false => Vec::new(),
         };
-        let mut slots = Vec::new();
-        for target in 0..count {
+        for (target, &slot) in slots.iter().enumerate() {
             let weight = weights.and_then(|weights| weights.get(target)).copied().unwrap_or(0.0);
-            let name = names.get(target).filter(|name| !name.is_empty());
-            let shared = name.and_then(|name| self.mesh.morphs.iter().position(|morph| morph.name == *name));
             let animated = clip.get(target).copied().unwrap_or(false);
-            slots.push(shared.unwrap_or(self.mesh.morphs.len()));
-            match shared {
-                None => {
-                    let name = name.cloned().unwrap_or_else(|| self.mesh.morphs.len().to_string());
-                    self.mesh.morphs.push(Morph { name, weight, animated, ..Morph::default() });
-                }
-                Some(slot) if self.mesh.morphs[slot].weight != weight && self.ask.morph_weights.is_none() => {
-                    let Morph { name, weight: first, .. } = &self.mesh.morphs[slot];
-                    let message = format!(
-                        "morph target `{name}` has the weights {first} and {weight}: {first} is used"
-                    );
-                    warn(warnings, &self.document.path, message);
-                }
-                Some(_) => {}
+            if slot == self.mesh.morphs.len() {
+                let name = names[slot].clone();
+                self.mesh.morphs.push(Morph { name, weight, animated, ..Morph::default() });
+            } else if self.mesh.morphs[slot].weight != weight && self.ask.morph_weights.is_none() {
+                let Morph { name, weight: first, .. } = &self.mesh.morphs[slot];
+                let message =
+                    format!("morph target `{name}` has the weights {first} and {weight}: {first} is used");
+                warn(warnings, &self.document.path, message);
             }
         }
         Ok(slots)

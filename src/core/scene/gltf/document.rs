@@ -9,7 +9,7 @@ use json::Index;
 use crate::scene::error::{SceneError, guarded, read_bytes};
 
 /// No mesh file or buffer above this many bytes is read.
-const MOST_BYTES: u64 = 1 << 32;
+pub(super) const MOST_BYTES: u64 = 1 << 32;
 
 /// Required extensions that change nothing that is read here, or that the accessors cover.
 const HARMLESS: [&str; 5] =
@@ -19,7 +19,7 @@ const HARMLESS: [&str; 5] =
 pub(in crate::scene) struct Document {
     pub(super) path: PathBuf,
     pub(super) root: json::Root,
-    buffers: Vec<Vec<u8>>,
+    pub(super) buffers: Vec<Vec<u8>>,
     /// The animation that moves nodes, where there is one at this place.
     pub(super) clip: usize,
 }

@@ -10,6 +10,8 @@
 //! - [`plain`]: which triangles are skin, and the materials of the others
 //! - [`skins`]: bones and their influences
 //! - [`skin_maps`]: the maps of the skin's own material
+//! - [`places`]: which of the mesh's vertices a primitive's are; [`streams`]: the file with numbers of these added, in a
+//!   [`container`]
 //! - [`textures`]: what a material says of a texture
 //! - [`assemble`]: every primitive of the scene in one [`Mesh`](super::mesh::Mesh)
 //!
@@ -20,17 +22,21 @@ mod accessor;
 mod animation;
 mod assemble;
 mod cameras;
+mod container;
 mod contents;
 mod document;
 mod lights;
 mod nodes;
+mod places;
 mod plain;
 mod primitive;
 mod skin_maps;
 mod skins;
+mod streams;
 mod textures;
 
 pub(super) use cameras::FileCamera;
+pub(crate) use container::container;
 pub(super) use document::Document;
 pub(super) use skin_maps::SkinMaps;
 pub(super) use textures::TextureUv;

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use crate::model::fields::Field;
+use crate::export::vertices::fields_at_vertices;
 use crate::samples::PosedSurface;
 use crate::scene::Scene;
 
@@ -13,12 +13,7 @@ pub(super) fn are_asked_for(scene: &Scene) -> bool {
 
 /// The table: a column for each number of each field, a row a vertex; none where rays find none of the fields.
 pub(super) fn table(scene: &Scene, surface: &PosedSurface<'_>) -> Option<String> {
-    let fields = scene.needs().fields;
-    let columns: Vec<(Field, Vec<f32>)> = fields
-        .iter()
-        .filter(|&field| field.map().is_none() && surface.finds_at_vertices(field))
-        .map(|field| (field, surface.field_of_vertices(field)))
-        .collect();
+    let columns = fields_at_vertices(scene, surface);
     if columns.is_empty() {
         return None;
     }
