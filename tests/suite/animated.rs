@@ -4,7 +4,7 @@
 
 use std::path::{Path, PathBuf};
 
-use skinfit::bake::bake_pose;
+use skinfit::bake::{PoseBake, bake_pose};
 use skinfit::demo;
 use skinfit::model::effects::{Effect, Effects};
 use skinfit::prepare::{Baked, ClipOcclusion, PrepareOptions, Views};
@@ -96,4 +96,33 @@ fn an_animated_morph_darkens_what_it_closes_about_as_a_bake_of_the_frame_does() 
             assert!(after < 0.6 * before, "{after} {before}");
         }
     }
+}
+
+#[test]
+fn bakes_between_two_poses_are_near_those_of_the_frames() {
+    let (baked, _folder) = nodding(Some(ClipOcclusion::Frames));
+    let animation = Animation::open(&baked.scene).unwrap().unwrap();
+    let (first, last) = animation.seconds;
+    let bake = |time: f64| {
+        let mesh = animation.mesh(time).unwrap();
+        bake_pose(&baked.scene, &mesh.pose(), None, Some(&cache())).0
+    };
+    let values = |bake: &PoseBake| bake.occlusion.as_ref().unwrap().base.clone();
+    let off = |a: &[f32], b: &[f32]| {
+        a.iter().zip(b).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / a.len() as f64
+    };
+    // Eight poses of the nod, and the frames half way between them.
+    let poses = 8;
+    let at = |place: f64| first + place / f64::from(poses) * (last - first);
+    let (mut between, mut held) = (0.0, 0.0);
+    for pose in 0..poses {
+        let (from, to) = (bake(at(f64::from(pose))), bake(at(f64::from(pose) + 1.0)));
+        let frame = values(&bake(at(f64::from(pose) + 0.5)));
+        let line = values(&from.between(&to, 0.5).unwrap());
+        between += off(&line, &frame) / f64::from(poses);
+        held += off(&values(&from), &frame) / f64::from(poses);
+    }
+    println!("mean error of frames between two poses {between:.4}, of the pose before {held:.4}");
+    // Rays are the same in all poses, so that what is left is how far motion is from lines.
+    assert!(between < 0.6 * held && between < 0.01, "{between} {held}");
 }

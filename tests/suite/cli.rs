@@ -4,6 +4,7 @@ mod ablation;
 mod added_term;
 mod browser;
 mod built_in;
+mod clip;
 mod constants;
 mod damaged;
 mod engines;

@@ -13,9 +13,11 @@
 //!   [`shadowed`]: how much; [`sky`]: which of both a scene asks for
 //! - [`thickness`]: how far below each vertex the mesh's far side lies
 //! - [`rays`]: the mesh as rays see it; `wide_bvh`: as many rays do
+//! - `between`: bakes of poses between two
 //! - [`cache`]: bakes kept between runs (`baker`: each bake through it)
 
 mod baker;
+mod between;
 pub mod cache;
 pub mod coefficients;
 pub mod harmonics;

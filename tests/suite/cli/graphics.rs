@@ -258,6 +258,10 @@ fn what_the_engines_cannot_do_is_refused_before_a_file_is_written() {
         (&["--accuracy", "good"], &["`exact`, `paper`"]),
         (&["--frames", "0"], &["0 is not in 1..=100000"]),
         (&["--animate"], &["--frames"]),
+        (&["--fps", "24"], &["--animate"]),
+        (&["--animate", "--fps", "0"], &["such as 24"]),
+        (&["--animate", "--frames", "2", "--loops", "2"], &["--fps"]),
+        (&["--animate", "--fps", "24", "--occlusion-rate", "4"], &["--occlusion frames"]),
         (&["--frames", "2", "--occlusion", "frames"], &["--animate"]),
     ] {
         let ran = sandbox.run(&[&["render", "scene.toml", "-o", "a.png"], more].concat());

@@ -34,14 +34,55 @@ pub(super) fn turntable(camera: &Camera, mesh: &Mesh, count: u32, output: &Path)
     (0..count).map(frame).collect()
 }
 
-/// `count` frames of the animation from its first key to its last, evenly.
-pub(super) fn animation(camera: &Camera, (first, last): (f64, f64), count: u32, output: &Path) -> Vec<Frame> {
+/// How many frames an animation has, and at which times.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Pace {
+    /// So many from its first key to its last, evenly.
+    Even(u32),
+    /// So many a second; all of it once, or so many frames, which begin again where it ends.
+    Rate(f64, Option<u32>),
+    /// So many a second of that many rounds, of which each ends where the next begins.
+    Rounds(f64, u32),
+}
+
+/// The most frames of a sequence.
+pub(super) const MOST: u32 = 100_000;
+/// Of a frame: a time that misses the last key by a rounding is its time.
+const ROUNDING: f64 = 1e-6;
+
+impl Pace {
+    /// How many frames an animation of so many seconds has; `None` beyond [`MOST`].
+    pub(super) fn count(self, seconds: f64) -> Option<u32> {
+        let count = match self {
+            Self::Even(count) | Self::Rate(_, Some(count)) => f64::from(count),
+            Self::Rate(rate, None) => (seconds * rate + ROUNDING).floor() + 1.0,
+            Self::Rounds(rate, rounds) => (seconds * rate * f64::from(rounds)).round().max(1.0),
+        };
+        (1.0..=f64::from(MOST)).contains(&count).then_some(count as u32)
+    }
+
+    /// The time of frame `i` of `count`.
+    fn time(self, (first, last): (f64, f64), i: u32, count: u32) -> f64 {
+        let (seconds, i) = (last - first, f64::from(i));
+        match self {
+            Self::Even(_) => first + i / f64::from((count - 1).max(1)) * seconds,
+            Self::Rate(rate, None) => (first + i / rate).min(last),
+            Self::Rate(rate, Some(_)) | Self::Rounds(rate, _) if seconds > 0.0 => {
+                first + (i / rate).rem_euclid(seconds)
+            }
+            Self::Rate(..) | Self::Rounds(..) => first,
+        }
+    }
+}
+
+/// The frames of an animation between the times of its first key and its last; `None` where there are more than [`MOST`].
+pub(super) fn animation(camera: &Camera, ends: (f64, f64), pace: Pace, output: &Path) -> Option<Vec<Frame>> {
+    let count = pace.count(ends.1 - ends.0)?;
     let frame = |i: u32| {
-        let share = f64::from(i) / f64::from((count - 1).max(1));
-        let time = Some(first + share * (last - first));
+        let time = Some(pace.time(ends, i, count));
         Frame { camera: *camera, time, path: numbered(output, i, count) }
     };
-    (0..count).map(frame).collect()
+    Some((0..count).map(frame).collect())
 }
 
 /// The middle of the mesh's bounding box as it stands.
@@ -64,6 +105,26 @@ fn numbered(output: &Path, i: u32, count: u32) -> PathBuf {
 mod tests {
     use super::*;
     use glam::Vec3;
+
+    #[test]
+    fn an_animation_goes_evenly_at_a_rate_or_around() {
+        let camera = Camera::pinhole(DMat4::IDENTITY, 0.5, [4, 4]);
+        let times = |pace: Pace| -> Vec<f64> {
+            let frames = animation(&camera, (1.0, 2.0), pace, Path::new("a.png")).unwrap();
+            frames.iter().filter_map(|frame| frame.time).collect()
+        };
+        assert_eq!(times(Pace::Even(3)), [1.0, 1.5, 2.0]);
+        assert_eq!(times(Pace::Even(1)), [1.0]);
+        assert_eq!(times(Pace::Rate(4.0, None)), [1.0, 1.25, 1.5, 1.75, 2.0]);
+        assert_eq!(times(Pace::Rate(4.0, Some(6))), [1.0, 1.25, 1.5, 1.75, 1.0, 1.25]);
+        assert_eq!(times(Pace::Rounds(2.0, 2)), [1.0, 1.5, 1.0, 1.5]);
+        // A third of a second has no exact number; the last frame is the last key all the same.
+        assert_eq!(times(Pace::Rate(3.0, None)).len(), 4);
+        // An animation of one key stands still.
+        let still = animation(&camera, (1.0, 1.0), Pace::Rounds(24.0, 3), Path::new("a.png")).unwrap();
+        assert_eq!(still.len(), 1);
+        assert!(animation(&camera, (0.0, 1e6), Pace::Rate(24.0, None), Path::new("a.png")).is_none());
+    }
 
     #[test]
     fn a_turn_keeps_the_distance_and_begins_where_the_camera_stands() {

@@ -2,7 +2,9 @@
 //!
 //! - `engine`: which engine draws, and its options
 //! - `frames`: which frames a sequence has, and their files
+//! - `clip`: what is baked of an animation's frames
 
+mod clip;
 mod engine;
 mod frames;
 
@@ -12,7 +14,6 @@ use super::graphics::Task;
 use super::scene::{SceneArguments, parse_effects};
 use super::set::SetArguments;
 use super::{Exit, Refusal, quieten_graphics, say, tell_warnings};
-use crate::bake::{self, PoseBake, SkyLight};
 use crate::fit::params_file::Foreign;
 use crate::gpu::painter::{Beside, Cut, PaintError, Painter, Picture};
 use crate::model::effects::{Effect, Effects};
@@ -24,14 +25,14 @@ use crate::render::image::{MAX_PIXELS, MAX_SIDE};
 use crate::render::tonemap::{Operator, ToneMap};
 use crate::samples;
 use crate::scene::animation::Animation;
-use crate::scene::mesh::Mesh;
 use crate::scene::view::Background;
-use frames::Frame;
+use frames::{Frame, Pace};
 
 /// Render a view of a scene with the model
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  skinfit render scene.toml --params runs/a/params.toml --view front -o front.exr\n  skinfit render --effects diffuse,occlusion --tone aces -o clay.png\n  skinfit render scene.toml --frames 120 --size 1920x1080 --accuracy paper --antialias msaa4 -o turn.png"
+    group(clap::ArgGroup::new("length").args(["frames", "fps"]).multiple(true)),
+    after_help = "Examples:\n  skinfit render scene.toml --params runs/a/params.toml --view front -o front.exr\n  skinfit render --effects diffuse,occlusion --tone aces -o clay.png\n  skinfit render scene.toml --frames 120 --size 1920x1080 --accuracy paper --antialias msaa4 -o turn.png\n  skinfit render scene.toml --animate --fps 24 --loops 2 --occlusion frames --occlusion-rate 6 -o walk.png"
 )]
 pub(super) struct Arguments {
     #[command(flatten)]
@@ -71,15 +72,25 @@ pub(super) struct Arguments {
     #[command(flatten)]
     engine: engine::EngineArguments,
     /// Render so many frames: a whole turn of the camera about the mesh's vertical axis.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), help_heading = "Sequences")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(frames::MOST)), help_heading = "Sequences")]
     frames: Option<u32>,
-    /// Let the frames go through the mesh's animation instead, the camera standing still.
-    #[arg(long, requires = "frames", help_heading = "Sequences")]
+    /// Let the frames go through the mesh's animation instead, the camera standing still: so many from its first key to
+    /// its last, or with --fps at its own speed.
+    #[arg(long, requires = "length", help_heading = "Sequences")]
     animate: bool,
+    /// Frames a second of the animation: all of it once, or --frames of them, which begin again where it ends.
+    #[arg(long, value_name = "RATE", value_parser = parse_rate, requires = "animate", help_heading = "Sequences")]
+    fps: Option<f64>,
+    /// Go through the animation so often, each round ending where the next begins.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000), requires = "fps", conflicts_with = "frames", help_heading = "Sequences")]
+    loops: Option<u32>,
     /// How ambient occlusion follows the animation: `targets`, by what is baked once for each morph target that it
     /// moves, or `frames`, by a bake of each frame.
     #[arg(long, value_name = "HOW", default_value = "targets", value_parser = ["targets", "frames"], requires = "animate", help_heading = "Sequences")]
     occlusion: String,
+    /// Of --occlusion frames: bake so many poses a second of the animation, and have those between by lines.
+    #[arg(long, value_name = "RATE", value_parser = parse_rate, requires = "animate", help_heading = "Sequences")]
+    occlusion_rate: Option<f64>,
     /// Print what a frame took: GPU time by pass, uploaded bytes, bindings.
     #[arg(long)]
     stats: bool,
@@ -102,6 +113,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         clip: arguments.animate.then_some(arguments.follows()),
         background: arguments.background,
     };
+    if arguments.occlusion_rate.is_some() && arguments.follows() == ClipOcclusion::Targets {
+        return Err(Refusal::new(
+            "--occlusion-rate says how often poses are baked: give --occlusion frames with it.".to_owned(),
+        ));
+    }
     let mut loaded = Loaded::read(&path, &options)?;
     if let Some((width, height)) = arguments.size {
         let camera = &mut loaded.scene.views[0].camera;
@@ -116,20 +132,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     tell_warnings(&baked.warnings);
     tell_warnings(&foreign(arguments, &path, &baked).into_iter().collect::<Vec<_>>());
     arguments.set.tell_idle(baked.scene.effects);
-    let frames = frames(arguments, &baked, animation.as_ref());
-    let sequence = arguments.frames.is_some();
+    let frames = frames(arguments, &baked, animation.as_ref())?;
+    let sequence = arguments.frames.is_some() || animation.is_some();
     // The effect `haze` is asked for by name, and has no other place to go.
     let layers = is_exr && arguments.layers;
     let beside = Beside { layers, haze: layers || is_exr && baked.scene.effects.has(Effect::Haze) };
     let painting = engine::Painting { animated: animation.is_some(), timed: arguments.stats };
     let mut painter = arguments.engine.painter(&baked, painting)?;
     let bar = progress::bar("frames", frames.len() as u64);
-    let mut light = None;
+    let cache = arguments.scene.cache();
+    let mut bakes = match (&animation, arguments.follows()) {
+        (Some(animation), ClipOcclusion::Frames) => {
+            Some(clip::ClipBakes::new(animation, arguments.occlusion_rate, cache.as_deref()))
+        }
+        _ => None,
+    };
     for frame in &frames {
         if let (Some(animation), Some(time)) = (&animation, frame.time) {
             let mesh = animation.mesh(time)?;
-            let own = frame_bake(arguments, &baked, &mesh, light.as_ref());
-            light = light.or_else(|| own.as_ref()?.sky.as_ref()?.light.clone());
+            let own = bakes.as_mut().map(|bakes| bakes.at(&baked.scene, &mesh, time)).transpose()?;
             painter.set_mesh(&mesh, own).map_err(refused)?;
         }
         let picture = painter.paint(&frame.camera, baked.gains[0], beside).map_err(refused)?;
@@ -162,12 +183,38 @@ fn foreign(arguments: &Arguments, path: &Path, baked: &Baked) -> Option<String> 
 }
 
 /// The requested frames.
-fn frames(arguments: &Arguments, baked: &Baked, animation: Option<&Animation>) -> Vec<Frame> {
+fn frames(
+    arguments: &Arguments,
+    baked: &Baked,
+    animation: Option<&Animation>,
+) -> Result<Vec<Frame>, Refusal> {
     let (camera, output) = (&baked.scene.views[0].camera, &arguments.output);
-    match (arguments.frames, animation) {
-        (None, _) => frames::still(*camera, output),
-        (Some(count), None) => frames::turntable(camera, &baked.scene.mesh, count, output),
-        (Some(count), Some(animation)) => frames::animation(camera, animation.seconds, count, output),
+    let pace = match (arguments.fps, arguments.loops, arguments.frames) {
+        (Some(rate), Some(rounds), _) => Pace::Rounds(rate, rounds),
+        (Some(rate), None, count) => Pace::Rate(rate, count),
+        (None, _, Some(count)) => Pace::Even(count),
+        (None, _, None) => return Ok(frames::still(*camera, output)),
+    };
+    match (animation, arguments.frames) {
+        (Some(animation), _) => frames::animation(camera, animation.seconds, pace, output).ok_or_else(|| {
+            let seconds = animation.seconds.1 - animation.seconds.0;
+            Refusal::new(format!(
+                "{}: its animation of {seconds} s has more than {} frames at --fps {}. Give --frames, or a lower rate.",
+                baked.scene.path.display(),
+                frames::MOST,
+                arguments.fps.unwrap_or_default()
+            ))
+        }),
+        (None, Some(count)) => Ok(frames::turntable(camera, &baked.scene.mesh, count, output)),
+        (None, None) => Ok(frames::still(*camera, output)),
+    }
+}
+
+/// A number of times a second.
+fn parse_rate(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(rate) if (1e-3..=1e4).contains(&rate) => Ok(rate),
+        _ => Err("give a number of times a second from 0.001 to 10000, such as 24".to_owned()),
     }
 }
 
@@ -214,22 +261,6 @@ impl Arguments {
     fn follows(&self) -> ClipOcclusion {
         if self.occlusion == "frames" { ClipOcclusion::Frames } else { ClipOcclusion::Targets }
     }
-}
-
-/// What is baked of a frame's pose alone, where each frame is to be baked; `light` is the environment's, where an earlier
-/// frame has it.
-fn frame_bake(
-    arguments: &Arguments,
-    baked: &Baked,
-    mesh: &Mesh,
-    light: Option<&SkyLight>,
-) -> Option<PoseBake> {
-    let cache = arguments.scene.cache();
-    let wanted = arguments.follows() == ClipOcclusion::Frames;
-    let (own, stats) =
-        wanted.then(|| bake::bake_pose(&baked.scene, &mesh.pose(), light, cache.as_deref()))?;
-    tell_warnings(&stats.warnings);
-    Some(own)
 }
 
 /// What was cut, and what to do about it.
