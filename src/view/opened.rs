@@ -171,7 +171,10 @@ fn baked(mut loaded: Loaded) -> Result<Baked, PrepareError> {
     let fixed = slid.into_iter().filter(|slid| free.iter().all(|column| column.param != slid.param));
     loaded.scene.fit.free.extend(fixed.collect::<Vec<_>>());
     // What is free is the scene's own again: nobody shares it yet.
-    Ok(loaded.bake()?.with_scene(|scene| scene.fit.free = free))
+    // To look at a scene moves no camera; a fit does.
+    let cameras = std::mem::take(&mut loaded.scene.fit.cameras);
+    let baked = loaded.bake()?.with_scene(|scene| scene.fit.cameras = cameras);
+    Ok(baked.with_scene(|scene| scene.fit.free = free))
 }
 
 fn extent(mesh: &PosedMesh) -> (DVec3, f64) {

@@ -84,7 +84,9 @@ impl Baked {
             warnings,
         };
         if asked.fit && baked.scene.fit.cameras {
+            let start = Instant::now();
             baked.cameras = registration::register(&mut baked)?;
+            baked.seconds.samples += start.elapsed().as_secs_f64();
             let path = baked.scene.path.display().to_string();
             baked.warnings.extend(baked.cameras.iter().map(|camera| camera.told(&path)));
         }

@@ -346,23 +346,32 @@ fn sampled(
     camera: &Camera,
     done: impl Fn(u64) + Sync,
 ) -> ViewSamples {
-    let n = scene.quality.samples_per_axis.max(1);
-    let hits = primary(posed.rays, posed.mesh, camera, n);
-    let surface = surface::Surface::new(scene, posed, camera);
-    let mut samples = group::pack(&hits, &surface, (camera.width, n * n), done);
-    samples.plain = plain::pixels(scene, posed, camera, &hits.plain, n * n);
+    let (mut samples, plain) = of_skin(scene, posed, camera, done);
+    let per_pixel = scene.quality.samples_per_axis.max(1).pow(2);
+    samples.plain = plain::pixels(scene, posed, camera, &plain, per_pixel);
     samples
 }
 
-/// What a camera sees: also what stands in no light's way.
-fn primary(rays: &RayMesh, mesh: &PosedMesh, camera: &Camera, n: u32) -> trace::Hits {
-    match mesh.occluders() {
-        Cow::Borrowed(_) => trace::trace(rays, mesh, camera, n),
-        Cow::Owned(_) => {
-            let all = RayMesh::new(&mesh.positions, &mesh.triangles);
-            trace::trace(&all, mesh, camera, n)
-        }
-    }
+/// As [`sample_view`], but that parts which are not skin are black: who compares what is covered needs no more.
+#[must_use]
+pub fn sample_silhouettes(scene: &Scene, posed: &PosedSurface<'_>, camera: &Camera) -> ViewSamples {
+    let (mut samples, plain) = of_skin(scene, posed, camera, |_| {});
+    samples.plain = plain::shares(&plain, scene.quality.samples_per_axis.max(1).pow(2));
+    samples
+}
+
+/// The samples of skin, and the pixels and hits of those that show something else.
+fn of_skin(
+    scene: &Scene,
+    posed: &PosedSurface<'_>,
+    camera: &Camera,
+    done: impl Fn(u64) + Sync,
+) -> (ViewSamples, Vec<(u32, Hit)>) {
+    let n = scene.quality.samples_per_axis.max(1);
+    let hits = trace::trace(posed.seen(), posed.mesh, camera, n);
+    let surface = surface::Surface::new(scene, posed, camera);
+    let samples = group::pack(&hits, &surface, (camera.width, n * n), done);
+    (samples, hits.plain)
 }
 
 /// So many records of what the effects of `scene` ask for, all zero.
@@ -375,5 +384,9 @@ pub fn asked_records(scene: &Scene, count: usize) -> SurfaceRecords {
 #[must_use]
 pub fn sample_hits(scene: &Scene, posed: &PosedMesh, rays: &RayMesh, camera: &Camera) -> Vec<Hit> {
     let n = scene.quality.samples_per_axis.max(1);
-    group::slots(&primary(rays, posed, camera, n), camera.width)
+    let hits = match posed.occluders() {
+        Cow::Borrowed(_) => trace::trace(rays, posed, camera, n),
+        Cow::Owned(_) => trace::trace(&RayMesh::new(&posed.positions, &posed.triangles), posed, camera, n),
+    };
+    group::slots(&hits, camera.width)
 }

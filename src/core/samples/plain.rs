@@ -79,6 +79,17 @@ pub(super) fn pixels(
         PlainPixel { pixel, share, rgb: rgb.map(|c| share * c as f32) }
     };
     let each: Vec<PlainPixel> = hits.par_iter().enumerate().with_min_len(CHUNK).map(radiance).collect();
+    by_pixel(each)
+}
+
+/// The shares of pixels alone, black.
+pub(super) fn shares(hits: &[(u32, Hit)], per_pixel: u32) -> Vec<PlainPixel> {
+    let share = 1.0 / per_pixel as f32;
+    by_pixel(hits.iter().map(|&(pixel, _)| PlainPixel { pixel, share, rgb: [0.0; 3] }).collect())
+}
+
+/// Samples whose pixels follow one another, added up.
+fn by_pixel(each: Vec<PlainPixel>) -> Vec<PlainPixel> {
     let mut pixels: Vec<PlainPixel> = Vec::new();
     for one in each {
         match pixels.last_mut().filter(|last| last.pixel == one.pixel) {
@@ -127,7 +138,7 @@ impl PlainLight<'_> {
         } else {
             (normal, place)
         };
-        let normal = facing(normal, view);
+        let normal = if normal == DVec3::ZERO { normal } else { facing(normal, view) };
         let tint =
             posed.mesh.plain.as_ref().map_or([1.0; 4], |plain| plain.tint(hit.triangle, hit.weights()));
         let surface = material.at(hit.uv(posed.mesh), tint);

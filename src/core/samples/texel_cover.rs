@@ -44,7 +44,10 @@ impl<'a> Layout<'a> {
         if uvs.is_empty() {
             return Err(AtlasError::NoUvs);
         }
-        match tile_outside_atlas(uvs) {
+        // Those of parts that are not skin are no part of it.
+        let corners = triangles.iter().filter(|[a, b, _]| a != b).flatten();
+        let of_skin: Vec<Vec2> = corners.filter_map(|&i| uvs.get(i as usize).copied()).collect();
+        match tile_outside_atlas(&of_skin) {
             Some([u, v]) => Err(AtlasError::Outside { u, v }),
             None => Ok(Self { uvs, triangles, size }),
         }

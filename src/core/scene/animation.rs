@@ -35,7 +35,7 @@ impl Animation {
         let folder = scene.path.parent().unwrap_or(Path::new(""));
         let document = mesh_file(&source, &file, folder)?;
         let needs = scene.needs();
-        let own = own_maps(&file, &document, &pose, &mut Warnings::new())?;
+        let own = own_maps(&file, &document, (&pose, needs), &mut Warnings::new())?;
         let uv = own.map(|own| own.uv()).unwrap_or_default();
         let ask = Ask { uv, ..ask(&scene.maps, scene.form, scene.effects, needs, &pose) };
         let seconds = document.animation_seconds()?;
@@ -117,6 +117,11 @@ impl Pose {
         })
     }
 
+    /// The names of what is skin.
+    pub(super) fn skin(&self) -> Option<&[String]> {
+        self.skin.as_deref()
+    }
+
     /// Seconds into the animation.
     pub(super) const fn time(&self) -> Option<f64> {
         self.time
@@ -144,24 +149,26 @@ impl Pose {
     }
 }
 
-/// The maps of the skin's own material, where the scene names none.
+/// The maps of the skin's own material that the effects ask for: where the scene names no maps, or says that those that it
+/// names are looked up as the material's.
 pub(super) fn own_maps(
     file: &SceneFile,
     document: &Document,
-    pose: &Pose,
+    (pose, needs): (&Pose, Needs),
     warnings: &mut Warnings,
 ) -> Result<Option<SkinMaps>, SceneError> {
     let MapsTable { color, normal, specular, attenuator, material, .. } = &file.maps;
     let named = [color, normal, specular, attenuator].into_iter().any(Option::is_some);
-    match named || *material == Some(false) {
-        true => Ok(None),
-        false => document.skin_maps(pose.skin.as_deref(), warnings),
+    let wanted = (needs.color_map, needs.normal_map);
+    match material.unwrap_or(!named) && wanted != (false, false) {
+        true => document.skin_maps(pose.skin(), wanted, warnings),
+        false => Ok(None),
     }
 }
 
 /// What the effects want of the mesh, `maps` being those that they look up.
 pub(super) fn ask(maps: &Maps, form: Form, effects: Effects, needs: Needs, pose: &Pose) -> Ask {
-    let Maps { color, normal, specular, attenuator, own } = maps;
+    let Maps { color, normal, specular, attenuator, own, .. } = maps;
     let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
     let looked_up = built_in || !own.is_empty();
     let uvs = match (needs.maps() || needs.atlas, looked_up || needs.atlas) {

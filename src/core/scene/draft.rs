@@ -95,6 +95,13 @@ impl Draft<'_> {
         }
     }
 
+    /// Whether the mesh's own material gives maps that no file here is named for: those that are looked up elsewhere than
+    /// by the first texture coordinates.
+    fn takes_own_maps(&self) -> bool {
+        let skin = self.contents.largest_material();
+        self.maps.is_empty() && skin.is_some_and(|skin| skin.color.is_some() || skin.normal.is_some())
+    }
+
     fn maps_table(&self, out: &mut String) {
         if !self.maps.is_empty() {
             line(out, "\n[maps]");
@@ -126,7 +133,9 @@ impl Draft<'_> {
         if self.environment.is_none() || !self.contents.lights.is_empty() {
             effects.extend(["lights", "shadows", "light_specular"]);
         }
-        if self.maps.iter().any(|(key, _)| *key == "normal") {
+        let own = self.contents.largest_material().filter(|_| self.takes_own_maps());
+        let own_normals = own.is_some_and(|skin| skin.normal.is_some());
+        if own_normals || self.maps.iter().any(|(key, _)| *key == "normal") {
             effects.push("normal_map");
         }
         if !self.contents.morph_targets.is_empty() {
@@ -137,7 +146,8 @@ impl Draft<'_> {
         }
         let names: Vec<String> = effects.iter().map(|name| format!("\"{name}\"")).collect();
         line(out, &format!("\n[model]\neffects = [{}]", names.join(", ")));
-        if !self.maps.iter().any(|(key, _)| *key == "color") {
+        let own_colors = own.is_some_and(|skin| skin.color.is_some());
+        if !own_colors && !self.maps.iter().any(|(key, _)| *key == "color") {
             line(
                 out,
                 "\n[model.params]\nbase_weight = [0.6, 0.42, 0.34]  # there is no colour map: skin all over",

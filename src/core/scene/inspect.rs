@@ -45,6 +45,9 @@ pub struct MeshPart {
     pub mesh: String,
     /// Its material's name.
     pub material: Option<String>,
+    /// And that material's place in the file.
+    #[serde(skip)]
+    pub material_index: Option<usize>,
     /// How many vertices.
     pub vertices: usize,
     /// How many triangles; 0 of points and lines.

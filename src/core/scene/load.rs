@@ -125,16 +125,17 @@ impl Scene {
         let declared = Fields::of(terms.iter().flat_map(|term| term.fields.iter())).of_maps();
         let mut maps = read_maps(&source, &file, folder, (needs, declared), &mut warnings)?;
         let mut uv = TextureUv::default();
-        if (needs.color_map || needs.normal_map)
-            && let Some(own) = own_maps(&file, &document, &pose, &mut warnings)?
-        {
-            let wanted = (needs.color_map, needs.normal_map);
-            (maps.color, maps.normal) = document.read_skin_maps(&own, wanted, &mut warnings)?;
+        if let Some(of_material) = own_maps(&file, &document, (&pose, needs), &mut warnings)? {
+            let wanted = (needs.color_map && maps.color.is_none(), needs.normal_map && maps.normal.is_none());
+            let (color, mut normal) = document.read_skin_maps(&of_material, wanted, &mut warnings);
             if normal_flip(&source, &file)? {
-                let texels = maps.normal.iter_mut().flat_map(|map| &mut map.texels);
+                let texels = normal.iter_mut().flat_map(|map| &mut map.texels);
                 texels.for_each(|texel| texel[1] = 1.0 - texel[1]);
             }
-            uv = own.uv();
+            maps.color = maps.color.or(color);
+            maps.normal = maps.normal.or(normal);
+            maps.material = Some(of_material.told());
+            uv = of_material.uv();
         }
         bar.inc(1);
         let ask = Ask { clip: options.clip, uv, ..ask(&maps, form, effects, needs, &pose) };
@@ -274,7 +275,14 @@ fn read_maps(
         (specular, ..) => specular,
     };
     let own = read_own_maps(source, maps, folder, (needs, declared))?;
-    Ok(Maps { color, normal: normals.filter(|_| normal.is_some()), specular, attenuator, own })
+    Ok(Maps {
+        color,
+        normal: normals.filter(|_| normal.is_some()),
+        specular,
+        attenuator,
+        own,
+        material: None,
+    })
 }
 
 /// The maps of fields that the scene's terms have `declared`, those alone that the enabled effects ask for.

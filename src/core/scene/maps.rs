@@ -57,6 +57,9 @@ pub struct Maps {
     pub attenuator: Option<Map<1>>,
     /// Those of fields that files of rules declare.
     pub own: Vec<(Field, OwnMap)>,
+    /// Where they are looked up as the mesh's own material says: what an engine has to do beside showing its pictures by
+    /// the first texture coordinates, if anything.
+    pub material: Option<Option<String>>,
 }
 
 /// The map of a field.

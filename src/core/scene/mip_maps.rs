@@ -48,15 +48,16 @@ impl MipMaps {
 
 /// The next level; `None` where all maps are of one texel.
 fn halved(maps: &Maps) -> Option<Maps> {
-    let Maps { color, normal, specular, attenuator, own } = maps;
+    let Maps { color, normal, specular, attenuator, own, .. } = maps;
     let next = Maps {
         color: color.as_ref().and_then(half),
         normal: normal.as_ref().and_then(half),
         specular: specular.as_ref().and_then(half),
         attenuator: attenuator.as_ref().and_then(half),
         own: own.iter().filter_map(|(field, map)| Some((*field, half_of_own(map)?))).collect(),
+        material: None,
     };
-    let Maps { color, normal, specular, attenuator, own } = &next;
+    let Maps { color, normal, specular, attenuator, own, .. } = &next;
     let built_in = color.is_some() || normal.is_some() || specular.is_some() || attenuator.is_some();
     let any = built_in || !own.is_empty();
     any.then_some(next)

@@ -2,8 +2,9 @@
 
 use std::path::Path;
 
-use super::error::SceneError;
-use super::file::{SceneFile, Source};
+use super::animation::{Pose, mesh_file};
+use super::error::{SceneError, Warnings};
+use super::file::{MapsTable, SceneFile, Source};
 use super::lit::Lights;
 
 /// What a scene file names that effects are about.
@@ -27,9 +28,22 @@ impl Offers {
         let file: SceneFile = source.parse()?;
         let lights = Lights::of_file(&source, &file)?;
         Ok(Self {
-            normal_map: file.maps.normal.is_some(),
+            normal_map: file.maps.normal.is_some() || own_normals(path, &source, &file)?,
             environment: file.environment.is_some(),
             lights: lights.any(),
         })
     }
+}
+
+/// Whether the skin's own material has a normal map that the scene would take.
+fn own_normals(path: &Path, source: &Source, file: &SceneFile) -> Result<bool, SceneError> {
+    let MapsTable { color, specular, attenuator, material, .. } = &file.maps;
+    let named = [color, specular, attenuator].into_iter().any(Option::is_some);
+    if !material.unwrap_or(!named) {
+        return Ok(false);
+    }
+    let document = mesh_file(source, file, path.parent().unwrap_or(Path::new("")))?;
+    let pose = Pose::check(source, file)?;
+    let maps = document.skin_maps(pose.skin(), (false, true), &mut Warnings::new())?;
+    Ok(maps.is_some())
 }

@@ -89,7 +89,11 @@ fn loaded(arguments: &Arguments, path: &Path, file: &mut ParamsFile) -> Result<S
     let (scene, warnings) = Scene::load(path, &LoadOptions { targets: false, ..LoadOptions::default() })?;
     *file = ParamsFile::read(&arguments.params, scene.form, &scene.params)?.of_scene(path);
     if !arguments.constants && arguments.to.dialect().is_some() {
-        tell_warnings(&warnings.iter().map(ToString::to_string).collect::<Vec<_>>());
+        let mut words: Vec<String> = warnings.iter().map(ToString::to_string).collect();
+        words.extend(scene.maps.material.iter().flatten().map(|told| {
+            format!("{}: {told}. The shader wants them so: have the engine do it.", path.display())
+        }));
+        tell_warnings(&words);
     }
     Ok(scene)
 }

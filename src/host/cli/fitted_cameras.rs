@@ -35,7 +35,7 @@ fn set_camera(view: &mut dyn TableLike, camera: &Camera) {
     }
     let rows = camera.world_to_camera.transpose().to_cols_array();
     set(view, "world_to_camera", Value::Array(Array::from_iter(rows)));
-    set(view, "fov_y_degrees", camera.fov_y.to_degrees().into());
+    set(view, "fov_y_degrees", degrees(camera.fov_y).into());
     // The focal length across goes with the one down.
     let focal = 0.5 * f64::from(camera.height) / (0.5 * camera.fov_y).tan();
     if let Some(lens) = view.get_mut("lens").and_then(Item::as_table_like_mut)
@@ -43,6 +43,13 @@ fn set_camera(view: &mut dyn TableLike, camera: &Camera) {
     {
         set(lens, "fx", (camera.lens.ratio * focal).into());
     }
+}
+
+/// Degrees that are read as these radians, to the last digit where there are some.
+fn degrees(radians: f64) -> f64 {
+    let near = radians.to_degrees();
+    let read = |degrees: &f64| degrees.to_radians() == radians;
+    [near, near.next_up(), near.next_down()].into_iter().find(read).unwrap_or(near)
 }
 
 #[cfg(test)]

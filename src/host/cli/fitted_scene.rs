@@ -27,6 +27,8 @@ pub(super) struct Changes<'a> {
     pub(super) start: Option<Start<'a>>,
     /// Fitted maps, instead of the file's: key in `[maps]` and path.
     pub(super) maps: &'a [(&'static str, String)],
+    /// Whether the scene's maps are looked up as the mesh's own material says: then fitted ones are, too.
+    pub(super) of_material: bool,
     /// Settings, instead of the file's.
     pub(super) settings: &'a [Choose],
     /// Cameras that the fit moved, instead of the file's.
@@ -55,6 +57,9 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
         && let Some(maps) = section(scene.as_table_mut(), "maps")
     {
         changes.maps.iter().for_each(|(key, path)| set(maps, key, path.as_str().into()));
+        if changes.of_material {
+            set(maps, "material", true.into());
+        }
     }
     if let Some(loss) = changes.loss
         && let Some(fit) = section(scene.as_table_mut(), "fit")

@@ -214,7 +214,11 @@ impl<'a> Bench<'a> {
             Some(_) => {
                 let options =
                     PrepareOptions { fit: true, cache: self.cache.clone(), ..PrepareOptions::default() };
-                Baked::new(self.path, &options)?
+                let mut loaded = Loaded::read(self.path, &options)?;
+                // Samples are those of the cameras that were found.
+                loaded.scene.fit.cameras = false;
+                let views = self.baked.scene.views.clone();
+                loaded.bake()?.with_scene(|scene| scene.views = views)
             }
         };
         let kept = self.surfaces.iter().zip(marked).filter(|(_, marked)| !**marked);

@@ -150,7 +150,8 @@ fn moved(scene: &str, got: &Pin, pin: &Pin) -> Vec<String> {
         // instructions round sums: at losses that are the same to 1e-8, AVX2 and AVX-512 end up to 0.15 standard errors
         // apart where constants stand for each other. f32 has no more than some 1e-7 of a constant.
         let by = 0.25 * error + 1e-7 * want.abs();
-        if (got - want).abs() > by || (found - error).abs() > by {
+        // Errors hang on where a fit ends: by up to 0.7% between those.
+        if (got - want).abs() > by || (found - error).abs() > 0.02 * error + 1e-7 * want.abs() {
             moved.push(format!("{scene}: {name} {got} +- {found:e} instead of {want} +- {error:e}"));
         }
     }

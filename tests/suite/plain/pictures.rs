@@ -14,6 +14,12 @@ fn black_and_white() -> Vec<u8> {
 
 /// Whether the eye is bright in the middles of four quarters of its width, left to right.
 fn quarters(info: &Value, edit: impl FnOnce(&mut Value)) -> [bool; 4] {
+    // It is seen from pixel 3.7 to 12.3 of the row.
+    bright(info, edit, [5, 7, 9, 11].map(|x| 8 * 16 + x))
+}
+
+/// Whether the image is bright at these pixels, where the eye's base colour is a picture.
+fn bright<const N: usize>(info: &Value, edit: impl FnOnce(&mut Value), pixels: [usize; N]) -> [bool; N] {
     let material = json!({"name": "Eye", "pbrMetallicRoughness": {"metallicFactor": 1, "roughnessFactor": 0, "baseColorTexture": info}});
     let folder = edited(&material, SCENE, |mesh, _| {
         mesh["textures"] = json!([{"source": 0, "sampler": 0}]);
@@ -22,8 +28,7 @@ fn quarters(info: &Value, edit: impl FnOnce(&mut Value)) -> [bool; 4] {
     });
     folder.write("picture.png", &black_and_white());
     let image = image(&sampled(&folder));
-    // It is seen from pixel 3.7 to 12.3 of the row.
-    [5, 7, 9, 11].map(|x| image.rgb[8 * 16 + x][0] > 0.5)
+    pixels.map(|pixel| image.rgb[pixel][0] > 0.5)
 }
 
 #[test]
@@ -41,6 +46,9 @@ fn samplers_and_transforms_are_gltfs() {
     // Half a turn about the corner, brought back.
     let turned = json!({"index": 0, "extensions": {"KHR_texture_transform": {"offset": [1, 1], "rotation": std::f64::consts::PI}}});
     assert_eq!(quarters(&turned, |_| {}), [true, true, false, false]);
+    // A positive angle turns the picture clockwise: what was to the left stands above.
+    let quarter = json!({"index": 0, "extensions": {"KHR_texture_transform": {"offset": [0, 1], "rotation": std::f64::consts::FRAC_PI_2}}});
+    assert_eq!(bright(&quarter, |_| {}, [5 * 16 + 8, 11 * 16 + 8]), [false, true]);
 }
 
 #[test]
@@ -125,4 +133,28 @@ fn a_scene_without_maps_takes_those_of_its_skins_material() {
         "baseColorTexture": {"index": 0, "extensions": transform}}});
     let (scene, told) = loaded(&apart, &bumped);
     assert!(scene.maps.normal.is_none() && told.contains("its normal map is looked up elsewhere"), "{told}");
+    // Of one that is named, the others may be the material's all the same, and all are looked up as its are.
+    let both =
+        bumped.replace("[environment]", "[maps]\nspecular = \"picture.png\"\nmaterial = true\n[environment]");
+    let (scene, _) = loaded(&skin, &both);
+    assert!(scene.maps.color.is_some() && scene.maps.normal.is_some());
+    assert!(scene.mesh.uvs[..4].iter().all(|uv| (0.25..=0.75).contains(&uv.x)));
+    let told = scene.maps.material.flatten().unwrap();
+    assert!(
+        told.contains("the picture times (1, 0.5, 0.25)") && told.contains("KHR_texture_transform"),
+        "{told}"
+    );
+}
+
+#[test]
+fn maps_that_cannot_be_had_are_a_warning() {
+    let of = |info: Value| json!({"name": "Skin", "pbrMetallicRoughness": {"baseColorTexture": info}});
+    for (skin, words) in [
+        (of(json!({"index": 7})), "refers to texture 7"),
+        (of(json!({"index": 0, "texCoord": 1})), "not all of the skin has texture coordinates 1"),
+    ] {
+        let (scene, told) = loaded(&skin, SCENE);
+        assert!(scene.maps.color.is_none(), "{told}");
+        assert!(told.contains(words) && told.contains("`material = false` in [maps]"), "{told}");
+    }
 }

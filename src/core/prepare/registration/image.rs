@@ -1,6 +1,7 @@
 //! Images at a reduced size, with the cameras that would have taken them.
 
 use crate::render::image::Image;
+use crate::render::shade::Shaded;
 use crate::scene::lens::Lens;
 use crate::scene::view::{Camera, View};
 
@@ -14,12 +15,15 @@ pub(super) struct Picture {
     pub(super) alpha: Option<Vec<f32>>,
     /// What each pixel counts; empty where all count 1.
     pub(super) mask: Vec<f32>,
+    /// The share of each pixel that is not skin, whose colours say nothing; empty where all is.
+    pub(super) plain: Vec<f32>,
 }
 
 impl Picture {
-    pub(super) fn of(image: Image) -> Self {
-        let Image { width, height, rgb, alpha, .. } = image;
-        Self { width, height, rgb, alpha: Some(alpha), mask: Vec::new() }
+    pub(super) fn of(shaded: Shaded) -> Self {
+        let Image { width, height, rgb, alpha, .. } = shaded.image;
+        let plain = shaded.plain.map_or(Vec::new(), |plain| plain.alpha);
+        Self { width, height, rgb, alpha: Some(alpha), mask: Vec::new(), plain }
     }
 
     /// A view's target.
@@ -33,6 +37,7 @@ impl Picture {
             rgb: target.rgb.clone(),
             alpha: target.alpha.as_ref().filter(shows).cloned(),
             mask: target.mask.clone().unwrap_or_default(),
+            plain: Vec::new(),
         })
     }
 
@@ -54,6 +59,7 @@ impl Picture {
             rgb: places().map(|(x, y)| std::array::from_fn(|c| mean(x, y, &|i| self.rgb[i][c]))).collect(),
             alpha: self.alpha.as_ref().map(|alpha| plane(alpha)),
             mask: if self.mask.is_empty() { Vec::new() } else { plane(&self.mask) },
+            plain: Vec::new(),
         }
     }
 }
@@ -113,6 +119,7 @@ mod tests {
             rgb: (0..20).map(|i| [i as f32, 1.0, 0.0]).collect(),
             alpha: Some(vec![0.5; 20]),
             mask: Vec::new(),
+            plain: Vec::new(),
         };
         let half = picture.reduced(2);
         assert_eq!((half.width, half.height), (2, 2));

@@ -2,7 +2,7 @@
 //!
 //! Each view's camera has seven unknowns: a turn about the mesh's middle, a shift, and the focal length. They are found by
 //! Gauss and Newton's steps (Levenberg's, damped) on what a drawn image and the target differ by, at a reduced size first.
-//! Derivatives are differences of images drawn a pixel to either side, so that what comes and goes at silhouettes counts.
+//! Derivatives are differences of images drawn most of a pixel to either side, so that what comes and goes at silhouettes counts.
 //!
 //! - `image`: images at a reduced size, with their cameras
 //! - `residual`: what a drawn image and a target differ by
@@ -66,12 +66,12 @@ pub(super) fn register(baked: &mut Baked) -> Result<Vec<MovedCamera>, PrepareErr
     let shader = Shader::new(baked.setup(), &baked.illumination, &scene.params)
         .map_err(|error| PrepareError::Shading { scene: scene.path.display().to_string(), error })?;
     let draw = |camera: &Camera| {
-        let mut seen = samples::sample_view(&scene, &surface, camera);
+        let mut seen = samples::sample_silhouettes(&scene, &surface, camera);
         if seen.pixel.is_empty() && seen.plain.is_empty() {
             return None;
         }
         seen.atlas.clone_from(&atlas);
-        Some(Picture::of(shader.shade(&seen, camera, 1.0).image))
+        Some(Picture::of(shader.shade(&seen, camera, 1.0)))
     };
     let wanted: Vec<usize> = (0..scene.views.len()).filter(|&i| scene.views[i].target.is_some()).collect();
     let bar = progress::bar("cameras", wanted.len() as u64);

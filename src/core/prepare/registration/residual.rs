@@ -42,7 +42,9 @@ impl Residual {
             }
             None => vec![0.0; count],
         };
-        let both = |i: usize| weight(i) >= 1.0 && covered(drawn, i) > WHOLE && covered(target, i) > WHOLE;
+        let skin = |i: usize| drawn.plain.get(i).is_none_or(|share| *share == 0.0);
+        let both =
+            |i: usize| skin(i) && weight(i) >= 1.0 && covered(drawn, i) > WHOLE && covered(target, i) > WHOLE;
         let compared: Vec<bool> = (0..count).map(both).collect();
         let fitted: [Line; 3] = std::array::from_fn(|c| Line::through(drawn, target, &compared, c));
         let color = |i: usize| {

@@ -51,14 +51,14 @@ pub(super) fn register(
     for _ in 0..MOST {
         let weights = here.weights();
         // Steps are in pixels of this size.
-        let pixels = Pixels::new(&reduced_camera(&camera, side), mesh)?;
+        let Some(pixels) = Pixels::new(&reduced_camera(&camera, side), mesh) else { break };
         let (curvature, gradient) =
             normal_equations(&here, weights, &|by| residual(&pixels.moved(&camera, by)));
         let share = here.share();
         let before = here.loss(weights, share);
         let mut moved = None;
         while damping <= MOST_DAMPING {
-            let by = step(&curvature, &gradient, damping)?;
+            let Some(by) = step(&curvature, &gradient, damping) else { break };
             let trial = pixels.moved(&camera, &by);
             let reached = residual(&trial).map(|there| (there.loss(weights, share), there));
             if let Some((_, there)) = reached.filter(|(loss, _)| *loss < before) {
@@ -68,7 +68,9 @@ pub(super) fn register(
             }
             damping *= 10.0;
         }
-        let Some((by, trial, there)) = moved else { return Some(Found { camera, settled: true }) };
+        let Some((by, trial, there)) = moved else {
+            return Some(Found { camera, settled: damping > MOST_DAMPING });
+        };
         (camera, here) = (trial, there);
         if by.iter().all(|pixels| pixels.abs() < SETTLED) {
             return Some(Found { camera, settled: true });

@@ -21,9 +21,16 @@ pub(super) struct Pixels {
 }
 
 impl Pixels {
-    /// For a camera that has the mesh in front of it; `None` otherwise.
+    /// For a camera that has some of the mesh in its image; `None` otherwise.
     pub(super) fn new(camera: &Camera, mesh: &PosedMesh) -> Option<Self> {
-        let ends = mesh.positions.iter().map(|p| p.as_dvec3());
+        // Of what is in the image: a body may go on behind the camera.
+        let shown = |p: &DVec3| {
+            let (x, y, depth) = camera.project(*p);
+            depth > 0.0
+                && (0.0..=f64::from(camera.width)).contains(&x)
+                && (0.0..=f64::from(camera.height)).contains(&y)
+        };
+        let ends = mesh.positions.iter().map(|p| p.as_dvec3()).filter(shown);
         let least = ends.clone().reduce(DVec3::min)?;
         let most = ends.reduce(DVec3::max)?;
         let middle = camera.world_to_camera.transform_point3(0.5 * (least + most));

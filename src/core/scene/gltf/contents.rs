@@ -44,6 +44,7 @@ impl Document {
                 parts.push(MeshPart {
                     mesh: name.clone(),
                     material: primitive.material.map(|index| self.material_name(index.value())),
+                    material_index: primitive.material.map(|index| index.value()),
                     vertices,
                     triangles: match primitive.mode {
                         Checked::Valid(json::mesh::Mode::Triangles) => corners / 3,

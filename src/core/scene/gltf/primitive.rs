@@ -180,9 +180,9 @@ impl Document {
             }
             return Ok(None);
         };
-        let uvs: Vec<Vec2> = self.floats::<2>(index)?.into_iter().map(Vec2::from).collect();
+        let uvs = ask.uv.moved(self.floats::<2>(index)?.into_iter().map(Vec2::from).collect());
         match uvs.iter().position(|uv| !uv.is_finite()) {
-            None => Ok(Some(ask.uv.moved(uvs))),
+            None => Ok(Some(uvs)),
             Some(i) => Err(self
                 .error("has a texture coordinate that is not finite", "Repair the mesh")
                 .at(format!("{place}, vertex {i}"))),

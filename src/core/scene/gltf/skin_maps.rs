@@ -1,6 +1,6 @@
 //! The maps of the skin's own material, for scenes that name none.
 
-use std::sync::Arc;
+use std::collections::BTreeMap;
 
 use gltf::json;
 
@@ -27,54 +27,74 @@ impl SkinMaps {
         let color = self.color.map(|(color, _)| color);
         color.or(self.normal).map(|texture| texture.uv).unwrap_or_default()
     }
+
+    /// What an engine has to do beside showing the file's pictures by the first texture coordinates; `None` where that
+    /// is all.
+    pub(in crate::scene) fn told(&self) -> Option<String> {
+        let mut words = Vec::new();
+        if let Some((_, [r, g, b])) = self.color.filter(|(_, factor)| *factor != [1.0; 3]) {
+            words.push(format!("its colour is the picture times ({r}, {g}, {b})"));
+        }
+        let uv = self.uv();
+        if uv.set != 0 {
+            words.push(format!("they are looked up by texture coordinates {}", uv.set));
+        }
+        if uv.is_moved() {
+            words.push("its KHR_texture_transform moves these".to_owned());
+        }
+        let name = &self.material;
+        (!words.is_empty())
+            .then(|| format!("the maps are those of the mesh's material {name:?}: {}", words.join(", ")))
+    }
+}
+
+/// What is said of a material that gives no maps after all.
+fn without(name: &str, why: impl std::fmt::Display) -> String {
+    format!(
+        "material {name:?}: {why}: its maps are not taken. `material = false` in [maps] says that they need not be"
+    )
 }
 
 impl Document {
-    /// The maps of the material that the most triangles of the skin have, of those with pictures; `skin` names materials
-    /// and meshes, without it all is skin.
+    /// The maps of the material that the most triangles of the skin have, of those with pictures, as far as they are
+    /// `wanted`: of its colour and its normals. `skin` names materials and meshes, without it all is skin. What cannot be
+    /// had is a warning: a scene need not have maps.
     pub(in crate::scene) fn skin_maps(
         &self,
         skin: Option<&[String]>,
+        wanted: (bool, bool),
         warnings: &mut Warnings,
     ) -> Result<Option<SkinMaps>, SceneError> {
         let named = |name: &str| skin.is_none_or(|names| names.iter().any(|other| other == name));
-        let materials = self.materials()?;
-        let mut found: Vec<(usize, usize)> = Vec::new();
-        let parts = self.parts()?;
-        for (i, material) in materials.iter().enumerate() {
-            let of_it = parts.iter().filter(|part| part.material.as_deref() == Some(&material.name));
-            let of_skin = of_it.filter(|part| named(&material.name) || named(&part.mesh));
-            let triangles: usize = of_skin.map(|part| part.triangles).sum();
-            if triangles > 0 && (material.color.is_some() || material.normal.is_some()) {
-                found.push((triangles, i));
+        let mut parts = self.parts()?;
+        parts.retain(|part| named(&part.mesh) || part.material.as_deref().is_some_and(named));
+        // Triangles by the materials' places in the file.
+        let mut triangles: BTreeMap<usize, usize> = BTreeMap::new();
+        for part in &parts {
+            if let Some(index) = part.material_index {
+                *triangles.entry(index).or_default() += part.triangles;
             }
         }
+        let mut found: Vec<(usize, SkinMaps)> = Vec::new();
+        for (index, count) in triangles.into_iter().filter(|(_, count)| *count > 0) {
+            match self.maps_of_material(index, wanted) {
+                Ok(maps) => found.extend(maps.map(|maps| (count, maps))),
+                Err(error) => warn(warnings, &self.path, without(&self.material_name(index), error)),
+            }
+        }
+        let others = found.len().saturating_sub(1);
         // Of equals the first.
-        let Some(&(_, i)) = found.iter().rev().max_by_key(|(triangles, _)| *triangles) else {
+        let Some((_, mut maps)) = found.into_iter().rev().max_by_key(|(count, _)| *count) else {
             return Ok(None);
         };
-        let name = materials[i].name.clone();
-        if found.len() > 1 {
-            let others = found.len() - 1;
+        if others > 0 {
             let message = format!(
-                "the skin has {others} more materials with pictures than {name:?}, whose maps are taken for all of it: \
-                 name maps in [maps], or fewer materials in [mesh] skin"
+                "the skin has {others} more materials with pictures than {:?}, whose maps are taken for all of it: name \
+                 maps in [maps], or fewer materials in [mesh] skin",
+                maps.material
             );
             warn(warnings, &self.path, message);
         }
-        let material = self.get(&self.root.materials, json::Index::new(i as u32), "material")?;
-        let surface = &material.pbr_metallic_roughness;
-        let [r, g, b, _] = surface.base_color_factor.0;
-        let color = surface.base_color_texture.as_ref().map(|info| (TextureUse::of(info), [r, g, b]));
-        let mut maps = SkinMaps {
-            material: name,
-            color: color.filter(|_| materials[i].color.is_some()),
-            normal: material
-                .normal_texture
-                .as_ref()
-                .filter(|_| materials[i].normal.is_some())
-                .map(TextureUse::of_normals),
-        };
         if maps.normal.is_some_and(|normal| normal.uv != maps.uv()) {
             let message = format!(
                 "material {:?}: its normal map is looked up elsewhere than its colour, and is not read: all maps share \
@@ -84,41 +104,68 @@ impl Document {
             warn(warnings, &self.path, message);
             maps.normal = None;
         }
+        let set = maps.uv().set;
+        if parts.iter().any(|part| part.triangles > 0 && part.uv_sets <= set as usize) {
+            let why = format!("not all of the skin has texture coordinates {set}");
+            warn(warnings, &self.path, without(&maps.material, why));
+            return Ok(None);
+        }
         Ok(Some(maps))
     }
 
-    /// The pictures of the skin's material, those that are `wanted`: of its colour, linear, and of its normals.
+    /// The maps of a material that are wanted, if it has pictures of them.
+    fn maps_of_material(
+        &self,
+        index: usize,
+        (color, normal): (bool, bool),
+    ) -> Result<Option<SkinMaps>, SceneError> {
+        let material = self.get(&self.root.materials, json::Index::new(index as u32), "material")?;
+        let surface = &material.pbr_metallic_roughness;
+        let [r, g, b, _] = surface.base_color_factor.0;
+        let sound = |x: f32| if x.is_finite() { x.max(0.0) } else { 1.0 };
+        let shown = |texture: Option<TextureUse>| match texture {
+            Some(texture) => Ok(self.picture(texture)?.map(|_| texture)),
+            None => Ok(None),
+        };
+        let color = shown(surface.base_color_texture.as_ref().filter(|_| color).map(TextureUse::of))?;
+        let normal = shown(material.normal_texture.as_ref().filter(|_| normal).map(TextureUse::of_normals))?;
+        let maps = SkinMaps {
+            material: self.material_name(index),
+            color: color.map(|color| (color, [r, g, b].map(sound))),
+            normal,
+        };
+        Ok((maps.color.is_some() || maps.normal.is_some()).then_some(maps))
+    }
+
+    /// The pictures of the skin's material, those that are `wanted`: of its colour, linear, and of its normals. One that
+    /// cannot be read is a warning.
     pub(in crate::scene) fn read_skin_maps(
         &self,
         maps: &SkinMaps,
         (color, normal): (bool, bool),
         warnings: &mut Warnings,
-    ) -> Result<(Option<Map<3>>, Option<Map<3>>), SceneError> {
+    ) -> (Option<Map<3>>, Option<Map<3>>) {
         let mut pictures = Pictures::default();
-        let mut read = |texture: TextureUse, as_color: bool| -> Result<Option<Arc<Map<4>>>, SceneError> {
-            let map = self.map_of(texture, as_color, &mut pictures)?;
-            Ok(map.map(|PlainMap { map, wrap, nearest }| {
-                if wrap != [Wrap::Repeat; 2] || nearest {
-                    let message = format!(
-                        "material {:?}: skin's maps repeat and are filtered, whatever the file's sampler says",
-                        maps.material
-                    );
-                    warn(warnings, &self.path, message);
+        let mut read = |texture: TextureUse, as_color: bool, factor: [f32; 3]| {
+            let PlainMap { map, wrap, nearest } = match self.map_of(texture, as_color, &mut pictures) {
+                Ok(map) => map?,
+                Err(error) => {
+                    warn(warnings, &self.path, without(&maps.material, error));
+                    return None;
                 }
-                map
-            }))
+            };
+            if wrap != [Wrap::Repeat; 2] || nearest {
+                let message = format!(
+                    "material {:?}: skin's maps repeat and are filtered, whatever the file's sampler says",
+                    maps.material
+                );
+                warn(warnings, &self.path, message);
+            }
+            Some(without_alpha(&map, factor))
         };
-        let colors = match maps.color.filter(|_| color) {
-            Some((texture, factor)) => read(texture, true)?.map(|map| (map, factor)),
-            None => None,
-        };
-        let normals = match maps.normal.filter(|_| normal) {
-            Some(texture) => read(texture, false)?,
-            None => None,
-        };
-        let sound = |x: f32| if x.is_finite() { x.max(0.0) } else { 1.0 };
-        let colors = colors.map(|(map, factor)| without_alpha(&map, factor.map(sound)));
-        Ok((colors, normals.map(|map| without_alpha(&map, [1.0; 3]))))
+        let colors = maps.color.filter(|_| color).and_then(|(texture, factor)| read(texture, true, factor));
+        let normals = maps.normal.filter(|_| normal).and_then(|texture| read(texture, false, [1.0; 3]));
+        (colors, normals)
     }
 }
 

@@ -192,6 +192,11 @@ impl Edit {
                 }
             };
             at(&mut self.root, own, None);
+            // Of an earlier bake.
+            let targets = self.root["meshes"][mesh]["primitives"][place.primitive]["targets"].as_array_mut();
+            targets.into_iter().flatten().filter_map(Value::as_object_mut).for_each(|target| {
+                target.remove(&attribute);
+            });
             for (target, &slot) in place.targets.iter().enumerate() {
                 // What is not baked of a target, it does not move.
                 if let Some(added) = stream.morphs.get(slot).filter(|added| !added.is_empty()) {

@@ -99,6 +99,7 @@ fn changes<'a>(arguments: &'a Arguments, scenes: &'a Scenes, part: &'a JointScen
         start: (elsewhere || scenes.several()).then_some(start),
         free: (!arguments.free.is_empty()).then_some(&fit.free),
         cameras: &part.baked.cameras,
+        of_material: part.baked.scene.maps.material.is_some(),
         ..Changes::default()
     }
 }

@@ -111,16 +111,25 @@ fn goes_on(scene: &FitScene, file: &Path) -> Result<(), String> {
     let text =
         scene_text(&scene.path, changes(values, &names(values.effects))).map_err(|refusal| refusal.words)?;
     let of_file = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
-    match [&of_file, &text].map(|text| bare(text)) {
+    let moves: bool = text.parse::<toml::Table>().ok().is_some_and(|scene| {
+        scene.get("fit").and_then(|fit| fit.get("cameras")).and_then(toml::Value::as_bool) == Some(true)
+    });
+    match [&of_file, &text].map(|text| bare(text, moves)) {
         [kept, own] if kept == own => Ok(()),
         _ => Err(other("another scene")),
     }
 }
 
 /// A scene's file without what a fit changes in it.
-fn bare(text: &str) -> toml::Table {
+fn bare(text: &str, moves_cameras: bool) -> toml::Table {
     let mut scene: toml::Table = text.parse().unwrap_or_default();
     scene.remove("fit");
+    if let Some(views) = scene.get_mut("view").and_then(toml::Value::as_array_mut).filter(|_| moves_cameras) {
+        let keys = ["world_to_camera", "eye", "look_at", "up", "camera", "fov_y_degrees", "lens"];
+        views.iter_mut().filter_map(toml::Value::as_table_mut).for_each(|view| {
+            keys.iter().for_each(|key| drop(view.remove(*key)));
+        });
+    }
     if let Some(model) = scene.get_mut("model").and_then(toml::Value::as_table_mut) {
         model.remove("params");
         model.remove("effects");
