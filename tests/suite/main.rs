@@ -36,6 +36,7 @@ mod graphics;
 mod hard_lights;
 mod hard_skin;
 mod harmonics;
+mod imported;
 mod instructions;
 mod joint;
 mod light_files;

@@ -8,6 +8,7 @@ use super::import::ImportedView;
 use super::inspect::MeshContents;
 use super::lens::{Distortion, Lens};
 use super::numbers::short;
+use super::view::Camera;
 
 /// Vertical field of view of the cameras that are made, in degrees: a portrait lens.
 const FOV: f64 = 25.0;
@@ -32,7 +33,9 @@ pub struct Draft<'a> {
     pub maps: Vec<(&'static str, String)>,
     /// Cameras, each with its target; without any, cameras are made that frame the mesh.
     pub views: Vec<(ImportedView, Option<String>)>,
-    /// Pixels along a side of the images of those.
+    /// A camera whose pose is not known: a view is made that frames the mesh through it.
+    pub calibrated: Option<Camera>,
+    /// Pixels along a side of the images of cameras that are made.
     pub size: u32,
 }
 
@@ -45,7 +48,9 @@ impl Draft<'_> {
         self.maps_table(&mut out);
         self.light_tables(&mut out);
         self.model_table(&mut out);
-        if self.views.is_empty() {
+        if let Some(camera) = &self.calibrated {
+            self.calibrated_view(&mut out, camera);
+        } else if self.views.is_empty() {
             for (name, azimuth, elevation) in STANDS {
                 self.framing_view(&mut out, name, azimuth, elevation);
             }
@@ -155,8 +160,9 @@ impl Draft<'_> {
         }
     }
 
-    /// A camera at this side of the mesh, as near as all of it is seen.
-    fn framing_view(&self, out: &mut String, name: &str, azimuth: f64, elevation: f64) {
+    /// Where a camera stands at this side of the mesh, as near as all of it is seen, and what it looks at; `open` are the
+    /// tangents of half its fields of view, across and down.
+    fn framed(&self, azimuth: f64, elevation: f64, open: [f64; 2]) -> [String; 2] {
         let [least, most] = self.contents.bounds.map(DVec3::from);
         let centre = 0.5 * (least + most);
         let (azimuth, elevation) = (azimuth.to_radians(), elevation.to_radians());
@@ -164,15 +170,20 @@ impl Draft<'_> {
             DVec3::new(azimuth.sin() * elevation.cos(), elevation.sin(), azimuth.cos() * elevation.cos());
         let right = DVec3::Y.cross(away).normalize();
         let up = away.cross(right);
-        let reach = FILLED * (0.5 * FOV.to_radians()).tan();
+        let [across, down] = open.map(|tangent| FILLED * tangent);
         let enough = self.contents.positions.iter().map(|&position| {
             let from = position - centre;
-            from.dot(away) + from.dot(right).abs().max(from.dot(up).abs()) / reach
+            from.dot(away) + (from.dot(right).abs() / across).max(from.dot(up).abs() / down)
         });
         // A mesh of one point has no size to be framed by.
         let distance = enough.fold(0.0, f64::max).max(f64::MIN_POSITIVE);
         let triple = |v: DVec3| v.to_array().map(|x| short(rounded(x, distance))).join(", ");
-        let (eye, target) = (triple(centre + distance * away), triple(centre));
+        [triple(centre + distance * away), triple(centre)]
+    }
+
+    /// A camera that is made.
+    fn framing_view(&self, out: &mut String, name: &str, azimuth: f64, elevation: f64) {
+        let [eye, target] = self.framed(azimuth, elevation, [(0.5 * FOV.to_radians()).tan(); 2]);
         line(
             out,
             &format!(
@@ -182,6 +193,23 @@ impl Draft<'_> {
         );
         let size = self.size;
         line(out, &format!("width = {size}\nheight = {size}\n# target = \"targets/{name}.exr\""));
+    }
+
+    /// A camera of which all is known but where it stood.
+    fn calibrated_view(&self, out: &mut String, camera: &Camera) {
+        let down = (0.5 * camera.fov_y).tan();
+        let across = down * f64::from(camera.width) / f64::from(camera.height) / camera.lens.ratio;
+        let (name, azimuth, elevation) = STANDS[0];
+        let [eye, target] = self.framed(azimuth, elevation, [across, down]);
+        line(
+            out,
+            &format!(
+                "\n# A calibration does not say where the camera stood: correct eye, look_at and up, or give \
+                 world_to_camera in their place.\n[[view]]\nname = \"{name}\"\neye = [{eye}]\nlook_at = [{target}]"
+            ),
+        );
+        lens_lines(out, camera);
+        line(out, &format!("# target = \"targets/{name}.png\""));
     }
 
     /// The file's own cameras, those whose names may be views'.
@@ -212,6 +240,15 @@ fn imported_view(out: &mut String, view: &ImportedView, target: Option<&str>) {
     let ImportedView { name, camera, .. } = view;
     let rows = camera.world_to_camera.transpose().to_cols_array().map(short).join(", ");
     line(out, &format!("\n[[view]]\nname = \"{name}\"\nworld_to_camera = [{rows}]"));
+    lens_lines(out, camera);
+    match target {
+        Some(target) => line(out, &format!("target = {}", quoted(target))),
+        None => line(out, &format!("# target = \"targets/{name}.png\"")),
+    }
+}
+
+/// What a camera is, wherever it stands.
+fn lens_lines(out: &mut String, camera: &Camera) {
     let (width, height) = (camera.width, camera.height);
     line(
         out,
@@ -236,10 +273,6 @@ fn imported_view(out: &mut String, view: &ImportedView, target: Option<&str>) {
         let numbers: Vec<String> =
             numbers.into_iter().map(|(name, number)| format!("{name} = {}", short(number))).collect();
         line(out, &format!("lens = {{ {model}{} }}", numbers.join(", ")));
-    }
-    match target {
-        Some(target) => line(out, &format!("target = {}", quoted(target))),
-        None => line(out, &format!("# target = \"targets/{name}.png\"")),
     }
 }
 

@@ -253,11 +253,12 @@ fn read_maps(
     let attenuator = wanted(&maps.attenuator, needs.attenuator_map);
     // The paper keeps the side-specular intensity in the normal map's alpha (listing 3-4).
     let packed = wanted(&maps.normal, needs.specular_map && maps.specular.is_none());
+    let mut told = Vec::new();
     let ((color, normals), (specular, attenuator)) = rayon::join(
         || {
             let normals = normal.as_ref().or(packed.as_ref());
             (
-                color.map(|path| images::color_map(&path)).transpose(),
+                color.map(|path| images::color_map(&path, &mut told)).transpose(),
                 normals.map(|path| images::normal_map(path, flip)).transpose(),
             )
         },
@@ -268,13 +269,14 @@ fn read_maps(
             )
         },
     );
+    warnings.append(&mut told);
     let (color, normals, attenuator) = (color?, normals?, attenuator?);
     let (normals, alpha) = normals.map_or((None, None), |(map, alpha)| (Some(map), alpha));
     let specular = match (specular?, packed, alpha) {
         (None, Some(path), Some(alpha)) => packed_specular(&path, alpha, warnings),
         (specular, ..) => specular,
     };
-    let own = read_own_maps(source, maps, folder, (needs, declared))?;
+    let own = read_own_maps(source, maps, folder, (needs, declared), warnings)?;
     Ok(Maps {
         color,
         normal: normals.filter(|_| normal.is_some()),
@@ -291,6 +293,7 @@ fn read_own_maps(
     maps: &MapsTable,
     folder: &Path,
     (needs, declared): (Needs, Fields),
+    warnings: &mut Warnings,
 ) -> Result<Vec<(Field, OwnMap)>, SceneError> {
     let mut own = Vec::new();
     for (name, path) in &maps.own {
@@ -310,7 +313,7 @@ fn read_own_maps(
         let path = folder.join(path);
         let map = match field.info().numbers {
             1 => OwnMap::Scalar(images::scalar_map(&path)?),
-            _ => OwnMap::Color(images::color_map(&path)?),
+            _ => OwnMap::Color(images::color_map(&path, warnings)?),
         };
         own.push((field, map));
     }

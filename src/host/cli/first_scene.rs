@@ -7,6 +7,7 @@ use crate::output;
 use crate::scene::draft::Draft;
 use crate::scene::import::ImportedView;
 use crate::scene::inspect::{FilePicture, MeshContents, Picture};
+use crate::scene::view::Camera;
 
 /// What a first scene file is made with.
 pub(super) struct FirstScene<'a> {
@@ -14,7 +15,9 @@ pub(super) struct FirstScene<'a> {
     pub environment: Option<&'a Path>,
     /// Cameras, each with the file of its target; without any, cameras are made.
     pub views: Vec<(ImportedView, Option<PathBuf>)>,
-    /// Pixels along a side of the images of those.
+    /// A camera whose pose is not known.
+    pub calibrated: Option<Camera>,
+    /// Pixels along a side of the images of cameras that are made.
     pub size: u32,
 }
 
@@ -61,6 +64,7 @@ impl FirstScene<'_> {
             environment: self.environment.map(|file| named_from(folder, file)),
             maps,
             views: views.map(|(view, target)| (view, target.map(|file| named_from(folder, &file)))).collect(),
+            calibrated: self.calibrated,
             size: self.size,
         };
         for (path, bytes) in within {

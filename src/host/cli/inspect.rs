@@ -38,6 +38,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
         let first = FirstScene {
             environment: arguments.environment.as_deref(),
             views: Vec::new(),
+            calibrated: None,
             size: arguments.size,
         };
         first.write(&contents, scene)?;

@@ -170,6 +170,59 @@ fn cameras_of_another_program_become_views_with_their_targets() {
 }
 
 #[test]
+fn metashapes_cameras_become_views_with_their_targets() {
+    let sandbox = Sandbox::new();
+    // The scene's own front view: 32 pixels under 35 degrees, 4 in front, in a chunk of half the size.
+    let focal = 16.0 / 17.5_f64.to_radians().tan();
+    let file = format!(
+        "<document version=\"2.0.0\"><chunk><sensors><sensor id=\"0\" type=\"frame\">\
+         <calibration type=\"frame\" class=\"adjusted\"><resolution width=\"32\" height=\"32\"/><f>{focal}</f></calibration>\
+         </sensor></sensors><components><component id=\"0\"><transform><scale>2</scale></transform></component></components>\
+         <cameras><camera id=\"0\" sensor_id=\"0\" component_id=\"0\" label=\"front\">\
+         <transform>1 0 0 0 0 -1 0 0 0 0 -1 2 0 0 0 1</transform></camera></cameras></chunk></document>"
+    );
+    sandbox.write("cameras.xml", file.as_bytes());
+    let import = ["import", "metashape", "cameras.xml", "--mesh", "mesh.glb", "--environment", "env.exr"];
+    let written = sandbox.run(&[&import[..], &["--images", "targets", "-o", "made.toml"]].concat()).done();
+    assert_eq!(written.out, "wrote made.toml: 1 view\n");
+    assert!(sandbox.text("made.toml").contains("target = \"targets/front.exr\""));
+    sandbox.run(&["render", "made.toml", "--engine", "cpu", "--view", "front", "-o", "made.exr"]).done();
+    sandbox.run(&["render", "scene.toml", "--engine", "cpu", "--view", "front", "-o", "own.exr"]).done();
+    let [made, own] = ["made.exr", "own.exr"].map(|image| covered(&sandbox, image));
+    // A pixel at the border may fall to either side.
+    assert!(made.iter().zip(own).all(|(a, b)| (a - b).abs() < 1.5 / 32.0), "{made:?} {own:?}");
+    sandbox.write("cameras.xml", file.replace("sensor_id=\"0\"", "sensor_id=\"1\"").as_bytes());
+    sandbox
+        .run(&[&import[..], &["-o", "other.toml"]].concat())
+        .refused(&["cameras.xml: line 1, camera: refers to a sensor that is not there"]);
+}
+
+#[test]
+fn a_calibration_becomes_a_view_that_frames_the_mesh() {
+    let sandbox = Sandbox::new();
+    let calibration = "%YAML:1.0\n---\nimage_width: 64\nimage_height: 48\ncamera_matrix: !!opencv-matrix\n   rows: 3\n   \
+                       cols: 3\n   dt: d\n   data: [ 120., 0., 31.5, 0., 118., 23.5, 0., 0., 1. ]\n\
+                       distortion_coefficients: !!opencv-matrix\n   rows: 4\n   cols: 1\n   dt: d\n   \
+                       data: [ -0.1, 0.01, 0., 0. ]\n";
+    sandbox.write("camera.yml", calibration.as_bytes());
+    let import = ["import", "opencv", "camera.yml", "--mesh", "mesh.glb", "--environment", "env.exr"];
+    let written = sandbox.run(&[&import[..], &["-o", "made.toml"]].concat()).done();
+    assert_eq!(written.out, "wrote made.toml: 1 view\n");
+    let scene = sandbox.text("made.toml");
+    assert!(scene.contains("width = 64\nheight = 48\nlens = { cx = 32, cy = 24, fx = 1"), "{scene}");
+    assert!(scene.contains("k1 = -0.1, k2 = 0.01"), "{scene}");
+    assert!(scene.contains("# A calibration does not say where the camera stood"), "{scene}");
+    sandbox.run(&["render", "made.toml", "--engine", "cpu", "--view", "front", "-o", "made.exr"]).done();
+    let [left, right, top, bottom] = covered(&sandbox, "made.exr");
+    // Nine tenths of the way to a border, but for what the lens draws in, and a pixel.
+    let reach = [0.5 - left, right - 0.5, 0.5 - top, bottom - 0.5].into_iter().fold(0.0, f64::max);
+    assert!((0.40..0.48).contains(&reach), "{left} {right} {top} {bottom}");
+    sandbox
+        .run(&[&import[..], &["--images", "targets", "-o", "other.toml"]].concat())
+        .refused(&["camera.yml: a calibration names no pictures. Leave --images out."]);
+}
+
+#[test]
 fn a_displaced_camera_is_told_before_the_fit() {
     let sandbox = Sandbox::new();
     sandbox.edit("1,0,0,0, 0,1,0,0, 0,0,1,-4", "1,0,0,0.3, 0,1,0,0, 0,0,1,-4");

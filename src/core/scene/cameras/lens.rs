@@ -9,9 +9,9 @@ use crate::scene::numbers::{number, short};
 use crate::scene::view::Camera;
 
 /// Focal lengths across and down that differ by more are of no camera.
-const MOST_RATIO: f64 = 10.0;
+pub(in crate::scene) const MOST_RATIO: f64 = 10.0;
 /// No lens of a camera has coefficients as large.
-const LARGEST: f64 = 1e3;
+pub(in crate::scene) const LARGEST_COEFFICIENT: f64 = 1e3;
 /// Between places of the image, along a side, where a lens is tried.
 const STEPS: u32 = 64;
 
@@ -65,8 +65,9 @@ fn distortion(source: &Source, lens: &LensTable) -> Result<Option<Distortion>, S
     let foreign: &[&str] = if fisheye { &["p1", "p2"] } else { &["k4"] };
     let mut numbers = [0.0; 6];
     for (place, (name, value)) in named.into_iter().enumerate() {
-        let wanted = format!("a coefficient, at most {} in size", short(LARGEST));
-        numbers[place] = number(source, value.as_ref(), 0.0, name, &wanted, |x| x.abs() <= LARGEST)?;
+        let wanted = format!("a coefficient, at most {} in size", short(LARGEST_COEFFICIENT));
+        numbers[place] =
+            number(source, value.as_ref(), 0.0, name, &wanted, |x| x.abs() <= LARGEST_COEFFICIENT)?;
         if let Some(value) = value.as_ref().filter(|_| foreign.contains(&name)) {
             let (model, other) = if fisheye { ("fisheye", "brown") } else { ("brown", "fisheye") };
             let what = format!("the lens model `{model}` has no {name}");

@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use glam::DMat4;
 use toml::Spanned;
 
+pub(super) use self::lens::{LARGEST_COEFFICIENT, MOST_RATIO};
 pub(super) use self::place::{MeshCameras, all_finite, turns_alone};
 
 use self::lens::{check_coefficients, with_lens};
@@ -22,9 +23,9 @@ use super::view::{Background, Camera};
 use crate::model::params::LARGEST;
 
 /// Degrees; seen through less, the rays of a thousand pixels are no longer a hundred different f32.
-const NARROWEST_FOV: f64 = 1e-3;
+pub(super) const NARROWEST_FOV: f64 = 1e-3;
 /// The most pixels along a side of a view.
-const LARGEST_SIDE: i64 = 16384;
+pub(super) const LARGEST_SIDE: i64 = 16384;
 
 /// A view before its images are read.
 pub(super) struct ViewPlan {

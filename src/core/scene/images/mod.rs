@@ -2,14 +2,23 @@
 //!
 //! - `open_exr`, `raster`: the decoders
 //! - `chromaticities`: other primaries than Rec.709's
+//! - `claims`: what PNG and JPEG files say of their colours; `code_points` and `icc` read it, `space` is what comes of it
 //! - `target`: images to be matched, and their masks
 //!
-//! Files are told apart by their content. Colour maps in 8 or 16 bits are sRGB; data maps are taken
-//! as they are; EXR and HDR are linear. Sizes are checked before anything is allocated.
+//! Files are told apart by their content. Colours in 8 or 16 bits are sRGB's where the file says nothing else; data maps are
+//! taken as they are; EXR and HDR are linear. Sizes are checked before anything is allocated.
 
 mod chromaticities;
+mod claims;
+mod code_points;
+mod icc;
+#[cfg(test)]
+mod luminance;
 mod open_exr;
+#[cfg(test)]
+mod profiled;
 mod raster;
+mod space;
 mod target;
 
 use std::path::Path;
@@ -18,9 +27,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use self::chromaticities::Chromaticities;
+use self::claims::Claims;
+use self::space::Space;
 pub(super) use target::{haze, target};
 
-use super::error::{SceneError, Warnings, guarded, read_bytes, warn};
+use super::error::{SceneError, Warning, Warnings, guarded, read_bytes, warn};
 use super::maps::Map;
 
 /// No image above this many texels is read.
@@ -39,6 +50,10 @@ struct Image {
     code: Option<u16>,
     /// What its colours are shares of, where the file says; else of Rec.709's primaries.
     chromaticities: Option<Chromaticities>,
+    /// What the file says of its codes.
+    claims: Claims,
+    /// How its codes are read where they are colours, and not sRGB's.
+    space: Option<Space>,
 }
 
 /// What a reader needs to know of the file that it decodes.
@@ -119,9 +134,11 @@ fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
     }
 }
 
-/// Decode an image of colours: in linear files Rec.709's shares, whatever primaries the file has.
-fn read_colors(path: &Path, size: Option<(u32, u32)>) -> Result<Image, SceneError> {
+/// Decode an image of colours: in linear files Rec.709's shares, whatever primaries the file has; of codes is known how
+/// they become such shares.
+fn read_colors(path: &Path, size: Option<(u32, u32)>, warnings: &mut Warnings) -> Result<Image, SceneError> {
     let mut image = read(path, size)?;
+    image.space = image.claims.followed(path, warnings)?;
     let Some(chromaticities) = image.chromaticities.take() else { return Ok(image) };
     let matrix = chromaticities.to_rec709().map_err(|what| {
         let what = format!("has {what} in its attribute `chromaticities`");
@@ -166,9 +183,12 @@ impl Image {
         }
     }
 
-    /// Codes to linear radiance; linear images stay.
-    fn decode_srgb(&mut self) {
+    /// Codes to linear radiance of Rec.709; linear images stay.
+    fn linearize(&mut self) {
         let Some(code) = self.code else { return };
+        if let Some(space) = &self.space {
+            return space.linearize(&mut self.rgb, code);
+        }
         let most = f64::from(code);
         let table: Vec<f32> =
             (0..=u32::from(code)).map(|i| srgb_decode(f64::from(i) / most) as f32).collect();
@@ -176,6 +196,11 @@ impl Image {
         for rgb in &mut self.rgb {
             *rgb = rgb.map(|value| table[index(value)]);
         }
+    }
+
+    /// The light of each channel at this share of the highest code.
+    fn light(&self, code: f64) -> [f64; 3] {
+        self.space.as_ref().map_or_else(|| [srgb_decode(code); 3], |space| space.light(code))
     }
 
     fn into_map(self) -> Map<3> {
@@ -189,13 +214,14 @@ pub fn srgb_decode(code: f64) -> f64 {
     if code <= 0.04045 { code / 12.92 } else { ((code + 0.055) / 1.055).powf(2.4) }
 }
 
-/// A colour map, or a picture of radiance: linear Rec.709. Codes of 8 or 16 bits are sRGB's.
+/// A colour map, or a picture of radiance: linear Rec.709. Codes of 8 or 16 bits are of the space that the file names, or
+/// sRGB's.
 ///
 /// # Errors
-/// When it cannot be read as an image.
-pub fn color_map(path: &Path) -> Result<Map<3>, SceneError> {
-    let mut image = read_colors(path, None)?;
-    image.decode_srgb();
+/// When it cannot be read as an image, or its colours have no white.
+pub fn color_map(path: &Path, warnings: &mut Vec<Warning>) -> Result<Map<3>, SceneError> {
+    let mut image = read_colors(path, None, warnings)?;
+    image.linearize();
     Ok(image.into_map())
 }
 
@@ -215,7 +241,8 @@ pub(super) fn normal_map(path: &Path, flip: bool) -> Result<(Map<3>, Option<Map<
     Ok((map, alpha))
 }
 
-/// A picture with its alpha, which is 1 without: colours are made linear, numbers are taken as they are.
+/// A picture with its alpha, which is 1 without: colours are made linear, numbers are taken as they are. Its colours are
+/// sRGB's whatever the file says: glTF 2.0 has profiles and gammas of its pictures ignored (section 3.8.3).
 pub(super) fn picture(path: &Path, color: bool) -> Result<Map<4>, SceneError> {
     Ok(with_alpha(read(path, None)?, color))
 }
@@ -229,7 +256,7 @@ pub(super) fn picture_of(path: &Path, bytes: &[u8], color: bool) -> Result<Map<4
 
 fn with_alpha(mut image: Image, color: bool) -> Map<4> {
     if color {
-        image.decode_srgb();
+        image.linearize();
     }
     let alpha = image.alpha.unwrap_or_else(|| vec![1.0; image.rgb.len()]);
     let texels = image.rgb.iter().zip(alpha).map(|(&[r, g, b], a)| [r, g, b, a]).collect();
@@ -245,12 +272,13 @@ pub(super) fn scalar_map(path: &Path) -> Result<Map<1>, SceneError> {
 
 /// A lat-long panorama: linear radiance, never negative.
 pub(super) fn panorama(path: &Path, warnings: &mut Warnings) -> Result<Map<3>, SceneError> {
-    let mut image = read_colors(path, None)?;
+    let mut image = read_colors(path, None, warnings)?;
     if let Some(code) = image.code {
         let bits = if code == 255 { 8 } else { 16 };
-        let message = format!("holds {bits}-bit colours, read as sRGB: lights brighter than white are lost");
+        let of = if image.space.is_some() { "by their profile" } else { "as sRGB" };
+        let message = format!("holds {bits}-bit colours, read {of}: lights brighter than white are lost");
         warn(warnings, path, message);
-        image.decode_srgb();
+        image.linearize();
     }
     if image.width != 2 * image.height {
         let message = format!(

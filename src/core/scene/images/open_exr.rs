@@ -12,6 +12,7 @@ use exr::prelude::{AnyChannels, ReadChannels, ReadLayers, Vec2};
 use glam::DVec2;
 
 use super::chromaticities::Chromaticities;
+use super::claims::Claims;
 use super::{Image, Opened};
 use crate::scene::error::SceneError;
 
@@ -19,7 +20,7 @@ const KIND: &str = "an EXR file";
 
 /// Decode an EXR file of any compression; tiled files at their full resolution.
 pub(super) fn decode(opened: Opened<'_>) -> Result<Image, SceneError> {
-    let remedy = "Save colours under these names, in any layer";
+    let remedy = "Save colours under these names, in any layer; luminance and chroma (Y, RY, BY) as RGB";
     decode_by(opened, colours, "has no channels R, G and B, nor Y", remedy)
 }
 
@@ -47,6 +48,7 @@ fn decode_by(
 ) -> Result<Image, SceneError> {
     let damaged = |e: exr::error::Error| opened.damaged(KIND, e);
     let meta = MetaData::read_from_buffered(Cursor::new(opened.bytes), false).map_err(damaged)?;
+    check_sampling(opened, &meta.headers)?;
     let window = meta.headers.first().map(|header| header.shared_attributes.display_window);
     let Some(window) = window else { return Err(opened.damaged(KIND, "it has no layer")) };
     check(opened, &meta.headers, window.size)?;
@@ -66,12 +68,24 @@ fn decode_by(
     let mut found = Vec::new();
     for layer in &image.layer_data {
         if let Some(channels) = find(layer) {
-            let placed = place(opened, layer, &channels, window.position, window.size)?;
+            let placed = place(layer, &channels, window.position, window.size);
             return Ok(Image { chromaticities: image.attributes.chromaticities.map(xy), ..placed });
         }
         found.extend(layer.channel_data.list.iter().map(|channel| channel.name.to_string()));
     }
     Err(opened.error(format!("{missing} (it has {})", found.join(", ")), remedy))
+}
+
+/// Refuse channels of fewer pixels than others, luminance and chroma (Y, RY, BY) above all: the decoder does not read them.
+fn check_sampling(opened: Opened<'_>, headers: &[Header]) -> Result<(), SceneError> {
+    let mut channels = headers.iter().flat_map(|header| &header.channels.list);
+    if channels.all(|channel| channel.sampling == Vec2(1, 1)) {
+        return Ok(());
+    }
+    Err(opened.error(
+        "has channels of fewer pixels than its image, as luminance and chroma (Y, RY, BY) have",
+        "Save it as RGB with all channels at full resolution",
+    ))
 }
 
 /// Refuse what cannot be read, before its pixels are allocated.
@@ -217,18 +231,12 @@ fn colours(layer: &Layer<AnyChannels<FlatSamples>>) -> Option<Found> {
 
 /// The layer in the display window; outside of the layer everything is 0.
 fn place(
-    opened: Opened<'_>,
     layer: &Layer<AnyChannels<FlatSamples>>,
     (rgb, alpha): &Found,
     origin: Vec2<i32>,
     size: Vec2<usize>,
-) -> Result<Image, SceneError> {
+) -> Image {
     let channels = &layer.channel_data.list;
-    if rgb.iter().chain(alpha).any(|&i| channels[i].sampling != Vec2(1, 1)) {
-        return Err(
-            opened.error("has subsampled colour channels", "Save it with all channels at full resolution")
-        );
-    }
     let samples = |i: usize| -> Vec<f32> { channels[i].sample_data.values_as_f32().collect() };
     let (width, height) = (size.width(), size.height());
     let offset = |layer: i32, window: i32| i64::from(layer) - i64::from(window);
@@ -251,5 +259,14 @@ fn place(
         copy(&samples(i), Box::new(|at, value| plane[at] = value));
         plane
     });
-    Ok(Image { width, height, rgb: out, alpha, code: None, chromaticities: None })
+    Image {
+        width,
+        height,
+        rgb: out,
+        alpha,
+        code: None,
+        chromaticities: None,
+        claims: Claims::default(),
+        space: None,
+    }
 }

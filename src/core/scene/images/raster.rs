@@ -5,6 +5,7 @@ use std::io::Cursor;
 use image::codecs::hdr::HdrDecoder;
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
+use super::claims::Claims;
 use super::{Image, Opened};
 use crate::scene::error::SceneError;
 
@@ -25,11 +26,16 @@ pub(super) fn decode(opened: Opened<'_>, format: ImageFormat) -> Result<Image, S
     let mut reader = ImageReader::with_format(Cursor::new(opened.bytes), format);
     // The size is checked below, against more than a fixed number of bytes.
     reader.no_limits();
-    let decoder = reader.into_decoder().map_err(damaged)?;
+    let mut decoder = reader.into_decoder().map_err(damaged)?;
     let (width, height) = decoder.dimensions();
     let densest = if format == ImageFormat::Png { PNG_TEXELS } else { JPEG_TEXELS };
     opened.check_size(width.into(), height.into(), densest)?;
     let has_alpha = decoder.color_type().has_alpha();
+    let grey = !decoder.color_type().has_color();
+    let claims = match format {
+        ImageFormat::Png => Claims::of_png(opened.bytes, grey),
+        _ => Claims::of_jpeg(opened.bytes, decoder.icc_profile().ok().flatten(), grey),
+    };
     let deep = decoder.color_type().bytes_per_pixel() / decoder.color_type().channel_count() > 1;
     let decoded = DynamicImage::from_decoder(decoder).map_err(damaged)?;
     let code: u16 = if deep { u16::MAX } else { 255 };
@@ -53,6 +59,8 @@ pub(super) fn decode(opened: Opened<'_>, format: ImageFormat) -> Result<Image, S
         alpha,
         code: Some(code),
         chromaticities: None,
+        claims,
+        space: None,
     })
 }
 
@@ -86,5 +94,7 @@ pub(super) fn decode_hdr(opened: Opened<'_>) -> Result<Image, SceneError> {
         alpha: None,
         code: None,
         chromaticities: None,
+        claims: Claims::default(),
+        space: None,
     })
 }

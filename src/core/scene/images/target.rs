@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Image, open_exr, read, read_colors, read_with, srgb_decode};
+use super::{Image, open_exr, read, read_colors, read_with};
 use crate::model::params::LARGEST;
 use crate::scene::error::{SceneError, Warnings, warn};
 use crate::scene::view::{Clip, Target};
@@ -13,20 +13,24 @@ const BRIGHTEST: f32 = LARGEST as f32;
 /// A target of `size`: linear radiance, premultiplied by coverage.
 ///
 /// EXR and HDR are taken as they are (EXR is premultiplied by convention). Codes of 8 or 16 bits are
-/// decoded from sRGB, multiplied by their straight alpha, and may be clipped at both ends.
+/// decoded, multiplied by their straight alpha, and may be clipped at both ends. A wider space than
+/// Rec.709 (P3, Adobe RGB, Rec.2020) is mixed by numbers that are below 0 off the diagonal: whatever is
+/// clipped in it lies at or beyond an end in Rec.709 too, with colours that Rec.709 has not.
 pub(in crate::scene) fn target(
     path: &Path,
     mask: Option<&Path>,
     size: (u32, u32),
     warnings: &mut Warnings,
 ) -> Result<Target, SceneError> {
-    let mut image = read_colors(path, Some(size))?;
+    let mut image = read_colors(path, Some(size), warnings)?;
     let clipped_at = image.code.map(|code| {
         // Half a code from either end: what rounds to the end may lie beyond it.
-        let at = |half: f64| srgb_decode(half / f64::from(code)) as f32;
-        Clip { low: at(0.5), high: at(f64::from(code) - 0.5) }
+        let at = |half: f64| image.light(half / f64::from(code)).map(|light| light as f32);
+        let (low, high) = (at(0.5), at(f64::from(code) - 0.5));
+        // Curves of three channels may differ: nearest to the ends.
+        Clip { low: low.into_iter().fold(1.0, f32::min), high: high.into_iter().fold(0.0, f32::max) }
     });
-    image.decode_srgb();
+    image.linearize();
     if let Some(i) = image.rgb.iter().position(|rgb| rgb.iter().any(|x| x.abs() > BRIGHTEST)) {
         let (x, y) = (i % size.0 as usize, i / size.0 as usize);
         return Err(SceneError::new(

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat4, DQuat, DVec3};
 
-use super::{ImportedView, Intrinsics, Names, damaged, turned_over};
+use super::{ImportedView, Intrinsics, Names, brown, damaged, turned_over};
 use crate::files;
 use crate::scene::error::{SceneError, read_bytes};
 use crate::scene::lens::Distortion;
@@ -107,7 +107,6 @@ fn intrinsics(
         return Err(damaged(path, place, "has a parameter that is not finite"));
     }
     let none = |k: &[f64]| k.iter().all(|x| *x == 0.0);
-    let brown = |k: [f64; 3], p: [f64; 2]| (!(none(&k) && none(&p))).then_some(Distortion::Brown { k, p });
     let fisheye = |k: [f64; 4]| Some(Distortion::Fisheye { k });
     let (focal, centre, distortion) = match model {
         "SIMPLE_PINHOLE" => ([p[0]; 2], [p[1], p[2]], None),
@@ -128,11 +127,7 @@ fn intrinsics(
         }
     };
     let side = |pixels: u64| u32::try_from(pixels).unwrap_or(0);
-    let intrinsics = Intrinsics { size: size.map(side), focal, centre, distortion };
-    match intrinsics.problem() {
-        Some(problem) => Err(damaged(path, place, format!("has {problem}"))),
-        None => Ok(intrinsics),
-    }
+    Intrinsics { size: size.map(side), focal, centre, distortion }.checked(path, place)
 }
 
 /// Lines that hold something, with their numbers.

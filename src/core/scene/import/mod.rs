@@ -1,9 +1,13 @@
 //! Cameras that another program solved or placed, as views of a scene file.
 //!
 //! - [`colmap`]: COLMAP's sparse models, as text or binary
+//! - [`metashape`]: what Agisoft Metashape exports
+//! - [`opencv`]: calibrations by OpenCV and ROS, which have no pose
 //! - [`transforms`]: `transforms.json`, as instant-ngp, nerfstudio and exporters for Blender and Metashape write it
 
 pub mod colmap;
+pub mod metashape;
+pub mod opencv;
 pub mod transforms;
 
 use std::collections::BTreeSet;
@@ -11,8 +15,10 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DMat4};
 
+use super::cameras::{LARGEST_COEFFICIENT, LARGEST_SIDE, MOST_RATIO, NARROWEST_FOV};
 use super::error::SceneError;
 use super::lens::{Distortion, Lens};
+use super::numbers::short;
 use super::view::Camera;
 
 /// A camera and the picture that it took.
@@ -44,18 +50,57 @@ impl Intrinsics {
         Camera { world_to_camera, fov_y: 2.0 * (0.5 * h / fy).atan(), width, height, lens }
     }
 
+    /// The same, unless it is of no camera, or of none that a view may have.
+    fn checked(self, path: &Path, place: &str) -> Result<Self, SceneError> {
+        let [width, height] = self.size;
+        if i64::from(width.max(height)) > LARGEST_SIDE {
+            let what = format!("has an image of {width} x {height} pixels");
+            let remedy = format!(
+                "A view has at most {LARGEST_SIDE} along a side: scale the pictures down and solve anew"
+            );
+            return Err(SceneError::new(path, what, remedy).at(place));
+        }
+        match self.problem() {
+            Some(problem) => Err(damaged(path, place, format!("has {problem}"))),
+            None => Ok(self),
+        }
+    }
+
     /// What no camera has.
     fn problem(&self) -> Option<String> {
-        let Self { size, focal, centre, .. } = self;
-        let sound = |length: &f64| length.is_finite() && *length > 0.0;
+        let Self { size, focal: [fx, fy], centre: [cx, cy], distortion } = *self;
+        let [width, height] = size.map(f64::from);
         if size.contains(&0) {
-            return Some(format!("an image of {} x {} pixels", size[0], size[1]));
+            return Some(format!("an image of {width} x {height} pixels"));
         }
-        if !focal.iter().all(sound) {
-            return Some(format!("the focal lengths {} and {}", focal[0], focal[1]));
+        // As views' own bounds are.
+        let longest = 0.5 * height / (0.5 * NARROWEST_FOV.to_radians()).tan();
+        let sound = fy > 0.0 && fy <= longest && (fy / MOST_RATIO..=fy * MOST_RATIO).contains(&fx);
+        if !sound {
+            return Some(format!("the focal lengths {} and {}", short(fx), short(fy)));
         }
-        (!centre.iter().all(|place| place.is_finite())).then(|| "a centre that is not finite".to_owned())
+        let within = |place: f64, pixels: f64| (-2.0 * pixels..=3.0 * pixels).contains(&place);
+        if !(within(cx, width) && within(cy, height)) {
+            return Some(format!("its axis at pixel ({}, {})", short(cx), short(cy)));
+        }
+        let coefficients = match distortion {
+            None => [0.0; 5],
+            Some(Distortion::Brown { k: [k1, k2, k3], p: [p1, p2] }) => [k1, k2, k3, p1, p2],
+            Some(Distortion::Fisheye { k: [k1, k2, k3, k4] }) => [k1, k2, k3, k4, 0.0],
+        };
+        let far = coefficients.into_iter().find(|k| k.is_nan() || k.abs() > LARGEST_COEFFICIENT);
+        far.map(|k| format!("the coefficient {}", short(k)))
     }
+}
+
+/// A number of pixels along a side: 0, which no image has, where it is not a whole one.
+fn side(pixels: f64) -> u32 {
+    if pixels.fract() == 0.0 && (1.0..=f64::from(u32::MAX)).contains(&pixels) { pixels as u32 } else { 0 }
+}
+
+/// Brown's distortion; none where all of its numbers are 0.
+fn brown(k: [f64; 3], p: [f64; 2]) -> Option<Distortion> {
+    (k != [0.0; 3] || p != [0.0; 2]).then_some(Distortion::Brown { k, p })
 }
 
 /// From a camera that looks along its +Z, with +Y down, to one that looks along its -Z, with +Y up.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DMat4, DVec4};
 
-use super::{ImportedView, Intrinsics, Names, damaged};
+use super::{ImportedView, Intrinsics, Names, brown, damaged, side};
 use crate::scene::cameras::turns_alone;
 use crate::scene::error::{SceneError, read_bytes};
 use crate::scene::lens::Distortion;
@@ -108,20 +108,13 @@ fn intrinsics(path: &Path, place: &str, own: &Numbers, all: &Numbers) -> Result<
         }
         "OPENCV" | "PINHOLE" | "SIMPLE_PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" if k[3] == 0.0 => {
             let [k1, k2, k3, _] = k;
-            (k[..3] != [0.0; 3] || p != [0.0; 2]).then_some(Distortion::Brown { k: [k1, k2, k3], p })
+            brown([k1, k2, k3], p)
         }
         _ => {
             let what = format!("has the camera model {model}, whose distortion no scene knows");
             return Err(SceneError::new(path, what, "Undistort the images first").at(place));
         }
     };
-    let side = |pixels: f64| {
-        if pixels.fract() == 0.0 && (1.0..65536.0).contains(&pixels) { pixels as u32 } else { 0 }
-    };
     let centre = [given(|n| n.cx).unwrap_or(0.5 * width), given(|n| n.cy).unwrap_or(0.5 * height)];
-    let intrinsics = Intrinsics { size: [side(width), side(height)], focal: [fx, fy], centre, distortion };
-    match intrinsics.problem() {
-        Some(problem) => Err(damaged(path, place, format!("has {problem}"))),
-        None => Ok(intrinsics),
-    }
+    Intrinsics { size: [side(width), side(height)], focal: [fx, fy], centre, distortion }.checked(path, place)
 }

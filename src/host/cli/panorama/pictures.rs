@@ -6,7 +6,7 @@ use image::{DynamicImage, ImageReader};
 use skinfit_panorama::merge::Exposure;
 use skinfit_panorama::picture::Picture;
 
-use crate::cli::Refusal;
+use crate::cli::{Refusal, tell};
 use crate::render::files::{ImageOptions, write_exr};
 use crate::render::image::Image;
 use crate::scene::images;
@@ -52,9 +52,11 @@ fn one_line(text: &str) -> String {
     text.replace(char::is_control, " ").trim_end_matches('.').to_owned()
 }
 
-/// A picture of radiance: EXR or HDR; PNG and JPEG are taken as sRGB.
+/// A picture of radiance: EXR or HDR; PNG and JPEG are read by their profile, or as sRGB.
 pub(super) fn radiance(path: &Path) -> Result<Picture, Refusal> {
-    let map = images::color_map(path)?;
+    let mut warnings = Vec::new();
+    let map = images::color_map(path, &mut warnings)?;
+    warnings.iter().for_each(|warning| tell(&format!("warning: {warning}")));
     Ok(Picture { width: map.width, height: map.height, texels: map.texels })
 }
 
