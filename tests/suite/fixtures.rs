@@ -173,6 +173,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
             free: Vec::new(),
             loss: Loss::L2,
             free_gains: false,
+            cameras: false,
             maps: MapSettings::default(),
         },
         quality: Quality::default(),
