@@ -123,6 +123,7 @@ fn bakes_between_two_poses_are_near_those_of_the_frames() {
         held += off(&values(&from), &frame) / f64::from(poses);
     }
     println!("mean error of frames between two poses {between:.4}, of the pose before {held:.4}");
-    // Rays are the same in all poses, so that what is left is how far motion is from lines.
-    assert!(between < 0.6 * held && between < 0.01, "{between} {held}");
+    // Half of the way is left of what moves along a line; the noise of 256 rays, which are turned anew where a vertex
+    // turns, is not, and neither is what the nod covers and uncovers.
+    assert!(between < 0.8 * held && between < 0.01, "{between} {held}");
 }

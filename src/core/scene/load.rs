@@ -132,9 +132,9 @@ impl Scene {
                 let texels = normal.iter_mut().flat_map(|map| &mut map.texels);
                 texels.for_each(|texel| texel[1] = 1.0 - texel[1]);
             }
+            maps.material = Some(of_material.told(color.is_some()));
             maps.color = maps.color.or(color);
             maps.normal = maps.normal.or(normal);
-            maps.material = Some(of_material.told());
             uv = of_material.uv();
         }
         bar.inc(1);

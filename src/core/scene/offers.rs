@@ -44,6 +44,6 @@ fn own_normals(path: &Path, source: &Source, file: &SceneFile) -> Result<bool, S
     }
     let document = mesh_file(source, file, path.parent().unwrap_or(Path::new("")))?;
     let pose = Pose::check(source, file)?;
-    let maps = document.skin_maps(pose.skin(), (false, true), &mut Warnings::new())?;
-    Ok(maps.is_some())
+    let maps = document.skin_maps(pose.skin(), (true, true), &mut Warnings::new())?;
+    Ok(maps.is_some_and(|maps| maps.has_normals()))
 }

@@ -3,7 +3,7 @@
 
 use crate::fit::fingerprint::Fingerprint;
 use crate::model::effects::Effect;
-use crate::prepare::{HeldOut, MovedCamera};
+use crate::prepare::HeldOut;
 use crate::scene::maps::{Environment, Map, Maps, OwnMap};
 use crate::scene::mesh::Mesh;
 use crate::scene::plain::Alpha;
@@ -14,8 +14,8 @@ use crate::scene::{Quality, Scene};
 const NONE: &str = "none";
 
 /// The fingerprint of a fit of `scene` without the views that are held out.
-/// Cameras that were moved count as they were before: what moved them is in the rest.
-pub(super) fn fingerprint(scene: &Scene, moved: &[MovedCamera], held: &HeldOut) -> Fingerprint {
+/// Cameras that a fit moved first count as it left them, as the scene in its folder has them.
+pub(super) fn fingerprint(scene: &Scene, held: &HeldOut) -> Fingerprint {
     let effects: Vec<&str> = scene.effects.iter().map(Effect::name).collect();
     let Maps { color, normal, specular, attenuator, own, .. } = &scene.maps;
     let read = Fingerprint::default()
@@ -62,10 +62,7 @@ pub(super) fn fingerprint(scene: &Scene, moved: &[MovedCamera], held: &HeldOut) 
     let held: Vec<&str> = held.views.iter().map(|view| view.name.as_str()).collect();
     let all = if held.is_empty() { all } else { all.with("list of held-out views", held.join(" ")) };
     scene.views.iter().fold(all, |all, view| {
-        let before = moved.iter().find(|moved| moved.view == view.name).map(|moved| moved.before);
-        let camera = Hash::default().words(&before.unwrap_or(view.camera));
-        // Those that are moved depend on the start, which others do not.
-        let camera = if before.is_some() { camera.words(&"moved").done() } else { camera.done() };
+        let camera = Hash::default().words(&view.camera).done();
         all.with(format!("camera of view {}", view.name), camera)
             .with(format!("target of view {}", view.name), target(view.target.as_ref()))
     })

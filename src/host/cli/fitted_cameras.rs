@@ -41,15 +41,20 @@ fn set_camera(view: &mut dyn TableLike, camera: &Camera) {
     if let Some(lens) = view.get_mut("lens").and_then(Item::as_table_like_mut)
         && lens.contains_key("fx")
     {
-        set(lens, "fx", (camera.lens.ratio * focal).into());
+        let across = camera.lens.ratio * focal;
+        set(lens, "fx", read_as(across, |fx| fx / focal == camera.lens.ratio).into());
     }
 }
 
 /// Degrees that are read as these radians, to the last digit where there are some.
 fn degrees(radians: f64) -> f64 {
-    let near = radians.to_degrees();
-    let read = |degrees: &f64| degrees.to_radians() == radians;
-    [near, near.next_up(), near.next_down()].into_iter().find(read).unwrap_or(near)
+    read_as(radians.to_degrees(), |degrees| degrees.to_radians() == radians)
+}
+
+/// The number, or one of its neighbours, of which a reader makes what is wanted.
+fn read_as(number: f64, wanted: impl Fn(f64) -> bool) -> f64 {
+    let near = [number, number.next_up(), number.next_down()];
+    near.into_iter().find(|number| wanted(*number)).unwrap_or(number)
 }
 
 #[cfg(test)]
@@ -82,7 +87,7 @@ mod tests {
                 .collect();
             // To the last digit.
             assert_eq!(rows, after.world_to_camera.transpose().to_cols_array());
-            assert!((view["fov_y_degrees"].as_float().unwrap().to_radians() - 0.6).abs() < 1e-15);
+            assert!(view["fov_y_degrees"].as_float().unwrap().to_radians() == 0.6);
             assert!((view["lens"]["fx"].as_float().unwrap() - 2.0 / 0.3_f64.tan()).abs() < 1e-12);
             assert!(["eye", "look_at", "camera"].iter().all(|key| !view.contains_key(*key)), "{scene}");
             assert!(table["view"][1].as_table().unwrap().len() == 1);

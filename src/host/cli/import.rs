@@ -85,10 +85,15 @@ fn target(folder: &Path, view: &ImportedView) -> Result<PathBuf, Refusal> {
     let file = folder.join(&view.picture);
     // transforms.json of Blender's own exporter leaves the ending out, and so do Metashape's labels, of files as cameras name
     // them.
-    let endings =
-        ["png", "exr", "jpg", "jpeg", "hdr", "PNG", "JPG", "JPEG"].map(|ending| file.with_extension(ending));
-    let tried =
-        std::iter::once(file.clone()).chain(endings.into_iter().filter(|_| file.extension().is_none()));
+    // A label may have a full stop, and no ending behind it.
+    let endings = ["png", "exr", "jpg", "jpeg", "hdr", "PNG", "JPG", "JPEG"].map(|ending| {
+        let mut name = file.clone().into_os_string();
+        name.push(".");
+        name.push(ending);
+        PathBuf::from(name)
+    });
+    let named = !view.picture.as_os_str().is_empty();
+    let tried = std::iter::once(file.clone()).chain(endings.into_iter().filter(|_| named));
     tried.into_iter().find(|file| file.is_file()).ok_or_else(|| {
         Refusal::new(format!(
             "{}: is not there. Name the folder of the pictures with --images, or leave it out.",

@@ -18,6 +18,11 @@ const MOST: usize = 12;
 const SETTLED: f64 = 0.01;
 /// And one further than this is cut short: beyond, images are no lines of the unknowns.
 const FARTHEST: f64 = 4.0;
+/// Steps that are taken by their slopes alone, once none lowers the loss: coverage counts whole samples, so that near its
+/// minimum the loss is rougher than it is curved, while slopes over some pixels are means over thousands of borders.
+const POLISHING: usize = 4;
+/// The loss may rise by this share of it in them.
+const ROUGHNESS: f64 = 0.01;
 /// The damping that is begun with, as a share of each unknown's curvature, and beyond which nothing is tried.
 const DAMPING: f64 = 1e-3;
 const MOST_DAMPING: f64 = 1e3;
@@ -48,6 +53,7 @@ pub(super) fn register(
     let mut camera = *start;
     let mut here = residual(&camera)?;
     let mut damping = DAMPING;
+    let mut settled = false;
     for _ in 0..MOST {
         let weights = here.weights();
         // Steps are in pixels of this size.
@@ -69,14 +75,49 @@ pub(super) fn register(
             damping *= 10.0;
         }
         let Some((by, trial, there)) = moved else {
-            return Some(Found { camera, settled: damping > MOST_DAMPING });
+            settled = damping > MOST_DAMPING;
+            break;
         };
         (camera, here) = (trial, there);
-        if by.iter().all(|pixels| pixels.abs() < SETTLED) {
-            return Some(Found { camera, settled: true });
+        settled = by.iter().all(|pixels| pixels.abs() < SETTLED);
+        if settled {
+            break;
         }
     }
-    Some(Found { camera, settled: false })
+    if settled {
+        camera = polished(camera, here, mesh, side, &residual);
+    }
+    Some(Found { camera, settled })
+}
+
+/// The camera after some steps by slopes alone, for as long as they shrink.
+fn polished(
+    start: Camera,
+    residual_there: Residual,
+    mesh: &PosedMesh,
+    side: u32,
+    residual: &(impl Fn(&Camera) -> Option<Residual> + Sync),
+) -> Camera {
+    let (mut camera, mut here, mut last) = (start, residual_there, f64::INFINITY);
+    let (weights, share) = (here.weights(), here.share());
+    let bound = (1.0 + ROUGHNESS) * here.loss(weights, share);
+    for _ in 0..POLISHING {
+        let Some(pixels) = Pixels::new(&reduced_camera(&camera, side), mesh) else { break };
+        let (curvature, gradient) =
+            normal_equations(&here, weights, &|by| residual(&pixels.moved(&camera, by)));
+        let Some(by) = step(&curvature, &gradient, DAMPING) else { break };
+        let length = by.iter().fold(0.0_f64, |most, pixels| most.max(pixels.abs()));
+        let trial = pixels.moved(&camera, &by);
+        let Some(there) = residual(&trial).filter(|there| there.loss(weights, share) <= bound) else { break };
+        if length >= last {
+            break;
+        }
+        (camera, here, last) = (trial, there, length);
+        if length < SETTLED {
+            break;
+        }
+    }
+    camera
 }
 
 /// The curvature and the gradient of the loss, by differences of images.

@@ -22,17 +22,23 @@ pub(in crate::scene) struct SkinMaps {
 }
 
 impl SkinMaps {
+    /// Whether there is a normal map.
+    pub(in crate::scene) const fn has_normals(&self) -> bool {
+        self.normal.is_some()
+    }
+
     /// Where both are looked up: one set of texture coordinates serves all maps of a scene.
     pub(in crate::scene) fn uv(&self) -> TextureUv {
         let color = self.color.map(|(color, _)| color);
         color.or(self.normal).map(|texture| texture.uv).unwrap_or_default()
     }
 
-    /// What an engine has to do beside showing the file's pictures by the first texture coordinates; `None` where that
+    /// What an engine has to do, where the colours are this material's or another's, beside showing the file's pictures by the first texture coordinates; `None` where that
     /// is all.
-    pub(in crate::scene) fn told(&self) -> Option<String> {
+    pub(in crate::scene) fn told(&self, colored: bool) -> Option<String> {
         let mut words = Vec::new();
-        if let Some((_, [r, g, b])) = self.color.filter(|(_, factor)| *factor != [1.0; 3]) {
+        let factor = self.color.filter(|(_, factor)| colored && *factor != [1.0; 3]);
+        if let Some((_, [r, g, b])) = factor {
             words.push(format!("its colour is the picture times ({r}, {g}, {b})"));
         }
         let uv = self.uv();

@@ -33,8 +33,8 @@ pub(super) struct Claims {
 impl Claims {
     /// Those of a PNG file.
     pub(super) fn of_png(bytes: &[u8], grey: bool) -> Self {
-        // As much as the image's own decoder takes, which has been through the same chunks.
-        let limits = png::Limits { bytes: usize::MAX };
+        // A profile is some thousand bytes; one that unpacks to more than this is not looked at.
+        let limits = png::Limits { bytes: 1 << 26 };
         let Ok(reader) = png::Decoder::new_with_limits(Cursor::new(bytes), limits).read_info() else {
             return Self { grey, ..Self::default() };
         };

@@ -48,6 +48,10 @@ fn of_colours(profile: &ColorProfile) -> Result<Option<Space>, Unheeded> {
 fn of_grey(profile: &ColorProfile) -> Result<Option<Space>, Unheeded> {
     let none = || Unheeded::Told("has a colour profile of grey without a tone curve".to_owned());
     let given = profile.gray_trc.as_ref().ok_or_else(none)?;
+    // There the curve gives L*, and not Y.
+    if profile.pcs != DataColorSpace::Xyz {
+        return Err(Unheeded::Told("has a colour profile of grey by L*".to_owned()));
+    }
     Space::new([curve(given), curve(given), curve(given)], None)
 }
 

@@ -252,7 +252,7 @@ fn numbers_that_are_no_colours_are_taken_as_they_are() {
 }
 
 #[test]
-fn a_target_of_p3_counts_one_sided_wherever_a_code_is_clipped() {
+fn a_target_of_p3_does_not_count_where_a_code_is_clipped() {
     let three = [0_u16, 128, 255];
     let codes: Vec<[u16; 3]> = (0..27).map(|i| [three[i % 3], three[i / 3 % 3], three[i / 9]]).collect();
     let profile = ColorProfile::new_display_p3().encode().unwrap();
@@ -263,15 +263,15 @@ fn a_target_of_p3_counts_one_sided_wherever_a_code_is_clipped() {
     image::ImageEncoder::write_image(encoder, &bytes, 27, 1, image::ExtendedColorType::Rgb8).unwrap();
     let (_folder, path) = file("front.png", &png);
     let target = target(&path, None, (27, 1), &mut Vec::new()).unwrap();
-    let clip = target.clipped_at.unwrap();
-    for (rgb, codes) in target.rgb.iter().zip(codes) {
-        for (value, code) in rgb.iter().zip(codes) {
-            assert!(code != 0 || *value <= clip.low, "{codes:?}: {rgb:?}");
-            assert!(code != 255 || *value >= clip.high, "{codes:?}: {rgb:?}");
-        }
+    // A mixture tells of no channel whether it was clipped.
+    assert!(target.clipped_at.is_none());
+    let counts = target.mask.unwrap();
+    for (counts, codes) in counts.iter().zip(&codes) {
+        let clipped = codes.iter().any(|code| [0, 255].contains(code));
+        assert_eq!(*counts, f32::from(u8::from(!clipped)), "{codes:?}");
     }
-    // A grey between the ends is not clipped.
-    assert!((clip.low..clip.high).contains(&target.rgb[13][0]) && target.rgb[13][0] > clip.low);
+    // The grey in the middle alone.
+    assert!(counts[13] == 1.0 && counts.iter().sum::<f32>() == 1.0);
 }
 
 #[test]

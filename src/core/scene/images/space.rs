@@ -75,6 +75,11 @@ impl Space {
         Self::new([curve(), curve(), curve()], colours)
     }
 
+    /// Whether channels are mixed: of a mixture no channel tells whether its codes were clipped.
+    pub(super) const fn mixes(&self) -> bool {
+        self.to_rec709.is_some()
+    }
+
     /// The light of each channel at this share of the highest code.
     pub(super) fn light(&self, code: f64) -> [f64; 3] {
         [0, 1, 2].map(|channel| self.curves[channel](code).clamp(0.0, 1.0))

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::space::Space;
 use super::{Image, open_exr, read, read_colors, read_with};
 use crate::model::params::LARGEST;
 use crate::scene::error::{SceneError, Warnings, warn};
@@ -13,9 +14,9 @@ const BRIGHTEST: f32 = LARGEST as f32;
 /// A target of `size`: linear radiance, premultiplied by coverage.
 ///
 /// EXR and HDR are taken as they are (EXR is premultiplied by convention). Codes of 8 or 16 bits are
-/// decoded, multiplied by their straight alpha, and may be clipped at both ends. A wider space than
-/// Rec.709 (P3, Adobe RGB, Rec.2020) is mixed by numbers that are below 0 off the diagonal: whatever is
-/// clipped in it lies at or beyond an end in Rec.709 too, with colours that Rec.709 has not.
+/// decoded, multiplied by their straight alpha, and may be clipped at both ends. Where a profile has other
+/// primaries than Rec.709 (P3, Adobe RGB, Rec.2020) its channels are mixed, so that a clipped code bounds no
+/// channel any more: pixels that have one do not count.
 pub(in crate::scene) fn target(
     path: &Path,
     mask: Option<&Path>,
@@ -23,7 +24,11 @@ pub(in crate::scene) fn target(
     warnings: &mut Warnings,
 ) -> Result<Target, SceneError> {
     let mut image = read_colors(path, Some(size), warnings)?;
-    let clipped_at = image.code.map(|code| {
+    let mixed = image.space.as_ref().is_some_and(Space::mixes);
+    // Codes are shares of the highest one.
+    let ends = |rgb: &[f32; 3]| rgb.iter().any(|code| *code <= 0.0 || *code >= 1.0);
+    let lost: Vec<bool> = if mixed { image.rgb.iter().map(ends).collect() } else { Vec::new() };
+    let clipped_at = image.code.filter(|_| !mixed).map(|code| {
         // Half a code from either end: what rounds to the end may lie beyond it.
         let at = |half: f64| image.light(half / f64::from(code)).map(|light| light as f32);
         let (low, high) = (at(0.5), at(f64::from(code) - 0.5));
@@ -48,7 +53,11 @@ pub(in crate::scene) fn target(
             *rgb = rgb.map(|value| value * a);
         }
     }
-    let mask = mask.map(|mask| read_mask(mask, size, warnings)).transpose()?;
+    let mut mask = mask.map(|mask| read_mask(mask, size, warnings)).transpose()?;
+    if lost.contains(&true) {
+        let counts = mask.get_or_insert_with(|| vec![1.0; lost.len()]);
+        counts.iter_mut().zip(&lost).filter(|(_, lost)| **lost).for_each(|(counts, _)| *counts = 0.0);
+    }
     Ok(Target { rgb: image.rgb, alpha, haze: None, mask, clipped_at })
 }
 

@@ -20,7 +20,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use glam::{DMat3, DMat4, DVec3, DVec4};
+use glam::{DMat3, DMat4, DQuat, DVec3, DVec4};
 use roxmltree::{Document, Node};
 
 use super::{ImportedView, Intrinsics, Names, brown, damaged, side, turned_over};
@@ -206,7 +206,8 @@ impl<'a> Source<'a> {
         if !eye.is_finite() {
             return Err(self.damaged(transform, "is moved beyond all numbers"));
         }
-        let mut pose = DMat4::from_mat3(rotation * turned);
+        // Each is a rotation as nearly as a file has one, and so is a scene's camera.
+        let mut pose = DMat4::from_quat(DQuat::from_mat3(&(rotation * turned)).normalize());
         pose.w_axis = eye.extend(1.0);
         Ok(pose)
     }

@@ -100,7 +100,7 @@ pub(super) fn solve(
 
 /// What the fit is of: a scene's own items, or those of all scenes by their names.
 fn fingerprint_of(scenes: &Scenes) -> Fingerprint {
-    let of = |part: &JointScene| fingerprint(&part.baked.scene, &part.baked.cameras, &part.held);
+    let of = |part: &JointScene| fingerprint(&part.baked.scene, &part.held);
     match scenes.parts.as_slice() {
         [part] => of(part),
         parts => {

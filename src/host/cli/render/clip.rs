@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use super::super::{Refusal, tell_warnings};
+use super::frames::ROUNDING;
 use crate::bake::{self, PoseBake, SkyLight};
 use crate::scene::Scene;
 use crate::scene::animation::Animation;
@@ -29,24 +30,33 @@ impl<'a> ClipBakes<'a> {
     pub(super) fn at(&mut self, scene: &Scene, mesh: &Mesh, time: f64) -> Result<PoseBake, Refusal> {
         let Some(rate) = self.rate else { return Ok(self.baked(scene, mesh)) };
         let place = (time - self.animation.seconds.0).max(0.0) * rate;
-        let before = place.floor();
-        let share = place - before;
+        // What misses a pose by a rounding is that pose.
+        let before = (place + ROUNDING).floor();
+        let (from, to) = (self.time(rate, before as u64), self.time(rate, before as u64 + 1));
+        let share = if to > from { ((time - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
         let from = self.pose(scene, rate, before as u64)?;
-        // A pose that is baked is nobody else's.
-        if share == 0.0 {
+        if share < ROUNDING {
             return Ok(from);
         }
         let to = self.pose(scene, rate, before as u64 + 1)?;
+        if share > 1.0 - ROUNDING {
+            return Ok(to);
+        }
         Ok(from.between(&to, share as f32).unwrap_or(from))
     }
 
-    /// The bake of the pose of that number; behind the last key all poses are that of the last key.
+    /// When the pose of that number is; behind the last key all are at the last key.
+    fn time(&self, rate: f64, number: u64) -> f64 {
+        let (first, last) = self.animation.seconds;
+        (first + number as f64 / rate).min(last)
+    }
+
+    /// The bake of the pose of that number.
     fn pose(&mut self, scene: &Scene, rate: f64, number: u64) -> Result<PoseBake, Refusal> {
         if let Some((_, bake)) = self.kept.iter().find(|(of, _)| *of == number) {
             return Ok(bake.clone());
         }
-        let (first, last) = self.animation.seconds;
-        let mesh = self.animation.mesh((first + number as f64 / rate).min(last))?;
+        let mesh = self.animation.mesh(self.time(rate, number))?;
         let bake = self.baked(scene, &mesh);
         // One frame needs two of them.
         if self.kept.len() == 2 {

@@ -47,8 +47,8 @@ pub(super) enum Pace {
 
 /// The most frames of a sequence.
 pub(super) const MOST: u32 = 100_000;
-/// Of a frame: a time that misses the last key by a rounding is its time.
-const ROUNDING: f64 = 1e-6;
+/// Of a frame: a time that misses a key by less is its time. Keys are f32, which at ten thousand frames have so many digits.
+pub(super) const ROUNDING: f64 = 1e-3;
 
 impl Pace {
     /// How many frames an animation of so many seconds has; `None` beyond [`MOST`].
@@ -68,7 +68,13 @@ impl Pace {
             Self::Even(_) => first + i / f64::from((count - 1).max(1)) * seconds,
             Self::Rate(rate, None) => (first + i / rate).min(last),
             Self::Rate(rate, Some(_)) | Self::Rounds(rate, _) if seconds > 0.0 => {
-                first + (i / rate).rem_euclid(seconds)
+                // Where a round has whole frames, each has the same times to the bit.
+                let (frames, whole) = (seconds * rate, (seconds * rate).round());
+                if whole >= 1.0 && (frames - whole).abs() < ROUNDING {
+                    (first + (i % whole) / rate).min(last)
+                } else {
+                    first + (i / rate).rem_euclid(seconds)
+                }
             }
             Self::Rate(..) | Self::Rounds(..) => first,
         }
@@ -118,8 +124,15 @@ mod tests {
         assert_eq!(times(Pace::Rate(4.0, None)), [1.0, 1.25, 1.5, 1.75, 2.0]);
         assert_eq!(times(Pace::Rate(4.0, Some(6))), [1.0, 1.25, 1.5, 1.75, 1.0, 1.25]);
         assert_eq!(times(Pace::Rounds(2.0, 2)), [1.0, 1.5, 1.0, 1.5]);
-        // A third of a second has no exact number; the last frame is the last key all the same.
-        assert_eq!(times(Pace::Rate(3.0, None)).len(), 4);
+        // Keys are f32, and 9.7 is a little more there, or a little less: the last frame is the last key all the same, and
+        // a round has 291 frames whose times come again.
+        let last = f64::from(9.7_f32);
+        let at = |pace: Pace| animation(&camera, (0.0, last), pace, Path::new("a.png")).unwrap();
+        let once = at(Pace::Rate(30.0, None));
+        assert_eq!((once.len(), once[291].time), (292, Some(last)));
+        let twice = at(Pace::Rounds(30.0, 2));
+        assert_eq!(twice.len(), 582);
+        assert!((0..291).all(|i| twice[i].time == twice[291 + i].time && twice[i].time < Some(last - 0.03)));
         // An animation of one key stands still.
         let still = animation(&camera, (1.0, 1.0), Pace::Rounds(24.0, 3), Path::new("a.png")).unwrap();
         assert_eq!(still.len(), 1);

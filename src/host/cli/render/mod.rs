@@ -199,8 +199,10 @@ fn frames(
         (Some(animation), _) => frames::animation(camera, animation.seconds, pace, output).ok_or_else(|| {
             let seconds = animation.seconds.1 - animation.seconds.0;
             Refusal::new(format!(
-                "{}: its animation of {seconds} s has more than {} frames at --fps {}. Give --frames, or a lower rate.",
+                "{}: its animation of {seconds} s, {} times, has more than {} frames at --fps {}. Give a lower rate, or \
+                 fewer --loops.",
                 baked.scene.path.display(),
+                arguments.loops.unwrap_or(1),
                 frames::MOST,
                 arguments.fps.unwrap_or_default()
             ))

@@ -34,6 +34,15 @@ impl<'a> Entries<'a> {
         })
     }
 
+    /// Where one of the names, or a part of it, is there at all.
+    pub(super) fn announced(&self, names: &[&str]) -> Option<String> {
+        let of = |entry: &&String| {
+            names.iter().any(|name| entry.strip_prefix(*name).is_some_and(|rest| rest.starts_with('.')))
+        };
+        let name = self.by_name.keys().find(of)?;
+        Some(format!("line {}, {name}", self.by_name[name].0))
+    }
+
     /// A word, with or without quotes.
     pub(super) fn word(&self, name: &str) -> Option<(String, &str)> {
         self.first(&[name]).map(|(place, text)| (place, text.trim().trim_matches(['"', '\''])))

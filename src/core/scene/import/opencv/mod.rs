@@ -116,7 +116,14 @@ fn check_uncut(entries: &Entries<'_>) -> Result<(), SceneError> {
 
 fn distortion(entries: &Entries<'_>) -> Result<Option<Distortion>, SceneError> {
     let absent = || ("its coefficients".to_owned(), Vec::new());
-    let (place, mut k) = entries.matrix(&COEFFICIENTS)?.unwrap_or_else(absent);
+    let (place, mut k) = match entries.matrix(&COEFFICIENTS)? {
+        Some(found) => found,
+        // A file that ends before its numbers has no pinhole.
+        None => match entries.announced(&COEFFICIENTS).or_else(|| model_of(entries)) {
+            Some(place) => return Err(damaged(entries.path, place, "announces coefficients, and has none")),
+            None => absent(),
+        },
+    };
     let foreign = |what: String| {
         let remedy = "Calibrate with k1, k2, p1, p2 and k3 alone, or undistort the pictures";
         SceneError::new(entries.path, what, remedy).at(place.clone())
@@ -131,11 +138,19 @@ fn distortion(entries: &Entries<'_>) -> Result<Option<Distortion>, SceneError> {
         let what = format!("has {} coefficients, and OpenCV's models have 4, 5, 8, 12 or 14", k.len());
         return Err(damaged(entries.path, place, what));
     }
+    if entries.number(&["xi"])?.is_some_and(|(_, xi)| xi != 0.0) {
+        return Err(foreign("is of cv::omnidir, which has a mirror".to_owned()));
+    }
     if k.iter().skip(5).any(|k| *k != 0.0) {
         return Err(foreign(format!("has {} coefficients, and scenes' lenses have five", k.len())));
     }
     k.resize(5, 0.0);
     Ok(brown([k[0], k[1], k[4]], [k[2], k[3]]))
+}
+
+/// Where a distortion has a name.
+fn model_of(entries: &Entries<'_>) -> Option<String> {
+    entries.word("distortion_model").filter(|(_, model)| !model.is_empty()).map(|(place, _)| place)
 }
 
 /// Whether the model is that of cv::fisheye.
