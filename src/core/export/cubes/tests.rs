@@ -147,7 +147,7 @@ fn a_ktx2_file_describes_four_signed_halves() {
     assert_eq!([4, 8, 12, 16, 20, 24].map(|i| word(&file, at + i)), [0, 88 << 16 | 2, 0x01_01_01, 0, 8, 0]);
     let sample = |i: usize| (0..4).map(|k| word(&file, at + 28 + 16 * i + 4 * k)).collect::<Vec<_>>();
     for (i, channel) in [0xC0, 0xC1, 0xC2, 0xCF].into_iter().enumerate() {
-        assert_eq!(sample(i), [channel << 24 | 15 << 16 | 16 * i, 0, 0xBF80_0000, 0x3F80_0000]);
+        assert_eq!(sample(i), [channel << 24 | 15 << 16 | (16 * i), 0, 0xBF80_0000, 0x3F80_0000]);
     }
 }
 
