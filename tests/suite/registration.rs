@@ -11,7 +11,10 @@ use skinfit::scene::view::Camera;
 use crate::common;
 
 fn read(path: &Path) -> Loaded {
-    let mut loaded = Loaded::read(path, &PrepareOptions { fit: true, ..PrepareOptions::default() }).unwrap();
+    // Bakes are kept from run to run, under all that they depend on.
+    let cache = Some(Path::new(env!("CARGO_TARGET_TMPDIR")).join("graphics"));
+    let mut loaded =
+        Loaded::read(path, &PrepareOptions { fit: true, cache, ..PrepareOptions::default() }).unwrap();
     loaded.scene.quality.samples_per_axis = 2;
     loaded
 }
