@@ -4,12 +4,12 @@ use serde_json::Value;
 
 use super::sandbox::Sandbox;
 
-/// The files of a sequence, in their order.
-fn frames(sandbox: &Sandbox, stem: &str) -> Vec<Vec<u8>> {
+/// The pictures of a sequence, in their order.
+fn frames(sandbox: &Sandbox, stem: &str) -> Vec<Vec<[f32; 3]>> {
     (0..)
         .map(|i| format!("{stem}.{i:04}.exr"))
         .take_while(|name| sandbox.path(name).exists())
-        .map(|name| sandbox.read(&name))
+        .map(|name| crate::fixtures::read_exr(&sandbox.path(&name)).rgb(["R", "G", "B"]))
         .collect()
 }
 
