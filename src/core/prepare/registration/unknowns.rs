@@ -72,7 +72,7 @@ mod tests {
         let corners = [[-1., -1., -1.], [1., 1., 1.], [-1., 1., -1.], [1., -1., 1.]].map(Vec3::from_array);
         let mesh = PosedMesh { positions: corners.to_vec(), ..PosedMesh::default() };
         let world_to_camera =
-            DMat4::from_rotation_y(0.3) * DMat4::from_translation(DVec3::new(0.2, 0.1, -9.0));
+            DMat4::from_translation(DVec3::new(0.2, 0.1, -9.0)) * DMat4::from_rotation_y(0.3);
         let camera = Camera::pinhole(world_to_camera, 0.4, [200, 160]);
         let pixels = Pixels::new(&camera, &mesh).unwrap();
         for unknown in 0..COUNT {
