@@ -229,11 +229,10 @@ fn chosen_settings_keep_their_promise_when_they_are_measured_again() {
     // More is allowed for less; and where nothing is near enough, the sweeps are there all the same.
     let few = ["irradiance", "rays"];
     done(run("far", &few, &["--within", "20%"]));
-    let rays = |to: &str| {
-        let settings = sandbox.json(&format!("{to}/results.json"))["choice"]["settings"].clone();
-        settings.as_array().unwrap().iter().find(|s| s[0] == "rays").unwrap()[1].clone()
-    };
-    assert_ne!(rays("far"), rays("near"));
+    // Which is the cheapest is measured, and so are the settings; that they keep within what is allowed is not.
+    let far = sandbox.json("far/results.json")["choice"].clone();
+    assert!(far["error"]["relative"].as_f64().unwrap() <= 0.2, "{far}");
+    assert!(far["settings"].as_array().unwrap().iter().any(|setting| setting[0] == "rays"), "{far}");
     done(run("soon", &few, &["--budget", "60s"]));
     assert_eq!(sandbox.json("soon/results.json")["choice"]["error"]["relative"].as_f64(), Some(0.0));
     let ran = run("soon", &few, &["--budget", "0.000001ms"]);
