@@ -31,8 +31,7 @@ use crate::scene::view::{Camera, View};
 use image::Picture;
 use solve::Found;
 
-/// Images are compared at most at so many pixels along their longer side: their noise, and what the model cannot show, moves
-/// a camera by less than a hundredth of a pixel there.
+/// Images are compared at most at so many pixels along their longer side, which bounds what a step costs.
 const FINEST: u32 = 512;
 /// The first size: a camera that is off by a tenth of the image is a few pixels off there.
 const COARSEST: u32 = 64;
