@@ -5,7 +5,7 @@ use std::process::Command;
 
 use serde_json::{Value, json};
 
-use crate::graphics::bench::gpu;
+use crate::graphics::bench::{built_in, cache, gpu};
 
 /// An example's program, which `cargo test` builds beside this one.
 fn program(name: &str) -> PathBuf {
@@ -27,9 +27,8 @@ fn printed(name: &str) -> (String, tempfile::TempDir) {
 
 /// What an example prints, run in that folder.
 fn printed_in(folder: &Path, name: &str, arguments: &[&str]) -> String {
-    let cache = folder.join("cache");
     let mut command = Command::new(program(name));
-    let run = command.current_dir(folder).env("SKINFIT_CACHE", cache).args(arguments).output().unwrap();
+    let run = command.current_dir(folder).env("SKINFIT_CACHE", cache()).args(arguments).output().unwrap();
     let (out, err) = (String::from_utf8_lossy(&run.stdout), String::from_utf8_lossy(&run.stderr));
     assert!(run.status.success(), "{name}: {}\n{out}\n{err}", run.status);
     out.into_owned()
@@ -76,15 +75,15 @@ fn gradients_on_tensors() {
     assert_eq!(gradients.matches("by differences").count(), 3, "{gradients}");
 }
 
-/// The built-in scene's file, below that folder.
-fn scene_in(folder: &Path) -> String {
-    skinfit::built_in_scene(&folder.join("scene")).unwrap().to_string_lossy().into_owned()
+/// The built-in scene's file.
+fn scene() -> String {
+    built_in().to_string_lossy().into_owned()
 }
 
 #[test]
 fn a_rate_of_rays() {
     let folder = tempfile::tempdir().unwrap();
-    printed_in(folder.path(), "rays", &[&scene_in(folder.path()), "-o", "row.json", "--threads", "2"]);
+    printed_in(folder.path(), "rays", &[&scene(), "-o", "row.json", "--threads", "2"]);
     let row: Value = serde_json::from_slice(&std::fs::read(folder.path().join("row.json")).unwrap()).unwrap();
     assert_eq!(row["rays"].as_f64(), row["distinct"].as_f64().map(|vertices| 256.0 * vertices), "{row}");
     for query in ["any", "nearest"] {
@@ -98,7 +97,7 @@ fn what_effects_cost_a_frame() {
         return;
     }
     let folder = tempfile::tempdir().unwrap();
-    let scene = scene_in(folder.path());
+    let scene = scene();
     let small = ["-o", "table.csv", "--width", "64", "--height", "48", "--frames", "4", "--full"];
     printed_in(folder.path(), "effects_cost", &[&[scene.as_str()], &small[..]].concat());
     let table = std::fs::read_to_string(folder.path().join("table.csv")).unwrap();

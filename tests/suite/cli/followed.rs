@@ -7,6 +7,7 @@ use std::path::Path;
 use std::process::Command;
 
 use super::sandbox::Ran;
+use crate::graphics::bench::cache;
 
 /// A block of a page: the words behind its fence, and its lines.
 fn blocks(page: &str) -> Vec<(String, String)> {
@@ -44,7 +45,7 @@ fn shell(folder: &Path, lines: &str) -> Ran {
     let path = format!("{}:{}", program.display(), std::env::var("PATH").unwrap());
     let mut command = Command::new("sh");
     command.args(["-e", "-c", lines]).current_dir(folder).env("PATH", path);
-    Ran::of(command.env("SKINFIT_CACHE", folder.join("cache")))
+    Ran::of(command.env("SKINFIT_CACHE", cache()))
 }
 
 #[test]
