@@ -77,7 +77,7 @@ fn engine(arguments: &Arguments, manifest: &Manifest, which: &str, keep: bool) -
     }
     let words = |error: skinfit::gpu::GpuError| error.to_string();
     let gpu = skinfit::gpu::Gpu::open(&skinfit::gpu::Choice::default()).map_err(words)?;
-    let start = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };
+    let start = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0.into()] };
     let engine = GpuEngine::new(&gpu, task, &start, Memory::default()).map_err(words)?;
     let (resident, _) = engine.bytes();
     eprintln!("race: {:.1} bytes a pixel on the device", resident as f64 / manifest.pixels as f64);
@@ -166,8 +166,8 @@ fn run(arguments: &Arguments) -> Result<Value> {
     }
     let manifest = Manifest::read(&arguments.data)?;
     let pre = arguments.mode == "pre";
-    let truth = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0] };
-    let mut start = Point { params: Manifest::params(&manifest.params_init), gains: vec![1.0] };
+    let truth = Point { params: Manifest::params(&manifest.params_true), gains: vec![1.0.into()] };
+    let mut start = Point { params: Manifest::params(&manifest.params_init), gains: vec![1.0.into()] };
     if pre {
         start.params.set(Param::NormalStrength, truth.params.scalar(Param::NormalStrength));
     }

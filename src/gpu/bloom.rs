@@ -1,6 +1,7 @@
 //! What follows the mesh's passes: what stands behind it, and the bloom that the haze drives (`render::backdrop`,
 //! `render::bloom`).
 
+use crate::model::gain::Gain;
 use wgpu::util::{DeviceExt as _, TextureDataOrder};
 use wgpu::{
     BindGroup, BindingResource, Buffer, BufferUsages, Extent3d, RenderPass, TexelCopyBufferLayout,
@@ -120,9 +121,9 @@ impl Finish {
         }
     }
 
-    /// Set the factor on the image's radiance.
-    pub(super) fn set(&self, gpu: &Gpu, gain: f64) {
-        gpu.queue.write_buffer(&self.gain, 0, bytemuck::cast_slice(&[gain as f32, 0.0, 0.0, 0.0]));
+    /// Set the factors on the image's radiance.
+    pub(super) fn set(&self, gpu: &Gpu, gain: Gain) {
+        gpu.queue.write_buffer(&self.gain, 0, bytemuck::cast_slice(&gain.channels().map(|x| x as f32)));
     }
 
     /// What the blur along rows is drawn into; none without a bloom.

@@ -3,6 +3,7 @@
 mod frames;
 mod made;
 
+use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::atlas::AtlasTraffic;
@@ -212,7 +213,8 @@ impl Renderer {
     ///
     /// # Errors
     /// When the image is too large, or the device fails.
-    pub fn render(&mut self, camera: &Camera, gain: f64) -> Result<Frame, GpuError> {
+    pub fn render(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Frame, GpuError> {
+        let gain = gain.into();
         self.show_behind(camera);
         let drawn = self.draw(None, camera, gain, true)?;
         let (image, clipped) = self.stages[drawn.stage].finished_image(&drawn.planes, gain);
@@ -223,7 +225,8 @@ impl Renderer {
     ///
     /// # Errors
     /// As of [`Self::render`].
-    pub async fn render_async(&mut self, camera: &Camera, gain: f64) -> Result<Frame, GpuError> {
+    pub async fn render_async(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Frame, GpuError> {
+        let gain = gain.into();
         self.show_behind(camera);
         let (stage, planes) = self.draw_async(None, camera, gain, true).await?;
         let (image, clipped) = self.stages[stage].finished_image(&planes, gain);
@@ -238,17 +241,23 @@ impl Renderer {
         &mut self,
         term: TermName,
         camera: &Camera,
-        gain: f64,
+        gain: impl Into<Gain>,
     ) -> Result<Image, GpuError> {
+        let gain = gain.into();
         let (stage, planes) = self.draw_async(Some(term), camera, gain, false).await?;
-        Ok(self.stages[stage].image(&planes, gain as f32).0)
+        Ok(self.stages[stage].image(&planes, gain).0)
     }
 
     /// As [`Self::render_haze`], without waiting.
     ///
     /// # Errors
     /// As of [`Self::render`].
-    pub async fn render_haze_async(&mut self, camera: &Camera, gain: f64) -> Result<Vec<f32>, GpuError> {
+    pub async fn render_haze_async(
+        &mut self,
+        camera: &Camera,
+        gain: impl Into<Gain>,
+    ) -> Result<Vec<f32>, GpuError> {
+        let gain = gain.into();
         if !hazy(self.plan()) {
             return Ok(Vec::new());
         }
@@ -261,7 +270,7 @@ impl Renderer {
         &mut self,
         output: Option<TermName>,
         camera: &Camera,
-        gain: f64,
+        gain: Gain,
         finished: bool,
     ) -> Result<(usize, Vec<Vec<f32>>), GpuError> {
         let (stage, copies) = self.submit(output, camera, gain, finished, None)?;
@@ -273,26 +282,34 @@ impl Renderer {
     }
 
     /// The haze that a stage's first plane holds as alpha.
-    fn haze(&self, stage: usize, planes: &[Vec<f32>], gain: f64) -> Vec<f32> {
+    fn haze(&self, stage: usize, planes: &[Vec<f32>], gain: Gain) -> Vec<f32> {
+        let gain = gain.channel(3) as f32;
         let largest = self.stages[stage].targets.key.precision.largest();
         let haze = planes[0].chunks_exact(4).map(|texel| texel[3].clamp(-largest, largest));
-        haze.map(|haze| gain as f32 * haze).collect()
+        haze.map(|haze| gain * haze).collect()
     }
 
     /// One term of the image alone, without bloom and backdrop; the terms add up to the image without them.
     ///
     /// # Errors
     /// As of [`Self::render`].
-    pub fn render_term(&mut self, term: TermName, camera: &Camera, gain: f64) -> Result<Image, GpuError> {
+    pub fn render_term(
+        &mut self,
+        term: TermName,
+        camera: &Camera,
+        gain: impl Into<Gain>,
+    ) -> Result<Image, GpuError> {
+        let gain = gain.into();
         let drawn = self.draw(Some(term), camera, gain, false)?;
-        Ok(self.stages[drawn.stage].image(&drawn.planes, gain as f32).0)
+        Ok(self.stages[drawn.stage].image(&drawn.planes, gain).0)
     }
 
     /// The haze of each pixel, premultiplied by its coverage and times the gain; empty where no effect makes one.
     ///
     /// # Errors
     /// As of [`Self::render`].
-    pub fn render_haze(&mut self, camera: &Camera, gain: f64) -> Result<Vec<f32>, GpuError> {
+    pub fn render_haze(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Vec<f32>, GpuError> {
+        let gain = gain.into();
         if !hazy(self.plan()) {
             return Ok(Vec::new());
         }

@@ -1,5 +1,6 @@
 //! A stage of images: the targets of one size, and what is drawn into them.
 
+use crate::model::gain::Gain;
 use wgpu::{
     Color, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment, RenderPassDepthStencilAttachment,
     RenderPassDescriptor, RenderPassTimestampWrites, StoreOp, TextureView,
@@ -24,8 +25,8 @@ pub(super) struct Stage {
 
 impl Stage {
     /// The image of a frame that is finished: the last passes have the gain in them already.
-    pub(super) fn finished_image(&self, planes: &[Vec<f32>], gain: f64) -> (Image, usize) {
-        self.image(planes, if self.finish.is_some() { 1.0 } else { gain as f32 })
+    pub(super) fn finished_image(&self, planes: &[Vec<f32>], gain: Gain) -> (Image, usize) {
+        self.image(planes, if self.finish.is_some() { Gain::ONE } else { gain })
     }
 
     /// Draw the mesh into a tile, and its samples into the image.
@@ -103,7 +104,7 @@ impl Stage {
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
-        gain: f64,
+        gain: Gain,
         finished: bool,
         mut timer: Option<&mut Timer>,
     ) -> Vec<Copy> {
@@ -123,7 +124,8 @@ impl Stage {
     }
 
     /// The image of those planes, and how many of its pixels reached the end of the targets' range.
-    pub(super) fn image(&self, planes: &[Vec<f32>], gain: f32) -> (Image, usize) {
+    pub(super) fn image(&self, planes: &[Vec<f32>], gain: Gain) -> (Image, usize) {
+        let gain = gain.0.map(|factor| factor as f32);
         let key = &self.targets.key;
         let largest = key.precision.largest();
         let mut image = Image::new(key.width as usize, key.height as usize);
@@ -132,7 +134,7 @@ impl Stage {
         for (i, texel) in texels.enumerate() {
             let rgb = [texel[0], texel[1], texel[2]].map(|x| x.clamp(-largest, largest));
             clipped += usize::from(rgb.iter().any(|x| x.abs() >= largest));
-            image.rgb[i] = rgb.map(|x| gain * x);
+            image.rgb[i] = [0, 1, 2].map(|c| gain[c] * rgb[c]);
             image.alpha[i] = planes.get(1).map_or(texel[3], |coverage| coverage[i]);
         }
         (image, clipped)

@@ -10,7 +10,7 @@ use skinfit_view::session::Orbit;
 use skinfit_view::values::column;
 
 use crate::model::effects::Effect;
-use crate::model::params::Param;
+use crate::model::params::{Channels, Param};
 
 /// What is done.
 #[derive(Clone, Debug, Deserialize)]
@@ -21,13 +21,18 @@ pub(crate) enum Command {
         slider: String,
         value: f64,
     },
-    /// The slider of a view's gain is moved, as part of a drag.
+    /// The slider of a view's gain, or of a channel of it, is moved, as part of a drag.
     SlideGain {
         view: usize,
+        channel: Option<usize>,
         value: f64,
     },
     /// Whether a fit moves the gains.
     FreeGains {
+        on: bool,
+    },
+    /// Whether it moves each of their channels.
+    FreeWhiteBalance {
         on: bool,
     },
     /// A drag is over.
@@ -104,8 +109,12 @@ pub(crate) fn run(session: &mut Session, look: &mut Look, command: Command) {
                 session.slide(column, value);
             }
         }
-        Command::SlideGain { view, value } => session.slide_gain(view, value),
+        Command::SlideGain { view, channel, value } => {
+            let channels = channel.filter(|c| *c < 3).map_or(Channels::Tied, Channels::One);
+            session.slide_gain(view, channels, value);
+        }
         Command::FreeGains { on } => session.edit(|values| values.free_gains = on),
+        Command::FreeWhiteBalance { on } => session.edit(|values| values.white_balance = on),
         Command::Settle => session.settle(),
         Command::Reset { param, to } => {
             if let Some(param) = Param::from_name(&param) {

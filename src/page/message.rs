@@ -1,5 +1,6 @@
 //! What the workers tell each other of a fit.
 
+use crate::model::gain::Gain;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -44,6 +45,7 @@ pub(crate) struct OfScene {
     at: At,
     free: Vec<String>,
     free_gains: bool,
+    white_balance: bool,
     effects: Vec<String>,
 }
 
@@ -56,7 +58,7 @@ impl Request {
     pub(crate) fn goes_on_as(&self, other: &Self) -> bool {
         let sorted = |names: &[String]| names.iter().cloned().collect::<BTreeSet<_>>();
         let same = |(one, other): (&OfScene, &OfScene)| {
-            one.free_gains == other.free_gains
+            (one.free_gains, one.white_balance) == (other.free_gains, other.white_balance)
                 && sorted(&one.free) == sorted(&other.free)
                 && sorted(&one.effects) == sorted(&other.effects)
         };
@@ -70,9 +72,10 @@ impl OfScene {
     fn of(scene: &FitScene) -> Self {
         let values = &scene.values;
         Self {
-            at: At { params: named(&values.params), gains: values.gains.clone() },
+            at: At { params: named(&values.params), gains: values.gains.iter().map(|gain| gain.0).collect() },
             free: values.free.iter().map(Column::name).collect(),
             free_gains: values.free_gains,
+            white_balance: values.white_balance,
             effects: values.effects.iter().map(|effect| effect.name().to_owned()).collect(),
         }
     }
@@ -94,8 +97,9 @@ impl OfScene {
     /// Begin there, with that free.
     pub(crate) fn set(&self, loaded: &mut Loaded, free: Vec<Column>) {
         set(&mut loaded.scene.params, &self.at.params);
-        loaded.gains.clone_from(&self.at.gains);
-        (loaded.scene.fit.free, loaded.scene.fit.free_gains) = (free, self.free_gains);
+        loaded.gains = self.at.gains.iter().copied().map(Gain).collect();
+        let fit = &mut loaded.scene.fit;
+        (fit.free, fit.free_gains, fit.white_balance) = (free, self.free_gains, self.white_balance);
     }
 }
 
@@ -127,18 +131,18 @@ pub(crate) enum Say {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct At {
     params: Vec<(String, [f64; 3])>,
-    gains: Vec<f64>,
+    gains: Vec<[f64; 3]>,
 }
 
 impl At {
     pub(crate) fn of(point: &Point) -> Self {
-        Self { params: named(&point.params), gains: point.gains.clone() }
+        Self { params: named(&point.params), gains: point.gains.iter().map(|gain| gain.0).collect() }
     }
 
     fn point(self, scene: &Opened) -> Point {
         let mut params = scene.baked.scene.params.clone();
         set(&mut params, &self.params);
-        Point { params, gains: self.gains }
+        Point { params, gains: self.gains.into_iter().map(Gain).collect() }
     }
 }
 

@@ -74,17 +74,23 @@ struct ViewRow {
 #[derive(Serialize)]
 struct Gains {
     free: bool,
+    /// Whether each channel of them is.
+    white_balance: bool,
     /// Whether there is anything to say of them.
     shown: bool,
     /// What their sliders span.
     lower: f64,
     upper: f64,
-    views: Vec<Gain>,
+    rows: Vec<GainRow>,
 }
 
 #[derive(Serialize)]
-struct Gain {
-    view: String,
+struct GainRow {
+    /// The view's, and after it the channel.
+    name: String,
+    view: usize,
+    /// `None` of one value for all channels.
+    channel: Option<usize>,
     value: f64,
     error: Option<String>,
 }
@@ -216,14 +222,23 @@ fn views(session: &Session) -> Vec<ViewRow> {
 
 fn gains(session: &Session) -> Option<Gains> {
     let (opened, values) = (session.opened()?, session.values()?);
-    let row = |(view, &value): (&View, &f64)| Gain {
-        view: view.name.clone(),
-        value,
-        error: session.known_gain(&view.name).map(Known::words),
+    let row = |(number, view): (usize, &View)| {
+        let of = |(channels, value): (Channels, f64)| GainRow {
+            name: format!("{}{}", view.name, channels.suffix()),
+            view: number,
+            channel: match channels {
+                Channels::Tied => None,
+                Channels::One(c) => Some(c),
+            },
+            value,
+            error: session.known_gain(&view.name, channels).map(Known::words),
+        };
+        values.gain_rows(number).into_iter().map(of).collect::<Vec<_>>()
     };
-    let views = opened.views().iter().zip(&values.gains).map(row).collect();
+    let rows = opened.views().iter().enumerate().flat_map(row).collect();
     let (lower, upper) = GAINS.into_inner();
-    Some(Gains { free: values.free_gains, shown: values.has_gains(), lower, upper, views })
+    let (free, white_balance) = (values.free_gains, values.white_balance);
+    Some(Gains { free, white_balance, shown: values.has_gains(), lower, upper, rows })
 }
 
 fn row(session: &Session, values: &Values, param: Param) -> Row {

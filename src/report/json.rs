@@ -258,7 +258,7 @@ fn whose(unknown: &Unknown) -> Option<(Option<usize>, Param)> {
     match unknown {
         Unknown::Param(column) => Some((None, column.param)),
         Unknown::Own(scene, column) => Some((Some(*scene), column.param)),
-        Unknown::Gain(_) => None,
+        Unknown::Gain(..) => None,
     }
 }
 

@@ -1,5 +1,6 @@
 //! Scenes in one setting, ready to be evaluated: baked, sampled, and with something to compare with.
 
+use crate::model::gain::Gain;
 use std::path::Path;
 
 use super::StudyError;
@@ -226,11 +227,11 @@ pub fn shaded(
     scene: &Scene,
     views: &[View],
     shader: &Shader,
-    (samples, gains): (&[&ViewSamples], &[f64]),
+    (samples, gains): (&[&ViewSamples], &[Gain]),
 ) -> Vec<Image> {
     let views = views.iter().zip(samples).enumerate();
     let image = |(i, (view, samples)): (usize, (&View, &&ViewSamples))| {
-        let mut shaded = shader.shade(samples, &view.camera, gains.get(i).copied().unwrap_or(1.0));
+        let mut shaded = shader.shade(samples, &view.camera, gains.get(i).copied().unwrap_or_default());
         if scene.effects.has(Effect::Bloom) {
             add_bloom(&mut shaded.image, &shaded.glow, scene.bloom.sigma);
         }

@@ -11,6 +11,7 @@ mod browser;
 mod thread;
 mod work;
 
+use crate::model::gain::Gain;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -55,7 +56,7 @@ pub struct Job {
     /// At these constants.
     pub params: Params,
     /// A factor on it.
-    pub gain: f64,
+    pub gain: Gain,
     /// From here.
     pub camera: Camera,
     /// The target to compare it with, where the camera is a view's.

@@ -2,6 +2,7 @@
 
 use crate::engine::Point;
 use crate::model::effects::{Effect, Effects, Form};
+use crate::model::gain::Gain;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::prepare::{Baked, untied};
 use crate::scene::view::View;
@@ -14,9 +15,11 @@ pub struct Values {
     /// The constants.
     pub params: Params,
     /// A factor on each view's image.
-    pub gains: Vec<f64>,
+    pub gains: Vec<Gain>,
     /// Whether a fit moves these, but for the first.
     pub free_gains: bool,
+    /// Whether it moves each of their channels.
+    pub white_balance: bool,
     /// What else a fit moves.
     pub free: Vec<Column>,
     /// The parameters that the scene's file leaves free: what is free again stands where it stood.
@@ -50,6 +53,7 @@ impl Values {
             params: scene.params.clone(),
             gains: baked.gains.clone(),
             free_gains: scene.fit.free_gains,
+            white_balance: scene.fit.white_balance,
             free: scene.fit.free.clone(),
             order: scene.fit.free.iter().map(|column| column.param).collect(),
             apart: Vec::new(),
@@ -130,7 +134,17 @@ impl Values {
     /// Whether there is anything to say of gains: they are free, or one is not 1.
     #[must_use]
     pub fn has_gains(&self) -> bool {
-        self.free_gains || self.gains.iter().any(|&gain| gain != 1.0)
+        self.free_gains || self.white_balance || self.gains.iter().any(|&gain| gain != Gain::ONE)
+    }
+
+    /// What a view's gain shows: one value, or one a channel where these differ or a fit moves each.
+    #[must_use]
+    pub fn gain_rows(&self, view: usize) -> Vec<(Channels, f64)> {
+        let Some(gain) = self.gains.get(view) else { return Vec::new() };
+        match gain.scalar().filter(|_| !self.white_balance) {
+            Some(factor) => vec![(Channels::Tied, factor)],
+            None => [0, 1, 2].map(|c| (Channels::One(c), gain.channel(c))).to_vec(),
+        }
     }
 
     /// Say whether a fit moves a parameter: in each channel where it shows a value for each.

@@ -74,7 +74,7 @@ fn point() -> Point {
     let mut params = params();
     params.set_rgb(weight(), [0.9, 0.6, 0.4]);
     params.set(f0(), 0.07);
-    Point { params, gains: vec![1.0] }
+    Point { params, gains: vec![1.0.into()] }
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

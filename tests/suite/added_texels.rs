@@ -394,7 +394,7 @@ mod over_stored_texels {
     fn at(scene: &Scene, set: &[(Param, f64)]) -> Point {
         let mut params = scene.params.clone();
         set.iter().for_each(|&(param, value)| params.set(param, value));
-        Point { params, gains: vec![1.0] }
+        Point { params, gains: vec![1.0.into()] }
     }
 
     fn parameters() -> [Param; 4] {

@@ -13,7 +13,7 @@ use skinfit::model::cube::{Cube, texel_direction};
 use skinfit::model::effects::{Effect, Effects, Form, Silhouette};
 use skinfit::model::evaluate::Setup;
 use skinfit::model::fragment::Fragment;
-use skinfit::model::params::{Column, Param, Params};
+use skinfit::model::params::{Channels, Column, Param, Params};
 use skinfit::samples::rows::{Row, Rows};
 use skinfit::samples::surface_records::Asked;
 use skinfit::samples::{LANES, SurfaceRecords, ViewSamples};
@@ -128,7 +128,7 @@ pub(crate) fn all_unknowns(gains: usize) -> Vec<Unknown> {
         Param::RimWeight => Column::per_channel(p).to_vec(),
         _ => vec![Column::tied(p)],
     });
-    columns.map(Unknown::Param).chain((1..gains).map(Unknown::Gain)).collect()
+    columns.map(Unknown::Param).chain((1..gains).map(|view| Unknown::Gain(view, Channels::Tied))).collect()
 }
 
 /// f32 evaluation of a few hundred roundings, of either sign, against f64: 1e-5 of the largest entry
@@ -208,7 +208,7 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
         for silhouette in Silhouette::ALL {
             for &effects in &sets {
                 let setup = Setup::new(form, silhouette, effects);
-                let point = Point { params: params(), gains: vec![1.0, 1.2] };
+                let point = Point { params: params(), gains: vec![1.0.into(), 1.2.into()] };
                 let plain = Reference::new(setup, &light, &views, Loss::L2, &unknowns).unwrap();
                 let got = engine(setup, &views, Loss::L2, &unknowns, true).normal_equations(&point);
                 let what = format!("{form:?} {silhouette:?} {effects:?}");
@@ -223,7 +223,7 @@ fn any_subset_of_free_parameters_keeps_the_same_answers() {
     let views = [view(7, 3)];
     let light = illumination();
     let all = all_unknowns(1);
-    let point = Point { params: params(), gains: vec![1.0] };
+    let point = Point { params: params(), gains: vec![1.0.into()] };
     for silhouette in [Silhouette::Fragment, Silhouette::Bumped] {
         let setup = Setup::new(Form::Corrected, silhouette, EVERYTHING);
         // Each lookup parameter alone beside the linear ones, none of them, and every unknown alone.
@@ -299,10 +299,10 @@ fn plans_that_are_compiled_ahead_say_what_the_rules_say() {
             let moves = |u: &Unknown| matches!(u, Unknown::Param(c) if moving.contains(&c.param));
             let unknowns: Vec<Unknown> = all_unknowns(2)
                 .into_iter()
-                .filter(|u| weights(u) || moves(u) || matches!(u, Unknown::Gain(_)))
+                .filter(|u| weights(u) || moves(u) || matches!(u, Unknown::Gain(..)))
                 .collect();
             for loss in [Loss::L2, Loss::RelativeL2] {
-                let mut point = Point { params: params(), gains: vec![1.0, 1.2] };
+                let mut point = Point { params: params(), gains: vec![1.0.into(), 1.2.into()] };
                 let turned = moving.contains(&Param::EnvironmentRotation);
                 point.params.set(Param::EnvironmentRotation, if turned { 20.0 } else { 0.0 });
                 let what = format!("{setup:?} {moving:?} {loss:?}");
@@ -347,7 +347,7 @@ fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
     views[0].clip = Some(skinfit::scene::view::Clip { low: 0.1, high: 1.5 });
     let unknowns = all_unknowns(1);
     let setup = Setup::new(Form::Corrected, Silhouette::Bumped, EVERYTHING);
-    let point = Point { params: params(), gains: vec![0.9] };
+    let point = Point { params: params(), gains: vec![0.9.into()] };
     for loss in Loss::ALL {
         let plain = Reference::new(setup, &light, &views, loss, &unknowns).unwrap().normal_equations(&point);
         let engine = engine(setup, &views, loss, &unknowns, true);
@@ -363,7 +363,7 @@ fn what_roundings_may_do_to_a_robust_loss_is_known() {
     let light = illumination();
     let unknowns = [Param::BaseWeight, Param::RimWeight, Param::Hilite, Param::RimExponent]
         .map(|param| Unknown::Param(Column::tied(param)));
-    let mut point = Point { params: params(), gains: vec![1.0] };
+    let mut point = Point { params: params(), gains: vec![1.0.into()] };
     let image = engine(setup, &near, Loss::L2, &unknowns, true).image(0, &point);
     let mut rng = StdRng::seed_from_u64(15);
     for (channel, plane) in image.iter().enumerate() {
@@ -404,7 +404,7 @@ fn images_equal_the_plain_model() {
     let light = illumination();
     for form in Form::ALL {
         let setup = Setup::new(form, Silhouette::Bumped, EVERYTHING);
-        let point = Point { params: params(), gains: vec![1.5] };
+        let point = Point { params: params(), gains: vec![1.5.into()] };
         let plain = Reference::new(setup, &light, &views, Loss::L2, &[]).unwrap();
         let image = engine(setup, &views, Loss::L2, &[], true).image(0, &point);
         for slot in 0..views[0].samples.groups() * LANES {
@@ -424,7 +424,7 @@ fn sums_are_the_same_to_the_bit_for_any_number_of_threads() {
     let unknowns = all_unknowns(2);
     let setup = Setup::new(Form::Corrected, Silhouette::Bumped, EVERYTHING);
     let engine = engine(setup, &views, Loss::Huber, &unknowns, true);
-    let point = Point { params: params(), gains: vec![1.0, 1.1] };
+    let point = Point { params: params(), gains: vec![1.0.into(), 1.1.into()] };
     let with_threads = |n: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(n).build().unwrap();
         pool.install(|| (engine.normal_equations(&point), engine.gradient(&point)))
@@ -440,7 +440,7 @@ fn a_stride_reads_every_nth_block_of_pixels_and_no_other() {
     let whole = view(128, 8);
     let unknowns = all_unknowns(1);
     let setup = Setup::new(Form::Corrected, Silhouette::Fragment, EVERYTHING);
-    let point = Point { params: params(), gains: vec![1.0] };
+    let point = Point { params: params(), gains: vec![1.0.into()] };
     let groups = whole.samples.groups();
     let mut coarse = engine(setup, std::slice::from_ref(&whole), Loss::L2, &unknowns, true);
     let full = coarse.normal_equations(&point);

@@ -8,6 +8,7 @@
 //! - `OnAdapter`: the engine on a graphics adapter
 //! - `Tensors`: the model on burn's tensors, with reverse-mode derivatives
 
+use skinfit::model::gain::Gain;
 use std::sync::Arc;
 
 use fearless_simd::Level;
@@ -39,7 +40,7 @@ use crate::witness::fragment::{
     Constants, Form, Lights as WitnessLights, Silhouette, Surface, Variant, shade,
 };
 use crate::witness::losses::Loss;
-use crate::witness::scene::{At, Pixel, Scene, Unknown, View};
+use crate::witness::scene::{At, Pixel, Scene, Unknown, View, gained};
 
 /// What an evaluator gives; what it has no means for is `None`.
 #[derive(Clone, Debug)]
@@ -189,21 +190,27 @@ fn params(constants: &Constants) -> Params {
 }
 
 fn point(at: &At) -> Point {
-    Point { params: params(&at.constants), gains: at.gains.clone() }
+    Point { params: params(&at.constants), gains: at.gains.iter().copied().map(Gain).collect() }
 }
 
 fn column(unknown: Unknown) -> Option<Column> {
     let (name, channels) = match unknown {
         Unknown::Tied(name) => (name, Channels::Tied),
         Unknown::Channel(name, c) => (name, Channels::One(c)),
-        Unknown::Gain(_) => return None,
+        Unknown::Gain(_) | Unknown::ChannelGain(..) => return None,
     };
     Some(Column { param: Param::from_name(name).unwrap(), channels })
 }
 
+/// The channel whose gain a channel has: alpha has green's.
+const fn alike(c: usize) -> usize {
+    if c < 3 { c } else { 1 }
+}
+
 fn unknowns_of(unknowns: &[Unknown]) -> Vec<engine::Unknown> {
     let of = |&unknown: &Unknown| match unknown {
-        Unknown::Gain(view) => engine::Unknown::Gain(view),
+        Unknown::Gain(view) => engine::Unknown::Gain(view, Channels::Tied),
+        Unknown::ChannelGain(view, c) => engine::Unknown::Gain(view, Channels::One(c)),
         other => engine::Unknown::Param(column(other).unwrap()),
     };
     unknowns.iter().map(of).collect()
@@ -392,7 +399,7 @@ impl Evaluator for Plain {
         let (light, views, point) = (illumination(scene), all_observed(scene), point(at));
         let plain = Reference::new(setup(scene), &light, &views, scene::Loss::L2, &[]).unwrap();
         let pixel = |view: usize, slot: usize| {
-            plain.pixel(view, slot, &point.params).map(|(value, _)| point.gains[view] * value)
+            gained(plain.pixel(view, slot, &point.params).map(|(value, _)| value), point.gains[view].0)
         };
         let image = |(v, view): (usize, &View)| (0..view.pixels.len()).map(|slot| pixel(v, slot)).collect();
         scene.views.iter().enumerate().map(image).collect()
@@ -515,9 +522,11 @@ fn means<R: Number>(fragments: &Fragments<'_, R>, like: R, pixels: &[Pixel]) -> 
 fn image_in<R: Number>(like: R, scene: &Scene, at: &At) -> Vec<Vec<[f64; 4]>> {
     let cubes = number_cubes::<R>(scene, at);
     let fragments = Fragments::new(setup(scene), &cubes, &params(&at.constants), &Wanted::default(), like);
-    let view = |(view, gain): (&View, &f64)| {
+    let view = |(view, gain): (&View, &[f64; 3])| {
+        let gain = gained([1.0; 4], *gain);
         let chunk = |pixels: &[Pixel]| {
-            let light = means(&fragments, like, pixels)[0].map(|x| (like.lit(*gain) * x).unpack());
+            let means = means(&fragments, like, pixels)[0];
+            let light = [0, 1, 2, 3].map(|c| (like.lit(gain[c]) * means[c]).unpack());
             (0..pixels.len()).map(|i| [0, 1, 2, 3].map(|c| light[c][i])).collect::<Vec<_>>()
         };
         view.pixels.chunks(R::COUNT).flat_map(chunk).collect()
@@ -540,7 +549,7 @@ fn equations_in<R: Number>(like: R, scene: &Scene, at: &At, unknowns: &[Unknown]
     let (mut loss, mut weights, mut square) = (0.0, 0.0, 0.0);
     let (mut jtr, mut jtj) = (vec![0.0; k], vec![0.0; k * k]);
     for (v, view) in scene.views.iter().enumerate() {
-        let gain = like.lit(at.gains[v]);
+        let gain = gained([1.0; 4], at.gains[v]).map(|factor| like.lit(factor));
         for pixels in view.pixels.chunks(R::COUNT) {
             let means = means(&fragments, like, pixels);
             let (value, moved) = (means[0], &means[1..]);
@@ -548,13 +557,16 @@ fn equations_in<R: Number>(like: R, scene: &Scene, at: &At, unknowns: &[Unknown]
                 .iter()
                 .map(|&unknown| match unknown {
                     Unknown::Gain(of) if of == v => value,
-                    Unknown::Gain(_) => [like.lit(0.0); 4],
+                    Unknown::ChannelGain(of, own) if of == v => {
+                        std::array::from_fn(|c| if alike(c) == own { value[c] } else { like.lit(0.0) })
+                    }
+                    Unknown::Gain(_) | Unknown::ChannelGain(..) => [like.lit(0.0); 4],
                     other => {
                         let Column { param, channels } = column(other).unwrap();
                         let all = moved[wanted.free.iter().position(|&free| free == param).unwrap()];
                         // Alpha has no channels of its own.
                         let own = |c: usize| c == 3 || channels.includes(c);
-                        std::array::from_fn(|c| if own(c) { gain * all[c] } else { like.lit(0.0) })
+                        std::array::from_fn(|c| if own(c) { gain[c] * all[c] } else { like.lit(0.0) })
                     }
                 })
                 .collect();
@@ -565,7 +577,7 @@ fn equations_in<R: Number>(like: R, scene: &Scene, at: &At, unknowns: &[Unknown]
             for c in 0..4 {
                 let target = lanes(&|pixel| pixel.target[c]);
                 let clip = view.clip.map(clip_of);
-                let row = residuals.weigh(clip, gain * value[c], target, weight);
+                let row = residuals.weigh(clip, gain[c] * value[c], target, weight);
                 let (scale, residual) = (row.scale.unpack(), row.residual.unpack());
                 let slopes: Vec<Vec<f64>> = slopes.iter().map(|slope| slope[c].unpack()).collect();
                 loss += row.loss.unpack().iter().sum::<f64>();
@@ -675,6 +687,7 @@ mod tensors {
         At, Evaluator, Found, Scene, Unknown, Width, all_observed, clip_of, column, illumination, params,
         residuals, setup,
     };
+    use super::{alike, gained};
 
     /// The model on burn's tensors: reverse mode, so that there is no J^T J.
     pub(super) struct Tensors(pub(super) &'static SharedDevice);
@@ -740,7 +753,7 @@ mod tensors {
             image
                 .iter_mut()
                 .zip(&at.gains)
-                .for_each(|(view, gain)| view.iter_mut().flatten().for_each(|x| *x *= gain));
+                .for_each(|(view, &gain)| view.iter_mut().for_each(|pixel| *pixel = gained(*pixel, gain)));
             image
         }
 
@@ -751,18 +764,19 @@ mod tensors {
             let image = Self::unscaled(scene, &shade, &inputs);
             let residuals = residuals(scene.loss);
             let (mut loss, mut weights, mut adjoint) = (0.0, 0.0, Vec::new());
-            let mut by_gain = vec![0.0; scene.views.len()];
+            let mut by_gain = vec![[0.0; 3]; scene.views.len()];
             for (v, view) in scene.views.iter().enumerate() {
+                let gain = gained([1.0; 4], at.gains[v]);
                 for (pixel, shown) in view.pixels.iter().zip(&image[v]) {
                     for c in 0..4 {
-                        let (model, target) = (at.gains[v] * shown[c], pixel.target[c]);
+                        let (model, target) = (gain[c] * shown[c], pixel.target[c]);
                         let clip = view.clip.map(clip_of);
                         let row = residuals.weigh(clip, model, target, pixel.weight);
                         let slope = 2.0 * row.scale * row.residual;
                         loss += row.loss;
                         weights += pixel.weight;
-                        by_gain[v] += slope * shown[c];
-                        adjoint.push(slope * at.gains[v]);
+                        by_gain[v][alike(c)] += slope * shown[c];
+                        adjoint.push(slope * gain[c]);
                     }
                 }
                 adjoint.resize(adjoint.len().next_multiple_of(4 * LANES), 0.0);
@@ -782,7 +796,8 @@ mod tensors {
             let by_lobe: f64 = by_texel.iter().zip(moving).map(|(a, b)| a * b).sum();
             assert_eq!(by_column.len(), columns.len());
             let gradient = unknowns.iter().enumerate().map(|(i, &unknown)| match unknown {
-                Unknown::Gain(view) => by_gain[view] / weights,
+                Unknown::Gain(view) => by_gain[view].iter().sum::<f64>() / weights,
+                Unknown::ChannelGain(view, c) => by_gain[view][c] / weights,
                 Unknown::Tied("specular_lobe") => by_lobe,
                 _ => of
                     .iter()

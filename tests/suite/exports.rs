@@ -345,7 +345,7 @@ fn exports_that_no_compiler_here_takes_are_as_they_were_when_read() {
 
 /// Constants of the paper's fragment program, fitted to two views.
 fn constants(target: Target, params: &Params) -> String {
-    let gains = [("front".to_owned(), 1.0), ("side.2".to_owned(), 0.1 + 0.2)];
+    let gains = [("front".to_owned(), 1.0.into()), ("side.2".to_owned(), (0.1 + 0.2).into())];
     let loss = Some("relative_l2");
     let constants =
         Constants { form: Form::Corrected, effects: Effects::SURFACE, params, loss, gains: &gains };
@@ -386,7 +386,7 @@ fn constants_as_toml_are_a_file_of_parameters() {
     // To the bit.
     assert_eq!((file.params, file.form, file.effects), (params, Form::Corrected, Some(Effects::SURFACE)));
     assert_eq!(file.loss.map(skinfit::scene::Loss::name), Some("relative_l2"));
-    assert_eq!(file.gains, [("front".to_owned(), 1.0), ("side.2".to_owned(), 0.1 + 0.2)]);
+    assert_eq!(file.gains, [("front".to_owned(), 1.0.into()), ("side.2".to_owned(), (0.1 + 0.2).into())]);
 }
 
 #[test]

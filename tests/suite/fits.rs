@@ -14,7 +14,7 @@ use rand::{RngExt, SeedableRng};
 use skinfit::engine::{Objective, Point, Unknown};
 use skinfit::fit::outcome::{Ending, Outcome};
 use skinfit::fit::{FitOptions, SolverKind, Tolerances, fit};
-use skinfit::model::params::{Column, Param};
+use skinfit::model::params::{Channels, Column, Param};
 use skinfit::scene::Loss;
 
 /// Fit with the defaults.
@@ -84,18 +84,18 @@ fn per_channel_weights_and_gains_come_back_too() {
         .flat_map(Column::per_channel)
         .map(Unknown::Param)
         .collect();
-    unknowns.extend([tied(Param::RimExponent), tied(Param::Occlusion), Unknown::Gain(1)]);
+    unknowns.extend([tied(Param::RimExponent), tied(Param::Occlusion), Unknown::Gain(1, Channels::Tied)]);
     let mut truth = truth();
     truth.params.set_rgb(Param::BaseWeight, [0.9, 0.6, 0.5]);
     truth.params.set_rgb(Param::Hilite, [0.7, 0.2, 0.1]);
-    truth.gains[1] = 1.7;
+    truth.gains[1] = 1.7.into();
     let image = Image::new(300, &truth).with(&unknowns);
     let mut start = truth.clone();
     start.params.set(Param::BaseWeight, 1.0);
     start.params.set(Param::Hilite, 0.5);
     start.params.set(Param::RimExponent, 2.0);
     start.params.set(Param::Occlusion, 0.3);
-    start.gains[1] = 1.0;
+    start.gains[1] = 1.0.into();
     for solver in [SolverKind::Varpro, SolverKind::Lm] {
         let outcome = run(&image, &start, solver);
         // As above.

@@ -170,6 +170,7 @@ pub(crate) fn bare_scene(effects: Effects) -> Scene {
         params: Params::defaults(Form::Corrected),
         views: Vec::new(),
         fit: FitSettings {
+            white_balance: false,
             free: Vec::new(),
             loss: Loss::L2,
             free_gains: false,

@@ -24,7 +24,7 @@ const LEVELS: f64 = 2e-6;
 
 /// The point that the engines are asked at.
 fn point() -> Point {
-    Point { params: params(), gains: vec![1.0, 1.2] }
+    Point { params: params(), gains: vec![1.0.into(), 1.2.into()] }
 }
 
 /// The greatest difference of two engines' sums, as a share of what its entry is summed of.
@@ -111,7 +111,7 @@ fn every_level_shows_the_plain_models_image() {
     let light = illumination();
     for form in Form::ALL {
         let setup = Setup::new(form, Silhouette::Bumped, EVERYTHING);
-        let point = Point { params: params(), gains: vec![1.5] };
+        let point = Point { params: params(), gains: vec![1.5.into()] };
         let plain = Reference::new(setup, &light, &views, Loss::L2, &[]).unwrap();
         for level in levels() {
             let mut engine = engine(setup, &views, Loss::L2, &[], true);
@@ -151,7 +151,7 @@ fn fits_end_at_the_same_constants_whatever_instructions_ran() {
     let mut views = [view(120, 35)];
     let setup = Setup::new(Form::Corrected, Silhouette::Fragment, EVERYTHING);
     let unknowns = all_unknowns(1);
-    let truth = Point { params: params(), gains: vec![1.0] };
+    let truth = Point { params: params(), gains: vec![1.0.into()] };
     // Targets that the model does not meet, so that a loss is left.
     let image = engine(setup, &views, Loss::L2, &unknowns, true).image(0, &truth);
     for (channel, plane) in image.iter().enumerate() {

@@ -23,13 +23,13 @@ fn views_without_a_target_take_no_part_and_a_warning_names_each() {
     let (folder, options) = quad();
     let mut loaded = Loaded::read(&folder.path("scene.toml"), &options).unwrap();
     loaded.scene.views[0].target = None;
-    loaded.gains[0] = 0.5;
+    loaded.gains[0] = 0.5.into();
     let sampled = loaded.bake().unwrap().sample().unwrap();
     assert_eq!(sampled.samples.len(), 2);
     let observed = sampled.clone().observe().unwrap();
     let [view] = &observed.scene.views[..] else { panic!("{} views", observed.scene.views.len()) };
     assert_eq!((view.name.as_str(), observed.views.len()), ("other", 1));
-    assert_eq!(observed.gains, [1.0]);
+    assert_eq!(observed.gains, [1.0.into()]);
     let warning = observed.warnings.last().unwrap();
     assert!(warning.ends_with("view \"front\" has no target and takes no part in the fit."), "{warning}");
     // What it was made of is as it was.

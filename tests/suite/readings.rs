@@ -58,7 +58,7 @@ fn shown(scene: &Scene) -> Vec<[f32; 3]> {
         unknowns: Vec::new(),
     };
     let engine = CpuEngine::new(task).unwrap();
-    let planes = engine.image(0, &Point { params: scene.params.clone(), gains: vec![1.0] });
+    let planes = engine.image(0, &Point { params: scene.params.clone(), gains: vec![1.0.into()] });
     there.into_iter().map(|slot| [0, 1, 2].map(|c| planes[c][slot])).collect()
 }
 

@@ -10,7 +10,7 @@ use skinfit::fit::outcome::{Direction, Ending, Iteration, Outcome, UnknownOutcom
 use skinfit::fit::profile::{Profile, ProfilePoint};
 use skinfit::fit::sandwich::Blocks;
 use skinfit::model::effects::Form;
-use skinfit::model::params::{Column, Param, Params};
+use skinfit::model::params::{Channels, Column, Param, Params};
 use skinfit::render::files::Image;
 use skinfit::render::places::Places;
 use skinfit::report::{ReportError, RunInfo, StageSeconds, ViewEvidence, write_run};
@@ -106,7 +106,7 @@ fn run_of(side: usize) -> RunInfo {
 
 /// A fit with every kind of unknown: tied, per channel, logarithmic, at a bound, undetermined, gain.
 fn outcome() -> Outcome {
-    let start = Point { params: Params::defaults(Form::Corrected), gains: vec![1.0; 2] };
+    let start = Point { params: Params::defaults(Form::Corrected), gains: vec![1.0.into(); 2] };
     let mut end = start.clone();
     let [red, green, blue] = Column::per_channel(Param::BaseWeight).map(Unknown::Param);
     let tied = |param| Unknown::Param(Column::tied(param));
@@ -120,7 +120,7 @@ fn outcome() -> Outcome {
         (tied(Param::Reflection), 0.02, None),
         (tied(Param::Occlusion), 0.811, Some(0.012)),
         (tied(Param::SpecularLobe), 210.0, Some(31.0)),
-        (Unknown::Gain(1), 1.07, Some(0.004)),
+        (Unknown::Gain(1, Channels::Tied), 1.07, Some(0.004)),
     ];
     let unknowns: Vec<UnknownOutcome> = known
         .into_iter()

@@ -57,6 +57,7 @@ fn keys_of_a_scene_do_what_they_say() {
         "[fit]\nfree = [\"base_weight\", \"hilite\"]\nper_channel = [\"base_weight\"]\ngains = true\nloss = \"huber\"",
     );
     assert_eq!((free.fit.free.len(), free.fit.free_gains, free.fit.loss), (4, true, Loss::Huber));
+    assert!(!free.fit.white_balance && edit("[fit]", "[fit]\nwhite_balance = true").fit.white_balance);
     assert_eq!(edit("[quality]", "[quality]\nsamples_per_axis = 3").quality.samples_per_axis, 3);
     let masked = edit("[fit]", "mask = \"mask.png\"\n[fit]");
     assert_eq!(masked.views[0].target.as_ref().unwrap().mask.as_ref().unwrap()[0], 1.0);
@@ -341,6 +342,25 @@ fn eight_bit_targets_are_decoded_premultiplied_and_known_to_clip() {
     // Half a code on the linear toe; and half a code below white, where the slope is 2.4 / 1.055.
     assert!((clip.low - 0.5 / 255.0 / 12.92).abs() < 1e-9);
     assert!((clip.high - (1.0 - 2.4 / 1.055 * 0.5 / 255.0)).abs() < 2e-5, "{}", clip.high);
+}
+
+#[test]
+fn a_views_response_says_how_much_light_a_code_is() {
+    let scene_folder = SceneFolder::new();
+    let codes = RgbaImage::from_pixel(4, 4, Rgba([255, 51, 0, 255]));
+    scene_folder.write("target.exr", &encode(codes, ImageFormat::Png));
+    scene_folder.write("response.csv", b"0,0,0\n2,1,0\n4,8,2\n");
+    let target = |response: &str| {
+        let (scene, warnings) =
+            scene_folder.edited("[fit]", &format!("response = {response}\n[fit]")).unwrap();
+        assert_eq!(warnings, []);
+        scene.views[0].target.clone().unwrap()
+    };
+    let linear = target("1");
+    assert_eq!((linear.rgb[0], linear.clipped_at.unwrap().low), ([1.0, 0.2, 0.0], (0.5 / 255.0) as f32));
+    assert_eq!(target("2.0").rgb[0], [1.0, (0.2_f64 * 0.2) as f32, 0.0]);
+    // Between the first two of three rows, and as shares of the brightest.
+    assert_eq!(target("\"response.csv\"").rgb[0], [0.5, (0.4_f64 / 8.0) as f32, 0.0]);
 }
 
 #[test]

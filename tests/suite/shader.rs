@@ -168,7 +168,7 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
             .filter(tied)
             .map(|p| Unknown::Param(Column::tied(p)))
             .chain(green)
-            .chain([Unknown::Gain(1)])
+            .chain([Unknown::Gain(1, Channels::Tied)])
             .collect();
         let held = |u: &Unknown| !matches!(u, Unknown::Param(c) if lookups.contains(&c.param));
         let kept: Vec<Unknown> = all.iter().copied().filter(held).collect();

@@ -45,7 +45,7 @@ fn engine(view: ObservedView, fits: bool) -> Result<CpuEngine> {
 }
 
 fn point(values: &[f64]) -> Result<Point> {
-    Ok(Point { params: data::params(values)?, gains: vec![1.0] })
+    Ok(Point { params: data::params(values)?, gains: vec![1.0.into()] })
 }
 
 /// Points so near one another that nothing changes but what is kept: no pass may find what the one before has left.

@@ -33,8 +33,12 @@ pub fn label(
     view: impl FnOnce(usize) -> Option<String>,
 ) -> String {
     let number = |text: &str| text.parse::<usize>().ok();
-    if let Some(view) = name.strip_prefix("gain.").and_then(number).and_then(view) {
-        return format!("gain.{view}");
+    if let Some(of_view) = name.strip_prefix("gain.") {
+        let (at, channel) =
+            of_view.split_once('.').map_or((of_view, ""), |(at, _)| (at, &of_view[at.len()..]));
+        if let Some(view) = number(at).and_then(view) {
+            return format!("gain.{view}{channel}");
+        }
     }
     let own = name.split_once('/').and_then(|(at, own)| Some((scene(number(at)?)?, own)));
     own.map_or_else(|| name.to_owned(), |(scene, own)| format!("{scene}/{own}"))
@@ -72,7 +76,7 @@ impl Joint {
                 Unknown::Param(column) if several && column.param.is_of_scene() => {
                     Unknown::Own(scene, column)
                 }
-                Unknown::Gain(view) => Unknown::Gain(views + view),
+                Unknown::Gain(view, channels) => Unknown::Gain(views + view, channels),
                 other => other,
             };
             of_scenes.push(engine.unknowns().iter().map(joint).collect());
@@ -83,7 +87,7 @@ impl Joint {
         let rank = |unknown: &Unknown| match unknown {
             Unknown::Param(_) => 0,
             Unknown::Own(..) => 1,
-            Unknown::Gain(_) => 2,
+            Unknown::Gain(..) => 2,
         };
         let mut unknowns: Vec<Unknown> = Vec::new();
         for unknown in of_scenes.iter().flatten() {

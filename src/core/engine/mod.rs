@@ -29,7 +29,8 @@ use std::sync::Arc;
 
 pub use self::task::Task;
 use self::view::ObservedView;
-use crate::model::params::{Column, Params};
+use crate::model::gain::Gain;
+use crate::model::params::{Channels, Column, Params};
 
 /// Groups of a block of pixels: a coarse pass reads every so-many-th block.
 pub const BLOCK: usize = 16;
@@ -167,8 +168,8 @@ pub enum Unknown {
     Param(Column),
     /// The same in one scene alone, by its number, of several that are fitted as one skin.
     Own(usize, Column),
-    /// The gain of a view, by its index.
-    Gain(usize),
+    /// The gain of a view, by its index, or one channel of it.
+    Gain(usize, Channels),
 }
 
 /// Where an objective is evaluated.
@@ -177,7 +178,7 @@ pub struct Point {
     /// The model's parameters.
     pub params: Params,
     /// A factor on each view's image.
-    pub gains: Vec<f64>,
+    pub gains: Vec<Gain>,
 }
 
 impl Unknown {
@@ -186,7 +187,7 @@ impl Unknown {
     pub const fn column(&self) -> Option<Column> {
         match self {
             Self::Param(column) | Self::Own(_, column) => Some(*column),
-            Self::Gain(_) => None,
+            Self::Gain(..) => None,
         }
     }
 
@@ -196,7 +197,7 @@ impl Unknown {
         match self {
             Self::Param(column) => column.get(&point.params),
             Self::Own(scene, column) => column.get_in(*scene, &point.params),
-            Self::Gain(view) => point.gains[*view],
+            Self::Gain(view, channels) => channels.of(point.gains[*view].0),
         }
     }
 
@@ -205,8 +206,18 @@ impl Unknown {
         match self {
             Self::Param(column) => column.set(&mut point.params, value),
             Self::Own(scene, column) => column.set_in(*scene, &mut point.params, value),
-            Self::Gain(view) => point.gains[*view] = value,
+            Self::Gain(view, channels) => {
+                let Gain(rgb) = point.gains[*view];
+                point.gains[*view] = Gain(channels.with(rgb, value));
+            }
         }
+    }
+
+    /// Whether it moves the gain of a view's channel; what stands after the colours is exposed as green is.
+    #[must_use]
+    pub fn is_gain_of(&self, view: usize, channel: usize) -> bool {
+        let channel = if channel < 3 { channel } else { 1 };
+        matches!(self, Self::Gain(of, channels) if *of == view && channels.includes(channel))
     }
 
     /// Least and greatest allowed value.
@@ -217,7 +228,7 @@ impl Unknown {
                 (column.param.info().lower, column.param.info().upper)
             }
             // A gain of 0 would explain any image by darkness.
-            Self::Gain(_) => (1e-3, 1e3),
+            Self::Gain(..) => (1e-3, 1e3),
         }
     }
 
@@ -226,17 +237,17 @@ impl Unknown {
     pub fn linear(&self) -> bool {
         match self {
             Self::Param(column) | Self::Own(_, column) => column.param.info().linear,
-            Self::Gain(_) => false,
+            Self::Gain(..) => false,
         }
     }
 
-    /// The name in reports: scenes and views by their numbers, as `1/environment_rotation` and `gain.2`.
+    /// The name in reports: scenes and views by their numbers, as `1/environment_rotation` and `gain.2`, of a channel `gain.2.r`.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
             Self::Param(column) => column.name(),
             Self::Own(scene, column) => format!("{scene}/{}", column.name()),
-            Self::Gain(view) => format!("gain.{view}"),
+            Self::Gain(view, channels) => format!("gain.{view}{}", channels.suffix()),
         }
     }
 }

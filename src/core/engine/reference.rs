@@ -11,6 +11,7 @@ use super::{HALF_UNIT, NormalEquations, Objective, Point, Unknown};
 use crate::bake::Illumination;
 use crate::model::batch::Batch;
 use crate::model::evaluate::Setup;
+use crate::model::gain::Gain;
 use crate::model::params::{Param, Params};
 use crate::program::lower::Natives;
 use crate::program::shading::{Shading, ShadingError};
@@ -207,15 +208,16 @@ impl<'a> Reference<'a> {
         &self,
         (view, slot): (usize, usize),
         pixel: PixelColumns,
-        gain: f64,
+        gain: Gain,
         (sums, moved): &mut (NormalEquations, Vec<f64>),
     ) {
         let (k, observed) = (self.unknowns.len(), &self.views[view]);
         let weight = f64::from(observed.pixel_weight(slot));
         for (c, (value, mut row)) in pixel.into_iter().enumerate().take(observed.target.stride()) {
             let target = f64::from(observed.target.number(c, slot));
+            let gain = gain.channel(c);
             row.iter_mut().for_each(|x| *x *= gain);
-            if let Some(g) = self.unknowns.iter().position(|u| *u == Unknown::Gain(view)) {
+            if let Some(g) = self.unknowns.iter().position(|unknown| unknown.is_gain_of(view, c)) {
                 row[g] = value;
             }
             let model = gain * value;

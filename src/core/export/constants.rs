@@ -7,8 +7,9 @@ use serde_json::{Map, Value, json};
 use super::names::PREFIX;
 use super::target::Target;
 use super::{Constants, Provenance, names};
-use crate::fit::params_file::quoted;
+use crate::fit::params_file::{quoted, value as rgb_value};
 use crate::model::effects::Effect;
+use crate::model::gain::Gain;
 use crate::model::params::{Param, Params};
 
 /// The constants that their effects read.
@@ -61,7 +62,7 @@ fn gains(constants: Constants<'_>) -> String {
     if constants.gains.is_empty() {
         return String::new();
     }
-    let gain = |(view, gain): &(String, f64)| format!("{} = {gain:?}\n", quoted(view));
+    let gain = |(view, Gain(rgb)): &(String, Gain)| format!("{} = {}\n", quoted(view), rgb_value(*rgb));
     format!("\n[gains]\n{}", constants.gains.iter().map(gain).collect::<String>())
 }
 

@@ -30,6 +30,7 @@ pub use provenance::Provenance;
 pub use target::Target;
 
 use crate::model::effects::{Effects, Form};
+use crate::model::gain::Gain;
 use crate::model::params::Params;
 use crate::shader::{Budget, Facts, PlanError};
 
@@ -92,7 +93,7 @@ pub struct Constants<'a> {
     /// The name of the loss that they minimise, where it is known.
     pub loss: Option<&'a str>,
     /// The factor on each view's image, by the view's name.
-    pub gains: &'a [(String, f64)],
+    pub gains: &'a [(String, Gain)],
 }
 
 impl<'a> Constants<'a> {

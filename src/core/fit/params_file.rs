@@ -13,6 +13,7 @@
 //!
 //! [gains]
 //! front = 1.0
+//! left = [1.1, 1.0, 0.9]          # of each channel: its white balance too
 //! ```
 //!
 //! Of several scenes that were fitted as one skin, `[params]` holds the skin's values alone, and what each scene has of its
@@ -44,6 +45,7 @@ use crate::engine::Unknown;
 use crate::files;
 use crate::fit::outcome::{Outcome, UnknownOutcome};
 use crate::model::effects::{Effect, Effects, Form};
+use crate::model::gain::Gain;
 use crate::model::params::{Channels, Param, Params};
 use crate::output::{self, OutputError};
 use crate::scene::names::names_of;
@@ -62,7 +64,7 @@ pub struct ParamsFile {
     /// The parameters.
     pub params: Params,
     /// A gain for each view, by its name, in the file's order.
-    pub gains: Vec<(String, f64)>,
+    pub gains: Vec<(String, Gain)>,
     /// What each of several scenes has of its own, in the order of their names.
     pub scenes: Vec<SceneValues>,
 }
@@ -77,7 +79,7 @@ pub struct SceneValues {
     /// Its parameters' values.
     pub params: Vec<(Param, [f64; 3])>,
     /// A gain for each of its views.
-    pub gains: Vec<(String, f64)>,
+    pub gains: Vec<(String, Gain)>,
 }
 
 /// Where the values of a `params.toml` come from, for its comments.
@@ -170,10 +172,9 @@ impl ParamsFile {
         if !self.gains.is_empty() {
             writeln!(text, "\n[gains]")?;
         }
-        for (view, (name, gain)) in self.gains.iter().enumerate() {
-            let line = format!("{} = {gain:?}", quoted(name));
-            let of_view = |unknown: &Unknown| (*unknown == Unknown::Gain(view)).then_some(0);
-            line_with_comment(text, &line, &comment(known, of_view))?;
+        for (view, (name, Gain(rgb))) in self.gains.iter().enumerate() {
+            let line = format!("{} = {}", quoted(name), value(*rgb));
+            line_with_comment(text, &line, &comment(known, |unknown| gain_channel(unknown, view)))?;
         }
         for (place, own) in self.scenes.iter().enumerate() {
             own.write_text(text, known, numbers.get(place).copied().flatten())?;
@@ -269,17 +270,16 @@ impl SceneValues {
             line_with_comment(text, &line, &comment(known, own))?;
         }
         writeln!(text, "\n[scenes.{name}.gains]")?;
-        for (view, (name, gain)) in self.gains.iter().enumerate() {
-            let line = format!("{} = {gain:?}", quoted(name));
-            let number = numbers.map(|(_, first)| Unknown::Gain(first + view));
-            let of_view = |unknown: &Unknown| (Some(*unknown) == number).then_some(0);
+        for (view, (name, Gain(rgb))) in self.gains.iter().enumerate() {
+            let line = format!("{} = {}", quoted(name), value(*rgb));
+            let of_view = |unknown: &Unknown| gain_channel(unknown, numbers?.1 + view);
             line_with_comment(text, &line, &comment(known, of_view))?;
         }
         Ok(())
     }
 }
 
-fn value(rgb: [f64; 3]) -> String {
+pub(crate) fn value(rgb: [f64; 3]) -> String {
     // `{:?}` writes the shortest decimal that reads back to the bit, and always as a float.
     if rgb[0] == rgb[1] && rgb[1] == rgb[2] { format!("{:?}", rgb[0]) } else { format!("{rgb:?}") }
 }
@@ -301,11 +301,24 @@ fn line_with_comment(text: &mut String, line: &str, comment: &str) -> std::fmt::
 /// The channel of `param` that an unknown moves; 0 for all of them.
 fn param_channel(unknown: &Unknown, param: Param) -> Option<usize> {
     match unknown {
-        Unknown::Param(column) if column.param == param => Some(match column.channels {
-            Channels::Tied => 0,
-            Channels::One(c) => c,
-        }),
+        Unknown::Param(column) if column.param == param => Some(first(column.channels)),
         _ => None,
+    }
+}
+
+/// The channel of a view's gain that an unknown moves.
+fn gain_channel(unknown: &Unknown, view: usize) -> Option<usize> {
+    match unknown {
+        Unknown::Gain(of, channels) if *of == view => Some(first(*channels)),
+        _ => None,
+    }
+}
+
+/// The first channel that is moved.
+const fn first(channels: Channels) -> usize {
+    match channels {
+        Channels::Tied => 0,
+        Channels::One(c) => c,
     }
 }
 
@@ -348,7 +361,10 @@ mod tests {
                 );
             }
             params.set_rgb(Param::Hilite, [0.1 + 0.2, 1e-17, 3e8]);
-            let gains = vec![("front \"left\"".to_owned(), 0.7), ("b\nc\u{7f}\u{1}".to_owned(), 1.0 / 3.0)];
+            let gains = vec![
+                ("front \"left\"".to_owned(), 0.7.into()),
+                ("b\nc\u{7f}\u{1}".to_owned(), Gain([1.0 / 3.0, 1.0, 1e-3])),
+            ];
             let effects = Some(Effects::SURFACE);
             let loss = Some(Loss::Huber);
             let file = ParamsFile { form, effects, loss, params, gains, scenes: Vec::new() };
@@ -371,7 +387,7 @@ mod tests {
             name: name.to_owned(),
             effects: (gain < 1.0).then_some(Effects::SURFACE.with(Effect::KeyLight)),
             params: vec![(Param::EnvironmentRotation, [turn; 3]), (Param::KeyColor, [0.1, 0.2, 0.3])],
-            gains: vec![("front".to_owned(), gain)],
+            gains: vec![("front".to_owned(), gain.into())],
         };
         let mut params = Params::defaults(form);
         params.set(Param::RimExponent, 3.3);
@@ -386,7 +402,10 @@ mod tests {
         assert!(shared.contains("rim_exponent") && !shared.contains("environment_rotation"), "{text}");
         let turn = |path: &str| {
             let file = read(&text, form).unwrap().of_scene(Path::new(path));
-            (file.params.scalar(Param::EnvironmentRotation), file.gains.first().map(|(_, gain)| *gain))
+            (
+                file.params.scalar(Param::EnvironmentRotation),
+                file.gains.first().and_then(|(_, gain)| gain.scalar()),
+            )
         };
         assert_eq!(turn("/d/noon.toml"), (-1.0 / 3.0, Some(0.7)));
         assert_eq!(turn("/noon/scene.toml"), (-1.0 / 3.0, Some(0.7)));
@@ -427,6 +446,8 @@ mod tests {
             ("colour = 1", "line 1", "unknown key `colour`"),
             ("[params]\nhilite = 1\nhilite = 2", "line 3", "not TOML"),
             ("[gains]\nfront = 0.0", "line 2", "outside its bounds"),
+            ("[gains]\nfront = [1.0, 0.0, 1.0]", "line 2", "outside its bounds"),
+            ("[gains]\nfront = [1.0, 1.0]", "line 2", "front takes a number or three: [r, g, b]"),
             ("params = 3", "line 1", "wrong kind"),
             ("[scenes]\nnoon = 3", "line 2", "wrong kind"),
             ("[scenes.noon]\nparam = 3", "line 2", "unknown key `param`"),

@@ -52,13 +52,14 @@ mod tests {
     use super::*;
     use crate::engine::Point;
     use crate::model::effects::Form;
-    use crate::model::params::{Column, Param, Params};
+    use crate::model::gain::Gain;
+    use crate::model::params::{Channels, Column, Param, Params};
 
     #[test]
     fn starts_are_within_bounds_differ_and_depend_on_seed_and_index_alone() {
         let mut unknowns: Vec<Unknown> = Param::all().map(|p| Unknown::Param(Column::tied(p))).collect();
-        unknowns.push(Unknown::Gain(0));
-        let origin = Point { params: Params::defaults(Form::Corrected), gains: vec![1.0] };
+        unknowns.push(Unknown::Gain(0, Channels::Tied));
+        let origin = Point { params: Params::defaults(Form::Corrected), gains: vec![Gain::ONE] };
         let coordinates = Coordinates::new(&unknowns, &origin);
         assert_eq!(coordinates.point(&draw(&coordinates, 9, 0)), origin);
         for index in 1..100 {

@@ -292,5 +292,5 @@ fn values(point: &Point) -> Vec<f64> {
     let own = point.params.own();
     let own = own.filter(|(_, param, rgb)| param.is_built_in() || *rgb != param.default_rgb(Form::Corrected));
     let own = own.flat_map(|(_, _, rgb)| rgb);
-    params.chain(point.gains.iter().copied()).chain(own).collect()
+    params.chain(point.gains.iter().flat_map(|gain| gain.0)).chain(own).collect()
 }

@@ -133,6 +133,7 @@ impl Shape {
 mod tests {
     use super::*;
     use crate::engine::Unknown;
+    use crate::model::params::Channels;
 
     #[test]
     fn values_stay_within_bounds_and_slopes_are_their_derivatives() {
@@ -151,7 +152,7 @@ mod tests {
             }
         }
         // A gain starts where it is, not at a share of its interval, which is a thousand wide.
-        let gain = Unknown::Gain(1).bounds();
+        let gain = Unknown::Gain(1, Channels::Tied).bounds();
         let gain = Shape::within(gain.0, gain.1);
         for inside in [0.01, 0.5, 1.0, 1.3, 50.0] {
             // The width, by which ratios are rounded, is a thousand times 1.

@@ -20,6 +20,34 @@ impl Channels {
             Self::One(channel) => channel == c,
         }
     }
+
+    /// What names end with: nothing, or `.r`, `.g` or `.b` of a channel by itself.
+    #[must_use]
+    pub fn suffix(self) -> &'static str {
+        match self {
+            Self::Tied => "",
+            Self::One(c) => [".r", ".g", ".b"][c],
+        }
+    }
+
+    /// Of three channels the value that is moved.
+    #[must_use]
+    pub const fn of(self, rgb: [f64; 3]) -> f64 {
+        match self {
+            Self::Tied => rgb[0],
+            Self::One(c) => rgb[c],
+        }
+    }
+
+    /// Three channels, with `value` where they are moved.
+    #[must_use]
+    pub const fn with(self, mut rgb: [f64; 3], value: f64) -> [f64; 3] {
+        match self {
+            Self::Tied => return [value; 3],
+            Self::One(c) => rgb[c] = value,
+        }
+        rgb
+    }
 }
 
 /// One free unknown of a fit: one column of the Jacobian.
@@ -47,48 +75,28 @@ impl Column {
     /// The name in reports: the parameter's, with `.r`, `.g` or `.b` when the channel is its own.
     #[must_use]
     pub fn name(&self) -> String {
-        match self.channels {
-            Channels::Tied => self.param.name().to_owned(),
-            Channels::One(c) => format!("{}.{}", self.param.name(), ["r", "g", "b"][c]),
-        }
+        format!("{}{}", self.param.name(), self.channels.suffix())
     }
 
     /// This column's value in `params`.
     #[must_use]
     pub fn get(&self, params: &Params) -> f64 {
-        self.of(params.rgb(self.param))
+        self.channels.of(params.rgb(self.param))
     }
 
     /// Set this column's value in `params`.
     pub fn set(&self, params: &mut Params, value: f64) {
-        params.set_rgb(self.param, self.with(params.rgb(self.param), value));
+        params.set_rgb(self.param, self.channels.with(params.rgb(self.param), value));
     }
 
     /// This column's value in one scene of several.
     #[must_use]
     pub fn get_in(&self, scene: usize, params: &Params) -> f64 {
-        self.of(params.rgb_in(scene, self.param))
+        self.channels.of(params.rgb_in(scene, self.param))
     }
 
     /// Set this column's value in one scene of several alone.
     pub fn set_in(&self, scene: usize, params: &mut Params, value: f64) {
-        params.set_rgb_in(scene, self.param, self.with(params.rgb_in(scene, self.param), value));
-    }
-
-    /// Of a parameter's channels the value that it moves.
-    fn of(&self, rgb: [f64; 3]) -> f64 {
-        match self.channels {
-            Channels::Tied => rgb[0],
-            Channels::One(c) => rgb[c],
-        }
-    }
-
-    /// A parameter's channels, with `value` where it moves them.
-    fn with(&self, mut rgb: [f64; 3], value: f64) -> [f64; 3] {
-        match self.channels {
-            Channels::Tied => rgb = [value; 3],
-            Channels::One(c) => rgb[c] = value,
-        }
-        rgb
+        params.set_rgb_in(scene, self.param, self.channels.with(params.rgb_in(scene, self.param), value));
     }
 }

@@ -10,7 +10,7 @@
 //! - [`evaluate`]: what is evaluated; [`dapple`]: where light falls through leaves from; [`key_light`]: where it stands;
 //!   [`bearing`]: directions as angles; [`mod@turn`]: how the environment is turned
 //! - [`shadow_filter`]: how a renderer finds shadows; [`texture_filter`]: how texture maps are filtered
-//! - [`fragment`]: a fragment as samples hold it
+//! - [`fragment`]: a fragment as samples hold it; [`gain`]: what a view's image is multiplied by
 //! - [`vertex`]: morphing, skinning and the frame of a vertex, of which meshes are posed
 //! - [`cube`]: cube maps and their seamless bilinear lookup
 //! - [`real`]: what is asked of a number (f32, f64, SIMD lanes); [`formats`]: number formats of graphics processors;
@@ -28,6 +28,7 @@ pub mod evaluate;
 pub mod fields;
 pub mod formats;
 pub mod fragment;
+pub mod gain;
 pub mod key_light;
 pub mod needs;
 pub mod params;

@@ -12,6 +12,8 @@ use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::Effects;
 use crate::model::evaluate::Setup;
+use crate::model::gain::Gain;
+use crate::model::params::Channels;
 use crate::samples::{self, SurfaceBakes, ViewSamples};
 use crate::scene::Scene;
 use crate::scene::view::View;
@@ -24,7 +26,7 @@ pub struct Baked {
     /// The effects that the parameter file's values were fitted with, where it says.
     pub fitted: Option<Effects>,
     /// A factor on each view's image.
-    pub gains: Vec<f64>,
+    pub gains: Vec<Gain>,
     /// The cubes that its effects ask for.
     pub illumination: Arc<Illumination>,
     /// Ambient occlusion, when asked for.
@@ -173,12 +175,21 @@ impl Baked {
         self.scene.setup()
     }
 
-    /// The unknowns of the scene's fit: free columns, then free gains.
+    /// The unknowns of the scene's fit: free columns, then free gains (of a view whose gain starts at three values, or with
+    /// its white balance, one a channel).
     #[must_use]
     pub fn unknowns(&self) -> Vec<Unknown> {
-        let gains = if self.scene.fit.free_gains { self.scene.views.len() } else { 0 };
-        let columns = self.scene.fit.free.iter().copied().map(Unknown::Param);
-        columns.chain((1..gains).map(Unknown::Gain)).collect()
+        let fit = &self.scene.fit;
+        let gains = |view: usize| -> Vec<Unknown> {
+            let alike = self.gains.get(view).copied().unwrap_or_default().scalar().is_some();
+            match (fit.free_gains, fit.white_balance) {
+                (false, false) => Vec::new(),
+                (true, false) if alike => vec![Unknown::Gain(view, Channels::Tied)],
+                _ => [0, 1, 2].map(|c| Unknown::Gain(view, Channels::One(c))).to_vec(),
+            }
+        };
+        let columns = fit.free.iter().copied().map(Unknown::Param);
+        columns.chain((1..self.scene.views.len()).flat_map(gains)).collect()
     }
 
     /// The scene's fit over other views than its own.

@@ -5,6 +5,7 @@ use web_time::Instant;
 use super::observed::beside;
 use super::{Baked, PrepareError, StageSeconds, silhouettes};
 use crate::engine::view::ObservedView;
+use crate::model::gain::Gain;
 use crate::samples;
 use crate::scene::Scene;
 use crate::scene::view::View;
@@ -15,7 +16,7 @@ pub struct HeldOut {
     /// The views; each has a target.
     pub views: Vec<View>,
     /// A factor on each view's image: as the fit found it, for nothing fits it.
-    pub gains: Vec<f64>,
+    pub gains: Vec<Gain>,
     /// Their samples and targets.
     pub observed: Vec<ObservedView>,
 }
@@ -41,7 +42,7 @@ impl Baked {
         let start = Instant::now();
         let mut held = HeldOut::default();
         let (mut gains, before) = (Vec::new(), std::mem::take(&mut self.gains));
-        let own = |i: usize| before.get(i).copied().unwrap_or(1.0);
+        let own = |i: usize| before.get(i).copied().unwrap_or_default();
         let mut baked = self.with_scene(|scene| {
             for (i, view) in std::mem::take(&mut scene.views).into_iter().enumerate() {
                 if marked.get(i) == Some(&true) {

@@ -7,6 +7,7 @@ use super::{Baked, ClipOcclusion, PrepareError, PrepareOptions, StageSeconds};
 use crate::bake::rays::any_can_be_hit;
 use crate::fit::params_file::ParamsFile;
 use crate::model::effects::Effects;
+use crate::model::gain::Gain;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::scene::load::LoadOptions;
 use crate::scene::{Assignment, Scene};
@@ -20,7 +21,7 @@ pub struct Loaded {
     /// The effects that the parameter file's values were fitted with, where it says.
     pub fitted: Option<Effects>,
     /// A factor on each view's image.
-    pub gains: Vec<f64>,
+    pub gains: Vec<Gain>,
     /// Seconds by stage so far.
     pub seconds: StageSeconds,
     /// What the user should know.
@@ -60,13 +61,13 @@ impl Loaded {
         let known: Vec<String> = scene.views.iter().map(|view| view.name.clone()).collect();
         options.views.choose(&mut scene)?;
         let mut warnings: Vec<String> = warnings.iter().map(ToString::to_string).collect();
-        let (mut gains, mut fitted) = (vec![1.0; scene.views.len()], None);
+        let (mut gains, mut fitted) = (vec![Gain::ONE; scene.views.len()], None);
         if let Some(path) = &options.params {
             let file = ParamsFile::read(path, scene.form, &scene.params)?.of_scene(&scene.path);
             (scene.params, fitted) = (file.params, file.effects);
             for (gain, view) in gains.iter_mut().zip(&scene.views) {
                 let given = file.gains.iter().find(|(name, _)| *name == view.name);
-                *gain = given.map_or(1.0, |&(_, gain)| gain);
+                *gain = given.map_or(Gain::ONE, |&(_, gain)| gain);
             }
             warnings.extend(unknown_gains(path, &file.gains, &known));
         }
@@ -123,7 +124,7 @@ fn check_area(scene: &Scene) -> Result<(), PrepareError> {
 }
 
 /// What is to be said of gains that no view of the scene has.
-fn unknown_gains(path: &Path, gains: &[(String, f64)], known: &[String]) -> Option<String> {
+fn unknown_gains(path: &Path, gains: &[(String, Gain)], known: &[String]) -> Option<String> {
     let unknown: Vec<&str> =
         gains.iter().map(|(name, _)| name.as_str()).filter(|name| !known.iter().any(|k| k == name)).collect();
     let (names, file) = (unknown.join(", "), path.display());

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::image::Image;
 use crate::bake::panorama::Radiance;
 use crate::model::effects::Effect;
+use crate::model::gain::Gain;
 use crate::model::params::{Param, Params};
 use crate::scene::Scene;
 use crate::scene::view::{Background, Camera};
@@ -61,22 +62,24 @@ impl Backdrop {
 
     /// The layer that it is of a picture: `gain` times what of it the mesh, of that coverage, leaves to be seen.
     #[must_use]
-    pub fn layer(&self, image: &Image, gain: f64) -> Image {
+    pub fn layer(&self, image: &Image, gain: impl Into<Gain>) -> Image {
+        let gain = gain.into();
         let mut layer = Image::new(image.width, image.height);
         let pixels = self.rgb.iter().zip(&image.alpha).zip(&mut layer.rgb).zip(&mut layer.alpha);
         for (((rgb, &coverage), shown), alpha) in pixels {
             *alpha = 1.0 - coverage;
-            let share = (gain * f64::from(*alpha)) as f32;
-            *shown = rgb.map(|c| share * c);
+            *shown = [0, 1, 2].map(|c| (gain.channel(c) * f64::from(*alpha)) as f32 * rgb[c]);
         }
         layer
     }
 
     /// Put it behind `image`, whose alpha is 1 everywhere then, and add to `glow` what of it blooms.
-    pub fn put_behind(&self, image: &mut Image, glow: &mut [[f32; 3]], gain: f64) {
-        let share = |coverage: f32| (gain * f64::from(1.0 - coverage)) as f32;
-        let add =
-            |to: &mut [f32; 3], what: &[f32; 3], share: f32| (0..3).for_each(|c| to[c] += share * what[c]);
+    pub fn put_behind(&self, image: &mut Image, glow: &mut [[f32; 3]], gain: impl Into<Gain>) {
+        let gain = gain.into();
+        let share = |coverage: f32| gain.0.map(|gain| (gain * f64::from(1.0 - coverage)) as f32);
+        let add = |to: &mut [f32; 3], what: &[f32; 3], share: [f32; 3]| {
+            (0..3).for_each(|c| to[c] += share[c] * what[c]);
+        };
         for ((to, what), &coverage) in glow.iter_mut().zip(&self.glow).zip(&image.alpha) {
             add(to, what, share(coverage));
         }

@@ -1,5 +1,6 @@
 //! Images in other number formats: the rules with every operation rounded.
 
+use crate::model::gain::Gain;
 use rayon::prelude::*;
 
 use super::image::Image;
@@ -68,7 +69,7 @@ impl FormatShader {
 
     /// The image of a view in numbers of `like`'s kind, times `gain`; means over a pixel's samples are exact.
     #[must_use]
-    pub fn shade<R>(&self, samples: &ViewSamples, camera: &Camera, gain: f64, like: R) -> Image
+    pub fn shade<R>(&self, samples: &ViewSamples, camera: &Camera, gain: Gain, like: R) -> Image
     where
         R: Real<Texel = f64> + Into<f64> + Send + Sync,
         R::Wide: Send + Sync,
@@ -77,7 +78,7 @@ impl FormatShader {
         for (slot, sum) in self.pixels(samples, like).into_iter().enumerate() {
             let (at, coverage) = (samples.pixel[slot] as usize, samples.coverage[slot]);
             if samples.pixel[slot] != u32::MAX {
-                image.rgb[at] = [0, 1, 2].map(|c| (f64::from(coverage) * gain * sum[c]) as f32);
+                image.rgb[at] = [0, 1, 2].map(|c| (f64::from(coverage) * gain.0[c] * sum[c]) as f32);
                 image.alpha[at] = coverage;
             }
         }

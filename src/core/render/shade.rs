@@ -9,6 +9,7 @@ use crate::engine::cubes_at::CubesAt;
 use crate::engine::rules::{Loads, Registers, SampleSteps, Setting, sample_facts};
 use crate::model::effects::{Effect, Effects};
 use crate::model::evaluate::Setup;
+use crate::model::gain::Gain;
 use crate::model::params::{Param, Params};
 use crate::model::terms::TermName;
 use crate::program::shading::{ShadingError, TermShading};
@@ -81,7 +82,8 @@ impl Shader {
     /// The image of a view, times `gain`; what is computed in texels is black where the samples have none. All cores;
     /// the same for any number of threads.
     #[must_use]
-    pub fn shade(&self, samples: &ViewSamples, camera: &Camera, gain: f64) -> Shaded {
+    pub fn shade(&self, samples: &ViewSamples, camera: &Camera, gain: impl Into<Gain>) -> Shaded {
+        let gain = gain.into();
         let (width, height) = (camera.width as usize, camera.height as usize);
         let plane = |wanted: bool| if wanted { width * height } else { 0 };
         let mut shaded = Shaded {
@@ -119,7 +121,7 @@ impl Shader {
             let mut plain = Image::new(width, height);
             for part in &samples.plain {
                 let at = part.pixel as usize;
-                let rgb = part.rgb.map(|c| (gain * f64::from(c)) as f32);
+                let rgb = [0, 1, 2].map(|c| (gain.channel(c) * f64::from(part.rgb[c])) as f32);
                 (plain.rgb[at], plain.alpha[at]) = (rgb, part.share);
                 (0..3).for_each(|c| shaded.image.rgb[at][c] += rgb[c]);
                 shaded.image.alpha[at] += part.share;
@@ -134,7 +136,7 @@ impl Shader {
         &self,
         samples: &ViewSamples,
         group: usize,
-        gain: f64,
+        gain: Gain,
         (setting, loads): (&Setting<'_, f64>, &Loads),
         registers: &mut Registers<f64>,
     ) -> Vec<Pixel> {
@@ -158,20 +160,21 @@ impl Shader {
             });
             for (lane, pixel) in pixels.iter_mut().enumerate() {
                 let weight = f64::from(samples.surface.weight(record * LANES + lane));
-                let share = weight * f64::from(pixel.coverage) * gain;
+                let share = weight * f64::from(pixel.coverage);
                 // Padding holds no numbers that could be relied on.
                 if share == 0.0 {
                     continue;
                 }
                 let haze = share * numbers[3 * count].0[lane];
+                let shares = gain.0.map(|gain| share * gain);
                 for (term, value) in pixel.terms.iter_mut().zip(numbers.chunks(3)) {
                     for c in 0..3 {
                         let value = value[c].0[lane];
-                        term[c] += share * value;
-                        pixel.glow[c] += haze * value;
+                        term[c] += shares[c] * value;
+                        pixel.glow[c] += gain.0[c] * haze * value;
                     }
                 }
-                pixel.haze += haze;
+                pixel.haze += gain.channel(3) * haze;
             }
         }
         pixels.retain(|pixel| pixel.index != u32::MAX as usize);

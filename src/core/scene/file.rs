@@ -154,6 +154,7 @@ pub(super) struct ViewTable {
     pub target: Option<PathBuf>,
     pub mask: Option<PathBuf>,
     pub haze: Option<PathBuf>,
+    pub response: Option<Spanned<ResponseValue>>,
     pub background: Option<Spanned<BackgroundValue>>,
 }
 
@@ -171,6 +172,17 @@ pub(super) struct LensTable {
     pub k4: Option<Spanned<f64>>,
     pub p1: Option<Spanned<f64>>,
     pub p2: Option<Spanned<f64>>,
+}
+
+/// A camera's response: a power, or a table's file.
+#[derive(Clone, Debug, serde::Deserialize)]
+#[serde(
+    untagged,
+    expecting = "invalid type: expected a number (the power of a code that light is) or the path of a table"
+)]
+pub(super) enum ResponseValue {
+    Gamma(f64),
+    Table(PathBuf),
 }
 
 /// What stands behind the mesh: a name, or a colour.
@@ -229,6 +241,8 @@ pub(super) struct FitTable {
     pub loss: Option<Spanned<String>>,
     #[serde(default)]
     pub gains: bool,
+    #[serde(default)]
+    pub white_balance: bool,
     #[serde(default)]
     pub cameras: bool,
     #[serde(default)]

@@ -9,7 +9,7 @@ use super::cameras::{self, MeshCameras, ViewPlan};
 use super::dapple::dapple;
 use super::diffusion;
 use super::error::{SceneError, Warning, Warnings, warn};
-use super::file::{EnvironmentTable, MapsTable, SceneFile, Source};
+use super::file::{EnvironmentTable, MapsTable, ResponseValue, SceneFile, Source};
 use super::gltf::{Ask, TextureUv};
 use super::lit::{self, Lights};
 use super::maps::{Environment, Map, Maps, OwnMap};
@@ -429,6 +429,13 @@ fn normal_flip(source: &Source, file: &SceneFile) -> Result<bool, SceneError> {
     }
 }
 
+fn read_response(given: ResponseValue, folder: &Path) -> Result<images::Response, SceneError> {
+    match given {
+        ResponseValue::Gamma(gamma) => Ok(images::Response::Gamma(gamma)),
+        ResponseValue::Table(path) => images::Response::read(&folder.join(path)),
+    }
+}
+
 fn read_views(
     plans: Vec<ViewPlan>,
     folder: &Path,
@@ -448,7 +455,9 @@ fn read_views(
         let haze = plan.haze.map(|haze| folder.join(haze));
         let target = match plan.target.filter(|_| targets) {
             Some(target) => {
-                let mut target = images::target(&folder.join(target), mask.as_deref(), size, &mut warnings)?;
+                let response = plan.response.map(|given| read_response(given, folder)).transpose()?;
+                let seen = images::Seen { mask: mask.as_deref(), response: response.as_ref() };
+                let mut target = images::target(&folder.join(target), seen, size, &mut warnings)?;
                 target.haze = haze.map(|haze| images::haze(&haze, &target, size)).transpose()?;
                 Some(target)
             }

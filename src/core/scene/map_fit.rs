@@ -200,6 +200,7 @@ mod tests {
             free: free.clone(),
             loss: Loss::default(),
             free_gains: false,
+            white_balance: false,
             cameras: false,
             maps,
         };

@@ -210,6 +210,8 @@ pub struct FitSettings {
     pub loss: Loss,
     /// Whether each view has a gain of its own (the first view's is held at 1).
     pub free_gains: bool,
+    /// Whether each view has such a gain in each channel.
+    pub white_balance: bool,
     /// Whether cameras are moved first to where the targets show the mesh.
     pub cameras: bool,
     /// How whole maps are fitted, when they are asked for.

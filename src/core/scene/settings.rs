@@ -206,7 +206,14 @@ pub(super) fn fit(
         None => Loss::default(),
     };
     let maps = map_fit::settings(source, &table.maps)?;
-    Ok(FitSettings { free: columns.collect(), loss, free_gains: table.gains, cameras: table.cameras, maps })
+    Ok(FitSettings {
+        free: columns.collect(),
+        loss,
+        free_gains: table.gains,
+        white_balance: table.white_balance,
+        cameras: table.cameras,
+        maps,
+    })
 }
 
 /// The free parameters: the names in `free`, or the default ones that an enabled effect asks for.

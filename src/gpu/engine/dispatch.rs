@@ -5,6 +5,7 @@ use super::fused::WORKGROUP;
 use super::part::Part;
 use super::parts::Parts;
 use crate::MOST_OF_A_DISPATCH;
+use crate::model::gain::Gain;
 use crate::samples::LANES;
 use skinfit_core::engine::BLOCK;
 use skinfit_core::engine::view::ObservedView;
@@ -22,7 +23,7 @@ fn tiles(pixels: usize, most: usize) -> u32 {
 }
 
 /// Bytes of a dispatch's uniform block.
-pub(super) const PART_BYTES: usize = 32;
+pub(super) const PART_BYTES: usize = 48;
 
 impl Parts {
     /// Samples of a part, padding included.
@@ -56,7 +57,7 @@ impl Parts {
         &self,
         views: &[ObservedView],
         part: &Part,
-        gain: f64,
+        gain: Gain,
         first_sum: u32,
     ) -> [u8; PART_BYTES] {
         // A target without a clip lies between the largest numbers; WGSL promises nothing about infinities.
@@ -64,7 +65,8 @@ impl Parts {
         let slots = part.groups.len() * LANES;
         let left_out = (self.stride - 1) * BLOCK * LANES;
         let counts = [part.read, slots as u32, left_out as u32, first_sum];
-        let numbers = [gain as f32, clip.0, clip.1].map(f32::to_bits);
+        let factors = gain.channels().map(|factor| factor as f32);
+        let numbers = factors.into_iter().chain([clip.0, clip.1]).map(f32::to_bits);
         let words = counts.into_iter().chain(numbers);
         let mut block = [0; PART_BYTES];
         for (bytes, word) in block.chunks_exact_mut(4).zip(words) {

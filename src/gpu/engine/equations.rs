@@ -47,8 +47,13 @@ impl Passed {
     fn add_to(&self, total: &mut NormalEquations, unknowns: &[Unknown]) {
         let k = unknowns.len();
         for (sums, &view) in self.sums.iter().zip(&self.view_of) {
-            let gain = unknowns.iter().position(|u| *u == Unknown::Gain(view));
-            let unknown = |i: usize| self.columns[i].unknown.or(gain);
+            let gain = |column: &ColumnOf| {
+                let channel = column.channel().unwrap_or(0);
+                unknowns.iter().position(|unknown| unknown.is_gain_of(view, channel))
+            };
+            let unknowns: Vec<Option<usize>> =
+                self.columns.iter().map(|column| column.unknown.or_else(|| gain(column))).collect();
+            let unknown = |i: usize| unknowns[i];
             let last = self.columns.len();
             for &(sum, value) in sums {
                 match sum {

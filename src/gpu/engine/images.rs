@@ -1,5 +1,6 @@
 //! The forward pass: images, left on the device.
 
+use crate::model::gain::Gain;
 use std::sync::MutexGuard;
 
 use web_time::Instant;
@@ -51,12 +52,12 @@ impl Images {
         gpu: &Gpu,
         parts: &Parts,
         views: &[ObservedView],
-        gains: &[f64],
+        gains: &[Gain],
         mut timers: Option<&mut Vec<Timer>>,
     ) -> Result<(), GpuError> {
         let Some(lights) = self.inputs.bound() else { return gpu.check() };
         for (part, (block, _, bindings)) in parts.parts.iter().zip(&self.parts) {
-            let gain = gains.get(part.view).copied().unwrap_or(1.0);
+            let gain = gains.get(part.view).copied().unwrap_or_default();
             if Parts::is_streamed(part) {
                 gpu.wait()?;
                 parts.stream(gpu, views, part)?;

@@ -29,6 +29,7 @@ mod program;
 mod samples;
 mod terms;
 
+use crate::model::gain::Gain;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -166,10 +167,10 @@ impl GpuEngine {
 
     fn written(&self, point: &Point) -> Written {
         let turns = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param == Param::EnvironmentRotation);
-        let gains = |u: &Unknown| matches!(u, Unknown::Gain(_));
+        let gains = |u: &Unknown| matches!(u, Unknown::Gain(..));
         Written {
             turned: point.params.scalar(Param::EnvironmentRotation) != 0.0 || self.unknowns.iter().any(turns),
-            gained: point.gains.iter().any(|gain| *gain != 1.0) || self.unknowns.iter().any(gains),
+            gained: point.gains.iter().any(|gain| *gain != Gain::ONE) || self.unknowns.iter().any(gains),
         }
     }
 

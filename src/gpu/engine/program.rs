@@ -1,5 +1,6 @@
 //! The shaders of a wish as pipelines, and one run of them.
 
+use crate::model::gain::Gain;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
 use super::dispatch::PART_BYTES;
@@ -94,12 +95,12 @@ impl Program {
         gpu: &Gpu,
         parts: &Parts,
         views: &[ObservedView],
-        gains: &[f64],
+        gains: &[Gain],
     ) -> Result<Vec<Vec<(Sum, f64)>>, GpuError> {
         let mut commands = encoder(gpu);
         for run in &self.runs {
             let part = &parts.parts[run.part];
-            let gain = gains.get(part.view).copied().unwrap_or(1.0);
+            let gain = gains.get(part.view).copied().unwrap_or_default();
             if Parts::is_streamed(part) {
                 // Its buffers may still be read by the part before it.
                 gpu.queue.submit([std::mem::replace(&mut commands, encoder(gpu)).finish()]);

@@ -1,5 +1,6 @@
 //! The CPU engine: rays through the samples' positions, the model in f64.
 
+use crate::model::gain::Gain;
 use std::future::ready;
 use std::sync::Arc;
 
@@ -123,7 +124,7 @@ impl Painter for CpuPainter {
         Ok(())
     }
 
-    fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, PaintError> {
+    fn paint(&mut self, camera: &Camera, gain: Gain, beside: Beside) -> Result<Picture, PaintError> {
         let start = Instant::now();
         let samples = match self.seen.take() {
             Some((seen, samples)) if seen == *camera => samples,
@@ -155,7 +156,7 @@ impl Painter for CpuPainter {
     }
 
     /// Computed at once: nothing is waited for.
-    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: f64, beside: Beside) -> Painting<'a> {
+    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: Gain, beside: Beside) -> Painting<'a> {
         Box::pin(ready(self.paint(camera, gain, beside)))
     }
 

@@ -1,5 +1,6 @@
 //! The production renderer.
 
+use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Painting, Picture};
@@ -44,7 +45,7 @@ impl GpuPainter {
     }
 
     /// The layers of a frame: terms, and what stands behind the mesh.
-    fn layers(&mut self, camera: &Camera, gain: f64) -> Result<Vec<(String, Image)>, GpuError> {
+    fn layers(&mut self, camera: &Camera, gain: Gain) -> Result<Vec<(String, Image)>, GpuError> {
         let mut terms = Vec::new();
         for &name in &self.terms {
             terms.push((name, self.renderer.render_term(name, camera, gain)?));
@@ -57,7 +58,7 @@ impl GpuPainter {
         &self,
         terms: Vec<(TermName, Image)>,
         camera: &Camera,
-        gain: f64,
+        gain: Gain,
     ) -> Vec<(String, Image)> {
         let (scene, n) = (&*self.scene, self.renderer.backdrop_samples());
         let background = scene.views[0].background;
@@ -98,7 +99,7 @@ impl Painter for GpuPainter {
         self.renderer.set_grid(per_axis);
     }
 
-    fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, PaintError> {
+    fn paint(&mut self, camera: &Camera, gain: Gain, beside: Beside) -> Result<Picture, PaintError> {
         let frame = self.renderer.render(camera, gain)?;
         self.times = frame.times;
         let layers = if beside.layers { self.layers(camera, gain)? } else { Vec::new() };
@@ -109,7 +110,7 @@ impl Painter for GpuPainter {
         Ok(Picture { image: frame.image, layers, haze, cut: self.cut(frame.clipped) })
     }
 
-    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: f64, beside: Beside) -> Painting<'a> {
+    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: Gain, beside: Beside) -> Painting<'a> {
         Box::pin(async move {
             let frame = self.renderer.render_async(camera, gain).await?;
             let mut layers = Vec::new();

@@ -9,6 +9,7 @@ mod gpu;
 pub use cpu::CpuPainter;
 pub use gpu::GpuPainter;
 
+use crate::model::gain::Gain;
 use std::pin::Pin;
 
 use skinfit_core::program::shading::ShadingError;
@@ -89,9 +90,9 @@ pub trait Painter {
     ///
     /// # Errors
     /// When the device fails, or the scene cannot be sampled.
-    fn paint(&mut self, camera: &Camera, gain: f64, beside: Beside) -> Result<Picture, PaintError>;
+    fn paint(&mut self, camera: &Camera, gain: Gain, beside: Beside) -> Result<Picture, PaintError>;
     /// As [`paint`](Self::paint), without waiting and without times, as a browser wants it.
-    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: f64, beside: Beside) -> Painting<'a>;
+    fn paint_async<'a>(&'a mut self, camera: &'a Camera, gain: Gain, beside: Beside) -> Painting<'a>;
     /// Bytes of mesh, maps and cubes on the adapter; 0 of the CPU engine.
     fn uploaded_bytes(&self) -> u64 {
         0

@@ -1,5 +1,6 @@
 //! Frames: drawn, read back, and timed.
 
+use crate::model::gain::Gain;
 use wgpu::CommandEncoderDescriptor;
 
 use super::Renderer;
@@ -92,7 +93,7 @@ impl Renderer {
         &mut self,
         output: Option<TermName>,
         camera: &Camera,
-        gain: f64,
+        gain: Gain,
         finished: bool,
     ) -> Result<Drawn, GpuError> {
         let mut timer = self.options.timed.then(|| Timer::new(&self.gpu));
@@ -107,7 +108,7 @@ impl Renderer {
         &mut self,
         output: Option<TermName>,
         camera: &Camera,
-        gain: f64,
+        gain: Gain,
         finished: bool,
         mut timer: Option<&mut Timer>,
     ) -> Result<(usize, Vec<Copy>), GpuError> {

@@ -8,7 +8,7 @@ override averaged: bool = false;
 // Whether something stands behind the mesh.
 override opaque: bool = false;
 
-// A factor on the image's radiance, in x.
+// A factor on each channel of the image's radiance.
 @group(0) @binding(0) var<uniform> gain: vec4f;
 // Half of the Gaussian, from its middle outwards, in one row.
 @group(0) @binding(1) var kernel: texture_2d<f32>;
@@ -64,13 +64,13 @@ fn bloom_across(@builtin(position) position: vec4f) -> @location(0) vec4f {
     for (var x = max(at.x - radius, 0); x <= min(at.x + radius, width - 1); x++) {
         sum += weight(abs(x - at.x)) * glow_at(vec2i(x, at.y));
     }
-    return vec4f(clamp(gain.x * sum, vec3f(-largest), vec3f(largest)), 0.0);
+    return vec4f(clamp(gain.rgb * sum, vec3f(-largest), vec3f(largest)), 0.0);
 }
 
 // The image in front of what stands behind it.
 fn image_at(at: vec2i) -> vec3f {
     let behind = (1.0 - coverage_at(at)) * backdrop_at(behind, at);
-    return gain.x * (color_at(at).rgb + behind);
+    return gain.rgb * (color_at(at).rgb + behind);
 }
 
 fn alpha_at(at: vec2i) -> f32 {

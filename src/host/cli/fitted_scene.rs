@@ -23,6 +23,8 @@ pub(super) struct Changes<'a> {
     pub(super) free: Option<&'a [Column]>,
     /// Whether gains are free, instead of what the file says.
     pub(super) free_gains: Option<bool>,
+    /// Whether each channel of them is.
+    pub(super) white_balance: Option<bool>,
     /// The start values, instead of the file's.
     pub(super) start: Option<Start<'a>>,
     /// Fitted maps, instead of the file's: key in `[maps]` and path.
@@ -71,11 +73,13 @@ pub(super) fn as_fitted(text: &str, folder: &Path, changes: Changes<'_>) -> Resu
     {
         set_free(fit, free);
     }
-    if let Some(free) = changes.free_gains
-        && let Some(fit) = section(scene.as_table_mut(), "fit")
-        && (free || fit.contains_key("gains"))
-    {
-        set(fit, "gains", free.into());
+    for (key, free) in [("gains", changes.free_gains), ("white_balance", changes.white_balance)] {
+        if let Some(free) = free
+            && let Some(fit) = section(scene.as_table_mut(), "fit")
+            && (free || fit.contains_key(key))
+        {
+            set(fit, key, free.into());
+        }
     }
     if let Some(start) = changes.start {
         let model = section(scene.as_table_mut(), "model");
@@ -133,7 +137,7 @@ fn place_files(scene: &mut DocumentMut, place: &mut dyn FnMut(&str) -> String) {
             }
         }
     }
-    let keys = ["target", "mask", "haze"];
+    let keys = ["target", "mask", "haze", "response"];
     match scene.get_mut("view") {
         Some(Item::ArrayOfTables(views)) => {
             views.iter_mut().for_each(|view| place_in(view, &keys, place));

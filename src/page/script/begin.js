@@ -10,6 +10,8 @@ function listen() {
   $("layout").onchange = () => look({ layout: $("layout").value });
   $("error-of").onchange = () => look({ error_of: $("error-of").value });
   $("free-gains").onchange = () => command("free_gains", { on: $("free-gains").checked });
+  $("free-white-balance").onchange = () =>
+    command("free_white_balance", { on: $("free-white-balance").checked });
   $("table").onclick = toggleTables;
   $("error").onchange = () => look({ error: $("error").value });
   $("tone").onchange = () => look({ operator: $("tone").value });

@@ -130,14 +130,15 @@ function errorBar(bar, slider) {
 
 function showGains() {
   const idle = state.fitting === null;
-  const views = state.gains?.views ?? [];
+  const rows = state.gains?.rows ?? [];
   if (state.gains?.shown && !$("gains").dataset.seen) {
     $("gains").open = true;
     $("gains").dataset.seen = "yes";
   }
   $("free-gains").checked = state.gains?.free ?? false;
-  $("free-gains").disabled = !idle;
-  sync($("gain-rows"), views.map((gain, view) => ({ ...gain, number: view })), (gain) => gain.view, () => {
+  $("free-white-balance").checked = state.gains?.white_balance ?? false;
+  $("free-gains").disabled = $("free-white-balance").disabled = !idle;
+  sync($("gain-rows"), rows, (gain) => gain.name, () => {
     const cells = [make("th", { scope: "row" }), make("input", { type: "range", min: 0, max: 1, step: 0.0005 }),
       make("input", { type: "number", step: "any", min: 0 }), make("td", { className: "error" })];
     const row = make("tr", {}, cells[0], make("td", {}, make("div", { className: "value" }, cells[1], cells[2])), cells[3]);
@@ -147,12 +148,12 @@ function showGains() {
     const [name, slider, number, error] = item.cells_;
     const { lower, upper } = state.gains;
     const range = { lower, upper, log: true, least: lower };
-    const slide = (value) => command("slide_gain", { view: gain.number, value });
-    name.textContent = gain.view;
+    const slide = (value) => command("slide_gain", { view: gain.view, channel: gain.channel, value });
+    name.textContent = gain.name;
     error.textContent = gain.error ?? "";
     slider.disabled = number.disabled = !idle;
-    slider.setAttribute("aria-label", `gain ${gain.view}`);
-    number.setAttribute("aria-label", `value of gain ${gain.view}`);
+    slider.setAttribute("aria-label", `gain ${gain.name}`);
+    number.setAttribute("aria-label", `value of gain ${gain.name}`);
     if (!slider.held) slider.value = place(range, gain.value);
     slider.setAttribute("aria-valuetext", written(gain.value));
     slider.oninput = () => {

@@ -1,6 +1,7 @@
 //! Hard cases of engines and fits: clipped targets, nothing to compare, what no pixel asks for, ten million
 //! pixels (MODEL 7's last rows).
 
+use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::case::FragmentInputs;
@@ -120,7 +121,7 @@ fn grey(fragments: &[FragmentInputs], target: f32, free: &[Param]) -> (Task, Poi
         loss: Loss::L2,
         unknowns: free.iter().map(|&p| Unknown::Param(Column::tied(p))).collect(),
     };
-    (task, Point { params: Params::defaults(Form::Corrected), gains: vec![1.0] })
+    (task, Point { params: Params::defaults(Form::Corrected), gains: vec![Gain::ONE] })
 }
 
 /// Facing the eye, where there is no rim.

@@ -4,6 +4,7 @@
 //!
 //! The other search holds every derivative against f64; these are held so by finite differences in the tests.
 
+use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use rand::SeedableRng;
@@ -188,7 +189,7 @@ fn task(batch: &LitBatch, moves: Option<&mut Moves<'_>>) -> (Task, Point) {
         loss: batch.loss,
         unknowns: free(batch),
     };
-    (task, Point { params, gains: vec![1.0] })
+    (task, Point { params, gains: vec![Gain::ONE] })
 }
 
 /// Every parameter that a fit may move, tied.

@@ -1,5 +1,6 @@
 //! Engines as evaluators: the sums over a batch's fragments, each a pixel with one sample.
 
+use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::case::{Batch, EVERYTHING, FragmentInputs, Setting};
@@ -95,7 +96,7 @@ impl<F: EngineFactory> Evaluator for EngineEvaluator<F> {
             loss,
             unknowns: unknowns(),
         };
-        let point = Point { params, gains: vec![1.0] };
+        let point = Point { params, gains: vec![Gain::ONE] };
         let planes = self.0.image(&task, &point)?;
         let value = |slot: usize| [0, 1, 2, 3].map(|c: usize| f64::from(planes[c][slot]));
         let values = (0..batch.fragments.len()).map(value).collect();
@@ -166,5 +167,5 @@ pub fn ordinary_task(fragments: &[FragmentInputs], lights: &LightBox) -> (Task, 
         loss: setting.loss,
         unknowns: unknowns(),
     };
-    (task, Point { params: setting.params, gains: vec![1.0] })
+    (task, Point { params: setting.params, gains: vec![Gain::ONE] })
 }

@@ -209,6 +209,7 @@ fn scene() -> Scene {
             free: Vec::new(),
             loss: Loss::L2,
             free_gains: false,
+            white_balance: false,
             cameras: false,
             maps: MapSettings::default(),
         },

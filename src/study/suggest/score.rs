@@ -1,5 +1,6 @@
 //! How good a set of effects is: each view scored by a fit of the others.
 
+use crate::model::gain::Gain;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -51,10 +52,10 @@ impl Judge<'_> {
             let held = |i: usize| i * folds / views.len() == fold;
             let seen: Vec<ObservedView> =
                 (0..views.len()).filter(|&i| !held(i)).map(|i| views[i].clone()).collect();
-            let gains = |of: &dyn Fn(usize) -> bool| -> Vec<f64> {
+            let gains = |of: &dyn Fn(usize) -> bool| -> Vec<Gain> {
                 (0..views.len())
                     .filter(|&i| of(i))
-                    .map(|i| baked.gains.get(i).copied().unwrap_or(1.0))
+                    .map(|i| baked.gains.get(i).copied().unwrap_or_default())
                     .collect()
             };
             let point = self.fit_views(baked, seen.into(), gains(&|i| !held(i)))?;
@@ -93,7 +94,7 @@ impl Judge<'_> {
         &self,
         baked: &Baked,
         views: Arc<[ObservedView]>,
-        gains: Vec<f64>,
+        gains: Vec<Gain>,
     ) -> Result<Point, StudyError> {
         let engine = CpuEngine::new(baked.task_over(views))?;
         let start = Point { gains, ..baked.start() };
@@ -106,7 +107,7 @@ impl Judge<'_> {
         let prepare = PrepareOptions { effects: Some(effects), ..self.prepare.clone() };
         let change = |loaded: &mut Loaded| {
             let scene = &mut loaded.scene;
-            scene.fit.free_gains = false;
+            (scene.fit.free_gains, scene.fit.white_balance) = (false, false);
             scene.fit.free = untied(&free(effects, &scene.fit.free), &scene.params, &[]);
             // What is free of a set is chosen here: what else the scene frees is not to be warned of.
             loaded.warnings.retain(|warning| !warning.contains("no enabled effect asks for it"));

@@ -65,7 +65,7 @@ fn fit_figures<'a>(outcome: &Outcome, rmse: f64, view: impl Fn(usize) -> &'a str
     ]);
     for unknown in &outcome.unknowns {
         let name = match unknown.unknown {
-            Unknown::Gain(index) => format!("gain.{}", view(index)),
+            Unknown::Gain(index, channels) => format!("gain.{}{}", view(index), channels.suffix()),
             other => other.name(),
         };
         add_constant(&mut figures, &name, unknown.value, unknown.std_error);

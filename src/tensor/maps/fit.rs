@@ -81,7 +81,7 @@ pub fn fit_maps(
     let held = |param: &Param| is_sharpness(*param) && *param != Param::SpecularLobe;
     let mut free = task.unknowns.iter().filter_map(|unknown| match unknown {
         Unknown::Param(column) | Unknown::Own(_, column) => Some(column.param),
-        Unknown::Gain(_) => None,
+        Unknown::Gain(..) => None,
     });
     if let Some(param) = free.find(held) {
         return Err(MapError::Sharpness { param: param.name() });

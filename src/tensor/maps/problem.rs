@@ -3,6 +3,7 @@
 //! The loss is the engine's: the mean of weighted squared residuals, where a robust loss is fitted by reweighting.
 //! Weights and working targets are taken on the CPU from the very text that the engine uses.
 
+use crate::model::gain::Gain;
 use burn::tensor::{Tensor, TensorData};
 
 use super::MapError;
@@ -36,8 +37,8 @@ struct Part {
 }
 
 /// What a pixel slot of an image shows, times its view's gain.
-fn shown(image: &[f32], slot: usize, gain: f64) -> Batch<f64, 4> {
-    Batch(std::array::from_fn(|c| gain * f64::from(image[4 * slot + c])))
+fn shown(image: &[f32], slot: usize, gain: Gain) -> Batch<f64, 4> {
+    Batch(std::array::from_fn(|c| gain.channel(c) * f64::from(image[4 * slot + c])))
 }
 
 /// The target at a view's slot; 0 in channels that are not compared.
@@ -51,7 +52,7 @@ pub struct Observed<'a> {
     /// Samples and target.
     pub view: &'a ObservedView,
     /// A factor on its image.
-    pub gain: f64,
+    pub gain: Gain,
     /// Whether it counts: a view that is held out does not.
     pub counts: bool,
 }
@@ -73,7 +74,7 @@ impl Problem {
             }
             let slots = shade.slots();
             Ok::<_, TensorError>(Part {
-                gain: Tensor::ones([slots, 1], device),
+                gain: Tensor::ones([slots, 4], device),
                 target: Tensor::zeros([slots, 4], device),
                 weight: Tensor::zeros([slots, 4], device),
                 shade,
@@ -113,7 +114,7 @@ impl Problem {
             for slot in 0..view.samples.groups() * LANES {
                 let pixel = if *counts { f64::from(view.pixel_weight(slot)) } else { 0.0 };
                 total += pixel * channels as f64;
-                let shown = shown(&image, gains.len(), *gain);
+                let shown = shown(&image, gains.len() / 4, *gain);
                 let rows = residuals.weigh(view.clip, shown, wanted(view, slot), Batch([pixel; 4]));
                 for (c, Weighted { scale, residual, .. }) in rows.each().enumerate() {
                     let (target, weight) = if c < channels && pixel > 0.0 {
@@ -126,7 +127,7 @@ impl Problem {
                     targets.push(target as f32);
                     weights.push(weight);
                 }
-                gains.push(*gain as f32);
+                gains.extend(gain.channels().map(|factor| factor as f32));
             }
         }
         let weights: Vec<f32> =
@@ -139,7 +140,7 @@ impl Problem {
                 Tensor::<2>::from_data(TensorData::new(numbers, [slots, columns]), shared.device())
             };
             (part.gain, part.target, part.weight) =
-                (matrix(&gains, 1), matrix(&targets, 4), matrix(&weights, 4));
+                (matrix(&gains, 4), matrix(&targets, 4), matrix(&weights, 4));
             first += slots;
         }
         Ok(())

@@ -1,5 +1,6 @@
 //! What the worker does: what is asked for first, then scores and terms of what was drawn.
 
+use crate::model::gain::Gain;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 
@@ -230,7 +231,7 @@ impl Work {
 async fn drawn_by(
     painter: &mut dyn Painter,
     camera: &Camera,
-    gain: f64,
+    gain: Gain,
     beside: Beside,
 ) -> Result<Picture, PaintError> {
     #[cfg(target_family = "wasm")]

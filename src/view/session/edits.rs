@@ -1,13 +1,14 @@
 //! What one does to the values: each is a step of the history, or part of one that goes on until it is settled. While a
 //! fit moves them nothing else does.
 
+use crate::model::gain::Gain;
 use std::ops::RangeInclusive;
 
 use super::Session;
 use crate::engine::Unknown;
 use crate::history::History;
 use crate::model::effects::Effect;
-use crate::model::params::{Column, Param};
+use crate::model::params::{Channels, Column, Param};
 use crate::skin::Skin;
 use crate::values::Values;
 
@@ -70,13 +71,13 @@ impl Session {
         }
     }
 
-    /// Move the slider of a view's gain, as part of a drag.
-    pub fn slide_gain(&mut self, view: usize, value: f64) {
-        let (least, greatest) = Unknown::Gain(view).bounds();
+    /// Move the slider of a view's gain, or of a channel of it, as part of a drag.
+    pub fn slide_gain(&mut self, view: usize, channels: Channels, value: f64) {
+        let (least, greatest) = Unknown::Gain(view, channels).bounds();
         if value.is_finite() {
             self.drag(|values| {
                 if let Some(gain) = values.gains.get_mut(view) {
-                    *gain = value.clamp(least, greatest);
+                    *gain = Gain(channels.with(gain.0, value.clamp(least, greatest)));
                 }
             });
         }

@@ -70,7 +70,7 @@ impl Session {
         let job = |slot: Slot, Point { params, gains }: Point| Job {
             opened: Arc::clone(opened),
             params,
-            gain: gains.get(self.at.1).copied().unwrap_or(1.0),
+            gain: gains.get(self.at.1).copied().unwrap_or_default(),
             camera,
             target: target.clone(),
             terms: self.terms && slot == Slot::Now,

@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use super::Session;
 use crate::host::{Found, GAIN, Known, ViewScore};
-use crate::model::params::{Column, Param};
+use crate::model::params::{Channels, Column, Param};
 use crate::prepare::view_of;
 
 /// The name of where the sliders began, among what they can be reset to.
@@ -63,10 +63,11 @@ impl Session {
         found.constant(&format!("{before}{name}")).or(alone)
     }
 
-    /// What the last fit says of a view's gain, where it moved that.
+    /// What the last fit says of a view's gain, or of a channel of it, where it moved that.
     #[must_use]
-    pub fn known_gain(&self, view: &str) -> Option<&Known> {
-        self.found()?.constant(&format!("{GAIN}{}", self.view_name(self.scene(), view)))
+    pub fn known_gain(&self, view: &str, channels: Channels) -> Option<&Known> {
+        let view = self.view_name(self.scene(), view);
+        self.found()?.constant(&format!("{GAIN}{view}{}", channels.suffix()))
     }
 
     /// Where the last fit has a constant for sure: from one standard error below what it found to one above.

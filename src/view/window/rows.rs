@@ -19,10 +19,12 @@ enum Edit {
     Free(Param, bool),
     /// A value for each channel, or one for all.
     Apart(Param, bool),
-    /// A view's gain, as part of a drag.
-    Gain(usize, f64),
+    /// A view's gain, or a channel of it, as part of a drag.
+    Gain(usize, Channels, f64),
     /// Whether a fit moves the gains.
     FreeGains(bool),
+    /// Whether it moves each of their channels.
+    WhiteBalance(bool),
     /// A drag is over.
     Settled,
 }
@@ -44,8 +46,9 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
             Edit::Reset(param, to) => session.reset(param, to),
             Edit::Free(param, free) => session.edit(|values| values.set_free(param, free)),
             Edit::Apart(param, apart) => session.edit(|values| values.set_apart(param, apart)),
-            Edit::Gain(view, gain) => session.slide_gain(view, gain),
+            Edit::Gain(view, channels, gain) => session.slide_gain(view, channels, gain),
             Edit::FreeGains(free) => session.edit(|values| values.free_gains = free),
+            Edit::WhiteBalance(free) => session.edit(|values| values.white_balance = free),
             Edit::Settled => session.settle(),
         }
     }
@@ -60,7 +63,16 @@ fn gains(ui: &mut Ui, session: &Session, values: &Values, edits: &mut Vec<Edit>)
         if ui.checkbox(&mut free, "free").on_hover_text(words).accessible_name("fit gains").changed() {
             edits.push(Edit::FreeGains(free));
         }
-        for (i, (view, &gain)) in opened.views().iter().zip(&values.gains).enumerate() {
+        let mut balance = values.white_balance;
+        let words = "Whether a fit moves each channel of them";
+        let response = ui.checkbox(&mut balance, "white balance").on_hover_text(words);
+        if response.accessible_name("fit white balance").changed() {
+            edits.push(Edit::WhiteBalance(balance));
+        }
+        let rows = opened.views().iter().enumerate();
+        let rows = rows.flat_map(|(i, view)| values.gain_rows(i).into_iter().map(move |row| (i, view, row)));
+        for (i, view, (channels, gain)) in rows {
+            let name = format!("{}{}", view.name, channels.suffix());
             ui.horizontal(|ui| {
                 ui.spacing_mut().slider_width = (ui.available_width() - 190.0).max(60.0);
                 let mut value = gain;
@@ -69,15 +81,15 @@ fn gains(ui: &mut Ui, session: &Session, values: &Values, edits: &mut Vec<Edit>)
                     .logarithmic(true)
                     .update_while_editing(false)
                     .max_decimals(5);
-                let response = ui.add(slider).accessible_name(format!("gain {}", view.name));
+                let response = ui.add(slider).accessible_name(format!("gain {name}"));
                 if value != gain {
-                    edits.push(Edit::Gain(i, value));
+                    edits.push(Edit::Gain(i, channels, value));
                 }
                 if is_over(&response, value != gain) {
                     edits.push(Edit::Settled);
                 }
-                ui.label(&view.name);
-                if let Some(known) = session.known_gain(&view.name) {
+                ui.label(&name);
+                if let Some(known) = session.known_gain(&view.name, channels) {
                     ui.weak(known.words());
                 }
             });

@@ -243,6 +243,36 @@ fn every_solver_finds_the_truth_and_a_gain_that_is_not_one() {
 }
 
 #[test]
+fn a_views_white_balance_is_found_beside_the_skin() {
+    let balance = [1.3, 1.0, 0.7];
+    let sandbox = Sandbox::new();
+    sandbox.write("truth_warm.toml", format!("{TRUTH}[gains]\nside = {balance:?}\n").as_bytes());
+    let render = ["render", "scene.toml", "--engine", "cpu", "--params", "truth_warm.toml", "--view", "side"];
+    sandbox.run(&[&render[..], &["-o", "targets/side.exr"]].concat()).done();
+    sandbox.edit("[fit]", "[fit]\nwhite_balance = true");
+    sandbox.fit("run", &[]).done();
+    let fitted: toml::Table = sandbox.text("run/params.toml").parse().unwrap();
+    let found = fitted["gains"]["side"].as_array().unwrap();
+    for (found, want) in found.iter().zip(balance) {
+        let found = found.as_float().unwrap();
+        assert!((found / want - 1.0).abs() < SHARE, "{found} is not {want}");
+    }
+    assert_eq!(fitted["gains"]["front"].as_float(), Some(1.0));
+    let report = sandbox.json("run/report.json");
+    let names: Vec<&str> =
+        report["unknowns"].as_array().unwrap().iter().map(|known| known["name"].as_str().unwrap()).collect();
+    assert!(
+        ["gain.side.r", "gain.side.g", "gain.side.b"].iter().all(|name| names.contains(name)),
+        "{names:?}"
+    );
+    // Read back, they are where the next fit starts, and stay so where nothing frees them.
+    sandbox.edit("white_balance = true", "white_balance = false");
+    sandbox.fit("again", &["--params", "run/params.toml"]).done();
+    let again: toml::Table = sandbox.text("again/params.toml").parse().unwrap();
+    assert_eq!(again["gains"], fitted["gains"]);
+}
+
+#[test]
 fn the_number_of_threads_changes_nothing() {
     let sandbox = Sandbox::new();
     let values = |threads: &str| {

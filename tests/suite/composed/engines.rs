@@ -3,6 +3,7 @@
 //! Engines add residuals up: a view is made of each fragment and channel, whose target is 1 below in that channel and the
 //! image in the others, so that with all other views' gains at 0 the gradient is a row of the Jacobian.
 
+use skinfit::model::gain::Gain;
 use std::sync::Arc;
 
 use skinfit::engine::cpu::CpuEngine;
@@ -66,10 +67,10 @@ impl On {
             loss: Loss::L2,
             unknowns,
         };
-        let point = |gains| Point { params: own.params.clone(), gains };
+        let point = |gains: Vec<Gain>| Point { params: own.params.clone(), gains };
         let (count, samples) = (own.count(), own.samples(setup));
         let seen = observed(&samples, &vec![[0.0; 4]; count], 0..count);
-        let planes = self.image(task(vec![seen], Vec::new()), &point(vec![1.0]));
+        let planes = self.image(task(vec![seen], Vec::new()), &point(vec![Gain::ONE]));
         let image: Vec<[f64; 4]> =
             (0..count).map(|i| std::array::from_fn(|c| f64::from(planes[c][i]))).collect();
         let view = |i: usize, c: usize| {
@@ -84,11 +85,11 @@ impl On {
         let unknowns = free.iter().map(|&param| Unknown::Param(Column::tied(param))).collect();
         let mut jacobian = vec![vec![None; columns.len()]; count];
         let count = views.len();
-        let start = point(vec![1.0; count]);
+        let start = point(vec![Gain::ONE; count]);
         let engine = self.engine(task(views, unknowns), &start);
         let weight = engine.normal_equations(&start).weight;
         for view in 0..count {
-            let gains = (0..count).map(|other| f64::from(u8::from(other == view))).collect();
+            let gains = (0..count).map(|other| f64::from(u8::from(other == view)).into()).collect();
             let (_, gradient) = engine.gradient(&point(gains));
             for (param, slope) in free.iter().zip(gradient) {
                 let k = columns.iter().position(|column| column == param).unwrap();

@@ -1,6 +1,7 @@
 //! Constants, plans, results and replayed cases, damaged: each reader says what is wrong in one paragraph that names
 //! the file, or what it passes is finite and within bounds.
 
+use skinfit::model::gain::Gain;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -71,7 +72,7 @@ fn no_file_of_constants_makes_its_reader_panic_or_pass_what_is_out_of_bounds() {
     let form = Form::Corrected;
     let mut params = Params::defaults(form);
     params.set_rgb(Param::Hilite, [0.4, 0.5, 0.6]);
-    let gains = vec![("front".to_owned(), 1.0), ("a side".to_owned(), 1.25)];
+    let gains = vec![("front".to_owned(), 1.0.into()), ("a side".to_owned(), Gain([1.25, 1.0, 0.75]))];
     let file = ParamsFile {
         form,
         effects: Some(Effects::SURFACE),
@@ -99,7 +100,11 @@ fn no_file_of_constants_makes_its_reader_panic_or_pass_what_is_out_of_bounds() {
                     prop_assert!(admitted, "{}: {:?}", param.name(), read.params.rgb(param));
                 }
                 let gains = read.gains.iter().chain(read.scenes.iter().flat_map(|scene| &scene.gains));
-                prop_assert!(gains.into_iter().all(|(_, gain)| gain.is_finite() && *gain > 0.0));
+                prop_assert!(
+                    gains
+                        .into_iter()
+                        .all(|(_, gain)| gain.0.iter().all(|factor| factor.is_finite() && *factor > 0.0))
+                );
                 let mut own = read.scenes.iter().flat_map(|scene| &scene.params);
                 prop_assert!(own.all(|(param, rgb)| rgb.iter().all(|x| param.info().admits(*x))));
                 Ok(())

@@ -327,14 +327,16 @@ impl Pixel {
         let linear =
             [Param::BaseWeight, Param::RimWeight, Param::SideSpecular, Param::Hilite, Param::Reflection];
         let terms = linear.map(|p| point.params.rgb(p)[c] * self.term(point, c, p, ripple));
-        point.gains[self.view] * terms.iter().sum::<f64>()
+        point.gains[self.view].channel(c) * terms.iter().sum::<f64>()
     }
 
     fn derivative(&self, point: &Point, c: usize, unknown: &Unknown, ripple: f64) -> f64 {
-        let gain = point.gains[self.view];
+        let gain = point.gains[self.view].channel(c);
         let column = match unknown {
-            Unknown::Gain(view) if *view == self.view => return self.value(point, c, ripple) / gain,
-            Unknown::Gain(_) => return 0.0,
+            Unknown::Gain(..) if unknown.is_gain_of(self.view, c) => {
+                return self.value(point, c, ripple) / gain;
+            }
+            Unknown::Gain(..) => return 0.0,
             Unknown::Param(column) | Unknown::Own(_, column) => column,
         };
         if !column.channels.includes(c) {
@@ -395,7 +397,7 @@ pub(super) fn point(values: &[(Param, f64)]) -> Point {
     for &(param, value) in values {
         params.set(param, value);
     }
-    Point { params, gains: vec![1.0, 1.0] }
+    Point { params, gains: vec![1.0.into(), 1.0.into()] }
 }
 
 /// Constants that are all away from the defaults and from every bound.

@@ -7,7 +7,7 @@ use super::{Each, run, starts};
 use skinfit::engine::{NormalEquations, Objective, Point, Unknown};
 use skinfit::fit::outcome::Ending;
 use skinfit::fit::{FitError, FitOptions, SolverKind, fit};
-use skinfit::model::params::Param;
+use skinfit::model::params::{Channels, Param};
 
 #[test]
 fn with_noise_the_truth_lies_as_far_away_as_the_standard_errors_say() {
@@ -89,14 +89,14 @@ fn the_ambiguity_of_gains_and_weights_is_found_and_holding_one_gain_resolves_it(
         let mut image = Image::new(400, &truth()).with_noise(0.01, 3);
         image.single_precision = single_precision;
         let mut unknowns = nine();
-        unknowns.push(Unknown::Gain(1));
+        unknowns.push(Unknown::Gain(1, Channels::Tied));
         for solver in [SolverKind::Varpro, SolverKind::Lm] {
             // The first view's gain held at 1: everything is determined.
             let held = run(&image.with(&unknowns), &point(&[]), solver);
             assert!(held.undetermined.is_empty() && held.unknowns.iter().all(|u| u.identifiable));
 
             let mut both = unknowns.clone();
-            both.push(Unknown::Gain(0));
+            both.push(Unknown::Gain(0, Channels::Tied));
             let free = run(&image.with(&both), &point(&[]), solver);
             assert_eq!(free.ending, Ending::Converged, "{solver:?}");
             assert_eq!(free.undetermined.len(), 1, "{solver:?}");

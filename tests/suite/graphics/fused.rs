@@ -47,7 +47,7 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
     for made in SAMPLINGS {
         let views = [made(9, 1), made(4, 2)];
         let light = illumination();
-        let point = Point { params: params(), gains: vec![1.0, 1.2] };
+        let point = Point { params: params(), gains: vec![1.0.into(), 1.2.into()] };
         let all = [EVERYTHING];
         // One effect at a time where the form and the silhouette are the defaults; all of them elsewhere. With the
         // normal map, as the samples have one.
@@ -68,7 +68,7 @@ fn normal_equations_equal_the_plain_model_for_every_form_silhouette_and_effect()
                     let asked = |u: &Unknown| matches!(u, Unknown::Param(c) if c.param.asked_for(effects));
                     let unknowns: Vec<Unknown> = all_unknowns(2)
                         .into_iter()
-                        .filter(|u| asked(u) || matches!(u, Unknown::Gain(_)))
+                        .filter(|u| asked(u) || matches!(u, Unknown::Gain(..)))
                         .collect();
                     let want = Reference::new(setup, &light, &views, Loss::L2, &unknowns)
                         .unwrap()
@@ -88,7 +88,7 @@ fn every_parameter_alone_gives_the_same_answers() {
     let Some(gpu) = gpu() else { return };
     let views = [view(7, 3)];
     let light = illumination();
-    let point = Point { params: params(), gains: vec![1.0] };
+    let point = Point { params: params(), gains: vec![1.0.into()] };
     for unknown in all_unknowns(1) {
         let unknowns = [unknown];
         let want = Reference::new(FULL, &light, &views, Loss::RelativeL2, &unknowns)
@@ -110,7 +110,7 @@ fn every_loss_gives_the_plain_models_loss_gradient_and_normal_equations() {
             [Param::BaseWeight, Param::RimExponent, Param::NormalStrength, Param::HazeWeight]
                 .map(|param| Unknown::Param(Column::tied(param)))
                 .to_vec();
-        let point = Point { params: params(), gains: vec![0.9] };
+        let point = Point { params: params(), gains: vec![0.9.into()] };
         for loss in Loss::ALL {
             let plain =
                 Reference::new(FULL, &light, &views, loss, &unknowns).unwrap().normal_equations(&point);
@@ -131,7 +131,7 @@ fn some_unknowns() -> Vec<Unknown> {
 fn sums_are_the_same_to_the_bit_from_run_to_run() {
     let Some(gpu) = gpu() else { return };
     let views = [view(300, 6), view(70, 7)];
-    let point = Point { params: params(), gains: vec![1.0, 1.1] };
+    let point = Point { params: params(), gains: vec![1.0.into(), 1.1.into()] };
     let make = || engine(gpu, FULL, &views, Loss::Huber, &some_unknowns(), &point);
     let one = make();
     let first = one.normal_equations(&point);
@@ -145,7 +145,7 @@ fn parts_and_streaming_give_the_same_sums() {
     for made in SAMPLINGS {
         let views = [made(100, 8), made(37, 9)];
         let unknowns = some_unknowns();
-        let point = Point { params: params(), gains: vec![1.0, 1.1] };
+        let point = Point { params: params(), gains: vec![1.0.into(), 1.1.into()] };
         let make =
             |memory| GpuEngine::new(gpu, task(FULL, &views, Loss::L2, &unknowns), &point, memory).unwrap();
         let whole = make(Memory::default());
@@ -177,7 +177,7 @@ fn parts_and_streaming_give_the_same_sums() {
 fn bytes_are_those_that_stand_on_the_device_and_that_a_pass_uploads() {
     let Some(gpu) = gpu() else { return };
     let views = [view(100, 8), view(37, 9)];
-    let point = Point { params: params(), gains: vec![1.0, 1.1] };
+    let point = Point { params: params(), gains: vec![1.0.into(), 1.1.into()] };
     let unknowns = some_unknowns();
     let bytes = |resident| {
         let task = task(FULL, &views, Loss::L2, &unknowns);
@@ -247,7 +247,7 @@ fn a_million_and_ten_million_samples_keep_six_digits() {
     // 500 groups of 16, over and over: their sums are so many times the first's.
     let small = [view(500, 10)];
     let (unknowns, light) = (some_unknowns(), illumination());
-    let point = Point { params: params(), gains: vec![1.0] };
+    let point = Point { params: params(), gains: vec![1.0.into()] };
     let once = Reference::new(FULL, &light, &small, Loss::L2, &unknowns).unwrap().normal_equations(&point);
     let samples = small[0].samples.records() * LANES;
     for least in [1_000_000, 10_000_000] {
@@ -281,7 +281,7 @@ fn strides_read_the_pixels_that_the_cpu_engine_reads() {
     for made in SAMPLINGS {
         let views = [made(130, 11)];
         let unknowns = some_unknowns();
-        let point = Point { params: params(), gains: vec![1.0] };
+        let point = Point { params: params(), gains: vec![1.0.into()] };
         let mut ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
         let mut theirs = cpu(FULL, &views, Loss::L2, &unknowns, true);
         for stride in [4, 3, 1] {
@@ -302,7 +302,7 @@ fn a_lost_device_ends_a_fit_with_its_reason_and_keeps_the_state() {
     let Some(gpu) = open(&Choice::default()) else { return };
     let views = [view(8, 12)];
     let unknowns = some_unknowns();
-    let point = Point { params: params(), gains: vec![1.0] };
+    let point = Point { params: params(), gains: vec![1.0.into()] };
     let engine = engine(&gpu, FULL, &views, Loss::L2, &unknowns, &point);
     let folder = tempfile::tempdir().unwrap();
     let state = folder.path().join("state.json");
@@ -334,7 +334,7 @@ fn kept_terms_follow_the_parameters_that_are_held() {
             [Param::BaseWeight, Param::RimExponent, Param::Hilite, Param::HazeWeight]
                 .map(|param| Unknown::Param(Column::tied(param)))
                 .to_vec();
-        let mut point = Point { params: params(), gains: vec![1.0] };
+        let mut point = Point { params: params(), gains: vec![1.0.into()] };
         let ours = engine(gpu, FULL, &views, Loss::L2, &unknowns, &point);
         let plain = Reference::new(FULL, &light, &views, Loss::L2, &unknowns).unwrap();
         for strength in [1.3, 0.4, 0.4, 1.3] {
@@ -381,7 +381,7 @@ fn records_and_targets_of_every_length_are_read_as_they_were_written() {
             let views = [lean(&made(21, 14), asked, channels, weighted)];
             assert_eq!(views[0].samples.surface.rows().stride(), rows);
             let light = illumination();
-            let point = Point { params: params(), gains: vec![1.1] };
+            let point = Point { params: params(), gains: vec![1.1.into()] };
             // Over the samples, and over their terms.
             for moves in [&[Param::NormalStrength][..], &[]] {
                 let weights = [Param::BaseWeight, Param::RimWeight, Param::SideSpecular, Param::Hilite];
@@ -403,7 +403,7 @@ fn images_equal_the_cpu_engines() {
         let views = [made(9, 5), made(30, 6)];
         for form in Form::ALL {
             let setup = Setup { form, ..FULL };
-            let point = Point { params: params(), gains: vec![1.5, 0.8] };
+            let point = Point { params: params(), gains: vec![1.5.into(), 0.8.into()] };
             let ours = engine(gpu, setup, &views, Loss::L2, &[], &point);
             let theirs = cpu(setup, &views, Loss::L2, &[], true);
             for index in 0..2 {

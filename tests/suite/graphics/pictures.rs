@@ -23,7 +23,7 @@ fn backdrop_and_bloom_are_the_same_from_both_engines() {
                 scene.views[0].background = background;
                 scene.bloom.sigma = 0.05;
             });
-            let baked = Baked { gains: vec![0.5], ..baked };
+            let baked = Baked { gains: vec![0.5.into()], ..baked };
             let options = RenderOptions { antialias: Antialias::Grid(n), ..EXACT };
             let (cpu, drawn) = (on_cpu(&baked, n), on_gpu(gpu, &baked, options));
             let shown = background != Background::None;
@@ -92,7 +92,8 @@ fn difference_off_the_outline(a: &Image, b: &Image, bare: &Image, margin: usize,
 #[test]
 fn the_glow_grows_with_the_gain_and_not_with_its_square() {
     let baked = before(baked(&built_in(), everything(), 64), Background::Color([2.0, 1.0, 0.5]));
-    let at = |gain: f64, on: &dyn Fn(&Baked) -> Image| on(&Baked { gains: vec![gain], ..baked.clone() });
+    let at =
+        |gain: f64, on: &dyn Fn(&Baked) -> Image| on(&Baked { gains: vec![gain.into()], ..baked.clone() });
     let check = |on: &dyn Fn(&Baked) -> Image| {
         let (once, thrice) = (at(1.0, on), at(3.0, on));
         for (one, three) in once.rgb.iter().flatten().zip(thrice.rgb.iter().flatten()) {

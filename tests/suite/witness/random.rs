@@ -48,7 +48,7 @@ pub(super) fn point(gains: usize) -> At {
         key_elevation: [35.0; 3],
         key_color: [0.5, 0.4, 0.3],
     };
-    At { constants, gains: [1.0, 1.2, 0.7][..gains].to_vec() }
+    At { constants, gains: [[1.0; 3], [1.2, 1.1, 1.3], [0.7; 3]][..gains].to_vec() }
 }
 
 /// Every constant tied to one value, and the gains of all views but the first.
@@ -56,13 +56,14 @@ pub(super) fn tied(gains: usize) -> Vec<Unknown> {
     NAMES.iter().map(|&(name, _)| Unknown::Tied(name)).chain((1..gains).map(Unknown::Gain)).collect()
 }
 
-/// Every constant, those that may with a value a channel, and the same gains.
+/// Every constant, those that may with a value a channel, and each channel of the same gains.
 pub(super) fn by_channel(gains: usize) -> Vec<Unknown> {
     let columns = NAMES.iter().flat_map(|&(name, rgb)| match rgb {
         true => [0, 1, 2].map(|c| Unknown::Channel(name, c)).to_vec(),
         false => vec![Unknown::Tied(name)],
     });
-    columns.chain((1..gains).map(Unknown::Gain)).collect()
+    let gains = (1..gains).flat_map(|view| [0, 1, 2].map(|c| Unknown::ChannelGain(view, c)));
+    columns.chain(gains).collect()
 }
 
 fn direction(rng: &mut StdRng) -> V3 {

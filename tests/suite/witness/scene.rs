@@ -44,7 +44,7 @@ pub(crate) struct Scene {
 pub(crate) struct At {
     pub(crate) constants: Constants,
     /// A factor on each view.
-    pub(crate) gains: Vec<f64>,
+    pub(crate) gains: Vec<[f64; 3]>,
 }
 
 /// One unknown.
@@ -54,8 +54,10 @@ pub(crate) enum Unknown {
     Tied(&'static str),
     /// One channel of it.
     Channel(&'static str, usize),
-    /// A view's gain.
+    /// All channels of a view's gain.
     Gain(usize),
+    /// One channel of it; alpha goes with green.
+    ChannelGain(usize, usize),
 }
 
 /// Loss, gradient and normal equations.
@@ -79,7 +81,8 @@ impl Unknown {
         match self {
             Self::Tied(name) => at.constants.of(name)[0],
             Self::Channel(name, c) => at.constants.of(name)[c],
-            Self::Gain(view) => at.gains[view],
+            Self::Gain(view) => at.gains[view][0],
+            Self::ChannelGain(view, c) => at.gains[view][c],
         }
     }
 
@@ -89,7 +92,8 @@ impl Unknown {
         match self {
             Self::Tied(name) => *at.constants.of(name) = [value; 3],
             Self::Channel(name, c) => at.constants.of(name)[c] = value,
-            Self::Gain(view) => at.gains[view] = value,
+            Self::Gain(view) => at.gains[view] = [value; 3],
+            Self::ChannelGain(view, c) => at.gains[view][c] = value,
         }
         at
     }
@@ -100,7 +104,8 @@ impl Unknown {
         match self {
             Self::Tied(name) => at.constants.of(name).iter_mut().for_each(|x| *x += by),
             Self::Channel(name, c) => at.constants.of(name)[c] += by,
-            Self::Gain(view) => at.gains[view] += by,
+            Self::Gain(view) => at.gains[view].iter_mut().for_each(|x| *x += by),
+            Self::ChannelGain(view, c) => at.gains[view][c] += by,
         }
         at
     }
@@ -121,8 +126,14 @@ impl Unknown {
             Self::Tied(name) => name.to_owned(),
             Self::Channel(name, c) => format!("{name}[{c}]"),
             Self::Gain(view) => format!("gain {view}"),
+            Self::ChannelGain(view, c) => format!("gain {view}[{c}]"),
         }
     }
+}
+
+/// A pixel times a gain; alpha is exposed as green is.
+pub(crate) fn gained(pixel: [f64; 4], [r, g, b]: [f64; 3]) -> [f64; 4] {
+    [r * pixel[0], g * pixel[1], b * pixel[2], g * pixel[3]]
 }
 
 /// A central difference of some function of a point along an unknown.
@@ -147,8 +158,8 @@ impl Scene {
     /// Each view's image.
     pub(crate) fn image(&self, at: &At) -> Vec<Vec<[f64; 4]>> {
         let mut image = self.unscaled(&at.constants);
-        for (view, gain) in image.iter_mut().zip(&at.gains) {
-            view.iter_mut().flatten().for_each(|x| *x *= gain);
+        for (view, &gain) in image.iter_mut().zip(&at.gains) {
+            view.iter_mut().for_each(|pixel| *pixel = gained(*pixel, gain));
         }
         image
     }

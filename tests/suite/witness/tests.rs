@@ -60,7 +60,7 @@ fn constants(form: Form, given: &Node<'_>) -> Constants {
 
 /// A point that is given column by column.
 fn at_columns(given: &Node<'_>) -> At {
-    let start = At { constants: Constants::defaults(Form::Corrected), gains: vec![1.0] };
+    let start = At { constants: Constants::defaults(Form::Corrected), gains: vec![[1.0; 3]] };
     COLUMNS.iter().fold(start, |at, (name, unknown)| unknown.set(&at, given.at(name).number()))
 }
 
@@ -182,7 +182,7 @@ fn the_witness_shades_as_the_oracle_does() {
         }
         let scene = fragment_scene(&vectors, &file, Form::Corrected, Silhouette::Bumped);
         let constants = constants(Form::Corrected, &file.at("constants").at("corrected"));
-        let at = At { constants, gains: vec![1.0] };
+        let at = At { constants, gains: vec![[1.0; 3]] };
         let columns: Vec<Vec<f64>> = unknowns().iter().map(|&unknown| scene.column(unknown, &at)).collect();
         let rows: Vec<f64> = (0..4).flat_map(|c| columns.iter().map(move |column| column[c])).collect();
         DIFFERENCES.check("Jacobian", &rows, &file.at("expected").at("corrected_jacobian").at("J"));
@@ -364,7 +364,7 @@ pub(crate) fn fragments_on(vectors: &Vectors, evaluators: &[Box<dyn Evaluator>])
             }
             let scene = fragment_scene(vectors, &file, form, silhouette);
             let constants = constants(form, &file.at("constants").at(name));
-            let at = At { constants, gains: vec![1.0] };
+            let at = At { constants, gains: vec![[1.0; 3]] };
             for evaluator in evaluators {
                 let exact = (evaluator.computes(), evaluator.stores()) == (Width::Double, Width::Double);
                 let tolerances = file.vector.tolerances();

@@ -3,13 +3,13 @@
 use rayon::prelude::*;
 
 use super::CpuEngine;
-use super::pass::Pass;
+use super::pass::{ChannelColumns, Pass};
 use super::streams::BATCH;
 use super::sums::{CHUNK, Sums, Wish, pairwise};
 use super::view_pass::with_scratch;
 use crate::engine::gram::pair;
 use crate::engine::pulls::{Gathered, Pulls};
-use crate::engine::{BLOCK, Engine, NormalEquations, Point, Unknown};
+use crate::engine::{BLOCK, Engine, NormalEquations, Point};
 use crate::with_simd;
 
 impl CpuEngine {
@@ -59,9 +59,7 @@ impl CpuEngine {
         let mut pulls = Pulls::default();
         for (index, (view, &width)) in self.views.iter().zip(widths).enumerate() {
             let of_view = self.view_pass((&pass.moved, &pass.read), &ready, point, index);
-            let own = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(index));
-            let columns: Vec<Vec<Option<usize>>> =
-                pass.channels.iter().map(|c| c.unknowns.iter().map(|u| u.or(own)).collect()).collect();
+            let columns: Vec<Vec<Option<usize>>> = self.columns(index, pass);
             let groups = view.samples.groups();
             let blocks: Vec<usize> = self.read_blocks(view).collect();
             let parts = blocks.par_iter().map(|&block| {
@@ -85,16 +83,23 @@ impl CpuEngine {
         Some(pulls)
     }
 
+    /// For each channel the unknowns of its columns in a view; none of a gain that is held.
+    fn columns(&self, view: usize, pass: &Pass) -> Vec<Vec<Option<usize>>> {
+        let of = |(c, channel): (usize, &ChannelColumns)| {
+            let gain = self.fitted.unknowns.iter().position(|unknown| unknown.is_gain_of(view, c));
+            channel.unknowns.iter().map(|unknown| unknown.or(gain)).collect()
+        };
+        pass.channels.iter().enumerate().map(of).collect()
+    }
+
     /// One view's packed sums into the full matrices.
     fn add(&self, view: usize, pass: &Pass, sums: &Sums, wish: Wish, total: &mut NormalEquations) {
         let Some(loss) = sums.0.last() else { return };
         total.loss += loss;
         let k = self.fitted.unknowns.len();
-        let gain = self.fitted.unknowns.iter().position(|u| *u == Unknown::Gain(view));
         let mut base = 0;
-        for channel in pass.channels.iter().filter(|_| wish != Wish::Loss) {
-            let (columns, count) = (channel.unknowns.len(), channel.unknowns.len() + 1);
-            let unknown: Vec<Option<usize>> = channel.unknowns.iter().map(|u| u.or(gain)).collect();
+        for unknown in self.columns(view, pass).iter().filter(|_| wish != Wish::Loss) {
+            let (columns, count) = (unknown.len(), unknown.len() + 1);
             // Of a gradient there is the last column alone.
             let entry = |i: usize, j: usize| if wish == Wish::Gradient { i } else { pair(i, j, count) };
             for i in 0..columns {

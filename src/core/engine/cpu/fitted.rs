@@ -47,6 +47,6 @@ impl Fitted {
     }
 
     pub(super) fn gains(&self) -> bool {
-        self.unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(_)))
+        self.unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(..)))
     }
 }

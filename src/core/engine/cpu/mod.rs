@@ -289,7 +289,7 @@ impl CpuEngine {
             bound: self.bound(reading, point, &ready.lobes),
             read,
             loss: self.loss,
-            gain: point.gains.get(view).copied().unwrap_or(1.0) as f32,
+            gain: point.gains.get(view).copied().unwrap_or_default().channels().map(|x| x as f32),
         }
     }
 

@@ -35,7 +35,7 @@ pub(super) struct Reading {
 /// The columns of one channel.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ChannelColumns {
-    /// For each column its unknown; `None` for the view's gain.
+    /// For each column its unknown; `None` for the view's gain of this channel.
     pub(super) unknowns: Vec<Option<usize>>,
     /// For each column the output that it is a multiple of: how the channel's value moves, or (of the gain) the value.
     pub(super) tangents: Vec<usize>,

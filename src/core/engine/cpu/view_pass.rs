@@ -33,7 +33,8 @@ pub(super) struct ViewPass<'a> {
     /// The tape's outputs that are wanted.
     pub(super) read: &'a [usize],
     pub(super) loss: Loss,
-    pub(super) gain: f32,
+    /// What each channel is multiplied by.
+    pub(super) gain: [f32; 4],
 }
 
 /// What a thread computes in.
@@ -132,7 +133,10 @@ impl Scratch {
 impl ViewPass<'_> {
     /// Whether every residual counts alike, and as it is.
     fn is_plain(&self) -> bool {
-        self.loss == Loss::L2 && self.view.weight.is_empty() && self.view.clip.is_none() && self.gain == 1.0
+        self.loss == Loss::L2
+            && self.view.weight.is_empty()
+            && self.view.clip.is_none()
+            && self.gain == [1.0; 4]
     }
 
     /// The outputs of `count` groups from `first` on.
@@ -188,11 +192,11 @@ impl ViewPass<'_> {
         groups: Range<usize>,
         planes: &mut [&mut [f32]],
     ) {
-        let gain = Lanes::splat(simd, self.gain);
         for start in groups.clone().step_by(BATCH) {
             let count = BATCH.min(groups.end - start);
             let shown = self.shown(simd, scratch, start, count);
-            for (column, plane) in shown.iter().zip(planes.iter_mut()) {
+            for ((column, plane), gain) in shown.iter().zip(planes.iter_mut()).zip(self.gain) {
+                let gain = Lanes::splat(simd, gain);
                 let rows = plane[(start - groups.start) * LANES..].chunks_exact_mut(LANES);
                 for (i, row) in rows.enumerate().take(count) {
                     row.copy_from_slice(&(gain * load(simd, &column[i])).to_array());
@@ -241,7 +245,7 @@ impl ViewPass<'_> {
         first: usize,
         count: usize,
     ) -> Lanes<S> {
-        let (one, gain) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, self.gain));
+        let (one, gain) = (Lanes::splat(simd, 1.0), Lanes::splat(simd, self.gain[channel]));
         let mut loss = Lanes::splat(simd, 0.0);
         if self.is_plain() {
             // The root of a weight takes as long as all else.
@@ -294,7 +298,7 @@ impl ViewPass<'_> {
         if self.is_plain() {
             return row;
         }
-        let (scale, gain) = (compared.scale[i].get(), self.gain_of(channel.unknowns[column]));
+        let (scale, gain) = (compared.scale[i].get(), self.gain_of(c, channel.unknowns[column]));
         row.iter_mut().zip(scale.iter()).for_each(|(x, scale)| *x *= gain * scale);
         row
     }
@@ -334,7 +338,7 @@ impl ViewPass<'_> {
                     let sums = &mut sums[base..];
                     match wish {
                         Wish::Loss => {}
-                        Wish::Gradient => self.add_slope(simd, channel, (shown, compared), count, sums),
+                        Wish::Gradient => self.add_slope(simd, (c, channel), (shown, compared), count, sums),
                         Wish::Normal => {
                             self.weigh(simd, channel, scratch, c, count);
                             add_gram(simd, FileColumns { columns: &columns[c], groups: count }, sums);
@@ -371,7 +375,7 @@ impl ViewPass<'_> {
         for ((&tangent, unknown), weighed) in
             channel.tangents.iter().zip(&channel.unknowns).zip(&scratch.weighed)
         {
-            let gain = Lanes::splat(simd, self.gain_of(*unknown));
+            let gain = Lanes::splat(simd, self.gain_of(c, *unknown));
             for i in 0..count {
                 let scale = gain * load(simd, &scale[i]);
                 store(&weighed[i], scale * load(simd, &shown[tangent][i]));
@@ -379,10 +383,10 @@ impl ViewPass<'_> {
         }
     }
 
-    /// What multiplies a column: the value moves by the view's gain times what the model's does, and along the gain
+    /// What multiplies a channel's column: the value moves by the view's gain times what the model's does, and along the gain
     /// itself by the model's value.
-    fn gain_of(&self, unknown: Option<usize>) -> f32 {
-        if unknown.is_some() { self.gain } else { 1.0 }
+    fn gain_of(&self, channel: usize, unknown: Option<usize>) -> f32 {
+        if unknown.is_some() { self.gain[channel] } else { 1.0 }
     }
 
     /// Add J^T r of a channel, and after it r^T r.
@@ -390,7 +394,7 @@ impl ViewPass<'_> {
     fn add_slope<S: Simd>(
         &self,
         simd: S,
-        channel: &ChannelColumns,
+        (c, channel): (usize, &ChannelColumns),
         (shown, compared): (&[Column], &Compared),
         count: usize,
         sums: &mut [Row],
@@ -409,22 +413,23 @@ impl ViewPass<'_> {
         for (k, tile) in tiles.iter().enumerate() {
             let slopes = slopes(simd, shown, tile, factors);
             for (j, &slope) in slopes.iter().enumerate() {
-                self.add_to(simd, channel.unknowns[TILE * k + j], slope, &mut sums[TILE * k + j]);
+                let gain = self.gain_of(c, channel.unknowns[TILE * k + j]);
+                add_to(simd, gain, slope, &mut sums[TILE * k + j]);
             }
         }
         let first = TILE * tiles.len();
         for (j, &tangent) in rest.iter().enumerate() {
             let [slope] = slopes(simd, shown, &[tangent], factors);
-            self.add_to(simd, channel.unknowns[first + j], slope, &mut sums[first + j]);
+            let gain = self.gain_of(c, channel.unknowns[first + j]);
+            add_to(simd, gain, slope, &mut sums[first + j]);
         }
     }
+}
 
-    /// Add to the sum of an unknown's slope, times what multiplies its column.
-    #[inline(always)]
-    fn add_to<S: Simd>(&self, simd: S, unknown: Option<usize>, slope: Lanes<S>, sum: &mut Row) {
-        let gain = Lanes::splat(simd, self.gain_of(unknown));
-        gain.mul_add(slope, Lanes::of_row(simd, sum)).store(sum);
-    }
+/// Add to the sum of an unknown's slope, times what multiplies its column.
+#[inline(always)]
+fn add_to<S: Simd>(simd: S, gain: f32, slope: Lanes<S>, sum: &mut Row) {
+    Lanes::splat(simd, gain).mul_add(slope, Lanes::of_row(simd, sum)).store(sum);
 }
 
 /// The sums of some columns times factors.

@@ -8,7 +8,8 @@ use toml::de::{DeArray, DeTable, DeValue};
 use super::{ParamsFile, SceneValues};
 use crate::engine::Unknown;
 use crate::model::effects::{Effect, Effects, Form};
-use crate::model::params::{Param, Params};
+use crate::model::gain::Gain;
+use crate::model::params::{Channels, Param, Params};
 use crate::scene::{Loss, short};
 
 /// What is wrong, and where in the text.
@@ -207,16 +208,7 @@ fn read_rgb(param: Param, value: &Spanned<DeValue<'_>>) -> Result<[f64; 3], Prob
         problem(value.span(), format!("{name} = {} is outside its bounds {low} to {high}.", short(number)))
     };
     match value.get_ref() {
-        DeValue::Array(channels) if info.rgb && channels.len() == 3 => {
-            let mut rgb = [0.0; 3];
-            for (c, channel) in rgb.iter_mut().zip(channels.iter()) {
-                *c = bounded(channel)?;
-            }
-            Ok(rgb)
-        }
-        DeValue::Array(_) if info.rgb => {
-            problem(value.span(), format!("{} takes a number or three: [r, g, b].", info.name))
-        }
+        DeValue::Array(channels) if info.rgb => three(info.name, value, channels, bounded),
         DeValue::Array(_) => {
             problem(value.span(), format!("{} takes one number for all channels.", info.name))
         }
@@ -224,20 +216,37 @@ fn read_rgb(param: Param, value: &Spanned<DeValue<'_>>) -> Result<[f64; 3], Prob
     }
 }
 
-fn read_gains(table: &DeTable<'_>) -> Result<Vec<(String, f64)>, Problem> {
-    let (lower, upper) = Unknown::Gain(0).bounds();
-    let mut gains: Vec<(usize, String, f64)> = Vec::new();
+/// A number a channel.
+fn three(
+    name: &str,
+    value: &Spanned<DeValue<'_>>,
+    channels: &[Spanned<DeValue<'_>>],
+    read: impl Fn(&Spanned<DeValue<'_>>) -> Result<f64, Problem>,
+) -> Result<[f64; 3], Problem> {
+    match channels {
+        [r, g, b] => Ok([read(r)?, read(g)?, read(b)?]),
+        _ => problem(value.span(), format!("{name} takes a number or three: [r, g, b].")),
+    }
+}
+
+fn read_gains(table: &DeTable<'_>) -> Result<Vec<(String, Gain)>, Problem> {
+    let (lower, upper) = Unknown::Gain(0, Channels::Tied).bounds();
+    let mut gains: Vec<(usize, String, Gain)> = Vec::new();
     for (key, value) in table {
         let name = key.get_ref().as_ref();
-        let gain = number(name, value)?;
-        if !(lower..=upper).contains(&gain) {
+        let bounded = |value: &Spanned<DeValue<'_>>| {
+            let gain = number(name, value)?;
+            if (lower..=upper).contains(&gain) {
+                return Ok(gain);
+            }
             let bounds = format!("{lower} to {upper}");
-            return problem(
-                value.span(),
-                format!("the gain of {name} is {gain}, outside its bounds {bounds}."),
-            );
-        }
-        gains.push((key.span().start, name.to_owned(), gain));
+            problem(value.span(), format!("the gain of {name} is {gain}, outside its bounds {bounds}."))
+        };
+        let gain = match value.get_ref() {
+            DeValue::Array(channels) => three(name, value, channels, bounded)?,
+            _ => [bounded(value)?; 3],
+        };
+        gains.push((key.span().start, name.to_owned(), Gain(gain)));
     }
     gains.sort_by_key(|&(place, ..)| place);
     Ok(gains.into_iter().map(|(_, name, gain)| (name, gain)).collect())

@@ -17,7 +17,7 @@ pub(super) use self::place::{MeshCameras, all_finite, turns_alone};
 use self::lens::{check_coefficients, with_lens};
 use self::place::Place;
 use super::error::{SceneError, Warnings};
-use super::file::{BackgroundValue, Source, ViewTable};
+use super::file::{BackgroundValue, ResponseValue, Source, ViewTable};
 use super::numbers::{interval, number, short};
 use super::view::{Background, Camera};
 use crate::model::params::LARGEST;
@@ -27,6 +27,9 @@ pub(super) const NARROWEST_FOV: f64 = 1e-3;
 /// The most pixels along a side of a view.
 pub(super) const LARGEST_SIDE: i64 = 16384;
 
+/// The greatest power of a response: of a steeper one all codes but the highest are dark.
+const STEEPEST: f64 = 10.0;
+
 /// A view before its images are read.
 pub(super) struct ViewPlan {
     pub name: String,
@@ -34,6 +37,7 @@ pub(super) struct ViewPlan {
     pub target: Option<PathBuf>,
     pub mask: Option<PathBuf>,
     pub haze: Option<PathBuf>,
+    pub response: Option<ResponseValue>,
     pub background: Background,
 }
 
@@ -68,11 +72,32 @@ pub(super) fn plan(
             target: table.target.clone(),
             mask: table.mask.clone(),
             haze: table.haze.clone(),
+            response: response(source, table.response.as_ref())?,
             background: background(source, table.background.as_ref())?,
         });
     }
     check_haze(source, tables)?;
     Ok(plans)
+}
+
+/// What a view says of its camera's response, the file of a table not read.
+fn response(
+    source: &Source,
+    value: Option<&Spanned<ResponseValue>>,
+) -> Result<Option<ResponseValue>, SceneError> {
+    let Some(value) = value else { return Ok(None) };
+    match value.get_ref() {
+        ResponseValue::Gamma(gamma) if !(gamma.is_finite() && *gamma > 0.0 && *gamma <= STEEPEST) => {
+            Err(source.error(
+                value,
+                format!("response = {gamma} is no power"),
+                format!(
+                    "Give the power of a code that light is, above 0 and at most {STEEPEST}, such as 2.2"
+                ),
+            ))
+        }
+        known => Ok(Some(known.clone())),
+    }
 }
 
 /// Haze is compared in every view that has a target, or in none: a fit has one set of channels.

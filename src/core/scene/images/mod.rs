@@ -3,6 +3,7 @@
 //! - `open_exr`, `raster`: the decoders
 //! - `chromaticities`: other primaries than Rec.709's
 //! - `claims`: what PNG and JPEG files say of their colours; `code_points` and `icc` read it, `space` is what comes of it
+//! - `response`: a camera's own curve, where a view has one
 //! - `target`: images to be matched, and their masks
 //!
 //! Files are told apart by their content. Colours in 8 or 16 bits are sRGB's where the file says nothing else; data maps are
@@ -18,6 +19,7 @@ mod open_exr;
 #[cfg(test)]
 mod profiled;
 mod raster;
+mod response;
 mod space;
 mod target;
 
@@ -29,7 +31,8 @@ use rayon::prelude::*;
 use self::chromaticities::Chromaticities;
 use self::claims::Claims;
 use self::space::Space;
-pub(super) use target::{haze, target};
+pub(super) use response::Response;
+pub(super) use target::{Seen, haze, target};
 
 use super::error::{SceneError, Warning, Warnings, guarded, read_bytes, warn};
 use super::maps::Map;

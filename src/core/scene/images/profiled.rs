@@ -262,7 +262,7 @@ fn a_target_of_p3_does_not_count_where_a_code_is_clipped() {
     image::ImageEncoder::set_icc_profile(&mut encoder, profile).unwrap();
     image::ImageEncoder::write_image(encoder, &bytes, 27, 1, image::ExtendedColorType::Rgb8).unwrap();
     let (_folder, path) = file("front.png", &png);
-    let target = target(&path, None, (27, 1), &mut Vec::new()).unwrap();
+    let target = target(&path, Seen::default(), (27, 1), &mut Vec::new()).unwrap();
     // A mixture tells of no channel whether it was clipped.
     assert!(target.clipped_at.is_none());
     let counts = target.mask.unwrap();

@@ -75,6 +75,11 @@ impl Space {
         Self::new([curve(), curve(), curve()], colours)
     }
 
+    /// These curves, and what else is known of the colours.
+    pub(super) fn with_curves(known: Option<Self>, curves: [Curve; 3]) -> Self {
+        Self { curves, to_rec709: known.and_then(|space| space.to_rec709) }
+    }
+
     /// Whether channels are mixed: of a mixture no channel tells whether its codes were clipped.
     pub(super) const fn mixes(&self) -> bool {
         self.to_rec709.is_some()

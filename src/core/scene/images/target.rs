@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::response::Response;
 use super::space::Space;
 use super::{Image, open_exr, read, read_colors, read_with};
 use crate::model::params::LARGEST;
@@ -11,6 +12,15 @@ use crate::scene::view::{Clip, Target};
 /// The largest number of a target: what is matched to it, and the squares of errors, stay in the range of f32.
 const BRIGHTEST: f32 = LARGEST as f32;
 
+/// What a view says of its target.
+#[derive(Clone, Copy, Default)]
+pub(in crate::scene) struct Seen<'a> {
+    /// What each pixel counts.
+    pub mask: Option<&'a Path>,
+    /// The camera's response, in the place of the curves that the file names.
+    pub response: Option<&'a Response>,
+}
+
 /// A target of `size`: linear radiance, premultiplied by coverage.
 ///
 /// EXR and HDR are taken as they are (EXR is premultiplied by convention). Codes of 8 or 16 bits are
@@ -19,11 +29,21 @@ const BRIGHTEST: f32 = LARGEST as f32;
 /// channel any more: pixels that have one do not count.
 pub(in crate::scene) fn target(
     path: &Path,
-    mask: Option<&Path>,
+    Seen { mask, response }: Seen<'_>,
     size: (u32, u32),
     warnings: &mut Warnings,
 ) -> Result<Target, SceneError> {
     let mut image = read_colors(path, Some(size), warnings)?;
+    if let Some(response) = response {
+        if image.code.is_none() {
+            return Err(SceneError::new(
+                path,
+                "holds light itself, and its view gives it a camera's response",
+                "Leave `response` out of the view",
+            ));
+        }
+        image.space = Some(Space::with_curves(image.space, response.curves()));
+    }
     let mixed = image.space.as_ref().is_some_and(Space::mixes);
     // Codes are shares of the highest one.
     let ends = |rgb: &[f32; 3]| rgb.iter().any(|code| *code <= 0.0 || *code >= 1.0);

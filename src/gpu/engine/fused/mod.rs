@@ -96,12 +96,19 @@ pub enum Sum {
 /// A column of the Jacobian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ColumnOf {
-    /// The unknown's index; `None` for the view's gain.
+    /// The unknown's index; `None` for the view's gain of these channels.
     pub unknown: Option<usize>,
     /// The seed whose tangent it is.
     seed: Option<usize>,
     /// The channels that it moves.
     channels: Moved,
+}
+
+impl ColumnOf {
+    /// The channel that it moves, where that is one alone.
+    pub(super) const fn channel(&self) -> Option<usize> {
+        self.channels.only()
+    }
 }
 
 /// Channels that a column moves, a bit each: three colours, and alpha where it is compared.
@@ -253,8 +260,14 @@ fn columns(unknowns: &[Unknown]) -> (Vec<Seed>, Vec<ColumnOf>) {
         };
         columns.push(ColumnOf { unknown: Some(index), seed: Some(seed), channels });
     }
-    if unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(_))) {
-        columns.push(ColumnOf { unknown: None, seed: None, channels: Moved::ALL });
-    }
+    // Where a channel has a gain of its own, each has a column, which says of whichever gain is its channel's.
+    let by_channel = unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(_, Channels::One(_))));
+    let gained = unknowns.iter().any(|unknown| matches!(unknown, Unknown::Gain(..)));
+    let gains = match (gained, by_channel) {
+        (false, _) => vec![],
+        (true, false) => vec![Moved::ALL],
+        (true, true) => (0..4).map(|c| Moved(1 << c)).collect(),
+    };
+    columns.extend(gains.into_iter().map(|channels| ColumnOf { unknown: None, seed: None, channels }));
     (params.into_iter().map(Seed::of_param).collect(), columns)
 }

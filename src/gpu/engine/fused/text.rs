@@ -19,8 +19,8 @@ impl Fused {
         wgsl.push_str("        var shown = vec4f();\n");
         wgsl.push_str(&self.samples(&[], false));
         for c in 0..self.channels() {
-            let _ =
-                writeln!(wgsl, "        partial_sums[{c}u * part.slots + slot] = {}shown[{c}];", self.gain());
+            let gain = self.gain_of(c);
+            let _ = writeln!(wgsl, "        partial_sums[{c}u * part.slots + slot] = {gain}shown[{c}];");
         }
         wgsl.push_str("    }\n}\n");
         wgsl
@@ -62,7 +62,7 @@ impl Fused {
         wgsl.push_str(&sample_struct(&self.fields()));
         let _ = write!(
             wgsl,
-            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // How many pixels a pass reads, and how many the part has.\n    read: u32,\n    slots: u32,\n    // Pixels that are left out after each block.\n    left_out: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    gain: f32,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
+            "\n// Of one view, or of a part of it.\nstruct Part {{\n    // How many pixels a pass reads, and how many the part has.\n    read: u32,\n    slots: u32,\n    // Pixels that are left out after each block.\n    left_out: u32,\n    // Where the sums of the workgroups stand, each sum's together.\n    first_sum: u32,\n    // A factor on each channel.\n    gain: vec4f,\n    clip_low: f32,\n    clip_high: f32,\n}}\n\n\
              @group(1) @binding(0) var<uniform> part: Part;\n\
              @group(1) @binding(1) var<storage, read> samples: array<f32>;\n\
              @group(1) @binding(2) var<storage, read> group_start: array<u32>;\n\
@@ -125,7 +125,7 @@ impl Fused {
             let _ = writeln!(
                 wgsl,
                 "        {{\n            let value = {}shown[{c}];\n            let wanted = observed[{c}];",
-                self.gain()
+                self.gain_of(c)
             );
             let counted = if self.fitted.clipped {
                 // A clipped target only says "at least" or "at most" (MODEL 7).
@@ -142,9 +142,14 @@ impl Fused {
         wgsl
     }
 
-    /// The factor that a view's gain is, where there is one.
+    /// The factors that a view's gain is, where there is one.
     const fn gain(&self) -> &'static str {
         if self.fitted.gained { "part.gain * " } else { "" }
+    }
+
+    /// The factor on one channel.
+    fn gain_of(&self, channel: usize) -> String {
+        if self.fitted.gained { format!("part.gain[{channel}] * ") } else { String::new() }
     }
 
     fn weighted_columns(&self, columns: &[usize]) -> String {

@@ -5,6 +5,7 @@ use crate::cli::Refusal;
 use crate::cli::fit_engine::surfaced_views;
 use crate::engine::Point;
 use crate::engine::view::ObservedView;
+use crate::model::gain::Gain;
 use crate::model::params::Params;
 use crate::prepare::{Baked, JointScene};
 use crate::progress;
@@ -23,7 +24,7 @@ pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>
     for part in &scenes.parts {
         let own = scenes.point_of(part, end);
         let shader = Shader::new(part.baked.setup(), &part.baked.illumination, &own.params)?;
-        let shown = |(view, observed, gain, held_out): (&View, &ObservedView, f64, bool)| {
+        let shown = |(view, observed, gain, held_out): (&View, &ObservedView, Gain, bool)| {
             bar.inc(1);
             let name = scenes.view_name(part, &view.name);
             ViewEvidence { name, held_out, ..shown(part, (&shader, &own.params), (view, observed, gain)) }
@@ -45,7 +46,7 @@ pub(super) fn evidence(scenes: &Scenes, end: &Point) -> Result<Vec<ViewEvidence>
 fn shown(
     part: &JointScene,
     (shader, params): (&Shader, &Params),
-    (view, observed, gain): (&View, &ObservedView, f64),
+    (view, observed, gain): (&View, &ObservedView, Gain),
 ) -> ViewEvidence {
     let Baked { scene, illumination, .. } = &part.baked;
     let shaded = shader.shade(&observed.samples, &view.camera, gain);

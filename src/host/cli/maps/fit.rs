@@ -1,5 +1,6 @@
 //! The fit of maps, as the command's arguments and the scene say.
 
+use crate::model::gain::Gain;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -132,7 +133,7 @@ fn gained(
     let views = baked.scene.views.iter().enumerate();
     let scored = views
         .map(|(i, view)| {
-            let scores = |shader: &Shader, observed: &ObservedView, gain: f64| {
+            let scores = |shader: &Shader, observed: &ObservedView, gain: Gain| {
                 let image = shader.shade(&observed.samples, &view.camera, gain).image;
                 let (target, coverage) = compared(view, observed, &image);
                 Comparison::new(&target, &image, &coverage).scores()

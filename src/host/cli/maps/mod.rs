@@ -118,7 +118,14 @@ mod tests {
             let maps = maps.iter().map(|&name| name.to_owned()).collect();
             let free = [Param::EnvironmentRotation, Param::Hilite].map(Column::tied).to_vec();
             let (loss, settings) = (Loss::default(), MapSettings::default());
-            let mut fit = FitSettings { free, loss, free_gains: false, cameras: false, maps: settings };
+            let mut fit = FitSettings {
+                free,
+                loss,
+                free_gains: false,
+                white_balance: false,
+                cameras: false,
+                maps: settings,
+            };
             let told = MapArguments { maps }.hold_constants(&mut fit);
             assert!(told.is_none_or(|told| told.contains("environment_rotation") && fit.free.len() == 1));
             fit.free.len()

@@ -9,6 +9,7 @@ use skinfit_panorama::response::{Response, SMOOTHNESS, recover};
 use super::pictures;
 use crate::cli::columns::aligned;
 use crate::cli::{Exit, Refusal, say, tell};
+use crate::output;
 use crate::scene::digits;
 
 /// An uneven card is no card.
@@ -30,6 +31,9 @@ pub(super) struct Arguments {
     /// The camera's response: srgb, recover, or gamma=G.
     #[arg(long, default_value = "srgb", value_parser = parse_response)]
     response: Asked,
+    /// With `recover`: write what was found here, a row a code, as a view's `response` takes it.
+    #[arg(long, value_name = "FILE.csv")]
+    write_response: Option<PathBuf>,
     /// How exposures are weighed: noise (by a sensor's), or hat (by distance from both ends of the codes).
     #[arg(long, default_value = "noise", value_parser = ["noise", "hat"])]
     weighting: String,
@@ -93,6 +97,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
             "--seconds: {times} for {count} photographs. Give one for each, in their order."
         )));
     }
+    if arguments.write_response.is_some() && !matches!(arguments.response, Asked::Recovered) {
+        return Err(Refusal::new(
+            "--write-response: the response was given. Recover it, or leave the option out.",
+        ));
+    }
     pictures::check_output(&arguments.output)?;
     let each = arguments.photographs.iter().zip(&arguments.seconds);
     let exposures: Vec<Exposure> =
@@ -103,6 +112,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
             let found = recover(&exposures, SMOOTHNESS)?;
             let off = found.residual.map(|share| format!("{}%", digits(100.0 * share, 2))).join(", ");
             say(&format!("response recovered; photographs lie off it by {off} (red, green, blue)"))?;
+            if let (Some(path), Response::Table(table)) = (&arguments.write_response, &found.response) {
+                let rows: String = table.iter().map(|[r, g, b]| format!("{r:?},{g:?},{b:?}\n")).collect();
+                output::write(path, rows.as_bytes())?;
+                say(&format!("wrote {}", path.display()))?;
+            }
             found.response
         }
     };

@@ -1,5 +1,6 @@
 //! What the window asks of the command line: fits, and scene files with what was changed in them.
 
+use crate::model::gain::Gain;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -77,7 +78,8 @@ impl CommandLine {
     /// Where it starts is in the scenes' files, but for gains, which have no place there.
     fn start_of(request: &FitRequest) -> Result<Vec<String>, String> {
         let file = request.run.join(START);
-        let gained = request.scenes.iter().any(|scene| scene.values.gains.iter().any(|&gain| gain != 1.0));
+        let gained =
+            request.scenes.iter().any(|scene| scene.values.gains.iter().any(|&gain| gain != Gain::ONE));
         if !request.resume {
             match gained.then_some(&request.start) {
                 Some(start) => output::write(&file, start.as_bytes()).map_err(|error| error.to_string())?,
@@ -104,7 +106,7 @@ fn goes_on(scene: &FitScene, file: &Path) -> Result<(), String> {
         return Err(other("other effects"));
     }
     if columns(&kept.fit.free) != columns(&untied(&values.free, &values.params, &[]))
-        || kept.fit.free_gains != values.free_gains
+        || (kept.fit.free_gains, kept.fit.white_balance) != (values.free_gains, values.white_balance)
     {
         return Err(other("other free constants"));
     }
@@ -146,6 +148,7 @@ fn changes<'a>(values: &'a Values, effects: &'a [&'static str]) -> Changes<'a> {
         free: Some(&values.free),
         start: Some(Start { form: values.form, params: &values.params, free: &values.free }),
         free_gains: Some(values.free_gains),
+        white_balance: Some(values.white_balance),
         ..Changes::default()
     }
 }

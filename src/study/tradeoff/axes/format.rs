@@ -3,6 +3,7 @@
 use crate::StudyError;
 use crate::engine::Objective;
 use crate::model::formats::{Declared, Emulated, Fixed, Format, Half, Single};
+use crate::model::gain::Gain;
 use crate::reference::Difference;
 use crate::render::image::Image;
 use crate::timing::{Rounds, interleaved, seconds_of};
@@ -89,7 +90,7 @@ impl SceneAxis for Formats {
 pub(super) fn images_in(
     evaluated: &Evaluated,
     bench: &Bench<'_>,
-    shade: impl Fn(&crate::samples::ViewSamples, &crate::scene::view::Camera, f64) -> Image,
+    shade: impl Fn(&crate::samples::ViewSamples, &crate::scene::view::Camera, Gain) -> Image,
 ) -> Vec<Image> {
     let views = evaluated.samples.iter().zip(&evaluated.scene.views).zip(&bench.baked.gains);
     views.map(|((samples, view), &gain)| shade(samples, &view.camera, gain)).collect()

@@ -1,5 +1,6 @@
 //! How the renderer finds shadows: rays at vertices, or shadow maps of some size and filter.
 
+use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::quality::ROUNDS;
@@ -165,7 +166,7 @@ fn texels(maps: &ShadowMaps) -> u32 {
 struct Drawn<'a> {
     renderer: Renderer,
     scene: Arc<Scene>,
-    gains: &'a [f64],
+    gains: &'a [Gain],
 }
 
 impl<'a> Drawn<'a> {
@@ -199,8 +200,9 @@ impl<'a> Drawn<'a> {
     /// The image of each view.
     fn frames(&mut self) -> Result<Vec<Image>, StudyError> {
         let Self { renderer, scene, gains } = self;
-        let frame =
-            |(view, &gain): (&crate::scene::view::View, &f64)| Ok(renderer.render(&view.camera, gain)?.image);
+        let frame = |(view, &gain): (&crate::scene::view::View, &Gain)| {
+            Ok(renderer.render(&view.camera, gain)?.image)
+        };
         scene.views.iter().zip(gains.iter()).map(frame).collect()
     }
 

@@ -144,7 +144,7 @@ fn a_page_has_a_run_beside_another_gains_and_the_error_of_any_image() {
         found.table = [...document.querySelectorAll("#tables-shown tbody tr")].map((row) => [...row.children].map((cell) => cell.textContent));
         key("F2");
         found.closed = !document.getElementById("tables").open;
-        const gain = () => skinfit.state().gains.views[0].value;
+        const gain = () => skinfit.state().gains.rows[0].value;
         const psnr = skinfit.state().image.psnr;
         slide("gain front", [0.6, 0.7]);
         await until("the gain", () => gain() > 1.5 && skinfit.state().idle && skinfit.state().image.psnr !== psnr);

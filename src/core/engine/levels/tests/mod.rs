@@ -18,6 +18,7 @@ use crate::engine::{Point, Task, Unknown};
 use crate::model::effects::Effects;
 use crate::model::effects::{Form, Silhouette};
 use crate::model::evaluate::Setup;
+use crate::model::gain::Gain;
 use crate::model::params::Param;
 use crate::model::params::{Column, Params};
 use crate::samples::rows::Rows;
@@ -167,7 +168,7 @@ fn dark() -> Arc<Illumination> {
 fn start(set: &[(Param, f64)]) -> Point {
     let mut params = Params::defaults(Form::Corrected);
     set.iter().for_each(|&(param, value)| params.set(param, value));
-    Point { params, gains: vec![1.0] }
+    Point { params, gains: vec![Gain::ONE] }
 }
 
 fn free(columns: &[Column]) -> Vec<Unknown> {

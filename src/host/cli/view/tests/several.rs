@@ -8,7 +8,7 @@ use skinfit_view::opened::Reading;
 
 use super::{Hand, click, drag, left_out, node, open, settle, start, until, value};
 use crate::fit::outcome::Ending;
-use crate::model::params::Param;
+use crate::model::params::{Channels, Param};
 
 /// The built-in scene twice, the second time with its light turned and its views' gains free.
 fn two(folder: &Path) -> Start {
@@ -136,29 +136,29 @@ fn a_views_gain_is_a_row_and_a_fit_starts_there() {
     let first = hand.state().session.opened().unwrap().views()[0].name.clone();
     drag(&mut hand, &format!("gain {first}"), &[10.0, 20.0]);
     settle(&mut hand);
-    let gain = hand.state().session.values().unwrap().gains[0];
+    let gain = hand.state().session.values().unwrap().gains[0].scalar().unwrap();
     assert!(gain > 1.05, "{gain}");
     // The image is drawn with it.
-    assert_eq!(hand.state().session.image(skinfit_view::paint::Slot::Now).unwrap().job.gain, gain);
+    assert_eq!(hand.state().session.image(skinfit_view::paint::Slot::Now).unwrap().job.gain, gain.into());
     click(&mut hand, "fit gains");
     click(&mut hand, "fit");
     until(&mut hand, "the fit ends", |window| window.session.fitting().is_none() && window.session.is_idle());
     let session = &hand.state().session;
     let found = session.found().unwrap_or_else(|| panic!("{:?}", session.told()));
     // The first view's is held where it was; the others follow it, as the light has no scale of its own.
-    assert_eq!(found.ends[0].gains[0], gain);
+    assert_eq!(found.ends[0].gains[0], gain.into());
     assert!(
-        found.ends[0].gains[1..].iter().all(|&other| (other / gain - 1.0).abs() < 0.05),
+        found.ends[0].gains[1..].iter().all(|other| (other.channel(1) / gain - 1.0).abs() < 0.05),
         "{:?}",
         found.ends[0].gains
     );
     let second = session.opened().unwrap().views()[1].name.clone();
-    assert!(session.known_gain(&second).is_some_and(|known| known.std_error.is_some()));
+    assert!(session.known_gain(&second, Channels::Tied).is_some_and(|known| known.std_error.is_some()));
     let text = std::fs::read_to_string(folder.path().join("run/scene.toml")).unwrap();
     assert!(text.contains("gains = true"), "{text}");
     // One step back is before the fit.
     click(&mut hand, "undo");
-    assert_eq!(hand.state().session.values().unwrap().gains[1], 1.0);
+    assert_eq!(hand.state().session.values().unwrap().gains[1], 1.0.into());
     node(&hand, &format!("gain {second}"));
 }
 
