@@ -25,6 +25,7 @@ use crate::graphics::bench::{Difference, EXACT, gpu, keep, on_gpu, quantile};
 use crate::graphics::raw::{Drawn, Raw, Sampled};
 use crate::lit::param;
 use crate::sky::{effect, head_changed};
+use crate::unreal::unreal_in_hlsl;
 
 /// Texels along the light map's side, pixels along the image's: whole rows of 256 bytes.
 const TEXELS: u32 = 96;
@@ -153,13 +154,14 @@ fn exported_passes_are_taken_by_the_compilers_of_their_languages() {
         // Siblings of HLSL, by the few words in which they differ.
         let cg = format!("{CG_IN_HLSL}\n{}", exported(Target::Cg, &baked));
         let metal = metal_in_hlsl(&exported(Target::Msl, &baked));
+        let unreal = unreal_in_hlsl(&exported(Target::Unreal, &baked));
         for part in parts(&plan) {
             let main = glsl_main(&plan, part);
             let text = format!("#version 450\n{glsl}\n{main}");
             compile_glsl(&text).unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
             let text = format!("{GODOT}\n{}\n{main}", godot_in_glsl(&exported(Target::Godot, &baked)));
             compile_glsl(&text).unwrap_or_else(|error| panic!("{name}, Godot: {error}\n{text}"));
-            for hlsl in [&hlsl, &cg, &metal] {
+            for hlsl in [&hlsl, &cg, &metal, &unreal] {
                 let text = format!("{hlsl}\n{}", hlsl_main(part));
                 compile_hlsl(&text).unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
             }

@@ -14,6 +14,8 @@ use skinfit::model::texture_filter::TextureFilter;
 use skinfit::shader::facts::MapFacts;
 use skinfit::shader::{Facts, plan};
 
+use crate::unreal::unreal_in_hlsl;
+
 pub(crate) fn provenance() -> Provenance {
     Provenance {
         scene: Some("scene.toml".to_owned()),
@@ -187,10 +189,12 @@ pub(crate) fn compiled_glsl(name: &str, facts: &Facts) -> String {
 }
 
 #[test]
-fn exported_hlsl_is_taken_by_glslang_and_its_code_is_valid_for_unity_too() {
-    for target in [Target::Hlsl, Target::Unity] {
+fn exported_hlsl_is_taken_by_glslang_and_its_code_is_valid_for_unity_and_unreal_too() {
+    for target in [Target::Hlsl, Target::Unity, Target::Unreal] {
         for (name, facts) in scenes() {
-            let text = hlsl_shader("", &facts, &exported(target, &facts));
+            let exported = exported(target, &facts);
+            let plain = if target == Target::Unreal { unreal_in_hlsl(&exported) } else { exported };
+            let text = hlsl_shader("", &facts, &plain);
             assert_taken(compile_hlsl, &format!("{} {name}", target.name()), &text, &[]);
         }
     }
@@ -426,7 +430,7 @@ fn defined(text: &str) -> Vec<String> {
             .any(|word| line.starts_with(word));
         names.extend(match () {
             () if line.starts_with("struct ") => last(before('{')),
-            () if line.starts_with("#define ") => last(line),
+            () if line.starts_with("#define ") => line.split(' ').nth(1).map(str::to_owned),
             // `const NAME: f32 = 1.0;` or `const float NAME = 1.0;`
             () if constant => last(before('=').split(':').next().unwrap_or_default().trim_end()),
             () if line.starts_with("@group") => last(line.split(": ").next().unwrap_or_default()),
@@ -546,6 +550,11 @@ fn exports_filter_maps_as_the_scene_does() {
             Target::Unity,
             "SamplerState skinfit_trilinear_repeat_sampler;",
             "Sample(skinfit_trilinear_repeat_aniso16_sampler",
+        ),
+        (
+            Target::Unreal,
+            "Texture2DSample(skinfit_color_map, skinfit_color_mapSampler, vertex_uv)",
+            "Texture2DSample(",
         ),
     ] {
         let name = target.name();

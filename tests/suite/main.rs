@@ -67,5 +67,6 @@ mod tensors;
 mod transfer;
 mod transmission;
 mod unblurred;
+mod unreal;
 mod vectors;
 mod witness;

@@ -1,5 +1,7 @@
 //! How each shading language spells what the shader rules say in WGSL.
 
+use super::function::is_color;
+use super::handed::Handed;
 use super::names::{PREFIX, function};
 use crate::model::texture_filter::TextureFilter;
 use crate::shader::quantity::{Kind, Resource};
@@ -35,6 +37,8 @@ pub struct Dialect {
     /// Declarations of a 2D map, a cube and a sampler: `{n}` name, `{b}` binding, `{h}` what a map of
     /// colours is marked with. Empty: none.
     pub declarations: [&'static str; 3],
+    /// The same as parameters of functions, where nothing is global: `{n}` the texture's name. Empty: nothing is handed over.
+    pub parameters: [&'static str; 3],
     /// What has the engine decode a map from sRGB.
     pub colour_hint: &'static str,
     /// The names of the samplers of maps and cubes.
@@ -59,6 +63,7 @@ const BASE: Dialect = Dialect {
     cube_lookup: "textureLod({t}, {c}, 0.0)",
     texel_load: "texelFetch({t}, {c}, 0)",
     declarations: [""; 3],
+    parameters: [""; 3],
     colour_hint: "",
     samplers: ["skinfit_map_sampler", "skinfit_cube_sampler"],
     filters: [""; 3],
@@ -136,6 +141,22 @@ pub const UNITY: Dialect = Dialect {
     ..HLSL
 };
 
+/// Unreal 5, for the *Custom* node of a material (Epic's documentation, "Custom Material Expressions"). Its code is the body of
+/// a function, whose arguments the textures are, each with a sampler `NAMESampler`; where nothing can be declared but
+/// structs, functions are a struct's, and constants are macros. The same text holds in an include file, too.
+pub const UNREAL: Dialect = Dialect {
+    constant: "#define",
+    map_lookup: "{t}.SampleLevel({t}Sampler, {c}, 0.0)",
+    // Unreal's own, which takes a level where a material is compiled for rays and has no derivatives.
+    mip_map_lookup: "Texture2DSample({t}, {t}Sampler, {c})",
+    cube_lookup: "{t}.SampleLevel({t}Sampler, {c}, 0.0)",
+    declarations: [""; 3],
+    parameters: ["Texture2D {n}", "TextureCube {n}", "SamplerState {n}Sampler"],
+    prologue: "#ifndef SKINFIT_INCLUDED\n#define SKINFIT_INCLUDED\n",
+    epilogue: "\n#endif\n",
+    ..HLSL
+};
+
 /// The paper's language (profiles with `texCUBElod`: fp40, gp4 and up).
 pub const CG: Dialect = Dialect {
     map_lookup: "tex2Dlod({t}, float4({c}, 0.0, 0.0))",
@@ -207,6 +228,7 @@ impl Dialect {
             if value.len() == 1 { numbers[0].clone() } else { format!("{kind}({})", numbers.join(", ")) };
         match self.family {
             Family::Wgsl => format!("{} {name}: {kind} = {value};", self.constant),
+            _ if self.constant == "#define" => format!("#define {name} {value}"),
             _ => format!("{} {kind} {name} = {value};", self.constant),
         }
     }
@@ -246,13 +268,28 @@ impl Dialect {
             Kind::Sampler => self.declarations[2],
             _ => self.declarations[0],
         };
-        let colored = match resource {
-            Resource::ColorMap => true,
-            Resource::OwnMap(field) => field.info().numbers == 3,
-            _ => false,
-        };
-        let hint = if colored { self.colour_hint } else { "" };
+        let hint = if is_color(resource) { self.colour_hint } else { "" };
         let name = function(resource.name());
         text.replace("{n}", self.resource(&name)).replace("{b}", &binding.to_string()).replace("{h}", hint)
+    }
+
+    /// Whether functions take the textures that they read.
+    #[must_use]
+    pub fn hands_over(&self) -> bool {
+        !self.parameters[0].is_empty()
+    }
+
+    /// A cube or map, by its name, as functions take it and pass it on.
+    #[must_use]
+    pub fn handed(&self, name: &str, cube: bool, sampled: bool) -> Handed {
+        let name = function(name);
+        let [map, of_cube, sampler] = self.parameters.map(|text| text.replace("{n}", &name));
+        let texture = if cube { of_cube } else { map };
+        if !sampled {
+            return Handed { parameters: texture, arguments: name.clone(), name };
+        }
+        // A sampler's name stands behind its type.
+        let own = sampler.split(' ').next_back().unwrap_or_default();
+        Handed { arguments: format!("{name}, {own}"), parameters: format!("{texture}, {sampler}"), name }
     }
 }

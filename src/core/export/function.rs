@@ -3,6 +3,7 @@
 use std::fmt::Write as _;
 
 use super::dialect::{Dialect, Family};
+use super::handed::{Handed, handed_over, parted};
 use super::idle::idle;
 use super::translate::translate;
 use super::{ExportError, Provenance, Target, names, passes};
@@ -29,14 +30,21 @@ pub(super) fn text(
     };
     let (plan, resources, idle) = planned(facts, params)?;
     let mut text = header((&plan, &resources), idle, params, from);
-    let _ = write!(text, "\n{}", dialect.prologue);
+    let code = code(dialect, &plan, &resources, params);
+    let _ = write!(text, "\n{}{code}{}", dialect.prologue, dialect.epilogue);
+    Ok(text)
+}
+
+/// Constants, declarations and functions.
+pub(super) fn code(dialect: &Dialect, plan: &Plan, resources: &[Resource], params: &Params) -> String {
+    let mut text = String::new();
     let literals = plan.literals(params);
     for (name, kind, value) in &literals {
         let _ = writeln!(text, "{}", dialect.definition(&names::constant(name), kind, value));
     }
     let filter = plan.facts.maps.filter;
     let levels: Vec<String> = plan.all_levels().iter().map(Level::bound).collect();
-    let declared = dialect.filtering(&declarations(dialect, &resources, &levels), filter);
+    let declared = dialect.filtering(&declarations(dialect, resources, &levels), filter);
     let constants: Vec<String> = literals.into_iter().map(|(name, ..)| name).collect();
     let read: Vec<&str> =
         resources.iter().map(|resource| resource.name()).chain(levels.iter().map(String::as_str)).collect();
@@ -50,11 +58,23 @@ pub(super) fn text(
             text,
             "\n// Textures and samplers, and the functions that read them.\nstruct Skinfit {{\n{body}}};\n"
         );
+    } else if dialect.hands_over() {
+        let cubes = |resource: &Resource| resource.kind() == Kind::Cube;
+        let sampled = resources.iter().filter(|resource| matches!(resource.kind(), Kind::Cube | Kind::Map));
+        let sampled = sampled.map(|resource| dialect.handed(resource.name(), cubes(resource), true));
+        let levels = levels.iter().map(|level| dialect.handed(level, false, false));
+        let handed: Vec<Handed> = sampled.chain(levels).collect();
+        let (structs, functions) = parted(&handed_over(&functions, &handed));
+        let body = indented(&functions);
+        let _ = write!(
+            text,
+            "\n{structs}\n// The functions, each with the textures and samplers that it reads behind its other arguments: `Skinfit skin;`,\n\
+             // then `skin.skinfit_shade(at, ...)`.\nstruct Skinfit {{\n{body}}};\n"
+        );
     } else {
         let _ = write!(text, "\n{declared}\n{functions}");
     }
-    text.push_str(dialect.epilogue);
-    Ok(text)
+    text
 }
 
 /// The plan of an export, what its passes and its image read together, and the effects that it leaves out.
@@ -143,6 +163,15 @@ fn declarations(dialect: &Dialect, resources: &[Resource], levels: &[String]) ->
 fn indented(text: &str) -> String {
     let line = |line: &str| if line.is_empty() { "\n".to_owned() } else { format!("    {line}\n") };
     text.lines().map(line).collect()
+}
+
+/// Whether a map holds colours, which are stored in sRGB.
+pub(super) fn is_color(resource: Resource) -> bool {
+    match resource {
+        Resource::ColorMap => true,
+        Resource::OwnMap(field) => field.info().numbers == 3,
+        _ => false,
+    }
 }
 
 /// What belongs in a cube or map.

@@ -6,6 +6,7 @@
 //! - `translate`: the rules' WGSL, in another language
 //! - [`provenance`]: where the constants come from
 //! - `names`: the prefix of all that an export defines, and its citations
+//! - `handed`: textures as arguments, for a language that has no global ones
 //! - `idle`: terms without a weight, which no shader need compute
 //! - [`cubes`]: baked cubes as KTX2 and DDS; [`vertices`]: what is baked of a mesh, as its attributes
 //! - `constants`, `function`, `material`: the texts; `passes`: how an engine makes what the function looks up of the UV atlas
@@ -16,6 +17,7 @@ mod constants;
 pub mod cubes;
 pub mod dialect;
 mod function;
+pub mod handed;
 mod idle;
 mod material;
 mod names;

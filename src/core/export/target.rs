@@ -25,11 +25,13 @@ pub enum Target {
     Godot,
     /// Unity.
     Unity,
+    /// Unreal 5.
+    Unreal,
 }
 
 impl Target {
     /// Every target, in the order of documentation.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Wgsl,
         Self::Glsl,
         Self::Hlsl,
@@ -40,6 +42,7 @@ impl Target {
         Self::Toml,
         Self::Godot,
         Self::Unity,
+        Self::Unreal,
     ];
 
     /// The name on the command line.
@@ -56,6 +59,7 @@ impl Target {
             Self::Toml => "toml",
             Self::Godot => "godot",
             Self::Unity => "unity",
+            Self::Unreal => "unreal",
         }
     }
 
@@ -76,6 +80,7 @@ impl Target {
             Self::Msl => Some(&dialect::MSL),
             Self::Godot => Some(&dialect::GODOT),
             Self::Unity => Some(&dialect::UNITY),
+            Self::Unreal => Some(&dialect::UNREAL),
             Self::C | Self::Json | Self::Toml => None,
         }
     }

@@ -14,12 +14,12 @@ use crate::shader::Facts;
 /// Write tuned constants, alone or with their shader, for another engine
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n  skinfit export runs/a/params.toml --to godot --material skin.gdshaderinc -o skin.tres\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot and unity hold the shader, and of light that scatters the passes before it, with how to wire them in the head; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
+    after_help = "Examples:\n  skinfit export runs/a/params.toml --to glsl -o skin.glsl\n  skinfit export runs/a/params.toml --to c -o skin.h\n  skinfit export runs/a/params.toml --to unity --set reflection=0 -o Skin.hlsl\n  skinfit export runs/a/params.toml --to godot --material skin.gdshaderinc -o skin.tres\n  skinfit export runs/a/params.toml --to unreal --material Skin -o Skin.txt\n\nTargets: wgsl, glsl, hlsl, cg, msl, godot, unity and unreal hold the shader, and of light that scatters the passes before it, with how to wire them in the head; c, json and toml constants alone, for which the parameters' file is enough. What toml holds is a file of parameters again."
 )]
 pub(super) struct Arguments {
     /// The parameters: params.toml of a run folder.
     params: PathBuf,
-    /// Language or format: wgsl, glsl, hlsl, cg, msl, c, json, toml, godot or unity.
+    /// Language or format: wgsl, glsl, hlsl, cg, msl, c, json, toml, godot, unity or unreal.
     #[arg(long, value_name = "TARGET", value_parser = parse_target)]
     to: Target,
     /// The constants alone, without the shader.
@@ -28,7 +28,8 @@ pub(super) struct Arguments {
     /// The scene that the parameters belong to [default: scene.toml beside them; constants alone need none].
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
-    /// For godot and unity: in place of the shader a material that includes it by this name.
+    /// For godot and unity: in place of the shader a material that includes it by this name. For unreal: nodes to paste into a
+    /// material, with the shader within and this title, or included by a path of a shader directory (/Project/Skin.ush).
     #[arg(long, value_name = "SHADER", conflicts_with = "constants")]
     material: Option<String>,
     #[command(flatten)]

@@ -145,7 +145,14 @@ fn a_material_includes_the_shader_by_its_name() {
     );
     let unity = material("unity", "Skin.hlsl").done().out;
     assert!(unity.contains("#include \"Skin.hlsl\"") && unity.contains("skinfit_hilite_cube (\""), "{unity}");
-    material("glsl", "skin.glsl").refused(&["glsl is no engine", "godot or unity"]);
+    // Unreal's holds it, but where it is told a path of a shader directory.
+    let unreal = material("unreal", "Skin").done().out;
+    assert!(unreal.starts_with("Begin Object ") && unreal.contains("Description=\"Skin\""), "{unreal}");
+    assert!(unreal.contains("struct Skinfit {") && !unreal.contains("IncludeFilePaths"), "{unreal}");
+    let unreal = material("unreal", "/Project/Skin.ush").done().out;
+    assert!(unreal.contains("IncludeFilePaths(0)=\"/Project/Skin.ush\""), "{unreal}");
+    assert!(!unreal.contains("struct Skinfit {"), "{unreal}");
+    material("glsl", "skin.glsl").refused(&["glsl is no engine", "godot, unity or unreal"]);
     let both = ["export", "run/params.toml", "--to", "unity", "--constants", "--material", "Skin.hlsl"];
     assert_eq!(sandbox.run(&both).code, Some(2));
 }

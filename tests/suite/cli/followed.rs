@@ -108,7 +108,7 @@ fn into_engines() {
         "skin.gdshaderinc",
         "skin.tres",
         "Skin.ush",
-        "skin.json",
+        "Skin.txt",
         "skin.glsl",
         "skin.h",
         "skin.wgsl",
@@ -119,8 +119,13 @@ fn into_engines() {
     for text in ["Skin.hlsl", "skin.gdshaderinc", "Skin.ush"] {
         let text = std::fs::read_to_string(folder.path().join(text)).unwrap();
         assert!(
-            text.contains("struct SkinfitSurface") && text.contains("skinfit_shade(SkinfitSurface at)"),
+            text.contains("struct SkinfitSurface") && text.contains("skinfit_shade(SkinfitSurface at"),
             "{text}"
         );
+    }
+    // What is pasted into Unreal takes the files of the page's cubes.
+    let nodes = std::fs::read_to_string(folder.path().join("Skin.txt")).unwrap();
+    for cube in ["irradiance", "specular", "hilite"] {
+        assert!(nodes.contains(&format!("'/Game/{cube}.{cube}'")), "{nodes}");
     }
 }

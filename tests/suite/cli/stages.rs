@@ -180,9 +180,13 @@ fn the_stages_of_diffusion_are_pictures_of_the_atlas() {
     sandbox.write("truth.toml", TRUTH.as_bytes());
     sandbox.edit("\"reflection\"]", "\"reflection\", \"diffusion\"]");
     let export = ["export", "truth.toml", "--scene", "scene.toml", "--to"];
-    for (target, load) in
-        [("glsl", "texelFetch("), ("unity", ".Load(int3("), ("msl", ".read(uint2("), ("cg", "tex2Dfetch(")]
-    {
+    for (target, load) in [
+        ("glsl", "texelFetch("),
+        ("unity", ".Load(int3("),
+        ("unreal", ".Load(int3("),
+        ("msl", ".read(uint2("),
+        ("cg", "tex2Dfetch("),
+    ] {
         let text = sandbox.run(&[&export[..], &[target]].concat()).done().out;
         for part in ["into textures of 64 x 64 texels", "skinfit_diffusion_level_3_pass(", "charts.csv", load]
         {

@@ -1,0 +1,95 @@
+//! A material of Unity: a ShaderLab file.
+
+use super::{Bound, Members, Parts};
+use crate::export::ExportError;
+
+/// Unity's X is glTF's, mirrored; the vertex stage has turned it back.
+const MEMBERS: Members = [
+    ("vertex_position", "from.position"),
+    ("vertex_normal", "from.normal"),
+    ("vertex_tangent", "from.tangent"),
+    ("vertex_bitangent", "from.bitangent"),
+    ("vertex_uv", "from.uv.xy"),
+    ("vertex_occlusion", "from.uv.z"),
+    ("eye", "turned(_WorldSpaceCameraPos)"),
+];
+
+/// A ShaderLab file (Unity's manual, "ShaderLab"): unlit, for the built-in pipeline and URP.
+pub(super) fn text(parts: &Parts<'_>) -> Result<String, ExportError> {
+    let property = |Bound { name, cube, words, .. }: Bound| {
+        let (kind, neutral) = if cube { ("Cube", "black") } else { ("2D", "white") };
+        let words = words.replace('"', "'");
+        format!("        [NoScaleOffset] {name} (\"{words}\", {kind}) = \"{neutral}\" {{}}\n")
+    };
+    let properties: String = parts.bound().map(property).collect();
+    let filled = parts.filled(&MEMBERS, "                ")?;
+    Ok(SHADER
+        .replace("PROPERTIES\n", &properties)
+        .replace("FILLED\n", &filled)
+        .replace("SHADER", &parts.shader.replace('"', "")))
+}
+
+const SHADER: &str = r#"// Linear radiance: the player's colour space is Linear. Maps other than the colour map, and all cubes, are imported with
+// sRGB off; the normal map as an ordinary texture, as it is read as stored. Occlusion is the first number of the second
+// texture coordinates.
+Shader "Skinfit/Skin" {
+    Properties {
+PROPERTIES
+    }
+    SubShader {
+        Tags { "RenderType" = "Opaque" "Queue" = "Geometry" }
+        Pass {
+            HLSLPROGRAM
+            #pragma target 4.5
+            #pragma vertex skin_vertex
+            #pragma fragment skin_fragment
+            #include "UnityCG.cginc"
+            #include "SHADER"
+
+            struct OfMesh {
+                float4 position : POSITION;
+                float3 normal : NORMAL;
+                float4 tangent : TANGENT;
+                float2 uv : TEXCOORD0;
+                float2 occlusion : TEXCOORD1;
+            };
+
+            struct Between {
+                float4 clip : SV_POSITION;
+                float3 position : TEXCOORD0;
+                float3 normal : TEXCOORD1;
+                float3 tangent : TEXCOORD2;
+                float3 bitangent : TEXCOORD3;
+                float3 uv : TEXCOORD4;
+            };
+
+            // Importers of glTF mirror X; the shader wants glTF's axes.
+            float3 turned(float3 v) {
+                return float3(-v.x, v.y, v.z);
+            }
+
+            Between skin_vertex(OfMesh from) {
+                Between to;
+                float3 normal = UnityObjectToWorldNormal(from.normal);
+                float3 tangent = UnityObjectToWorldDir(from.tangent.xyz);
+                // Of Unity's own frame, and turned with it.
+                float3 bitangent = cross(normal, tangent) * from.tangent.w * unity_WorldTransformParams.w;
+                to.clip = UnityObjectToClipPos(from.position);
+                to.position = turned(mul(unity_ObjectToWorld, from.position).xyz);
+                to.normal = turned(normal);
+                to.tangent = turned(tangent);
+                to.bitangent = turned(bitangent);
+                to.uv = float3(from.uv, from.occlusion.x);
+                return to;
+            }
+
+            float4 skin_fragment(Between from) : SV_Target {
+                SkinfitSurface at;
+FILLED
+                return skinfit_shade(at);
+            }
+            ENDHLSL
+        }
+    }
+}
+"#;
