@@ -1,7 +1,6 @@
 //! What follows the mesh's passes: what stands behind it, and the bloom that the haze drives (`render::backdrop`,
 //! `render::bloom`).
 
-use crate::model::gain::Gain;
 use wgpu::util::{DeviceExt as _, TextureDataOrder};
 use wgpu::{
     BindGroup, BindingResource, Buffer, BufferUsages, Extent3d, RenderPass, TexelCopyBufferLayout,
@@ -11,6 +10,7 @@ use wgpu::{
 use super::device::Gpu;
 use super::filter::{Filter, Input};
 use super::targets::{Targets, texture};
+use crate::model::gain::Gain;
 use crate::render::backdrop::Backdrop;
 use crate::render::bloom::kernel;
 

@@ -3,7 +3,6 @@
 mod frames;
 mod made;
 
-use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::atlas::AtlasTraffic;
@@ -14,6 +13,7 @@ use super::stage::Stage;
 use super::timing::PassTime;
 use super::upload::{Content, Uploads};
 use crate::bake::PoseBake;
+use crate::model::gain::Gain;
 use crate::model::params::{Param, Params};
 use crate::model::terms::TermName;
 use crate::render::antialias::Antialias;

@@ -1,6 +1,5 @@
 //! A stage of images: the targets of one size, and what is drawn into them.
 
-use crate::model::gain::Gain;
 use wgpu::{
     Color, CommandEncoder, LoadOp, Operations, RenderPassColorAttachment, RenderPassDepthStencilAttachment,
     RenderPassDescriptor, RenderPassTimestampWrites, StoreOp, TextureView,
@@ -14,6 +13,7 @@ use super::readback::Copy;
 use super::resolve::Resolve;
 use super::targets::{Planes, Targets, Tile};
 use super::timing::Timer;
+use crate::model::gain::Gain;
 use crate::render::image::Image;
 
 /// Targets, and the passes after the mesh's.

@@ -114,7 +114,7 @@ pub(crate) fn run(session: &mut Session, look: &mut Look, command: Command) {
             session.slide_gain(view, channels, value);
         }
         Command::FreeGains { on } => session.edit(|values| values.free_gains = on),
-        Command::FreeWhiteBalance { on } => session.edit(|values| values.white_balance = on),
+        Command::FreeWhiteBalance { on } => session.edit(|values| values.set_white_balance(on)),
         Command::Settle => session.settle(),
         Command::Reset { param, to } => {
             if let Some(param) = Param::from_name(&param) {

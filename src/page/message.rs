@@ -1,6 +1,5 @@
 //! What the workers tell each other of a fit.
 
-use crate::model::gain::Gain;
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
@@ -14,6 +13,7 @@ use skinfit_view::values::column;
 use crate::engine::Point;
 use crate::fit::outcome::{Ending, Iteration};
 use crate::model::effects::{Effect, Effects};
+use crate::model::gain::Gain;
 use crate::model::params::{Column, Param, Params};
 use crate::prepare::Loaded;
 

@@ -43,7 +43,7 @@ pub struct Summary {
     pub ending: Ending,
     /// What was minimised.
     pub loss_name: &'static str,
-    /// Each unknown: a tied parameter, one channel of a parameter, or a view's gain.
+    /// Each unknown: a tied parameter, one channel of a parameter, a view's gain, or one channel of it.
     pub unknowns: Vec<UnknownSummary>,
     /// What the standard errors rest on.
     pub errors: Errors,
@@ -117,7 +117,7 @@ pub enum Value<T> {
 /// What is known of one unknown.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct UnknownSummary {
-    /// `hilite`, `hilite.g`, `gain.<view>`.
+    /// `hilite`, `hilite.g`, `gain.<view>`, `gain.<view>.g`.
     pub name: String,
     /// Where the fit began.
     pub start: f64,

@@ -1,6 +1,5 @@
 //! Scenes in one setting, ready to be evaluated: baked, sampled, and with something to compare with.
 
-use crate::model::gain::Gain;
 use std::path::Path;
 
 use super::StudyError;
@@ -11,6 +10,7 @@ use crate::engine::{Engine, Objective, Point, Task};
 use crate::fit::outcome::Outcome;
 use crate::fit::{self, FitOptions};
 use crate::model::effects::Effect;
+use crate::model::gain::Gain;
 use crate::model::params::{Column, Param, Params};
 use crate::prepare::{
     Baked, HeldOut, JointScenes, Loaded, PrepareError, PrepareOptions, ReadyScene, Sampled,

@@ -11,13 +11,13 @@ mod browser;
 mod thread;
 mod work;
 
-use crate::model::gain::Gain;
 use std::collections::BTreeMap;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
+use crate::model::gain::Gain;
 use crate::model::params::Params;
 use crate::model::terms::TermName;
 use crate::opened::Opened;

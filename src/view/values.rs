@@ -137,6 +137,14 @@ impl Values {
         self.free_gains || self.white_balance || self.gains.iter().any(|&gain| gain != Gain::ONE)
     }
 
+    /// Say whether a fit moves each channel of the gains; where it does not, each is one value, which is green's.
+    pub fn set_white_balance(&mut self, free: bool) {
+        self.white_balance = free;
+        if !free {
+            self.gains.iter_mut().for_each(|gain| *gain = gain.channel(1).into());
+        }
+    }
+
     /// What a view's gain shows: one value, or one a channel where these differ or a fit moves each.
     #[must_use]
     pub fn gain_rows(&self, view: usize) -> Vec<(Channels, f64)> {

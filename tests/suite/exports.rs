@@ -9,6 +9,7 @@ use skinfit::fit::params_file::ParamsFile;
 use skinfit::model::dapple::Dapple;
 use skinfit::model::effects::{Effect, Effects, Form, Lookups, Silhouette};
 use skinfit::model::evaluate::Setup;
+use skinfit::model::gain::Gain;
 use skinfit::model::params::{Param, Params};
 use skinfit::model::texture_filter::TextureFilter;
 use skinfit::shader::facts::MapFacts;
@@ -349,7 +350,7 @@ fn exports_that_no_compiler_here_takes_are_as_they_were_when_read() {
 
 /// Constants of the paper's fragment program, fitted to two views.
 fn constants(target: Target, params: &Params) -> String {
-    let gains = [("front".to_owned(), 1.0.into()), ("side.2".to_owned(), (0.1 + 0.2).into())];
+    let gains = [("front".to_owned(), 1.0.into()), ("side.2".to_owned(), Gain([0.1 + 0.2, 1.0, 1.0 / 3.0]))];
     let loss = Some("relative_l2");
     let constants =
         Constants { form: Form::Corrected, effects: Effects::SURFACE, params, loss, gains: &gains };
@@ -390,7 +391,10 @@ fn constants_as_toml_are_a_file_of_parameters() {
     // To the bit.
     assert_eq!((file.params, file.form, file.effects), (params, Form::Corrected, Some(Effects::SURFACE)));
     assert_eq!(file.loss.map(skinfit::scene::Loss::name), Some("relative_l2"));
-    assert_eq!(file.gains, [("front".to_owned(), 1.0.into()), ("side.2".to_owned(), (0.1 + 0.2).into())]);
+    assert_eq!(
+        file.gains,
+        [("front".to_owned(), 1.0.into()), ("side.2".to_owned(), Gain([0.1 + 0.2, 1.0, 1.0 / 3.0]))]
+    );
 }
 
 #[test]

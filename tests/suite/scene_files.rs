@@ -359,8 +359,29 @@ fn a_views_response_says_how_much_light_a_code_is() {
     let linear = target("1");
     assert_eq!((linear.rgb[0], linear.clipped_at.unwrap().low), ([1.0, 0.2, 0.0], (0.5 / 255.0) as f32));
     assert_eq!(target("2.0").rgb[0], [1.0, (0.2_f64 * 0.2) as f32, 0.0]);
-    // Between the first two of three rows, and as shares of the brightest.
-    assert_eq!(target("\"response.csv\"").rgb[0], [0.5, (0.4_f64 / 8.0) as f32, 0.0]);
+    // Green between the first two of three rows. Red ends at less light than the clip, which is the brightest channel's:
+    // of a clipped red nothing is known.
+    let table = target("\"response.csv\"");
+    assert_eq!((table.rgb[0], table.mask.unwrap()[0]), ([4.0, 0.4, 0.0], 0.0));
+    assert_eq!((linear.mask, table.clipped_at.unwrap().low), (None, 0.0));
+    // A black that is not dark, in two channels more so than in the third.
+    scene_folder.write("response.csv", b"1,1,0.1\n2,2,2\n");
+    scene_folder.write(
+        "target.exr",
+        &encode(
+            RgbaImage::from_fn(4, 4, |x, _| Rgba([100, 100, if x == 0 { 0 } else { 100 }, 255])),
+            ImageFormat::Png,
+        ),
+    );
+    assert_eq!(target("\"response.csv\"").mask, None);
+    scene_folder.write(
+        "target.exr",
+        &encode(
+            RgbaImage::from_fn(4, 4, |x, _| Rgba([if x == 0 { 0 } else { 100 }, 100, 100, 255])),
+            ImageFormat::Png,
+        ),
+    );
+    assert_eq!(target("\"response.csv\"").mask.unwrap()[..2], [0.0, 1.0]);
 }
 
 #[test]

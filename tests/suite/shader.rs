@@ -169,6 +169,8 @@ fn fused_passes_of_every_effect_set_form_and_silhouette_validate() {
             .map(|p| Unknown::Param(Column::tied(p)))
             .chain(green)
             .chain([Unknown::Gain(1, Channels::Tied)])
+            // Of some, a view's white balance too.
+            .chain((i % 3 == 0).then_some(Unknown::Gain(2, Channels::One(2))))
             .collect();
         let held = |u: &Unknown| !matches!(u, Unknown::Param(c) if lookups.contains(&c.param));
         let kept: Vec<Unknown> = all.iter().copied().filter(held).collect();

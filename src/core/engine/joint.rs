@@ -242,3 +242,17 @@ impl Objective for Joint {
         all
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_are_called_by_their_views() {
+        let called = |name: &str| {
+            label(name, |scene| Some(format!("s{scene}")), |view| (view < 3).then(|| format!("a.{view}")))
+        };
+        let labels = ["gain.2", "gain.2.r", "gain.7.r", "1/hilite.g", "hilite.g"].map(called);
+        assert_eq!(labels, ["gain.a.2", "gain.a.2.r", "gain.7.r", "s1/hilite.g", "hilite.g"]);
+    }
+}

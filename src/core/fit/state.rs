@@ -292,5 +292,7 @@ fn values(point: &Point) -> Vec<f64> {
     let own = point.params.own();
     let own = own.filter(|(_, param, rgb)| param.is_built_in() || *rgb != param.default_rgb(Form::Corrected));
     let own = own.flat_map(|(_, _, rgb)| rgb);
-    params.chain(point.gains.iter().flat_map(|gain| gain.0)).chain(own).collect()
+    let gains =
+        point.gains.iter().flat_map(|gain| gain.scalar().map_or(gain.0.to_vec(), |factor| vec![factor]));
+    params.chain(gains).chain(own).collect()
 }

@@ -1,6 +1,5 @@
 //! Images in other number formats: the rules with every operation rounded.
 
-use crate::model::gain::Gain;
 use rayon::prelude::*;
 
 use super::image::Image;
@@ -9,6 +8,7 @@ use crate::engine::cubes_at::CubesAt;
 use crate::engine::rules::{Loads, Registers, SampleSteps, Setting, sample_facts};
 use crate::model::effects::Form;
 use crate::model::evaluate::Setup;
+use crate::model::gain::Gain;
 use crate::model::params::{Param, Params};
 use crate::model::real::Real;
 use crate::program::graph::{Binary, Id};

@@ -1,6 +1,5 @@
 //! The forward pass: images, left on the device.
 
-use crate::model::gain::Gain;
 use std::sync::MutexGuard;
 
 use web_time::Instant;
@@ -13,6 +12,7 @@ use super::lights::Inputs;
 use super::parts::Parts;
 use super::pipeline::{Uniform, bind_part, buffer, encoder, part_layout, pipeline};
 use super::{GpuEngine, OnDevice};
+use crate::model::gain::Gain;
 use crate::model::terms::TermName;
 use crate::readback::read_floats;
 use crate::timing::Timer;

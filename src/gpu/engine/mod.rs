@@ -29,7 +29,6 @@ mod program;
 mod samples;
 mod terms;
 
-use crate::model::gain::Gain;
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
@@ -44,6 +43,7 @@ pub use self::samples::{DeviceSampleError, DeviceSamples};
 use self::terms::replace_samples;
 use crate::bake::Illumination;
 use crate::model::evaluate::Setup;
+use crate::model::gain::Gain;
 use crate::model::params::Param;
 use crate::model::terms::TermName;
 use crate::scene::Loss;

@@ -1,6 +1,5 @@
 //! The shaders of a wish as pipelines, and one run of them.
 
-use crate::model::gain::Gain;
 use wgpu::{BindGroup, Buffer, BufferUsages, CommandEncoder, ComputePassDescriptor, ComputePipeline};
 
 use super::dispatch::PART_BYTES;
@@ -11,6 +10,7 @@ use super::parts::Parts;
 use super::pipeline::{
     READ, UNIFORM, Uniform, WRITE, bind, bind_part, buffer, encoder, layout, part_layout, pipeline,
 };
+use crate::model::gain::Gain;
 use crate::readback::map;
 use crate::{Gpu, GpuError};
 use skinfit_core::engine::view::ObservedView;

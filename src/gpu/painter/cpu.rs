@@ -1,6 +1,5 @@
 //! The CPU engine: rays through the samples' positions, the model in f64.
 
-use crate::model::gain::Gain;
 use std::future::ready;
 use std::sync::Arc;
 
@@ -13,6 +12,7 @@ use crate::bake::lobe_sky::LobeSky;
 use crate::bake::rays::RayMesh;
 use crate::bake::sky::traces_lobes;
 use crate::model::effects::Effect;
+use crate::model::gain::Gain;
 use crate::model::params::Params;
 use crate::prepare::Baked;
 use crate::render::backdrop::Backdrop;

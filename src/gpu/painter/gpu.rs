@@ -1,10 +1,10 @@
 //! The production renderer.
 
-use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::{BACKGROUND, Beside, Cut, PaintError, Painter, Painting, Picture};
 use crate::bake::PoseBake;
+use crate::model::gain::Gain;
 use crate::model::params::Params;
 use crate::model::terms::TermName;
 use crate::prepare::Baked;

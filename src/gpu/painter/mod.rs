@@ -9,13 +9,13 @@ mod gpu;
 pub use cpu::CpuPainter;
 pub use gpu::GpuPainter;
 
-use crate::model::gain::Gain;
 use std::pin::Pin;
 
 use skinfit_core::program::shading::ShadingError;
 
 use super::GpuError;
 use crate::bake::PoseBake;
+use crate::model::gain::Gain;
 use crate::model::params::Params;
 use crate::render::image::Image;
 use crate::samples::SampleError;

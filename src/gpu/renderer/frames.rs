@@ -1,12 +1,12 @@
 //! Frames: drawn, read back, and timed.
 
-use crate::model::gain::Gain;
 use wgpu::CommandEncoderDescriptor;
 
 use super::Renderer;
 use crate::GpuError;
 use crate::atlas::ATLAS;
 use crate::constants::Values;
+use crate::model::gain::Gain;
 use crate::model::terms::TermName;
 use crate::readback::Copy;
 use crate::scene::view::Camera;

@@ -239,9 +239,9 @@ mod tests {
             "# kept\n[mesh]\nfile = '/sc\"ene/a b.glb' # here too\n[maps]\ncolor = \"/c.png\"\n\
              [[view]]\ntarget = '/sc\"ene/tA.exr'\n"
         );
-        let inline = "view = [{ target = \"a.exr\", mask = \"b.png\", haze = \"c.exr\" }] # views\n";
+        let inline = "view = [{ target = \"a.exr\", mask = \"b.png\", haze = \"c.exr\", response = \"d.csv\" }, { response = 2.2 }] # views\n";
         let text = as_fitted(inline, Path::new("/s"), Changes::default()).unwrap();
-        let wanted = "view = [{ target = \"/s/a.exr\", mask = \"/s/b.png\", haze = \"/s/c.exr\" }] # views\n";
+        let wanted = "view = [{ target = \"/s/a.exr\", mask = \"/s/b.png\", haze = \"/s/c.exr\", response = \"/s/d.csv\" }, { response = 2.2 }] # views\n";
         assert_eq!(text, wanted);
     }
 

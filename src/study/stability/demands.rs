@@ -1,7 +1,6 @@
 //! Hard cases of engines and fits: clipped targets, nothing to compare, what no pixel asks for, ten million
 //! pixels (MODEL 7's last rows).
 
-use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::case::FragmentInputs;
@@ -17,6 +16,7 @@ use crate::model::cube::Cube;
 use crate::model::effects::{Effect, Effects, Form, Silhouette};
 use crate::model::evaluate::Setup;
 use crate::model::fragment::Fragment;
+use crate::model::gain::Gain;
 use crate::model::params::{Column, Param, Params};
 use crate::samples::rows::Row;
 use crate::samples::surface_records::Asked;

@@ -4,7 +4,6 @@
 //!
 //! The other search holds every derivative against f64; these are held so by finite differences in the tests.
 
-use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use rand::SeedableRng;
@@ -24,6 +23,7 @@ use crate::engine::reference::Reference;
 use crate::engine::view::ObservedView;
 use crate::engine::{Point, Task, Unknown};
 use crate::model::choices::SpecularModel;
+use crate::model::gain::Gain;
 use crate::model::params::{Column, Param, Params};
 use crate::samples::ViewSamples;
 

@@ -1,6 +1,5 @@
 //! Engines as evaluators: the sums over a batch's fragments, each a pixel with one sample.
 
-use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::case::{Batch, EVERYTHING, FragmentInputs, Setting};
@@ -13,6 +12,7 @@ use crate::engine::{Objective, Point, Task, Unknown};
 use crate::gpu::Gpu;
 use crate::gpu::engine::{GpuEngine, Memory};
 use crate::model::evaluate::Setup;
+use crate::model::gain::Gain;
 use crate::model::params::{Column, Param};
 use crate::samples::rows::{Row, Rows};
 use crate::samples::surface_records::Asked;

@@ -1,6 +1,5 @@
 //! How good a set of effects is: each view scored by a fit of the others.
 
-use crate::model::gain::Gain;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -10,6 +9,7 @@ use crate::engine::cpu::CpuEngine;
 use crate::engine::view::ObservedView;
 use crate::fit::{self, FitOptions};
 use crate::model::effects::Effects;
+use crate::model::gain::Gain;
 use crate::model::params::{Column, Param};
 use crate::prepare::{Baked, Loaded, PrepareOptions, untied};
 use crate::reference::ReferenceView;

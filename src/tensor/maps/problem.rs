@@ -3,7 +3,6 @@
 //! The loss is the engine's: the mean of weighted squared residuals, where a robust loss is fitted by reweighting.
 //! Weights and working targets are taken on the CPU from the very text that the engine uses.
 
-use crate::model::gain::Gain;
 use burn::tensor::{Tensor, TensorData};
 
 use super::MapError;
@@ -11,6 +10,7 @@ use super::layer::Layer;
 use crate::engine::residual::{Residuals, Weighted};
 use crate::engine::view::ObservedView;
 use crate::model::batch::Batch;
+use crate::model::gain::Gain;
 use crate::samples::LANES;
 use crate::scene::Loss;
 use crate::{Input, Inputs, Shade, SharedDevice, TensorError};
@@ -29,7 +29,7 @@ struct Part {
     shade: Shade,
     /// What it takes; layers' own inputs follow their values.
     inputs: Inputs,
-    /// What each pixel slot's image is multiplied with: \[slots, 1\].
+    /// What each pixel slot's image is multiplied with: \[slots, 4\].
     gain: Tensor<2>,
     /// Working targets and their weights (which add up to 1 over all parts): \[slots, 4\].
     target: Tensor<2>,

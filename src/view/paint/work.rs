@@ -1,6 +1,5 @@
 //! What the worker does: what is asked for first, then scores and terms of what was drawn.
 
-use crate::model::gain::Gain;
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 
@@ -10,6 +9,7 @@ use web_time::Instant;
 use super::{Answer, Compared, Engine, Job, Painted, Shared, Slot, Wake};
 use crate::gpu::painter::{Beside, CpuPainter, GpuPainter, PaintError, Painter, Picture};
 use crate::gpu::{Choice, Gpu, GpuError, RenderOptions};
+use crate::model::gain::Gain;
 use crate::model::terms::TermName;
 use crate::opened::Opened;
 use crate::render::antialias::Antialias;

@@ -1,13 +1,13 @@
 //! What one does to the values: each is a step of the history, or part of one that goes on until it is settled. While a
 //! fit moves them nothing else does.
 
-use crate::model::gain::Gain;
 use std::ops::RangeInclusive;
 
 use super::Session;
 use crate::engine::Unknown;
 use crate::history::History;
 use crate::model::effects::Effect;
+use crate::model::gain::Gain;
 use crate::model::params::{Channels, Column, Param};
 use crate::skin::Skin;
 use crate::values::Values;

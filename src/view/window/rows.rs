@@ -48,7 +48,7 @@ pub(crate) fn show(ui: &mut Ui, session: &mut Session) {
             Edit::Apart(param, apart) => session.edit(|values| values.set_apart(param, apart)),
             Edit::Gain(view, channels, gain) => session.slide_gain(view, channels, gain),
             Edit::FreeGains(free) => session.edit(|values| values.free_gains = free),
-            Edit::WhiteBalance(free) => session.edit(|values| values.white_balance = free),
+            Edit::WhiteBalance(free) => session.edit(|values| values.set_white_balance(free)),
             Edit::Settled => session.settle(),
         }
     }

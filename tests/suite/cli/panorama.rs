@@ -51,6 +51,53 @@ fn brackets_are_merged_to_the_radiance_that_they_are_of() {
     assert!(quantile(&errors, 0.5) < 0.02, "{}", quantile(&errors, 0.5));
 }
 
+/// Photographs of one view with a response that is a power, of which the file of a table gives back the light.
+#[test]
+fn a_recovered_response_is_a_views() {
+    let sandbox = Sandbox::new();
+    let power = 1.8;
+    let light = |x: u32, y: u32| 0.004 * 1.045_f64.powi((x + 3 * y) as i32);
+    let times = [0.25, 1.0, 4.0];
+    for (i, seconds) in times.iter().enumerate() {
+        let code =
+            |x: u32, y: u32| (255.0 * (seconds * light(x, y)).min(1.0).powf(1.0 / power)).round() as u8;
+        let picture = RgbImage::from_fn(64, 32, |x, y| Rgb([code(x, y); 3]));
+        sandbox.write(&format!("{i}.png"), &encode(picture, ImageFormat::Png));
+    }
+    let merge = ["panorama", "merge", "0.png", "1.png", "2.png", "--seconds", "0.25,1,4", "-o", "merged.exr"];
+    let recover = ["--response", "recover", "--write-response", "camera.csv"];
+    let ran = sandbox.run(&[&merge[..], &recover].concat());
+    assert_eq!(ran.code, Some(0), "{ran:?}");
+    assert!(ran.out.contains("wrote camera.csv"), "{ran:?}");
+    let rows: Vec<f64> = sandbox
+        .text("camera.csv")
+        .lines()
+        .map(|line| line.split(',').nth(1).unwrap().parse().unwrap())
+        .collect();
+    assert_eq!(rows.len(), 256);
+    // Where codes are trusted, light is that power of them, but for its unit: 2% is asked of merged radiance.
+    for code in [60_usize, 100, 200] {
+        let found = rows[code] / rows[128];
+        let want = (code as f64 / 128.0).powf(power);
+        assert!((found / want - 1.0).abs() < 0.02, "{code}: {found} is not {want}");
+    }
+    // A view takes it.
+    let grey = RgbImage::from_pixel(32, 24, Rgb([128; 3]));
+    sandbox.write("targets/front.exr", &encode(grey, ImageFormat::Png));
+    sandbox
+        .edit("target = \"targets/front.exr\"", "target = \"targets/front.exr\"\nresponse = \"camera.csv\"");
+    sandbox.run(&["bake", "scene.toml", "-o", "baked"]).done();
+    let fit = sandbox.fit("run", &["--max-iterations", "1"]);
+    assert!(fit.code != Some(2), "{fit:?}");
+    assert!(sandbox.text("run/scene.toml").contains("camera.csv"));
+    sandbox
+        .run(&[&merge[..], &["--write-response", "camera.csv"]].concat())
+        .refused(&["--write-response", "--response recover"]);
+    sandbox
+        .run(&[&merge[..], &["--response", "recover", "--write-response", "merged.exr"]].concat())
+        .refused(&["merged.exr is where the radiance goes"]);
+}
+
 /// A grey photograph.
 fn photograph(code: u8) -> Vec<u8> {
     encode(RgbImage::from_pixel(16, 12, Rgb([code, code, code / 2])), ImageFormat::Png)

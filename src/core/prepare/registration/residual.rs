@@ -18,6 +18,9 @@ const LEAST: f64 = 0.02;
 /// pixels side by side say the same.
 const ALIKE: f64 = 0.25;
 
+/// Pixels whose colours are compared, at the least, for each factor that is the best for them.
+const ENOUGH: usize = 8;
+
 /// Weights of the two kinds of differences.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Weights {
@@ -49,7 +52,11 @@ impl Residual {
         let skin = |i: usize| drawn.plain.get(i).is_none_or(|share| *share == 0.0);
         let both =
             |i: usize| skin(i) && weight(i) >= 1.0 && covered(drawn, i) > WHOLE && covered(target, i) > WHOLE;
-        let compared: Vec<bool> = (0..count).map(both).collect();
+        let mut compared: Vec<bool> = (0..count).map(both).collect();
+        // A mixture lies through any few pixels.
+        if compared.iter().filter(|&&both| both).count() < ENOUGH * (drawn.terms.len() + 1) {
+            compared.fill(false);
+        }
         let fitted = [0, 1, 2].map(|c| Mixture::nearest(drawn, target, &compared, c));
         let color = |i: usize| {
             let difference = |c: usize| fitted[c].difference(drawn, i, c, f64::from(target.rgb[i][c]));
@@ -150,27 +157,18 @@ impl Mixture {
         let parts: Vec<DMatrix<f64>> = firsts.into_par_iter().map(sums).collect();
         let sums = parts.into_iter().fold(DMatrix::zeros(width, width), |all, part| all + part);
         let count = sums[(width - 1, width - 1)];
-        if count < 2.0 {
+        if count == 0.0 {
             return Self { factors: vec![0.0; terms], ..Self::default() };
         }
         let mean = |k: usize| sums[(k, width - 1)] / count;
         let covariance = |a: usize, b: usize| sums[(a.min(b), a.max(b))] / count - mean(a) * mean(b);
         let between = DMatrix::from_fn(terms, terms, covariance);
         let towards = DVector::from_fn(terms, |k, _| covariance(k, terms));
-        // One factor for all; colours that go the other way are not the same surface's.
-        let alike = if between.sum() > 0.0 { (towards.sum() / between.sum()).max(0.0) } else { 0.0 };
-        let alike = DVector::from_element(terms, alike);
-        let mut held = between.clone();
-        for k in 0..terms {
-            held[(k, k)] += HELD * between[(k, k)] + 1e-9 * between.trace() + f64::MIN_POSITIVE;
-        }
-        let apart = held.cholesky().map(|held| held.solve(&(&towards - &between * &alike)));
-        let factors =
-            apart.filter(|apart| apart.iter().all(|x| x.is_finite())).map_or(alike.clone(), |x| alike + x);
+        let factors = factors(&between, &towards);
         let constant = mean(terms) - (0..terms).map(|k| factors[k] * mean(k)).sum::<f64>();
         let deviation = covariance(terms, terms).max(0.0).sqrt();
         let scale = if deviation > 0.0 { deviation.recip() } else { 0.0 };
-        Self { factors: factors.iter().copied().collect(), constant, scale }
+        Self { factors, constant, scale }
     }
 
     fn difference(&self, drawn: &Picture, i: usize, channel: usize, target: f64) -> f64 {
@@ -178,6 +176,33 @@ impl Mixture {
         let shown: f64 = terms.map(|(term, factor)| factor * f64::from(term[i][channel])).sum();
         self.scale * (shown + self.constant - target)
     }
+}
+
+/// The factors of terms, none below 0, that come nearest by these covariances of terms with each other and with the target.
+/// Colours that go the other way are not the same surface's.
+fn factors(between: &DMatrix<f64>, towards: &DVector<f64>) -> Vec<f64> {
+    let mut factors = vec![0.0; towards.len()];
+    let mut kept: Vec<usize> = (0..towards.len()).collect();
+    while !kept.is_empty() {
+        let own = between.select_rows(&kept).select_columns(&kept);
+        let wanted = towards.select_rows(&kept);
+        let alike = if own.sum() > 0.0 { (wanted.sum() / own.sum()).max(0.0) } else { 0.0 };
+        let alike = DVector::from_element(kept.len(), alike);
+        let mut held = own.clone();
+        for k in 0..kept.len() {
+            held[(k, k)] += HELD * own[(k, k)] + 1e-9 * own.trace() + f64::MIN_POSITIVE;
+        }
+        let apart = held.cholesky().map(|held| held.solve(&(&wanted - &own * &alike)));
+        let found = apart.map_or_else(|| alike.clone(), |apart| &alike + apart);
+        let found = if found.iter().all(|x| x.is_finite()) { found } else { alike };
+        let (least, value) = found.argmin();
+        if value >= 0.0 {
+            kept.iter().zip(&found).for_each(|(&k, &factor)| factors[k] = factor);
+            break;
+        }
+        kept.remove(least);
+    }
+    factors
 }
 
 #[cfg(test)]
@@ -217,5 +242,30 @@ mod tests {
         let mut other = mixed([0.7, 1.4], 0.2);
         other.iter_mut().enumerate().for_each(|(i, rgb)| rgb[0] += (i as f32 * 0.9).sin());
         assert!(worst(&picture(other, Vec::new())) > 0.5);
+        // Nor is what goes the other way: no factor makes it one of theirs.
+        let away: Vec<[f32; 3]> = drawn.rgb.iter().map(|rgb| rgb.map(|x| 9.0 - x)).collect();
+        assert!(worst(&picture(away, Vec::new())) > 1.0);
+    }
+
+    #[test]
+    fn few_pixels_say_nothing_of_colours() {
+        let picture = |count: usize, terms: usize| Picture {
+            width: count,
+            height: 1,
+            rgb: (0..count).map(|i| [(i as f32).sin() + 2.0; 3]).collect(),
+            terms: (1..=terms)
+                .map(|k| (0..count).map(|i| [(k as f32 * i as f32).cos() + 2.0; 3]).collect())
+                .collect(),
+            alpha: Some(vec![1.0; count]),
+            mask: Vec::new(),
+            plain: Vec::new(),
+        };
+        let loss = |count: usize| {
+            let residual = Residual::new(&picture(count, 6), &picture(count, 0));
+            residual.loss(Weights { cover: 1.0, color: 1.0 }, 1.0)
+        };
+        // Three channels, each as far off as its standard deviation.
+        assert_eq!(loss(20), 1.5);
+        assert!(loss(400) > 0.0 && loss(400) < 1.5);
     }
 }

@@ -13,20 +13,22 @@ const MOST_BYTES: u64 = 1 << 24;
 pub(in crate::scene) enum Response {
     /// The code, as a share of the highest, to this power; 1 of linear codes.
     Gamma(f64),
-    /// Light at codes evenly from 0 to the highest, as shares of the most; linear between them.
+    /// Light at codes evenly from 0 to the highest; linear between them.
     Table(Vec<[f64; 3]>),
 }
 
 impl Response {
     /// The table of a file: a row a code, evenly from 0 to the highest, each of one number or three (red, green, blue),
-    /// with commas between them. Light in any unit.
+    /// with commas between them.
     ///
     /// # Errors
     /// When it cannot be read, or is no response: fewer than two rows, other than finite light of at least 0, or less light
     /// for a higher code.
     pub(in crate::scene) fn read(path: &Path) -> Result<Self, SceneError> {
         let bytes = read_bytes(path, MOST_BYTES)?;
+        // Spreadsheets begin a file with a mark of its encoding.
         let text = String::from_utf8_lossy(&bytes);
+        let text = text.trim_start_matches('\u{feff}');
         let rows = "Give a row a code, evenly from 0 to the highest: one number, or red,green,blue";
         let wrong = |line: usize, what: String| SceneError::new(path, what, rows).at(format!("line {line}"));
         let mut table: Vec<[f64; 3]> = Vec::new();
@@ -55,8 +57,7 @@ impl Response {
         if (0..3).any(|c| last[c] <= first[c]) {
             return Err(SceneError::new(path, "is a response that is the same for all codes", rows));
         }
-        let most = last.into_iter().fold(0.0, f64::max);
-        Ok(Self::Table(table.into_iter().map(|light| light.map(|x| x / most)).collect()))
+        Ok(Self::Table(table))
     }
 
     /// A curve a channel.
@@ -93,10 +94,10 @@ mod tests {
     }
 
     #[test]
-    fn a_table_is_linear_between_its_rows_and_as_bright_as_its_brightest() {
-        let [red, green, _] = read("0\n0.5, 1, 1\n\n1,4,2\n").unwrap().curves();
-        assert_eq!([0.0, 0.25, 0.5, 0.75, 1.0].map(&red), [0.0, 0.0625, 0.125, 0.1875, 0.25]);
-        assert_eq!([0.0, 0.5, 1.0, 2.0].map(&green), [0.0, 0.25, 1.0, 1.0]);
+    fn a_table_is_linear_between_its_rows() {
+        let [red, green, _] = read("\u{feff}0\n0.5, 1, 1\n\n1,4,2\n").unwrap().curves();
+        assert_eq!([0.0, 0.25, 0.5, 0.75, 1.0].map(&red), [0.0, 0.25, 0.5, 0.75, 1.0]);
+        assert_eq!([0.0, 0.5, 1.0, 2.0].map(&green), [0.0, 1.0, 4.0, 4.0]);
         let [power, ..] = Response::Gamma(2.0).curves();
         assert_eq!(power(0.5), 0.25);
     }

@@ -14,6 +14,8 @@ pub(super) struct Space {
     curves: [Curve; 3],
     /// None where shares of Rec.709's primaries come out of the curves.
     to_rec709: Option<DMat3>,
+    /// The most light that a curve gives.
+    most: f64,
 }
 
 /// Why a claim is not followed.
@@ -49,7 +51,7 @@ impl Space {
         if to_rec709.is_none() && curves.iter().all(is_srgb) {
             return Ok(None);
         }
-        Ok(Some(Self { curves, to_rec709 }))
+        Ok(Some(Self { curves, to_rec709, most: 1.0 }))
     }
 
     /// Of PNG's `gAMA` and `cHRM`, one of which may be absent.
@@ -75,9 +77,9 @@ impl Space {
         Self::new([curve(), curve(), curve()], colours)
     }
 
-    /// These curves, and what else is known of the colours.
+    /// These curves, of light in any unit, and what else is known of the colours.
     pub(super) fn with_curves(known: Option<Self>, curves: [Curve; 3]) -> Self {
-        Self { curves, to_rec709: known.and_then(|space| space.to_rec709) }
+        Self { curves, to_rec709: known.and_then(|space| space.to_rec709), most: f64::MAX }
     }
 
     /// Whether channels are mixed: of a mixture no channel tells whether its codes were clipped.
@@ -87,7 +89,7 @@ impl Space {
 
     /// The light of each channel at this share of the highest code.
     pub(super) fn light(&self, code: f64) -> [f64; 3] {
-        [0, 1, 2].map(|channel| self.curves[channel](code).clamp(0.0, 1.0))
+        [0, 1, 2].map(|channel| self.curves[channel](code).clamp(0.0, self.most))
     }
 
     /// Codes in [0, 1], of which `most` is the highest, to linear Rec.709.

@@ -45,16 +45,14 @@ pub(in crate::scene) fn target(
         image.space = Some(Space::with_curves(image.space, response.curves()));
     }
     let mixed = image.space.as_ref().is_some_and(Space::mixes);
-    // Codes are shares of the highest one.
-    let ends = |rgb: &[f32; 3]| rgb.iter().any(|code| *code <= 0.0 || *code >= 1.0);
-    let lost: Vec<bool> = if mixed { image.rgb.iter().map(ends).collect() } else { Vec::new() };
     let clipped_at = image.code.filter(|_| !mixed).map(|code| {
         // Half a code from either end: what rounds to the end may lie beyond it.
         let at = |half: f64| image.light(half / f64::from(code)).map(|light| light as f32);
         let (low, high) = (at(0.5), at(f64::from(code) - 0.5));
         // Curves of three channels may differ: nearest to the ends.
-        Clip { low: low.into_iter().fold(1.0, f32::min), high: high.into_iter().fold(0.0, f32::max) }
+        Clip { low: low.into_iter().fold(f32::MAX, f32::min), high: high.into_iter().fold(0.0, f32::max) }
     });
+    let lost = lost(&image, clipped_at);
     image.linearize();
     if let Some(i) = image.rgb.iter().position(|rgb| rgb.iter().any(|x| x.abs() > BRIGHTEST)) {
         let (x, y) = (i % size.0 as usize, i / size.0 as usize);
@@ -79,6 +77,29 @@ pub(in crate::scene) fn target(
         counts.iter_mut().zip(&lost).filter(|(_, lost)| **lost).for_each(|(counts, _)| *counts = 0.0);
     }
     Ok(Target { rgb: image.rgb, alpha, haze: None, mask, clipped_at })
+}
+
+/// Pixels with a clipped code of which nothing is known any more: of mixed channels every one, else where the light of the
+/// channel's end does not lie beyond the clip. Empty where there is none.
+fn lost(image: &Image, clip: Option<Clip>) -> Vec<bool> {
+    if image.code.is_none() {
+        return Vec::new();
+    }
+    let (dark, bright) = (image.light(0.0), image.light(1.0));
+    let told = |c: usize| match clip {
+        Some(Clip { low, high }) => [dark[c] as f32 <= low, bright[c] as f32 >= high],
+        None => [false; 2],
+    };
+    let [red, green, blue] = [0, 1, 2].map(told);
+    let ends = [red, green, blue];
+    if ends.as_flattened().iter().all(|told| *told) {
+        return Vec::new();
+    }
+    // Codes are shares of the highest one.
+    let is_lost = |rgb: &[f32; 3]| {
+        rgb.iter().zip(ends).any(|(&code, [low, high])| (code <= 0.0 && !low) || (code >= 1.0 && !high))
+    };
+    image.rgb.iter().map(is_lost).collect()
 }
 
 /// The haze of a target of `size`: an EXR's channel `haze.Y`, or the Y of an image that has no colours; linear,

@@ -1,6 +1,5 @@
 //! The fit of maps, as the command's arguments and the scene say.
 
-use crate::model::gain::Gain;
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,6 +14,7 @@ use crate::engine::view::ObservedView;
 use crate::gpu::Choice;
 use crate::maps::fit::MapStep;
 use crate::maps::{FittedMaps, MapError, MapTask, fit_maps};
+use crate::model::gain::Gain;
 use crate::prepare::{Baked, Observed, StageSeconds};
 use crate::progress;
 use crate::render::shade::Shader;

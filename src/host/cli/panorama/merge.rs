@@ -18,7 +18,7 @@ const UNEVEN: f64 = 0.1;
 /// Merge photographs of one view, taken with different shutter times, to a picture of radiance
 #[derive(clap::Args)]
 #[command(
-    after_help = "Each pixel is the mean of the exposures that see it, by what is known of their noise: clipped ones are left out. Told afterwards: pixels that no exposure sees, shots that are shifted against each other, and shutter times that the pictures contradict.\n\nThe response is how the camera turns light into codes. srgb is what JPEG files claim; recover finds it from the photographs themselves (Debevec and Malik 1997); gamma=G is a power, 1 for linear codes.\n\nExamples:\n  skinfit panorama merge a.png b.png c.png --seconds 1/1000,1/60,1/4 -o north.exr\n  skinfit panorama merge *.jpg --seconds 1/1000,1/250,1/60 --response recover --align -o ball.exr\n  skinfit panorama merge a.png b.png --seconds 0.01,0.1 --grey-card 800,600,40,40 -o north.exr"
+    after_help = "Each pixel is the mean of the exposures that see it, by what is known of their noise: clipped ones are left out. Told afterwards: pixels that no exposure sees, shots that are shifted against each other, and shutter times that the pictures contradict.\n\nThe response is how the camera turns light into codes. srgb is what JPEG files claim; recover finds it from the photographs themselves (Debevec and Malik 1997); gamma=G is a power, 1 for linear codes.\n\nExamples:\n  skinfit panorama merge a.png b.png c.png --seconds 1/1000,1/60,1/4 -o north.exr\n  skinfit panorama merge *.jpg --seconds 1/1000,1/250,1/60 --response recover --align -o ball.exr\n  skinfit panorama merge *.jpg --seconds 1/1000,1/250,1/60 --response recover --write-response camera.csv -o ball.exr\n  skinfit panorama merge a.png b.png --seconds 0.01,0.1 --grey-card 800,600,40,40 -o north.exr"
 )]
 pub(super) struct Arguments {
     /// The photographs: PNG or JPEG, of 8 or 16 bits.
@@ -97,10 +97,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
             "--seconds: {times} for {count} photographs. Give one for each, in their order."
         )));
     }
-    if arguments.write_response.is_some() && !matches!(arguments.response, Asked::Recovered) {
-        return Err(Refusal::new(
-            "--write-response: the response was given. Recover it, or leave the option out.",
-        ));
+    if let Some(path) = &arguments.write_response {
+        if !matches!(arguments.response, Asked::Recovered) {
+            return Err(Refusal::new(
+                "--write-response: the response is given. Find it with --response recover, or leave the option out.",
+            ));
+        }
+        if *path == arguments.output {
+            let path = path.display();
+            return Err(Refusal::new(format!(
+                "--write-response: {path} is where the radiance goes. Name another file."
+            )));
+        }
     }
     pictures::check_output(&arguments.output)?;
     let each = arguments.photographs.iter().zip(&arguments.seconds);

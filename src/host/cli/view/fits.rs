@@ -1,6 +1,5 @@
 //! What the window asks of the command line: fits, and scene files with what was changed in them.
 
-use crate::model::gain::Gain;
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,6 +19,7 @@ use crate::cli::opened::{REPORT, START, SceneOrRun, run_of, scene_file};
 use crate::cli::run_folder::{RunFolder, scene_text};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
+use crate::model::gain::Gain;
 use crate::model::params::Column;
 use crate::output;
 use crate::prepare::{Loaded, PrepareOptions, untied};

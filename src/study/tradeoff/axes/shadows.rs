@@ -1,6 +1,5 @@
 //! How the renderer finds shadows: rays at vertices, or shadow maps of some size and filter.
 
-use crate::model::gain::Gain;
 use std::sync::Arc;
 
 use super::quality::ROUNDS;
@@ -8,6 +7,7 @@ use crate::StudyError;
 use crate::gpu::upload::Content;
 use crate::gpu::{Choice, Gpu, GpuError, RenderOptions, Renderer};
 use crate::model::effects::Effect;
+use crate::model::gain::Gain;
 use crate::model::shadow_filter::ShadowFilter;
 use crate::reference::Difference;
 use crate::render::antialias::Antialias;

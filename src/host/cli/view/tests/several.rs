@@ -160,6 +160,19 @@ fn a_views_gain_is_a_row_and_a_fit_starts_there() {
     click(&mut hand, "undo");
     assert_eq!(hand.state().session.values().unwrap().gains[1], 1.0.into());
     node(&hand, &format!("gain {second}"));
+    // With its white balance free, a gain is a row a channel; held again, it is one value.
+    click(&mut hand, "fit white balance");
+    hand.run_steps(20);
+    drag(&mut hand, &format!("gain {second}.b"), &[10.0, 20.0]);
+    settle(&mut hand);
+    let gain = |hand: &Hand| hand.state().session.values().unwrap().gains[1];
+    let [red, green, blue] = gain(&hand).0;
+    assert!(red == 1.0 && green == 1.0 && blue > 1.05, "{:?}", gain(&hand));
+    click(&mut hand, "fit white balance");
+    hand.run_steps(20);
+    assert_eq!(gain(&hand), 1.0.into());
+    click(&mut hand, "undo");
+    assert_eq!(gain(&hand).0, [red, green, blue]);
 }
 
 #[test]
