@@ -106,11 +106,24 @@ impl Stage {
         encoder: &mut CommandEncoder,
         gain: Gain,
         finished: bool,
-        mut timer: Option<&mut Timer>,
+        timer: Option<&mut Timer>,
     ) -> Vec<Copy> {
-        let Some(finish) = self.finish.as_ref().filter(|_| finished) else {
-            return self.targets.pixels.views().map(|view| Copy::new(gpu, encoder, view)).collect();
-        };
+        let whole = if finished { self.encode_finish(gpu, encoder, gain, timer) } else { None };
+        match whole {
+            Some(whole) => vec![Copy::new(gpu, encoder, whole)],
+            None => self.targets.pixels.views().map(|view| Copy::new(gpu, encoder, view)).collect(),
+        }
+    }
+
+    /// After the last tile: what stands behind the mesh and the bloom, in the whole image; `None` where neither is.
+    pub(super) fn encode_finish(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut CommandEncoder,
+        gain: f64,
+        mut timer: Option<&mut Timer>,
+    ) -> Option<&TextureView> {
+        let finish = self.finish.as_ref()?;
         finish.set(gpu, gain);
         let clear = LoadOp::Clear(Color::TRANSPARENT);
         if let Some(blurred) = finish.blurred() {
@@ -120,7 +133,7 @@ impl Stage {
         let last = if finish.blurred().is_some() { "bloom, columns" } else { "backdrop" };
         let times = timer.as_mut().and_then(|timer| timer.around(last));
         over(encoder, &finish.whole, clear, times, |pass| finish.draw_last(pass));
-        vec![Copy::new(gpu, encoder, &finish.whole)]
+        Some(&finish.whole)
     }
 
     /// The image of those planes, and how many of its pixels reached the end of the targets' range.

@@ -1,9 +1,13 @@
 //! Programs of experiments run, and leave what they say.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use serde_json::{Value, json};
+use skinfit::prepare::{Loaded, PrepareOptions};
+use skinfit::scene::animation::Animation;
+use skinfit::scene::mesh::Mesh;
 
 use crate::graphics::bench::{built_in, cache, gpu};
 
@@ -107,6 +111,83 @@ fn what_effects_cost_a_frame() {
     assert_eq!(rows[0][6], "SPIR-V instructions");
     let instructions: Vec<usize> = rows[1..].iter().map(|row| row[6].parse().unwrap()).collect();
     assert!(instructions[0] > instructions[1], "the scene's effects are more than their fetches\n{table}");
+}
+
+/// What the example `animated` says of the built-in scene, and the folder that it ran in.
+fn animated(arguments: &[&str]) -> (Value, tempfile::TempDir) {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scene();
+    let own = ["dense", "-o", "row.json", "--scene", &scene];
+    printed_in(folder.path(), "animated", &[&own[..], arguments].concat());
+    let row = serde_json::from_slice(&std::fs::read(folder.path().join("row.json")).unwrap()).unwrap();
+    (row, folder)
+}
+
+#[test]
+fn a_head_goes_through_its_clip_as_the_cpu_engine_draws_it() {
+    if gpu().is_none() {
+        return;
+    }
+    let small = ["--width", "64", "--height", "48", "--frames", "4", "--vertices", "45000"];
+    let (row, _folder) = animated(&small);
+    assert!(row["vertices"].as_u64().is_some_and(|count| (45_000..45_010).contains(&count)), "{row}");
+    assert_eq!((&row["bones"], &row["morph_targets"]), (&json!(98), &json!(5)), "{row}");
+    let rows = row["rows"].as_array().unwrap();
+    assert_eq!(rows.len(), 2, "{row}");
+    for of in rows {
+        // It ends with an error where images are further apart than it says.
+        let agreement = of["agreement"].as_array().unwrap();
+        assert_eq!(agreement.iter().map(|of| &of["frame"]).collect::<Vec<_>>(), [0, 2, 3], "{row}");
+        for frame in agreement {
+            let off = |what: &str| frame[what].as_f64().unwrap();
+            assert!(
+                off("inside_99") <= of["tolerance"].as_f64().unwrap() && off("mean") <= off("max"),
+                "{row}"
+            );
+        }
+        for what in ["pose_ms", "upload_and_draw_ms", "frame_ms"] {
+            let time = |which: &str| of[what][which].as_f64().unwrap();
+            assert!(time("median") > 0.0 && time("median") <= time("p95"), "{what}: {row}");
+        }
+    }
+}
+
+/// Corners less edges and more triangles of a surface, whatever seams there are: cuts change it only where they open it.
+fn euler(mesh: &Mesh) -> i64 {
+    let place = |vertex: u32| mesh.positions[vertex as usize].to_array().map(|x| (x + 0.0).to_bits());
+    let (mut corners, mut edges) = (HashSet::new(), HashSet::new());
+    for triangle in &mesh.triangles {
+        let [a, b, c] = triangle.map(place);
+        corners.extend([a, b, c]);
+        edges.extend([(a, b), (b, c), (c, a)].map(|(a, b)| (a.min(b), a.max(b))));
+    }
+    corners.len() as i64 - edges.len() as i64 + mesh.triangles.len() as i64
+}
+
+#[test]
+fn the_dense_head_has_what_dawn_had_and_all_of_it_moves() {
+    let (row, folder) = animated(&["--no-draw"]);
+    assert!(row["vertices"].as_u64().is_some_and(|count| count >= 180_000), "{row}");
+    let file = folder.path().join("dense/scene.toml");
+    let read = |scene: &Path| Loaded::read(scene, &PrepareOptions::default()).unwrap().scene;
+    let (dense, own) = (read(&file), read(&built_in()));
+    assert_eq!((dense.mesh.bones.len(), dense.mesh.morphs.len()), (98, 5));
+    assert_eq!(dense.mesh.positions.len() as u64, row["vertices"].as_u64().unwrap());
+    assert_eq!(euler(&dense.mesh), euler(&own.mesh), "the surface has opened");
+    let sums = dense.mesh.weights.iter().map(|weights| weights.iter().sum::<f32>());
+    assert!(sums.into_iter().all(|sum| (sum - 1.0).abs() < 1e-6));
+    let animation = Animation::open(&dense).unwrap().unwrap();
+    assert!(animation.seconds.1 - animation.seconds.0 > 1.0);
+    let [one, other] = [0.3, 2.6].map(|time| animation.mesh(time).unwrap());
+    for (bone, (a, b)) in one.bones.iter().zip(&other.bones).enumerate() {
+        assert!(!a.abs_diff_eq(*b, 1e-6), "bone {bone} stands still");
+    }
+    for (a, b) in one.morphs.iter().zip(&other.morphs) {
+        assert!((a.weight - b.weight).abs() > 1e-3, "{} keeps its weight", a.name);
+    }
+    let mut inspect = Command::new(env!("CARGO_BIN_EXE_skinfit"));
+    let inspected = inspect.arg("inspect").arg(file.with_file_name("dense.glb")).output().unwrap();
+    assert!(inspected.status.success(), "{}", String::from_utf8_lossy(&inspected.stderr));
 }
 
 /// Planes of 32-bit numbers: a plane a channel, of the vector's pixels or its one number each.

@@ -1,4 +1,4 @@
-//! Frames: drawn, read back, and timed.
+//! Frames: drawn, and read back, timed, or left on the adapter.
 
 use wgpu::CommandEncoderDescriptor;
 
@@ -86,6 +86,33 @@ impl Renderer {
             }
         }
         Ok(if gpu.timestamps() { times } else { Vec::new() })
+    }
+
+    /// Have the image drawn that `camera` sees, times `gain`, and leave it on the adapter: nothing is waited for nor read
+    /// back, so that whoever plays an animation has the next pose ready meanwhile.
+    ///
+    /// # Errors
+    /// As of [`Self::render`].
+    pub fn draw_unread(&mut self, camera: &Camera, gain: f64) -> Result<(), GpuError> {
+        self.show_behind(camera);
+        let program = self.program(None)?;
+        let stage = self.stage(camera, program)?;
+        let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
+        let (program, stage, morph_weights) = (&programs[program], &stages[stage], morph_weights.as_slice());
+        let tiles = &stage.targets.tiles;
+        for (i, &tile) in tiles.iter().enumerate() {
+            let params = &uploads.content().params;
+            program.set(gpu, &Values { params, camera, tile, morph_weights });
+            let mut encoder =
+                gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
+            uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, None);
+            stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, None);
+            if i + 1 == tiles.len() {
+                stage.encode_finish(gpu, &mut encoder, gain, None);
+            }
+            gpu.queue.submit([encoder.finish()]);
+        }
+        gpu.check()
     }
 
     /// Draw the whole or a term; what follows the mesh's passes where it is to be `finished`.

@@ -112,3 +112,15 @@ fn an_image_that_is_not_waited_for_is_the_same_and_so_is_that_of_an_adopted_devi
     let lost = pollster::block_on(renderer.render_async(&camera, 0.7)).map(|_| ());
     assert!(matches!(lost, Err(GpuError::Lost { .. })), "{lost:?}");
 }
+
+#[test]
+fn a_frame_that_is_left_on_the_adapter_changes_none_that_is_read() {
+    let Some(gpu) = gpu() else { return };
+    let baked = baked(&built_in(), everything(), 64);
+    let camera = baked.scene.views[0].camera;
+    let mut renderer = Renderer::new(gpu, Content::of(&baked), EXACT).unwrap();
+    let read = renderer.render(&camera, 0.7).unwrap().image;
+    renderer.draw_unread(&camera, 0.3).unwrap();
+    gpu.wait().unwrap();
+    assert!(renderer.render(&camera, 0.7).unwrap().image == read);
+}
