@@ -82,7 +82,7 @@ fn a_recovered_response_is_a_views() {
         assert!((found / want - 1.0).abs() < 0.02, "{code}: {found} is not {want}");
     }
     // A view takes it.
-    let grey = RgbImage::from_pixel(32, 24, Rgb([128; 3]));
+    let grey = RgbImage::from_pixel(32, 32, Rgb([128; 3]));
     sandbox.write("targets/front.exr", &encode(grey, ImageFormat::Png));
     sandbox
         .edit("target = \"targets/front.exr\"", "target = \"targets/front.exr\"\nresponse = \"camera.csv\"");
