@@ -5,7 +5,6 @@ use rand::{RngExt, SeedableRng};
 
 use super::coordinates::{Coordinates, is_angle, is_log};
 use crate::engine::Unknown;
-use crate::model::gain::Gain;
 
 /// Intervals whose ends have a greater ratio than this are no guide to where an answer may be.
 const WIDEST_RATIO: f64 = 1e4;
@@ -53,6 +52,7 @@ mod tests {
     use super::*;
     use crate::engine::Point;
     use crate::model::effects::Form;
+    use crate::model::gain::Gain;
     use crate::model::params::{Channels, Column, Param, Params};
 
     #[test]
