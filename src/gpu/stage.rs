@@ -120,7 +120,7 @@ impl Stage {
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
-        gain: f64,
+        gain: Gain,
         mut timer: Option<&mut Timer>,
     ) -> Option<&TextureView> {
         let finish = self.finish.as_ref()?;
