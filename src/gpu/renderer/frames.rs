@@ -93,7 +93,8 @@ impl Renderer {
     ///
     /// # Errors
     /// As of [`Self::render`].
-    pub fn draw_unread(&mut self, camera: &Camera, gain: f64) -> Result<(), GpuError> {
+    pub fn draw_unread(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<(), GpuError> {
+        let gain = gain.into();
         self.show_behind(camera);
         let program = self.program(None)?;
         let stage = self.stage(camera, program)?;
