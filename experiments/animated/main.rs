@@ -146,8 +146,11 @@ fn drawn(
     let view = baked.scene.views.first().ok_or("the scene has no view")?;
     let camera = Camera { width, height, ..view.camera };
     let animation = Animation::open(&baked.scene)?.ok_or("the scene that was written has no animation")?;
-    let (mesh, gain, frames) =
-        (baked.scene.mesh.clone(), baked.gains.first().copied().unwrap_or(1.0), arguments.frames as usize);
+    let (mesh, gain, frames) = (
+        baked.scene.mesh.clone(),
+        baked.gains.first().copied().unwrap_or_default(),
+        arguments.frames as usize,
+    );
     let mut player = Player { rig, mesh, camera, gain, frames };
     let references = player.references(&baked, &animation)?;
     let (mut rows, mut failed) = (Vec::new(), Vec::new());

@@ -8,6 +8,7 @@ use std::time::Instant;
 use serde_json::{Value, json};
 use skinfit::gpu::painter::{Beside, CpuPainter, Painter};
 use skinfit::gpu::{Gpu, GpuError, Renderer};
+use skinfit::model::gain::Gain;
 use skinfit::prepare::Baked;
 use skinfit::render::image::Image;
 use skinfit::scene::animation::Animation;
@@ -26,7 +27,7 @@ pub(crate) struct Player<'a> {
     pub(crate) rig: &'a Rig,
     pub(crate) mesh: Mesh,
     pub(crate) camera: Camera,
-    pub(crate) gain: f64,
+    pub(crate) gain: Gain,
     pub(crate) frames: usize,
 }
 

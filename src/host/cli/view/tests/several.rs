@@ -165,7 +165,7 @@ fn a_views_gain_is_a_row_and_a_fit_starts_there() {
     hand.run_steps(20);
     drag(&mut hand, &format!("gain {second}.b"), &[10.0, 20.0]);
     settle(&mut hand);
-    let gain = |hand: &Hand| hand.state().session.values().unwrap().gains[1];
+    let gain = |hand: &Hand<'_>| hand.state().session.values().unwrap().gains[1];
     let [red, green, blue] = gain(&hand).0;
     assert!(red == 1.0 && green == 1.0 && blue > 1.05, "{:?}", gain(&hand));
     click(&mut hand, "fit white balance");
