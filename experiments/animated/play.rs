@@ -135,7 +135,7 @@ impl Player<'_> {
         self.rig.pose(self.time(frame), &mut self.mesh);
         times.pose.push(milliseconds(start));
         let start = Instant::now();
-        renderer.set_mesh(&self.mesh, None)?;
+        self.show(renderer)?;
         times.upload.push(milliseconds(start));
         let start = Instant::now();
         renderer.draw_unread(&self.camera, self.gain)?;
@@ -143,10 +143,16 @@ impl Player<'_> {
         Ok(())
     }
 
+    /// Hand the pose to the renderer.
+    fn show(&self, renderer: &mut Renderer) -> Result<(), GpuError> {
+        let weights: Vec<f32> = self.mesh.morphs.iter().map(|morph| morph.weight).collect();
+        renderer.set_pose(&self.mesh.bones, &weights)
+    }
+
     /// The image of a frame.
     pub(crate) fn image(&mut self, renderer: &mut Renderer, frame: usize) -> Result<Image, GpuError> {
         self.rig.pose(self.time(frame), &mut self.mesh);
-        renderer.set_mesh(&self.mesh, None)?;
+        self.show(renderer)?;
         Ok(renderer.render(&self.camera, self.gain)?.image)
     }
 

@@ -3,13 +3,14 @@
 mod frames;
 mod made;
 
+use glam::Mat4;
 use std::sync::Arc;
 
 use super::atlas::AtlasTraffic;
 use super::device::Gpu;
 use super::error::GpuError;
 use super::program::{Program, Shaded};
-use super::stage::Stage;
+use super::stage::{End, Stage};
 use super::timing::PassTime;
 use super::upload::{Content, Uploads};
 use crate::bake::PoseBake;
@@ -176,6 +177,22 @@ impl Renderer {
         Ok(())
     }
 
+    /// Move the bones of the scene's own mesh, and the weights of its targets: all that a clip changes of most meshes, and
+    /// far less to write than [`set_mesh`](Self::set_mesh) does. Bones and targets that are not given stand as in the scene;
+    /// occlusion is the scene's. Only with [`RenderOptions::animated`].
+    ///
+    /// # Errors
+    /// As of [`set_mesh`](Self::set_mesh).
+    pub fn set_pose(&mut self, bones: &[Mat4], weights: &[f32]) -> Result<(), GpuError> {
+        self.uploads.set_pose(&self.gpu, bones, weights)?;
+        self.programs.iter().for_each(Program::forget);
+        let own = &self.uploads.content().scene.mesh.morphs;
+        for (i, (weight, own)) in self.morph_weights.iter_mut().zip(own).enumerate() {
+            *weight = weights.get(i).copied().unwrap_or(own.weight);
+        }
+        Ok(())
+    }
+
     /// Shade `per_axis` samples along a pixel's side in the images to come; not where the hardware multisamples.
     pub fn set_grid(&mut self, per_axis: u32) {
         if let Antialias::Grid(samples) = &mut self.options.antialias
@@ -216,7 +233,7 @@ impl Renderer {
     pub fn render(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Frame, GpuError> {
         let gain = gain.into();
         self.show_behind(camera);
-        let drawn = self.draw(None, camera, gain, true)?;
+        let drawn = self.draw(None, camera, gain, End::Finished)?;
         let (image, clipped) = self.stages[drawn.stage].finished_image(&drawn.planes, gain);
         Ok(Frame { image, clipped, times: drawn.times })
     }
@@ -228,7 +245,7 @@ impl Renderer {
     pub async fn render_async(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<Frame, GpuError> {
         let gain = gain.into();
         self.show_behind(camera);
-        let (stage, planes) = self.draw_async(None, camera, gain, true).await?;
+        let (stage, planes) = self.draw_async(None, camera, gain, End::Finished).await?;
         let (image, clipped) = self.stages[stage].finished_image(&planes, gain);
         Ok(Frame { image, clipped, times: Vec::new() })
     }
@@ -244,7 +261,7 @@ impl Renderer {
         gain: impl Into<Gain>,
     ) -> Result<Image, GpuError> {
         let gain = gain.into();
-        let (stage, planes) = self.draw_async(Some(term), camera, gain, false).await?;
+        let (stage, planes) = self.draw_async(Some(term), camera, gain, End::Parts).await?;
         Ok(self.stages[stage].image(&planes, gain).0)
     }
 
@@ -261,7 +278,7 @@ impl Renderer {
         if !hazy(self.plan()) {
             return Ok(Vec::new());
         }
-        let (stage, planes) = self.draw_async(None, camera, gain, false).await?;
+        let (stage, planes) = self.draw_async(None, camera, gain, End::Parts).await?;
         Ok(self.haze(stage, &planes, gain))
     }
 
@@ -271,9 +288,9 @@ impl Renderer {
         output: Option<TermName>,
         camera: &Camera,
         gain: Gain,
-        finished: bool,
+        end: End,
     ) -> Result<(usize, Vec<Vec<f32>>), GpuError> {
-        let (stage, copies) = self.submit(output, camera, gain, finished, None)?;
+        let (stage, copies) = self.submit(output, camera, gain, end, None)?;
         let mut planes = Vec::with_capacity(copies.len());
         for copy in &copies {
             planes.push(copy.arrived(&self.gpu).await?);
@@ -300,7 +317,7 @@ impl Renderer {
         gain: impl Into<Gain>,
     ) -> Result<Image, GpuError> {
         let gain = gain.into();
-        let drawn = self.draw(Some(term), camera, gain, false)?;
+        let drawn = self.draw(Some(term), camera, gain, End::Parts)?;
         Ok(self.stages[drawn.stage].image(&drawn.planes, gain).0)
     }
 
@@ -313,7 +330,7 @@ impl Renderer {
         if !hazy(self.plan()) {
             return Ok(Vec::new());
         }
-        let drawn = self.draw(None, camera, gain, false)?;
+        let drawn = self.draw(None, camera, gain, End::Parts)?;
         Ok(self.haze(drawn.stage, &drawn.planes, gain))
     }
 

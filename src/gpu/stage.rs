@@ -23,6 +23,17 @@ pub(super) struct Stage {
     pub(super) finish: Option<Finish>,
 }
 
+/// How a frame ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    /// What the mesh's passes drew is read.
+    Parts,
+    /// What stands behind the mesh and the bloom are added, and it is read.
+    Finished,
+    /// They are added, and it stays on the adapter.
+    Unread,
+}
+
 impl Stage {
     /// The image of a frame that is finished: the last passes have the gain in them already.
     pub(super) fn finished_image(&self, planes: &[Vec<f32>], gain: Gain) -> (Image, usize) {
@@ -98,25 +109,26 @@ impl Stage {
         pipeline.draw(&mut pass);
     }
 
-    /// After the last tile: what stands behind the mesh and the bloom, where it is to be `finished`, and copies of what
-    /// the image is made of.
+    /// After the last tile: what stands behind the mesh and the bloom, and copies of what the image is made of, as far as
+    /// they are wanted.
     pub(super) fn encode_end(
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,
         gain: Gain,
-        finished: bool,
+        end: End,
         timer: Option<&mut Timer>,
     ) -> Vec<Copy> {
-        let whole = if finished { self.encode_finish(gpu, encoder, gain, timer) } else { None };
+        let whole = if end == End::Parts { None } else { self.encode_finish(gpu, encoder, gain, timer) };
         match whole {
+            _ if end == End::Unread => Vec::new(),
             Some(whole) => vec![Copy::new(gpu, encoder, whole)],
             None => self.targets.pixels.views().map(|view| Copy::new(gpu, encoder, view)).collect(),
         }
     }
 
-    /// After the last tile: what stands behind the mesh and the bloom, in the whole image; `None` where neither is.
-    pub(super) fn encode_finish(
+    /// What stands behind the mesh and the bloom, in the whole image; `None` where neither is.
+    fn encode_finish(
         &self,
         gpu: &Gpu,
         encoder: &mut CommandEncoder,

@@ -1,5 +1,6 @@
 //! A scene on the device: what plans read of it, each thing uploaded once and only when a plan names it.
 
+use glam::Mat4;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -357,6 +358,24 @@ impl Uploads {
         check_size(gpu, what, found, limit)?;
         self.bytes += found;
         Ok(Bound::Buffer(buffer(gpu, what, bytes, BufferUsages::STORAGE)?))
+    }
+
+    /// Put other bones, and with the targets' weights what is found at vertices, in place of those that are on the device.
+    pub(super) fn set_pose(&mut self, gpu: &Gpu, bones: &[Mat4], weights: &[f32]) -> Result<(), GpuError> {
+        let mesh = &self.content.scene.mesh;
+        let mut posed = mesh.bones.clone();
+        posed.iter_mut().zip(bones).for_each(|(old, new)| *old = *new);
+        let finds = self.attributes.keys().any(|attribute| matches!(attribute, Attribute::Field(_)));
+        if self.shadow_maps.is_some() || finds {
+            // Shadows and what is found at vertices are of the posed surface, which the processor knows of the whole mesh.
+            let mut mesh = Mesh { bones: posed, ..mesh.clone() };
+            mesh.morphs.iter_mut().zip(weights).for_each(|(morph, weight)| morph.weight = *weight);
+            return self.set_mesh(gpu, &mesh, None);
+        }
+        if let Some(Bound::Buffer(buffer)) = self.resources.get(&Resource::Bones) {
+            gpu.queue.write_buffer(buffer, 0, bytemuck::cast_slice(&vertices::bones(&posed)));
+        }
+        Ok(())
     }
 
     /// Put another pose of the mesh (the same vertices at another time) in place of the one that is on the

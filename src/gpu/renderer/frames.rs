@@ -10,6 +10,7 @@ use crate::model::gain::Gain;
 use crate::model::terms::TermName;
 use crate::readback::Copy;
 use crate::scene::view::Camera;
+use crate::stage::End;
 use crate::timing::{PassTime, Timer};
 
 /// What was drawn and read back.
@@ -94,38 +95,20 @@ impl Renderer {
     /// # Errors
     /// As of [`Self::render`].
     pub fn draw_unread(&mut self, camera: &Camera, gain: impl Into<Gain>) -> Result<(), GpuError> {
-        let gain = gain.into();
         self.show_behind(camera);
-        let program = self.program(None)?;
-        let stage = self.stage(camera, program)?;
-        let Self { gpu, programs, stages, uploads, morph_weights, .. } = self;
-        let (program, stage, morph_weights) = (&programs[program], &stages[stage], morph_weights.as_slice());
-        let tiles = &stage.targets.tiles;
-        for (i, &tile) in tiles.iter().enumerate() {
-            let params = &uploads.content().params;
-            program.set(gpu, &Values { params, camera, tile, morph_weights });
-            let mut encoder =
-                gpu.device.create_command_encoder(&CommandEncoderDescriptor { label: Some("frame") });
-            uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, None);
-            stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, None);
-            if i + 1 == tiles.len() {
-                stage.encode_finish(gpu, &mut encoder, gain, None);
-            }
-            gpu.queue.submit([encoder.finish()]);
-        }
-        gpu.check()
+        self.submit(None, camera, gain.into(), End::Unread, None).map(drop)
     }
 
-    /// Draw the whole or a term; what follows the mesh's passes where it is to be `finished`.
+    /// Draw the whole or a term, and read it.
     pub(super) fn draw(
         &mut self,
         output: Option<TermName>,
         camera: &Camera,
         gain: Gain,
-        finished: bool,
+        end: End,
     ) -> Result<Drawn, GpuError> {
         let mut timer = self.options.timed.then(|| Timer::new(&self.gpu));
-        let (stage, copies) = self.submit(output, camera, gain, finished, timer.as_mut())?;
+        let (stage, copies) = self.submit(output, camera, gain, end, timer.as_mut())?;
         let planes = copies.iter().map(|copy| copy.read(&self.gpu)).collect::<Result<Vec<_>, _>>()?;
         Ok(Drawn { stage, planes, times: timer.map(|timer| timer.times).unwrap_or_default() })
     }
@@ -137,7 +120,7 @@ impl Renderer {
         output: Option<TermName>,
         camera: &Camera,
         gain: Gain,
-        finished: bool,
+        end: End,
         mut timer: Option<&mut Timer>,
     ) -> Result<(usize, Vec<Copy>), GpuError> {
         let program = self.program(output)?;
@@ -154,7 +137,7 @@ impl Renderer {
             uploads.draw_shadow_maps(gpu, &mut encoder, morph_weights, timer.as_deref_mut());
             stage.encode_tile(gpu, &mut encoder, program, tile, i == 0, timer.as_deref_mut());
             if i + 1 == tiles.len() {
-                copies = stage.encode_end(gpu, &mut encoder, gain, finished, timer.as_deref_mut());
+                copies = stage.encode_end(gpu, &mut encoder, gain, end, timer.as_deref_mut());
             }
             if let Some(timer) = &mut timer {
                 timer.finish(&mut encoder);

@@ -124,3 +124,26 @@ fn a_frame_that_is_left_on_the_adapter_changes_none_that_is_read() {
     gpu.wait().unwrap();
     assert!(renderer.render(&camera, 0.7).unwrap().image == read);
 }
+
+#[test]
+fn bones_and_weights_alone_move_a_frame_as_a_mesh_in_that_pose_does() {
+    let Some(gpu) = gpu() else { return };
+    let baked = baked(&built_in(), everything(), 64);
+    let camera = baked.scene.views[0].camera;
+    let options = RenderOptions { animated: true, ..EXACT };
+    let renderer = || Renderer::new(gpu, Content::of(&baked), options).unwrap();
+    let (mut by_mesh, mut by_pose) = (renderer(), renderer());
+    let still = by_pose.render(&camera, 1.0).unwrap().image;
+    let mut mesh = baked.scene.mesh.clone();
+    let turn = glam::Mat4::from_rotation_x(0.2);
+    mesh.bones.iter_mut().for_each(|bone| *bone = turn * *bone);
+    mesh.morphs.iter_mut().for_each(|morph| morph.weight = 0.5);
+    by_mesh.set_mesh(&mesh, None).unwrap();
+    let weights: Vec<f32> = mesh.morphs.iter().map(|morph| morph.weight).collect();
+    by_pose.set_pose(&mesh.bones, &weights).unwrap();
+    let moved = by_pose.render(&camera, 1.0).unwrap().image;
+    assert!(moved == by_mesh.render(&camera, 1.0).unwrap().image && moved != still);
+    // What is not given stands as in the scene.
+    by_pose.set_pose(&[], &[]).unwrap();
+    assert!(by_pose.render(&camera, 1.0).unwrap().image == still);
+}
