@@ -80,7 +80,7 @@ fn middle_and_skin(material: &Value) -> ([f32; 3], [f32; 3]) {
     (image.rgb[8 * 16 + 8], image.rgb[8 * 16 + 2])
 }
 
-fn close(got: [f32; 3], want: [f32; 3], tolerance: f32) -> bool {
+pub(crate) fn close(got: [f32; 3], want: [f32; 3], tolerance: f32) -> bool {
     got.iter().zip(want).all(|(got, want)| (got - want).abs() <= tolerance)
 }
 
