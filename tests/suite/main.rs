@@ -48,6 +48,7 @@ mod meshes;
 mod occlusion;
 mod phases;
 mod plain;
+mod props;
 mod readings;
 mod refusals;
 mod registration;
