@@ -11,8 +11,6 @@ pub(super) struct Picture {
     pub(super) width: usize,
     pub(super) height: usize,
     pub(super) rgb: Vec<[f32; 3]>,
-    /// The model's terms, which add up to it; none of a target.
-    pub(super) terms: Vec<Vec<[f32; 3]>>,
     /// `None` where nothing says what is covered.
     pub(super) alpha: Option<Vec<f32>>,
     /// What each pixel counts; empty where all count 1.
@@ -25,8 +23,7 @@ impl Picture {
     pub(super) fn of(shaded: Shaded) -> Self {
         let Image { width, height, rgb, alpha, .. } = shaded.image;
         let plain = shaded.plain.map_or(Vec::new(), |plain| plain.alpha);
-        let terms = shaded.terms.into_iter().map(|(_, term)| term.rgb).collect();
-        Self { width, height, rgb, terms, alpha: Some(alpha), mask: Vec::new(), plain }
+        Self { width, height, rgb, alpha: Some(alpha), mask: Vec::new(), plain }
     }
 
     /// A view's target.
@@ -38,7 +35,6 @@ impl Picture {
             width: view.camera.width as usize,
             height: view.camera.height as usize,
             rgb: target.rgb.clone(),
-            terms: Vec::new(),
             alpha: target.alpha.as_ref().filter(shows).cloned(),
             mask: target.mask.clone().unwrap_or_default(),
             plain: Vec::new(),
@@ -61,7 +57,6 @@ impl Picture {
             width,
             height,
             rgb: places().map(|(x, y)| std::array::from_fn(|c| mean(x, y, &|i| self.rgb[i][c]))).collect(),
-            terms: Vec::new(),
             alpha: self.alpha.as_ref().map(|alpha| plane(alpha)),
             mask: if self.mask.is_empty() { Vec::new() } else { plane(&self.mask) },
             plain: Vec::new(),
@@ -122,7 +117,6 @@ mod tests {
             width: 5,
             height: 4,
             rgb: (0..20).map(|i| [i as f32, 1.0, 0.0]).collect(),
-            terms: Vec::new(),
             alpha: Some(vec![0.5; 20]),
             mask: Vec::new(),
             plain: Vec::new(),
