@@ -1,6 +1,11 @@
 //! The program around the library: its command line, progress bars and signals.
+//!
+//! - [`cli`]: a file or folder a command; a program that contains this one runs [`cli::main_of`], and fits by [`cli::CommandLine`]
+//! - [`contained`]: what is said then is heard by that program
+//! - `progress`: progress bars
 
 pub mod cli;
+pub mod contained;
 mod progress;
 
 // What other members of the workspace hold stands under the names that it has there.

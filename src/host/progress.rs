@@ -3,11 +3,14 @@
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use skinfit_core::progress::{Progress, Steps, watch};
 
-/// A bar over `length` steps, labelled `label`; hidden when standard error is not a terminal.
+use crate::contained::is_contained;
+
+/// A bar over `length` steps, labelled `label`; hidden when standard error is not a terminal,
+/// or not ours.
 ///
 /// The bar is safe to advance from any thread (`bar.inc(1)`); call `finish_and_clear` at the end.
 pub(crate) fn bar(label: &'static str, length: u64) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(length), ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(Some(length), target());
     if let Ok(style) = ProgressStyle::with_template("{prefix:>12} [{bar:32}] {pos}/{len} {elapsed} {msg}") {
         bar.set_style(style.progress_chars("=> "));
     }
@@ -15,13 +18,18 @@ pub(crate) fn bar(label: &'static str, length: u64) -> ProgressBar {
 }
 
 /// A counter without an end, for work whose length nobody knows; hidden when standard error is not a
-/// terminal.
+/// terminal, or not ours.
 pub(crate) fn spinner(label: &'static str) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(None, ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(None, target());
     if let Ok(style) = ProgressStyle::with_template("{prefix:>12} {spinner} step {pos} {elapsed} {msg}") {
         bar.set_style(style);
     }
     bar.with_prefix(label)
+}
+
+/// Where bars are drawn.
+fn target() -> ProgressDrawTarget {
+    if is_contained() { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() }
 }
 
 /// Shows the library's work as bars.

@@ -5,6 +5,7 @@ use crate::model::effects::{Effect, Effects, Form};
 use crate::model::gain::Gain;
 use crate::model::params::{Channels, Column, Param, Params};
 use crate::prepare::{Baked, untied};
+use crate::scene::Scene;
 use crate::scene::view::View;
 
 /// Every state of these is a step of the history.
@@ -47,11 +48,16 @@ impl Values {
     /// A scene's own.
     #[must_use]
     pub fn of(baked: &Baked) -> Self {
-        let scene = &*baked.scene;
+        Self::of_scene(&baked.scene, &baked.gains)
+    }
+
+    /// A scene's own, of which nothing is baked yet.
+    #[must_use]
+    pub fn of_scene(scene: &Scene, gains: &[Gain]) -> Self {
         Self {
             form: scene.form,
             params: scene.params.clone(),
-            gains: baked.gains.clone(),
+            gains: gains.to_vec(),
             free_gains: scene.fit.free_gains,
             white_balance: scene.fit.white_balance,
             free: scene.fit.free.clone(),

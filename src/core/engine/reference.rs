@@ -117,6 +117,20 @@ impl<'a> Reference<'a> {
         group[slot % LANES].clone()
     }
 
+    /// Value and columns of every pixel slot of a view, those of padding among them. All cores.
+    #[must_use]
+    pub fn pixels(&self, view: usize, params: &Params) -> Vec<PixelColumns> {
+        let cubes = self.cubes(params);
+        let setting = self.steps.setting(params, &cubes, 0.0);
+        let at = self.at(view, &setting, (params, &cubes));
+        let group = |registers: &mut Registers<f64>, group| self.group(&at, group, registers);
+        (0..at.view.samples.groups())
+            .into_par_iter()
+            .map_init(Registers::default, group)
+            .flatten_iter()
+            .collect()
+    }
+
     /// The pixels of a group.
     fn group(&self, at: &ViewAt<'_>, group: usize, registers: &mut Registers<f64>) -> [PixelColumns; LANES] {
         let nothing = || (0.0, vec![0.0; self.unknowns.len()]);

@@ -11,7 +11,6 @@ pub(super) struct Interrupt(Arc<AtomicBool>);
 
 impl Interrupt {
     /// One that something else may set, too.
-    #[cfg(feature = "view")]
     pub(super) fn of(flag: &Arc<AtomicBool>) -> Self {
         Self(Arc::clone(flag))
     }

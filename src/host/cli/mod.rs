@@ -9,6 +9,7 @@
 //! - `scene`: how a command finds its scene and its cache; `set`: values of parameters on the command line
 //! - `maps`: fits of whole maps, where the program is built with them
 //! - `interrupt`: Ctrl-C once a fit is under way; `unfinished`: what goes with it before, and in the other commands
+//! - `requested`: fits that a window, or another program, asks for
 //! - `run_folder`, `fitted_scene`, `fitted_cameras`: where a fit leaves what it found, and what it was made from
 
 mod ablate;
@@ -34,6 +35,7 @@ mod page;
 mod panorama;
 mod params;
 mod render;
+mod requested;
 mod run_folder;
 mod scene;
 mod set;
@@ -45,12 +47,15 @@ mod tradeoff;
 mod unfinished;
 mod view;
 
+use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+pub use self::requested::{CommandLine, save as save_scene};
+use crate::contained::{hear, is_contained};
 use crate::scene::register_terms;
 use crate::shader::term::library;
 use crate::{output, progress};
@@ -105,6 +110,18 @@ impl Refusal {
     pub fn failure(words: impl Into<String>) -> Self {
         Self { words: words.into(), failed: true }
     }
+
+    /// The paragraph that the program prints.
+    #[must_use]
+    pub fn words(&self) -> &str {
+        &self.words
+    }
+
+    /// Whether the input was good and the work failed.
+    #[must_use]
+    pub const fn is_failure(&self) -> bool {
+        self.failed
+    }
 }
 
 #[derive(Parser)]
@@ -150,9 +167,16 @@ enum Command {
 /// Run the program on the process' arguments.
 #[must_use]
 pub fn main() -> ExitCode {
-    know_terms();
+    ExitCode::from(main_of(&std::env::args_os().collect::<Vec<_>>()))
+}
+
+/// Run the program on these words, the first of which is its own name: its exit code. The process is the program's while
+/// it runs: a word that is not understood ends it, and Ctrl-C is the program's to handle.
+#[must_use]
+pub fn main_of(words: &[OsString]) -> u8 {
+    know_terms(words);
     // A word that is not understood ends here, with exit code 2.
-    let arguments = Arguments::parse();
+    let arguments = Arguments::parse_from(words);
     // A window shows progress itself.
     if !matches!(arguments.command, Command::View(_)) {
         progress::show();
@@ -179,21 +203,21 @@ pub fn main() -> ExitCode {
         Command::Collect(arguments) => sweep::run_collect(&arguments),
     };
     match done {
-        Ok(Exit::Done) => ExitCode::SUCCESS,
-        Ok(Exit::Failed) => ExitCode::from(1),
+        Ok(Exit::Done) => 0,
+        Ok(Exit::Failed) => 1,
         Err(Refusal { words, failed }) => {
             tell(&words);
-            ExitCode::from(if failed { 1 } else { 2 })
+            if failed { 1 } else { 2 }
         }
     }
 }
 
 /// Know the effects of the scenes that the command line names before it is understood, as options name them. What is
 /// wrong with a scene is told when it is read.
-fn know_terms() {
+fn know_terms(words: &[OsString]) {
     library::register_all();
-    for argument in std::env::args_os().skip(1) {
-        let path = Path::new(&argument);
+    for argument in words.iter().skip(1) {
+        let path = Path::new(argument);
         if path.extension().is_some_and(|ending| ending == "toml") && path.is_file() {
             let _ = register_terms(path);
         }
@@ -203,6 +227,9 @@ fn know_terms() {
 /// Print a line on standard output. A reader that has gone away (`| head -1`) is no failure; a full
 /// disk is.
 fn say(line: &str) -> Result<(), Refusal> {
+    if hear(|heard| heard.said.push(line.to_owned())) {
+        return Ok(());
+    }
     match writeln!(std::io::stdout(), "{line}") {
         Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Refusal::new(format!(
             "standard output cannot be written: {error}. Send it to a file or a terminal that takes it."
@@ -225,6 +252,9 @@ fn write_or_say(file: Option<&Path>, text: &str) -> Result<(), Refusal> {
 /// Print a line on standard error, after the program's name; there is nobody to tell that it failed. At once, as
 /// processes of one sweep share it.
 fn tell(line: &str) {
+    if hear(|heard| heard.told.push(line.to_owned())) {
+        return;
+    }
     let _ = std::io::stderr().write_all(format!("skinfit: {line}\n").as_bytes());
 }
 
@@ -240,6 +270,9 @@ fn tell_warnings(warnings: &[String]) {
 /// variable, which a process can only have from its start; so the program starts anew with it, in the same
 /// process.
 fn quieten_graphics() {
+    if is_contained() {
+        return;
+    }
     #[cfg(unix)]
     {
         use std::os::unix::process::CommandExt as _;

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 
 use skinfit_view::Run;
-#[cfg(feature = "view")]
 use skinfit_view::{Start, opened::Reading};
 
 use toml_edit::{DocumentMut, Item};
@@ -51,7 +50,6 @@ impl SceneOrRun {
     }
 
     /// What a window begins with: the scenes' files at `paths`, bakes in `cache`, fits beside what is looked at.
-    #[cfg(feature = "view")]
     pub(super) fn start(self, paths: Vec<PathBuf>, cache: Option<&Path>) -> Start {
         let reading = |scene| Reading { scene, cache: cache.map(Path::to_owned), ..Reading::default() };
         Start {

@@ -70,7 +70,6 @@ impl RunFolder {
     }
 
     /// Refuse a folder that another run writes to, or that holds results of another command; what was made goes again.
-    #[cfg(feature = "view")]
     pub(super) fn check_free(output: &Path) -> Result<(), Refusal> {
         Self::locked(output.to_owned())?.check(Work::Fit)
     }

@@ -11,6 +11,7 @@ use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 use super::{Refusal, tell};
+use crate::contained::is_contained;
 use crate::output;
 
 /// What goes when the command is interrupted.
@@ -46,8 +47,12 @@ fn change<T>(change: impl FnOnce(&mut Unfinished) -> T) -> T {
     change(&mut UNFINISHED.lock().unwrap_or_else(std::sync::PoisonError::into_inner))
 }
 
-/// From now on Ctrl-C ends the program by [`interrupted`], with the exit code of an interrupted fit.
+/// From now on Ctrl-C ends the program by [`interrupted`], with the exit code of an interrupted fit; a program that
+/// contains this one handles it itself.
 pub(super) fn install() {
+    if is_contained() {
+        return;
+    }
     // Refused only if a handler is there already; then Ctrl-C ends the program as it always did.
     let _ = ctrlc::set_handler(|| change(interrupted));
 }

@@ -1,12 +1,10 @@
 //! `skinfit view`: a window in which a fit is seen and touched.
 //!
 //! - `absent`: what stands in where the program is built without it
-//! - `window`: the window, for the command's arguments; `fits`: what it asks of the command line
+//! - `window`: the window, for the command's arguments
 
 #[cfg(not(feature = "view"))]
 mod absent;
-#[cfg(feature = "view")]
-mod fits;
 #[cfg(test)]
 #[cfg(feature = "view")]
 mod tests;

@@ -11,9 +11,8 @@ use skinfit_view::window::watch_progress;
 use skinfit_view::{Start, ViewError, open_window};
 
 use super::Arguments;
-use super::fits::CommandLine;
 use crate::cli::opened::{SceneOrRun, run_of};
-use crate::cli::{Exit, Refusal, quieten_graphics, say, unfinished};
+use crate::cli::{CommandLine, Exit, Refusal, quieten_graphics, say, unfinished};
 
 /// Open the window, or leave what it shows.
 pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
@@ -23,7 +22,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> Result<Exit, Refusal> {
     let homeless = arguments.scenes.is_empty() && arguments.bakes.cache().is_none();
     let scratch = homeless.then(unfinished::scratch).transpose()?;
     let start = start(arguments, scratch.as_ref().map_or(Path::new(""), |scratch| scratch.path()))?;
-    let host = Arc::new(CommandLine { bakes: arguments.bakes.words(), cache: arguments.bakes.cache() });
+    let host = Arc::new(CommandLine { words: arguments.bakes.words(), cache: arguments.bakes.cache() });
     let names: Vec<String> = arguments.scenes.iter().map(|path| path.display().to_string()).collect();
     let name = if names.is_empty() { "the built-in scene".to_owned() } else { names.join(", ") };
     let (width, height) = arguments.size;

@@ -24,7 +24,7 @@ use skinfit_view::paint::Engine;
 use skinfit_view::window::offscreen::render_state;
 use skinfit_view::{Start, Window};
 
-use super::fits::CommandLine;
+use crate::cli::CommandLine;
 use crate::model::params::Param;
 
 /// How long anything in the window is waited for: a fit of the built-in scene takes a second on two cores.
@@ -56,7 +56,7 @@ fn start(folder: &Path) -> Start {
 /// Words of the command line that name the same bakes.
 fn host(start: &Start) -> Arc<CommandLine> {
     let cache = start.scenes[0].cache.as_ref().unwrap().display().to_string();
-    Arc::new(CommandLine { bakes: vec!["--cache".to_owned(), cache], cache: start.scenes[0].cache.clone() })
+    Arc::new(CommandLine { words: vec!["--cache".to_owned(), cache], cache: start.scenes[0].cache.clone() })
 }
 
 /// A window over a scene, complete.

@@ -1,4 +1,5 @@
-//! What the window asks of the command line: fits, and scene files with what was changed in them.
+//! What a window, or a program that contains this one, asks of the command line: fits, and scene files with what was
+//! changed in them.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use skinfit_view::reported::reported;
 use skinfit_view::values::Values;
 use skinfit_view::{FitRequest, Host, Run, Start as View};
 
-use crate::cli::fit;
+use crate::cli::{Refusal, fit};
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::opened::{REPORT, START, SceneOrRun, run_of, scene_file};
@@ -27,11 +28,11 @@ use crate::study::suggest::names;
 
 /// Fits as `skinfit fit` does.
 #[derive(Clone)]
-pub(super) struct CommandLine {
-    /// Words of the command line that say where bakes are kept.
-    pub(super) bakes: Vec<String>,
-    /// Where they are kept.
-    pub(super) cache: Option<PathBuf>,
+pub struct CommandLine {
+    /// Further words of its command line: where bakes are kept, and how the solver goes about it.
+    pub words: Vec<String>,
+    /// Where bakes are kept.
+    pub cache: Option<PathBuf>,
 }
 
 /// The command line of a fit.
@@ -44,12 +45,15 @@ struct Line {
 impl CommandLine {
     /// Fit, and leave the run folder that `skinfit fit` leaves. `watch` is told of each iteration, and the fit goes on when
     /// it returns; it ends soon after `interrupt` is set, with a state to be resumed.
-    fn fit(
+    ///
+    /// # Errors
+    /// As the program tells them.
+    pub fn fit(
         &self,
         request: &FitRequest,
         watch: &mut dyn FnMut(&Iteration, &[Point]),
         interrupt: &Arc<AtomicBool>,
-    ) -> Result<Fitted, String> {
+    ) -> Result<Fitted, Refusal> {
         let FitRequest { scenes, run, resume, .. } = request;
         let files: Vec<PathBuf> =
             scenes.iter().map(|scene| run.join(scene_file(&scene.name, scenes.len() > 1))).collect();
@@ -57,9 +61,9 @@ impl CommandLine {
             scenes.iter().zip(&files).try_for_each(|(scene, file)| goes_on(scene, file))?;
         } else {
             // Only a folder that no other run writes to is changed.
-            RunFolder::check_free(run).map_err(|refusal| refusal.words)?;
+            RunFolder::check_free(run)?;
             for (scene, file) in scenes.iter().zip(&files) {
-                self.save_scene(&scene.path, &scene.values, file)?;
+                save(&scene.path, &scene.values, file)?;
             }
         }
         let mut words = vec!["fit".to_owned()];
@@ -68,21 +72,20 @@ impl CommandLine {
         words.extend(resume.then(|| "--resume".to_owned()));
         words.extend(Self::start_of(request)?);
         words.extend(request.hold_out().iter().map(|view| format!("--hold-out={view}")));
-        words.extend(self.bakes.iter().cloned());
-        let line = Line::try_parse_from(words).map_err(|error| error.to_string())?;
-        let done = fit::run_watched(&line.arguments, &Interrupt::of(interrupt), watch);
-        let (_, ends) = done.map_err(|refusal| refusal.words)?;
-        reported(&run.join(REPORT), ends)
+        words.extend(self.words.iter().cloned());
+        let line = Line::try_parse_from(words)?;
+        let (_, ends) = fit::run_watched(&line.arguments, &Interrupt::of(interrupt), watch)?;
+        reported(&run.join(REPORT), ends).map_err(Refusal::new)
     }
 
     /// Where it starts is in the scenes' files, but for gains, which have no place there.
-    fn start_of(request: &FitRequest) -> Result<Vec<String>, String> {
+    fn start_of(request: &FitRequest) -> Result<Vec<String>, Refusal> {
         let file = request.run.join(START);
         let gained =
             request.scenes.iter().any(|scene| scene.values.gains.iter().any(|&gain| gain != Gain::ONE));
         if !request.resume {
             match gained.then_some(&request.start) {
-                Some(start) => output::write(&file, start.as_bytes()).map_err(|error| error.to_string())?,
+                Some(start) => output::write(&file, start.as_bytes())?,
                 // Of an earlier fit in this folder.
                 None => drop(std::fs::remove_file(&file)),
             }
@@ -94,12 +97,13 @@ impl CommandLine {
 
 /// Refuse to go on with a fit of another scene than this, or of other effects or constants: what the boxes say would not
 /// hold.
-fn goes_on(scene: &FitScene, file: &Path) -> Result<(), String> {
+fn goes_on(scene: &FitScene, file: &Path) -> Result<(), Refusal> {
     let other = |what: &str| {
         let file = file.display();
-        format!("{file}: the fit that was stopped there was of {what}. Put these back, or fit.")
+        let words = format!("{file}: the fit that was stopped there was of {what}. Put these back, or fit.");
+        Refusal::new(words)
     };
-    let kept = Loaded::read(file, &PrepareOptions::default()).map_err(|error| error.to_string())?;
+    let kept = Loaded::read(file, &PrepareOptions::default())?;
     let (kept, values) = (&kept.scene, &scene.values);
     let columns = |free: &[Column]| free.iter().map(Column::name).collect::<BTreeSet<_>>();
     if kept.effects != values.effects {
@@ -110,9 +114,9 @@ fn goes_on(scene: &FitScene, file: &Path) -> Result<(), String> {
     {
         return Err(other("other free constants"));
     }
-    let text =
-        scene_text(&scene.path, changes(values, &names(values.effects))).map_err(|refusal| refusal.words)?;
-    let of_file = std::fs::read_to_string(file).map_err(|error| format!("{}: {error}", file.display()))?;
+    let text = scene_text(&scene.path, changes(values, &names(values.effects)))?;
+    let unreadable = |error| Refusal::new(format!("{}: {error}", file.display()));
+    let of_file = std::fs::read_to_string(file).map_err(unreadable)?;
     let moves: bool = text.parse::<toml::Table>().ok().is_some_and(|scene| {
         scene.get("fit").and_then(|fit| fit.get("cameras")).and_then(toml::Value::as_bool) == Some(true)
     });
@@ -141,7 +145,16 @@ fn bare(text: &str, moves_cameras: bool) -> toml::Table {
     scene
 }
 
-/// What the window changed in a scene's file.
+/// The text of a scene file with the values that were changed, and absolute paths, in a file of its own.
+///
+/// # Errors
+/// When the scene's file cannot be read any more, or the other not be written.
+pub fn save(scene: &Path, values: &Values, file: &Path) -> Result<(), Refusal> {
+    let text = scene_text(scene, changes(values, &names(values.effects)))?;
+    Ok(output::write(file, text.as_bytes())?)
+}
+
+/// What was changed in a scene's file.
 fn changes<'a>(values: &'a Values, effects: &'a [&'static str]) -> Changes<'a> {
     Changes {
         effects: Some(effects),
@@ -156,7 +169,9 @@ fn changes<'a>(values: &'a Values, effects: &'a [&'static str]) -> Changes<'a> {
 impl Host for CommandLine {
     fn begin_fit(&self, request: FitRequest, tell: Tell) -> Box<dyn FitControl> {
         let host = self.clone();
-        on_a_thread(tell, move |watch, interrupt| host.fit(&request, watch, interrupt))
+        on_a_thread(tell, move |watch, interrupt| {
+            host.fit(&request, watch, interrupt).map_err(|refusal| refusal.words)
+        })
     }
 
     fn start(&self, path: &Path) -> Result<View, String> {
@@ -170,8 +185,6 @@ impl Host for CommandLine {
     }
 
     fn save_scene(&self, scene: &Path, values: &Values, file: &Path) -> Result<(), String> {
-        let effects = names(values.effects);
-        let text = scene_text(scene, changes(values, &effects)).map_err(|refusal| refusal.words)?;
-        output::write(file, text.as_bytes()).map_err(|error| error.to_string())
+        save(scene, values, file).map_err(|refusal| refusal.words)
     }
 }
