@@ -55,6 +55,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 pub use self::requested::{CommandLine, save as save_scene};
+pub use self::scene::parse_effects;
 use crate::contained::{hear, is_contained};
 use crate::scene::register_terms;
 use crate::shader::term::library;

@@ -13,11 +13,11 @@ use skinfit_view::reported::reported;
 use skinfit_view::values::Values;
 use skinfit_view::{FitRequest, Host, Run, Start as View};
 
-use crate::cli::{Refusal, fit};
 use crate::cli::fitted_scene::{Changes, Start};
 use crate::cli::interrupt::Interrupt;
 use crate::cli::opened::{REPORT, START, SceneOrRun, run_of, scene_file};
 use crate::cli::run_folder::{RunFolder, scene_text};
+use crate::cli::{Refusal, fit};
 use crate::engine::Point;
 use crate::fit::outcome::Iteration;
 use crate::model::gain::Gain;

@@ -167,7 +167,10 @@ impl BakeArguments {
 }
 
 /// `diffuse,rim,...` as a set of effects.
-pub(super) fn parse_effects(list: &str) -> Result<Effects, String> {
+///
+/// # Errors
+/// A paragraph on the first name that is none, or is there twice.
+pub fn parse_effects(list: &str) -> Result<Effects, String> {
     let known: Vec<&str> = Effect::offered().map(Effect::name).collect();
     let parse = |name: &str| {
         Effect::from_name(name)

@@ -1,0 +1,95 @@
+//! What is raised: a class a kind, with the paragraph that the command line prints. The classes are Python's
+//! (`skinfit.errors`).
+
+use pyo3::{PyErr, import_exception};
+use skinfit_core::output::OutputError;
+use skinfit_core::prepare::PrepareError;
+use skinfit_core::program::shading::ShadingError;
+use skinfit_core::samples::SampleError;
+use skinfit_gpu::painter::PaintError;
+
+import_exception!(skinfit.errors, ArrayError);
+import_exception!(skinfit.errors, BakeError);
+import_exception!(skinfit.errors, Fault);
+import_exception!(skinfit.errors, FileError);
+import_exception!(skinfit.errors, FitError);
+import_exception!(skinfit.errors, ParamError);
+import_exception!(skinfit.errors, SceneError);
+import_exception!(skinfit.errors, SkinError);
+import_exception!(skinfit.errors, ViewError);
+
+/// Why there is no result.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum Refused {
+    /// A stage before the fit.
+    #[error(transparent)]
+    Prepare(#[from] PrepareError),
+    /// An image that is drawn.
+    #[error(transparent)]
+    Paint(#[from] PaintError),
+    /// Samples of a view.
+    #[error(transparent)]
+    Samples(#[from] SampleError),
+    /// Rules that the processor cannot compute.
+    #[error("{0}.")]
+    Shading(#[from] ShadingError),
+    /// A file that cannot be written.
+    #[error(transparent)]
+    Output(#[from] OutputError),
+    /// A fit or a scene file, in the command line's words.
+    #[error("{0}")]
+    Fit(String),
+    /// Effects that there are not.
+    #[error("{0}")]
+    Scene(String),
+    /// A name or a value of a parameter.
+    #[error("{0}")]
+    Param(String),
+    /// A view that there is not.
+    #[error("{0}")]
+    View(String),
+    /// What an array has to be.
+    #[error("{0}")]
+    Array(String),
+    /// A panic.
+    #[error("{0}. This is a fault of skinfit's: please report it.")]
+    Fault(String),
+}
+
+impl From<Refused> for PyErr {
+    fn from(refused: Refused) -> Self {
+        let words = refused.to_string();
+        match refused {
+            Refused::Prepare(error) => of_stage(&error, words),
+            Refused::Paint(_) | Refused::Samples(_) | Refused::Shading(_) | Refused::Scene(_) => {
+                SceneError::new_err(words)
+            }
+            Refused::Output(_) => FileError::new_err(words),
+            Refused::Fit(_) => FitError::new_err(words),
+            Refused::Param(_) => ParamError::new_err(words),
+            Refused::View(_) => ViewError::new_err(words),
+            Refused::Array(_) => ArrayError::new_err(words),
+            Refused::Fault(_) => Fault::new_err(words),
+        }
+    }
+}
+
+/// The class of a stage's error.
+fn of_stage(error: &PrepareError, words: String) -> PyErr {
+    match error {
+        PrepareError::Params(_) => ParamError::new_err(words),
+        PrepareError::Bake(_) => BakeError::new_err(words),
+        PrepareError::NoView { .. } | PrepareError::HoldOut(_) => ViewError::new_err(words),
+        PrepareError::NotOneSkin(_)
+        | PrepareError::NamedTwice { .. }
+        | PrepareError::CalledTheSame { .. }
+        | PrepareError::Joint(_)
+        | PrepareError::NoScene => SkinError::new_err(words),
+        PrepareError::Scene(_)
+        | PrepareError::Samples(_)
+        | PrepareError::Target { .. }
+        | PrepareError::Collapsed { .. }
+        | PrepareError::Shading { .. }
+        | PrepareError::NoTarget { .. } => SceneError::new_err(words),
+    }
+}

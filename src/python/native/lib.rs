@@ -1,0 +1,43 @@
+//! The library that Python loads as `skinfit._native`: the command line's own calls, with arrays and exceptions. What
+//! people call is Python (`package/skinfit`) over it.
+//!
+//! - `scene`: a scene with the values that one edits; `params`: these
+//! - `paint`: a view as an image; `objective`: loss, gradient and Jacobian products; `fitting`: a fit, step by step
+//! - `waiting`: long work beside Python, which goes on meanwhile and hears Ctrl-C
+//! - `arrays`: images as arrays and as files; `errors`: what is raised; `program`: the command line
+
+mod arrays;
+mod errors;
+mod fitting;
+mod objective;
+mod paint;
+mod params;
+mod program;
+mod scene;
+mod waiting;
+
+use pyo3::pymodule;
+
+/// What `skinfit` is made of.
+#[pymodule]
+mod _native {
+    use pyo3::prelude::*;
+
+    #[pymodule_export]
+    use crate::arrays::write_exr;
+    #[pymodule_export]
+    use crate::fitting::Fitting;
+    #[pymodule_export]
+    use crate::objective::Objective;
+    #[pymodule_export]
+    use crate::program::{built_in_scene, default_cache, run_program, version};
+    #[pymodule_export]
+    use crate::scene::Scene;
+
+    /// Know the effects that come with the program, as its command line does.
+    #[pymodule_init]
+    fn init(_module: &Bound<'_, PyModule>) -> PyResult<()> {
+        skinfit_core::shader::term::library::register_all();
+        Ok(())
+    }
+}

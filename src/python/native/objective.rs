@@ -1,0 +1,298 @@
+//! A scene's fit as a function of what is free, for other solvers: loss, gradient and normal equations by the CPU engine,
+//! in the numbers that a fit of the command line sees; images and their Jacobian's products in f64, by the rules.
+
+use std::sync::Arc;
+
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray3};
+use pyo3::types::{PyDict, PyDictMethods};
+use pyo3::{Bound, PyResult, Python, pyclass, pymethods};
+use skinfit_core::engine::cpu::CpuEngine;
+use skinfit_core::engine::joint::label;
+use skinfit_core::engine::reference::{PixelColumns, Reference};
+use skinfit_core::engine::{NormalEquations, Objective as _, Point, Unknown};
+use skinfit_core::prepare::{NamedScene, Observed, untied};
+use skinfit_core::scene::{short, suggestion};
+
+use crate::errors::Refused;
+use crate::scene::Read;
+use crate::waiting::wait;
+
+/// The objective of a scene at the values that it had.
+#[pyclass(frozen, module = "skinfit._native")]
+pub(crate) struct Objective(Arc<Observing>);
+
+struct Observing {
+    observed: Observed,
+    engine: CpuEngine,
+    names: Vec<String>,
+}
+
+/// Products of a view's Jacobian take the numbers of each pixel and channel: its place in the image, its value, and a row
+/// of the Jacobian.
+type Take<'a> = &'a mut dyn FnMut(usize, f64, &[f64]);
+
+impl Objective {
+    /// Of a scene as it stands, over the views that have a target and are not held out.
+    pub(crate) fn of(read: &Read, hold_out: &[String]) -> Result<Self, Refused> {
+        let values = read.values();
+        let mut loaded = read.loaded.clone();
+        loaded.scene.params.clone_from(&values.params);
+        loaded.scene.fit.free = untied(&values.free, &values.params, &[]);
+        let scene = NamedScene { name: String::new(), loaded };
+        let marked = NamedScene::marked(std::slice::from_ref(&scene), hold_out);
+        let marks = marked.map_err(skinfit_core::prepare::PrepareError::from)?.concat();
+        let (baked, _) = scene.loaded.bake()?.hold_out(&marks)?;
+        let observed = baked.sample()?.observe()?;
+        let engine = observed.engine()?;
+        let view = |number: usize| observed.scene.views.get(number).map(|view| view.name.clone());
+        let name = |unknown: &Unknown| label(&unknown.name(), |_| None, view);
+        let names = engine.unknowns().iter().map(name).collect();
+        Ok(Self(Arc::new(Observing { observed, engine, names })))
+    }
+}
+
+impl Observing {
+    /// The point of these values, each of which its unknown may have.
+    fn at(&self, x: &[f64]) -> Result<Point, Refused> {
+        let unknowns = self.engine.unknowns();
+        if x.len() != unknowns.len() {
+            let (given, wanted) = (x.len(), unknowns.len());
+            let names = self.names.join(", ");
+            return Err(Refused::Array(format!(
+                "{given} values, where {wanted} are free: {names}. Give one for each."
+            )));
+        }
+        let mut point = self.observed.start();
+        for ((unknown, &value), name) in unknowns.iter().zip(x).zip(&self.names) {
+            let (lower, upper) = unknown.bounds();
+            if !value.is_finite() || !(lower..=upper).contains(&value) {
+                let [lower, upper] = [lower, upper].map(short);
+                return Err(Refused::Param(format!(
+                    "{name} = {value} is out of bounds. Give a number from {lower} to {upper}."
+                )));
+            }
+            unknown.set(&mut point, value);
+        }
+        Ok(point)
+    }
+
+    /// The number of a view.
+    fn view(&self, name: Option<&str>) -> Result<usize, Refused> {
+        let Some(name) = name else { return Ok(0) };
+        let views = &self.observed.scene.views;
+        let known: Vec<&str> = views.iter().map(|view| view.name.as_str()).collect();
+        let unknown = || {
+            let scene = self.observed.scene.path.display();
+            Refused::View(format!(
+                "{scene}: there is no view `{name}` to be fitted. {}.",
+                suggestion(name, &known)
+            ))
+        };
+        views.iter().position(|view| view.name == name).ok_or_else(unknown)
+    }
+
+    /// Height and width of a view.
+    fn size(&self, view: usize) -> [usize; 2] {
+        let camera = &self.observed.scene.views[view].camera;
+        [camera.height as usize, camera.width as usize]
+    }
+
+    /// Have `take` see each pixel and channel of a view: radiance premultiplied by the coverage, times the gain.
+    fn rows(&self, x: &[f64], view: usize, take: Take<'_>) -> Result<(), Refused> {
+        let (point, unknowns) = (self.at(x)?, self.engine.unknowns());
+        let scene = &self.observed.scene;
+        let light = &self.observed.illumination;
+        let reference =
+            Reference::new(self.observed.setup(), light, &self.observed.views, scene.fit.loss, unknowns)?;
+        let samples = &self.observed.views[view].samples;
+        let pixels: Vec<PixelColumns> = reference.pixels(view, &point.params);
+        for ((slot, pixel), &place) in pixels.into_iter().enumerate().zip(&samples.pixel) {
+            if place == u32::MAX {
+                continue;
+            }
+            let coverage = f64::from(samples.coverage[slot]);
+            for (channel, (value, mut row)) in pixel.into_iter().enumerate().take(3) {
+                let share = coverage * point.gains[view].channel(channel);
+                row.iter_mut().for_each(|slope| *slope *= share);
+                for (slope, unknown) in row.iter_mut().zip(unknowns) {
+                    if unknown.is_gain_of(view, channel) {
+                        *slope = coverage * value;
+                    }
+                }
+                take(3 * place as usize + channel, share * value, &row);
+            }
+        }
+        Ok(())
+    }
+
+    /// A number for each pixel and channel of a view, made of its value and its row.
+    fn image(
+        &self,
+        x: &[f64],
+        view: Option<&str>,
+        of: impl Fn(f64, &[f64]) -> f64,
+    ) -> Result<Plane, Refused> {
+        let view = self.view(view)?;
+        let size = self.size(view);
+        let mut numbers = vec![0.0; 3 * size[0] * size[1]];
+        self.rows(x, view, &mut |place, value, row| numbers[place] = of(value, row))?;
+        Ok(Plane { numbers, size })
+    }
+
+    fn length(&self, v: &[f64]) -> Result<(), Refused> {
+        let (given, wanted) = (v.len(), self.names.len());
+        match given == wanted {
+            true => Ok(()),
+            false => Err(Refused::Array(format!("a vector of {given}, where {wanted} constants are free."))),
+        }
+    }
+}
+
+/// Three numbers a pixel.
+struct Plane {
+    numbers: Vec<f64>,
+    size: [usize; 2],
+}
+
+impl Plane {
+    fn array(self, py: Python<'_>) -> PyResult<Bound<'_, PyArray3<f64>>> {
+        let [height, width] = self.size;
+        PyArray1::from_vec(py, self.numbers).reshape([height, width, 3])
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn numbers(of: &PyReadonlyArray1<'_, f64>) -> Vec<f64> {
+    of.as_array().iter().copied().collect()
+}
+
+#[pymethods]
+impl Objective {
+    /// The names of what is free, in the order of every vector.
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.0.names.clone()
+    }
+
+    /// The views over which it is.
+    #[getter]
+    fn views(&self) -> Vec<String> {
+        self.0.observed.scene.views.iter().map(|view| view.name.clone()).collect()
+    }
+
+    /// What the user should know.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.0.observed.warnings.clone()
+    }
+
+    /// The values that the scene had.
+    #[getter]
+    fn start<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let start = self.0.observed.start();
+        PyArray1::from_vec(py, self.0.engine.unknowns().iter().map(|unknown| unknown.get(&start)).collect())
+    }
+
+    /// Least and greatest value of each.
+    #[getter]
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.0.engine.unknowns().iter().map(Unknown::bounds).collect()
+    }
+
+    /// The loss.
+    fn loss(&self, py: Python<'_>, x: PyReadonlyArray1<'_, f64>) -> PyResult<f64> {
+        let (own, x) = (Arc::clone(&self.0), numbers(&x));
+        wait(py, move || Ok(own.engine.loss(&own.at(&x)?)))
+    }
+
+    /// The loss and its gradient.
+    fn loss_and_gradient<'py>(
+        &self,
+        py: Python<'py>,
+        x: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<(f64, Bound<'py, PyArray1<f64>>)> {
+        let (own, x) = (Arc::clone(&self.0), numbers(&x));
+        let (loss, gradient) = wait(py, move || Ok(own.engine.gradient(&own.at(&x)?)))?;
+        Ok((loss, PyArray1::from_vec(py, gradient)))
+    }
+
+    /// Loss, J^T r and J^T J, with the sums of weights and of squared residuals, as a dictionary.
+    fn normal_equations<'py>(
+        &self,
+        py: Python<'py>,
+        x: PyReadonlyArray1<'_, f64>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let (own, x) = (Arc::clone(&self.0), numbers(&x));
+        let sums: NormalEquations = wait(py, move || Ok(own.engine.normal_equations(&own.at(&x)?)))?;
+        let (all, order) = (PyDict::new(py), self.0.names.len());
+        let jtj: Bound<'py, PyArray2<f64>> = PyArray1::from_vec(py, sums.jtj).reshape([order, order])?;
+        all.set_item("loss", sums.loss)?;
+        all.set_item("residual", sums.residual)?;
+        all.set_item("weight", sums.weight)?;
+        all.set_item("count", sums.count)?;
+        all.set_item("jtr", PyArray1::from_vec(py, sums.jtr))?;
+        all.set_item("jtj", jtj)?;
+        Ok(all)
+    }
+
+    /// A view's image.
+    #[pyo3(signature = (x, view = None))]
+    fn image<'py>(
+        &self,
+        py: Python<'py>,
+        x: PyReadonlyArray1<'_, f64>,
+        view: Option<String>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (own, x) = (Arc::clone(&self.0), numbers(&x));
+        wait(py, move || own.image(&x, view.as_deref(), |value, _| value))?.array(py)
+    }
+
+    /// The Jacobian of a view's image times a vector.
+    #[pyo3(signature = (x, v, view = None))]
+    fn jvp<'py>(
+        &self,
+        py: Python<'py>,
+        x: PyReadonlyArray1<'_, f64>,
+        v: PyReadonlyArray1<'_, f64>,
+        view: Option<String>,
+    ) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let (own, x, v) = (Arc::clone(&self.0), numbers(&x), numbers(&v));
+        let product = move || {
+            own.length(&v)?;
+            own.image(&x, view.as_deref(), |_, row| dot(row, &v))
+        };
+        wait(py, product)?.array(py)
+    }
+
+    /// An image times the Jacobian of a view's image.
+    #[pyo3(signature = (x, image, view = None))]
+    fn vjp<'py>(
+        &self,
+        py: Python<'py>,
+        x: PyReadonlyArray1<'_, f64>,
+        image: PyReadonlyArray3<'_, f64>,
+        view: Option<String>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (own, x) = (Arc::clone(&self.0), numbers(&x));
+        let image = image.as_array();
+        let (shape, image) = (image.shape().to_vec(), image.iter().copied().collect::<Vec<f64>>());
+        let product = move || {
+            let view = own.view(view.as_deref())?;
+            let [height, width] = own.size(view);
+            if shape != [height, width, 3] {
+                return Err(Refused::Array(format!(
+                    "an array of {shape:?}, where the view has {height} x {width} pixels of three numbers."
+                )));
+            }
+            let mut sums = vec![0.0; own.names.len()];
+            own.rows(&x, view, &mut |place, _, row| {
+                sums.iter_mut().zip(row).for_each(|(sum, slope)| *sum += image[place] * slope);
+            })?;
+            Ok(sums)
+        };
+        Ok(PyArray1::from_vec(py, wait(py, product)?))
+    }
+}
