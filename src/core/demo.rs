@@ -2,6 +2,7 @@
 //! constants: what `builtin` makes, taken through the stages.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use crate::builtin::{self, BuiltinError};
 use crate::output::{self, OutputError};
@@ -25,6 +26,15 @@ pub enum DemoError {
     Shading(#[from] ShadingError),
     #[error(transparent)]
     Output(#[from] OutputError),
+}
+
+/// The file by which builds are told apart, where it is not the process' own.
+static LIBRARY: OnceLock<PathBuf> = OnceLock::new();
+
+/// Have builds be told apart by this file from now on: that of a library, which holds the model where another program has
+/// loaded it. The first one stays.
+pub fn told_apart_by(library: &Path) {
+    let _ = LIBRARY.set(library.to_owned());
 }
 
 /// The built-in scene below `folder`, made there with its bakes the first time. Returns its scene file.
@@ -70,7 +80,8 @@ fn kept(
 /// libraries. The size and the time of its file tell builds apart, as `make` does it. `None`, so that nothing is
 /// taken for its own, where there is no such file to ask.
 fn program() -> Option<String> {
-    let file = std::env::current_exe().and_then(std::fs::metadata).ok()?;
+    let file = LIBRARY.get().cloned().map_or_else(std::env::current_exe, Ok);
+    let file = file.and_then(std::fs::metadata).ok()?;
     let modified = file.modified().ok()?.duration_since(std::time::UNIX_EPOCH).ok()?;
     Some(format!("skinfit {}, {} bytes, {}", env!("CARGO_PKG_VERSION"), file.len(), modified.as_nanos()))
 }

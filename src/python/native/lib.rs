@@ -30,7 +30,7 @@ mod _native {
     #[pymodule_export]
     use crate::objective::Objective;
     #[pymodule_export]
-    use crate::program::{built_in_scene, default_cache, run_program, version};
+    use crate::program::{built_in_scene, default_cache, loaded_from, run_program, version};
     #[pymodule_export]
     use crate::scene::Scene;
 

@@ -17,6 +17,11 @@ pub(crate) fn rows<'py>(py: Python<'py>, values: &Values) -> PyResult<Vec<Bound<
     values.rows().into_iter().map(|param| row(py, values, param)).collect()
 }
 
+/// The row of one parameter.
+pub(crate) fn row_of<'py>(py: Python<'py>, values: &Values, name: &str) -> PyResult<Bound<'py, PyDict>> {
+    row(py, values, known(values, name)?)
+}
+
 fn row<'py>(py: Python<'py>, values: &Values, param: Param) -> PyResult<Bound<'py, PyDict>> {
     let info = param.info();
     let row = PyDict::new(py);

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use pyo3::{PyResult, Python, pyfunction};
 use skinfit_core::bake::cache::default_folder;
-use skinfit_core::demo::{DemoError, kept_scene};
+use skinfit_core::demo::{DemoError, kept_scene, told_apart_by};
 
 use crate::errors::Refused;
 use crate::waiting::wait;
@@ -15,6 +15,13 @@ use crate::waiting::wait;
 #[pyfunction]
 pub(crate) fn run_program(py: Python<'_>, words: Vec<OsString>) -> u8 {
     py.detach(|| skinfit_host::cli::main_of(&words))
+}
+
+/// The library's own file: the built-in scene is made anew where that is another than before.
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value, reason = "Python hands it over")]
+pub(crate) fn loaded_from(file: PathBuf) {
+    told_apart_by(&file);
 }
 
 /// The built-in scene's file below `folder`, written there the first time.

@@ -28,6 +28,8 @@ pub(crate) struct Read {
     pub(crate) path: PathBuf,
     /// Where bakes are kept, if they are.
     pub(crate) cache: Option<PathBuf>,
+    /// Whether it was read with effects that its file does not name.
+    asked: bool,
     pub(crate) loaded: Loaded,
     pub(crate) values: Mutex<Values>,
     /// What drew the last image.
@@ -49,7 +51,8 @@ impl Read {
         };
         let loaded = Loaded::read(&path, &options)?;
         let values = Values::of_scene(&loaded.scene, &loaded.gains);
-        Ok(Self { path, cache, loaded, values: Mutex::new(values), painted: Mutex::new(None) })
+        let asked = options.effects.is_some();
+        Ok(Self { path, cache, asked, loaded, values: Mutex::new(values), painted: Mutex::new(None) })
     }
 
     /// The values as they stand.
@@ -92,6 +95,18 @@ impl Scene {
         self.0.loaded.scene.effects.iter().map(Effect::name).collect()
     }
 
+    /// Where bakes are kept.
+    #[getter]
+    fn cache(&self) -> Option<PathBuf> {
+        self.0.cache.clone()
+    }
+
+    /// Whether it is another than its file says.
+    #[getter]
+    fn is_changed(&self) -> bool {
+        self.0.asked || self.0.values() != Values::of_scene(&self.0.loaded.scene, &self.0.loaded.gains)
+    }
+
     /// The form of the model: `corrected` or `listing`.
     #[getter]
     fn form(&self) -> &'static str {
@@ -107,6 +122,11 @@ impl Scene {
     /// The rows of the parameter table.
     fn rows<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         params::rows(py, &self.0.values())
+    }
+
+    /// The row of one parameter.
+    fn row<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyDict>> {
+        params::row_of(py, &self.0.values(), name)
     }
 
     /// The names of what a fit moves.

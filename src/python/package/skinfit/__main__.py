@@ -1,0 +1,5 @@
+"""`python -m skinfit`: the command line."""
+
+from .command import main
+
+main()

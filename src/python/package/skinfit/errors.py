@@ -1,0 +1,57 @@
+"""What skinfit raises: a class a kind, each with the paragraph that the command line prints.
+
+A paragraph says file, place, what is wrong and what to do. All are `Error`; those that are about a value are
+`ValueError` too, those about a name `LookupError`.
+"""
+
+
+class Error(Exception):
+    """Whatever skinfit raises."""
+
+
+class SceneError(Error, ValueError):
+    """A scene file, or a file that it names, is not sound, or a view cannot be sampled."""
+
+
+class ParamError(Error, ValueError, KeyError):
+    """There is no such parameter in the scene, or it may not have that value."""
+
+    def __str__(self) -> str:
+        # A KeyError would quote it.
+        return Exception.__str__(self)
+
+
+class ViewError(Error, LookupError):
+    """The scene has no view of that name, or none is left to fit."""
+
+
+class BakeError(Error, ValueError):
+    """Light or occlusion cannot be baked of this scene."""
+
+
+class SkinError(Error, ValueError):
+    """These scenes cannot be fitted as one skin."""
+
+
+class ArrayError(Error, ValueError):
+    """An array has another shape or other numbers than asked for."""
+
+
+class FitError(Error, RuntimeError):
+    """A fit was refused, or failed before it found anything."""
+
+
+class StudyError(Error, RuntimeError):
+    """A command of the command line was refused, or failed before it had results."""
+
+
+class FileError(Error, OSError):
+    """A file cannot be written."""
+
+
+class Fault(Error, RuntimeError):
+    """Something that should not happen: a fault of skinfit's."""
+
+
+class SkinfitWarning(UserWarning):
+    """What the command line would print as a warning: something was mended, or left out."""

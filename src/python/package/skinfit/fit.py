@@ -1,0 +1,377 @@
+"""Fits: their steps, and what they have found.
+
+A fit is the command line's, and leaves its run folder; a `Fit` is a view of such a folder, whoever has made it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Union
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from .command import run as run_command
+from .errors import Error, FitError, SkinfitWarning
+from .html import framed
+from .params import Value
+from .progress import Progress
+from .study import copy
+from .table import best
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .scene import Scene
+
+FilePath = Union[str, "PathLike[str]"]
+Ending = Literal["converged", "ran-out", "stalled", "interrupted"]
+
+
+class FitOptions(TypedDict, total=False):
+    """How a fit goes about it; what is not given is as of `skinfit fit`."""
+
+    solver: Literal["varpro", "lm", "lbfgs", "nelder-mead", "adam"]
+    loss: Literal["l2", "relative_l2", "huber", "smape"]
+    """Instead of the scenes' own."""
+    starts: int
+    """Fit from this many starts and keep the best."""
+    seed: int
+    """What the other starts are drawn from."""
+    max_iterations: int
+    """Of each start."""
+    engine: Literal["auto", "cpu", "gpu"]
+    """What makes the passes."""
+    samples: Literal["cpu", "gpu"]
+    """What makes the GPU engine's samples."""
+    adapter: str
+    """Part of a graphics adapter's name."""
+    device_memory: int
+    """Most megabytes of samples that stay on the adapter."""
+    verify: bool
+    """Hold the first pass against the model in f64."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """An iteration of a fit, and where it has led."""
+
+    iteration: int
+    """0 at the start."""
+    evaluations: int
+    """Passes over the samples so far."""
+    loss: float
+    seconds: float
+    """Since the fit began."""
+    constants: Mapping[str, Value]
+    """The value of each parameter; of several scenes those of the first."""
+    scenes: Sequence[Mapping[str, Value]]
+    """The same of each scene."""
+
+
+@dataclass(frozen=True)
+class Iteration:
+    """An iteration, as the report has it."""
+
+    iteration: int
+    evaluations: int
+    loss: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Scores:
+    """How good a view is; `None` where no pixel of it is wholly covered."""
+
+    psnr: float | None
+    """dB."""
+    ssim: float | None
+    flip: float | None
+    held_out: bool
+    """Whether the fit has not seen it."""
+
+
+class Fit:
+    """What a fit has found. `_repr_html_` is its report."""
+
+    def __init__(
+        self,
+        run: Path,
+        scenes: Sequence[Scene],
+        text: str = "",
+        scratch: tempfile.TemporaryDirectory[str] | None = None,
+    ) -> None:
+        self.run = run
+        """The run folder."""
+        self.report: dict[str, Any] = _report(run)
+        """All numbers, as `report.json` has them."""
+        self._scenes = list(scenes)
+        self._text = text
+        # A run folder that goes with this.
+        self._scratch = scratch
+
+    @property
+    def ending(self) -> Ending:
+        """How it ended. An interrupted fit, or one that ran out, can be resumed."""
+        ending: Ending = self.report["ending"]
+        return ending
+
+    @property
+    def converged(self) -> bool:
+        """Whether it ended as it should."""
+        return self.ending == "converged"
+
+    @property
+    def loss(self) -> float:
+        """The loss at the end."""
+        return float(self.report["loss"]["end"])
+
+    @property
+    def params(self) -> dict[str, Value]:
+        """The value of each parameter that was free: `scene.params.set_all(fit.params)` takes them over. Of several scenes,
+        what each has of its own is named `SCENE/NAME`."""
+        return {name: _value(param["value"]) for name, param in self.report["params"].items()}
+
+    @property
+    def std_errors(self) -> dict[str, float | None]:
+        """One standard error of each unknown (a parameter, a channel as `hilite.r`, a gain as `gain.left`), in the
+        parameter's unit; `None` at a bound, and where the images do not determine it."""
+        return {unknown["name"]: unknown["std_error"] for unknown in self.report["unknowns"]}
+
+    @property
+    def unknowns(self) -> Any:
+        """A table with a row for each unknown: start, value, standard errors, bounds, whether it ended on one."""
+        return best(self.report["unknowns"])
+
+    @property
+    def correlations(self) -> tuple[list[str], NDArray[np.float64]]:
+        """The unknowns' names, and their (K, K) correlations; NaN beside an unknown without a standard error."""
+        found = self.report["correlations"]
+        matrix = np.array(found["matrix"], dtype=np.float64).reshape(len(found["names"]), len(found["names"]))
+        return list(found["names"]), matrix
+
+    @property
+    def undetermined(self) -> list[dict[str, float]]:
+        """Directions in which the images do not tell constants apart: each a unit vector, unknown to component."""
+        return [dict(direction) for direction in self.report["undetermined"]]
+
+    @property
+    def history(self) -> list[Iteration]:
+        """The loss after each iteration; the first is the start."""
+        return [Iteration(**iteration) for iteration in self.report["history"]]
+
+    @property
+    def scores(self) -> dict[str, Scores]:
+        """How good each view is, held-out ones among them."""
+        views = self.report["views"].items()
+        return {name: Scores(of["psnr"], of["ssim"], of["flip"], of["held_out"]) for name, of in views}
+
+    @property
+    def held_out(self) -> dict[str, Scores]:
+        """How good the views are that the fit has not seen."""
+        return {name: scores for name, scores in self.scores.items() if scores.held_out}
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the report warns of."""
+        return list(self.report["warnings"])
+
+    @property
+    def html(self) -> str:
+        """The report's page."""
+        return (self.run / "report.html").read_text(encoding="utf-8")
+
+    def save(self, folder: FilePath) -> Path:
+        """Copy the run folder, with the report and what `resume` and `skinfit render --params` take, to one that is not
+        there yet. Raises `FileError`."""
+        return copy(self.run, Path(folder))
+
+    def resume(self, callback: Callable[[Step], Any] | None = None, **options: Unpack[FitOptions]) -> Fit:
+        """Go on from where it stopped, in the same folder, with its solver, starts and seed; `max_iterations` counts from
+        the first start. Raises `FitError` where the scenes were changed since."""
+        result = fit(self._scenes, callback, run=self.run, resume=True, hold_out=list(self.held_out), **options)
+        result._scratch = self._scratch
+        return result
+
+    def export(
+        self,
+        to: str,
+        file: FilePath | None = None,
+        *,
+        constants: bool = False,
+        material: str | None = None,
+    ) -> str:
+        """The constants with their shader for another engine (`skinfit export --to`), or `constants` alone: the text, which
+        is written to `file`, too, if one is named. Raises `FitError`."""
+        words = ["export", str(self.run / "params.toml"), "--to", to, *(["--constants"] if constants else [])]
+        if material is not None:
+            words += ["--material", material]
+        with tempfile.TemporaryDirectory(prefix="skinfit-") as scratch:
+            place = Path(file) if file is not None else Path(scratch) / "export"
+            said = run_command([*words, "-o", str(place)], FitError)
+            _warn(said.told)
+            return place.read_text(encoding="utf-8")
+
+    def __repr__(self) -> str:
+        if self._text:
+            return self._text
+        values = "; ".join(f"{unknown['name']} = {unknown['value']:.6g}" for unknown in self.report["unknowns"])
+        return f"Fit({self.ending}, loss {self.loss:.6e}: {values})"
+
+    def _repr_html_(self) -> str:
+        return framed(self.html)
+
+
+class FitSteps(Iterator[Step]):
+    """A fit under way, which waits after each step for the next one to be asked for.
+
+    Whoever leaves the loop early asks for `result()`: the fit goes on to its end by itself, unless `stop()` was called.
+    """
+
+    def __init__(self, native: _native.Fitting, run: Path, scenes: Sequence[Scene], scratch: Any) -> None:
+        self._native = native
+        self._run = run
+        self._scenes = scenes
+        self._scratch = scratch
+        self.last: Step | None = None
+        """The last step; `None` while the scenes are still read, baked and sampled."""
+
+    def __next__(self) -> Step:
+        told = self._native.next()
+        if told is None:
+            raise StopIteration
+        iteration, evaluations, loss, seconds, constants = told
+        scenes = [{name: _value(rgb) for name, rgb in scene.items()} for scene in constants]
+        self.last = Step(iteration, evaluations, loss, seconds, scenes[0], scenes)
+        return self.last
+
+    def stop(self) -> None:
+        """Have the fit end after the iteration that it is at, with what it has found and a state to be resumed."""
+        self._native.stop()
+
+    def result(self) -> Fit:
+        """Wait for its end: what it has found. Raises `FitError` where it was refused or failed."""
+        said, told = self._native.finish()
+        _warn(told)
+        return Fit(self._run, self._scenes, "\n".join(said), self._scratch)
+
+
+def fit_steps(
+    scenes: Sequence[Scene],
+    *,
+    run: FilePath | None = None,
+    resume: bool = False,
+    hold_out: Sequence[str] = (),
+    **options: Unpack[FitOptions],
+) -> FitSteps:
+    """Begin a fit, as `fit` does, and hand out its steps:
+
+        steps = skinfit.fit_steps([scene])
+        for step in steps:
+            if step.loss < 1e-4:
+                steps.stop()
+        found = steps.result()
+    """
+    unknown = set(options) - set(FitOptions.__annotations__)
+    if unknown:
+        raise TypeError(f"a fit has no option {', '.join(sorted(unknown))}; it has {', '.join(FitOptions.__annotations__)}.")
+    if resume and run is None:
+        raise FitError("a fit goes on in the folder that it was stopped in. Name it: run=...")
+    scratch = tempfile.TemporaryDirectory(prefix="skinfit-", ignore_cleanup_errors=True) if run is None else None
+    place = Path(scratch.name) / "fit" if scratch is not None else Path(str(run))
+    words = [f"--hold-out={name}" for name in hold_out]
+    for name, value in options.items():
+        option = "--" + name.replace("_", "-")
+        if value is True:
+            words.append(option)
+        elif value is not False and value is not None:
+            words.append(f"{option}={value}")
+    native = _native.Fitting([scene._native for scene in scenes], place, words, resume)
+    return FitSteps(native, place, scenes, scratch)
+
+
+def fit(
+    scenes: Sequence[Scene],
+    callback: Callable[[Step], Any] | None = None,
+    *,
+    run: FilePath | None = None,
+    resume: bool = False,
+    hold_out: Sequence[str] = (),
+    progress: bool | None = None,
+    **options: Unpack[FitOptions],
+) -> Fit:
+    """Fit what is free of these scenes to their targets, several as one skin in different light, as `skinfit fit` does: the
+    results are equal to the bit.
+
+    - `callback` is called with each `Step`, and the fit goes on when it returns; `False` stops it there. What it raises ends
+      the fit, and is raised here.
+    - `run`: the run folder, by default one that goes with the `Fit`; `resume`: go on with the fit that was stopped there.
+    - `hold_out`: views that are scored and not fitted; of several scenes also scenes, or `SCENE/VIEW`.
+    - `progress`: whether a line shows how far it is, by default in a notebook and on a terminal.
+    - `options`: see `FitOptions`.
+
+    Ctrl-C stops the search after its iteration and keeps what there is: the `Fit` then is `interrupted`. Before the search,
+    while scenes are read and baked, nothing is there to keep, and `KeyboardInterrupt` is raised, as it is by Ctrl-C a second
+    time. Python's lock is free meanwhile. Raises `FitError` and `SkinError` with the command line's paragraph. A fit that did
+    not converge is no error: a `SkinfitWarning` says what to do.
+    """
+    steps = fit_steps(scenes, run=run, resume=resume, hold_out=hold_out, **options)
+    shown = Progress(progress)
+    try:
+        for step in steps:
+            shown.step(step)
+            if callback is not None and callback(step) is False:
+                steps.stop()
+    except KeyboardInterrupt:
+        steps.stop()
+        if steps.last is None:
+            raise
+    except BaseException:
+        steps.stop()
+        with contextlib.suppress(Error):
+            steps.result()
+        raise
+    finally:
+        shown.close()
+    return steps.result()
+
+
+def load_run(folder: FilePath) -> Fit:
+    """What a run folder of `skinfit fit`, or of `Fit.save`, holds. Raises `FitError` where it is none."""
+    from .scene import load_file
+
+    run = Path(folder)
+    report = _report(run)
+    several = [file for file in report["files"] if file.startswith("scenes/") and file.endswith(".toml")]
+    return Fit(run, [load_file(run / file) for file in several or ["scene.toml"]])
+
+
+def _report(run: Path) -> dict[str, Any]:
+    file = run / "report.json"
+    try:
+        report = json.loads(file.read_bytes())
+    except (OSError, ValueError) as error:
+        raise FitError(f"{file}: this is not the folder of a fit: {error}. Name the run folder of one.") from error
+    if not isinstance(report, dict) or "unknowns" not in report:
+        raise FitError(f"{file}: this is no report of a fit. Name the run folder of one.")
+    return report
+
+
+def _value(number: float | Sequence[float]) -> Value:
+    if isinstance(number, (int, float)):
+        return float(number)
+    red, green, blue = number
+    return red if red == green == blue else (red, green, blue)
+
+
+def _warn(told: Sequence[str]) -> None:
+    for words in told:
+        warnings.warn(words.removeprefix("warning: "), SkinfitWarning, stacklevel=4)

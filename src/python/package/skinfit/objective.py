@@ -1,0 +1,107 @@
+"""A scene's fit as a function of what is free, for SciPy, JAX, PyTorch or a solver of one's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from . import _native
+from .errors import ArrayError
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class NormalEquations:
+    """What one pass over the samples yields, with residuals r (weighted, over pixels and channels) and their Jacobian J."""
+
+    loss: float
+    """The mean of the weighted losses."""
+    residual: float
+    """r'r; of a robust loss that of its reweighted quadratic."""
+    weight: float
+    """The sum of the weights: what the loss is a mean over."""
+    count: int
+    """How many residuals have a weight."""
+    jtr: Vector
+    """(K,): J'r."""
+    jtj: Vector
+    """(K, K): J'J."""
+
+
+class Objective:
+    """The loss of a scene over its free constants, at the values that it had when this was made.
+
+    `x` below is an array of (K,) float64, a number for each of `names`, within `bounds`: outside of them, and where it is
+    not finite, `ParamError` is raised; of another length, `ArrayError`. Angles are in degrees, as in scene files.
+
+    Loss, gradient and normal equations are those of the CPU engine, by the numbers of which `Scene.fit` goes. Images and
+    products of their Jacobian are computed in float64.
+    """
+
+    def __init__(self, native: _native.Objective) -> None:
+        self._native = native
+
+    @property
+    def names(self) -> list[str]:
+        """What is free: `rim_exponent`, one channel of a parameter as `hilite.r`, a view's gain as `gain.left`."""
+        return self._native.names
+
+    @property
+    def views(self) -> list[str]:
+        """The views that count."""
+        return self._native.views
+
+    @property
+    def start(self) -> Vector:
+        """(K,): the values that the scene had."""
+        return self._native.start
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        """Least and greatest value of each, as SciPy takes them."""
+        return self._native.bounds
+
+    def loss(self, x: ArrayLike) -> float:
+        """The loss."""
+        return self._native.loss(_vector(x))
+
+    def gradient(self, x: ArrayLike) -> Vector:
+        """(K,): the loss' gradient."""
+        return self.loss_and_gradient(x)[1]
+
+    def loss_and_gradient(self, x: ArrayLike) -> tuple[float, Vector]:
+        """The loss and its gradient (K,), in one pass: `scipy.optimize.minimize(f.loss_and_gradient, f.start, jac=True)`."""
+        return self._native.loss_and_gradient(_vector(x))
+
+    def normal_equations(self, x: ArrayLike) -> NormalEquations:
+        """The loss with J'r and J'J, in one pass."""
+        return NormalEquations(**self._native.normal_equations(_vector(x)))
+
+    def image(self, x: ArrayLike, view: str | None = None) -> Vector:
+        """(height, width, 3): a view (the first, unless named) in linear Rec.709 radiance, premultiplied by coverage, times
+        the view's gain; 0 where no skin is seen. Raises `ViewError` where there is no such view."""
+        return self._native.image(_vector(x), view)
+
+    def jvp(self, x: ArrayLike, v: ArrayLike, view: str | None = None) -> Vector:
+        """(height, width, 3): how `image` moves as `x` moves along `v` (K,), the Jacobian times `v`."""
+        return self._native.jvp(_vector(x), _vector(v), view)
+
+    def vjp(self, x: ArrayLike, image: ArrayLike, view: str | None = None) -> Vector:
+        """(K,): `image` (height, width, 3) times the Jacobian of `Objective.image`: the gradient of their inner product."""
+        array = np.asarray(image, dtype=np.float64)
+        if array.ndim != 3:
+            raise ArrayError(f"an array of shape {array.shape} is no image. Give height x width x 3 numbers.")
+        return self._native.vjp(_vector(x), array, view)
+
+    def __repr__(self) -> str:
+        return f"Objective({', '.join(self.names)}; views {', '.join(self.views)})"
+
+
+def _vector(x: ArrayLike) -> Vector:
+    vector = np.asarray(x, dtype=np.float64)
+    if vector.ndim != 1:
+        raise ArrayError(f"an array of shape {vector.shape} is no vector. Give a number for each free constant.")
+    return vector

@@ -1,0 +1,30 @@
+"""An image that was drawn, with what it is made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True)
+class Rendering:
+    """A view, row by row from the top, in linear Rec.709 radiance, premultiplied by coverage."""
+
+    image: NDArray[np.float32]
+    """(height, width, 3)."""
+    alpha: NDArray[np.float32]
+    """(height, width): the share of each pixel that the mesh covers, in [0, 1]."""
+    layers: Mapping[str, NDArray[np.float32]] = field(default_factory=dict)
+    """By name, each (height, width, 3): a layer for each term, `plain` for what is not skin, `background` for what stands
+    behind. They add up to the image without its bloom. Empty unless terms were asked for."""
+    haze: NDArray[np.float32] | None = None
+    """(height, width), premultiplied; `None` unless terms were asked for and an effect makes it."""
+
+    def srgb(self, exposure: float = 0.0) -> NDArray[np.uint8]:
+        """(height, width, 3) codes for a screen: brightened by `exposure` stops, clipped, sRGB's curve, on black."""
+        linear = np.clip(self.image.astype(np.float64) * 2.0**exposure, 0.0, 1.0)
+        curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        return np.round(255.0 * curved).astype(np.uint8)
