@@ -3,8 +3,8 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use exr::prelude::{Image as Exr, SpecificChannels, WritableImage as _};
-use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3, PyUntypedArrayMethods};
+use exr::prelude::{Image as Exr, SpecificChannels, Vec2, WritableImage as _};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray3};
 use pyo3::{Bound, PyResult, Python, pyfunction};
 use skinfit_core::output::{self, OutputError};
 use skinfit_core::render::image::Image;
@@ -35,8 +35,9 @@ pub(crate) fn plane(
 /// whole or not at all.
 #[pyfunction]
 pub(crate) fn write_exr(py: Python<'_>, file: PathBuf, numbers: PyReadonlyArray3<'_, f32>) -> PyResult<()> {
-    let &[height, width, channels] = numbers.shape() else { unreachable!("it has three dimensions") };
-    let numbers: Vec<f32> = numbers.as_array().iter().copied().collect();
+    let numbers = numbers.as_array();
+    let (height, width, channels) = numbers.dim();
+    let numbers: Vec<f32> = numbers.iter().copied().collect();
     wait(py, move || {
         if !(3..=4).contains(&channels) || height == 0 || width == 0 {
             return Err(Refused::Array(format!(
@@ -50,20 +51,17 @@ pub(crate) fn write_exr(py: Python<'_>, file: PathBuf, numbers: PyReadonlyArray3
 
 fn write(file: &Path, numbers: &[f32], [width, height, channels]: [usize; 3]) -> Result<(), Refused> {
     let at = |x: usize, y: usize, channel: usize| numbers[(y * width + x) * channels + channel];
-    let colour = |x, y| (at(x, y, 0), at(x, y, 1), at(x, y, 2));
+    let colour = |p: Vec2<usize>| (at(p.x(), p.y(), 0), at(p.x(), p.y(), 1), at(p.x(), p.y(), 2));
+    let covered = |p: Vec2<usize>| {
+        let (r, g, b) = colour(p);
+        (r, g, b, at(p.x(), p.y(), 3))
+    };
     let mut bytes = Cursor::new(Vec::new());
+    let size = (width, height);
     let written = if channels == 3 {
-        let image = Exr::from_channels(
-            (width, height),
-            SpecificChannels::rgb(|p: exr::math::Vec2<usize>| colour(p.x(), p.y())),
-        );
-        image.write().to_buffered(&mut bytes)
+        Exr::from_channels(size, SpecificChannels::rgb(colour)).write().to_buffered(&mut bytes)
     } else {
-        let covered = |p: exr::math::Vec2<usize>| {
-            let (r, g, b) = colour(p.x(), p.y());
-            (r, g, b, at(p.x(), p.y(), 3))
-        };
-        Exr::from_channels((width, height), SpecificChannels::rgba(covered)).write().to_buffered(&mut bytes)
+        Exr::from_channels(size, SpecificChannels::rgba(covered)).write().to_buffered(&mut bytes)
     };
     written.map_err(|error| OutputError::new(file, &error))?;
     Ok(output::write(file, &bytes.into_inner())?)

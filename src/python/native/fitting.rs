@@ -37,7 +37,7 @@ enum Message {
 enum End {
     /// What the command line would have said.
     Done(Heard),
-    Refused(String, PyErr),
+    Refused(PyErr),
 }
 
 /// A fit under way. Dropped, it stops soon.
@@ -108,7 +108,7 @@ impl Fitting {
             Message::Over(end) => {
                 *locked(&self.end) = Some(match *end {
                     Ok(heard) => End::Done(heard),
-                    Err(refused) => End::Refused(refused.to_string(), refused.into()),
+                    Err(refused) => End::Refused(refused.into()),
                 });
                 Ok(None)
             }
@@ -127,7 +127,7 @@ impl Fitting {
         while self.next(py)?.is_some() {}
         match &*locked(&self.end) {
             Some(End::Done(heard)) => Ok((heard.said.clone(), heard.told.clone())),
-            Some(End::Refused(_, error)) => Err(error.clone_ref(py)),
+            Some(End::Refused(error)) => Err(error.clone_ref(py)),
             None => Ok((Vec::new(), Vec::new())),
         }
     }

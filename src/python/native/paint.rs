@@ -63,23 +63,23 @@ pub(crate) fn paint(
     let mut painted = locked(&read.painted);
     let mut warnings = Vec::new();
     // Taken out while it draws: what is left half changed does not stay.
-    let mut painter =
-        match painted.take().filter(|painted| painted.draws(view.unwrap_or_else(first), &values)) {
-            Some(painter) => painter,
-            None => {
-                let mut painter = Painted::new(read, view, &values)?;
-                warnings = std::mem::take(&mut painter.warnings);
-                painter
-            }
-        };
-    painter.painter.set_params(&values.params)?;
-    let own = read.loaded.scene.views.iter().position(|view| view.name == painter.view.name);
-    let gain = own.and_then(|own| values.gains.get(own)).copied().unwrap_or_default();
-    let picture = painter.painter.paint(&painter.view.camera, gain, Beside { layers, haze: layers })?;
+    let kept = painted.take().filter(|painted| painted.draws(view.unwrap_or_else(first), &values));
+    let mut now = match kept {
+        Some(kept) => kept,
+        None => {
+            let mut new = Painted::new(read, view, &values)?;
+            warnings = std::mem::take(&mut new.warnings);
+            new
+        }
+    };
+    now.painter.set_params(&values.params)?;
+    let place = read.loaded.scene.views.iter().position(|view| view.name == now.view.name);
+    let gain = place.and_then(|place| values.gains.get(place)).copied().unwrap_or_default();
+    let picture = now.painter.paint(&now.view.camera, gain, Beside { layers, haze: layers })?;
     if picture.image.alpha.iter().all(|&alpha| alpha == 0.0) {
-        return Err(nothing_visible(&read.loaded.scene, &painter.view).into());
+        return Err(nothing_visible(&read.loaded.scene, &now.view).into());
     }
-    *painted = Some(painter);
+    *painted = Some(now);
     Ok((picture, warnings))
 }
 

@@ -2,7 +2,7 @@
 
 use pyo3::types::{PyDict, PyDictMethods};
 use pyo3::{Bound, PyResult, Python};
-use skinfit_core::model::params::{Channels, Param};
+use skinfit_core::model::params::{Column, Param};
 use skinfit_core::scene::{Assignment, suggestion};
 use skinfit_view::values::{Freedom, Values};
 
@@ -90,10 +90,5 @@ fn known(values: &Values, name: &str) -> Result<Param, Refused> {
 
 /// The names of what a fit moves, as reports have them: `rim_exponent`, `hilite.r`.
 pub(crate) fn free_names(values: &Values) -> Vec<String> {
-    let tied = |channels: Channels| channels == Channels::Tied;
-    values
-        .free
-        .iter()
-        .map(|column| if tied(column.channels) { column.param.name().to_owned() } else { column.name() })
-        .collect()
+    values.free.iter().map(Column::name).collect()
 }

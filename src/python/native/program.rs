@@ -47,6 +47,6 @@ pub(crate) fn default_cache() -> PathBuf {
 
 /// The version of the library.
 #[pyfunction]
-pub(crate) const fn version() -> &'static str {
+pub(crate) fn version() -> &'static str {
     env!("CARGO_PKG_VERSION")
 }

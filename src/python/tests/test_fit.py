@@ -1,0 +1,186 @@
+"""Fits are the command line's to the bit; they can be watched, stopped and resumed."""
+
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import skinfit
+
+from conftest import Program, numbers, report_of
+
+
+def test_a_fit_is_the_command_lines_to_the_bit(
+    fitted: skinfit.Fit, demo_file: Path, cache: Path, program: Program, tmp_path: Path
+) -> None:
+    program("fit", demo_file, "-o", tmp_path, "--cache", cache, "--engine", "cpu")
+    assert numbers(fitted.report) == numbers(report_of(tmp_path))
+    assert fitted.converged and fitted.loss < 1e-6
+
+
+def test_changed_values_are_those_of_the_command_lines_words(
+    scene: skinfit.Scene, demo_file: Path, cache: Path, program: Program, tmp_path: Path
+) -> None:
+    scene.params["rim_exponent"] = 3
+    scene.params["hilite"] = (0.6, 0.5, 0.4)
+    scene.params.free_only("base_weight", "rim_exponent", "hilite")
+    scene.params.free("hilite", per_channel=True)
+    words = ["--set", "rim_exponent=3", "--set", "hilite=0.6,0.5,0.4", "--free", "base_weight,rim_exponent,hilite"]
+    program("fit", demo_file, "-o", tmp_path, "--cache", cache, "--engine", "cpu", "--solver", "lm", *words)
+    found = scene.fit(engine="cpu", solver="lm")
+    assert numbers(found.report)["unknowns"] == numbers(report_of(tmp_path))["unknowns"]
+    assert list(found.std_errors) == ["base_weight", "rim_exponent", "hilite.r", "hilite.g", "hilite.b"]
+
+
+def test_what_is_found_stands_in_the_fit(fitted: skinfit.Fit, tmp_path: Path) -> None:
+    assert fitted.params["base_weight"] == pytest.approx(0.85, abs=1e-5)
+    names, matrix = fitted.correlations
+    assert matrix.shape == (len(names), len(names)) and np.allclose(np.diag(matrix)[~np.isnan(np.diag(matrix))], 1)
+    assert fitted.history[0].iteration == 0 and fitted.history[-1].loss == fitted.loss
+    assert "<iframe" in fitted._repr_html_() and "base_weight" in repr(fitted)
+    saved = fitted.save(tmp_path / "kept")
+    again = skinfit.load_run(saved)
+    assert again.report == fitted.report and again.params == fitted.params
+    with pytest.raises(skinfit.FileError):
+        fitted.save(tmp_path / "kept")
+
+
+def test_held_out_views_are_scored_and_not_fitted(scene: skinfit.Scene) -> None:
+    found = scene.fit(engine="cpu", hold_out=["profile"])
+    assert list(found.held_out) == ["profile"]
+    assert not found.scores["front"].held_out
+    with pytest.raises(skinfit.FitError, match="nobody"):
+        scene.fit(hold_out=["nobody"])
+
+
+def test_each_step_is_told_and_false_stops(scene: skinfit.Scene) -> None:
+    steps: list[skinfit.Step] = []
+
+    def watch(step: skinfit.Step) -> bool:
+        steps.append(step)
+        return len(steps) < 2
+
+    with pytest.warns(skinfit.SkinfitWarning, match="interrupted"):
+        found = scene.fit(watch, engine="cpu")
+    assert found.ending == "interrupted" and len(steps) == 2
+    assert set(steps[0].constants) == set(scene.params)
+
+
+def test_a_stopped_fit_goes_on_to_the_same_bits(
+    scene: skinfit.Scene, fitted: skinfit.Fit, tmp_path: Path, unwarned: None
+) -> None:
+    steps = scene.fit_steps(run=tmp_path / "run", engine="cpu")
+    next(steps)
+    next(steps)
+    steps.stop()
+    stopped = steps.result()
+    assert stopped.ending == "interrupted"
+    found = stopped.resume(engine="cpu")
+    assert found.converged and found.params == fitted.params and found.loss == fitted.loss
+    scene.params["rim_exponent"] = 3
+    scene.params.fix("rim_exponent")
+    with pytest.raises(skinfit.FitError, match="other free constants"):
+        scene.fit(run=tmp_path / "run", resume=True)
+
+
+def test_what_a_callback_raises_ends_the_fit_and_is_raised(scene: skinfit.Scene, tmp_path: Path, unwarned: None) -> None:
+    class Enough(Exception):
+        pass
+
+    def watch(step: skinfit.Step) -> None:
+        raise Enough
+
+    with pytest.raises(Enough):
+        scene.fit(watch, run=tmp_path / "run", engine="cpu")
+    # It has ended: its folder is whole, and free for the next.
+    assert skinfit.load_run(tmp_path / "run").ending == "interrupted"
+    assert scene.fit(run=tmp_path / "run", engine="cpu").converged
+
+
+def test_several_scenes_are_fitted_as_one_skin(
+    scene: skinfit.Scene, cache: Path, program: Program, tmp_path: Path
+) -> None:
+    files = [tmp_path / "noon.toml", tmp_path / "night.toml"]
+    for file in files:
+        scene.save(file)
+    both = [skinfit.load_file(file, cache=cache) for file in files]
+    found = skinfit.fit(both, engine="cpu")
+    program("fit", *files, "-o", tmp_path / "run", "--cache", cache, "--engine", "cpu")
+    assert numbers(found.report)["unknowns"] == numbers(report_of(tmp_path / "run"))["unknowns"]
+    assert "noon/front" in found.scores
+    with pytest.raises(skinfit.SkinError, match="named twice"):
+        skinfit.fit([both[0], both[0]])
+
+
+def test_other_threads_go_on_while_a_fit_runs(scene: skinfit.Scene) -> None:
+    count, over = 0, threading.Event()
+
+    def tick() -> None:
+        nonlocal count
+        while not over.is_set():
+            count += 1
+            time.sleep(1e-3)
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begun = time.monotonic()
+    scene.fit(engine="cpu", starts=4)
+    seconds, ticks = time.monotonic() - begun, count
+    over.set()
+    thread.join()
+    # A lock that is held lets it tick in between alone, some tens of times.
+    assert ticks > 50 * seconds, (ticks, seconds)
+
+
+_INTERRUPTED = """
+    import sys, time, warnings
+    import skinfit
+    warnings.simplefilter("ignore")
+    scene = skinfit.load_file({scene!r}, cache={cache!r})
+    def watch(step):
+        print("step", flush=True)
+        time.sleep(0.2)
+    found = scene.fit(watch, engine="cpu", solver="nelder-mead", run={run!r})
+    print(found.ending, len(found.history), flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
+def test_ctrl_c_keeps_what_there_is(demo_file: Path, cache: Path, tmp_path: Path) -> None:
+    script = textwrap.dedent(_INTERRUPTED.format(scene=str(demo_file), cache=str(cache), run=str(tmp_path / "run")))
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "step\n"
+        process.send_signal(signal.SIGINT)
+        told = process.stdout.read().split()
+    assert process.returncode == 0
+    # It stopped at once, not after its hundreds of steps.
+    assert told.count("step") <= 1 and told[-2] == "interrupted"
+    assert skinfit.load_run(tmp_path / "run").ending == "interrupted"
+
+
+_BAKING = """
+    import time
+    import skinfit
+    try:
+        skinfit.load_file({scene!r}, cache=False).fit(engine="cpu")
+    except KeyboardInterrupt:
+        print("interrupted", time.time(), flush=True)
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
+def test_ctrl_c_is_heard_within_a_second_wherever_it_comes(demo_file: Path) -> None:
+    script = textwrap.dedent(_BAKING.format(scene=str(demo_file)))
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        time.sleep(1.0)
+        sent = time.time()
+        process.send_signal(signal.SIGINT)
+        word, heard = process.stdout.readline().split()
+        assert word == "interrupted" and float(heard) - sent < 1.0

@@ -1,0 +1,93 @@
+"""Loss, gradient and Jacobian products, against differences and against one another."""
+
+import numpy as np
+import pytest
+import skinfit
+from numpy.typing import NDArray
+from scipy.optimize import approx_fprime, check_grad, minimize
+
+Vector = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def objective(demo_file, cache) -> skinfit.Objective:  # type: ignore[no-untyped-def]
+    return skinfit.load_file(demo_file, cache=cache).objective()
+
+
+@pytest.fixture(scope="module")
+def x(objective: skinfit.Objective) -> Vector:
+    """Near the start, and a way from every bound."""
+    lower, upper = np.array(objective.bounds).T
+    return np.clip(objective.start, lower + 0.05, upper - 0.05)
+
+
+def test_the_gradient_is_that_of_the_loss(objective: skinfit.Objective, x: Vector) -> None:
+    gradient = objective.gradient(x)
+    # The loss rounds to some 1e-7 of itself.
+    apart = check_grad(objective.loss, objective.gradient, x, epsilon=1e-3)
+    assert apart < 2e-2 * np.linalg.norm(gradient)
+    sums = objective.normal_equations(x)
+    assert np.allclose(2 * sums.jtr / sums.weight, gradient, rtol=1e-5, atol=1e-12)
+    assert sums.jtj.shape == (len(x), len(x)) and np.array_equal(sums.jtj, sums.jtj.T)
+
+
+def test_the_loss_is_the_fits(objective: skinfit.Objective, fitted: skinfit.Fit) -> None:
+    assert objective.normal_equations(objective.start).loss == fitted.report["loss"]["start"]
+    assert objective.names == list(fitted.std_errors)
+
+
+def test_products_of_the_jacobian_are_those_of_the_image(objective: skinfit.Objective, x: Vector) -> None:
+    random = np.random.default_rng(1)
+    v = random.normal(size=len(x))
+    step = 1e-5
+    moved = objective.jvp(x, v, "profile")
+    differences = (objective.image(x + step * v, "profile") - objective.image(x - step * v, "profile")) / (2 * step)
+    assert np.abs(moved).max() > 0.01
+    assert np.allclose(moved, differences, atol=1e-6 * np.abs(moved).max())
+    w = random.normal(size=moved.shape)
+    assert np.dot(objective.vjp(x, w, "profile"), v) == pytest.approx(np.sum(w * moved), rel=1e-9)
+
+
+def test_the_image_is_the_drawn_one(objective: skinfit.Objective, demo_file, cache) -> None:  # type: ignore[no-untyped-def]
+    drawn = skinfit.load_file(demo_file, cache=cache).render("front")
+    assert np.allclose(objective.image(objective.start, "front"), drawn.image, atol=1e-5)
+
+
+def test_scipy_finds_what_the_fit_finds(objective: skinfit.Objective, fitted: skinfit.Fit) -> None:
+    found = minimize(
+        objective.loss_and_gradient, objective.start, jac=True, bounds=objective.bounds, method="L-BFGS-B",
+        options={"maxiter": 200},
+    )
+    assert found.fun < 1e-2 * objective.loss(objective.start)
+    place = objective.names.index("base_weight")
+    assert found.x[place] == pytest.approx(fitted.params["base_weight"], abs=0.05)
+
+
+def test_what_is_no_point_is_refused(objective: skinfit.Objective, x: Vector) -> None:
+    with pytest.raises(skinfit.ArrayError, match="are free"):
+        objective.loss(x[:-1])
+    with pytest.raises(skinfit.ArrayError):
+        objective.loss(x[None])
+    outside = x.copy()
+    outside[objective.names.index("rim_exponent")] = 100.0
+    with pytest.raises(skinfit.ParamError, match="rim_exponent = 100 is out of bounds"):
+        objective.loss(outside)
+    with pytest.raises(skinfit.ParamError):
+        objective.loss(np.full_like(x, np.nan))
+    with pytest.raises(skinfit.ArrayError):
+        objective.vjp(x, np.ones((2, 2, 3)))
+    with pytest.raises(skinfit.ViewError, match="there is no view"):
+        objective.image(x, "behind")
+
+
+def test_the_loss_has_its_gradient_in_pytorch(objective: skinfit.Objective, x: Vector) -> None:
+    torch = pytest.importorskip("torch", reason="NOT CHECKED: PyTorch is not installed")
+    import skinfit.torch
+
+    at = torch.tensor(x, requires_grad=True)
+    skinfit.torch.loss(objective, at).backward()
+    assert np.array_equal(at.grad.numpy(), objective.gradient(x))
+    at.grad = None
+    skinfit.torch.image(objective, at, "front").square().sum().backward()
+    slopes = approx_fprime(x, lambda y: float(np.sum(objective.image(y, "front") ** 2)), 1e-6)
+    assert np.allclose(at.grad.numpy(), slopes, rtol=1e-3)

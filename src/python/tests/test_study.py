@@ -1,0 +1,76 @@
+"""Studies return tables and plots; what the command line refuses is raised."""
+
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from pathlib import Path
+
+import pytest
+import skinfit
+from skinfit.table import Table, read_csv
+
+
+def test_an_ablation_is_a_table(scene: skinfit.Scene, fitted: skinfit.Fit, tmp_path: Path) -> None:
+    study = scene.ablate(gpu="never", params=fitted.run / "params.toml")
+    rows = study.rows()
+    assert {"left_out", "view", "loss", "psnr_db"} <= set(rows[0])
+    assert {"rim", "hilite"} <= {row["left_out"] for row in rows}
+    assert all(isinstance(row["loss"], float) for row in rows)
+    assert len(study.table) == len(rows) and "left out" in repr(study)
+    assert (study.save(tmp_path / "kept") / "report.html").is_file()
+
+
+def test_a_tradeoff_has_a_plot_for_each_axis(scene: skinfit.Scene) -> None:
+    study = scene.tradeoff(axes=["filter"])
+    assert list(study.plots) == ["filter"] and study.plots["filter"].lstrip().startswith("<svg")
+    assert all(row["axis"] == "filter" for row in study.rows())
+    assert "<iframe" in study._repr_html_()
+    with pytest.raises(skinfit.StudyError, match="unknown axis"):
+        scene.tradeoff(axes=["fliter"])
+
+
+def test_a_study_of_stability_has_a_row_for_each_case(scene: skinfit.Scene) -> None:
+    study = scene.stability(gpu=False, cases=250, pixels=1000)
+    rows = study.rows()
+    assert not study.failed and all(row["failure"] is None for row in rows)
+    assert {row["search"] for row in rows} == {"hard", "random", "lights", "scene"}
+    assert "<table>" in study._repr_html_() or "<table" in study._repr_html_()
+
+
+def test_changed_values_go_into_a_study(scene: skinfit.Scene, tmp_path: Path) -> None:
+    scene.params["rim_exponent"] = 3.0
+    file = scene._file(tmp_path)
+    assert file != scene.path and "rim_exponent = 3" in file.read_text()
+    assert skinfit.load_file(scene.path)._file(tmp_path) == scene.path
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there is no such signal")
+def test_ctrl_c_ends_a_study(demo_file: Path, tmp_path: Path) -> None:
+    script = textwrap.dedent(
+        f"""
+        import skinfit
+        scene = skinfit.load_file({str(demo_file)!r})
+        print("begun", flush=True)
+        try:
+            scene.tradeoff(run={str(tmp_path / "run")!r})
+        except KeyboardInterrupt:
+            print("interrupted", flush=True)
+        """
+    )
+    with subprocess.Popen([sys.executable, "-c", script], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None and process.stdout.readline() == "begun\n"
+        time.sleep(2.0)
+        process.send_signal(signal.SIGINT)
+        assert process.stdout.readline() == "interrupted\n"
+    # It leaves nothing where it had nothing.
+    assert not (tmp_path / "run").exists() or any((tmp_path / "run").glob("results.*"))
+
+
+def test_a_table_is_a_list_of_rows(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("name,n,x,on\na,1,2.5,true\nb,,1e-3,false\n")
+    table = Table(read_csv(tmp_path / "a.csv"))
+    assert table[0] == {"name": "a", "n": 1, "x": 2.5, "on": True} and table.column("n") == [1, None]
+    assert len(table[1:]) == 1 and repr(table).splitlines()[0].split() == ["name", "n", "x", "on"]
+    assert "<td>2.5</td>" in table._repr_html_()
