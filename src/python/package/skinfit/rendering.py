@@ -27,4 +27,5 @@ class Rendering:
         """(height, width, 3) codes for a screen: brightened by `exposure` stops, clipped, sRGB's curve, on black."""
         linear = np.clip(self.image.astype(np.float64) * 2.0**exposure, 0.0, 1.0)
         curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-        return np.round(255.0 * curved).astype(np.uint8)
+        codes: NDArray[np.uint8] = np.round(255.0 * curved).astype(np.uint8)
+        return codes

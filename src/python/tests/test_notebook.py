@@ -1,0 +1,22 @@
+"""The notebook runs from its first cell to its last."""
+
+from pathlib import Path
+
+import nbclient
+import nbformat
+
+NOTEBOOK = Path(__file__).resolve().parents[3] / "experiments/notebook/fit.ipynb"
+
+
+def test_the_notebook_runs() -> None:
+    notebook = nbformat.read(NOTEBOOK, as_version=4)
+    # Where a cell fails this raises.
+    nbclient.NotebookClient(notebook, timeout=600, resources={"metadata": {"path": str(NOTEBOOK.parent)}}).execute()
+    shown = [output for cell in notebook.cells for output in cell.get("outputs", [])]
+    pages = [output["data"]["text/html"] for output in shown if "text/html" in output.get("data", {})]
+    assert any("<table>" in page for page in pages), "the parameter table is shown"
+    assert any("<iframe" in page for page in pages), "the report is shown"
+    said = "".join(output.get("text", "") for output in shown)
+    for line in said.splitlines():
+        if line.startswith("NOT CHECKED"):
+            print(line)
