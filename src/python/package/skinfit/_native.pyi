@@ -1,15 +1,27 @@
 """The library itself; the package's own classes are what people use."""
 
 from os import PathLike
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "Fitting",
+    "Objective",
+    "Scene",
+    "built_in_scene",
+    "default_cache",
+    "loaded_from",
+    "run_program",
+    "version",
+    "write_exr",
+]
+
 _Path = str | PathLike[str]
 _Vector = NDArray[np.float64]
 
-class Row(TypedDict):
+class _Row(TypedDict):
     name: str
     value: list[float]
     by_channel: bool
@@ -23,6 +35,7 @@ class Row(TypedDict):
     meaning: str
     source: str
 
+@final
 class Scene:
     def __new__(cls, path: _Path, cache: _Path | None, effects: str | None = None) -> Scene: ...
     @property
@@ -43,14 +56,15 @@ class Scene:
     def loss(self) -> str: ...
     @property
     def free(self) -> list[str]: ...
-    def rows(self) -> list[Row]: ...
-    def row(self, name: str) -> Row: ...
+    def rows(self) -> list[_Row]: ...
+    def row(self, name: str) -> _Row: ...
     def set(self, name: str, numbers: list[float]) -> None: ...
     def set_freedom(self, name: str, freedom: str) -> None: ...
     def save(self, file: _Path) -> None: ...
     def render(self, view: str | None = None, layers: bool = False) -> tuple[dict[str, Any], list[str]]: ...
     def objective(self, hold_out: list[str]) -> Objective: ...
 
+@final
 class Objective:
     @property
     def names(self) -> list[str]: ...
@@ -69,6 +83,7 @@ class Objective:
     def jvp(self, x: _Vector, v: _Vector, view: str | None = None) -> _Vector: ...
     def vjp(self, x: _Vector, image: _Vector, view: str | None = None) -> _Vector: ...
 
+@final
 class Fitting:
     def __new__(cls, scenes: list[Scene], run: _Path, words: list[str], resume: bool = False) -> Fitting: ...
     @property

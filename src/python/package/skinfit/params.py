@@ -140,7 +140,7 @@ def _value(rgb: Sequence[float], by_channel: bool = False) -> Value:
     return (red, green, blue) if by_channel or not red == green == blue else red
 
 
-def _info(row: _native.Row) -> ParamInfo:
+def _info(row: _native._Row) -> ParamInfo:
     lower, upper = row["bounds"]
     return ParamInfo(
         name=row["name"],
