@@ -27,7 +27,6 @@ fn row<'py>(py: Python<'py>, values: &Values, param: Param) -> PyResult<Bound<'p
     let row = PyDict::new(py);
     row.set_item("name", info.name)?;
     row.set_item("value", values.params.rgb(param))?;
-    row.set_item("by_channel", values.by_channel(param))?;
     row.set_item("default", param.default_rgb(values.form))?;
     row.set_item("bounds", (info.lower, info.upper))?;
     row.set_item("unit", info.unit)?;

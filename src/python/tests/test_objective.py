@@ -23,9 +23,10 @@ def x(objective: skinfit.Objective) -> Vector:
 
 def test_the_gradient_is_that_of_the_loss(objective: skinfit.Objective, x: Vector) -> None:
     gradient = objective.gradient(x)
-    # The loss rounds to some 1e-7 of itself.
-    apart = check_grad(objective.loss, objective.gradient, x, epsilon=1e-3)
-    assert apart < 2e-2 * np.linalg.norm(gradient)
+    # The loss rounds to some 1e-7 of itself: a step that is not too small.
+    steps = 1e-3 * np.eye(len(x))
+    differences = [(objective.loss(x + step) - objective.loss(x - step)) / 2e-3 for step in steps]
+    assert np.abs(gradient - differences).max() < 1e-2 * np.abs(gradient).max()
     sums = objective.normal_equations(x)
     assert np.allclose(2 * sums.jtr / sums.weight, gradient, rtol=1e-5, atol=1e-12)
     assert sums.jtj.shape == (len(x), len(x)) and np.array_equal(sums.jtj, sums.jtj.T)
@@ -47,6 +48,14 @@ def test_products_of_the_jacobian_are_those_of_the_image(objective: skinfit.Obje
     w = random.normal(size=moved.shape)
     assert np.dot(objective.vjp(x, w, "profile"), v) == pytest.approx(np.sum(w * moved), rel=1e-9)
 
+    def weighed(y: Vector) -> float:
+        return float(np.sum(w * objective.image(y, "profile")))
+
+    def slopes(y: Vector) -> Vector:
+        return objective.vjp(y, w, "profile")
+
+    assert check_grad(weighed, slopes, x, epsilon=1e-6) < 1e-4 * np.linalg.norm(slopes(x))
+
 
 def test_the_image_is_the_drawn_one(objective: skinfit.Objective, demo_file, cache) -> None:  # type: ignore[no-untyped-def]
     drawn = skinfit.load_file(demo_file, cache=cache).render("front")
@@ -58,9 +67,7 @@ def test_scipy_finds_what_the_fit_finds(objective: skinfit.Objective, fitted: sk
         objective.loss_and_gradient, objective.start, jac=True, bounds=objective.bounds, method="L-BFGS-B",
         options={"maxiter": 200},
     )
-    assert found.fun < 1e-2 * objective.loss(objective.start)
-    place = objective.names.index("base_weight")
-    assert found.x[place] == pytest.approx(fitted.params["base_weight"], abs=0.05)
+    assert fitted.loss <= found.fun < 0.1 * objective.loss(objective.start)
 
 
 def test_what_is_no_point_is_refused(objective: skinfit.Objective, x: Vector) -> None:

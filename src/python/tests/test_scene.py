@@ -74,7 +74,7 @@ def test_a_scene_of_arrays_is_drawn_and_fitted(cache: Path, tmp_path: Path) -> N
     ("change", "kind", "words"),
     [
         ({"target": np.ones((24, 32, 5))}, skinfit.ArrayError, "no image"),
-        ({"target": np.ones((3, 3, 3))}, skinfit.SceneError, "24"),
+        ({"target": np.ones((3, 3, 3))}, skinfit.SceneError, "target"),
         ({"width": "wide"}, skinfit.SceneError, "width"),
         ({"widht": 3}, skinfit.SceneError, "Did you mean `width`"),
         ({"eye": object()}, skinfit.SceneError, "eye"),

@@ -24,7 +24,7 @@ def test_an_ablation_is_a_table(scene: skinfit.Scene, fitted: skinfit.Fit, tmp_p
 
 def test_a_tradeoff_has_a_plot_for_each_axis(scene: skinfit.Scene) -> None:
     study = scene.tradeoff(axes=["filter"])
-    assert list(study.plots) == ["filter"] and study.plots["filter"].lstrip().startswith("<svg")
+    assert list(study.plots) == ["filter"] and "<svg" in study.plots["filter"]
     assert all(row["axis"] == "filter" for row in study.rows())
     assert "<iframe" in study._repr_html_()
     with pytest.raises(skinfit.StudyError, match="unknown axis"):
@@ -36,7 +36,7 @@ def test_a_study_of_stability_has_a_row_for_each_case(scene: skinfit.Scene) -> N
     rows = study.rows()
     assert not study.failed and all(row["failure"] is None for row in rows)
     assert {row["search"] for row in rows} == {"hard", "random", "lights", "scene"}
-    assert "<table>" in study._repr_html_() or "<table" in study._repr_html_()
+    assert "<table" in study._repr_html_()
 
 
 def test_changed_values_go_into_a_study(scene: skinfit.Scene, tmp_path: Path) -> None:

@@ -24,7 +24,6 @@ _Vector = NDArray[np.float64]
 class _Row(TypedDict):
     name: str
     value: list[float]
-    by_channel: bool
     default: list[float]
     bounds: tuple[float, float]
     unit: str

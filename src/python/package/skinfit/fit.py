@@ -330,6 +330,7 @@ def fit(
             shown.step(step)
             if callback is not None and callback(step) is False:
                 steps.stop()
+                break
     except KeyboardInterrupt:
         steps.stop()
         if steps.last is None:
@@ -368,7 +369,7 @@ def _report(run: Path) -> dict[str, Any]:
 def _value(number: float | Sequence[float]) -> Value:
     if isinstance(number, (int, float)):
         return float(number)
-    red, green, blue = number
+    red, green, blue = map(float, number)
     return red if red == green == blue else (red, green, blue)
 
 

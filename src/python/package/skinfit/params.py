@@ -135,16 +135,16 @@ def _numbers(value: float | Sequence[float]) -> list[float]:
         return [float(number) for number in value]  # type: ignore[union-attr]
 
 
-def _value(rgb: Sequence[float], by_channel: bool = False) -> Value:
+def _value(rgb: Sequence[float]) -> Value:
     red, green, blue = rgb
-    return (red, green, blue) if by_channel or not red == green == blue else red
+    return red if red == green == blue else (red, green, blue)
 
 
 def _info(row: _native._Row) -> ParamInfo:
     lower, upper = row["bounds"]
     return ParamInfo(
         name=row["name"],
-        value=_value(row["value"], row["by_channel"]),
+        value=_value(row["value"]),
         default=_value(row["default"]),
         bounds=(lower, upper),
         unit=row["unit"],
