@@ -2,7 +2,6 @@
 
 use pyo3::types::{PyDict, PyDictMethods};
 use pyo3::{Bound, PyResult, Python};
-use skinfit_core::model::effects::Effects;
 use skinfit_core::model::params::Params;
 use skinfit_core::prepare::{Loaded, PrepareOptions, Views};
 use skinfit_core::samples::{check_uvs, nothing_visible};
@@ -22,7 +21,6 @@ pub(crate) struct Painted {
     view: View,
     /// Of the bakes.
     params: Params,
-    effects: Effects,
     warnings: Vec<String>,
 }
 
@@ -30,7 +28,7 @@ impl Painted {
     /// Read and bake the scene for one of its views, as it was told to be.
     fn new(read: &Read, view: Option<&str>, values: &Values) -> Result<Self, Refused> {
         let options = PrepareOptions {
-            effects: Some(values.effects),
+            effects: read.effects,
             views: view.map_or(Views::First, |view| Views::Named(view.to_owned())),
             cache: read.cache.clone(),
             ..PrepareOptions::default()
@@ -39,16 +37,14 @@ impl Painted {
         loaded.scene.params.clone_from(&values.params);
         let baked = loaded.bake()?;
         check_uvs(&baked.scene, &baked.scene.mesh.uvs)?;
-        let Scene { views, params, effects, .. } = &*baked.scene;
-        let (view, params, effects) = (views[0].clone(), params.clone(), *effects);
-        Ok(Self { painter: CpuPainter::new(&baked)?, view, params, effects, warnings: baked.warnings })
+        let Scene { views, params, .. } = &*baked.scene;
+        let (view, params) = (views[0].clone(), params.clone());
+        Ok(Self { painter: CpuPainter::new(&baked)?, view, params, warnings: baked.warnings })
     }
 
     /// Whether it draws what is asked for, but for weights.
     fn draws(&self, view: &str, values: &Values) -> bool {
-        self.view.name == view
-            && self.effects == values.effects
-            && self.params.differ_in_weights_alone(&values.params)
+        self.view.name == view && self.params.differ_in_weights_alone(&values.params)
     }
 }
 

@@ -28,8 +28,8 @@ pub(crate) struct Read {
     pub(crate) path: PathBuf,
     /// Where bakes are kept, if they are.
     pub(crate) cache: Option<PathBuf>,
-    /// Whether it was read with effects that its file does not name.
-    asked: bool,
+    /// The effects that it was read with, where they are not its file's.
+    pub(crate) effects: Option<Effects>,
     pub(crate) loaded: Loaded,
     pub(crate) values: Mutex<Values>,
     /// What drew the last image.
@@ -51,8 +51,7 @@ impl Read {
         };
         let loaded = Loaded::read(&path, &options)?;
         let values = Values::of_scene(&loaded.scene, &loaded.gains);
-        let asked = options.effects.is_some();
-        Ok(Self { path, cache, asked, loaded, values: Mutex::new(values), painted: Mutex::new(None) })
+        Ok(Self { path, cache, effects, loaded, values: Mutex::new(values), painted: Mutex::new(None) })
     }
 
     /// The values as they stand.
@@ -104,7 +103,8 @@ impl Scene {
     /// Whether it is another than its file says.
     #[getter]
     fn is_changed(&self) -> bool {
-        self.0.asked || self.0.values() != Values::of_scene(&self.0.loaded.scene, &self.0.loaded.gains)
+        self.0.effects.is_some()
+            || self.0.values() != Values::of_scene(&self.0.loaded.scene, &self.0.loaded.gains)
     }
 
     /// The form of the model: `corrected` or `listing`.

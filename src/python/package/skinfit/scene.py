@@ -47,7 +47,9 @@ class Scene:
         # Files that arrays were written to: they go with the scene.
         self._folder = folder
         self._params = Params(native)
-        _warn(native.warnings)
+        # What was told of it.
+        self._told: set[str] = set()
+        self._warn_once(native.warnings)
 
     @property
     def path(self) -> Path:
@@ -87,7 +89,7 @@ class Scene:
         quick. Raises `ViewError` where there is no such view, `SceneError` where it sees nothing of the mesh.
         """
         drawn, warned = self._native.render(view, terms)
-        _warn(warned)
+        self._warn_once(warned)
         return Rendering(**drawn)
 
     def fit(
@@ -118,7 +120,7 @@ class Scene:
         """The scene's fit as a function of what is free, at the values of now, over the views with a target that are not
         held out. Raises `SceneError` where no view has a target, `ViewError` for a name that is none."""
         native = self._native.objective(list(hold_out))
-        _warn([words for words in native.warnings if words not in self._native.warnings])
+        self._warn_once(native.warnings)
         return Objective(native)
 
     def ablate(self, **options: Any) -> Study:
@@ -136,6 +138,13 @@ class Scene:
     def save(self, file: FilePath) -> None:
         """Write the scene with its values as a scene file whose paths are absolute. Raises `FileError`."""
         self._native.save(file)
+
+    def _warn_once(self, words: Sequence[str]) -> None:
+        """Warn of what was not told yet."""
+        for paragraph in words:
+            if paragraph not in self._told:
+                self._told.add(paragraph)
+                warnings.warn(paragraph, SkinfitWarning, stacklevel=3)
 
     def _file(self, folder: Path) -> Path:
         """A file of the scene as it stands: its own, or where values were changed one in `folder` that is called the same."""
@@ -212,8 +221,3 @@ def _cache(cache: Cache) -> FilePath | None:
 
 def _list(effects: Sequence[str] | None) -> str | None:
     return None if effects is None else ",".join(effects)
-
-
-def _warn(words: Sequence[str]) -> None:
-    for paragraph in words:
-        warnings.warn(paragraph, SkinfitWarning, stacklevel=3)
