@@ -19,7 +19,6 @@ pub(crate) fn run_program(py: Python<'_>, words: Vec<OsString>) -> u8 {
 
 /// The library's own file: the built-in scene is made anew where that is another than before.
 #[pyfunction]
-#[allow(clippy::needless_pass_by_value, reason = "Python hands it over")]
 pub(crate) fn loaded_from(file: PathBuf) {
     told_apart_by(&file);
 }
