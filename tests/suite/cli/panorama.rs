@@ -2,8 +2,15 @@
 
 #![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
-use image::{ImageFormat, Rgb, RgbImage};
+#[path = "../../../src/panorama/tests/common/rendered.rs"]
+mod rendered;
 
+use glam::{DQuat, DVec2, DVec3};
+use image::{ImageFormat, Rgb, RgbImage};
+use skinfit_panorama::lens::{Fisheye, Lens, Projection};
+use skinfit_panorama::picture::Picture;
+
+use super::pinned::scene_text;
 use super::sandbox::Sandbox;
 use crate::common;
 use crate::fixtures::{quantile, read_exr};
@@ -140,6 +147,72 @@ fn shots_of_an_even_room_become_an_even_panorama_that_a_scene_takes() {
     }
     sandbox.edit("env.exr", "sky.exr");
     sandbox.run(&["render", "scene.toml", "--engine", "cpu", "--view", "front", "-o", "lit.exr"]).done();
+}
+
+/// A picture's RGB planes.
+fn picture(file: &std::path::Path) -> Picture {
+    let planes = read_exr(file);
+    Picture { width: planes.width, height: planes.height, texels: planes.rgb(["R", "G", "B"]) }
+}
+
+/// Two fisheyes back to back, of which the second is told wrong and a little brighter: what their panorama makes of a
+/// fit.
+#[test]
+fn constants_fitted_under_stitched_light_are_those_under_the_true_one() {
+    let Some(data) = common::data() else { return };
+    let data = data.canonicalize().unwrap();
+    let world = picture(&data.join("env/forest.exr"));
+    let sandbox = Sandbox::with_shared_bakes();
+    const SIZE: usize = 1000;
+    let (centre, radius) = (DVec2::splat(500.0), 494.0);
+    let lens = Lens::Fisheye(Fisheye {
+        projection: Projection::Equidistant,
+        centre,
+        radius,
+        field_of_view_degrees: 200.0,
+    });
+    let first = DQuat::from_rotation_x(0.1) * DQuat::from_rotation_y(0.4);
+    let second = first * DQuat::from_rotation_y(std::f64::consts::PI);
+    let off = DQuat::from_axis_angle(DVec3::new(0.5, 0.7, -0.3).normalize(), 3_f64.to_radians());
+    let mut shots = String::new();
+    for (name, real, told, brighter) in [("a.exr", first, first, 1.0), ("b.exr", second, off * second, 1.07)]
+    {
+        let shot = rendered::shot(&world, &lens, real, SIZE);
+        sandbox.write_exr(name, SIZE, SIZE, |x, y| shot.texels[y * SIZE + x].map(|x| x * brighter));
+        let (towards, up) = ((told * DVec3::NEG_Z).to_array(), (told * DVec3::Y).to_array());
+        shots += &format!(
+            "[[shot]]\nfile = \"{name}\"\nlens = \"equidistant\"\ncentre = [{}, {}]\nradius = {radius}\n\
+             field_of_view_degrees = 200\ntowards = {towards:?}\nup = {up:?}\n",
+            centre.x, centre.y
+        );
+    }
+    sandbox.write("shots.toml", shots.as_bytes());
+    let ran = sandbox.run(&["panorama", "stitch", "shots.toml", "-o", "stitched.exr", "--width", "1024"]);
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let truth = rendered::truth(&world, 1024);
+    sandbox.write_exr("true.exr", 1024, 512, |x, y| truth.texels[y * 1024 + x]);
+    let (size, signed) = rendered::error(&picture(&sandbox.path("stitched.exr")), &truth, |_| true);
+    // As the stitch's own tests have it.
+    assert!(size < 0.01, "{size} {signed}");
+    let fitted = |light: &str| {
+        let mut scene: toml::Table = scene_text(&data, "lps_forest").parse().unwrap();
+        scene["environment"]["file"] = sandbox.path(light).to_str().unwrap().into();
+        sandbox.write("forest.toml", scene.to_string().as_bytes());
+        let ran = sandbox.run(&["fit", "forest.toml", "-o", "run", "--engine", "cpu"]);
+        assert_eq!(ran.code, Some(0), "{}", ran.err);
+        let report = sandbox.json("run/report.json");
+        let unknown = |unknown: &serde_json::Value| {
+            (unknown["name"].as_str().unwrap().to_owned(), unknown["value"].as_f64().unwrap())
+        };
+        report["unknowns"].as_array().unwrap().iter().map(unknown).collect::<Vec<_>>()
+    };
+    let (want, got) = (fitted("true.exr"), fitted("stitched.exr"));
+    assert_eq!(got.len(), want.len());
+    for ((name, want), (_, got)) in want.iter().zip(&got) {
+        println!("{name}: {want} under the true light, {got} under the stitched one");
+        // What the radiance is held to.
+        assert!((got - want).abs() <= 0.01 * want.abs(), "{name}: {got} for {want}");
+    }
 }
 
 #[test]
