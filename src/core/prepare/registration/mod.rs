@@ -61,22 +61,24 @@ pub struct MovedCamera {
 /// Move the camera of each view that has a target. Other cameras stay.
 ///
 /// What shading tells of a camera hangs on the constants, and these on the cameras: each is found in turn, until the
-/// cameras stay. The constants themselves are left to the fit.
+/// cameras stay. The constants themselves are left to the fit; views that are held out have no part in them.
 ///
 /// # Errors
 /// When a view sees nothing of the mesh, or its rules cannot be computed.
-pub(super) fn register(baked: &mut Baked) -> Result<Vec<MovedCamera>, PrepareError> {
+pub(super) fn register(baked: &mut Baked, held_out: &[bool]) -> Result<Vec<MovedCamera>, PrepareError> {
     let scene = Arc::clone(&baked.scene);
     let posed = scene.mesh.pose();
     let wanted: Vec<usize> = (0..scene.views.len()).filter(|&i| scene.views[i].target.is_some()).collect();
     let mut settled = round(baked, &posed, &wanted, &scene.params, Sizes::All)?;
     for _ in 0..ROUNDS {
-        let Some(params) = constants::fitted(baked)? else { break };
+        let Some(params) = constants::fitted(baked, held_out)? else { break };
         let before = cameras(&baked.scene);
-        settled = round(baked, &posed, &wanted, &params, Sizes::Finest)?;
+        let found = round(baked, &posed, &wanted, &params, Sizes::Finest)?;
         let after = cameras(&baked.scene);
-        let moved = |&i: &usize| displacement(&posed, &before[i], &after[i])[0];
-        if wanted.iter().map(moved).fold(0.0, f64::max) < STAYED {
+        let stayed = |&i: &usize| displacement(&posed, &before[i], &after[i])[0] < STAYED;
+        let stayed: Vec<bool> = wanted.iter().map(stayed).collect();
+        settled = found.iter().zip(&stayed).map(|(&settled, &stayed)| settled && stayed).collect();
+        if !stayed.contains(&false) {
             break;
         }
     }
