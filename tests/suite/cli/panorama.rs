@@ -103,6 +103,17 @@ fn a_recovered_response_is_a_views() {
     sandbox
         .run(&[&merge[..], &["--response", "recover", "--write-response", "merged.exr"]].concat())
         .refused(&["merged.exr is where the radiance goes"]);
+    sandbox
+        .run(
+            &[&merge[..], &["--response", "recover", "--write-response", "./targets/../merged.exr"]].concat(),
+        )
+        .refused(&["merged.exr is where the radiance goes"]);
+    // What is refused leaves nothing behind.
+    let card = ["--write-response", "other.csv", "--grey-card", "60,30,10,10"];
+    sandbox
+        .run(&[&merge[..], &["--response", "recover"], &card].concat())
+        .refused(&["leaves the picture of 64 x 32 pixels"]);
+    assert!(!sandbox.path("other.csv").exists());
 }
 
 /// A grey photograph.
@@ -122,6 +133,66 @@ fn a_grey_card_sets_balance_and_exposure() {
     for channel in ["R", "G", "B"] {
         // To the 16 bits that such a picture has room for.
         assert!(planes.planes[channel].iter().all(|value| (value - 0.18).abs() < 2e-4), "{channel}");
+    }
+}
+
+#[test]
+fn a_card_that_is_clipped_in_every_photograph_is_refused() {
+    let sandbox = Sandbox::new();
+    sandbox.write("a.png", &photograph(255));
+    sandbox.write("b.png", &photograph(255));
+    sandbox
+        .run(&[
+            "panorama",
+            "merge",
+            "a.png",
+            "b.png",
+            "--seconds",
+            "1/4,1/2",
+            "--grey-card",
+            "2,2,8,8",
+            "-o",
+            "card.exr",
+        ])
+        .refused(&["No exposure sees 64 of the card's 64 pixels"]);
+    assert!(!sandbox.path("card.exr").exists());
+}
+
+/// A PNG file that says that its linear colours are of Display P3's primaries.
+fn of_p3(code: [u8; 3]) -> Vec<u8> {
+    let plain = encode(RgbImage::from_pixel(16, 12, Rgb(code)), ImageFormat::Png);
+    // Primaries, transfer, no matrix, all of the range (ITU-T H.273).
+    let chunk = [*b"cICP", [12, 13, 0, 1]].concat();
+    let mut crc = flate2::Crc::new();
+    crc.update(&chunk);
+    let chunk = [&4_u32.to_be_bytes()[..], &chunk, &crc.sum().to_be_bytes()].concat();
+    // Behind the signature and the header.
+    [&plain[..33], &chunk, &plain[33..]].concat()
+}
+
+#[test]
+fn radiance_is_of_rec709s_primaries_whatever_the_photographs_are_of() {
+    let sandbox = Sandbox::new();
+    sandbox.write("a.png", &of_p3([120, 60, 60]));
+    sandbox.write("b.png", &of_p3([160, 80, 80]));
+    sandbox.write("plain.png", &photograph(160));
+    let merge = |second: &str| {
+        let arguments = ["--seconds", "1,1", "--response", "gamma=1", "-o", "wide.exr"];
+        sandbox.run(&[&["panorama", "merge", "a.png", second], &arguments[..]].concat())
+    };
+    merge("plain.png").refused(&["plain.png: its colour profile has other primaries than that of a.png"]);
+    let ran = merge("a.png");
+    assert_eq!(ran.code, Some(0), "{}", ran.err);
+    let planes = read_exr(&sandbox.path("wide.exr"));
+    // CSS Color 4: linear P3 to linear Rec.709.
+    let [r, g] = [120.0 / 255.0, 60.0 / 255.0];
+    let want = [1.224_94 * r - 0.224_94 * g, -0.042_06 * r + 1.042_06 * g, -0.019_64 * r + 1.019_63 * g];
+    for (channel, want) in ["R", "G", "B"].into_iter().zip(want) {
+        // To the 16 bits that such a picture has room for.
+        assert!(
+            planes.planes[channel].iter().all(|value| (f64::from(*value) - want).abs() < 1e-3),
+            "{channel}"
+        );
     }
 }
 
@@ -243,6 +314,11 @@ fn what_is_no_photograph_or_no_shot_is_refused() {
     stitch(shot).refused(&["shots.toml: shot 0: has no field_of_view_degrees"]);
     stitch(&shot.replace("[0, 0, -1]", "[0, 1, 0]"))
         .refused(&["shot 0: towards and up are no two directions"]);
+    stitch(&format!("{shot}field_of_view_degrees = 180\ntrusted = 0.9\n")).refused(&[
+        "shots.toml: shot 0: trusted is a mirror ball's, and its lens is a fisheye. Leave it out",
+    ]);
+    stitch(&format!("{shot}field_of_view_degrees = 180\n").replace("equidistant", "mirror_ball"))
+        .refused(&["shot 0: field_of_view_degrees is a fisheye's, and its lens is a mirror ball"]);
     stitch(&format!("{shot}field_of_view_degrees = 900\n")).refused(&["900"]);
     stitch(&format!("{shot}field_of_view_degrees = 180\n").replace("env.exr", "none.exr"))
         .refused(&["none.exr"]);
