@@ -1,6 +1,6 @@
 //! Image files as linear numbers: OpenEXR, Radiance HDR, PNG and JPEG.
 //!
-//! - `open_exr`, `raster`: the decoders
+//! - `open_exr`, `raster`: the decoders; `sampled`, `chroma` and `dwa` are parts of the former
 //! - `chromaticities`: other primaries than Rec.709's
 //! - `claims`: what PNG and JPEG files say of their colours; `code_points` and `icc` read it, `space` is what comes of it
 //! - `response`: a camera's own curve, where a view has one
@@ -9,9 +9,11 @@
 //! Files are told apart by their content. Colours in 8 or 16 bits are sRGB's where the file says nothing else; data maps are
 //! taken as they are; EXR and HDR are linear. Sizes are checked before anything is allocated.
 
+mod chroma;
 mod chromaticities;
 mod claims;
 mod code_points;
+mod dwa;
 mod icc;
 #[cfg(test)]
 mod luminance;
@@ -20,6 +22,7 @@ mod open_exr;
 mod profiled;
 mod raster;
 mod response;
+mod sampled;
 mod space;
 mod target;
 
