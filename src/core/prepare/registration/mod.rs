@@ -40,8 +40,8 @@ const FINEST: u32 = 512;
 const COARSEST: u32 = 64;
 /// Times that constants and cameras are found in turn, at most.
 const ROUNDS: usize = 3;
-/// Cameras that move the mesh by no more pixels (median) have stayed: a fifth of what they are asked for.
-const STAYED: f64 = 0.02;
+/// Cameras that move the mesh by no more pixels (median) have stayed: half of what they are asked for.
+const STAYED: f64 = 0.05;
 
 /// How a view's camera was moved.
 #[derive(Clone, Debug, PartialEq)]
@@ -152,11 +152,13 @@ fn one(
     let target = Picture::of_target(view)?;
     let longest = view.camera.width.max(view.camera.height);
     let least = longest.div_ceil(FINEST).max(1);
-    let mut side = match sizes {
-        Sizes::All => longest.div_ceil(COARSEST).max(1),
-        Sizes::Finest => least,
-    };
     let mut camera = view.camera;
+    if sizes == Sizes::Finest {
+        let Found { camera, settled } =
+            solve::refine(&camera, mesh, &target.reduced(least as usize), least, draw)?;
+        return Some((camera, settled));
+    }
+    let mut side = longest.div_ceil(COARSEST).max(1);
     loop {
         let Found { camera: found, settled } =
             solve::register(&camera, mesh, &target.reduced(side as usize), side, draw)?;
