@@ -25,16 +25,19 @@ const RATES: [usize; 5] = [15, 10, 5, 2, 1];
 /// Rays a vertex of the bake that tells noise from change; a scene has 256 unless it says more.
 const MANY: u32 = 4096;
 
-/// Occlusion alone asks for no light; whatever light a scene has, this is the same.
+/// Occlusion is asked for by what it takes light from; whatever light that is, this is the same.
 const SCENE: &str = r#"
 [mesh]
 file = "MESH"
 metres_per_unit = 1.0
 skin = ["skin"]
 
+[environment]
+file = "LIGHT"
+
 [model]
 form = "corrected"
-effects = ["occlusion", "morph", "skin"]
+effects = ["diffuse", "occlusion", "morph", "skin"]
 
 [[view]]
 name = "front"
@@ -95,7 +98,9 @@ fn scene_file(lab: &Lab) -> Result<PathBuf> {
         return Err(format!("{} is not there: the MakeHuman head's clip", mesh.display()).into());
     }
     let path = lab.scratch.path().join("nod.toml");
-    std::fs::write(&path, SCENE.replace("\"MESH\"", &format!("{:?}", mesh.display().to_string())))?;
+    let quoted = |path: &std::path::Path| format!("{:?}", path.display().to_string());
+    let text = SCENE.replace("\"MESH\"", &quoted(&mesh));
+    std::fs::write(&path, text.replace("\"LIGHT\"", &quoted(&lab.data.join("env/forest.exr"))))?;
     Ok(path)
 }
 
@@ -186,6 +191,7 @@ impl Clip {
         let baked = loaded.bake()?;
         let occlusion = baked.occlusion.as_ref().ok_or("no occlusion was baked")?;
         let frames = self.weights.iter().map(|weights| self.of_skin(&occlusion.posed(weights))).collect();
-        Ok((frames, baked.stats.seconds() / self.poses.len() as f64))
+        let rows = baked.stats.rows.iter().filter(|row| row.name == "occlusion");
+        Ok((frames, rows.map(|row| row.seconds).sum::<f64>() / self.poses.len() as f64))
     }
 }
