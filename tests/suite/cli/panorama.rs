@@ -110,9 +110,9 @@ fn a_recovered_response_is_a_views() {
         .refused(&["merged.exr is where the radiance goes"]);
     // What is refused leaves nothing behind.
     let card = ["--write-response", "other.csv", "--grey-card", "60,30,10,10"];
-    sandbox
-        .run(&[&merge[..], &["--response", "recover"], &card].concat())
-        .refused(&["leaves the picture of 64 x 32 pixels"]);
+    let refused = sandbox.run(&[&merge[..], &["--response", "recover"], &card].concat());
+    assert_eq!(refused.code, Some(2), "{refused:?}");
+    assert!(refused.err.contains("leaves the picture of 64 x 32 pixels"), "{refused:?}");
     assert!(!sandbox.path("other.csv").exists());
 }
 
