@@ -146,7 +146,7 @@ impl UnderWay {
         let scenes = scenes.map_err(|error| error.to_string())?;
         let marks = NamedScene::marked(&scenes, &request.hold_out).map_err(|error| error.to_string())?;
         let ready = |(NamedScene { name, loaded }, marks): (NamedScene, Vec<bool>)| {
-            let (baked, held) = loaded.bake_but(&marks)?.hold_out(&marks)?;
+            let (baked, held) = loaded.bake()?.hold_out(&marks)?;
             // A scene of which all is held out has nothing to be fitted.
             if held.is_all_of(&baked.scene) {
                 return Ok(ReadyScene { name, baked, held, engine: None });

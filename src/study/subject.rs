@@ -48,7 +48,7 @@ impl SampledScene {
     /// # Errors
     /// When a stage refuses its input.
     pub fn new(name: String, loaded: Loaded, marked: &[bool]) -> Result<Self, PrepareError> {
-        let (baked, held) = loaded.bake_but(marked)?.hold_out(marked)?;
+        let (baked, held) = loaded.bake()?.hold_out(marked)?;
         let sampled = match held.is_all_of(&baked.scene) {
             true => Sampled { baked, samples: Vec::new() },
             false => baked.sample()?,

@@ -54,7 +54,7 @@ impl Baked {
         Loaded::read(path, options)?.bake()
     }
 
-    pub(super) fn of(loaded: Loaded, held_out: &[bool]) -> Result<Self, PrepareError> {
+    pub(super) fn of(loaded: Loaded) -> Result<Self, PrepareError> {
         let start = Instant::now();
         let Loaded { scene, fitted, gains, seconds, mut warnings, asked } = loaded;
         let ranges = Ranges::of(&scene, asked.fit);
@@ -87,7 +87,7 @@ impl Baked {
         };
         if asked.fit && baked.scene.fit.cameras {
             let start = Instant::now();
-            baked.cameras = registration::register(&mut baked, held_out)?;
+            baked.cameras = registration::register(&mut baked)?;
             baked.seconds.samples += start.elapsed().as_secs_f64();
             let path = baked.scene.path.display().to_string();
             baked.warnings.extend(baked.cameras.iter().map(|camera| camera.told(&path)));

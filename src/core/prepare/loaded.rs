@@ -109,16 +109,7 @@ impl Loaded {
     /// # Errors
     /// When the scene lacks what its effects ask for.
     pub fn bake(self) -> Result<Baked, PrepareError> {
-        Baked::of(self, &[])
-    }
-
-    /// As [`Loaded::bake`], where the marked views will be [held out](Baked::hold_out): if cameras are to be moved, by
-    /// constants of the others alone.
-    ///
-    /// # Errors
-    /// As of [`Loaded::bake`].
-    pub fn bake_but(self, marked: &[bool]) -> Result<Baked, PrepareError> {
-        Baked::of(self, marked)
+        Baked::of(self)
     }
 }
 

@@ -4,13 +4,11 @@
 //! Gauss and Newton's steps (Levenberg's, damped) on what a drawn image and the target differ by, at a reduced size first.
 //! Derivatives are differences of images drawn most of a pixel to either side, so that what comes and goes at silhouettes counts.
 //!
-//! - `constants`: the constants that images are drawn with, fitted for cameras that are nearly right
 //! - `image`: images at a reduced size, with their cameras
 //! - `residual`: what a drawn image and a target differ by
 //! - `unknowns`: a camera and its seven unknowns, in pixels
 //! - `solve`: the steps
 
-mod constants;
 mod image;
 mod residual;
 mod solve;
@@ -23,13 +21,12 @@ use rayon::prelude::*;
 
 use super::{Baked, PrepareError};
 use crate::bake::rays::RayMesh;
-use crate::model::params::Params;
 use crate::progress;
 use crate::render::shade::Shader;
 use crate::samples::{self, PosedSurface};
+use crate::scene::digits;
 use crate::scene::mesh::PosedMesh;
 use crate::scene::view::{Camera, View};
-use crate::scene::{Scene, digits};
 
 use image::Picture;
 use solve::Found;
@@ -38,10 +35,6 @@ use solve::Found;
 const FINEST: u32 = 512;
 /// The first size: a camera that is off by a tenth of the image is a few pixels off there.
 const COARSEST: u32 = 64;
-/// Times that constants and cameras are found in turn, at most.
-const ROUNDS: usize = 3;
-/// Cameras that move the mesh by no more pixels (median) have stayed: half of what they are asked for.
-const STAYED: f64 = 0.05;
 
 /// How a view's camera was moved.
 #[derive(Clone, Debug, PartialEq)]
@@ -60,50 +53,16 @@ pub struct MovedCamera {
 
 /// Move the camera of each view that has a target. Other cameras stay.
 ///
-/// What shading tells of a camera hangs on the constants, and these on the cameras: each is found in turn, until the
-/// cameras stay. The constants themselves are left to the fit; views that are held out have no part in them.
-///
 /// # Errors
 /// When a view sees nothing of the mesh, or its rules cannot be computed.
-pub(super) fn register(baked: &mut Baked, held_out: &[bool]) -> Result<Vec<MovedCamera>, PrepareError> {
+pub(super) fn register(baked: &mut Baked) -> Result<Vec<MovedCamera>, PrepareError> {
     let scene = Arc::clone(&baked.scene);
     let posed = scene.mesh.pose();
-    let wanted: Vec<usize> = (0..scene.views.len()).filter(|&i| scene.views[i].target.is_some()).collect();
-    let mut settled = round(baked, &posed, &wanted, &scene.params, Sizes::All)?;
-    for _ in 0..ROUNDS {
-        let Some(params) = constants::fitted(baked, held_out)? else { break };
-        let before = cameras(&baked.scene);
-        let found = round(baked, &posed, &wanted, &params, Sizes::Finest)?;
-        let after = cameras(&baked.scene);
-        let stayed = |&i: &usize| displacement(&posed, &before[i], &after[i])[0] < STAYED;
-        let stayed: Vec<bool> = wanted.iter().map(stayed).collect();
-        settled = found.iter().zip(&stayed).map(|(&settled, &stayed)| settled && stayed).collect();
-        if !stayed.contains(&false) {
-            break;
-        }
-    }
-    let moved = |(&i, settled): (&usize, bool)| {
-        let (view, after) = (&scene.views[i], baked.scene.views[i].camera);
-        let pixels = displacement(&posed, &view.camera, &after);
-        MovedCamera { view: view.name.clone(), before: view.camera, after, pixels, settled }
-    };
-    Ok(wanted.iter().zip(settled).map(moved).collect())
-}
-
-/// Move the wanted views' cameras, with images drawn by those constants; whether each settled.
-fn round(
-    baked: &mut Baked,
-    posed: &PosedMesh,
-    wanted: &[usize],
-    params: &Params,
-    sizes: Sizes,
-) -> Result<Vec<bool>, PrepareError> {
-    let scene = Arc::clone(&baked.scene);
     samples::check_uvs(&scene, &posed.uvs)?;
-    let rays = RayMesh::of(posed);
-    let surface = PosedSurface::new(&scene, posed, &rays, &scene.mesh.morphs, baked.surface_bakes())?;
+    let rays = RayMesh::of(&posed);
+    let surface = PosedSurface::new(&scene, &posed, &rays, &scene.mesh.morphs, baked.surface_bakes())?;
     let atlas = samples::atlas_of(&scene, &surface)?;
-    let shader = Shader::new(baked.setup(), &baked.illumination, params)
+    let shader = Shader::new(baked.setup(), &baked.illumination, &scene.params)
         .map_err(|error| PrepareError::Shading { scene: scene.path.display().to_string(), error })?;
     let draw = |camera: &Camera| {
         let mut seen = samples::sample_silhouettes(&scene, &surface, camera);
@@ -113,52 +72,44 @@ fn round(
         seen.atlas.clone_from(&atlas);
         Some(Picture::of(shader.shade(&seen, camera, 1.0)))
     };
+    let wanted: Vec<usize> = (0..scene.views.len()).filter(|&i| scene.views[i].target.is_some()).collect();
     let bar = progress::bar("cameras", wanted.len() as u64);
-    let mut found = Vec::new();
-    for &i in wanted {
+    let mut moved = Vec::new();
+    for i in wanted {
         let view = &scene.views[i];
-        found.push(one(view, posed, sizes, &draw).ok_or_else(|| samples::nothing_visible(&scene, view))?);
+        let (camera, settled) =
+            one(view, &posed, &draw).ok_or_else(|| samples::nothing_visible(&scene, view))?;
+        let pixels = displacement(&posed, &view.camera, &camera);
+        moved.push(MovedCamera {
+            view: view.name.clone(),
+            before: view.camera,
+            after: camera,
+            pixels,
+            settled,
+        });
         bar.inc(1);
     }
     bar.finish_and_clear();
     drop(surface);
     let scene = Arc::make_mut(&mut baked.scene);
-    for (&i, (camera, _)) in wanted.iter().zip(&found) {
-        scene.views[i].camera = *camera;
+    for camera in &moved {
+        let of_view = scene.views.iter_mut().filter(|view| view.name == camera.view);
+        of_view.for_each(|view| view.camera = camera.after);
     }
-    Ok(found.into_iter().map(|(_, settled)| settled).collect())
-}
-
-/// At which sizes images are compared.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Sizes {
-    /// From the coarsest on.
-    All,
-    /// For a camera that is nearly right.
-    Finest,
-}
-
-fn cameras(scene: &Scene) -> Vec<Camera> {
-    scene.views.iter().map(|view| view.camera).collect()
+    Ok(moved)
 }
 
 /// The camera of one view, from coarse images to fine ones; `None` where it sees nothing.
 fn one(
     view: &View,
     mesh: &PosedMesh,
-    sizes: Sizes,
     draw: &(impl Fn(&Camera) -> Option<Picture> + Sync),
 ) -> Option<(Camera, bool)> {
     let target = Picture::of_target(view)?;
     let longest = view.camera.width.max(view.camera.height);
+    let mut side = longest.div_ceil(COARSEST).max(1);
     let least = longest.div_ceil(FINEST).max(1);
     let mut camera = view.camera;
-    if sizes == Sizes::Finest {
-        let Found { camera, settled } =
-            solve::refine(&camera, mesh, &target.reduced(least as usize), least, draw)?;
-        return Some((camera, settled));
-    }
-    let mut side = longest.div_ceil(COARSEST).max(1);
     loop {
         let Found { camera: found, settled } =
             solve::register(&camera, mesh, &target.reduced(side as usize), side, draw)?;

@@ -1,7 +1,7 @@
 //! What a drawn image and a target differ by: in coverage, and in colour where both are covered wholly.
 //!
-//! The model may miss some of what a target shows, and at first its constants are not fitted yet: colours are compared but
-//! for a factor and a constant a channel, which are the best for that image. Each kind of difference weighs by how large it is where nothing moves it any more.
+//! The constants are not fitted yet, so that colours are compared but for a factor and a constant a channel, which are
+//! the best for that image. Each kind of difference weighs by how large it is where nothing moves it any more.
 
 use super::image::Picture;
 

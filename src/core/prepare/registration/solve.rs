@@ -85,35 +85,19 @@ pub(super) fn register(
         }
     }
     if settled {
-        camera = polished(camera, here, mesh, side, &residual).0;
+        camera = polished(camera, here, mesh, side, &residual);
     }
     Some(Found { camera, settled })
 }
 
-/// As [`register`], from a camera that is less than a pixel off: by slopes alone.
-pub(super) fn refine(
-    start: &Camera,
-    mesh: &PosedMesh,
-    target: &Picture,
-    side: u32,
-    draw: &(impl Fn(&Camera) -> Option<Picture> + Sync),
-) -> Option<Found> {
-    let residual =
-        |camera: &Camera| draw(&reduced_camera(camera, side)).map(|drawn| Residual::new(&drawn, target));
-    let here = residual(start)?;
-    let (camera, last) = polished(*start, here, mesh, side, &residual);
-    // Nearer, the roughness of coverage decides.
-    Some(Found { camera, settled: last < STEP })
-}
-
-/// The camera after some steps by slopes alone, for as long as they shrink, and how many pixels the last one was.
+/// The camera after some steps by slopes alone, for as long as they shrink.
 fn polished(
     start: Camera,
     residual_there: Residual,
     mesh: &PosedMesh,
     side: u32,
     residual: &(impl Fn(&Camera) -> Option<Residual> + Sync),
-) -> (Camera, f64) {
+) -> Camera {
     let (mut camera, mut here, mut last) = (start, residual_there, f64::INFINITY);
     let (weights, share) = (here.weights(), here.share());
     let bound = (1.0 + ROUGHNESS) * here.loss(weights, share);
@@ -133,7 +117,7 @@ fn polished(
             break;
         }
     }
-    (camera, last)
+    camera
 }
 
 /// The curvature and the gradient of the loss, by differences of images.

@@ -63,7 +63,7 @@ impl Scenes {
         let (mut ready, mut whys, mut maps) = (Vec::new(), Vec::new(), None);
         for (NamedScene { name, loaded }, marks) in scenes.into_iter().zip(marks) {
             let Ready { baked, held, chosen, maps: found } =
-                Ready::of(arguments, loaded.bake_but(&marks)?, &marks, interrupt)?;
+                Ready::of(arguments, loaded.bake()?, &marks, interrupt)?;
             maps = maps.or(found);
             let (engine, why) = chosen.map(|chosen| (chosen.engine, chosen.why)).unzip();
             ready.push(ReadyScene { name, baked, held, engine });
