@@ -187,8 +187,8 @@ fn tell_counts(merged: &Merged) {
 
 /// Make a card grey, and where a reflectance is given as bright as it says; returns what that was.
 fn balance(merged: &mut Merged, rectangle: Rectangle, reflectance: Option<f64>) -> Result<String, Refusal> {
-    let reflectance_or_usual = reflectance.unwrap_or(REFLECTANCE);
-    let card = grey_card::measure(&merged.picture, Some(&merged.seen), rectangle, reflectance_or_usual)?;
+    let assumed = reflectance.unwrap_or(REFLECTANCE);
+    let card = grey_card::measure(&merged.picture, Some(&merged.seen), rectangle, assumed)?;
     if card.unevenness > UNEVEN {
         let percent = digits(100.0 * card.unevenness, 2);
         tell(&format!(
